@@ -92,7 +92,7 @@ Judged in_order_of(const Graph& graph, const app::NamedGraph& named, const serve
   for (const server::JudgedEdge& edge : judged.edges) {
     out.odometry.push_back(edge.odometry);
     out.accepted.push_back(edge.accepted);
-    out.reasons.emplace_back(to_string(edge.objection));
+    out.reasons.emplace_back(judge::reason_of(edge.objection, edge.price));
   }
   const auto id_of = [&](const KeyframeId& id) {
     return named.ids[static_cast<std::size_t>(std::ranges::lower_bound(named.robots.vertices, id) -

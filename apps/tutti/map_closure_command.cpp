@@ -67,7 +67,7 @@ void print(const mapfile::ClosureFit& fit) {
   const Eigen::Quaterniond& q = measured.T_a_b.rotation;
   const Vector6d sigma = measured.covariance.diagonal().cwiseSqrt();
   fmt::print("\nkeyframes    {} and {}: {}{}{}\n", fit.closure.from.index, fit.closure.to.index, to_string(fit.state),
-             fit.objection == judge::Objection::none ? "" : ", ", to_string(fit.objection));
+             fit.reason.empty() ? "" : ", ", fit.reason);
   fmt::print("measured     x y z {:.3f} {:.3f} {:.3f} m, quaternion x y z w {:.5f} {:.5f} {:.5f} {:.5f}\n", t.x(),
              t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
   fmt::print("sigma        {:.3f} {:.3f} {:.3f} m, {:.2f} {:.2f} {:.2f} deg\n", sigma(0), sigma(1), sigma(2),

@@ -93,7 +93,7 @@ std::string closures_csv(const NamedGraph& graph, const server::JudgedGraph& jud
     if (edge.odometry) continue;
     const PoseGraphEdge& ends = graph.robots.graph.edges[e];
     fmt::format_to(std::back_inserter(out), "{},{},{},{}", graph.names[ends.from], graph.names[ends.to],
-                   edge.accepted ? 1 : 0, to_string(edge.objection));
+                   edge.accepted ? 1 : 0, judge::reason_of(edge.objection, edge.price));
     if (!truth.right.empty()) fmt::format_to(std::back_inserter(out), ",{}", truth.right[e] ? 1 : 0);
     out += '\n';
   }

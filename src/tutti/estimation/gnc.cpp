@@ -19,7 +19,7 @@
 namespace tutti::estimation {
 namespace {
 
-constexpr double kControlStep = 1.4;  // factor of mu between outer iterations
+constexpr double kControlStep = 2.0;  // factor of mu between outer iterations
 constexpr int kMaxOuterIterations = 100;
 /// A rejected edge keeps this weight inside the solver, so that what it alone connected stays determined.
 constexpr double kWeightFloor = 1e-8;

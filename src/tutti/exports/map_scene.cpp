@@ -58,7 +58,7 @@ void add_closures(const mapfile::Content& content, const server::MapEstimate& ma
       const auto* from = find_node(map, fit.closure.from);
       const auto* to = find_node(map, fit.closure.to);
       if (!fit.misfit || from == nullptr || to == nullptr) continue;
-      Scene::Closure closure{.name = info.name, .state = to_string(fit.state), .reason = to_string(fit.objection)};
+      Scene::Closure closure{.name = info.name, .state = to_string(fit.state), .reason = fit.reason};
       if (closure.reason.empty() && fit.state != mapfile::ClosureState::accepted) closure.reason = info.reason;
       closure.between_robots = fit.closure.from.chain.robot != fit.closure.to.chain.robot;
       closure.frame = worlds.of(from->component);

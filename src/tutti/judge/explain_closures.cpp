@@ -8,42 +8,14 @@
 #include <utility>
 
 #include "tutti/base/check.hpp"
-#include "tutti/geometry/so3.hpp"
 #include "tutti/judge/closure_support.hpp"
 #include "tutti/judge/hypothesis.hpp"
 
 namespace tutti::judge {
 namespace {
 
-/// Where in a stretch a failure seems at most this many times as large as where it seems least, and so many seconds of
-/// usual motion more, odometry may have failed. A radian counts as much as so many seconds of motion.
-constexpr double kAboutLeast = 1.5;
-constexpr double kAboutLeast_s = 1.0;
-constexpr double kRadian_s = 5.0;
 /// A group of closures is at least so many.
 constexpr std::size_t kLeastGroup = 2;
-
-/// How large a failure was, seen from a node of its stretch, in seconds of usual motion: a wrong turn shifts everything
-/// the more the farther away it was.
-double size_at(const OdometryWays& odometry, const FailedStretch& failed, std::size_t node) {
-  const Pose3 T_to_node = odometry.T(failed.to, node);
-  const Pose3 seen = T_to_node.inverse() * (retract(Pose3{}, failed.missed) * T_to_node);
-  return seen.translation.norm() / odometry.usual_speed() + kRadian_s * rotation_angle(seen);
-}
-
-/// Far from where odometry turned wrongly, the failure would have to be larger: it failed about here.
-FailedStretch narrowed(const OdometryWays& odometry, FailedStretch failed) {
-  std::vector<double> sizes;
-  for (std::size_t k = failed.from; k <= failed.to; ++k) sizes.push_back(size_at(odometry, failed, k));
-  const auto least = std::ranges::min_element(sizes);
-  const auto is_larger = [about = kAboutLeast * *least + kAboutLeast_s](double size) { return size > about; };
-  const auto begin = std::find_if(std::make_reverse_iterator(least), sizes.rend(), is_larger).base();
-  const auto end = std::find_if(least, sizes.end(), is_larger);
-  const std::size_t from = failed.from;
-  failed.to = std::max(from + static_cast<std::size_t>(end - sizes.begin()) - 1, from + 1);
-  failed.from = std::min(from + static_cast<std::size_t>(begin - sizes.begin()), failed.to - 1);
-  return failed;
-}
 
 class Search {
  public:

@@ -200,8 +200,8 @@ TEST(HypothesisSolver, EveryStretchOfAWindowPaysForHowFarItIsFromItsErrors) {
   Laps one(50, 0.1), two(50, 0.1);
   for (Laps* laps : {&one, &two}) {
     if (laps == &two)
-      laps->graph.edges[54].T_from_to =
-          laps->graph.edges[54].T_from_to * Pose3{so3_exp({0, 0, 0.1}), Eigen::Vector3d::Zero()};
+      laps->graph.edges[58].T_from_to =
+          laps->graph.edges[58].T_from_to * Pose3{so3_exp({0, 0, 0.1}), Eigen::Vector3d::Zero()};
     laps->close_laps(2);
   }
   const auto price = [](const Laps& laps) {

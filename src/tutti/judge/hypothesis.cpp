@@ -12,6 +12,7 @@
 #include "tutti/base/chi_square.hpp"
 #include "tutti/estimation/between_factor.hpp"
 #include "tutti/estimation/truncated_least_squares.hpp"
+#include "tutti/geometry/so3.hpp"
 
 namespace tutti::judge {
 namespace {
@@ -23,11 +24,29 @@ constexpr double kNothing = 1e-9;
 /// refused by this share of all votes. Otherwise refused closures are strewn about, as wrong ones are.
 constexpr double kStrained = 1.0;
 constexpr double kManyRefused = 0.1;
-/// Odometry fails by no more than a body would get to at this many times the usual speed.
-constexpr double kReach = 10.0;
+/// Where in a stretch a failure seems at most this many times as large as where it seems least, and so many seconds of
+/// usual motion more, odometry may have failed. A radian counts as much as so many seconds of motion.
+constexpr double kAboutLeast = 1.5;
+constexpr double kAboutLeast_s = 1.0;
+constexpr double kRadian_s = 5.0;
+/// Odometry fails by no more than a body moves in the time that it took, and in so many seconds more, as what jumps
+/// between two samples has moved in no time at all.
+constexpr double kReach_s = 10.0;
 /// Where solutions begin is solved to this share of the cost: with wrong closures in it the rest takes most of the
 /// steps, and says nothing.
 constexpr double kBeginning = 1e-3;
+
+/// What a stretch missed, seen from one of its nodes: a wrong turn shifts everything the more the farther away it was.
+Pose3 seen_from(const OdometryWays& odometry, const FailedStretch& failed, std::size_t node) {
+  const Pose3 T_to_node = odometry.T(failed.to, node);
+  return T_to_node.inverse() * (retract(Pose3{}, failed.missed) * T_to_node);
+}
+
+/// How large a failure was, seen from there, in seconds of usual motion.
+double size_at(const OdometryWays& odometry, const FailedStretch& failed, std::size_t node) {
+  const Pose3 seen = seen_from(odometry, failed, node);
+  return seen.translation.norm() / odometry.usual_speed() + kRadian_s * rotation_angle(seen);
+}
 
 /// With nothing let go or refused.
 estimation::PoseGraphSolution beginning(const PoseGraph& graph, estimation::GncConfig gnc) {
@@ -36,6 +55,19 @@ estimation::PoseGraphSolution beginning(const PoseGraph& graph, estimation::GncC
 }
 
 }  // namespace
+
+FailedStretch narrowed(const OdometryWays& odometry, FailedStretch failed) {
+  std::vector<double> sizes;
+  for (std::size_t k = failed.from; k <= failed.to; ++k) sizes.push_back(size_at(odometry, failed, k));
+  const auto least = std::ranges::min_element(sizes);
+  const auto is_larger = [about = kAboutLeast * *least + kAboutLeast_s](double size) { return size > about; };
+  const auto begin = std::find_if(std::make_reverse_iterator(least), sizes.rend(), is_larger).base();
+  const auto end = std::find_if(least, sizes.end(), is_larger);
+  const std::size_t from = failed.from;
+  failed.to = std::max(from + static_cast<std::size_t>(end - sizes.begin()) - 1, from + 1);
+  failed.from = std::min(from + static_cast<std::size_t>(begin - sizes.begin()), failed.to - 1);
+  return failed;
+}
 
 HypothesisSolver::HypothesisSolver(const PoseGraph& graph, const OdometryWays& odometry, std::size_t odometry_edges,
                                    const WhoIsWrongConfig& config, const estimation::GncConfig& gnc,
@@ -167,8 +199,12 @@ Solution HypothesisSolver::judge(Hypothesis hypothesis, estimation::GncResult op
 /// what a body can do, so that large failures are rarer than small ones. With the power 1, errors of any size are as
 /// likely, to a factor, and two failures that cancel each other explain a group of look-alikes too cheaply.
 double HypothesisSolver::votes_for(const FailedStretch& failed) const {
-  const double duration_s = odometry_.seconds(failed.to) - odometry_.seconds(failed.from);
-  if (failed.missed.head<3>().norm() > kReach * odometry_.usual_speed() * duration_s) return kInfinite;
+  const FailedStretch about = narrowed(odometry_, failed);
+  double least_m = kInfinite;
+  for (std::size_t node = about.from; node <= about.to; ++node)
+    least_m = std::min(least_m, seen_from(odometry_, failed, node).translation.norm());
+  const double took_s = odometry_.seconds(about.to) - odometry_.seconds(about.from);
+  if (least_m > odometry_.usual_speed() * (took_s + kReach_s)) return kInfinite;
   const Matrix6d covariance = odometry_.between(failed.from, failed.to).covariance;
   const double squared_distance = failed.missed.dot(covariance.llt().solve(failed.missed));
   constexpr double kPower = 1.25, kAxes = 6.0;

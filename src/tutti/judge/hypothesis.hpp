@@ -42,6 +42,9 @@ struct Solution {
   double unexplained = 0.0;
 };
 
+/// Where a stretch failed: far from where odometry turned wrongly, the failure would have to be larger.
+FailedStretch narrowed(const OdometryWays& odometry, FailedStretch failed);
+
 /// Solves a pose graph under hypotheses, on the graph of the closures' ends.
 class HypothesisSolver {
  public:

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/judge/judge_closures.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <map>
 #include <numeric>
@@ -12,6 +15,7 @@
 #include "tutti/estimation/influence.hpp"
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/judge/closure_groups.hpp"
+#include "tutti/judge/settle.hpp"
 
 namespace tutti::judge {
 namespace {
@@ -22,8 +26,12 @@ constexpr double kDoubt = 2.0;
 /// Closures of neighbouring submaps may be wrong all together.
 constexpr double kNeighbours_s = 15.0;
 
-/// How many groups of closures can be refused as lone witnesses against all the rest.
+/// How many groups of closures can be refused as lone witnesses against all the rest, and how many closures make one:
+/// fewer are judged one by one, by what the map pays for them.
 constexpr int kRefusals = 5;
+constexpr std::size_t kLeastWitnesses = 3;
+
+constexpr double kUnknown = std::numeric_limits<double>::infinity();
 
 class Optimiser {
  public:
@@ -40,19 +48,23 @@ class Optimiser {
 
   [[nodiscard]] Optimum decide() const {
     auto [objections, failed, work] = explain();
-    Optimum best = optimise(std::move(objections), std::move(failed), work);
+    Optimum best = settle(map_.searched, std::move(objections), std::move(failed), work);
     for (int round = 0; round < kRefusals && refuse_lone_witness(best);) ++round;
+    std::vector<double> prices = std::move(best.prices);
+    best = settle(map_.graph, std::move(best.objections), std::move(best.failed), best.work);
+    for (std::size_t c = 0; c < prices.size(); ++c)
+      if (best.objections[c] == Objection::lone) best.prices[c] = prices[c];
     return best;
   }
 
  private:
   /// Objections to each closure, and the odometry that failed. What it takes is gone when the map is optimised.
   [[nodiscard]] std::tuple<std::vector<Objection>, std::vector<FailedStretch>, SearchWork> explain() const {
-    PoseGraph graph = map_.graph;
+    PoseGraph graph = map_.searched;
     graph.edges.insert(graph.edges.end(), closure_edges_.begin(), closure_edges_.end());
     std::vector<double> seconds;
     for (const MapNode& node : map_.nodes) seconds.push_back(node.stamp - map_.nodes.front().stamp);
-    const OdometryWays odometry(seconds, map_.graph.edges);
+    const OdometryWays odometry(seconds, map_.searched.edges);
     std::vector<std::size_t> all(closures_.size());
     std::iota(all.begin(), all.end(), std::size_t{0});
     const auto groups = closure_groups(map_.nodes, closure_edges_, all,
@@ -82,68 +94,86 @@ class Optimiser {
     }
   }
 
-  [[nodiscard]] Optimum optimise(std::vector<Objection> objections, std::vector<FailedStretch> failed,
-                                 const SearchWork& work) const {
+  /// Whether a closure may be asked again.
+  static bool is_open(Objection objection) {
+    return objection == Objection::none || objection == Objection::contradicted || objection == Objection::dear ||
+           objection == Objection::too_few;
+  }
+
+  /// The map with the closures that are worth what it pays for them.
+  [[nodiscard]] Optimum settle(const PoseGraph& odometry, std::vector<Objection> objections,
+                               std::vector<FailedStretch> failed, const SearchWork& work) const {
     Optimum out{.failed = std::move(failed),
-                .graph = map_.graph,
+                .graph = odometry,
                 .closure_of_edge = {},
-                .robust = {},
-                .fitting = {},
+                .solution = {},
                 .objections = std::move(objections),
+                .prices = std::vector<double>(closures_.size(), kUnknown),
                 .work = work};
     for (const FailedStretch& stretch : out.failed)
       weaken(out.graph, map_.odometry_edges, stretch.from, stretch.to, kDoubt * stretch.missed.head<3>().norm(),
              kDoubt * stretch.missed.tail<3>().norm());
+    PoseGraph all = out.graph;
+    std::vector<std::size_t> asked;
+    std::vector<char> in;
+    std::vector<bool> certain;
     for (std::size_t c = 0; c < closures_.size(); ++c) {
-      // What did not fit before may fit without what has been refused since.
-      if (out.objections[c] == Objection::misfit) out.objections[c] = Objection::none;
-      if (out.objections[c] != Objection::none) continue;
-      out.graph.edges.push_back(closure_edges_[c]);
-      out.closure_of_edge.push_back(c);
+      if (!is_open(out.objections[c])) continue;
+      asked.push_back(c);
+      in.push_back(out.objections[c] == Objection::none ? 1 : 0);
+      certain.push_back(certain_[c]);
+      all.edges.push_back(closure_edges_[c]);
     }
-    std::vector<estimation::EdgeRole> roles(out.graph.edges.size(), estimation::EdgeRole::robust);
-    std::fill_n(roles.begin(), map_.odometry_edges, estimation::EdgeRole::trusted);
-    for (std::size_t e = map_.odometry_edges; e < roles.size(); ++e)
-      if (is_certain(out, e)) roles[e] = estimation::EdgeRole::trusted;
-    out.robust = estimation::solve_pose_graph_gnc(out.graph, gnc_, roles);
-    out.work.factorisations += static_cast<std::size_t>(out.robust.solution.summary.factorisations);
-    for (std::size_t e = map_.odometry_edges; e < out.graph.edges.size(); ++e) {
-      if (out.robust.inlier_weight[e] >= 0.5)
-        out.fitting.push_back(e);
-      else
-        out.objections[out.closure_of_edge[e - map_.odometry_edges]] = Objection::misfit;
+    Settled settled = settle_closures(all, map_.odometry_edges, std::move(in), certain, config_, gnc_.solver);
+    out.work.factorisations += settled.factorisations;
+    out.graph.poses = std::move(settled.poses);
+    for (std::size_t k = 0; k < asked.size(); ++k) {
+      Objection& objection = out.objections[asked[k]];
+      out.prices[asked[k]] = settled.prices[k];
+      if (settled.in[k] == 0) {
+        if (objection == Objection::none || std::isfinite(settled.prices[k])) objection = Objection::dear;
+        continue;
+      }
+      objection = Objection::none;
+      out.graph.edges.push_back(closure_edges_[asked[k]]);
+      out.closure_of_edge.push_back(asked[k]);
     }
+    out.solution.summary.termination = settled.termination;
+    if (!estimation::is_usable(settled.termination)) return out;
+    estimation::SolverConfig from_there = gnc_.solver;
+    from_there.initialisation = "given";
+    out.solution = estimation::solve_pose_graph(out.graph, from_there);
+    out.work.factorisations += static_cast<std::size_t>(out.solution.summary.factorisations);
     return out;
-  }
-
-  /// Of an edge beyond odometry.
-  [[nodiscard]] bool is_certain(const Optimum& of, std::size_t edge) const {
-    return certain_[of.closure_of_edge[edge - map_.odometry_edges]];
   }
 
   /// Takes back the group of closures at one pair of places that contradicts all the rest of the map most, if it does
   /// beyond chance: as a lone closure against odometry, a lone group is wrong itself. False if there is none.
   [[nodiscard]] bool refuse_lone_witness(Optimum& best) const {
-    if (!estimation::is_usable(best.robust.solution.summary.termination)) return false;
-    PoseGraph fitted{.poses = {},
-                     .edges = {best.graph.edges.begin(),
-                               best.graph.edges.begin() + static_cast<std::ptrdiff_t>(map_.odometry_edges)}};
-    fitted.poses = best.graph.poses;
-    for (const std::size_t e : best.fitting) fitted.edges.push_back(best.graph.edges[e]);
-    std::vector<std::size_t> closures;  // among the edges of `fitted`
-    for (std::size_t k = 0; k < best.fitting.size(); ++k)
-      if (!is_certain(best, best.fitting[k])) closures.push_back(map_.odometry_edges + k);
-    std::vector<estimation::EdgeRole> roles(fitted.edges.size(), estimation::EdgeRole::robust);
+    if (!estimation::is_usable(best.solution.summary.termination)) return false;
+    std::vector<std::size_t> closures;  // edges of best.graph
+    for (std::size_t k = 0; k < best.closure_of_edge.size(); ++k)
+      if (!certain_[best.closure_of_edge[k]]) closures.push_back(map_.odometry_edges + k);
+    std::vector<estimation::EdgeRole> roles(best.graph.edges.size(), estimation::EdgeRole::robust);
     std::fill_n(roles.begin(), map_.odometry_edges, estimation::EdgeRole::trusted);
-    const auto groups = closure_groups(map_.nodes, fitted.edges, closures);
+    auto groups = closure_groups(map_.nodes, best.graph.edges, closures);
+    std::erase_if(groups, [](const auto& group) { return group.size() < kLeastWitnesses; });
+    if (groups.empty()) return false;
     ++best.work.factorisations;
-    const auto misfits = estimation::group_misfits(fitted, best.robust.solution.poses, roles, groups);
+    const auto misfits = estimation::group_misfits(best.graph, best.solution.poses, roles, groups);
     const auto worst = std::ranges::max_element(misfits);
-    if (worst == misfits.end() || *worst <= chi_square_quantile(config_.confidence, 6)) return false;
-    for (const std::size_t e : groups[static_cast<std::size_t>(worst - misfits.begin())])
-      best.objections[best.closure_of_edge[best.fitting[e - map_.odometry_edges] - map_.odometry_edges]] =
-          Objection::lone;
-    best = optimise(std::move(best.objections), std::move(best.failed), best.work);
+    if (*worst <= chi_square_quantile(config_.confidence, 6)) return false;
+    std::vector<std::pair<std::size_t, double>> missed;
+    for (const std::size_t e : groups[static_cast<std::size_t>(worst - misfits.begin())]) {
+      const std::size_t c = best.closure_of_edge[e - map_.odometry_edges];
+      best.objections[c] = Objection::lone;
+      missed.emplace_back(c, *worst);
+    }
+    std::vector<double> prices = std::move(best.prices);
+    best = settle(map_.searched, std::move(best.objections), std::move(best.failed), best.work);
+    for (std::size_t c = 0; c < prices.size(); ++c)  // of groups that were refused before
+      if (best.objections[c] == Objection::lone) best.prices[c] = prices[c];
+    for (const auto& [c, by] : missed) best.prices[c] = by;
     return true;
   }
 
@@ -183,6 +213,16 @@ Optimum judge_closures(const OdometryGraph& map, const NodeIndex& index, const C
   return Optimiser(map, index, closures, config, gnc).decide();
 }
 
+std::string reason_of(Objection objection, double price) {
+  const double most = most_paid({});
+  if (objection == Objection::dear && std::isfinite(price))
+    return fmt::format("{}: {:.0f} (at most {:.0f})", to_string(objection), price, most);
+  if (objection == Objection::lone && std::isfinite(price))
+    return fmt::format("{}: by {:.0f} (at most {:.0f})", to_string(objection), price,
+                       chi_square_quantile(WhoIsWrongConfig{}.confidence, 6));
+  return to_string(objection);
+}
+
 const char* to_string(Objection objection) {
   switch (objection) {
     case Objection::none:
@@ -192,11 +232,11 @@ const char* to_string(Objection objection) {
     case Objection::fixes:
       return "position fixes contradict it";
     case Objection::contradicted:
-      return "odometry and other closures contradict it";
+      return "odometry and other closures contradict it and nothing else joins its ends";
     case Objection::too_few:
       return "too few closures join these two";
-    case Objection::misfit:
-      return "does not fit the map";
+    case Objection::dear:
+      return "the map would pay more for it than a right one costs";
     case Objection::lone:
       return "with those of its place it contradicts the rest of the map";
     case Objection::no_map:

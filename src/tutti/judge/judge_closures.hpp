@@ -2,10 +2,12 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 #include <unordered_map>
 #include <vector>
 
 #include "tutti/estimation/gnc.hpp"
+#include "tutti/estimation/pose_graph_solver.hpp"
 #include "tutti/judge/explain_closures.hpp"
 #include "tutti/judge/settings.hpp"
 #include "tutti/model/loop_closure.hpp"
@@ -21,11 +23,13 @@ enum class Objection {
   fixes,         ///< Fixes of both robots contradict it (server/refuted_closures.hpp).
   contradicted,  ///< Odometry and other closures contradict it (explain_closures.hpp).
   too_few,       ///< Too few closures join these two pieces of odometry.
-  misfit,        ///< It does not fit the map that the others make.
+  dear,          ///< The map would pay more for it than a right one costs (settle.hpp).
   lone,          ///< With the other closures of its pair of places it contradicts all the rest of the map.
   no_map         ///< The map could not be solved.
 };
-const char* to_string(Objection objection);  ///< A sentence's end for people; empty for none.
+const char* to_string(Objection objection);  ///< The rule, for people; empty for none.
+/// The rule with its number: what the map pays for the closure, or would (Optimum::prices). Has no comma.
+std::string reason_of(Objection objection, double price);
 
 using NodeIndex = std::unordered_map<KeyframeId, std::size_t>;
 
@@ -40,25 +44,28 @@ struct Closures {
 /// The map that follows from a judgement of the closures.
 struct Optimum {
   std::vector<FailedStretch> failed;
-  PoseGraph graph;  ///< Odometry, weakened where it failed, and the closures without objection before the solution.
+  PoseGraph graph;                           ///< Odometry, weakened where it failed, and the closures of the map.
   std::vector<std::size_t> closure_of_edge;  ///< Per edge beyond odometry its position in Closures::judged.
-  estimation::GncResult robust;
-  std::vector<std::size_t> fitting;   ///< Edges of graph: the closures that fit the map.
+  estimation::PoseGraphSolution solution;
   std::vector<Objection> objections;  ///< Per judged closure.
-  SearchWork work;                    ///< The cost, with that of the optima before this one.
+  std::vector<double>
+      prices;       ///< Per judged closure what the map pays for it, or would (settle.hpp); infinite: unknown.
+  SearchWork work;  ///< The cost, with that of the optima before this one.
 };
 
 /// A map without closures, as input of judge_closures(), which keeps no references.
 struct OdometryGraph {
   const std::vector<MapNode>& nodes;
-  const PoseGraph& graph;  ///< Over the nodes; its first odometry_edges edges are odometry.
+  const PoseGraph& graph;     ///< Over the nodes; its first odometry_edges edges are odometry.
+  const PoseGraph& searched;  ///< The same, with rotations as certain as the closures show them to be: which closures
+                              ///< and which odometry are wrong is looked for with these weights.
   std::size_t odometry_edges = 0;
 };
 
 /// Decides which closures the map is made with and which odometry has failed: explain_closures(), then, up to five
 /// times, refusal of the group of closures that alone contradicts the rest of the map (docs/math.md, "Lone witnesses").
 /// `index`: of each keyframe its position among the nodes. Closures that are certain are never refused. Numerical
-/// failures are in Optimum::robust.
+/// failures are in Optimum::solution.
 Optimum judge_closures(const OdometryGraph& map, const NodeIndex& index, const Closures& closures,
                        const WhoIsWrongConfig& config, const estimation::GncConfig& gnc);
 

@@ -8,7 +8,8 @@ namespace tutti::judge {
 /// Settings of judge_closures() and explain_closures().
 struct WhoIsWrongConfig {
   bool let_odometry_fail = true;
-  double confidence = 0.999;  ///< Share of pairs of right closures that agree.
+  double confidence = 0.999;    ///< Share of pairs of right closures that agree.
+  double right_refused = 1e-5;  ///< Share of right closures for which the map would pay too much, by chance.
   /// A closure with which fewer others agree, nor the odometry between its ends, is not considered.
   int least_support = 2;
   double least_votes = 2.0;  ///< Failed odometry must explain more votes than this, one more for every run that is let

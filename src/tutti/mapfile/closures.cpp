@@ -25,7 +25,7 @@ std::string reason_of(const ClosureInfo& info) {
     return fmt::format("{}ed by {}", to_string(info.word->wish), info.word->by.empty() ? "an operator" : info.word->by);
   if (info.state == ClosureState::candidate) return "not judged";
   if (info.state == ClosureState::accepted) return {};
-  return judge::to_string(info.closures.front().objection);
+  return info.closures.front().reason;
 }
 
 }  // namespace
@@ -54,7 +54,7 @@ std::vector<ClosureInfo> closures(const Content& content, const server::MapEstim
       });
       if (found == last) continue;
       fit.state = found->second->accepted ? ClosureState::accepted : ClosureState::rejected;
-      fit.objection = found->second->objection;
+      fit.reason = judge::reason_of(found->second->objection, found->second->price);
     }
     const auto is = [&](ClosureState state) {
       return std::ranges::any_of(info.closures, [&](const ClosureFit& fit) { return fit.state == state; });

@@ -22,7 +22,7 @@ const char* to_string(ClosureState state);
 struct ClosureFit {
   LoopClosure closure;
   ClosureState state = ClosureState::candidate;
-  judge::Objection objection = judge::Objection::none;
+  std::string reason;  ///< Why it is not in the map, with the rule's number (judge::reason_of); empty if it is.
   /// Difference between the closure and the map, and its squared Mahalanobis distance in the closure's covariance (6
   /// degrees of freedom). No value when the map does not join the closure's two ends.
   struct Misfit {

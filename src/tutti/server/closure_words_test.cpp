@@ -135,7 +135,7 @@ class WordsToAServer : public testing::Test {
     answer(server_, *finder_);
     server_.optimise();
     for (const JudgedClosure& closure : server_.map().closures)
-      if (closure.objection == judge::Objection::contradicted || closure.objection == judge::Objection::misfit)
+      if (closure.objection == judge::Objection::contradicted || closure.objection == judge::Objection::dear)
         refused_ = closure.closure;
     for (const auto& [pair, verdict] : server_.state().verdicts)
       if (verdict.closures.front() == refused_) pair_ = pair;

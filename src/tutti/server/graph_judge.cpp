@@ -136,6 +136,7 @@ JudgedGraph judge_graph(const RobotGraph& graph, const MapConfig& config) {
     const bool is_judged = find_node(out.map, c.closure.from) != nullptr && find_node(out.map, c.closure.to) != nullptr;
     edge.accepted = is_judged && judged->accepted;
     edge.objection = is_judged ? judged->objection : judge::Objection::no_map;
+    if (is_judged) edge.price = judged->price;
     if (is_judged) ++judged;
   }
   return out;

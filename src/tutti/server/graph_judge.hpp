@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "tutti/base/ids.hpp"
@@ -22,8 +23,9 @@ struct RobotGraph {
 /// The verdict on one edge.
 struct JudgedEdge {
   bool odometry = false;
-  bool accepted = true;                                 ///< Always true for odometry, even where it failed.
-  judge::Objection objection = judge::Objection::none;  ///< Of a closure that is not accepted.
+  bool accepted = true;                                    ///< Always true for odometry, even where it failed.
+  judge::Objection objection = judge::Objection::none;     ///< Of a closure that is not accepted.
+  double price = std::numeric_limits<double>::infinity();  ///< JudgedClosure::price
 };
 
 /// The result of judge_graph().

@@ -112,13 +112,18 @@ void raise_understated(const std::vector<judge::OdometryPiece>& pieces, judge::C
       closure.measurement.covariance = judge::scaled(closure.measurement.covariance, found->second);
 }
 
-/// Odometry's rotations count as much as the closures show that they are worth.
-void see_through(MapEstimate& map) {
-  for (std::size_t e = 0; e < map.odometry_edges; ++e) {
-    PoseGraphEdge& edge = map.graph.edges[e];
-    edge.information =
-        judge::scale_rotation(edge.information, 1.0 / map.rotation_factors.at(map.nodes[edge.from].id.chain));
-  }
+/// Odometry whose rotations have less than this share of their stated variance says much too much of its errors.
+constexpr double kOverstatedRotation = 0.15;
+
+/// Odometry whose rotations count as much as the closures show that they are worth, of chains with a factor of at most
+/// `most`.
+PoseGraph seen_through(const MapEstimate& map, double most = 1.0) {
+  PoseGraph out = map.graph;
+  for (PoseGraphEdge& edge : out.edges)
+    if (const auto factor = map.rotation_factors.find(map.nodes[edge.from].id.chain);
+        factor != map.rotation_factors.end() && factor->second <= most)
+      edge.information = judge::scale_rotation(edge.information, 1.0 / factor->second);
+  return out;
 }
 
 /// Odometry whose loops are so many times their stated variance, at least, says much too little of its errors.
@@ -154,12 +159,15 @@ void label_components(MapEstimate& map) {
 }
 
 void adopt(const judge::Optimum& optimum, MapEstimate& map) {
-  for (const std::size_t edge : optimum.fitting) {
-    map.graph.edges.push_back(optimum.graph.edges[edge]);
-    map.closures[optimum.closure_of_edge[edge - map.odometry_edges]].accepted = true;
+  for (std::size_t k = 0; k < optimum.closure_of_edge.size(); ++k) {
+    map.graph.edges.push_back(optimum.graph.edges[map.odometry_edges + k]);
+    map.closures[optimum.closure_of_edge[k]].accepted = true;
   }
-  for (std::size_t c = 0; c < map.closures.size(); ++c) map.closures[c].objection = optimum.objections[c];
-  map.graph.poses = optimum.robust.solution.poses;
+  for (std::size_t c = 0; c < map.closures.size(); ++c) {
+    map.closures[c].objection = optimum.objections[c];
+    map.closures[c].price = optimum.prices[c];
+  }
+  map.graph.poses = optimum.solution.poses;
   for (std::size_t i = 0; i < map.nodes.size(); ++i) map.nodes[i].T_world_body = map.graph.poses[i];
   for (const judge::FailedStretch& failed : optimum.failed) record_failure(failed, map);
 }
@@ -192,19 +200,19 @@ std::map<ChainId, judge::OdometryHonesty> honesty_after(const MapEstimate& map, 
       step_to[edge.to] = edge.information.ldlt().solve(Matrix6d::Identity());
   }
   std::vector<LoopClosure> fitting;
-  for (const std::size_t e : optimum.fitting)
-    fitting.push_back(closures[optimum.closure_of_edge[e - map.odometry_edges]]);
+  for (const std::size_t c : optimum.closure_of_edge) fitting.push_back(closures[c]);
   return judge::odometry_honesty(odometry_pieces(map.nodes, step_to), fitting);
 }
 
 /// True if the odometry of any chain was far worse than it said; it now says so.
-bool raise_understated(const std::map<ChainId, judge::OdometryHonesty>& honesty, MapEstimate& map) {
+bool raise_understated(const std::map<ChainId, judge::OdometryHonesty>& honesty, MapEstimate& map,
+                       PoseGraph& searched) {
   for (const auto& [chain, worth] : honesty)
     if (worth.whole > kUnderstated) map.understated[chain] = worth.whole;
   for (std::size_t e = 0; e < map.odometry_edges; ++e) {
-    PoseGraphEdge& edge = map.graph.edges[e];
-    if (const auto found = map.understated.find(map.nodes[edge.from].id.chain); found != map.understated.end())
-      edge.information /= found->second;
+    const auto found = map.understated.find(map.nodes[map.graph.edges[e].from].id.chain);
+    if (found == map.understated.end()) continue;
+    for (PoseGraph* graph : {&map.graph, &searched}) graph->edges[e].information /= found->second;
   }
   return !map.understated.empty();
 }
@@ -220,18 +228,20 @@ MapEstimate estimate_together(const SubmapSet& submaps, const VerdictSet& verdic
   const std::vector<LoopClosure> stated = closures.judged;
   const std::vector<judge::OdometryPiece> pieces = odometry_pieces(map.nodes, stated_steps(submaps, index));
   if (config.judge_closures) raise_understated(pieces, closures, map);
-  if (config.judge_odometry) {
+  if (config.judge_odometry)
     for (const auto& [chain, worth] : judge::odometry_honesty(pieces, closures.judged))
       map.rotation_factors[chain] = worth.rotation;
-    see_through(map);
-  }
-  judge::Optimum optimum = judge::judge_closures({map.nodes, map.graph, map.odometry_edges}, index, closures,
-                                                 config.who_is_wrong, config.gnc);
+  PoseGraph searched = seen_through(map);
+  map.graph = seen_through(map, kOverstatedRotation);
+  const auto decide = [&] {
+    return judge::judge_closures({map.nodes, map.graph, searched, map.odometry_edges}, index, closures,
+                                 config.who_is_wrong, config.gnc);
+  };
+  judge::Optimum optimum = decide();
   auto honesty = honesty_after(map, optimum, closures.judged);
-  if (config.judge_odometry && raise_understated(honesty, map)) {
+  if (config.judge_odometry && raise_understated(honesty, map, searched)) {
     const judge::SearchWork before = optimum.work;
-    optimum = judge::judge_closures({map.nodes, map.graph, map.odometry_edges}, index, closures, config.who_is_wrong,
-                                    config.gnc);
+    optimum = decide();
     optimum.work += before;
     honesty = honesty_after(map, optimum, closures.judged);
   }
@@ -239,7 +249,7 @@ MapEstimate estimate_together(const SubmapSet& submaps, const VerdictSet& verdic
   for (const auto& [chain, worth] : honesty) map.overstated[chain] = std::min(1.0, worth.whole);
   for (std::size_t c = 0; c < closures.judged.size(); ++c)
     map.closures.push_back({stated[c], false, closures.certain[c], judge::Objection::no_map});
-  map.converged = estimation::is_usable(optimum.robust.solution.summary.termination);
+  map.converged = estimation::is_usable(optimum.solution.summary.termination);
   if (map.converged) adopt(optimum, map);
   for (const LoopClosure& closure : closures.rejected)
     map.closures.push_back({closure, false, true, judge::Objection::operators});

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -40,6 +41,8 @@ struct JudgedClosure {
   bool accepted = false;
   bool by_operator = false;                             ///< An operator's word decided, whatever the map says.
   judge::Objection objection = judge::Objection::none;  ///< Why it is not accepted.
+  /// What the map pays for it, or would (judge/settle.hpp); infinite: unknown.
+  double price = std::numeric_limits<double>::infinity();
 };
 
 /// Odometry that failed, as closures show: between these two keyframes of one chain it is not used.
@@ -62,7 +65,8 @@ struct MapEstimate {
   /// Factor on the variances of the closures between two chains, where these err by more than they say
   /// (closure_honesty.hpp). It is applied in `graph` but not in `closures`.
   std::map<std::pair<ChainId, ChainId>, judge::ClosureHonesty> closure_factors;
-  /// Factor on the variances of rotation of each chain's odometry (odometry_honesty.hpp); applied in `graph`.
+  /// Factor on the variances of rotation of each chain's odometry (odometry_honesty.hpp) with which what is wrong was
+  /// looked for; applied in `graph` where odometry says far too much of its errors (0.15 and below).
   std::map<ChainId, double> rotation_factors;
   /// Factor on all variances of a chain's odometry, where that is far worse than it says; applied in `graph`.
   std::map<ChainId, double> understated;

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/estimation/switched_graph.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <limits>
+
+#include "tutti/base/check.hpp"
+#include "tutti/base/disjoint_sets.hpp"
+#include "tutti/estimation/between_factor.hpp"
+#include "tutti/estimation/chain_reduction.hpp"
+#include "tutti/estimation/gnc.hpp"
+#include "tutti/estimation/internal/gauss_newton.hpp"
+#include "tutti/estimation/internal/graph_equations.hpp"
+#include "tutti/estimation/internal/selected_inverse.hpp"
+#include "tutti/estimation/truncated_least_squares.hpp"
+
+namespace tutti::estimation {
+namespace {
+
+/// An edge that is out keeps this weight, so that what it alone would join stays determined.
+constexpr double kOut = 1e-8;
+/// Less than this share of what is known of a direction comes from elsewhere: nothing does.
+constexpr double kNothingElse = 1e-9;
+
+/// Where the first solution begins is solved to this share of its cost.
+constexpr double kRoughly = 1e-3;
+
+using internal::EdgeSlot;
+using internal::SelectedInverse;
+
+/// H^-1 at the ends of an edge, in the coordinates of its residual.
+Matrix6d covariance_of(const SelectedInverse& inverse, const EdgeSlot& slot, const BetweenLinearisation& factor) {
+  Matrix6d out = Matrix6d::Zero();
+  const auto add = [&](int a, const Matrix6d& J_a, int b, const Matrix6d& J_b) {
+    if (a >= 0 && b >= 0) out += J_a * inverse.block(a, b) * J_b.transpose();
+  };
+  add(slot.from, factor.J_i, slot.from, factor.J_i);
+  add(slot.from, factor.J_i, slot.to, factor.J_j);
+  add(slot.to, factor.J_j, slot.from, factor.J_i);
+  add(slot.to, factor.J_j, slot.to, factor.J_j);
+  return 0.5 * (out + out.transpose());
+}
+
+double price(const PoseGraphEdge& edge, const BetweenLinearisation& factor, const Matrix6d& covariance, bool is_in) {
+  const Matrix6d upper = edge.information.llt().matrixU();  // Omega = upper^T upper
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> known(upper * covariance * upper.transpose());
+  const Vector6d missed = known.eigenvectors().transpose() * (upper * factor.residual);
+  double out = 0.0;
+  for (int d = 0; d < 6; ++d) {
+    const double share = std::max(0.0, known.eigenvalues()(d));
+    const double rest = is_in ? 1.0 - share : 1.0 + share;
+    if (rest > kNothingElse) out += missed(d) * missed(d) / rest;
+  }
+  return out;
+}
+
+}  // namespace
+
+struct SwitchedGraph::State {
+  const PoseGraph& graph;
+  SolverConfig config;
+  std::vector<EdgeRole> roles;
+  ReducedGraph reduced;
+  internal::BlockStructure structure;
+  std::unique_ptr<internal::GraphEquations> equations;
+  std::vector<double> scale;  // per reduced edge
+  std::vector<Pose3> poses;   // of reduced nodes
+  bool solved = false;
+  double cost = 0.0;
+  int factorisations = 0;
+};
+
+SwitchedGraph::SwitchedGraph(const PoseGraph& graph, std::span<const EdgeRole> roles, const SolverConfig& config)
+    : state_(std::make_unique<State>(State{.graph = graph, .config = config, .roles = {roles.begin(), roles.end()}})) {
+  TUTTI_CHECK(roles.size() == graph.edges.size(), "{} roles, {} edges", roles.size(), graph.edges.size());
+  State& s = *state_;
+  s.config.loss = "none";
+  s.reduced = reduce_chains(graph, roles);
+  s.structure = internal::analyse_blocks(s.reduced.graph);
+  s.equations = std::make_unique<internal::GraphEquations>(s.reduced.graph, s.structure);
+  s.scale.assign(s.reduced.graph.edges.size(), 1.0);
+}
+SwitchedGraph::~SwitchedGraph() = default;
+
+Termination SwitchedGraph::solve(const std::vector<char>& in) {
+  State& s = *state_;
+  TUTTI_CHECK(in.size() == s.roles.size(), "{} switches, {} edges", in.size(), s.roles.size());
+  for (std::size_t e = 0; e < in.size(); ++e)
+    if (s.roles[e] == EdgeRole::robust) s.scale[*s.reduced.edge[e]] = in[e] ? 1.0 : kOut;
+  if (!s.solved) {
+    PoseGraph only{.poses = s.reduced.graph.poses, .edges = {}};
+    for (std::size_t e = 0; e < s.reduced.graph.edges.size(); ++e)
+      if (s.scale[e] == 1.0) only.edges.push_back(s.reduced.graph.edges[e]);
+    SolverConfig roughly = s.config;
+    roughly.relative_cost_tolerance = std::max(kRoughly, roughly.relative_cost_tolerance);
+    const PoseGraphSolution start = solve_pose_graph(only, roughly);
+    s.factorisations += start.summary.factorisations;
+    if (!is_usable(start.summary.termination)) return start.summary.termination;
+    s.poses = start.poses;
+  }
+  const SolveSummary summary =
+      internal::minimise(*s.equations, s.poses, {.loss = {}, .roles = {}, .scale = s.scale}, s.config);
+  s.factorisations += summary.factorisations;
+  s.cost = summary.final_cost;
+  s.solved = is_usable(summary.termination);
+  return summary.termination;
+}
+
+std::vector<double> SwitchedGraph::prices() {
+  State& s = *state_;
+  std::vector<double> out(s.roles.size(), 0.0);
+  DisjointSets parts(s.reduced.graph.poses.size());
+  for (std::size_t e = 0; e < s.reduced.graph.edges.size(); ++e)
+    if (s.scale[e] == 1.0) parts.join(s.reduced.graph.edges[e].from, s.reduced.graph.edges[e].to);
+  const std::vector<int> part = parts.labels().first;
+  s.equations->linearise(s.poses, {.loss = {}, .roles = {}, .scale = s.scale}, true);
+  ++s.factorisations;
+  if (s.structure.variables == 0 || !s.equations->factorise()) return out;
+  const SelectedInverse inverse(s.equations->hessian().factor());
+  for (std::size_t e = 0; e < out.size(); ++e) {
+    if (s.roles[e] != EdgeRole::robust) continue;
+    const std::size_t at = *s.reduced.edge[e];
+    const PoseGraphEdge& edge = s.reduced.graph.edges[at];
+    const bool is_in = s.scale[at] == 1.0;
+    if (!is_in && part[edge.from] != part[edge.to]) {
+      out[e] = std::numeric_limits<double>::infinity();
+      continue;
+    }
+    const auto factor = linearise_between(s.poses[edge.from], s.poses[edge.to], edge.T_from_to);
+    out[e] = price(edge, factor, covariance_of(inverse, s.structure.edges[at], factor), is_in);
+  }
+  return out;
+}
+
+std::vector<Pose3> SwitchedGraph::poses() const {
+  std::vector<Pose3> out = state_->graph.poses;
+  if (!state_->poses.empty()) expand_chains(state_->graph, state_->reduced, state_->poses, out);
+  return out;
+}
+double SwitchedGraph::cost() const { return state_->cost; }
+int SwitchedGraph::factorisations() const { return state_->factorisations; }
+
+}  // namespace tutti::estimation

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/estimation/switched_graph.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "support/estimation/random_graphs.hpp"
+
+namespace tutti::estimation {
+namespace switched_graph_test {
+
+using namespace testing;
+
+constexpr SolverConfig kPrecise{.relative_cost_tolerance = 1e-13};
+
+std::vector<EdgeRole> chain_is_trusted(const PoseGraph& graph) {
+  std::vector<EdgeRole> out(graph.edges.size(), EdgeRole::robust);
+  for (std::size_t e = 0; e + 1 < graph.poses.size(); ++e) out[e] = EdgeRole::trusted;
+  return out;
+}
+
+TEST(SwitchedGraph, APriceIsWhatTheMapPays) {
+  for (std::uint64_t seed = 0; seed < 5; ++seed) {
+    Rng rng(seed);
+    const PoseGraph graph = random_graph(rng, 30, 6, 0.02).graph;
+    SwitchedGraph switched(graph, chain_is_trusted(graph), kPrecise);
+    std::vector<char> in(graph.edges.size(), 1);
+    ASSERT_TRUE(is_usable(switched.solve(in)));
+    const double whole = switched.cost();
+    const std::vector<double> prices = switched.prices();
+    for (std::size_t e = graph.poses.size() - 1; e < graph.edges.size(); ++e) {
+      in[e] = 0;
+      ASSERT_TRUE(is_usable(switched.solve(in)));
+      const double saved = whole - switched.cost(), would_cost = switched.prices()[e];
+      in[e] = 1;
+      EXPECT_NEAR(prices[e], saved, 0.05 * saved + 0.05) << seed << " edge " << e;
+      EXPECT_NEAR(would_cost, saved, 0.05 * saved + 0.05) << seed << " edge " << e;
+    }
+  }
+}
+
+TEST(SwitchedGraph, TakingInAndOutEndsWhereItBegan) {
+  Rng rng(3);
+  const PoseGraph graph = random_graph(rng, 25, 5, 0.02).graph;
+  SwitchedGraph switched(graph, chain_is_trusted(graph), kPrecise);
+  std::vector<char> in(graph.edges.size(), 1);
+  ASSERT_TRUE(is_usable(switched.solve(in)));
+  const std::vector<Pose3> before = switched.poses();
+  in.back() = 0;
+  ASSERT_TRUE(is_usable(switched.solve(in)));
+  in.back() = 1;
+  ASSERT_TRUE(is_usable(switched.solve(in)));
+  const std::vector<Pose3> after = switched.poses();
+  ASSERT_EQ(after.size(), graph.poses.size());
+  for (std::size_t k = 0; k < after.size(); ++k) EXPECT_LT(local(before[k], after[k]).norm(), 1e-6) << k;
+}
+
+TEST(SwitchedGraph, WhatAloneJoinsTwoPartsHasNoPrice) {
+  Rng rng(5);
+  PoseGraph graph = random_graph(rng, 10, 2, 0.02).graph;
+  const std::size_t one = graph.poses.size();
+  std::vector<EdgeRole> roles = chain_is_trusted(graph);
+  for (int k = 0; k < 3; ++k) graph.poses.push_back(graph.poses[static_cast<std::size_t>(k)]);
+  const PoseGraphEdge step = graph.edges.front();
+  for (std::size_t k = one; k + 1 < graph.poses.size(); ++k) {
+    graph.edges.push_back({k, k + 1, step.T_from_to, step.information});
+    roles.push_back(EdgeRole::trusted);
+  }
+  for (const std::size_t end : {one, one + 2}) {
+    graph.edges.push_back({2, end, step.T_from_to, step.information});
+    roles.push_back(EdgeRole::robust);
+  }
+  SwitchedGraph switched(graph, roles, kPrecise);
+  std::vector<char> in(graph.edges.size(), 1);
+  in.back() = in[in.size() - 2] = 0;
+  ASSERT_TRUE(is_usable(switched.solve(in)));
+  EXPECT_TRUE(std::isinf(switched.prices().back()));
+  in[in.size() - 2] = 1;
+  ASSERT_TRUE(is_usable(switched.solve(in)));
+  EXPECT_TRUE(std::isfinite(switched.prices().back()));
+}
+
+}  // namespace switched_graph_test
+}  // namespace tutti::estimation
