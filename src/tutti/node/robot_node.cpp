@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "tutti/base/plain_text.hpp"
+#include "tutti/node/internal/stored_robot.hpp"
 #include "tutti/node/robot_tables.hpp"
 #include "tutti/node/status_envelope.hpp"
 #include "tutti/node/submap_frames.hpp"
@@ -17,31 +18,22 @@ using namespace robot_tables;  // NOLINT
 
 Result<std::unique_ptr<RobotNode>> RobotNode::open(RobotId robot, std::uint64_t session, const RobotNodeConfig& config,
                                                    const storage::TableStore& store) {
-  const auto whose = store.read(kMeta, kRobot);
-  if (!whose) return tl::unexpected(whose.error());
-  if (*whose && **whose != storage::key_of({robot.value}))
-    return fail(ErrorCode::invalid, "what is stored is another robot's than {}", robot.value);
-  const auto starts = store.read(kMeta, kStarts);
-  if (!starts) return tl::unexpected(starts.error());
-  wire::StateRows rows;
-  const auto keep = [&](std::string_view key, std::string_view bytes) {
-    rows.emplace(key, bytes);
-    return true;
-  };
-  if (auto scanned = store.scan(kCheckpoint, {}, keep); !scanned) return tl::unexpected(scanned.error());
-
+  const auto stored = internal::read_stored(robot, store);
+  if (!stored) return tl::unexpected(stored.error());
+  const wire::StateRows& rows = stored->checkpoint;
+  const std::uint64_t next = stored->newest_session == 0 ? session : std::max(session, stored->newest_session + 1);
   const auto make = [&](robot::AgentState state) {
     return std::unique_ptr<RobotNode>(new RobotNode(robot, config, std::move(state), store));
   };
   std::unique_ptr<RobotNode> node;
-  Status readable;
+  Status readable = stored->lost ? Status(fail(ErrorCode::parse, "{}", *stored->lost)) : Status();
   const bool is_whole = rows.contains(kWhole);
   if (rows.empty()) {
-    node = make({{.session = session}});
+    node = make({{.session = next}});
   } else if (auto state = is_whole ? wire::decode_agent_state(rows.at(kWhole)) : wire::decode_state_rows(rows)) {
-    wire::StoredState stored = is_whole ? wire::StoredState{} : wire::stored_state(*state);
+    wire::StoredState written = is_whole ? wire::StoredState{} : wire::stored_state(*state);
     node = make(std::move(*state));
-    node->stored_ = std::move(stored);
+    node->stored_ = std::move(written);
     if (is_whole) node->obsolete_ = {kWhole};
   } else {
     readable = in_context("checkpoint", state.error());
@@ -57,50 +49,36 @@ Result<std::unique_ptr<RobotNode>> RobotNode::open(RobotId robot, std::uint64_t 
   };
   if (auto scanned = store.scan(kJournal, {}, hear); !scanned) return tl::unexpected(scanned.error());
   if (!readable) {
-    const auto before = newest_session(store);
-    if (!before) return tl::unexpected(before.error());
-    node = make({{.session = std::max(session, *before) + 1}});
-    for (const auto& [key, bytes] : rows) node->obsolete_.push_back(key);
+    node = make({{.session = std::max(session + 1, next)}});
+    if (Status aside = node->set_aside(rows, stored->newest_session); !aside) return tl::unexpected(aside.error());
     node->why_lost_ = readable.error().message;
   }
   for (const auto& [key, bytes] : rows) node->rows_.insert(key);
   node->gate_ = OdometryGate(robot, node->agent_.newest_sample());
   node->journal_ = entries;
   node->is_new_ = rows.empty() || !readable;
-  if (const auto before = storage::numbers_of(starts->value_or(""), 1)) node->starts_ = before->front() + 1;
+  node->starts_ = stored->starts + 1;
   if (Status ok = node->read_outbox(); !ok)
     return in_context(fmt::format("robot {}: what is stored", robot.value), ok.error());
   return node;
 }
 
-/// Of those that the store says itself, and of submaps that wait; 0: none.
-Result<std::uint64_t> RobotNode::newest_session(const storage::TableStore& store) {
-  const auto row = store.read(kMeta, kSession);
-  if (!row) return tl::unexpected(row.error());
-  std::uint64_t newest = 0;
-  if (const auto session = storage::numbers_of(row->value_or(""), 1)) newest = session->front();
-  const auto look = [&](std::string_view key, std::size_t) {
-    if (const auto numbers = storage::numbers_of(key, 3)) newest = std::max(newest, (*numbers)[1]);
-  };
-  if (auto read = store.sizes(kOutbox, look); !read) return tl::unexpected(read.error());
-  return newest;
-}
-
+/// What is no submap's key is another version's, and stays as it is.
 Status RobotNode::read_outbox() {
   Status ok;
   std::map<SubmapId, std::size_t> kept;
   const auto id_of = [&](std::string_view key) {
     const auto id = submap_of_key(key);
-    if (!id || id->chain.robot != agent_.robot())
+    if (id && id->chain.robot != agent_.robot())
       ok = fail(ErrorCode::invalid, "a submap of somebody else in the outbox");
     return id;
   };
   const auto keep = [&](std::string_view key, std::size_t size) {
-    if (const auto id = id_of(key); ok) kept.emplace(*id, size);
+    if (const auto id = id_of(key)) kept.emplace(*id, size);
   };
   const auto mark = [&](std::string_view key, std::size_t) {
     const auto id = id_of(key);
-    if (auto known = ok ? kept.extract(*id) : decltype(kept)::node_type()) {
+    if (auto known = id ? kept.extract(*id) : decltype(kept)::node_type()) {
       archive_bytes_ += known.mapped();
       archive_.insert(std::move(known));
     }
@@ -152,7 +130,11 @@ Step RobotNode::resume(Timestamp now) {
     step.writes.push_back({kMeta, kStarts, storage::key_of({starts_})});
     step.writes.push_back({kMeta, kSession, storage::key_of({agent_.chain().session})});
   }
-  if (why_lost_) step.tell(now, StateLost{agent_.robot(), agent_.chain().session, *std::exchange(why_lost_, {})});
+  if (const auto why = std::exchange(why_lost_, {})) {
+    if (config_.keeps_state) step.writes.push_back({kMeta, kLost, std::nullopt});
+    step.tell(now, StateLost{agent_.robot(), agent_.chain().session, *why});
+    session_begun_ = {now, "what was stored could not be read: " + *why};
+  }
   send_submaps(now, {}, step);
   return step;
 }
@@ -281,6 +263,7 @@ Step RobotNode::on_timer(Timestamp now) {
 
 void RobotNode::save_checkpoint(Step& step) {
   if (!config_.keeps_state) return;
+  for (storage::Write& write : std::exchange(aside_, {})) step.writes.push_back(std::move(write));
   wire::StateChange change = wire::changed_rows(agent_, stored_);
   for (auto* keys : {&obsolete_, &change.removed})
     for (std::string& key : std::exchange(*keys, {})) {

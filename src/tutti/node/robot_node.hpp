@@ -35,7 +35,7 @@ struct RobotNodeConfig {
   double journal_period_s = 0.5;
   /// Keyframes without a scan (or images) after which SensorMissing is told.
   std::uint64_t most_keyframes_without = 20;
-  double jump_told_s = 600.0;  ///< How long status() says that odometry has jumped, or its clock.
+  double jump_told_s = 600.0;  ///< How long status() says that odometry has jumped, or why a session has begun.
 };
 
 /// A robot as a node: RobotAgent with its store and messages. It takes odometry, sensor data and proxy graphs, and
@@ -47,11 +47,11 @@ struct RobotNodeConfig {
 /// agent().newest_sample() on, including the scan of that very sample; then nothing is lost.
 class RobotNode {
  public:
-  /// On an empty store, begins a new chain with this session, which must be larger than any before (ChainId). Otherwise
-  /// the robot goes on as if it had never stopped; `config` must be as before. A state that cannot be read (for example
-  /// because another version wrote it) is deleted: the robot then begins a session after all earlier ones, keeps its
-  /// outbox, and tells StateLost. Fails when the store cannot be read or is another robot's. The store must outlive the
-  /// node.
+  /// On an empty store, begins a new chain with this session, or a later one than the store knows. Otherwise the robot
+  /// goes on as if it had never stopped; `config` must be as before. A state that cannot be read (for example because
+  /// another version wrote it) is set aside in the store: the robot then begins a session after all earlier ones, keeps
+  /// its outbox, and tells StateLost. So it does without a state where the row robot_tables::kLost says why. Fails when
+  /// the store cannot be read or is another robot's. The store must outlive the node.
   static Result<std::unique_ptr<RobotNode>> open(RobotId robot, std::uint64_t session, const RobotNodeConfig& config,
                                                  const storage::TableStore& store);
 
@@ -110,7 +110,8 @@ class RobotNode {
   RobotNode(RobotId robot, const RobotNodeConfig& config, robot::AgentState state, const storage::TableStore& store)
       : config_(config), store_(store), agent_(robot, config.agent, std::move(state)), gate_(robot) {}
 
-  static Result<std::uint64_t> newest_session(const storage::TableStore& store);
+  /// Moves the checkpoint and the journal to where nothing reads them, with the next checkpoint.
+  Status set_aside(const wire::StateRows& checkpoint, std::uint64_t session);
   Status hear_again(const JournalEntry& entry);
   Status read_outbox();
   void hear(const OdometrySample& sample, Timestamp now, Step& step);
@@ -172,6 +173,7 @@ class RobotNode {
   wire::StoredState stored_;           // of the agent, in the checkpoint
   std::set<std::string> rows_;         // keys of the checkpoint
   std::vector<std::string> obsolete_;  // rows of the checkpoint, until the next one
+  std::vector<storage::Write> aside_;  // what could not be read, likewise
   std::optional<std::string> why_lost_;
   std::optional<std::pair<Timestamp, std::string>> session_begun_;  // when, and why
   bool is_new_ = false;                                             // there is no checkpoint yet

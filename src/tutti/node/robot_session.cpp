@@ -37,6 +37,18 @@ void RobotNode::change_session(const std::string& why, Timestamp now, Step& step
   step.tell(now, SessionBegun{agent_.robot(), session, why});
 }
 
+Status RobotNode::set_aside(const wire::StateRows& checkpoint, std::uint64_t session) {
+  const std::string prefix = kAside + std::to_string(session) + "/";
+  for (const auto& [key, bytes] : checkpoint) {
+    aside_.push_back({kCheckpoint, prefix + kCheckpoint + "/" + key, bytes});
+    obsolete_.push_back(key);
+  }
+  return store_.scan(kJournal, {}, [&](std::string_view key, std::string_view bytes) {
+    aside_.push_back({kCheckpoint, prefix + kJournal + "/" + std::string(key), std::string(bytes)});
+    return true;
+  });
+}
+
 void RobotNode::note_conflict(const Receipt& receipt, Timestamp now, Step& step) {
   owner_session_ = receipt.owner_session;
   const std::optional<std::string> before = std::exchange(conflict_, std::nullopt);

@@ -17,6 +17,7 @@
 #include "tutti/storage/sqlite_store.hpp"
 #include "tutti/wire/agent_state/agent_state.hpp"
 #include "tutti/wire/codec.hpp"
+#include "tutti/wire/frame.hpp"
 
 namespace tutti::node {
 namespace robot_state_test {
@@ -190,10 +191,141 @@ TEST_F(StoredRobot, WhoseStateCannotBeReadBeginsASessionAndKeepsItsOutbox) {
       EXPECT_EQ(resumed.messages.size(), 4U);
       ASSERT_TRUE(store.commit(resumed.writes).has_value());
       EXPECT_TRUE(store.tables().at("journal").empty());
+      const auto kept = store.tables().at("checkpoint");  // what is not understood is not removed
+      for (const char* from : {"checkpoint", "journal"})
+        for (const auto& [key, bytes] : tables.at(from))
+          EXPECT_EQ(kept.at(std::string("aside/101/") + from + "/" + key), bytes);
       Robot again(store, 7);
       EXPECT_TRUE(again.node->resume({}).events.empty());
       EXPECT_EQ(again.node->agent().chain().session, 102U);
     }
+}
+
+/// A robot's store with all that a state may have: a graph's constraints, a jump of odometry, a receiver, and scans and
+/// fixes that come before the odometry that they wait for.
+void walk_with_everything(storage::MemoryStore& store) {
+  Robot robot(store);
+  const auto done = [&](const Step& step) { ASSERT_TRUE(store.commit(step.writes).has_value()); };
+  done(robot.node->resume({}));
+  for (int i = 0; i < 125; ++i) {
+    const Timestamp now = Timestamp{} + 0.5 * i, later = robot::test::at(i) + 0.1;
+    const float x = 0.5F * static_cast<float>(i);
+    done(robot.node->add_scan({later, std::make_shared<const PointCloud>(PointCloud{{{x, 1.0F, 2.0F}}}), {}}, now));
+    done(robot.node->add_fix({.stamp = later, .antenna = {46.5, 6.6, 400.0 + i}}, now));
+    if (i == 110) robot.T_odom_body = Pose3{};
+    if (i == 100) done(robot.hear(robot::test::broadcast(robot.node->agent(), 1, robot::test::kWorld), now));
+    done(robot.walk(i));
+  }
+}
+
+/// tests/stored/robot_state_N.tutti: what the program of version N of the agent state made of walk_with_everything().
+/// Whoever raises the version writes the file of the new one: test_node --gtest_also_run_disabled_tests
+/// --gtest_filter='*WritesTheStoredFile'.
+std::filesystem::path stored_file(unsigned version) {
+  return tutti::test::source_path("tests/stored/robot_state_" + std::to_string(version) + ".tutti");
+}
+constexpr wire::MessageKind kState = wire::MessageKind::agent_state;
+
+TEST(RobotState, DISABLED_WritesTheStoredFile) {
+  storage::MemoryStore walked(storage::robot_schema());
+  walk_with_everything(walked);
+  std::vector<storage::Write> rows;
+  for (const auto& [table, of_table] : walked.tables())
+    for (const auto& [key, bytes] : of_table) rows.push_back({table, key, bytes});
+  const auto file = stored_file(wire::versions(kState).current);
+  std::filesystem::remove(file);
+  ASSERT_TRUE(storage::open_sqlite_store(file, storage::robot_schema(), {.min_free_bytes = 0}).value()->commit(rows));
+}
+
+storage::MemoryStore::Tables stored_tables(unsigned version) {
+  const auto file = std::filesystem::path(testing::TempDir()) / "robot_state.tutti";
+  std::filesystem::copy_file(stored_file(version), file, std::filesystem::copy_options::overwrite_existing);
+  const auto stored = storage::open_sqlite_store(file, storage::robot_schema(), {.min_free_bytes = 0}).value();
+  storage::MemoryStore::Tables tables;
+  for (const std::string& table : storage::robot_schema().tables)
+    EXPECT_TRUE(stored->scan(table, {}, [&](std::string_view key, std::string_view bytes) {
+      return tables[table].emplace(key, bytes).second;
+    }));
+  return tables;
+}
+
+/// Back and forth between the versions whose states are rows: what the program before wrote is read to the bit.
+TEST(RobotState, OfEveryVersionOnIsReadToTheBit) {
+  std::string before;
+  for (unsigned version = 4; version <= wire::versions(kState).current; ++version) {
+    SCOPED_TRACE(version);
+    const storage::MemoryStore store(storage::robot_schema(), stored_tables(version));
+    const auto tables = store.tables();
+    for (const auto& [key, bytes] : tables.at("checkpoint")) EXPECT_EQ(wire::version_of(bytes), version) << key;
+    const Robot robot(store, 7);
+    EXPECT_TRUE(robot.node->resume({}).events.empty());
+    EXPECT_EQ(robot.node->agent().chain().session, 101U);
+    EXPECT_GT(robot.node->agent().ledger().size(), 0U);
+    const std::string state = wire::encode(robot.node->agent().state());
+    if (!before.empty()) {
+      EXPECT_EQ(state, before);
+    }
+    before = state;
+  }
+}
+
+/// Whoever adds to what a row holds raises the version of the agent state (docs/storage.md): an older program of the
+/// same version would take the row for garbage.
+TEST(RobotState, IsWrittenAsItsVersionWasWhenItWasRaised) {
+  const auto tables = stored_tables(wire::versions(kState).current);
+  const auto& stored = tables.at("checkpoint");
+  auto state = wire::decode_state_rows({stored.begin(), stored.end()});
+  ASSERT_TRUE(state.has_value()) << state.error().message;
+  const robot::RobotAgent agent(kRobot, {}, std::move(*state));
+  wire::StoredState nothing;
+  const wire::StateRows rows = wire::changed_rows(agent, nothing).put;
+  const auto payload = [](const std::string& frame) { return wire::unpack_frame(kState, frame).value().payload; };
+  for (const char* key : {"head", "corrections"}) EXPECT_EQ(payload(rows.at(key)), payload(stored.at(key))) << key;
+}
+
+/// The next version is simulated by frames that are numbered one higher: the program before leaves them, begins a
+/// session, and keeps what waits; the next one, which is back, goes on with that.
+TEST(RobotState, OneVersionBackAndForthLosesNothing) {
+  auto tables = stored_tables(wire::versions(kState).current);
+  const std::size_t waiting = tables.at("outbox").size();
+  ASSERT_GT(waiting, 0U);
+  for (auto& [key, bytes] : tables.at("checkpoint")) ++bytes[2];  // the frame's version
+  storage::MemoryStore store(storage::robot_schema(), tables);
+  std::size_t made = 0;
+  {
+    Robot back(store, 7);
+    const Step resumed = back.node->resume({});
+    ASSERT_EQ(resumed.events.size(), 1U);
+    EXPECT_NE(std::get<StateLost>(resumed.events[0].what).why.find("of version"), std::string::npos);
+    EXPECT_NE(back.node->status({}).trouble.find("session 102"), std::string::npos);
+    EXPECT_EQ(back.node->status(Timestamp{} + 601.0).trouble, "");
+    ASSERT_TRUE(store.commit(resumed.writes).has_value());
+    for (int i = 0; i < 60; ++i) ASSERT_TRUE(store.commit(back.walk(i).writes).has_value());
+    made = back.node->backlog().size() - waiting;
+    EXPECT_GT(made, 0U);
+  }
+  Robot forth(store, 7);
+  EXPECT_TRUE(forth.node->resume({}).events.empty());
+  EXPECT_EQ(forth.node->agent().chain().session, 102U);
+  EXPECT_EQ(forth.node->backlog().size(), waiting + made);
+  for (const auto& [key, bytes] : tables.at("checkpoint"))
+    EXPECT_EQ(store.tables().at("checkpoint").at("aside/101/checkpoint/" + key), bytes);
+}
+
+TEST(RobotState, WithoutACheckpointNoSessionIsBegunTwice) {
+  storage::MemoryStore store(storage::robot_schema(), {{"meta", {{"session", storage::key_of({101})}}}});
+  EXPECT_EQ(Robot(store, 101).node->agent().chain().session, 102U);
+  EXPECT_EQ(Robot(store, 200).node->agent().chain().session, 200U);
+  EXPECT_EQ(Robot(storage::MemoryStore(storage::robot_schema()), 0).node->agent().chain().session, 0U);
+}
+
+/// Another version may have rows of its own there.
+TEST(RobotState, WhatIsNoSubmapInTheOutboxIsLeftAlone) {
+  storage::MemoryStore store(storage::robot_schema(), {{"outbox", {{"later", "1"}}}, {"archive", {{"later", ""}}}});
+  Robot robot(store);
+  EXPECT_TRUE(robot.node->backlog().empty());
+  ASSERT_TRUE(store.commit(robot.node->resume({}).writes).has_value());
+  EXPECT_TRUE(store.tables().at("outbox").contains("later"));
 }
 
 }  // namespace robot_state_test

@@ -186,11 +186,11 @@ Told tell(const node::RobotRefused& refused) {
       Level::warning};
 }
 Told tell(const node::StateLost& lost) {
-  return {
-      {{"event", "state_lost"}, {"robot", lost.robot.value}, {"session", lost.session}, {"why", lost.why}},
-      fmt::format("what was stored of this robot cannot be read; it begins session {}, submaps that wait are kept: {}",
-                  lost.session, lost.why),
-      Level::warning};
+  return {{{"event", "state_lost"}, {"robot", lost.robot.value}, {"session", lost.session}, {"why", lost.why}},
+          fmt::format("what was stored of this robot cannot be read; it is set aside, and session {} is begun; submaps "
+                      "that wait are kept: {}",
+                      lost.session, lost.why),
+          Level::warning};
 }
 Told tell(const node::SessionBegun& begun) {
   return {{{"event", "session_begun"}, {"robot", begun.robot.value}, {"session", begun.session}, {"why", begun.why}},

@@ -70,7 +70,8 @@ const char* name(MessageKind kind) {
 // evidence. Verdicts of a job: from 2 on with evidence. Proxy graph: up to 5 it told what it is unsure of in other
 // terms, which no robot compares any more, up to 6 not where others were last seen, and 7 said more of whole scales
 // than anybody needs; nobody keeps one. Cloud: came with 2, the same since. Receipt: 2 says what is refused, and whose
-// the number is. Agent state: 1 did not say how sure the robot is of where it is, 2 knew no images; 4 is rows.
+// the number is. Agent state: 1 did not say how sure the robot is of where it is, 2 knew no images; 4 is rows; 5 has
+// what grew under 4: waiting sensors, the watch of odometry's jumps, fixes.
 Versions versions(MessageKind kind) {
   switch (kind) {
     case MessageKind::submap:
@@ -97,7 +98,7 @@ Versions versions(MessageKind kind) {
     case MessageKind::refinement:
       return {.oldest = 1, .current = 1};
     case MessageKind::agent_state:
-      return {.oldest = 3, .current = 4};
+      return {.oldest = 3, .current = 5};
   }
   return {};
 }

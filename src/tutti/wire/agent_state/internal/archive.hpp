@@ -36,7 +36,8 @@ class Writer {
 /// Gives zeros where there is nothing more; is_complete() tells at the end.
 class Reader {
  public:
-  explicit Reader(const v1::AgentState& in) : in_(in) {}
+  /// `version`: of the frame. States of before kComplete may end early, at places where has_more() asks.
+  Reader(const v1::AgentState& in, std::uint16_t version) : in_(in), may_end_(version < kComplete) {}
   void integer(std::uint64_t& x) { x = next(in_.integer(), integers_); }
   void number(double& x) { x = next(in_.number(), numbers_); }
   void coordinate(float& x) { x = next(in_.coordinate(), coordinates_); }
@@ -50,7 +51,7 @@ class Reader {
     list.resize(short_ ? 0 : static_cast<std::size_t>(count));
     return list.size();
   }
-  [[nodiscard]] bool has_more() const { return integers_ < in_.integer_size(); }
+  [[nodiscard]] bool has_more() const { return !may_end_ || integers_ < in_.integer_size(); }
   [[nodiscard]] bool is_complete() const {
     return !short_ && integers_ == in_.integer_size() && numbers_ == in_.number_size() &&
            coordinates_ == in_.coordinate_size();
@@ -63,7 +64,9 @@ class Reader {
     short_ = true;
     return 0;
   }
+  static constexpr std::uint16_t kComplete = 5;
   const v1::AgentState& in_;
+  bool may_end_;
   int integers_ = 0, numbers_ = 0, coordinates_ = 0;
   bool short_ = false;
 };
