@@ -315,9 +315,12 @@ void add_map_command(CLI::App& app, int& exit_code) {
 
   const auto damaged = std::make_shared<std::string>(), whole = std::make_shared<std::string>();
   CLI::App* salvage = map->add_subcommand(
-      "salvage", "Copy every row of a damaged map that can be read into a new one, and say which cannot.");
-  salvage->footer("Example: tutti map salvage state/map.tutti -o salvaged.tutti\n");
-  salvage->add_option("map", *damaged, "The damaged map; it stays as it is.")->type_name("MAP")->required();
+      "salvage",
+      "Copy every row of a damaged map, or of a robot's store, that can be read into a new one, and say which cannot.");
+  salvage->footer(
+      "Example: tutti map salvage state/map.tutti -o salvaged.tutti\n"
+      "A robot does this by itself: what it set aside is state/robot.damaged-1.tutti.\n");
+  salvage->add_option("map", *damaged, "The damaged file; it stays as it is.")->type_name("MAP")->required();
   salvage->add_option("-o,--output", *whole, "The map to be made; it must not be there.")->type_name("MAP")->required();
   salvage->callback([damaged, whole, &exit_code] { exit_code = salvage_map(*damaged, *whole); });
 

@@ -110,7 +110,8 @@ Result<Salvaged> salvage_kind(const fs::path& in, const fs::path& out, std::span
 }  // namespace
 
 Result<Salvaged> salvage(const fs::path& in, const fs::path& out, std::uint64_t now_ns) {
-  return salvage_kind(in, out, {&storage::map_schema(), 1}, "", now_ns);
+  const std::array schemas{storage::map_schema(), storage::robot_schema()};
+  return salvage_kind(in, out, schemas, "it was damaged, and salvaged by hand", now_ns);
 }
 
 Result<Salvaged> salvage_robot(const fs::path& in, const fs::path& out, const std::string& why, std::uint64_t now_ns) {

@@ -7,8 +7,10 @@
 #include <set>
 
 #include "support/mapfile/small_map.hpp"
+#include "support/paths.hpp"
 #include "tutti/base/file.hpp"
 #include "tutti/mapfile/content.hpp"
+#include "tutti/node/robot_node.hpp"
 #include "tutti/storage/sqlite_store.hpp"
 
 namespace tutti::mapfile {
@@ -102,6 +104,30 @@ TEST_F(SalvagedMap, OfNoBytesIsRefused) {
   ASSERT_TRUE(write_file(map_.string(), ""));
   EXPECT_NE(open(map_).error().message.find("0 bytes"), std::string::npos) << open(map_).error().message;
   EXPECT_FALSE(salvage(map_, out_, kNow_ns).has_value());
+}
+
+TEST_F(SalvagedMap, ARobotsStoreGivesItsSubmapsAndBeginsASession) {
+  const fs::path file = folder_ / "robot.tutti";
+  fs::copy_file(tutti::test::source_path("tests/stored/robot_1.tutti"), file);  // four submaps wait
+  std::string bytes = read_file(file.string()).value();
+  bytes.replace(0, 4096, 4096, '\x55');
+  ASSERT_TRUE(write_file(file.string(), bytes));
+  const auto salvaged = salvage(file, out_, kNow_ns);
+  ASSERT_TRUE(salvaged.has_value()) << salvaged.error().message;
+  EXPECT_EQ(salvaged->kind, "robot");
+  EXPECT_EQ(salvaged->rows.at("outbox"), 4U);
+  EXPECT_FALSE(salvaged->rows.contains("checkpoint"));
+  const auto store = storage::open_sqlite_store(out_, storage::robot_schema(), {.min_free_bytes = 0}).value();
+  const auto robot = node::RobotNode::open(RobotId{1}, 7, {}, *store);
+  ASSERT_TRUE(robot.has_value()) << robot.error().message;
+  EXPECT_EQ((*robot)->backlog().size(), 4U);
+  EXPECT_EQ((*robot)->agent().chain().session, kNow_ns + 1);
+  const node::Step step = (*robot)->resume({});
+  ASSERT_EQ(step.events.size(), 1U);
+  EXPECT_TRUE(std::holds_alternative<node::StateLost>(step.events[0].what));
+  EXPECT_NE((*robot)->status({}).trouble.find("salvaged by hand"), std::string::npos) << (*robot)->status({}).trouble;
+  ASSERT_TRUE(store->commit(step.writes).has_value());
+  EXPECT_TRUE(node::RobotNode::open(RobotId{1}, 7, {}, *store).value()->resume({}).events.empty());
 }
 
 TEST_F(SalvagedMap, IsNotThereWhenItFails) {
