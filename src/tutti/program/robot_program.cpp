@@ -17,7 +17,6 @@
 #include "tutti/program/server_program.hpp"
 #include "tutti/program/state_folder.hpp"
 #include "tutti/program/stop.hpp"
-#include "tutti/storage/sqlite_store.hpp"
 #include "tutti/wire/message_kind.hpp"
 
 namespace tutti::program {
@@ -181,9 +180,10 @@ Status RobotProgram::start() {
   auto log = EventLog::open(folder_->path(), options_.name, options_.console);
   if (!log) return tl::unexpected(log.error());
   log_ = std::move(*log);
-  auto store = storage::open_sqlite_store(folder_->path() / kRobotFile, storage::robot_schema());
-  if (!store) return tl::unexpected(store.error());
-  store_ = std::move(*store);
+  auto stored = open_robot_store(folder_->path(), wall_clock_ns());
+  if (!stored) return tl::unexpected(stored.error());
+  store_ = std::move(stored->store);
+  if (!stored->damage.empty()) log_->say(Level::error, stored->damage);
   const auto driver = open_driver();  // where the recording stood
   if (!driver) return in_context((folder_->path() / kRobotFile).string(), driver.error());
   clock_.emplace(options_.rate, begin_s(**driver));

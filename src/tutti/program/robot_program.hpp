@@ -17,13 +17,13 @@
 #include "tutti/program/event_log.hpp"
 #include "tutti/program/feed/feed_server.hpp"
 #include "tutti/program/robot_driver.hpp"
+#include "tutti/program/robot_store.hpp"
 #include "tutti/robot/agent.hpp"
 #include "tutti/robot/odometry_covariance.hpp"
 
 namespace tutti::program {
 
-inline constexpr const char* kRobotFile = "robot.tutti";  ///< In a robot's state folder.
-inline constexpr const char* kEnded = "ended";            ///< The program's last event, which has its traffic.
+inline constexpr const char* kEnded = "ended";  ///< The program's last event, which has its traffic.
 
 /// How a client that feeds a robot's raw messages is to interpret them.
 struct DriverSettings {
