@@ -211,6 +211,7 @@ std::map<std::string, std::vector<std::string>> seeds() {
                 "element face 1\nproperty list uchar int vertex_indices\nend_header\n1 2 3\n4 5 6\n3 0 1 0\n"};
   add_images(out);
   add_bags(out);
+  out.merge(store_seeds());
   return out;
 }
 

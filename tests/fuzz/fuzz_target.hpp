@@ -18,6 +18,11 @@ const std::map<std::string, Target>& targets();
 inline constexpr char kNextFile = '\x1e';
 /// The graph that deltas of these inputs are against.
 const ProxyGraph& delta_base();
+/// Of fuzz_stores.cpp.
+void fixes(std::string_view bytes);
+void meta_rows(std::string_view bytes);
+void salvage(std::string_view bytes);
+std::map<std::string, std::vector<std::string>> store_seeds();
 /// Valid inputs to begin with; made from the tests' messages. Those in tests/fuzz/corpus were.
 std::map<std::string, std::vector<std::string>> seeds();
 
