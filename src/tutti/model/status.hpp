@@ -29,7 +29,8 @@ struct NodeStatus {
   /// Time since it used that graph; nothing when it has used none since its start.
   std::optional<double> update_age_s;
   std::uint64_t keyframes = 0;
-  Pose3 T_odom_body;  ///< Of a robot, at its newest sample.
+  std::optional<std::uint64_t> submaps;  ///< Number of submaps that a robot has begun in its session.
+  Pose3 T_odom_body;                     ///< Of a robot, at its newest sample.
   std::uint64_t alerts = 0;
   bool finished = false;        ///< Its recording has ended.
   std::uint64_t jobs_done = 0;  ///< A worker's jobs since it started.
@@ -45,7 +46,7 @@ struct MissionStatus {
     std::optional<Timestamp> last_seen;    ///< Nothing when the robot was not heard since the server started.
     std::optional<Timestamp> last_update;  ///< When the robot last used a proxy graph.
     std::uint64_t submaps = 0;             ///< Submaps in the map, over all sessions.
-    std::uint64_t refused = 0;             ///< Submaps that the map does not take.
+    std::uint64_t refused = 0;             ///< Submaps of the robot that the map does not take.
     std::string conflict;  ///< Why another program that claims to be this robot is refused; empty when there is none.
     NodeStatus status;     ///< The latest status of the session that owns the robot's name and number.
     std::uint64_t unread = 0;  ///< Submaps in versions that the server cannot read, which the robot keeps.

@@ -344,6 +344,7 @@ NodeStatus RobotNode::status(Timestamp now) const {
                     .heard_revision = agent_.map_age().second,
                     .update_age_s = {},
                     .keyframes = agent_.keyframes().size(),
+                    .submaps = agent_.submap_of().empty() ? 0 : agent_.submap_of().back() + std::uint64_t{1},
                     .T_odom_body = agent_.T_odom_body(),
                     .alerts = alerts_,
                     .finished = finished_,

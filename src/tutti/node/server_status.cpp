@@ -2,6 +2,7 @@
 // What a ServerNode knows of the others, and says of the whole.
 #include <algorithm>
 #include <functional>
+#include <limits>
 
 #include "tutti/base/plain_text.hpp"
 #include "tutti/node/server_node.hpp"
@@ -18,6 +19,22 @@ std::uint64_t count(const std::map<std::uint64_t, NumberSet>& sessions) {
   std::uint64_t all = 0;
   for (const auto& [session, numbers] : sessions)
     for (const auto& [begin, end] : numbers.stretches()) all += end - begin;
+  return all;
+}
+
+/// How many refused submaps are the robot's: of numbers that it has used, by its own word or because a later one is in
+/// the map. Others are garbage that anybody may have sent.
+std::uint64_t count_refused(const Receipt& receipt, const NodeStatus& status) {
+  std::uint64_t all = 0;
+  for (const auto& [session, numbers] : receipt.refused) {
+    std::uint64_t used = 0;
+    if (const auto stored = receipt.stored.find(session); stored != receipt.stored.end())
+      for (const NumberSet::Stretch& stretch : stored->second.stretches()) used = stretch.end;
+    if (session == status.session && !status.name.empty())  // older robots do not say it
+      used = std::max(used, status.submaps.value_or(std::numeric_limits<std::uint64_t>::max()));
+    for (const NumberSet::Stretch& stretch : numbers.stretches())
+      all += std::min(stretch.end, used) - std::min(stretch.begin, used);
+  }
   return all;
 }
 
@@ -124,7 +141,8 @@ MissionStatus ServerNode::mission_status(Timestamp now) const {
     entry.robot = robot;
     if (const Receipt* const told = receipts_.find(robot)) {
       entry.submaps = count(told->stored);
-      entry.refused = count(told->refused);
+      const auto known = registry_.robots().find(robot);
+      entry.refused = count_refused(*told, known == registry_.robots().end() ? NodeStatus{} : known->second.status);
       entry.unread = count(told->unread);
     }
     if (const auto found = registry_.robots().find(robot); found != registry_.robots().end()) {

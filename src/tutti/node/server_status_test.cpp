@@ -250,10 +250,36 @@ TEST_F(ServerStatus, WhatItNeverTakesIsInTheReceiptAndSurvivesARestart) {
   };
   check();
   EXPECT_EQ(store_->tables().at("submaps").size(), 1U);
+  EXPECT_EQ(node_->mission_status(now_).robots[0].refused, 0U);  // they may be anybody's
+  hear(kAlpha, "alpha", 7);                                      // an older robot, which does not say how many it made
   EXPECT_EQ(node_->mission_status(now_).robots[0].refused, 3U);
   receipts_.clear();
   restart();
   check();
+}
+
+/// Of numbers that the robot has not used, what is refused is not its own, and is not told as that; it was told for
+/// ever.
+TEST_F(ServerStatus, GarbageUnderNumbersThatARobotNeverUsedIsNotTheRobots) {
+  const ChainId chain{kAlpha, 7};
+  receive(test::envelope(test::submap(chain, 0)));
+  bus::Envelope garbage = test::envelope(test::submap(chain, 1));
+  garbage.bytes = std::make_shared<const std::string>("TU garbage");
+  for (const SubmapId id : {SubmapId{chain, 1}, {chain, 5}, {chain, 6}, {{kAlpha, 8}, 0}}) {
+    garbage.id = message_id(id);
+    receive(garbage);
+  }
+  const auto refused = [&](std::uint64_t submaps) {
+    receive(to_server(Endpoint::of(kAlpha), {.name = "alpha", .session = 7, .start = 2, .submaps = submaps}));
+    return node_->mission_status(now_).robots.at(0).refused;
+  };
+  EXPECT_EQ(refused(1), 0U);
+  EXPECT_EQ(refused(3), 1U);
+  receive(test::envelope(test::submap(chain, 2)));
+  EXPECT_EQ(refused(3), 1U);  // one was really lost
+  receive(test::envelope(test::submap(chain, 1)));
+  EXPECT_EQ(refused(3), 0U);
+  EXPECT_EQ(node_->mission_status(now_).refusals.at(0).count, 4U);
 }
 
 TEST_F(ServerStatus, OfOneIdTheFirstContentStays) {

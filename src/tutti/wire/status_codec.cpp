@@ -41,6 +41,7 @@ void write(const NodeStatus& status, v1::Status& out) {
   out.set_heard_revision(status.heard_revision);
   if (status.update_age_s) out.set_update_age_s(*status.update_age_s);
   out.set_keyframes(status.keyframes);
+  if (status.submaps) out.set_submaps(*status.submaps);
   if (!(status.T_odom_body == Pose3{})) wire::write(status.T_odom_body, *out.mutable_pose());
   out.set_alerts(status.alerts);
   out.set_finished(status.finished);
@@ -60,6 +61,7 @@ Result<NodeStatus> read(const v1::Status& in) {
                     .heard_revision = in.heard_revision(),
                     .update_age_s = {},
                     .keyframes = in.keyframes(),
+                    .submaps = {},
                     .T_odom_body = {},
                     .alerts = in.alerts(),
                     .finished = in.finished(),
@@ -67,6 +69,7 @@ Result<NodeStatus> read(const v1::Status& in) {
                     .trouble = in.trouble(),
                     .can = {}};
   for (const v1::Method& id : in.can()) status.can.push_back(wire::read(id));
+  if (in.has_submaps()) status.submaps = in.submaps();
   if (in.has_update_age_s()) status.update_age_s = in.update_age_s();
   if (in.pose_size() == kPoseNumbers)
     status.T_odom_body = read_pose(in.pose(), 0);

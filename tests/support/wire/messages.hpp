@@ -223,6 +223,7 @@ inline NodeStatus any_status(Rng& rng) {
                     .can = {}};
   for (std::uint64_t i = rng.index(3); i > 0; --i) status.can.push_back({"visual", 2, i - 1});
   if (rng.bernoulli(0.5)) status.update_age_s = rng.uniform(0.0, 1e4);
+  if (rng.bernoulli(0.5)) status.submaps = count();
   return status;
 }
 
