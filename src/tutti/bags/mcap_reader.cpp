@@ -228,7 +228,7 @@ Status McapReader::enter_chunk(const Record& record, bool cut) {
   const auto packed_size = cursor.number<std::uint64_t>("length of the records");
   const std::string_view packed = cursor.take(cut ? cursor.left() : packed_size, "records");
   if (!cursor.ok()) return cut ? Status{} : fail_at(record, ErrorCode::parse, "{}", *cursor.error());
-  auto chunk = internal::unpack_chunk(packed, compression, size, cut);
+  auto chunk = internal::unpack_chunk(packed, compression, size, cut, std::exchange(chunk_, {}));
   if (!chunk) return fail_at(record, chunk.error().code, "{}", chunk.error().message);
   if (const auto found = internal::crc32(*chunk); !cut && crc != 0 && found != crc)
     return fail_at(record, ErrorCode::parse, "CRC {:08x}, expected {:08x}: its bytes have changed", found, crc);

@@ -229,7 +229,8 @@ Result<std::optional<BagMessage>> Ros1Reader::take(const Record& record, std::st
 }
 
 Status Ros1Reader::enter_chunk(const Record& record) {
-  auto chunk = internal::unpack_chunk(data_, record.compression == "none" ? "" : record.compression, record.size, cut_);
+  auto chunk = internal::unpack_chunk(data_, record.compression == "none" ? "" : record.compression, record.size, cut_,
+                                      std::exchange(chunk_, {}));
   if (!chunk) return fail_at(record.position, chunk.error().code, "chunk: {}", chunk.error().message);
   data_.clear();
   data_.shrink_to_fit();  // the packed chunk is not held beside the unpacked one

@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <limits>
 #include <memory>
+#include <utility>
 
 #include "tutti/base/check.hpp"
 
@@ -27,13 +28,14 @@ struct Progress {
 
 /// `step(in, out, room)` unpacks some of `in`. Of a chunk that is cut off as much as may come of what is there.
 template <class Step>
-Result<std::string> unpack(std::string_view packed, std::uint64_t size, bool cut, const char* name, const Step& step) {
+Result<std::string> unpack(std::string_view packed, std::uint64_t size, bool cut, std::string out, const char* name,
+                           const Step& step) {
   const std::uint64_t most = most_unpacked(packed.size());
   if (size > most && !cut)
     return fail(ErrorCode::unsupported, "{}: {} bytes unpack to {}, expected at most {}", name, packed.size(), size,
                 most);
   const std::uint64_t wanted = std::min(size, most);
-  std::string out;
+  out.clear();
   std::size_t filled = 0;
   bool ended = false;
   while (true) {
@@ -54,9 +56,9 @@ Result<std::string> unpack(std::string_view packed, std::uint64_t size, bool cut
   return out;
 }
 
-Result<std::string> unpack_zstd(std::string_view packed, std::uint64_t size, bool cut) {
+Result<std::string> unpack_zstd(std::string_view packed, std::uint64_t size, bool cut, std::string memory) {
   const std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context(ZSTD_createDCtx(), ZSTD_freeDCtx);
-  return unpack(packed, size, cut, "zstd", [&](std::string_view in, char* out, std::size_t room) {
+  return unpack(packed, size, cut, std::move(memory), "zstd", [&](std::string_view in, char* out, std::size_t room) {
     ZSTD_inBuffer from{in.data(), in.size(), 0};
     ZSTD_outBuffer to{out, room, 0};
     const std::size_t hint = ZSTD_decompressStream(context.get(), &to, &from);
@@ -64,13 +66,13 @@ Result<std::string> unpack_zstd(std::string_view packed, std::uint64_t size, boo
   });
 }
 
-Result<std::string> unpack_lz4(std::string_view packed, std::uint64_t size, bool cut) {
+Result<std::string> unpack_lz4(std::string_view packed, std::uint64_t size, bool cut, std::string memory) {
   LZ4F_dctx* made = nullptr;
   if (LZ4F_isError(LZ4F_createDecompressionContext(&made, LZ4F_VERSION)))
     return fail(ErrorCode::io, "lz4: no memory for a decoder");
   const std::unique_ptr<LZ4F_dctx, decltype(&LZ4F_freeDecompressionContext)> context(made,
                                                                                      LZ4F_freeDecompressionContext);
-  return unpack(packed, size, cut, "lz4", [&](std::string_view in, char* out, std::size_t room) {
+  return unpack(packed, size, cut, std::move(memory), "lz4", [&](std::string_view in, char* out, std::size_t room) {
     std::size_t taken = in.size(), written = room;
     const std::size_t hint = LZ4F_decompress(context.get(), out, &written, in.data(), &taken, nullptr);
     if (LZ4F_isError(hint)) return Progress{0, 0, false, LZ4F_getErrorName(hint)};
@@ -79,12 +81,12 @@ Result<std::string> unpack_lz4(std::string_view packed, std::uint64_t size, bool
 }
 
 /// In one stream, as ROS 1 writes it.
-Result<std::string> unpack_bz2(std::string_view packed, std::uint64_t size, bool cut) {
+Result<std::string> unpack_bz2(std::string_view packed, std::uint64_t size, bool cut, std::string memory) {
   bz_stream stream{};
   if (BZ2_bzDecompressInit(&stream, 0, 0) != BZ_OK) return fail(ErrorCode::io, "bz2: no memory for a decoder");
   const std::unique_ptr<bz_stream, decltype(&BZ2_bzDecompressEnd)> end(&stream, BZ2_bzDecompressEnd);
   bool ended = false;
-  return unpack(packed, size, cut, "bz2", [&](std::string_view in, char* out, std::size_t room) {
+  return unpack(packed, size, cut, std::move(memory), "bz2", [&](std::string_view in, char* out, std::size_t room) {
     if (ended) return Progress{0, 0, true, in.empty() ? nullptr : "bytes behind its end"};
     const auto most = [](std::size_t bytes) {
       return static_cast<unsigned>(std::min<std::size_t>(bytes, std::numeric_limits<unsigned>::max()));
@@ -116,16 +118,18 @@ std::string pack_zstd(std::string_view bytes) {
   return out;
 }
 
-Result<std::string> unpack_chunk(std::string_view packed, std::string_view compression, std::uint64_t size, bool cut) {
+Result<std::string> unpack_chunk(std::string_view packed, std::string_view compression, std::uint64_t size, bool cut,
+                                 std::string memory) {
   if (size > kMaxChunkBytes)
     return fail(ErrorCode::unsupported, "unpacks to {} bytes, expected at most {}", size, kMaxChunkBytes);
   if (compression.empty()) {
     if (!cut && packed.size() != size) return fail(ErrorCode::parse, "has {} bytes, expected {}", packed.size(), size);
-    return std::string(packed);
+    memory.assign(packed);
+    return memory;
   }
-  if (compression == "zstd") return unpack_zstd(packed, size, cut);
-  if (compression == "lz4") return unpack_lz4(packed, size, cut);
-  if (compression == "bz2") return unpack_bz2(packed, size, cut);
+  if (compression == "zstd") return unpack_zstd(packed, size, cut, std::move(memory));
+  if (compression == "lz4") return unpack_lz4(packed, size, cut, std::move(memory));
+  if (compression == "bz2") return unpack_bz2(packed, size, cut, std::move(memory));
   return fail(ErrorCode::unsupported, "compression '{:.40}', expected none, zstd, lz4 or bz2", compression);
 }
 
