@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A fuzzer that any compiler builds: mutations of the corpus, always the same ones in the same order, for so
-// many seconds. What fails is written to a file, which replays it.
+// many seconds. Some inputs are grown, up to a million bytes. What fails, or takes too much time or memory, is written
+// to a file, which replays it.
 //   tutti_fuzz TARGET SECONDS CORPUS [SEED]    tries mutations of the files in CORPUS/TARGET
 //   tutti_fuzz TARGET FILE                     tries this input
 //   tutti_fuzz --write-seeds CORPUS            writes the seeds
 //   tutti_fuzz --check CORPUS TARGET...        fails unless these are all targets, with a corpus each
+#include <fmt/format.h>
+#include <sys/resource.h>
+
 #include <algorithm>
 #include <csignal>
 #include <cstdint>
@@ -28,8 +32,15 @@ namespace {
 namespace fs = std::filesystem;
 using namespace tutti;  // NOLINT
 
-constexpr std::size_t kMostBytes = 64U << 10U;
-constexpr double kMostCpu_s = 5.0;  // for one input
+constexpr std::size_t kMegabyte = 1U << 20U;
+constexpr std::size_t kMostBytes = 64U << 10U, kMostGrown = kMegabyte;
+constexpr std::uint64_t kGrownFirst = 2;  // before any other input
+constexpr double kGrown = 0.002;          // the share of the others
+constexpr double kSanitized = 5.0;        // times slower
+
+/// What one input may cost.
+double most_cpu_s(std::size_t size) { return 5.0 + 1e-5 * static_cast<double>(size); }
+std::size_t most_memory(std::size_t size) { return 256 * kMegabyte + 256 * size; }
 
 std::string input;  // in hand, for those who come after a crash
 std::string target_name;
@@ -38,6 +49,21 @@ void keep_input() {
   const std::string path = "fuzz-" + target_name + ".bin";
   static_cast<void>(write_file(path, input));
   std::fprintf(stderr, "the input is in %s (%zu bytes)\n", path.c_str(), input.size());
+}
+
+bool is_sanitized() { return __sanitizer_set_death_callback != nullptr; }
+
+/// The most that this process held since forget_peak().
+std::size_t peak_memory() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::size_t>(usage.ru_maxrss) << 10U;
+}
+void forget_peak() {
+  if (std::FILE* file = std::fopen("/proc/self/clear_refs", "w"); file != nullptr) {
+    std::fputs("5", file);
+    std::fclose(file);
+  }
 }
 
 double cpu_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
@@ -88,19 +114,37 @@ std::string mutated(const std::vector<std::string>& corpus, Rng& rng) {
   return bytes;
 }
 
+/// Much of one thing: a few bytes of an input, again and again.
+std::string grown(const std::vector<std::string>& corpus, Rng& rng) {
+  std::string bytes = mutated(corpus, rng);
+  const std::size_t at = rng.index(bytes.size() + 1), length = 1 + rng.index(rng.bernoulli(0.5) ? 8 : 1'000);
+  const std::string part = at < bytes.size() ? bytes.substr(at, length) : odd(rng);
+  std::string run;
+  for (const std::size_t size = kMostBytes + rng.index(kMostGrown - kMostBytes); run.size() < size;) run += part;
+  return bytes.insert(at, run);
+}
+
+[[noreturn]] void give_up(const std::string& why) {
+  std::fprintf(stderr, "%s: %s\n", target_name.c_str(), why.c_str());
+  keep_input();
+  std::exit(1);
+}
+
 void try_input(fuzz::Target target) {
   const double begin_s = cpu_s();
+  const std::size_t before = peak_memory();
   try {
     target(input);
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s: %s\n", target_name.c_str(), error.what());
-    keep_input();
-    std::exit(1);
+    give_up(error.what());
   }
-  if (cpu_s() - begin_s < kMostCpu_s) return;
-  std::fprintf(stderr, "%s: an input of %zu bytes took %.1f s\n", target_name.c_str(), input.size(), cpu_s() - begin_s);
-  keep_input();
-  std::exit(1);
+  const std::size_t size = input.size();
+  if (const double took_s = cpu_s() - begin_s; took_s > most_cpu_s(size) * (is_sanitized() ? kSanitized : 1.0))
+    give_up(fmt::format("an input of {} bytes took {:.1f} s of CPU", size, took_s));
+  const std::size_t memory = peak_memory() - before;
+  if (memory > most_memory(size) && !is_sanitized())  // sanitizers keep what is freed
+    give_up(fmt::format("an input of {} bytes took {} MB", size, memory / kMegabyte));
+  if (memory > kMegabyte) forget_peak();
 }
 
 int fuzz_target(fuzz::Target target, double seconds, const fs::path& folder, std::uint64_t seed) {
@@ -112,8 +156,8 @@ int fuzz_target(fuzz::Target target, double seconds, const fs::path& folder, std
   for (const std::string& bytes : corpus) try_input((input = bytes, target));
   Rng rng(seed);
   std::uint64_t tried = 0;
-  for (const double end_s = cpu_s() + seconds; cpu_s() < end_s; ++tried) {
-    input = mutated(corpus, rng);
+  for (const double end_s = cpu_s() + seconds; cpu_s() < end_s || tried < kGrownFirst; ++tried) {
+    input = tried < kGrownFirst || rng.bernoulli(kGrown) ? grown(corpus, rng) : mutated(corpus, rng);
     try_input(target);
   }
   std::printf("%s: %llu inputs, seed %llu\n", target_name.c_str(), static_cast<unsigned long long>(tried),

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <unistd.h>
+
+#include <filesystem>
 #include <initializer_list>
 #include <memory>
 
@@ -8,6 +11,7 @@
 #include "support/robot/drifting_robot.hpp"
 #include "support/wire/messages.hpp"
 #include "support/wire/visual.hpp"
+#include "tutti/base/file.hpp"
 #include "tutti/bus/lease_holder.hpp"
 #include "tutti/formats/image_file.hpp"
 #include "tutti/formats/ply.hpp"
@@ -89,6 +93,19 @@ void add_images(std::map<std::string, std::vector<std::string>>& out) {
 }
 
 /// Chunks without CRC: few mutations would pass one.
+/// In small pages.
+std::string small_db3(const std::vector<bags::test::Sample>& samples) {
+  const auto file = std::filesystem::temp_directory_path() / fmt::format("tutti_fuzz_{}.db3", getpid());
+  bags::test::write_db3(file, samples);
+  sqlite3* db = nullptr;
+  sqlite3_open(file.c_str(), &db);
+  sqlite3_exec(db, "PRAGMA page_size=512; VACUUM", nullptr, nullptr, nullptr);
+  sqlite3_close(db);
+  std::string bytes = read_file(file).value();
+  std::filesystem::remove(file);
+  return bytes;
+}
+
 void add_bags(std::map<std::string, std::vector<std::string>>& out) {
   using namespace bags::test;
   const std::string definitions = joined({schema(1, "nav_msgs/msg/Odometry"), channel(1, 1, "/odom")});
@@ -101,6 +118,7 @@ void add_bags(std::map<std::string, std::vector<std::string>>& out) {
                                     {"/points", "sensor_msgs/msg/PointCloud2", 7, point_cloud(2)}};
   for (const char* const compression : {"none", "bz2", "lz4"})
     out["ros1_bag"].push_back(bags::test::ros1_bag(samples, compression, 1));
+  out["db3"] = {small_db3(samples)};
   out["rosbag2_metadata"] = {metadata_of({"bag_0.mcap", "bag_1.mcap.zstd"}, 12)};
   for (const int how : {0, 1, 2}) {
     char type = '\0';
@@ -209,6 +227,10 @@ std::map<std::string, std::vector<std::string>> seeds() {
   out["ply"] = {formats::to_ply(std::vector<Eigen::Vector3f>{{1, 2, 3}, {4, 5, 6}}),
                 "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n"
                 "element face 1\nproperty list uchar int vertex_indices\nend_header\n1 2 3\n4 5 6\n3 0 1 0\n"};
+  out["yaml"] = {
+      "max_clients: 4\nblend: &b {a: 1.5, 'b c': [x, ~, \"\\n\"]}\nmore: [*b, *b, {}, []]\n"
+      "? key\n: |\n  text\n  more\n",
+      "# nothing\n- - 1\n  - !tag 2\n-\n"};
   add_images(out);
   add_bags(out);
   out.merge(store_seeds());

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <sys/mman.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <memory>
 #include <sstream>
@@ -8,6 +11,7 @@
 #include "support/wire/messages.hpp"
 #include "tutti/bags/bag_info.hpp"
 #include "tutti/bags/camera.hpp"
+#include "tutti/bags/db3_reader.hpp"
 #include "tutti/bags/depth.hpp"
 #include "tutti/bags/mcap_reader.hpp"
 #include "tutti/bags/point_cloud.hpp"
@@ -15,6 +19,7 @@
 #include "tutti/bags/ros_messages.hpp"
 #include "tutti/bags/rosbag2_metadata.hpp"
 #include "tutti/base/check.hpp"
+#include "tutti/base/config_io.hpp"
 #include "tutti/bus/bus_address.hpp"
 #include "tutti/bus/delivery.hpp"
 #include "tutti/bus/internal/nats_names.hpp"
@@ -33,6 +38,7 @@
 #include "tutti/formats/trajectory_file.hpp"
 #include "tutti/node/journal.hpp"
 #include "tutti/program/feed/feed_frames.hpp"
+#include "tutti/program/feed/feed_settings.hpp"
 #include "tutti/wire/agent_state/agent_state.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
@@ -180,8 +186,24 @@ void ros1_bag(std::string_view bytes) {
   auto bag = bags::Ros1Reader::open(std::make_unique<std::istringstream>(std::string(bytes)), "fuzz");
   if (bag) add_up(*bag);
 }
+/// In a file of memory: SQLite reads no bytes.
+void db3(std::string_view bytes) {
+  static const int file = memfd_create("fuzz.db3", MFD_CLOEXEC);
+  TUTTI_CHECK(ftruncate(file, 0) == 0 && pwrite(file, bytes.data(), bytes.size(), 0) == std::ssize(bytes));
+  auto bag = bags::Db3Reader::open(fmt::format("/proc/self/fd/{}", file));
+  if (bag) add_up(*bag);
+}
 void rosbag2_metadata(std::string_view bytes) {
   static_cast<void>(bags::parse_rosbag2_metadata(std::string(bytes), "fuzz"));
+}
+/// What was read can be written; and a message about its keys is short.
+void yaml(std::string_view bytes) {
+  const auto node = parse_yaml(std::string(bytes), "fuzz");
+  if (!node) return;
+  static_cast<void>(parse_yaml(to_yaml(*node), "again"));
+  program::FeedSettings settings;
+  if (const Status read = load_config(*node, settings, "fuzz"); !read)
+    TUTTI_CHECK(read.error().message.size() < 100'000, "a message of {} letters", read.error().message.size());
 }
 /// The first byte says which type. What is a cloud is one of points, too, and an image a picture or depth.
 void message(std::string_view bytes, bags::RosEncoding encoding) {
@@ -280,6 +302,7 @@ const std::map<std::string, Target>& targets() {
       {"cameras", cameras},
       {"cdr", cdr},
       {"cloud", cloud},
+      {"db3", db3},
       {"euroc_csv", file<formats::parse_euroc_csv>},
       {"feed", feed},
       {"feed_message", feed_message},
@@ -321,6 +344,7 @@ const std::map<std::string, Target>& targets() {
       {"verdict", verdict},
       {"verdicts", verdicts},
       {"word", word},
+      {"yaml", yaml},
   };
   return all;
 }
