@@ -93,7 +93,7 @@ class FleetTwin : public testing::Test {
 };
 
 TEST_F(FleetTwin, IsAMissionFromItsOdometryToTheCorrectedRobots) {
-  ASSERT_TRUE(formats::write_pyfg((folder_ / "twin.pyfg").string(), test::fleet_graph(1)));
+  ASSERT_TRUE(formats::write_pyfg((folder_ / "twin.pyfg").string(), fleets::fleet_graph(1)));
   const FleetRun run = run_fleet("twin.pyfg", folder_, {"compare_policies=[every_node,spectral,skeleton]"});
   expect_the_graph(run);
   const MissionRecord& record = run.record;
@@ -113,9 +113,9 @@ TEST_F(FleetTwin, IsAMissionFromItsOdometryToTheCorrectedRobots) {
 }
 
 TEST_F(FleetTwin, IsTheSameAsJrl) {
-  const formats::PyfgFile graph = test::fleet_graph(2, 120.0);
+  const formats::PyfgFile graph = fleets::fleet_graph(2, 120.0);
   ASSERT_TRUE(formats::write_pyfg((folder_ / "twin.pyfg").string(), graph));
-  ASSERT_TRUE(write_file((folder_ / "twin.jrl").string(), formats::test::to_jrl(graph)));
+  ASSERT_TRUE(write_file((folder_ / "twin.jrl").string(), formats::jrl_files::to_jrl(graph)));
   const MissionRecord pyfg = run_fleet("twin.pyfg", folder_).record, jrl = run_fleet("twin.jrl", folder_).record;
   ASSERT_EQ(pyfg.robots.size(), jrl.robots.size());
   EXPECT_EQ(pyfg.server.closures.size(), jrl.server.closures.size());
@@ -125,7 +125,7 @@ TEST_F(FleetTwin, IsTheSameAsJrl) {
 }
 
 TEST_F(FleetTwin, OfOneRobotOrWithoutTruthRuns) {
-  formats::PyfgFile graph = test::fleet_graph(3, 120.0);
+  formats::PyfgFile graph = fleets::fleet_graph(3, 120.0);
   for (auto& vertex : graph.vertices) vertex.pose.reset();
   const auto is_of_others = [&](const formats::PyfgEdge& edge) {
     return graph.vertices[edge.from].name.robot != 'a' || graph.vertices[edge.to].name.robot != 'a';

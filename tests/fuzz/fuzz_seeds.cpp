@@ -214,7 +214,7 @@ std::map<std::string, std::vector<std::string>> seeds() {
       "VERTEX_SE3:QUAT 0.5 A0 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 1.5 B12 1 0 0 0 0 0 1\n"
       "VERTEX_SE3:QUAT:PRIOR 0.5 A0 0 0 0 0 0 0 1 9 0 0 0 0 0 9 0 0 0 0 9 0 0 0 9 0 0 9 0 9\n"
       "EDGE_SE3:QUAT 1.5 A0 B12 1 0 0 0 0 0 1 9 0 0 0 0 0 9 0 0 0 0 9 0 0 0 9 0 0 9 0 9\n"};
-  out["jrl"] = {formats::test::to_jrl(*formats::parse_pyfg(
+  out["jrl"] = {formats::jrl_files::to_jrl(*formats::parse_pyfg(
       "VERTEX_SE3:QUAT 1 A0 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 2 A1 1 0 0 0 0 0 1\nVERTEX_SE3:QUAT 2 B12 1 0 0 0 0 0 1\n"
       "EDGE_SE3:QUAT 2 A0 A1 1 0 0 0 0 0 1 9 0 0 0 0 0 9 0 0 0 0 9 0 0 0 9 0 0 9 0 9\n"
       "EDGE_SE3:QUAT 9 A0 B12 1 0 0 0 0 0 1 9 0 0 0 0 0 9 0 0 0 0 9 0 0 0 9 0 0 9 0 9\n",

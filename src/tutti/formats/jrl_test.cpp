@@ -50,7 +50,7 @@ bool by_ends(const PyfgEdge& a, const PyfgEdge& b) { return std::pair(a.from, a.
 
 TEST(Jrl, HasWhatTheSameGraphHasAsPyfg) {
   PyfgFile expected = fleet();
-  auto file = parse_jrl(test::to_jrl(expected), "g.jrl");
+  auto file = parse_jrl(jrl_files::to_jrl(expected), "g.jrl");
   ASSERT_TRUE(file) << file.error().message;
   ASSERT_EQ(file->vertices.size(), expected.vertices.size());
   for (std::size_t v = 0; v < expected.vertices.size(); ++v) {
@@ -74,14 +74,14 @@ TEST(Jrl, TwoClosuresOfOnePairOfKeyframesAreTwo) {
   PyfgFile graph = fleet();
   graph.edges.push_back(graph.edges.back());
   graph.edges.back().measurement.T_a_b.translation.x() += 0.1;
-  const auto file = parse_jrl(test::to_jrl(graph), "g.jrl");
+  const auto file = parse_jrl(jrl_files::to_jrl(graph), "g.jrl");
   ASSERT_TRUE(file);
   EXPECT_EQ(file->edges.size(), graph.edges.size());
 }
 
 TEST(Jrl, WithoutGroundTruthHasTheSameVerticesAndTimes) {
-  const auto with = parse_jrl(test::to_jrl(fleet()), "g.jrl"),
-             without = parse_jrl(test::to_jrl(fleet(), false), "g.jrl");
+  const auto with = parse_jrl(jrl_files::to_jrl(fleet()), "g.jrl"),
+             without = parse_jrl(jrl_files::to_jrl(fleet(), false), "g.jrl");
   ASSERT_TRUE(without) << without.error().message;
   ASSERT_EQ(without->vertices.size(), with->vertices.size());
   for (const PyfgVertex& vertex : without->vertices) EXPECT_FALSE(vertex.pose);
@@ -95,7 +95,7 @@ std::string replaced(std::string text, const std::string& what, const std::strin
 }
 
 TEST(Jrl, SaysWhatIsWrongAndWhere) {
-  const std::string good = test::to_jrl(fleet());
+  const std::string good = jrl_files::to_jrl(fleet());
   const auto says = [&](const std::string& text, const std::string& expected) {
     const auto result = parse_jrl(text, "g.jrl");
     const std::string message = result ? "no error" : result.error().message;
@@ -110,9 +110,10 @@ TEST(Jrl, SaysWhatIsWrongAndWhere) {
   says(R"({"measurements": 7})", "is a number, expected a list");
   says_of("\"measurements\": [", "\"measurements\": [[],", "measurements['a'][0].measurements[0]: has no 'type'");
   says_of("BetweenFactorPose3", "RangeFactorPose3", "type is 'RangeFactorPose3', expected BetweenFactorPose3");
-  const std::string a0 = fmt::format("{}", test::jrl_key({'a', 0})), a1 = fmt::format("{}", test::jrl_key({'a', 1}));
+  const std::string a0 = fmt::format("{}", jrl_files::jrl_key({'a', 0})),
+                    a1 = fmt::format("{}", jrl_files::jrl_key({'a', 1}));
   says_of(a0, "3", "is 3, expected letter << 56 | number");
-  says_of(a0, fmt::format("{}", test::jrl_key({'a', 1'000'000'000})), "is a1000000000, which is no pose");
+  says_of(a0, fmt::format("{}", jrl_files::jrl_key({'a', 1'000'000'000})), "is a1000000000, which is no pose");
   says_of("\"key2\": " + a1, "\"key2\": " + a0, "joins a0 to itself");
   says_of("\"key2\": " + a1, "\"key2\": -1", "is '-1', expected a whole number");
   says_of("\"rotation\": [1, 0", "\"rotation\": [2, 0", "quaternion has norm 2");
@@ -122,7 +123,7 @@ TEST(Jrl, SaysWhatIsWrongAndWhere) {
   PyfgFile stray = fleet();
   stray.vertices.push_back({{'b', 77}, {}, {}, {}});
   stray.edges.push_back({stray.edges.back().stamp, 0, 6, stray.edges.back().measurement});
-  says(test::to_jrl(stray), "a closure from a0 to b77: no odometry, prior or ground truth names b77");
+  says(jrl_files::to_jrl(stray), "a closure from a0 to b77: no odometry, prior or ground truth names b77");
 }
 
 TEST(Jrl, ListsWithinListsNeedNoStack) {
@@ -134,7 +135,7 @@ TEST(Jrl, ListsWithinListsNeedNoStack) {
 }
 
 RC_GTEST_PROP(Jrl, SurvivesDamage, ()) {
-  static const std::string good = test::to_jrl(fleet());
+  static const std::string good = jrl_files::to_jrl(fleet());
   const auto file = parse_jrl(internal::damaged(good), "g.jrl");
   if (!file) RC_ASSERT(file.error().message.starts_with("g.jrl: "));
 }
@@ -142,7 +143,7 @@ RC_GTEST_PROP(Jrl, SurvivesDamage, ()) {
 TEST(Jrl, IsToldByHowItBegins) {
   EXPECT_TRUE(looks_like_jrl("\n {\"name\": 1}"));
   EXPECT_FALSE(looks_like_jrl(to_pyfg(fleet())));
-  EXPECT_FALSE(looks_like_pyfg(test::to_jrl(fleet())));
+  EXPECT_FALSE(looks_like_pyfg(jrl_files::to_jrl(fleet())));
 }
 
 }  // namespace jrl_test

@@ -14,7 +14,7 @@
 namespace tutti::mission {
 namespace {
 
-constexpr std::size_t kTried = 5;  // scans that may be no good before the bag is refused
+constexpr std::size_t kTriedScans = 5;  // scans that may be no good before the bag is refused
 
 class BagScans final : public ScanSource {
  public:
@@ -34,7 +34,7 @@ class BagScans final : public ScanSource {
     const std::size_t first = std::min(from(odometry.front().stamp), places_.size() - 1);
     const std::size_t last = std::max(first + 1, from(odometry.back().stamp));
     Result<std::optional<lidar::PointTimes>> found;
-    for (std::size_t i = first; i < std::min(first + kTried, last); ++i) {
+    for (std::size_t i = first; i < std::min(first + kTriedScans, last); ++i) {
       auto times = times_of(i, robot);
       if (times || i == first) found = std::move(times);
       if (found) break;

@@ -137,7 +137,7 @@ TEST_F(GraphRecordingTest, WithoutVerticesThereIsNoReference) {
   ASSERT_TRUE(pyfg) << pyfg.error().message;
   EXPECT_TRUE(pyfg->reference.empty());
   EXPECT_EQ(pyfg->odometry[2].stamp, fleet("ab").vertices[6].stamp);
-  const auto jrl = read_graph_recording(path_of(formats::test::to_jrl(file, false)), "b");
+  const auto jrl = read_graph_recording(path_of(formats::jrl_files::to_jrl(file, false)), "b");
   ASSERT_TRUE(jrl) << jrl.error().message;
   EXPECT_TRUE(jrl->reference.empty());
   EXPECT_EQ(jrl->odometry[0].stamp, fleet("ab").vertices[4].stamp);

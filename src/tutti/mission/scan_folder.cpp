@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kTried = 5;  // scans that may be unreadable before the folder is refused
+constexpr std::size_t kTriedFiles = 5;  // scans that may be unreadable before the folder is refused
 constexpr std::array<const char*, 2> kExtensions = {".pcd", ".bin"};
 
 std::string stem_of(std::size_t number) { return fmt::format("{:06d}", number); }
@@ -83,7 +83,7 @@ Status ScanFolder::check_numbers() const {
 Status ScanFolder::look_into(const RobotConfig& robot) {
   Result<std::optional<lidar::PointTimes>> found = no_scans();
   std::size_t tried = 0;
-  for (std::size_t sample = 0; sample < moments_.stamps.size() && tried < kTried; ++sample) {
+  for (std::size_t sample = 0; sample < moments_.stamps.size() && tried < kTriedFiles; ++sample) {
     if (!file_of(sample)) continue;
     auto times = times_of(sample, robot);
     if (times || tried++ == 0) found = std::move(times);

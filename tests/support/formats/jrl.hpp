@@ -9,7 +9,7 @@
 #include "tutti/formats/pyfg.hpp"
 
 /// Writes JRL as its own library does: keys as symbols, quaternions w first, covariances rotation first.
-namespace tutti::formats::test {
+namespace tutti::formats::jrl_files {
 
 inline std::uint64_t jrl_key(const PyfgName& name) {
   return (static_cast<std::uint64_t>(name.robot) << 56U) | name.number;
@@ -68,4 +68,4 @@ inline std::string to_jrl(const PyfgFile& file, bool with_truth = true) {
   return "{\"name\": \"fleet\",\n\"measurements\": " + by_robot(entries) + ground + "}\n";
 }
 
-}  // namespace tutti::formats::test
+}  // namespace tutti::formats::jrl_files

@@ -9,7 +9,7 @@
 #include "support/server/corridor_run.hpp"
 #include "tutti/formats/pyfg.hpp"
 
-namespace tutti::mission::test {
+namespace tutti::mission::fleets {
 
 /// Three simulated robots in the shape of a real fleet of COSMO-Bench: stamps since 1970, poses 1.3 s apart, robots
 /// that begin some seconds one after the other, the truth as vertices; one closure in ten is wrong. A closure within a
@@ -52,4 +52,4 @@ inline formats::PyfgFile fleet_graph(std::uint64_t seed, double duration_s = 240
   return file;
 }
 
-}  // namespace tutti::mission::test
+}  // namespace tutti::mission::fleets
