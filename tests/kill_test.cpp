@@ -239,7 +239,10 @@ class Mission {
     if (dies(Part::tell)) return dropped();
     for (const node::Event& event : step.events) jumps_ += std::holds_alternative<node::OdometryJumped>(event.what);
     for (const node::Event& event : step.events)
-      if (const auto* refused = std::get_if<node::MessageRefused>(&event.what)) refusals_.push_back(refused->why);
+      if (const auto* refused = std::get_if<node::MessageRefused>(&event.what))
+        // Who was killed hears answers to what it had asked before; they count no more.
+        if (refused->why.find("none of this server's since it started") == std::string::npos)
+          refusals_.push_back(refused->why);
     if (dies(Part::acknowledge)) return dropped();
     if (ticket) program.port->acknowledge(*ticket);
     if (dies(Part::end)) return dropped();
