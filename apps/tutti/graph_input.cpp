@@ -59,7 +59,7 @@ void place(const PoseGraph& graph, std::vector<Loose> loose, NamedGraph& out) {
   }
 }
 
-/// Of vertices that are in their places.
+/// For vertices that are in their places.
 bool are_times(const NamedGraph& graph) {
   std::vector<std::uint32_t> robots;
   for (const KeyframeId& id : graph.robots.vertices) robots.push_back(id.chain.robot.value);

@@ -79,7 +79,7 @@ Status Db3Reader::start(const std::string& uri) {
   sqlite3_limit(opened, SQLITE_LIMIT_LENGTH,
                 static_cast<int>(internal::kMaxMessageBytes));  // what columns compute, too
   if (auto ok = read_topics(); !ok) return ok;
-  // Of a blob that is too long, SQLite reads the length alone.
+  // SQLite reads only the length of a blob that is too long.
   auto messages = prepare(
       "SELECT id, topic_id, timestamp, length(data), CASE WHEN length(data) <= ?2 THEN data END FROM messages "
       "WHERE id >= ?1 ORDER BY id");

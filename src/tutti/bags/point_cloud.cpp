@@ -95,7 +95,7 @@ Result<formats::TimedCloud> to_timed_cloud(const RosPointCloud& message) {
   const bool swapped = message.is_bigendian == (std::endian::native == std::endian::little);
   formats::TimedCloud out;
   if (time) out.time_field = time->name;
-  // Of rows without points there may be four thousand millions in no bytes.
+  // Rows without points take no bytes, so there may be four thousand millions.
   const std::uint32_t rows = message.width == 0 ? 0 : message.height;
   const std::size_t count = std::size_t{message.width} * rows;
   out.cloud.points.reserve(count);
