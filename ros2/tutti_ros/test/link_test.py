@@ -51,8 +51,49 @@ class Reconnecting(unittest.TestCase):
         link = self.filled()
         self.welcome(link)
         self.assertEqual([s.stamp_ns for s in self.said(link)], [1000 + i * 10**8 for i in range(10)])
-        link.add_odometry(10**12, pose_at(10))
-        self.assertEqual([s.stamp_ns for s in self.said(link)], [10**12])
+        link.add_odometry(10**10, pose_at(10))
+        self.assertEqual([s.stamp_ns for s in self.said(link)], [10**10])
+
+    def test_one_stamp_far_ahead_shuts_nothing_out(self):
+        link = self.filled()
+        self.welcome(link)
+        self.said(link)
+        with self.assertRaisesRegex(ValueError, "is 3600 s ahead of 900001000 ns: more than 60 s, so it counts only if"):
+            link.add_odometry(1000 + 9 * 10**8 + 3600 * 10**9, pose_at(10))
+        with self.assertRaisesRegex(ValueError, "3600 s ahead of odometry's newest, expected at most 60 s"):
+            link.add_fix(1000 + 9 * 10**8 + 3600 * 10**9, (46.5, 7.9, 600.0), [1.0] * 3, (0.0, 0.0, 0.0))
+        link.add_odometry(1000 + 10 * 10**8, pose_at(10))
+        link.add_fix(1000 + 10 * 10**8, (46.5, 7.9, 600.0), [1.0] * 3, (0.0, 0.0, 0.0))
+        self.assertEqual([s.stamp_ns for s in self.said(link)], [1000 + 10**9] * 2)
+
+    def test_a_step_ahead_that_the_next_stamp_confirms_is_said(self):
+        link = self.filled()
+        self.welcome(link)
+        self.said(link)
+        stamps_ns = [3600 * 10**9, 3600 * 10**9 + 10**8]
+        with self.assertRaises(ValueError):
+            link.add_odometry(stamps_ns[0], pose_at(10))
+        link.add_odometry(stamps_ns[1], pose_at(11))
+        self.assertEqual([s.stamp_ns for s in self.said(link)], stamps_ns)
+
+    def test_a_clock_that_begins_anew_is_said_after_two_seconds(self):
+        link = self.filled()
+        self.welcome(link)
+        self.said(link)
+        self.stored(link, 1000 + 9 * 10**8)
+        taken = []
+        for i in range(60):
+            try:
+                stamp_ns = i * 10**8 // 2 - 10**10
+                link.add_odometry(stamp_ns, pose_at(i))
+                taken.append(stamp_ns)
+            except ValueError as error:
+                self.assertIn("expected stamps to increase", str(error))
+        self.assertEqual(len(taken), 60 - 41)
+        said = self.said(link)
+        self.assertEqual([s.stamp_ns for s in said], taken)
+        self.assertEqual(said[0].increment_covariance[0], 1.0)  # it does not know how far the robot has come
+        self.assertEqual([s.stamp_ns for s in link.kept], taken)
 
     def test_goes_on_behind_what_the_robot_has(self):
         link = self.filled()
@@ -72,9 +113,9 @@ class Reconnecting(unittest.TestCase):
         waits = [link.lost("killed") for _ in range(8)]
         self.assertEqual(waits[:3] + waits[-1:], [0.25, 0.5, 1.0, 5.0])
         self.assertEqual(link.why, "killed")
-        link.add_odometry(10**12, pose_at(10))  # while away
+        link.add_odometry(10**10, pose_at(10))  # while away
         self.welcome(link, 1000 + 3 * 10**8)
-        self.assertEqual([s.stamp_ns for s in self.said(link)], [1000 + i * 10**8 for i in range(4, 10)] + [10**12])
+        self.assertEqual([s.stamp_ns for s in self.said(link)], [1000 + i * 10**8 for i in range(4, 10)] + [10**10])
         self.assertEqual(link.lost("again"), 0.25)
 
     def test_memory_is_bounded_and_increments_stay_whole(self):

@@ -12,6 +12,8 @@ from tutti_ros.feed_messages import Feed
 PROTOCOL_VERSION = 1
 LONGEST_FRAME = 16 * 1024 * 1024
 FIRST_WAIT_S, LONGEST_WAIT_S = 0.25, 5.0
+FAR_NS = 60 * 10**9  # a step of odometry's stamps that a second one has to confirm
+ANEW_NS, LEAST_ANEW = 2 * 10**9, 3  # so long, and so many, stamps before the newest are of a clock that began anew
 LATEST_NS = 500_000_000  # behind odometry, for what was not said before a connection was lost
 UNSEEN_M2, UNSEEN_RAD2 = 1.0, 0.03  # of a stretch of odometry that this program did not see
 NAMES = {"fixes": "fix", "images": "images", "imu": "imu"}  # of kinds that older robots do not take (Welcome.takes)
@@ -69,6 +71,29 @@ class Sample:
         return not self.frame and not self.pose
 
 
+class StampWatch:
+    """Which stamps of odometry to believe, by the rules of the robot (src/tutti/robot/stamp_watch.hpp), so that one wrong stamp
+    does not shut out here what it would take."""
+
+    def __init__(self):
+        self.newest_ns = None
+        self.row = None  # (is it ahead, first, last, count) of stamps in a row that did not follow the newest
+
+    def take(self, stamp_ns):
+        """"follows", "waits", "confirms" the one that waits, "is_before", or "begins_anew"."""
+        is_ahead = self.newest_ns is not None and stamp_ns > self.newest_ns
+        if self.newest_ns is None or (is_ahead and stamp_ns - self.newest_ns <= FAR_NS):
+            self.row, self.newest_ns = None, stamp_ns
+            return "follows"
+        goes_on = self.row and self.row[0] == is_ahead and 0 < stamp_ns - self.row[2] <= FAR_NS
+        first_ns, count = (self.row[1], self.row[3] + 1) if goes_on else (stamp_ns, 1)
+        self.row = (is_ahead, first_ns, stamp_ns, count)
+        if not (count > 1 if is_ahead else count >= LEAST_ANEW and stamp_ns - first_ns > ANEW_NS):
+            return "waits" if is_ahead else "is_before"
+        self.row, self.newest_ns = None, stamp_ns
+        return "confirms" if is_ahead else "begins_anew"
+
+
 class Link:
     """Samples are kept until the robot has them on its disk, so that one that was killed is told again what it lost. From
     `most_samples` on the oldest go; from `most_bytes` on the oldest scans, images and what else is no odometry. States: away,
@@ -84,14 +109,35 @@ class Link:
         self.framed, self.framed_bytes = collections.deque(), 0  # those of `kept` that are no odometry
         self.waiting = collections.deque()  # those of `kept` that are to be said on this connection
         self.last = None           # the newest odometry sample
+        self.stamps, self.unsure = StampWatch(), None  # a stamp and pose far ahead, until the next one confirms it
         self.last_fix_ns = None
         self.known_spent = None    # of the newest that the robot has; None: one that this program did not see
         self.welcome, self.goodbye, self.received = None, False, b""
 
     def add_odometry(self, stamp_ns, pose):
-        if self.last and stamp_ns <= self.last.stamp_ns:
+        newest_ns, verdict = self.stamps.newest_ns, self.stamps.take(stamp_ns)
+        unsure, self.unsure = self.unsure, None
+        if verdict == "is_before":
             self.counts["odometry_left_out"] += 1
-            raise ValueError(f"odometry of {stamp_ns} ns after {self.last.stamp_ns} ns, expected stamps to increase")
+            raise ValueError(f"odometry of {stamp_ns} ns after {newest_ns} ns, expected stamps to increase")
+        if verdict == "waits":
+            self.unsure = (stamp_ns, pose)
+            raise ValueError(f"odometry of {stamp_ns} ns is {(stamp_ns - newest_ns) * 1e-9:.0f} s ahead of {newest_ns} ns: more "
+                             f"than {FAR_NS // 10**9} s, so it counts only if the next one confirms it")
+        if verdict == "begins_anew":
+            self._begin_anew()
+        elif verdict == "confirms":
+            self._add_odometry(*unsure)
+        self._add_odometry(stamp_ns, pose)
+
+    def _begin_anew(self):
+        """The robot begins a session, and has no use for what is of the clock before; what was not said yet still is."""
+        self.kept.clear()
+        self.framed.clear()
+        self.framed_bytes = 0
+        self.last, self.last_fix_ns, self.known_spent = None, None, None
+
+    def _add_odometry(self, stamp_ns, pose):
         spent = (0.0, 0.0)
         if self.last:
             seconds = (stamp_ns - self.last.stamp_ns) * 1e-9
@@ -104,6 +150,9 @@ class Link:
         self._add(Sample(stamp_ns, frame=scan_frame(stamp_ns, points, ages), kind="scans"))
 
     def add_fix(self, stamp_ns, place, covariance, p_body_antenna):
+        if self.last and stamp_ns - self.last.stamp_ns > FAR_NS:
+            raise ValueError(f"a fix of {stamp_ns} ns, {(stamp_ns - self.last.stamp_ns) * 1e-9:.0f} s ahead of odometry's newest, "
+                             f"expected at most {FAR_NS // 10**9} s")
         if self.last_fix_ns is not None and stamp_ns <= self.last_fix_ns:
             raise ValueError(f"a fix of {stamp_ns} ns after {self.last_fix_ns} ns, expected stamps to increase")
         self._check_taken("fixes")
