@@ -117,7 +117,8 @@ No sockets, clocks or threads inside: how messages travel is yours. Several thre
       .def(
           "add_odometry", &add_odometry, "stamp"_a, "T_odom_body"_a, "covariance"_a,
           R"(Raw odometry: stamp in seconds, T_odom_body (4, 4), and the covariance (6, 6) of the step since the sample before, of its
-right perturbation [translation m; rotation rad]. ValueError: it is refused, and nothing changes.)")
+right perturbation [translation m; rotation rad]. Any later stamp is believed: one that is far ahead by mistake shuts out all
+up to it. ValueError: it is refused, and nothing changes.)")
       .def(
           "add_scan", &add_scan, "stamp"_a, "points"_a, "age_s"_a = py::none(),
           R"(A sweep that ends at stamp: points (n, 3), metres in the body's frame of the moment that each was measured, which is

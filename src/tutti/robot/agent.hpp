@@ -123,8 +123,8 @@ class RobotAgent {
 
   /// Adds a sample of raw odometry; a bad one is refused and nothing changes (SubmapBuilder::add_odometry()).
   /// `increment_covariance` (right tangent) is of the step since the previous sample, and ignored for the first.
-  ///
-  /// Quaternions that are off by rounding (1e-3) are normalised. Covariances may lack a coordinate (odometry in the
+  /// Any later stamp is believed, so one far ahead shuts out all up to it: have a StampWatch decide before, as nodes
+  /// do. Quaternions that are off by rounding (1e-3) are normalised. Covariances may lack a coordinate (odometry in the
   /// plane) or call one unknown; what is used and uploaded has an inverse, and standard deviations of at most 10 m and
   /// 0.3 rad (geometry/covariance.hpp).
   ///
