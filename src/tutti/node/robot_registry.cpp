@@ -19,10 +19,13 @@ void remember(std::set<std::uint64_t>& sessions, std::uint64_t session) {
   if (sessions.size() > RobotRow::kMostSessions) sessions.erase(sessions.begin());
 }
 
-/// It has begun a new session, for example because its clock was set back. Only a start with a random part tells.
-bool is_one_program(const NodeStatus& before, const NodeStatus& now) {
+/// It has begun a new session, for example because its clock was set back. Only a start with a random part tells. While
+/// two programs seem to have the owner's session, it is the first of them.
+bool is_one_program(const RobotRegistry::Robot& robot, const NodeStatus& now, Timestamp when) {
   constexpr std::uint64_t kCounts = std::uint64_t{1} << 32U;
-  return now.start >= kCounts && now.start == before.start && now.session > before.session;
+  if (now.start < kCounts || now.session <= robot.status.session) return false;
+  const bool are_two = robot.heard_again && when - *robot.heard_again < RobotRegistry::kHeardAgain_s;
+  return now.start == robot.start_before || (now.start == robot.status.start && !are_two);
 }
 
 }  // namespace
@@ -88,7 +91,7 @@ std::string RobotRegistry::objection(RobotId id, const NodeStatus& status, Times
         "was copied",
         owner.session, owner.name);
   }
-  if (is_one_program(owner, status)) return {};
+  if (is_one_program(found->second, status, now)) return {};
   if (found->second.former.contains(status.session))
     return fmt::format("session {} of robot '{}' has been replaced by session {}", status.session, owner.name,
                        owner.session);
@@ -120,6 +123,7 @@ bool RobotRegistry::note_start(Robot& robot, const NodeStatus& status, Timestamp
   if (now - *robot.heard_again < kHeardAgain_s) return false;
   remember(robot.copies, known);
   robot.start_before = 0;
+  robot.heard_again.reset();
   return true;
 }
 
@@ -148,6 +152,7 @@ RobotRegistry::Heard RobotRegistry::hear(RobotId id, const NodeStatus& status, T
   if (!is_owner) {
     take_over(id, robot, status);
     robot.start_before = 0;
+    robot.heard_again.reset();
     robot.copies.clear();
     heard.must_be_stored = is_mapped(id);
   }

@@ -96,6 +96,32 @@ TEST_F(Registry, AProgramMayBeginAnotherSession) {
   EXPECT_FALSE(hears(registry_, 12, (6ULL << 32U) + 1, 4.0));  // another program
 }
 
+// The map has a submap of the second one under an id that the first one used next, so that it had to begin another
+// session.
+TEST_F(Registry, OfTwoProgramsOfASessionTheFirstMayBeginAnotherAndTheSecondMayNot) {
+  constexpr std::uint64_t kFirst = (5ULL << 32U) + 4, kSecond = (9ULL << 32U) + 4;
+  for (const std::uint64_t leaves : {kFirst, kSecond}) {
+    registry_ = {};
+    EXPECT_TRUE(hears(registry_, 10, kFirst, 0.0));
+    EXPECT_TRUE(hears(registry_, 10, kSecond, 2.0));
+    if (leaves == kSecond) {
+      EXPECT_TRUE(hears(registry_, 10, kFirst, 3.0));
+    }
+    EXPECT_EQ(hears(registry_, 11, leaves, 4.0), leaves == kFirst);
+    EXPECT_EQ(owner(kOne), leaves == kFirst ? 11U : 10U);
+    EXPECT_EQ(hears(registry_, 10, leaves == kFirst ? kSecond : kFirst, 5.0), leaves == kSecond);
+  }
+}
+
+TEST_F(Registry, ALateStatusOfTheStartBeforeMakesNoSecondProgram) {
+  constexpr std::uint64_t kBefore = (5ULL << 32U) + 4, kStart = (9ULL << 32U) + 5;
+  EXPECT_TRUE(hears(registry_, 10, kBefore, 0.0));
+  EXPECT_TRUE(hears(registry_, 10, kStart, 2.0));
+  EXPECT_TRUE(hears(registry_, 10, kBefore, 2.1));
+  for (int i = 0; i < 10; ++i) EXPECT_TRUE(hears(registry_, 10, kStart, 4.0 + i));
+  EXPECT_TRUE(hears(registry_, 11, kStart, 15.0));
+}
+
 TEST_F(Registry, AfterThirtySecondsANewSessionTakesItsPlaceForGood) {
   hear(kOne, "alpha", 10, 0);
   EXPECT_FALSE(hear(kOne, "alpha", 11, 29.9));
