@@ -39,8 +39,9 @@ TEST(BusAddressTest, CredentialsLeaveAUrlWhereItIsRead) {
 }
 
 TEST(BusAddressTest, WhatIsNoUrlIsRefusedWithoutItsPassword) {
-  for (const std::string text : {"nats://alpha:hidden@", "nats://alpha:hidden@a b:1", "nats://:hidden@base:1",
-                                 "na ts://alpha:hidden@base:1", "alpha:hidden@base/elsewhere:1"}) {
+  for (const std::string text :
+       {"nats://alpha:hidden@", "nats://alpha:hidden@a b:1", "nats://:hidden@base:1", "na ts://alpha:hidden@base:1",
+        "http://alpha:hidden@base:1", "alpha:hidden@base/elsewhere:1"}) {
     const auto read = parse_bus_url(text);
     ASSERT_FALSE(read.has_value()) << text;
     EXPECT_EQ(read.error().message.find("hidden"), std::string::npos) << read.error().message;

@@ -87,6 +87,17 @@ MissionLease::State MissionLease::wait(double wall_s) const {
   return state_;
 }
 
+Status MissionLease::check_held() const {
+  const State seen = state();
+  if (seen.held) return {};
+  if (!seen.last_error.empty()) return fail(ErrorCode::io, "{}", seen.last_error);
+  if (!seen.waits.empty()) return fail(ErrorCode::io, "{}", seen.waits);
+  const LeaseHolder* other = seen.server_of(where_.mission);
+  return fail(ErrorCode::io, "{}: the lease of mission '{}' is {}, expected this program's",
+              without_credentials(where_.url), where_.mission,
+              other == nullptr ? "not taken yet" : "that of " + to_string(*other));
+}
+
 std::string MissionLease::why_alone() const {
   const State seen = state();
   if (!seen.has_looked || seen.held || seen.missions.empty() || seen.server_of(where_.mission) != nullptr) return {};

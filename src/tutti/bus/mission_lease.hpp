@@ -63,6 +63,9 @@ class MissionLease {
   [[nodiscard]] State state() const;
   /// state(), as soon as the bus has been looked at and it is known who has the lease, or after `wall_s` at the latest.
   [[nodiscard]] State wait(double wall_s) const;
+  /// An error while `self` does not hold the lease, which says why: the bus cannot be reached or refuses, or who has
+  /// it.
+  [[nodiscard]] Status check_held() const;
   /// For people, why no server is heard: this mission has none on the bus, but others have. Empty when that is not so.
   [[nodiscard]] std::string why_alone() const;
 

@@ -118,8 +118,8 @@ NatsState JetStreamPort::state() const {
 
 /// True: there is a new session.
 bool JetStreamPort::connect() {
-  if (options_.may_connect && !options_.may_connect()) {
-    note("may not connect yet: the lease of the mission is not this program's");
+  if (const Status may = options_.may_connect ? options_.may_connect() : Status(); !may) {
+    note(may.error().message);
     return false;
   }
   auto connection = NatsConnection::open(options_, name_of(self_));

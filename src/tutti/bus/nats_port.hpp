@@ -22,8 +22,9 @@ struct NatsPortOptions {
   std::uint64_t max_held_bytes = std::uint64_t{64} << 20U;
   std::uint64_t max_stream_bytes = std::uint64_t{512} << 20U;
   double stranded_s = 30.0;
-  /// Asked before each connection, empty: always allowed. A server's port asks its MissionLease.
-  std::function<bool()> may_connect = {};
+  /// Asked before each connection; its error says why not. Empty: always allowed. A server's port asks its
+  /// MissionLease.
+  std::function<Status()> may_connect = {};
   template <class V>
   void describe(V& v) {
     v.field("url", url, any(), "\"nats://HOST:PORT\"");

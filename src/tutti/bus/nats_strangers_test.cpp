@@ -11,6 +11,7 @@
 #include "support/bus/nats_network.hpp"
 #include "support/bus/nats_process.hpp"
 #include "tutti/bus/internal/nats_connection.hpp"
+#include "tutti/bus/mission_lease.hpp"
 
 namespace tutti::bus {
 namespace nats_strangers_test {
@@ -77,6 +78,11 @@ TEST_F(NatsStrangers, WhatTheBusDoesNotAllowIsSaidAsThat) {
   EXPECT_TRUE(within(10.0, [&] { return !robot->state().denied.empty(); })) << robot->state().last_error;
   EXPECT_NE(robot->state().denied.find("mission.test.robot.3.submap"), std::string::npos) << robot->state().denied;
   options.credentials = {"robot", "wrong"};
+  const auto lease = MissionLease::open(options, LeaseHolder{.host = "base", .state = "/s", .seat = "a"}).value();
+  EXPECT_TRUE(within(10.0, [&] {
+    const Status held = lease->check_held();
+    return !held && held.error().message.find("Authentication Violation") != std::string::npos;
+  })) << lease->check_held().error().message;
   const auto refused = open_nats_port(kRobot, options).value();
   EXPECT_TRUE(within(10.0, [&] { return !refused->state().last_error.empty(); }));
   options.credentials = {};

@@ -262,7 +262,7 @@ Status ServerProgram::take_lease() {
   auto lease = bus::MissionLease::open(bus_, holder_of(*folder_));
   if (!lease) return tl::unexpected(lease.error());
   lease_ = std::move(*lease);
-  bus_.may_connect = [lease = lease_] { return lease->state().held; };
+  bus_.may_connect = [lease = lease_] { return lease->check_held(); };
   bus::MissionLease::State seen = lease_->wait(kLeaseAnswer_s);
   if (!seen.waits.empty()) {
     log_->say(Level::warning, seen.waits);
