@@ -3,15 +3,26 @@
 
 #include <fmt/format.h>
 
+#include <string_view>
 #include <utility>
 
 namespace tutti::program {
+namespace {
+
+/// ": why", without the bus's address, which most errors of a port begin with and the sentence has already.
+std::string why_of(const bus::NatsState& state) {
+  const std::string_view error = state.last_error;
+  const std::string address = state.url + ": ";
+  return error.empty() ? "" : fmt::format(": {}", error.starts_with(address) ? error.substr(address.size()) : error);
+}
+
+}  // namespace
 
 std::vector<LinkWatch::Said> LinkWatch::look(const bus::NatsState& state, double wall_s) {
   std::vector<Said> said;
   const auto say = [&](Level level, std::string sentence) { said.push_back({level, std::move(sentence)}); };
   trouble_.clear();
-  const std::string why = state.last_error.empty() ? "" : ": " + state.last_error;
+  const std::string why = why_of(state);
   if (!state.connected) {
     if (!gone_since_s_) gone_since_s_ = wall_s;
     const double gone_s = wall_s - *gone_since_s_;
@@ -37,7 +48,7 @@ std::vector<LinkWatch::Said> LinkWatch::look(const bus::NatsState& state, double
   if (!is_in_vain && said_in_vain_) say(Level::info, "jobs are answered again");
   said_in_vain_ = is_in_vain;
   if (!state.denied.empty()) {
-    trouble_ = fmt::format("the bus {} does not allow this program something: {}", state.url, state.denied);
+    trouble_ = fmt::format("the bus {} does not allow this program what it needs: {}", state.url, state.denied);
     if (std::exchange(said_denied_, state.denied) != state.denied) say(Level::error, trouble_);
   } else if (state.unconfirmed_s > kStores_s) {
     trouble_ = fmt::format("the bus {} is there and has stored nothing for {:.0f} s: its disk may be full{}", state.url,
@@ -47,6 +58,12 @@ std::vector<LinkWatch::Said> LinkWatch::look(const bus::NatsState& state, double
     say(Level::info, fmt::format("the bus {} stores again", state.url));
   }
   return said;
+}
+
+bool AnewWatch::connects_anew(bool is_in_vain, bool holds_job, double wall_s) {
+  if (!is_in_vain || holds_job || (last_s_ && wall_s - *last_s_ < kAgain_s)) return false;
+  last_s_ = wall_s;
+  return true;
 }
 
 }  // namespace tutti::program

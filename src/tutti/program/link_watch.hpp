@@ -38,4 +38,17 @@ class LinkWatch {
   std::string trouble_;
 };
 
+/// Decides when a worker's port is to connect anew: the bus gives jobs to workers and gets no answers
+/// (NatsState::given_in_vain), and this worker has none. So they are given to an old request, or over a connection that
+/// the bus takes for a good one.
+class AnewWatch {
+ public:
+  static constexpr double kAgain_s = 60.0;  ///< Not more often than this.
+  /// True: connect anew now. To be called about once a second.
+  bool connects_anew(bool is_in_vain, bool holds_job, double wall_s);
+
+ private:
+  std::optional<double> last_s_;
+};
+
 }  // namespace tutti::program

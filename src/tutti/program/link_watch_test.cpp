@@ -32,6 +32,26 @@ TEST(LinkWatch, SaysOnceThatThereIsNoLinkAndThatItIsBack) {
   EXPECT_TRUE(has(said[0].sentence, "lost its link to the bus")) << said[0].sentence;
 }
 
+TEST(LinkWatch, TheAddressOfTheBusIsSaidOnce) {
+  LinkWatch watch;
+  const bus::NatsState state{.url = "nats://base:4222", .last_error = "nats://base:4222: connecting: no server"};
+  watch.look(state, 0);
+  const auto said = watch.look(state, 5);
+  ASSERT_EQ(said.size(), 1U);
+  EXPECT_TRUE(has(said[0].sentence, "cannot reach the bus nats://base:4222: connecting: no server"))
+      << said[0].sentence;
+}
+
+TEST(AnewWatch, ConnectsAnIdleWorkerAnewOnceAMinute) {
+  AnewWatch watch;
+  EXPECT_FALSE(watch.connects_anew(false, false, 1.0));
+  EXPECT_FALSE(watch.connects_anew(true, true, 2.0));
+  EXPECT_TRUE(watch.connects_anew(true, false, 3.0));
+  for (double s = 4.0; s < 63.0; s += 1.0) EXPECT_FALSE(watch.connects_anew(true, false, s)) << s;
+  EXPECT_FALSE(watch.connects_anew(false, false, 64.0));
+  EXPECT_TRUE(watch.connects_anew(true, false, 65.0));
+}
+
 TEST(LinkWatch, ACutThatNobodyNoticesIsNotSaid) {
   LinkWatch watch;
   bus::NatsState state{.url = "nats://base:4222", .connected = true};

@@ -22,6 +22,7 @@
 #include "tutti/node/status_envelope.hpp"
 #include "tutti/program/host.hpp"
 #include "tutti/program/incarnation.hpp"
+#include "tutti/program/link_watch.hpp"
 #include "tutti/program/state_folder.hpp"
 #include "tutti/program/stop.hpp"
 #include "tutti/program/worker_program.hpp"
@@ -137,21 +138,18 @@ class OwnWorker {
   void note_given_in_vain(bool is_in_vain) { is_in_vain_ = is_in_vain; }
 
  private:
-  /// This thread is not at a job when this is called. Jobs that are given and do not come here are given to an old
-  /// request, or over a connection that the bus takes for a good one.
+  /// This thread is not at a job when this is called.
   void look_whether_in_vain() {
     const auto* worker = dynamic_cast<const HostedWorker*>(host_.hosted());
-    if (!is_in_vain_ || worker == nullptr || worker->holds_job() || clock_.wall_s() < again_s_) return;
-    again_s_ = clock_.wall_s() + kAnewAgain_s;
+    if (worker == nullptr || !anew_.connects_anew(is_in_vain_, worker->holds_job(), clock_.wall_s())) return;
     log_.say(Level::error, "jobs are given to workers in vain, and its own one has none: connects that one anew");
     host_.start_anew();
   }
 
   static constexpr bus::Endpoint kSelf{bus::Endpoint::Role::worker, 0};
-  static constexpr double kAnewAgain_s = 60.0;
   std::atomic<bool> stop_ = false;
   std::atomic<bool> is_in_vain_ = false;
-  double again_s_ = 0.0;
+  AnewWatch anew_;
   Host host_;
   const Clock& clock_;
   EventLog& log_;
