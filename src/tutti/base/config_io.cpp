@@ -191,6 +191,14 @@ std::string describe_bound(const Bound& bound) {
 
 namespace {
 
+/// Several structs may read one place, and know the same keys.
+std::vector<std::string> each_once(const std::vector<std::string>& words) {
+  std::vector<std::string> out;
+  for (const std::string& word : words)
+    if (std::ranges::find(out, word) == out.end()) out.push_back(word);
+  return out;
+}
+
 /// Keys of a place that no struct knows.
 void complain_of_unknown(Findings& findings, const std::string& path, const Findings::Place& place) {
   const auto& [node, known] = place;
@@ -205,7 +213,7 @@ void complain_of_unknown(Findings& findings, const std::string& path, const Find
     const auto close = nearest_word(key, known);
     complain(findings, value, path.empty() ? key : path + "." + key,
              close ? fmt::format("unknown key, did you mean '{}'?", *close)
-                   : fmt::format("unknown key, known here: {}", fmt::join(known, ", ")));
+                   : fmt::format("unknown key, known here: {}", fmt::join(each_once(known), ", ")));
   }
 }
 

@@ -361,6 +361,10 @@ TEST(ConfigLoader, EveryKeyIsOfOneOfTheReaders) {
             "x.yaml:2: robots.0.speed_mp: unknown key, did you mean 'speed_mps'?");
   EXPECT_EQ(load("weather: wet\nrobots: [{speed_mps: -1, voxel_m: 0}]").second,
             "x.yaml:2: robots.0.voxel_m: is 0, must be > 0\nx.yaml:2: robots.0.speed_mps: is -1, must be > 0");
+  EXPECT_EQ(
+      load("weather: wet\ncompletely_different_words: 1").second,
+      "x.yaml:2: completely_different_words: unknown key, known here: enable_feedback, min_inliers, seed, limit_s, "
+      "base, robots, weather");
 }
 
 TEST(ConfigLoader, KeysOfAnotherVersionMayBeLeftAlone) {

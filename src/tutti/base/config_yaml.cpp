@@ -140,7 +140,7 @@ Result<ConfigNode> parse_yaml(const std::string& text, const std::string& name) 
   } catch (const ContentError& error) {
     return fail(ErrorCode::parse, "{}:{}: {}", name, error.line, error.text);
   } catch (const YAML::Exception& error) {
-    return fail(ErrorCode::parse, "{}:{}: {}", name, error.mark.line + 1, error.msg);
+    return fail(ErrorCode::parse, "{}:{}: no YAML: {}", name, error.mark.line + 1, error.msg);
   }
 }
 
