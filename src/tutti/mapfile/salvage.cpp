@@ -85,7 +85,12 @@ Result<Salvaged> salvage_kind(const fs::path& in, const fs::path& out, std::span
     remove_store(copy);
     if (Status copied = copy_store(in, copy); !copied) return copied;
     auto damaged = storage::DamagedStore::open(copy, schemas);
-    if (!damaged) return in_context(in.string(), damaged.error());
+    if (!damaged) {  // it names the copy
+      std::string_view text = damaged.error().message;
+      const std::string of_copy = copy.string() + ": ";
+      if (text.starts_with(of_copy)) text.remove_prefix(of_copy.size());
+      return fail(damaged.error().code, "{}: {}", in.string(), text);
+    }
     salvaged.kind = damaged->schema().kind;
     return make_store(out, damaged->schema(), [&](storage::TableStore& store) -> Status {
       Writer writer(store);

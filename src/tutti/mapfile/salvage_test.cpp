@@ -93,6 +93,7 @@ TEST_F(SalvagedMap, WithoutItsFirstPageIsWholeAndACutOneHasWhatIsBefore) {
 
   fs::remove(out_);
   ASSERT_TRUE(write_file(map_.string(), whole.substr(0, whole.size() - 4096)));
+  EXPECT_EQ(open(map_).error().message.find("PRAGMA"), std::string::npos) << open(map_).error().message;
   EXPECT_NE(open(map_).error().message.find("tutti map salvage"), std::string::npos) << open(map_).error().message;
   const auto cut = salvage(map_, out_, kNow_ns);
   ASSERT_TRUE(cut.has_value()) << cut.error().message;
@@ -103,7 +104,18 @@ TEST_F(SalvagedMap, WithoutItsFirstPageIsWholeAndACutOneHasWhatIsBefore) {
 TEST_F(SalvagedMap, OfNoBytesIsRefused) {
   ASSERT_TRUE(write_file(map_.string(), ""));
   EXPECT_NE(open(map_).error().message.find("0 bytes"), std::string::npos) << open(map_).error().message;
-  EXPECT_FALSE(salvage(map_, out_, kNow_ns).has_value());
+  EXPECT_EQ(salvage(map_, out_, kNow_ns).error().message, map_.string() + ": 0 bytes, which hold no row");
+}
+
+/// SQLite's own words are of two lines: "*** in database main ***" and what it is.
+TEST_F(SalvagedMap, WithADamagedPageIsToldInOneLine) {
+  std::string damaged = read_file(map_.string()).value();
+  const std::size_t pages = damaged.size() / 4096;
+  for (std::size_t page = 2; page < pages; page += 2) damaged.replace(4096 * page, 4096, 4096, '\x55');
+  ASSERT_TRUE(write_file(map_.string(), damaged));
+  const auto opened = open(map_);
+  ASSERT_FALSE(opened.has_value());
+  EXPECT_EQ(opened.error().message.find('\n'), std::string::npos) << opened.error().message;
 }
 
 TEST_F(SalvagedMap, ARobotsStoreGivesItsSubmapsAndBeginsASession) {

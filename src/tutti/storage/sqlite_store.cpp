@@ -82,8 +82,7 @@ tl::unexpected<Error> SqliteStore::failure(int code, std::string_view doing) con
     case SQLITE_FULL:
       return fail(ErrorCode::io, "{}: {}: the disk, or the size that the file may have, is full", file, doing);
     case SQLITE_CORRUPT:
-      return fail(ErrorCode::parse, "{}: {}: the file is damaged: {}{}", file, doing, sqlite3_errmsg(database_.get()),
-                  kSalvage);
+      return fail(ErrorCode::parse, "{}: the file is damaged: {}{}", file, sqlite3_errmsg(database_.get()), kSalvage);
     default:
       return fail(ErrorCode::io, "{}: {}: {}", file, doing, sqlite3_errmsg(database_.get()));
   }
@@ -212,7 +211,9 @@ Status SqliteStore::check(const Schema& schema) const {
                 schema.version, *found);
   const Result<std::string> damage = value_of("PRAGMA integrity_check(1)");
   if (!damage) return tl::unexpected(damage.error());
-  if (*damage != "ok") return fail(ErrorCode::parse, "{}: the file is damaged: {}{}", file, *damage, kSalvage);
+  if (*damage != "ok")  // "*** in database main ***", and in the last line what it is
+    return fail(ErrorCode::parse, "{}: the file is damaged: {}{}", file, damage->substr(damage->rfind('\n') + 1),
+                kSalvage);
   return {};
 }
 
