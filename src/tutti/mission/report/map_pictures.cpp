@@ -107,6 +107,20 @@ double crossings(const std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>>&
   return score;
 }
 
+/// Where a point lies in a slice: along it, and its height; nothing beside the slice.
+struct SlicePlane {
+  Slice slice;
+  GroundPlane ground;
+
+  std::optional<Eigen::Vector2d> operator()(const Eigen::Vector3d& p) const {
+    const Eigen::Vector2d from_centre = ground(p) - slice.centre;
+    const double u = slice.along.dot(from_centre);
+    const double aside = slice.along.x() * from_centre.y() - slice.along.y() * from_centre.x();
+    if (std::abs(aside) > 0.5 * kSliceThickness_m || std::abs(u) > 0.5 * slice.length_m) return std::nullopt;
+    return Eigen::Vector2d(u, p[3 - ground.right - ground.up]);
+  }
+};
+
 /// Up and down from a cloud's points in the slice: all but the outermost 0.5 %.
 Range heights(const std::vector<CloudLayer>& layers,
               const std::function<std::optional<Eigen::Vector2d>(const Eigen::Vector3d&)>& to_plane) {
@@ -120,6 +134,17 @@ Range heights(const std::vector<CloudLayer>& layers,
   out.include(seen[seen.size() / 200]);
   out.include(seen[seen.size() - 1 - seen.size() / 200]);
   return out;
+}
+
+/// How much a slice shows of `points` (display frame): the squares of its plane in which any of them lies.
+std::size_t squares_seen(const Points3d& points, const SlicePlane& plane) {
+  constexpr double kSquare_m = 0.3;
+  std::vector<std::pair<long, long>> seen;
+  for (const Eigen::Vector3d& p : points)
+    if (const auto flat = plane(p))
+      seen.emplace_back(std::lround(flat->x() / kSquare_m), std::lround(flat->y() / kSquare_m));
+  std::sort(seen.begin(), seen.end());
+  return static_cast<std::size_t>(std::unique(seen.begin(), seen.end()) - seen.begin());
 }
 
 }  // namespace
@@ -161,9 +186,12 @@ Points2d cloud_corners(const std::vector<CloudLayer>& clouds, const GroundPlane&
   return corners;
 }
 
-Slice busiest_slice(const std::vector<Points2d>& routes, double length_m) {
+Slice busiest_slice(const std::vector<Points2d>& routes, double length_m,
+                    const std::function<std::size_t(const Slice&)>& shows) {
   constexpr std::size_t kMostSteps = 2000;
   constexpr std::size_t kMostCentres = 250;
+  constexpr std::size_t kMostLookedAt = 150;
+  constexpr double kBusyEnough = 0.5;
   constexpr int kDirections = 12;
   std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>> steps;
   std::size_t total = 0;
@@ -172,21 +200,28 @@ Slice busiest_slice(const std::vector<Points2d>& routes, double length_m) {
   for (const auto& route : routes)
     for (std::size_t i = stride; i < route.size(); i += stride)
       if (route[i].allFinite() && route[i - stride].allFinite()) steps.emplace_back(route[i - stride], route[i]);
-  Slice best{.length_m = length_m};
-  if (!steps.empty()) best.centre = steps.front().first;
-  double most = 0.0;
+  Slice first{.length_m = length_m};
+  if (!steps.empty()) first.centre = steps.front().first;
+  std::vector<std::pair<double, Slice>> found{{0.0, first}};
   for (int d = 0; d < kDirections; ++d) {
     const double angle = M_PI * d / kDirections;
     const Eigen::Vector2d along(std::cos(angle), std::sin(angle));
     for (std::size_t c = 0; c < steps.size(); c += steps.size() / kMostCentres + 1) {
       const Slice slice{steps[c].first, along, length_m};
-      const double found = crossings(steps, slice);
-      if (found <= most) continue;
-      most = found;
-      best = slice;
+      found.emplace_back(crossings(steps, slice), slice);
     }
   }
-  return best;
+  std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  if (!shows) return found.front().second;
+  std::erase_if(found, [least = kBusyEnough * found.front().first](const auto& f) { return f.first < least; });
+  const Slice* best = nullptr;
+  std::size_t most = 0;
+  for (std::size_t i = 0; i < found.size(); i += found.size() / kMostLookedAt + 1)
+    if (const std::size_t shown = shows(found[i].second); best == nullptr || shown > most) {
+      most = shown;
+      best = &found[i].second;
+    }
+  return *best;
 }
 
 MapPicture map_from_above(const MissionRecord& record) {
@@ -200,27 +235,28 @@ MapPicture map_from_above(const MissionRecord& record) {
 }
 
 MapPicture map_section(const MissionRecord& record) {
+  constexpr double kWidthOfHeight = 2.5;
   const Shown clouds = shown(record);
   if (clouds.server.empty()) return {};
-  const GroundPlane& ground = clouds.ground;
-  const Points2d corners = cloud_corners(clouds.server, ground, clouds.routes);
+  const Points2d corners = cloud_corners(clouds.server, clouds.ground, clouds.routes);
   if (corners.empty()) return {};
-  const Slice slice = busiest_slice(clouds.routes, std::clamp(0.4 * (corners[1] - corners[0]).maxCoeff(), 10.0, 40.0));
-  const Eigen::Vector2d across(-slice.along.y(), slice.along.x());
-  const Eigen::Index height = 3 - ground.right - ground.up;
-  const auto to_plane = [&](const Eigen::Vector3d& p) -> std::optional<Eigen::Vector2d> {
-    const Eigen::Vector2d from_centre = ground(p) - slice.centre;
-    const double u = slice.along.dot(from_centre);
-    if (std::abs(across.dot(from_centre)) > 0.5 * kSliceThickness_m || std::abs(u) > 0.5 * slice.length_m)
-      return std::nullopt;
-    return Eigen::Vector2d(u, p[height]);
-  };
+  Points3d points;
+  for_each_point(clouds.server, 100'000, [&](const Eigen::Vector3d& p) {
+    if (p.allFinite()) points.push_back(p);
+  });
+  const Eigen::Vector2d extent = corners[1] - corners[0];
+  Slice slice = busiest_slice(clouds.routes, std::clamp(0.4 * extent.maxCoeff(), 10.0, 40.0), [&](const Slice& tried) {
+    return squares_seen(points, {tried, clouds.ground});
+  });
   std::vector<CloudLayer> own = clouds.server;
   own.insert(own.end(), clouds.onboard.begin(), clouds.onboard.end());
-  const Range high = heights(own, to_plane);
+  Range high = heights(own, SlicePlane{slice, clouds.ground});
   if (high.empty) return {};
+  // Of a high place a longer slice fits into the picture at the same scale.
+  slice.length_m = std::max(slice.length_m, std::min(kWidthOfHeight * (high.high - high.low), extent.norm()));
+  high = heights(own, SlicePlane{slice, clouds.ground});
   const Points2d box{{-0.5 * slice.length_m, high.low}, {0.5 * slice.length_m, high.high}};
-  return picture(clouds, PlanView({box}, kWide_px, 0.4 * kWide_px), to_plane);
+  return picture(clouds, PlanView({box}, kWide_px, kWide_px / kWidthOfHeight), SlicePlane{slice, clouds.ground});
 }
 
 RgbaImage compose(const MapPicture& picture, std::size_t columns) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -43,8 +44,11 @@ struct Slice {
   double length_m = 0.0;
 };
 /// The slice of this length that the routes cross at most places and as squarely as possible, because a cut through
-/// several corridors or a junction shows more than one along a wall. Among equals, the one crossed most often.
-Slice busiest_slice(const std::vector<Points2d>& routes, double length_m);
+/// several corridors or a junction shows more than one along a wall. Among equals, the one crossed most often. With
+/// `shows`, which counts what there is to see in a slice, the one that shows most of those that are at least half as
+/// busy: outdoors most cuts across a route show little but the ground below it.
+Slice busiest_slice(const std::vector<Points2d>& routes, double length_m,
+                    const std::function<std::size_t(const Slice&)>& shows = {});
 
 /// The clouds of the robots of one component, in the joint map.
 std::vector<CloudLayer> server_layers(const MissionRecord& record, std::uint32_t component);

@@ -20,6 +20,18 @@ Colour at(const RgbaImage& image, std::size_t x, std::size_t y) {
   return {image.rgba[i], image.rgba[i + 1], image.rgba[i + 2], image.rgba[i + 3]};
 }
 
+/// Of the lower half: in how many of its columns there is anything to see.
+double share_of_lit_columns(const RgbaImage& image) {
+  std::size_t lit = 0;
+  for (std::size_t x = 0; x < image.width; ++x) {
+    bool any = false;
+    for (std::size_t y = image.height / 2; y < image.height; ++y)
+      any = any || at(image, x, y)[0] + at(image, x, y)[1] > 120;
+    lit += any ? 1 : 0;
+  }
+  return static_cast<double>(lit) / static_cast<double>(image.width);
+}
+
 TEST(Png, ReadsBack) {
   RgbaImage image{37, 11, {}};
   Rng rng(1);
@@ -107,6 +119,46 @@ TEST(BusiestSlice, CutsMostCorridors) {
   EXPECT_EQ(busiest_slice({}, 5.0).length_m, 5.0);
 }
 
+TEST(BusiestSlice, ShowsMostOfThoseThatAreBusy) {
+  // Four parallel ways; behind the far ends of the first two there is something to see, and behind nothing that no way
+  // crosses.
+  std::vector<Points2d> routes(4);
+  for (std::size_t r = 0; r < 4; ++r)
+    for (double x = 0.0; x < 40.0; x += 0.5) routes[r].emplace_back(x, 5.0 * static_cast<double>(r));
+  const auto shows = [](const Slice& slice) -> std::size_t {
+    return slice.centre.x() > 30.0 && slice.centre.y() < 7.0 ? 100 : 10;
+  };
+  const Slice slice = busiest_slice(routes, 15.0, shows);
+  EXPECT_EQ(shows(slice), 100U);
+  EXPECT_NEAR(std::abs(slice.along.y()), 1.0, 0.3);  // across the ways
+  EXPECT_EQ(busiest_slice({}, 5.0, shows).length_m, 5.0);
+}
+
+/// Walls of 20 m around squares of 10 m: 50 m of these fit into the picture, where 24 would leave half of it black.
+TEST(MapPictures, ASectionOfAHighPlaceTakesTheWholePicture) {
+  MissionRecord record = test::example_record({.robots = 1, .keyframes = 60, .cloud = true});
+  auto& points = record.server.clouds[0].cloud.points;
+  points.clear();
+  const std::uint32_t component = record.server.largest_component;
+  const Pose3 T_world_display = display_from_world(record, component).inverse();
+  const Eigen::Vector3d start = displayed_routes(record, component).front().front();
+  const auto put = [&](double x, double y, double z) {
+    points.push_back((T_world_display * (start + Eigen::Vector3d(x, y, z))).cast<float>());
+  };
+  for (double x = -60.0; x < 60.0; x += 0.25)
+    for (double y = -60.0; y < 60.0; y += 0.25) put(x + 0.24 * std::sin(5.0 * y), y + 0.24 * std::sin(7.0 * x), 0.0);
+  for (double wall = -60.0; wall <= 60.0; wall += 10.0)
+    for (double along = -60.0; along < 60.0; along += 0.5)
+      for (double z = 0.5; z < 20.0; z += 0.5) {
+        put(wall, along, z);
+        put(along, wall, z);
+      }
+  record.robots[0].onboard_cloud.points.clear();
+  const MapPicture picture = map_section(record);
+  ASSERT_EQ(picture.panels.size(), 1U);
+  EXPECT_GT(share_of_lit_columns(picture.panels[0].image), 0.8);
+}
+
 TEST(MapPictures, ShowWhatThereIs) {
   const auto names = [](const MapPicture& picture) {
     std::vector<std::string> out;
@@ -164,15 +216,7 @@ TEST(MapPictures, OfASmallPlaceAFloorIsALineAndNoDots) {
   record.robots[0].onboard_cloud.points.clear();
   const MapPicture picture = map_section(record);
   ASSERT_EQ(picture.panels.size(), 1U);
-  const RgbaImage& image = picture.panels[0].image;
-  std::size_t lit = 0;
-  for (std::size_t x = 0; x < image.width; ++x) {
-    bool any = false;
-    for (std::size_t y = image.height / 2; y < image.height; ++y)
-      any = any || at(image, x, y)[0] + at(image, x, y)[1] > 120;
-    lit += any ? 1 : 0;
-  }
-  EXPECT_GT(static_cast<double>(lit), 0.8 * static_cast<double>(image.width));
+  EXPECT_GT(share_of_lit_columns(picture.panels[0].image), 0.8);
 }
 
 TEST(MapPictures, ComposeKeepsEveryPanel) {
