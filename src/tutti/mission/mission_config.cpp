@@ -114,7 +114,7 @@ bool has_graphs(const MissionConfig& config) {
 std::string problem_of_name(const std::string& name) {
   constexpr const char* kLetters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-";
   if (name.size() <= kLongestName && name.find_first_not_of(kLetters) == std::string::npos) return {};
-  return fmt::format("is '{}', expected at most {} letters, digits, '_' and '-'", name, kLongestName);
+  return fmt::format("is '{:.80}', expected at most {} letters, digits, '_' and '-'", name, kLongestName);
 }
 
 std::vector<std::string> problems_of(const MissionConfig& config) {

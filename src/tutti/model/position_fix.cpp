@@ -24,7 +24,7 @@ Status check_fix(const Geodetic& antenna, const Eigen::Matrix3d& covariance, con
   constexpr double kLeast = kLeastFixSigma_m * kLeastFixSigma_m, kMost = kLargestFixSigma_m * kLargestFixSigma_m;
   for (int axis = 0; axis < 3; ++axis)
     if (const double variance = covariance(axis, axis); !(variance >= kLeast && variance <= kMost))
-      return fail(ErrorCode::invalid, "variance {} m^2 {}, expected {} to {}", variance,
+      return fail(ErrorCode::invalid, "variance {:g} m^2 {}, expected {:g} to {:g}", variance,
                   axis == 0   ? "east"
                   : axis == 1 ? "north"
                               : "up",
@@ -34,7 +34,11 @@ Status check_fix(const Geodetic& antenna, const Eigen::Matrix3d& covariance, con
                            ? Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues()(0)
                            : -largest;
   if (!(least >= -kRounding * largest))
-    return fail(ErrorCode::invalid, "a covariance that is not symmetric and positive semidefinite");
+    return fail(ErrorCode::invalid,
+                "covariance [{:g} {:g} {:g}; {:g} {:g} {:g}; {:g} {:g} {:g}] m^2, expected a symmetric and positive "
+                "semidefinite one",
+                covariance(0, 0), covariance(0, 1), covariance(0, 2), covariance(1, 0), covariance(1, 1),
+                covariance(1, 2), covariance(2, 0), covariance(2, 1), covariance(2, 2));
   if (!(p_antenna.norm() <= kFarthestAntenna_m))
     return fail(ErrorCode::invalid, "antenna {} m from the body, expected at most {} m", p_antenna.norm(),
                 kFarthestAntenna_m);

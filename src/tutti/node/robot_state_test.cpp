@@ -319,6 +319,14 @@ TEST(RobotState, WithoutACheckpointNoSessionIsBegunTwice) {
   EXPECT_EQ(Robot(storage::MemoryStore(storage::robot_schema()), 0).node->agent().chain().session, 0U);
 }
 
+TEST(RobotState, OfAnotherRobotIsRefusedWithBothNumbers) {
+  storage::MemoryStore store(storage::robot_schema(), stored_tables(wire::versions(kState).current));
+  const auto node = RobotNode::open(RobotId{7}, 101, {}, store);
+  ASSERT_FALSE(node.has_value());
+  EXPECT_NE(node.error().message.find("what is stored is robot 1's, expected robot 7's"), std::string::npos)
+      << node.error().message;
+}
+
 /// Another version may have rows of its own there.
 TEST(RobotState, WhatIsNoSubmapInTheOutboxIsLeftAlone) {
   storage::MemoryStore store(storage::robot_schema(), {{"outbox", {{"later", "1"}}}, {"archive", {{"later", ""}}}});

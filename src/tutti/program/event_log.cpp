@@ -182,7 +182,7 @@ Told tell(const node::RobotJoined& joined) {
 Told tell(const node::RobotRefused& refused) {
   return {
       {{"event", "robot_refused"}, {"robot", refused.robot.value}, {"session", refused.session}, {"why", refused.why}},
-      "a second robot was refused: " + refused.why,
+      fmt::format("robot {}, session {}, is refused: {}", refused.robot.value, refused.session, refused.why),
       Level::warning};
 }
 Told tell(const node::StateLost& lost) {

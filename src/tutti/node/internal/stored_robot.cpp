@@ -29,7 +29,8 @@ Result<StoredRobot> read_stored(RobotId robot, const storage::TableStore& store)
   for (const auto* row : {&whose, &starts, &lost})
     if (!*row) return tl::unexpected(row->error());
   if (*whose && **whose != storage::key_of({robot.value}))
-    return fail(ErrorCode::invalid, "what is stored is another robot's than {}", robot.value);
+    return fail(ErrorCode::invalid, "what is stored is robot {}'s, expected robot {}'s",
+                storage::numbers_of(**whose, 1).value_or(std::vector<std::uint64_t>{0}).front(), robot.value);
   const auto newest = newest_session(store);
   if (!newest) return tl::unexpected(newest.error());
   StoredRobot out{.starts = 0, .newest_session = *newest, .lost = *lost, .checkpoint = {}};
