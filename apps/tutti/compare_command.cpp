@@ -115,7 +115,7 @@ void add_compare_command(CLI::App& app, int& exit_code) {
   command->add_option("EST", options->b, "What is judged: B")->required()->type_name("FILE|FOLDER");
   command->add_option("REF", options->a, "What is true, or the best there is: A")->required()->type_name("FILE|FOLDER");
   command
-      ->add_option("--out", options->out,
+      ->add_option("-o,--out", options->out,
                    "Write pictures (compare.html) and figures (compare.json) here, made if missing")
       ->type_name("FOLDER");
   command->add_flag("--json", options->json, "Print JSON instead of tables; with the whole disagreement map");

@@ -73,7 +73,8 @@ Counts count(const mapfile::Content& content) {
 
 int list_maps(const fs::path& folder) {
   std::error_code failure;
-  if (!fs::is_directory(folder, failure)) return complain("map list", folder.string() + ": no such folder");
+  if (!fs::is_directory(folder, failure))
+    return complain("map list", folder.string() + ": no such folder; of one file: tutti map info");
   std::vector<fs::path> files;
   const auto options = fs::directory_options::skip_permission_denied;
   for (auto at = fs::recursive_directory_iterator(folder, options, failure); at != fs::end(at); at.increment(failure)) {

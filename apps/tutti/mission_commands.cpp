@@ -66,7 +66,7 @@ struct MissionArguments {
 
 void add_mission_options(CLI::App& command, MissionArguments& arguments) {
   command
-      .add_option("--out", arguments.out,
+      .add_option("-o,--out", arguments.out,
                   "Folder for the report, made if missing; default: out/ and the mission's name")
       ->type_name("DIR");
   command.add_option("--seed", arguments.run.seed, "Everything random comes from this number; default: 1")

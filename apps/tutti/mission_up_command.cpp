@@ -73,7 +73,7 @@ void add_mission_command(CLI::App& app, int& exit_code) {
                                             "tutti run. What each program said and stored is left in OUT/state.");
   add_mission_argument(*command, *common, "The mission, or 'demo'")->required();
   command
-      ->add_option("--out", options->out,
+      ->add_option("-o,--out", options->out,
                    "Folder for report and state, made if missing; default: out/ and the mission's name")
       ->type_name("DIR");
   add_rate_option(*command, options->rate, "Times real time; what the machine does not keep up with comes later");
