@@ -53,7 +53,7 @@ TEST(RosFix, OfAReceiverWithoutOneIsNoneAndGarbageIsToldApart) {
   skewed.position_covariance[1] = 100.0;
   EXPECT_FALSE(heard(none).value().has_value());
   EXPECT_EQ(heard(nowhere).error().message, "latitude nan degrees, expected -90 to 90");
-  EXPECT_NE(heard(skewed).error().message.find("not symmetric"), std::string::npos);
+  EXPECT_NE(heard(skewed).error().message.find("expected a symmetric"), std::string::npos);
 }
 
 }  // namespace ros_fix_test
