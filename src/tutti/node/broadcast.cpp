@@ -14,12 +14,13 @@ bus::Envelope to_robot(RobotId robot, bus::MessageKind kind, std::shared_ptr<con
 }
 
 void Broadcast::send(ProxyGraphMessage map, std::shared_ptr<const server::Beliefs> beliefs,
-                     const std::set<RobotId>& robots, bool wait, Timestamp now, Step& step) {
+                     const std::set<RobotId>& robots, const ChangeWatch::LoneClosures& lone, Timestamp now,
+                     Step& step) {
   last_ = std::move(map);
   std::shared_ptr<const std::string> whole;
   for (const RobotId robot : robots) {
     ProxyGraph own = consistency::own_part(last_.graph, robot);
-    ChangeWatch::Decision decision = watch_.take(robot, own, beliefs, wait);
+    ChangeWatch::Decision decision = watch_.take(robot, {own, beliefs}, lone, now);
     if (decision.send) send_last(robot, std::move(own), whole, step);
     for (ChangeOfMind& told : decision.told) step.tell(now, std::move(told));
   }
@@ -28,7 +29,7 @@ void Broadcast::send(ProxyGraphMessage map, std::shared_ptr<const server::Belief
 void Broadcast::send_waiting(const std::set<RobotId>& robots, Timestamp now, Step& step) {
   std::shared_ptr<const std::string> whole;
   for (const RobotId robot : robots)
-    if (auto told = watch_.follow(robot)) {
+    if (auto told = watch_.follow(robot, now)) {
       send_last(robot, consistency::own_part(last_.graph, robot), whole, step);
       step.tell(now, std::move(*told));
     }

@@ -24,10 +24,10 @@ class Broadcast {
   /// With `to_all` every robot is sent the whole map, as in the paper (ServerConfig::broadcast).
   explicit Broadcast(bool to_all) : to_all_(to_all) {}
 
-  /// Sends a new map, which holds `beliefs` for true. With `wait`, robots about which it changes its mind are not sent
-  /// it yet; otherwise every robot is sent it.
+  /// Sends a new map, which holds `beliefs` for true. With `lone` (ChangeWatch::take), robots about which it changes
+  /// its mind are not sent it yet; otherwise every robot is sent it.
   void send(ProxyGraphMessage map, std::shared_ptr<const server::Beliefs> beliefs, const std::set<RobotId>& robots,
-            bool wait, Timestamp now, Step& step);
+            const ChangeWatch::LoneClosures& lone, Timestamp now, Step& step);
   /// True while some robot was not sent the last map.
   [[nodiscard]] bool anything_waits() const { return watch_.anything_waits(); }
   /// Sends the last map to the robots that wait for it, because it has stood.

@@ -18,17 +18,16 @@ const char* to_string(ChangeOutcome outcome) {
   return "";
 }
 
-ChangeWatch::Decision ChangeWatch::take(RobotId robot, const ProxyGraph& own,
-                                        std::shared_ptr<const server::Beliefs> beliefs, bool wait) {
+ChangeWatch::Decision ChangeWatch::take(RobotId robot, Map map, const LoneClosures& lone, Timestamp now) {
   Decision out;
   Robot& known = robots_[robot];
-  Map map{own, std::move(beliefs)};
+  const ProxyGraph& own = map.own;
   const auto end_waiting = [&](ChangeOutcome outcome) {
     if (known.waiting) out.told.push_back({robot, outcome, known.waiting->change, known.waiting->reason});
     known.waiting.reset();
   };
   const auto follow = [&] { known.followed = std::move(map); };
-  if (own.nodes.empty() || !wait) {
+  if (own.nodes.empty() || !lone) {
     end_waiting(ChangeOutcome::stands);
     follow();
     return out;
@@ -40,26 +39,38 @@ ChangeWatch::Decision ChangeWatch::take(RobotId robot, const ProxyGraph& own,
     follow();
     return out;
   }
-  if (known.waiting &&
-      consistency::map_change(known.waiting->map.own, own, chain).translation_m < change.translation_m) {
+  server::ChangeReason reason = server::reason_of_change(*known.followed.beliefs, *map.beliefs, chain);
+  reason.lone = lone(known.followed, own);
+  const bool stands =
+      known.waiting && consistency::map_change(known.waiting->map.own, own, chain).translation_m < change.translation_m;
+  if (stands && has_stood(*known.waiting, reason.lone, now)) {
     end_waiting(ChangeOutcome::stands);
     follow();
     return out;
   }
-  end_waiting(ChangeOutcome::gone);
-  const server::ChangeReason reason = server::reason_of_change(*known.followed.beliefs, *map.beliefs, chain);
   out.send = false;
+  if (stands) {
+    known.waiting->map = std::move(map);
+    known.waiting->reason.lone = reason.lone;
+    return out;
+  }
+  end_waiting(ChangeOutcome::gone);
   out.told.push_back({robot, ChangeOutcome::waits, change, reason});
-  known.waiting = {std::move(map), change, reason};
+  known.waiting = {now, std::move(map), change, reason};
   return out;
 }
 
-std::optional<ChangeOfMind> ChangeWatch::follow(RobotId robot) {
+std::optional<ChangeOfMind> ChangeWatch::follow(RobotId robot, Timestamp now) {
   const auto known = robots_.find(robot);
   if (known == robots_.end() || !known->second.waiting) return std::nullopt;
+  if (!has_stood(*known->second.waiting, known->second.waiting->reason.lone, now)) return std::nullopt;
   Waiting waiting = *std::exchange(known->second.waiting, std::nullopt);
   known->second.followed = std::move(waiting.map);
   return ChangeOfMind{robot, ChangeOutcome::stands, waiting.change, waiting.reason};
+}
+
+bool ChangeWatch::has_stood(const Waiting& waiting, std::size_t lone_closures, Timestamp now) {
+  return lone_closures == 0 || now - waiting.since >= kStands_s;
 }
 
 bool ChangeWatch::anything_waits() const {

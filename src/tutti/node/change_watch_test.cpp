@@ -32,8 +32,10 @@ ProxyGraph map_with(double aside_m, const ChainId& chain = {kBravo, 1}) {
 
 class ChangeWatchTest : public testing::Test {
  protected:
-  ChangeWatch::Decision take(const ProxyGraph& map, bool wait = true) {
-    return watch_.take(kBravo, map, std::make_shared<const server::Beliefs>(), wait);
+  /// Ten seconds after the last one; a map that rests on so many closures of one place.
+  ChangeWatch::Decision take(const ProxyGraph& map, std::size_t lone_closures = 0) {
+    const auto lone = [&](const ChangeWatch::Map&, const ProxyGraph&) { return lone_closures; };
+    return watch_.take(kBravo, {map, std::make_shared<const server::Beliefs>()}, lone, now_ = now_ + 10.0);
   }
   /// What is told, one outcome at most.
   static std::optional<ChangeOutcome> told(const ChangeWatch::Decision& decision) {
@@ -41,6 +43,7 @@ class ChangeWatchTest : public testing::Test {
     return decision.told.empty() ? std::nullopt : std::optional(decision.told.front().outcome);
   }
   ChangeWatch watch_;
+  Timestamp now_;
 };
 
 TEST_F(ChangeWatchTest, TheFirstMapAndThoseLikeItAreSent) {
@@ -95,16 +98,49 @@ TEST_F(ChangeWatchTest, AThirdOpinionWaitsAnew) {
 
 TEST_F(ChangeWatchTest, AnUpdateWithoutNewsLetsItStand) {
   take(map_with(0.0));
-  EXPECT_FALSE(watch_.follow(kBravo).has_value());
+  EXPECT_FALSE(watch_.follow(kBravo, now_).has_value());
   EXPECT_FALSE(take(map_with(2.0)).send);
-  EXPECT_EQ(watch_.follow(kBravo)->outcome, ChangeOutcome::stands);
+  EXPECT_EQ(watch_.follow(kBravo, now_)->outcome, ChangeOutcome::stands);
   EXPECT_FALSE(watch_.anything_waits());
   EXPECT_TRUE(take(map_with(2.0)).send);
 }
 
+// The robot stays where it was for two minutes, whether or not there is news, and is told of one change only.
+TEST_F(ChangeWatchTest, WhatRestsOnOnePlaceStandsForMinutes) {
+  take(map_with(0.0));
+  const auto first = take(map_with(2.0), 4);
+  EXPECT_EQ(told(first), ChangeOutcome::waits);
+  EXPECT_EQ(first.told[0].reason.lone, 4U);
+  for (const Timestamp since = now_; now_ - since < ChangeWatch::kStands_s - 10.0;) {
+    const auto next = take(map_with(2.1), 5);
+    EXPECT_FALSE(next.send);
+    EXPECT_EQ(told(next), std::nullopt);
+    EXPECT_FALSE(watch_.follow(kBravo, now_).has_value());
+  }
+  const auto last = take(map_with(2.1), 6);
+  EXPECT_TRUE(last.send);
+  EXPECT_EQ(told(last), ChangeOutcome::stands);
+  EXPECT_EQ(last.told[0].reason.lone, 5U);  // of the map that waited
+}
+
+TEST_F(ChangeWatchTest, ASecondPlaceThatSaysTheSameEndsTheWait) {
+  take(map_with(0.0));
+  EXPECT_FALSE(take(map_with(2.0), 4).send);
+  EXPECT_FALSE(take(map_with(2.0), 4).send);
+  EXPECT_TRUE(take(map_with(2.0), 0).send);
+}
+
+TEST_F(ChangeWatchTest, WithoutNewsItIsFollowedAfterMinutes) {
+  take(map_with(0.0));
+  EXPECT_FALSE(take(map_with(2.0), 4).send);
+  EXPECT_FALSE(watch_.follow(kBravo, now_ + (ChangeWatch::kStands_s - 1.0)).has_value());
+  EXPECT_TRUE(watch_.anything_waits());
+  EXPECT_EQ(watch_.follow(kBravo, now_ + ChangeWatch::kStands_s)->outcome, ChangeOutcome::stands);
+}
+
 TEST_F(ChangeWatchTest, WhoeverDoesNotWaitIsSentItAtOnce) {
   take(map_with(0.0));
-  EXPECT_TRUE(take(map_with(2.0), false).send);
+  EXPECT_TRUE(watch_.take(kBravo, {map_with(2.0), std::make_shared<const server::Beliefs>()}, nullptr, now_).send);
   EXPECT_TRUE(take(map_with(2.0)).send);
 }
 

@@ -13,6 +13,7 @@
 #include "tutti/node/map_meta.hpp"
 #include "tutti/node/meta_keys.hpp"
 #include "tutti/node/worker_node.hpp"
+#include "tutti/server/change_support.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/submap_copy_codec.hpp"
 
@@ -294,16 +295,25 @@ void ServerNode::send_map(ProxyGraphMessage message, Timestamp now, Step& step) 
   for (const RobotId robot : robots_)
     if (const auto owner = registry_.owner(robot)) consistency::see_last_in(message.graph, *owner);
   const bool wait = config_.server.change_of_mind == "wait" && !std::exchange(operator_spoke_, false);
+  const auto lone = [&](const ChangeWatch::Map& followed, const ProxyGraph& own) {
+    return server::change_support(server_.map(), *followed.beliefs, followed.own, own, own.nodes.front().chain,
+                                  config_.server.map.gnc.solver)
+        .lone_closures;
+  };
   broadcast_.send(std::move(message), std::make_shared<const server::Beliefs>(server::beliefs_of(server_.map())),
-                  robots_, wait, now, step);
-  // What waits is sent at the next update, whether or not there is news by then.
-  if (broadcast_.anything_waits()) timer_ = now + config_.server.update_period_s;
+                  robots_, wait ? ChangeWatch::LoneClosures(lone) : nullptr, now, step);
+  look_again_at_what_waits(now);
   if (const MapCounts now_there = counts(); stored_counts_ != now_there) {
     stored_counts_ = now_there;
     step.writes.push_back(to_row(now_there));
   }
   send_refinement_job(now, step);
   note_settling(now);
+}
+
+/// At the next update, whether or not there is news by then.
+void ServerNode::look_again_at_what_waits(Timestamp now) {
+  if (broadcast_.anything_waits()) timer_ = now + config_.server.update_period_s;
 }
 
 Step ServerNode::on_timer(Timestamp now) {
@@ -314,6 +324,7 @@ Step ServerNode::on_timer(Timestamp now) {
     timer_.reset();
     if (!server_.has_news() && broadcast_.anything_waits()) {
       broadcast_.send_waiting(robots_, now, step);
+      look_again_at_what_waits(now);
       return step;
     }
     send_map(server_.optimise(), now, step);

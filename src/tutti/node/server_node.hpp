@@ -161,6 +161,7 @@ class ServerNode {
   [[nodiscard]] MapCounts counts() const;
   /// Sends a map that has just been computed.
   void send_map(ProxyGraphMessage message, Timestamp now, Step& step);
+  void look_again_at_what_waits(Timestamp now);
   /// Sets the timer when something new has come, and stores whether it has.
   void note_news(Timestamp now, bool before, Step& step);
   [[nodiscard]] storage::Write meta() const;

@@ -47,7 +47,8 @@ struct ServerConfig {
             "them, and where the others were last seen; 'all' = everybody's (the paper). It does the same with both.");
     v.field("change_of_mind", change_of_mind, one_of({"wait", "follow"}),
             "A map that differs from the one a robot follows by more than three of that map's own standard deviations: "
-            "'wait' = the robot is sent it once it has stood for another update, or an operator has spoken since; "
+            "'wait' = the robot is sent it once it has stood for another update (for two minutes, if it rests on the "
+            "closures of one place), or an operator has spoken since; "
             "'follow' = at once.");
   }
 };
