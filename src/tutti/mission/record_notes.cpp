@@ -2,12 +2,14 @@
 #include "tutti/mission/record_notes.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <utility>
 
+#include "tutti/server/map_components.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::mission {
@@ -71,6 +73,25 @@ void note_inconsistent_closures(const server::MapEstimate& map, MissionRecord& r
         "{}: {} of {} closures contradict the map and are not in it; so many are seldom all wrong: odometry may be "
         "worse than its covariance says, or have failed where nothing tells",
         names_of(robots, record), count.refused, count.all));
+  }
+}
+
+/// Why robots that closures would join are in maps of their own.
+void note_separate_maps(const server::MapEstimate& map, MissionRecord& record) {
+  const auto component = server::choose_components(map).of_robot;
+  std::map<std::pair<RobotId, RobotId>, std::map<std::string, std::size_t>> refused;  // by reason
+  for (const server::JudgedClosure& judged : map.closures) {
+    const auto robots = std::minmax({judged.closure.from.chain.robot, judged.closure.to.chain.robot});
+    if (!judged.accepted && component.contains(robots.first) && component.contains(robots.second) &&
+        component.at(robots.first) != component.at(robots.second))
+      ++refused[robots][judge::to_string(judged.objection)];
+  }
+  for (const auto& [robots, reasons] : refused) {
+    std::vector<std::string> counts;
+    for (const auto& [reason, count] : reasons) counts.push_back(fmt::format("{} ({})", reason, count));
+    record.notes.push_back(fmt::format("{} and {}: two maps, because every closure between them is refused: {}",
+                                       name_of(robots.first, record), name_of(robots.second, record),
+                                       fmt::join(counts, "; ")));
   }
 }
 
@@ -145,6 +166,7 @@ void note_what_the_map_lacks(const server::MapEstimate& map, MissionRecord& reco
                     name_of(chain.robot, record), std::sqrt(factor)));
   note_understated_closures(map, record);
   note_inconsistent_closures(map, record);
+  note_separate_maps(map, record);
   if (map.spare_pairs > 0)
     record.notes.push_back(
         fmt::format("{} pairs of submaps have closures that the map does not need and that were not judged "

@@ -85,6 +85,26 @@ TEST(Notes, ManyClosuresThatContradictTheMap) {
   EXPECT_NE(notes(10, 20).at(0).find("alpha with bravo: 20 of 30 closures contradict the map"), std::string::npos);
 }
 
+TEST(Notes, WhyTwoRobotsAreTwoMaps) {
+  const auto notes = [](std::uint32_t component_of_bravo) {
+    MissionRecord record = joined();
+    record.notes.clear();
+    server::MapEstimate map;
+    for (const std::uint32_t robot : {0U, 1U}) {
+      map.nodes.push_back({.id = {{RobotId{robot}, 1}, 0}, .representative = true});
+      map.nodes.back().component = robot == 0 ? 0 : component_of_bravo;
+    }
+    for (const auto objection : {judge::Objection::too_few, judge::Objection::dear, judge::Objection::dear})
+      map.closures.push_back({{{{RobotId{1}, 1}, 0}, {{RobotId{0}, 1}, 0}, {}}, false, false, objection});
+    note_what_the_map_lacks(map, record);
+    return record.notes;
+  };
+  EXPECT_EQ(notes(1), std::vector<std::string>{
+                          "alpha and bravo: two maps, because every closure between them is refused: the map would pay "
+                          "more for it than a right one costs (2); too few closures join these two (1)"});
+  EXPECT_TRUE(notes(0).empty());  // of one map, joined by others
+}
+
 TEST(Notes, OdometryThatSaysTooLittleOfItsErrors) {
   MissionRecord record = joined();
   record.notes.clear();
