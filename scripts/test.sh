@@ -71,7 +71,7 @@ build_and_test() {
 }
 
 stage "packages"
-"$root/scripts/install_dependencies.sh" --tests --bench
+"$root/scripts/install_dependencies.sh" --tests
 trap finish EXIT
 build_and_test "$preset" Release "${tests[@]}"
 if [ "$sanitize" = yes ]; then
