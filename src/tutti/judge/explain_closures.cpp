@@ -27,7 +27,7 @@ class Search {
     // Whatever failed pays for its places and at least one run.
     if (!best.solved || !config_.let_odometry_fail || !best.suspicious || best.unexplained < config_.least_votes + 1.0)
       return best;
-    if (Solution proposal = proposed(); proposal.solved && !proposal.failed.empty())
+    if (Solution proposal = without_impossible(proposed()); proposal.solved && !proposal.failed.empty())
       keep_better(best, without_idle(std::move(proposal)));
     return refuse_groups(std::move(groups), best) ? without_idle(std::move(best)) : best;
   }
@@ -53,6 +53,19 @@ class Search {
         windows.push_back(window);
     }
     return solver_.judge({std::move(windows), {}}, std::move(all.optimum));
+  }
+
+  /// Takes back the windows in which odometry would have missed more than the robot can have moved. They go first: what
+  /// else failed shows in a solution that is possible.
+  [[nodiscard]] Solution without_impossible(Solution best) const {
+    while (best.solved) {
+      std::vector<std::size_t> impossible;
+      for (std::size_t k = 0; k < best.hypothesis.windows.size(); ++k)
+        if (std::isinf(best.prices[k])) impossible.push_back(k);
+      if (impossible.empty()) break;
+      best = solver_.solve(without(best.hypothesis, impossible));
+    }
+    return best;
   }
 
   /// Takes back the windows that do not pay for themselves, the cheapest first and as many at once as together fit no

@@ -156,6 +156,27 @@ TEST(WhoIsWrong, PlacesThatLookAlikeBlameNothing) {
   for (std::size_t c = 0; c < found.accepted.size(); ++c) EXPECT_EQ(found.accepted[c], c < right) << c;
 }
 
+// Twenty closures that agree say that a robot at 1 m/s was aside by so much between nodes 40 and 60. Closures before
+// and after leave it at most 10 s to get there: what it can have moved is believed, and the same from farther away is
+// not.
+TEST(WhoIsWrong, OdometryMissesNoMoreThanTheRobotCanHaveMoved) {
+  const auto accepted = [](double aside_m) {
+    Laps laps;
+    for (std::size_t k = 1; k < kLap; k += 5)
+      if (k < 40 || k >= 60) laps.close(k, k + kLap);
+    const std::size_t right = laps.graph.edges.size();
+    const Pose3 aside{Eigen::Quaterniond::Identity(), {aside_m, 0.0, 0.0}};
+    for (std::size_t k = 40; k < 60; ++k)
+      laps.graph.edges.push_back(
+          {k, k + kLap, laps.truth[k].inverse() * aside * laps.truth[k + kLap], information(0.03, 0.005)});
+    const Judgement judged = laps.explain();
+    return std::count(judged.accepted.begin() + static_cast<std::ptrdiff_t>(right - laps.odometry_edges),
+                      judged.accepted.end(), true);
+  };
+  EXPECT_EQ(accepted(4.0), 20);
+  EXPECT_EQ(accepted(14.0), 0);
+}
+
 TEST(WhoIsWrong, DoesNotDependOnTheOrderOfTheClosures) {
   Laps laps(130, 0.3);
   laps.close_laps(5);

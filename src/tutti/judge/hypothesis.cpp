@@ -31,7 +31,7 @@ constexpr double kAboutLeast_s = 1.0;
 constexpr double kRadian_s = 5.0;
 /// Odometry fails by no more than a body moves in the time that it took, and in so many seconds more, as what jumps
 /// between two samples has moved in no time at all.
-constexpr double kReach_s = 10.0;
+constexpr double kReach_s = 2.0;
 /// Where solutions begin is solved to this share of the cost: with wrong closures in it the rest takes most of the
 /// steps, and says nothing.
 constexpr double kBeginning = 1e-3;
