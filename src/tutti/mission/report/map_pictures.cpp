@@ -252,7 +252,7 @@ MapPicture map_section(const MissionRecord& record) {
   own.insert(own.end(), clouds.onboard.begin(), clouds.onboard.end());
   Range high = heights(own, SlicePlane{slice, clouds.ground});
   if (high.empty) return {};
-  // Of a high place a longer slice fits into the picture at the same scale.
+  // A longer slice of a high place fits into the picture at the same scale.
   slice.length_m = std::max(slice.length_m, std::min(kWidthOfHeight * (high.high - high.low), extent.norm()));
   high = heights(own, SlicePlane{slice, clouds.ground});
   const Points2d box{{-0.5 * slice.length_m, high.low}, {0.5 * slice.length_m, high.high}};

@@ -20,7 +20,7 @@ Colour at(const RgbaImage& image, std::size_t x, std::size_t y) {
   return {image.rgba[i], image.rgba[i + 1], image.rgba[i + 2], image.rgba[i + 3]};
 }
 
-/// Of the lower half: in how many of its columns there is anything to see.
+/// The share of columns in whose lower half there is anything to see.
 double share_of_lit_columns(const RgbaImage& image) {
   std::size_t lit = 0;
   for (std::size_t x = 0; x < image.width; ++x) {
@@ -134,24 +134,29 @@ TEST(BusiestSlice, ShowsMostOfThoseThatAreBusy) {
   EXPECT_EQ(busiest_slice({}, 5.0, shows).length_m, 5.0);
 }
 
-/// Walls of 20 m around squares of 10 m: 50 m of these fit into the picture, where 24 would leave half of it black.
-TEST(MapPictures, ASectionOfAHighPlaceTakesTheWholePicture) {
-  MissionRecord record = test::example_record({.robots = 1, .keyframes = 60, .cloud = true});
+/// Clears the server's cloud; what is returned puts a point into it, seen from where the first robot began (display
+/// frame).
+auto empty_cloud(MissionRecord& record) {
   auto& points = record.server.clouds[0].cloud.points;
   points.clear();
   const std::uint32_t component = record.server.largest_component;
-  const Pose3 T_world_display = display_from_world(record, component).inverse();
-  const Eigen::Vector3d start = displayed_routes(record, component).front().front();
-  const auto put = [&](double x, double y, double z) {
-    points.push_back((T_world_display * (start + Eigen::Vector3d(x, y, z))).cast<float>());
+  return [&points, T_world_display = display_from_world(record, component).inverse(),
+          start = displayed_routes(record, component).front().front()](const Eigen::Vector3d& from_start) {
+    points.push_back((T_world_display * (start + from_start)).cast<float>());
   };
+}
+
+/// Walls of 20 m around squares of 10 m: 50 m of these fit into the picture, where 24 would leave half of it black.
+TEST(MapPictures, ASectionOfAHighPlaceTakesTheWholePicture) {
+  MissionRecord record = test::example_record({.robots = 1, .keyframes = 60, .cloud = true});
+  const auto put = empty_cloud(record);
   for (double x = -60.0; x < 60.0; x += 0.25)
-    for (double y = -60.0; y < 60.0; y += 0.25) put(x + 0.24 * std::sin(5.0 * y), y + 0.24 * std::sin(7.0 * x), 0.0);
+    for (double y = -60.0; y < 60.0; y += 0.25) put({x + 0.24 * std::sin(5.0 * y), y + 0.24 * std::sin(7.0 * x), 0.0});
   for (double wall = -60.0; wall <= 60.0; wall += 10.0)
     for (double along = -60.0; along < 60.0; along += 0.5)
       for (double z = 0.5; z < 20.0; z += 0.5) {
-        put(wall, along, z);
-        put(along, wall, z);
+        put({wall, along, z});
+        put({along, wall, z});
       }
   record.robots[0].onboard_cloud.points.clear();
   const MapPicture picture = map_section(record);
@@ -202,16 +207,12 @@ TEST(MapPictures, ServerAndSurveyLieOnEachOther) {
 /// A room whose floor and ceiling three submaps have seen, each thinned to 0.3 m; a section of 10 m is shown.
 TEST(MapPictures, OfASmallPlaceAFloorIsALineAndNoDots) {
   MissionRecord record = test::example_record({.robots = 1, .keyframes = 5, .cloud = true});
-  auto& points = record.server.clouds[0].cloud.points;
-  points.clear();
-  const std::uint32_t component = record.server.largest_component;
-  const Pose3 T_world_display = display_from_world(record, component).inverse();
-  const Eigen::Vector3d start = displayed_routes(record, component).front().front();
+  const auto put = empty_cloud(record);
   Rng rng(1);
   for (int i = 0; i < 3 * 2 * 80 * 80; ++i) {
     const Eigen::Vector3d corner(0.3 * (i % 80) - 12.0, 0.3 * (i / 80 % 80) - 12.0, i / 6400 % 2 == 0 ? 0.0 : 2.5);
     const Eigen::Vector3d within(rng.uniform(0.0, 0.3), rng.uniform(0.0, 0.3), 0.0);
-    points.push_back((T_world_display * (start + corner + within)).cast<float>());
+    put(corner + within);
   }
   record.robots[0].onboard_cloud.points.clear();
   const MapPicture picture = map_section(record);
