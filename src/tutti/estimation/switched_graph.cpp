@@ -10,11 +10,9 @@
 #include "tutti/base/disjoint_sets.hpp"
 #include "tutti/estimation/between_factor.hpp"
 #include "tutti/estimation/chain_reduction.hpp"
-#include "tutti/estimation/gnc.hpp"
 #include "tutti/estimation/internal/gauss_newton.hpp"
 #include "tutti/estimation/internal/graph_equations.hpp"
 #include "tutti/estimation/internal/selected_inverse.hpp"
-#include "tutti/estimation/truncated_least_squares.hpp"
 
 namespace tutti::estimation {
 namespace {

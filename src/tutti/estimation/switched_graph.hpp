@@ -21,7 +21,7 @@ class SwitchedGraph {
   SwitchedGraph& operator=(const SwitchedGraph&) = delete;
 
   /// Least squares of the trusted edges and of the robust ones that are `in` (per edge of the graph; trusted edges are
-  /// in whatever it says), from the last solution on, the first time from the measurements.
+  /// in whatever it says), from the last solution on, the first time from where config.initialisation says.
   Termination solve(const std::vector<char>& in);
   /// Per edge what it makes the map pay at the last solution: by how much the least sum of r^T Omega r falls when the
   /// edge is taken out, or rises when it is taken in, to first order. With r the residual, C = J H^-1 J^T the
@@ -29,7 +29,7 @@ class SwitchedGraph {
   /// degrees of freedom if the edge and the map are right. Zero for trusted edges, and where the rest of the map does
   /// not say anything. An edge between two parts that nothing else joins has no price (infinity).
   [[nodiscard]] std::vector<double> prices();
-  /// Of all nodes of the graph, at the last solution; as they were given, if there was none.
+  /// Poses of all nodes of the graph, at the last solution; as they were given, if there was none.
   [[nodiscard]] std::vector<Pose3> poses() const;
   [[nodiscard]] double cost() const;         ///< At the last solution, of what is in.
   [[nodiscard]] int factorisations() const;  ///< So far.

@@ -8,7 +8,6 @@
 #include <limits>
 #include <map>
 #include <numeric>
-#include <tuple>
 #include <utility>
 
 #include "tutti/base/chi_square.hpp"
@@ -47,19 +46,15 @@ class Optimiser {
   }
 
   [[nodiscard]] Optimum decide() const {
-    auto [objections, failed, work] = explain();
-    Optimum best = settle(map_.searched, std::move(objections), std::move(failed), work);
+    Optimum best = settle(map_.searched, explain());
     for (int round = 0; round < kRefusals && refuse_lone_witness(best);) ++round;
-    std::vector<double> prices = std::move(best.prices);
-    best = settle(map_.graph, std::move(best.objections), std::move(best.failed), best.work);
-    for (std::size_t c = 0; c < prices.size(); ++c)
-      if (best.objections[c] == Objection::lone) best.prices[c] = prices[c];
-    return best;
+    return settle(map_.graph, std::move(best));
   }
 
  private:
-  /// Objections to each closure, and the odometry that failed. What it takes is gone when the map is optimised.
-  [[nodiscard]] std::tuple<std::vector<Objection>, std::vector<FailedStretch>, SearchWork> explain() const {
+  /// Objections to each closure, and the odometry that failed, without a map. What it takes is gone when the map is
+  /// optimised.
+  [[nodiscard]] Optimum explain() const {
     PoseGraph graph = map_.searched;
     graph.edges.insert(graph.edges.end(), closure_edges_.begin(), closure_edges_.end());
     std::vector<double> seconds;
@@ -74,7 +69,13 @@ class Optimiser {
     for (const bool accepted : found.accepted)
       objections.push_back(accepted ? Objection::none : Objection::contradicted);
     leave_unjoined(odometry, objections);
-    return {std::move(objections), std::move(found.failed), found.work};
+    return {.failed = std::move(found.failed),
+            .graph = {},
+            .closure_of_edge = {},
+            .solution = {},
+            .objections = std::move(objections),
+            .prices = std::vector<double>(closures_.size(), kUnknown),
+            .work = found.work};
   }
 
   /// Too few closures do not join two pieces of odometry, unless an operator says so.
@@ -100,16 +101,12 @@ class Optimiser {
            objection == Objection::too_few;
   }
 
-  /// The map with the closures that are worth what it pays for them.
-  [[nodiscard]] Optimum settle(const PoseGraph& odometry, std::vector<Objection> objections,
-                               std::vector<FailedStretch> failed, const SearchWork& work) const {
-    Optimum out{.failed = std::move(failed),
-                .graph = odometry,
-                .closure_of_edge = {},
-                .solution = {},
-                .objections = std::move(objections),
-                .prices = std::vector<double>(closures_.size(), kUnknown),
-                .work = work};
+  /// The map with the closures that are worth what it pays for them, from the objections, the failed odometry and the
+  /// work of `out`. Closures that are not asked keep the price that they were refused for.
+  [[nodiscard]] Optimum settle(const PoseGraph& odometry, Optimum out) const {
+    out.graph = odometry;
+    out.closure_of_edge.clear();
+    out.solution = {};
     for (const FailedStretch& stretch : out.failed)
       weaken(out.graph, map_.odometry_edges, stretch.from, stretch.to, kDoubt * stretch.missed.head<3>().norm(),
              kDoubt * stretch.missed.tail<3>().norm());
@@ -163,17 +160,12 @@ class Optimiser {
     const auto misfits = estimation::group_misfits(best.graph, best.solution.poses, roles, groups);
     const auto worst = std::ranges::max_element(misfits);
     if (*worst <= chi_square_quantile(config_.confidence, 6)) return false;
-    std::vector<std::pair<std::size_t, double>> missed;
     for (const std::size_t e : groups[static_cast<std::size_t>(worst - misfits.begin())]) {
       const std::size_t c = best.closure_of_edge[e - map_.odometry_edges];
       best.objections[c] = Objection::lone;
-      missed.emplace_back(c, *worst);
+      best.prices[c] = *worst;
     }
-    std::vector<double> prices = std::move(best.prices);
-    best = settle(map_.searched, std::move(best.objections), std::move(best.failed), best.work);
-    for (std::size_t c = 0; c < prices.size(); ++c)  // of groups that were refused before
-      if (best.objections[c] == Objection::lone) best.prices[c] = prices[c];
-    for (const auto& [c, by] : missed) best.prices[c] = by;
+    best = settle(map_.searched, std::move(best));
     return true;
   }
 

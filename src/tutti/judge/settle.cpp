@@ -10,7 +10,7 @@
 namespace tutti::judge {
 namespace {
 
-/// Of closures that are too dear, those go at once that cost this share of what the dearest does.
+/// Closures that are too dear go at once if they cost this share of what the dearest does.
 constexpr double kDearest = 0.5;
 /// A closure that went so often does not come again.
 constexpr int kTimesOut = 2;
