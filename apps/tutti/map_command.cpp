@@ -18,11 +18,8 @@
 #include <vector>
 
 #include "commands.hpp"
-#include "map_grid_options.hpp"
 #include "options.hpp"
-#include "tutti/base/folder.hpp"
 #include "tutti/mapfile/closures.hpp"
-#include "tutti/mapfile/export.hpp"
 #include "tutti/mapfile/merge.hpp"
 #include "tutti/mapfile/salvage.hpp"
 #include "tutti/server/map_components.hpp"
@@ -199,44 +196,6 @@ int show_map(const fs::path& file) {
   return 0;
 }
 
-struct ExportOptions {
-  std::string map, g2o, tum, ply;
-  bool live = false;
-  std::shared_ptr<GridOptions> grid;
-};
-
-int export_map(const ExportOptions& options) {
-  if (options.g2o.empty() && options.tum.empty() && options.ply.empty() && !wants_grid(*options.grid))
-    return complain("map export", "nothing to write: expected --g2o, --tum, --ply, --grid or --voxels", 2);
-  const auto map = options.live ? mapfile::open_copy(options.map) : mapfile::open(options.map);
-  if (!map) return complain("map export", map.error().message);
-  const auto content = mapfile::read(**map);
-  if (!content) return complain("map export", content.error().message);
-  const server::MapEstimate estimate = mapfile::estimate(*content);
-  for (const std::string& file : {options.g2o, options.ply})
-    if (auto made = make_folder_of(file); !made) return complain("map export", made.error().message);
-  if (estimate.components > 1)
-    fmt::print("note: {} components, of which each has a frame of its own\n", estimate.components);
-  if (!options.g2o.empty()) {
-    if (auto ok = mapfile::export_g2o(estimate, options.g2o); !ok) return complain("map export", ok.error().message);
-    fmt::print("{}: {} vertices, {} edges\n", options.g2o, estimate.graph.poses.size(), estimate.graph.edges.size());
-  }
-  if (!options.tum.empty()) {
-    const auto files = mapfile::export_tum(*content, estimate, options.tum);
-    if (!files) return complain("map export", files.error().message);
-    for (const std::string& file : *files) fmt::print("{}\n", (fs::path(options.tum) / file).string());
-  }
-  if (!options.ply.empty()) {
-    const auto cloud = mapfile::export_ply(**map, *content, estimate, options.ply);
-    if (!cloud) return complain("map export", cloud.error().message);
-    if (cloud->points == 0) return complain("map export", options.map + ": no submap has a cloud");
-    fmt::print("{}: {} points of {} submaps{}{}\n", options.ply, cloud->points, cloud->submaps,
-               cloud->left_out > 0 ? fmt::format("; {} are not tied to these", cloud->left_out) : "",
-               cloud->of_the_largest ? "" : "; the largest part of the map has no clouds, this is of another");
-  }
-  return export_grids(**map, *content, estimate, *options.grid);
-}
-
 struct MergeOptions {
   std::vector<std::string> maps;
   std::string out;
@@ -285,22 +244,7 @@ void add_map_command(CLI::App& app, int& exit_code) {
   info->add_option("map", *file, "The map's file.")->type_name("MAP")->required();
   info->callback([file, &exit_code] { exit_code = show_map(*file); });
 
-  const auto options = std::make_shared<ExportOptions>();
-  CLI::App* out = map->add_subcommand("export", "Write the joint map for other programs.");
-  out->add_option("map", options->map, "The map's file.")->type_name("MAP")->required();
-  out->add_flag(
-      "--live", options->live,
-      "A server may have the map open, now or meanwhile: it is copied to the folder for temporary files (TMPDIR) "
-      "first, and neither changed nor locked.");
-  out->add_option("--g2o", options->g2o, "The joint pose graph; beside it which keyframe each vertex is.")
-      ->type_name("FILE.g2o");
-  out->add_option("--tum", options->tum, "Every session's trajectory in the joint map, as NAME.tum.")->type_name("DIR");
-  out->add_option("--ply", options->ply, "What all robots saw, thinned to voxels of 0.1 m.")->type_name("FILE.ply");
-  options->grid = add_grid_options(*out);
-  out->footer(
-      "Example: tutti map export state/map.tutti --grid map.yaml\n"
-      "Of a running server: tutti map export state/map.tutti --live --grid map.yaml\n");
-  out->callback([options, &exit_code] { exit_code = export_map(*options); });
+  add_export_command(*map, exit_code);
 
   const auto merging = std::make_shared<MergeOptions>();
   CLI::App* merge = map->add_subcommand("merge", "Join two maps into a third; the two stay as they are.");
