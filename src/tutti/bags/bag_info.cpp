@@ -8,6 +8,7 @@
 
 #include "tutti/bags/camera.hpp"
 #include "tutti/bags/rgbd.hpp"
+#include "tutti/bags/robot_namespace.hpp"
 #include "tutti/bags/ros_messages.hpp"
 
 namespace tutti::bags {
@@ -92,12 +93,29 @@ void look_at(TopicInfo& topic, const BagMessage& message) {
   topic.last = std::max(topic.last, message.log_time);
 }
 
-void add_transforms(TransformTree& tree, const BagMessage& message) {
+/// Trees are by namespace. Also finds which namespaces of frames have odometry.
+void add_transforms(std::map<std::string, TransformTree>& trees, std::set<std::string>& robots,
+                    const BagMessage& message) {
   const auto encoding = to_encoding(message.channel->message_encoding);
   if (!encoding) return;
   const auto transforms = decode_tf(message.data, *encoding);
   if (!transforms) return;
-  for (const RosTransform& transform : *transforms) static_cast<void>(tree.add(transform, true));
+  const std::string of = namespace_of(message.channel->topic);
+  const bool is_static = is_static_tf(message.channel->topic);
+  for (const RosTransform& transform : *transforms) {
+    static_cast<void>(trees[of].add(transform, is_static));  // it keeps its problems
+    if (!is_static && is_odometry_frame(frame_name(transform.header.frame_id)))
+      robots.insert(of.empty() ? namespace_of(transform.header.frame_id) : of);
+  }
+}
+
+void take_trees(const std::map<std::string, TransformTree>& trees, BagInfo& out) {
+  for (const auto& [of, tree] : trees) {
+    for (const auto& [problem, count] : tree.problems())
+      out.notes.push_back(fmt::format("transforms{}: {}{}", of.empty() ? "" : " of /" + of, problem,
+                                      count > 1 ? fmt::format(" ({} times)", count) : ""));
+    out.tree.merge(tree);
+  }
 }
 
 bool shows_depth(const TopicInfo& topic) { return topic.image && is_depth(topic.topic, topic.image->encoding); }
@@ -178,6 +196,7 @@ BagInfo inspect(BagReader& bag) {
     return topic;
   };
   std::map<const BagChannel*, TopicInfo*> of_channel;
+  std::map<std::string, TransformTree> trees;
   while (true) {
     const auto message = bag.next();
     if (!message) {
@@ -188,14 +207,19 @@ BagInfo inspect(BagReader& bag) {
     TopicInfo*& topic = of_channel[(*message)->channel];
     if (!topic) topic = &topic_of(*(*message)->channel);
     look_at(*topic, **message);
-    if (topic->use == Use::transforms && topic->topic.ends_with("tf_static")) add_transforms(out.tree, **message);
+    if (topic->use == Use::transforms) add_transforms(trees, out.robots, **message);
     ++out.messages;
   }
   for (const BagChannel* const channel : bag.channels()) topic_of(*channel);
   out.notes = bag.notes();
   if (const auto stated = bag.stated_messages(); stated && *stated != out.messages)
     out.notes.push_back(fmt::format("its statistics say {} messages, {} could be read", *stated, out.messages));
-  for (auto& [name, topic] : topics) out.topics.push_back(std::move(topic));
+  for (auto& [name, topic] : topics) {
+    if (topic.use == Use::odometry) out.robots.insert(namespace_of(topic.topic));
+    out.topics.push_back(std::move(topic));
+  }
+  out.robots.erase("");
+  take_trees(trees, out);
   return out;
 }
 
@@ -233,6 +257,7 @@ std::vector<std::string> uses(const BagInfo& info) {
     if (row.use != Use::images) continue;
     if (const std::string depth = depth_in_words(info); !depth.empty()) add("depth", depth);
   }
+  if (!info.robots.empty()) add("robots", fmt::format("{} (namespaces with odometry)", fmt::join(info.robots, ", ")));
   return out;
 }
 

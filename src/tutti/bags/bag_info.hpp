@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -32,7 +33,8 @@ struct TopicInfo {
 
 struct BagInfo {
   std::vector<TopicInfo> topics;  ///< Sorted by name, then by type.
-  TransformTree tree;             ///< Of /tf_static.
+  TransformTree tree;             ///< Of all topics of transforms.
+  std::set<std::string> robots;   ///< Namespaces that have odometry.
   std::uint64_t messages = 0;
   std::uint64_t errors = 0;        ///< Records and chunks that could not be read.
   std::vector<std::string> said;   ///< Messages of the first ten errors.

@@ -115,6 +115,27 @@ TEST(BagInfo, DepthIsNoCameraAndItsOwnIsNamed) {
       << said("depth");
 }
 
+TEST(BagInfo, RobotsAreNamedAndSoAreTheContradictionsOfTheirTransforms) {
+  const auto transform = [](const std::string& parent, const std::string& child, double x) {
+    const RosTransform out{
+        .header = {{1}, parent}, .child_frame_id = child, .translation = {x, 0, 0}, .rotation = {1, 0, 0, 0}};
+    return encode(std::span(&out, 1));
+  };
+  const std::string tf = "tf2_msgs/msg/TFMessage";
+  std::string data = kMagic + schema(1, "nav_msgs/msg/Odometry") + schema(2, tf) + channel(1, 1, "/alpha/odom") +
+                     channel(2, 2, "/tf") + channel(3, 2, "/charlie/tf") + channel(4, 2, "/tf_static");
+  data += message(1, 1, odometry()) + message(2, 1, transform("bravo/odom", "bravo/base_link", 0.0)) +
+          message(3, 1, transform("odom", "base_link", 0.0)) + message(4, 1, transform("base_link", "lidar", 0.0)) +
+          message(4, 2, transform("base_link", "lidar", 2.0));
+  const BagInfo info = info_of(data);
+  EXPECT_EQ(uses(info).back(), "robots       alpha, bravo, charlie (namespaces with odometry)");
+  ASSERT_EQ(info.notes.size(), 2U);
+  EXPECT_NE(info.notes.back().find("transforms: frame 'lidar' in 'base_link' is static at [0.000 0.000 0.000] m and "
+                                   "at [2.000 0.000 0.000] m, 2.000 m and 0.00 degrees apart"),
+            std::string::npos)
+      << info.notes.back();
+}
+
 TEST(BagInfo, WithoutOdometryThatIsSaid) {
   EXPECT_EQ(uses(info_of(kMagic)).at(0), "odometry     missing: without odometry nothing can be made of this bag");
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/bags/transform_tree.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -15,6 +17,10 @@ constexpr double kStill_m = 1e-3, kStill_rad = 1e-3;
 
 bool is_same(const Pose3& a, const Pose3& b) {
   return (a.translation - b.translation).norm() < kStill_m && a.rotation.angularDistance(b.rotation) < kStill_rad;
+}
+
+std::string in_words(const Pose3& pose) {
+  return fmt::format("[{:.3f} {:.3f} {:.3f}] m", pose.translation.x(), pose.translation.y(), pose.translation.z());
 }
 
 }  // namespace
@@ -34,13 +40,55 @@ Result<Pose3> to_pose(const Eigen::Vector3d& translation, const Eigen::Quaternio
 }
 
 Status TransformTree::add(const RosTransform& transform, bool is_static) {
+  Status out = take(transform, is_static);
+  if (!out) add_problem(out.error().message);
+  return out;
+}
+
+void TransformTree::add_problem(const std::string& problem, std::uint64_t count) {
+  constexpr std::size_t kMost = 20;  // a stranger may send any number
+  if (problems_.size() < kMost || problems_.contains(problem)) problems_[problem] += count;
+}
+
+Status TransformTree::take(const RosTransform& transform, bool is_static) {
   const auto pose = to_pose(transform.translation, transform.rotation);
   const std::string parent = frame_name(transform.header.frame_id), child = frame_name(transform.child_frame_id);
   if (!pose) return in_context(fmt::format("transform {:.80} -> {:.80}", parent, child), pose.error());
-  const auto [at, is_new] = joints_.try_emplace(child, Joint{parent, *pose});
-  if (!is_new && !is_static && (at->second.parent != parent || !is_same(at->second.T_parent_child, *pose)))
+  const Joint said{parent, *pose, is_static};
+  const auto [at, is_new] = joints_.try_emplace(child, said);
+  if (is_new) return {};
+  if (!is_static && (at->second.parent != parent || !is_same(at->second.T_parent_child, *pose)))
     at->second.moves = true;
-  return {};
+  return check_agrees(child, at->second, said);
+}
+
+/// Numbers are those of transforms that do not move: the others have new ones in each message.
+Status TransformTree::check_agrees(const std::string& child, const Joint& first, const Joint& later) {
+  const auto place = [](const Joint& joint) {
+    return fmt::format("'{:.80}'{}", joint.parent, joint.is_static ? " at " + in_words(joint.T_parent_child) : "");
+  };
+  if (first.parent != later.parent)
+    return fail(ErrorCode::invalid, "frame '{:.80}' has two parents, {} and {}: the first counts", child, place(first),
+                place(later));
+  if ((!first.is_static && !later.is_static) || is_same(first.T_parent_child, later.T_parent_child)) return {};
+  if (first.is_static != later.is_static)
+    return fail(ErrorCode::invalid, "frame '{:.80}' in '{:.80}' is static, and moves", child, first.parent);
+  constexpr double kDegrees = 180.0 / M_PI;
+  return fail(
+      ErrorCode::invalid,
+      "frame '{:.80}' in '{:.80}' is static at {} and at {}, {:.3f} m and {:.2f} degrees apart: the first counts",
+      child, first.parent, in_words(first.T_parent_child), in_words(later.T_parent_child),
+      (first.T_parent_child.translation - later.T_parent_child.translation).norm(),
+      kDegrees * first.T_parent_child.rotation.angularDistance(later.T_parent_child.rotation));
+}
+
+void TransformTree::merge(const TransformTree& other) {
+  for (const auto& [problem, count] : other.problems_) add_problem(problem, count);
+  for (const auto& [child, joint] : other.joints_) {
+    const auto [at, is_new] = joints_.try_emplace(child, joint);
+    if (is_new) continue;
+    if (const Status ok = check_agrees(child, at->second, joint); !ok) add_problem(ok.error().message);
+  }
 }
 
 /// From the frame upwards, with T_ancestor_frame; a ring is gone round once.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
@@ -25,8 +26,14 @@ class TransformTree {
  public:
   /// Adds a transform; one that to_pose() refuses is an error and changes nothing. Of several transforms of one child
   /// frame the first counts; if a later one of /tf (not `is_static`) differs by 1 mm, 1 mrad or its parent, the frame
-  /// moves, and find() does not go through it.
+  /// moves, and find() does not go through it. Transforms that contradict each other are an error, too, with both: of
+  /// one frame in two parents, and of a frame that is static and differs.
   Status add(const RosTransform& transform, bool is_static);
+  /// Adds the frames of another tree that are not known yet, and its problems.
+  void merge(const TransformTree& other);
+  /// Errors of add(), each with how often it came.
+  [[nodiscard]] const std::map<std::string, std::uint64_t>& problems() const { return problems_; }
+  void add_problem(const std::string& problem, std::uint64_t count = 1);
   /// T_to_from, or no value when no chain of transforms that do not move joins the two frames.
   [[nodiscard]] std::optional<Pose3> find(const std::string& to, const std::string& from) const;
   /// All frames that do not move, "base_link, lidar", for messages.
@@ -36,11 +43,15 @@ class TransformTree {
   struct Joint {
     std::string parent;
     Pose3 T_parent_child;
-    bool moves = false;
+    bool is_static = false, moves = false;
   };
+  [[nodiscard]] static Status check_agrees(const std::string& child, const Joint& first, const Joint& later);
   [[nodiscard]] std::vector<std::pair<std::string, Pose3>> ancestors(const std::string& frame) const;
 
+  Status take(const RosTransform& transform, bool is_static);
+
   std::map<std::string, Joint> joints_;  ///< By child.
+  std::map<std::string, std::uint64_t> problems_;
 };
 
 }  // namespace tutti::bags

@@ -48,6 +48,28 @@ TEST(TransformTree, WhatMovesDoesNotLeadAnywhere) {
   EXPECT_FALSE(tree.find("base", "arm"));
 }
 
+TEST(TransformTree, ContradictionsAreErrorsAndTheFirstCounts) {
+  TransformTree tree;
+  const Pose3 here, there{Eigen::Quaterniond::Identity(), {0, 0, 0.1}};
+  ASSERT_TRUE(tree.add(transform("odom", "base", here), false));
+  EXPECT_EQ(tree.add(transform("map", "base", there), false).error().message,
+            "frame 'base' has two parents, 'odom' and 'map': the first counts");
+  ASSERT_TRUE(tree.add(transform("base", "lidar", here), true));
+  ASSERT_TRUE(tree.add(transform("base", "lidar", here), true));
+  EXPECT_FALSE(tree.add(transform("base", "lidar", there), true));
+  EXPECT_EQ(tree.find("base", "lidar")->translation.z(), 0.0);
+  EXPECT_EQ(tree.add(transform("base", "lidar", there), false).error().message,
+            "frame 'lidar' in 'base' is static, and moves");
+  EXPECT_EQ(tree.problems().size(), 3U);
+
+  TransformTree other;
+  ASSERT_TRUE(other.add(transform("base", "camera", there), true));
+  ASSERT_TRUE(other.add(transform("mast", "lidar", here), true));
+  tree.merge(other);
+  EXPECT_TRUE(tree.find("base", "camera"));
+  EXPECT_EQ(tree.problems().size(), 4U);
+}
+
 TEST(TransformTree, RingsAndPosesThatAreNoneDoNoHarm) {
   TransformTree tree;
   ASSERT_TRUE(tree.add(transform("a", "b", {}), true));

@@ -5,6 +5,7 @@
 
 #include "tutti/bags/bag_info.hpp"
 #include "tutti/bags/camera.hpp"
+#include "tutti/bags/robot_namespace.hpp"
 #include "tutti/bags/ros_fix.hpp"
 #include "tutti/bags/ros_messages.hpp"
 
@@ -12,8 +13,6 @@ namespace tutti::mission {
 namespace {
 
 using bags::BagMessage;
-
-constexpr std::string_view kStatic = "tf_static";
 
 Status check_stamp(Timestamp stamp, Timestamp before) {
   if (before < stamp) return {};
@@ -51,7 +50,7 @@ class Indexer {
       case bags::Use::poses:
         return take_pose_stamped(index.poses[topic], message);
       case bags::Use::transforms:
-        return take_transforms(message, topic.ends_with(kStatic));
+        return take_transforms(message, bags::is_static_tf(topic));
       case bags::Use::scans:
         return take_scan(index.scans[topic], message);
       case bags::Use::fixes:
@@ -83,17 +82,19 @@ class Indexer {
   }
 
   void take_transforms(const BagMessage& message, bool is_static) {
-    ++tf_messages_;
+    const std::string& topic = message.channel->topic;
+    const std::string name_space = bags::namespace_of(topic);
+    bags::TransformTree& tree = index.trees[name_space];
     const auto transforms = bags::decode_tf(message.data, encoding_of(message));
-    if (!transforms) return index.bad_transforms.add(tf_messages_, transforms.error().message);
+    if (!transforms) return tree.add_problem(transforms.error().message);
     for (const bags::RosTransform& transform : *transforms) {
-      if (const auto ok = index.tree.add(transform, is_static); !ok)
-        index.bad_transforms.add(tf_messages_, ok.error().message);
+      static_cast<void>(tree.add(transform, is_static));  // it keeps its problems
       const std::string parent = bags::frame_name(transform.header.frame_id),
                         child = bags::frame_name(transform.child_frame_id), pair = parent + "->" + child;
-      const bool is_odometry = parent == "odom" || parent.ends_with("/odom") || pair == pair_;
+      const std::string key = name_space.empty() ? pair : topic + ":" + pair;
+      const bool is_odometry = bags::is_odometry_frame(parent) || pair == pair_ || key == pair_;
       if (is_static || !is_odometry) continue;
-      OdometryTrack& track = index.transforms[pair];
+      OdometryTrack& track = index.transforms[key];
       track.frame = parent;
       track.body = child;
       take_pose(track, transform.header.stamp, transform.translation, transform.rotation);
@@ -194,7 +195,6 @@ class Indexer {
 
   const std::string& pair_;
   bool with_images_;
-  std::uint64_t tf_messages_ = 0;
 };
 
 }  // namespace
@@ -205,6 +205,34 @@ void Refusals::add(std::uint64_t message, const std::string& why) {
 
 std::string note_of(const std::string& topic, const Refusals& refused, std::uint64_t of) {
   return fmt::format("{}: {} of {} messages refused, the first because: {}", topic, refused.count, of, refused.first);
+}
+
+void keep_robot(BagIndex& index, const RobotConfig& robot) {
+  std::vector<std::string> odometry;
+  for (const auto* tracks : {&index.odometry, &index.transforms})
+    for (const auto& [topic, track] : *tracks) odometry.push_back(topic);
+  if (odometry.empty())
+    for (const auto& [topic, track] : index.poses) odometry.push_back(topic);
+  const auto& topics = robot.topics;
+  const bags::RobotNamespace names = bags::robot_namespace(odometry, robot.name, topics.odometry);
+  if (!names.own.empty() && names.all.size() > 1)
+    index.notes.push_back(
+        fmt::format("topics of /{} are used: the bag has robots {}", names.own, fmt::join(names.all, ", ")));
+  const auto keep = [&](const std::string& wanted, auto&... tracks) {
+    if (wanted.empty()) (names.keep(tracks), ...);
+  };
+  keep(topics.odometry, index.odometry, index.poses, index.transforms);
+  keep(topics.scans, index.scans);
+  if (topics.depth.empty()) keep(topics.images, index.images);
+  keep(topics.imu, index.imu);
+  keep(topics.fixes, index.fixes);
+
+  const auto own = index.trees.find(names.own);
+  if (own != index.trees.end()) index.tree = own->second;
+  for (const auto& [of, tree] : index.trees)
+    if (of != names.own && names.may_use(of + "/tf")) index.tree.merge(tree);
+  for (const auto& [problem, count] : index.tree.problems())
+    index.notes.push_back(fmt::format("transforms: {}{}", problem, count > 1 ? fmt::format(" ({} times)", count) : ""));
 }
 
 BagIndex index_bag(bags::BagReader& bag, const std::string& pair, bool with_images) {

@@ -12,6 +12,7 @@
 #include "tutti/bags/depth.hpp"
 #include "tutti/bags/transform_tree.hpp"
 #include "tutti/base/result.hpp"
+#include "tutti/mission/mission_config.hpp"
 #include "tutti/model/position_fix.hpp"
 #include "tutti/model/trajectory.hpp"
 #include "tutti/model/visual.hpp"
@@ -79,21 +80,29 @@ struct FixTrack {
 /// What a mission needs to know of a bag before it reads scans one by one. It has the poses of all topics that may be
 /// odometry, and of /tf the frames whose name says that they are.
 struct BagIndex {
-  std::map<std::string, OdometryTrack> odometry;    ///< nav_msgs/Odometry, by topic
-  std::map<std::string, OdometryTrack> poses;       ///< geometry_msgs/PoseStamped, by topic
-  std::map<std::string, OdometryTrack> transforms;  ///< By pair of frames: "odom->base_link".
+  std::map<std::string, OdometryTrack> odometry;  ///< nav_msgs/Odometry, by topic
+  std::map<std::string, OdometryTrack> poses;     ///< geometry_msgs/PoseStamped, by topic
+  /// By pair of frames, "odom->base_link"; those of a namespace's own topic as "/alpha/tf:odom->base_link".
+  std::map<std::string, OdometryTrack> transforms;
   std::map<std::string, ScanTrack> scans;
   std::map<std::string, ImageTrack> images;
   std::map<std::string, bags::RosCameraInfo> cameras;  ///< The first message of each topic.
   std::map<std::string, ImuTrack> imu;
   std::map<std::string, FixTrack> fixes;
-  bags::TransformTree tree;
-  Refusals bad_transforms, bad_records;
+  std::map<std::string, bags::TransformTree> trees;  ///< By namespace: of "/alpha/tf" and "/alpha/tf_static".
+  bags::TransformTree tree;                          ///< The robot's (keep_robot()).
+  Refusals bad_records;
   std::vector<std::string> notes;  ///< Remarks of the bag's reader.
 };
 
 /// Reads the whole bag once. `pair`, such as "map->base", is kept whatever its frames are called. Images, cameras and
 /// IMUs are only indexed `with_images`.
 BagIndex index_bag(bags::BagReader& bag, const std::string& pair, bool with_images);
+
+/// Leaves in the index what is the robot's: if the bag has several robots, each in a namespace, that of its own
+/// (bags::RobotNamespace), by its name or by its `topics.odometry`. Topics that `topics` names stay, wherever they are.
+/// Its transforms are those of its namespace, and of the shared topics where these know more. Adds to the notes which
+/// robots there are, and how transforms contradict each other.
+void keep_robot(BagIndex& index, const RobotConfig& robot);
 
 }  // namespace tutti::mission

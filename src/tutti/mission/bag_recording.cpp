@@ -72,7 +72,10 @@ Result<const std::pair<const std::string, Track>*> choose(const std::map<std::st
 Result<const std::pair<const std::string, OdometryTrack>*> choose_odometry(const BagIndex& index,
                                                                            const RobotConfig& robot) {
   const std::string& wanted = robot.topics.odometry;
-  if (wanted.find(kOfTransforms) != std::string::npos) return choose(index.transforms, wanted, "odometry", robot);
+  if (wanted.find(kOfTransforms) != std::string::npos) {
+    const std::string own = fmt::format("/{}/tf:{}", robot.name, wanted);
+    return choose(index.transforms, index.transforms.contains(own) ? own : wanted, "odometry", robot);
+  }
   if (index.poses.contains(wanted)) return choose(index.poses, wanted, "odometry", robot);
   auto found = choose(index.odometry, wanted, "odometry", robot);
   if (!found || *found != nullptr) return found;
@@ -165,12 +168,11 @@ Result<BagRecording> read_bag(const fs::path& data, const RobotConfig& robot, bo
   const auto reader = bags::open_bag(out.file);
   if (!reader) return tl::unexpected(reader.error());
   BagIndex index = index_bag(**reader, robot.topics.odometry, with_images);
+  keep_robot(index, robot);
   out.notes = index.notes;
   if (const Refusals& bad = index.bad_records; bad.count > 0)
     out.notes.push_back(
         fmt::format("{} records, chunks or files could not be read, the first: {}", bad.count, bad.first));
-  if (const Refusals& bad = index.bad_transforms; bad.count > 0)
-    out.notes.push_back(fmt::format("{} transforms refused, the first because: {}", bad.count, bad.first));
   const auto odometry = choose_odometry(index, robot);
   if (!odometry) return in_context(out.file, odometry.error());
   const auto scans = choose(index.scans, robot.topics.scans, "scans", robot);

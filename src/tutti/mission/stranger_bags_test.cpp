@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Bags as strangers record them: several robots in one, clocks that disagree, transforms that cannot be.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+#include "support/bags/robot_bag.hpp"
+#include "tutti/mission/bag_recording.hpp"
+
+namespace tutti::mission {
+namespace stranger_bags_test {
+
+using namespace bags::test;
+namespace fs = std::filesystem;
+
+constexpr Timestamp kStart{1'700'000'000'000'000'000};
+constexpr int kPoses = 200, kScans = 40;
+constexpr double kPeriod_s = 0.05, kScanPeriod_s = 0.2;
+
+Pose3 at_x(double x, double z = 0.0) { return {Eigen::Quaterniond::Identity(), {x, 0.0, z}}; }
+
+/// What one robot says: odometry at 20 Hz along x for 10 s, scans at 5 Hz, and where its LiDAR is.
+struct Robot {
+  std::string topics;  ///< In front of its topics: "/alpha".
+  std::string frames;  ///< In front of its frames: "alpha/".
+  std::string tf = "/tf_static";
+  double speed_m_s = 1.0, lidar_x_m = 0.3;
+};
+
+std::vector<Sample> samples_of(const Robot& robot) {
+  const std::string body = robot.frames + "base_link", lidar = robot.frames + "lidar";
+  std::vector<Sample> out{sample_of(robot.tf, kTf, kStart, tf_of(kStart, {{body, lidar, at_x(robot.lidar_x_m)}}))};
+  for (int i = 0; i < kPoses; ++i) {
+    const Timestamp stamp = kStart + kPeriod_s * i;
+    out.push_back(sample_of(robot.topics + "/odom", kOdometry, stamp,
+                            odometry_of(stamp, at_x(robot.speed_m_s * kPeriod_s * i), robot.frames + "odom", body)));
+  }
+  for (int i = 0; i < kScans; ++i) {
+    const Timestamp stamp = kStart + 0.01 + kScanPeriod_s * i;
+    out.push_back(sample_of(robot.topics + "/points", kCloud, stamp + 0.05, cloud_of(stamp, lidar, {{1, 2, 3}})));
+  }
+  return out;
+}
+
+class StrangerBags : public testing::Test {
+ protected:
+  void SetUp() override { file_ = fs::path(testing::TempDir()) / fmt::format("stranger_bags_{}.mcap", getpid()); }
+  void TearDown() override { fs::remove(file_); }
+
+  void write(const std::vector<std::vector<Sample>>& parts) const {
+    std::vector<Sample> all;
+    for (const auto& part : parts) all.insert(all.end(), part.begin(), part.end());
+    std::ranges::stable_sort(all, {}, &Sample::ns);
+    write_bytes(file_, mcap_of(all, "", 100));
+  }
+  [[nodiscard]] Result<BagRecording> read(RobotConfig robot) const {
+    robot.bag = file_.string();
+    return read_bag("", robot);
+  }
+  [[nodiscard]] Result<BagRecording> read(const std::string& name) const {
+    RobotConfig robot;
+    robot.name = name;
+    return read(robot);
+  }
+  static std::string notes_of(const Result<BagRecording>& bag) {
+    return bag ? fmt::format("{}", fmt::join(bag->notes, "\n")) : bag.error().message;
+  }
+  static void expect_note(const Result<BagRecording>& bag, const std::string& part) {
+    EXPECT_NE(notes_of(bag).find(part), std::string::npos) << part << "\nis not in\n" << notes_of(bag);
+  }
+
+  fs::path file_;
+};
+
+/// With shared transforms and prefixed frames, and with transforms of their own that have the same frames.
+TEST_F(StrangerBags, TwoRobotsInOneAreToldApartByTheirNamespaces) {
+  for (const bool is_shared : {true, false}) {
+    Robot alpha{.topics = "/alpha"}, bravo{.topics = "/bravo", .speed_m_s = 2.0, .lidar_x_m = 0.7};
+    for (Robot* robot : {&alpha, &bravo})
+      if (is_shared)
+        robot->frames = robot->topics.substr(1) + "/";
+      else
+        robot->tf = robot->topics + "/tf_static";
+    write({samples_of(alpha), samples_of(bravo)});
+    for (const Robot& robot : {alpha, bravo}) {
+      const auto bag = read(robot.topics.substr(1));
+      ASSERT_TRUE(bag) << bag.error().message;
+      EXPECT_EQ(bag->odometry.size(), kPoses);
+      EXPECT_NEAR(bag->odometry.back().pose.translation.x(), robot.speed_m_s * kPeriod_s * (kPoses - 1), 1e-9);
+      EXPECT_EQ(bag->scan_topic, robot.topics + "/points");
+      EXPECT_EQ(bag->scans.size(), kScans);
+      EXPECT_EQ(bag->T_body_lidar.translation.x(), robot.lidar_x_m);
+      expect_note(bag, fmt::format("topics of {} are used: the bag has robots alpha, bravo", robot.topics));
+    }
+    EXPECT_NE(read("charlie").error().message.find("--topic charlie.odometry=/alpha/odom"), std::string::npos);
+    RobotConfig renamed;
+    renamed.name = "charlie";
+    renamed.topics.odometry = "/bravo/odom";  // the rest follows
+    EXPECT_EQ(read(renamed)->scan_topic, "/bravo/points");
+    EXPECT_EQ(read(renamed)->T_body_lidar.translation.x(), 0.7);
+  }
+}
+
+TEST_F(StrangerBags, OdometryOfTransformsIsTheRobotsOwn) {
+  const auto with_tf = [](const Robot& robot, double speed_m_s) {
+    std::vector<Sample> out = samples_of(robot);
+    for (Sample& sample : out)
+      if (sample.type == kOdometry) {
+        const Timestamp stamp{static_cast<std::int64_t>(sample.ns)};
+        const Pose3 pose = at_x(speed_m_s * (stamp - kStart));
+        sample = sample_of(robot.topics + "/tf", kTf, stamp, tf_of(stamp, {{"odom", "base_link", pose}}));
+      }
+    return out;
+  };
+  write({with_tf({.topics = "/alpha", .frames = "", .tf = "/alpha/tf_static"}, 1.0),
+         with_tf({.topics = "/bravo", .frames = "", .tf = "/bravo/tf_static"}, 2.0)});
+  RobotConfig bravo;
+  bravo.name = "bravo";
+  for (const char* const wanted : {"", "odom->base_link", "/bravo/tf:odom->base_link"}) {
+    bravo.topics.odometry = wanted;
+    const auto bag = read(bravo);
+    ASSERT_TRUE(bag) << bag.error().message;
+    EXPECT_NEAR(bag->odometry.back().pose.translation.x(), 2.0 * kPeriod_s * (kPoses - 1), 1e-6);
+  }
+}
+
+/// Sensors of one robot need not be in the namespace of its odometry.
+TEST_F(StrangerBags, WhatIsInNoRobotsNamespaceIsAnybodys) {
+  std::vector<Sample> samples = samples_of({.topics = "/alpha"});
+  for (Sample& sample : samples)
+    if (sample.type == kCloud) sample.topic = "/points";
+  write({samples, samples_of({.topics = "/bravo", .tf = "/bravo/tf_static"})});
+  EXPECT_EQ(read("alpha")->scan_topic, "/points");
+  EXPECT_EQ(read("bravo")->scan_topic, "/bravo/points");
+}
+
+TEST_F(StrangerBags, TransformsThatContradictEachOtherAreSaidWithNumbers) {
+  const auto transforms = [](const char* parent, double x) {
+    return sample_of("/tf_static", kTf, kStart + 1.0, tf_of(kStart, {{parent, "lidar", at_x(x)}}));
+  };
+  write({samples_of({}), {transforms("base_link", 1.3), transforms("base_link", 1.3), transforms("mast", 0.5)}});
+  const auto bag = read("alpha");
+  ASSERT_TRUE(bag) << bag.error().message;
+  EXPECT_EQ(bag->T_body_lidar.translation.x(), 0.3);
+  expect_note(bag,
+              "frame 'lidar' in 'base_link' is static at [0.300 0.000 0.000] m and at [1.300 0.000 0.000] m, 1.000 m "
+              "and 0.00 degrees apart: the first counts (2 times)");
+  expect_note(bag,
+              "frame 'lidar' has two parents, 'base_link' at [0.300 0.000 0.000] m and 'mast' at [0.500 0.000 0.000] "
+              "m: the first counts");
+}
+
+}  // namespace stranger_bags_test
+}  // namespace tutti::mission
