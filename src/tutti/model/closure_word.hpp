@@ -6,6 +6,7 @@
 #include <string>
 #include <tuple>
 
+#include "tutti/base/fields.hpp"
 #include "tutti/model/loop_closure.hpp"
 
 namespace tutti {
@@ -28,6 +29,14 @@ struct ClosureWord {
   Wish wish = Wish::withdraw;
   std::string by;             ///< Who said it, for people; may be empty.
   std::int64_t given_ns = 0;  ///< When, since the Unix epoch.
+  template <class V>
+  void describe(V& v) {
+    constexpr std::size_t kMostBytes = 200;
+    v.field(1, "closure", closure, {.text = FieldRule::Text::any, .at_least = 1, .at_most = kMostBytes});
+    v.field(2, "wish", wish, {.low = 1, .high = 3});
+    v.field(3, "by", by, {.text = FieldRule::Text::any, .at_most = kMostBytes});
+    v.field(4, "given_ns", given_ns);
+  }
   friend bool operator==(const ClosureWord&, const ClosureWord&) = default;
 };
 

@@ -6,6 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include "tutti/base/fields.hpp"
+
 namespace tutti {
 
 /// Identifies a method, which is a closure finder or a map refiner. Methods with equal ids compute the same from the
@@ -15,6 +17,12 @@ struct MethodId {
   /// Version of the code; a commit that changes what the method computes raises it by hand.
   std::uint32_t version = 0;
   std::uint64_t settings = 0;  ///< settings_hash() of its settings; 0: any, or unknown.
+  template <class V>
+  void describe(V& v) {
+    v.field(1, "name", name, {.text = FieldRule::Text::word, .at_most = 64});
+    v.field(2, "version", version);
+    v.field(3, "settings", settings, {.fixed = true});
+  }
   friend auto operator<=>(const MethodId&, const MethodId&) = default;
   friend bool operator==(const MethodId&, const MethodId&) = default;
 };

@@ -6,13 +6,15 @@
 #include <string>
 #include <vector>
 
+#include "tutti/base/fields.hpp"
 #include "tutti/base/ids.hpp"
 #include "tutti/base/timestamp.hpp"
 #include "tutti/geometry/pose3.hpp"
 #include "tutti/model/method_id.hpp"
 
-/// What nodes tell each other about their state. Every time is mission time by the sender's clock, which others do not
-/// share.
+/// What nodes report about their state. Every time is mission time by the sender's clock, which others do not share.
+/// What is added to a list of fields here is sent, checked, shown and recorded everywhere (docs/extending.md); only
+/// proto/tutti/v1/status.proto, which is for other languages, names it again.
 namespace tutti {
 
 /// From a robot or worker to the server, every two seconds: a sign of life and the state. Fields that a role does not
@@ -36,6 +38,26 @@ struct NodeStatus {
   std::uint64_t jobs_done = 0;  ///< A worker's jobs since it started.
   std::string trouble;          ///< A problem, for people; empty: none.
   std::vector<MethodId> can;    ///< A worker's finders and refiners; those without settings can be made with any.
+  template <class V>
+  void describe(V& v) {
+    v.field(1, "name", name, {.text = FieldRule::Text::name});
+    v.field(2, "session", session);
+    v.field(3, "start", start);
+    v.field(4, "version", version);
+    v.field(5, "backlog_submaps", backlog_submaps);
+    v.field(6, "backlog_bytes", backlog_bytes);
+    v.field(7, "heard_epoch", heard_epoch);
+    v.field(8, "heard_revision", heard_revision);
+    v.field(9, "update_age_s", update_age_s, {.low = 0.0});
+    v.field(10, "keyframes", keyframes);
+    v.field(11, "T_odom_body", T_odom_body);
+    v.field(12, "alerts", alerts);
+    v.field(13, "finished", finished);
+    v.field(14, "jobs_done", jobs_done);
+    v.field(15, "trouble", trouble);
+    v.field(20, "can", can, {.at_most = 100});
+    v.field(24, "submaps_begun", submaps);
+  }
   friend bool operator==(const NodeStatus&, const NodeStatus&) = default;
 };
 
@@ -50,12 +72,29 @@ struct MissionStatus {
     std::string conflict;  ///< Why another program that claims to be this robot is refused; empty when there is none.
     NodeStatus status;     ///< The latest status of the session that owns the robot's name and number.
     std::uint64_t unread = 0;  ///< Submaps in versions that the server cannot read, which the robot keeps.
+    template <class V>
+    void describe(V& v) {
+      v.field(1, "number", robot);
+      v.field(2, "last_seen", last_seen);
+      v.field(3, "last_update", last_update);
+      v.field(4, "submaps", submaps);
+      v.field(5, "refused_submaps", refused);
+      v.field(6, "conflict", conflict);
+      v.field(7, "status", status, {.is_flat = true});
+      v.field(8, "unread_submaps", unread);
+    }
     friend bool operator==(const Robot&, const Robot&) = default;
   };
   struct Worker {
     std::uint32_t number = 0;
     Timestamp last_seen;
     NodeStatus status;
+    template <class V>
+    void describe(V& v) {
+      v.field(1, "number", number);
+      v.field(2, "last_seen", last_seen);
+      v.field(3, "status", status, {.is_flat = true});
+    }
     friend bool operator==(const Worker&, const Worker&) = default;
   };
   /// Refused messages of one kind from one role.
@@ -64,6 +103,13 @@ struct MissionStatus {
     std::string kind;  ///< wire::name()
     std::uint64_t count = 0;
     std::string last_why;
+    template <class V>
+    void describe(V& v) {
+      v.field(1, "from", from);
+      v.field(2, "kind", kind);
+      v.field(3, "count", count);
+      v.field(4, "last_why", last_why);
+    }
     friend bool operator==(const Refusals&, const Refusals&) = default;
   };
 
@@ -71,8 +117,15 @@ struct MissionStatus {
   struct Word {
     std::uint64_t content = 0;  ///< content_hash() of its frame.
     std::string why;            ///< Why the word is not stored; empty: it is.
+    template <class V>
+    void describe(V& v) {
+      v.field(1, "content", content, {.fixed = true});
+      v.field(2, "why", why);
+    }
     friend bool operator==(const Word&, const Word&) = default;
   };
+
+  static constexpr std::size_t kMostRobots = 10'000;  ///< Likewise workers.
 
   Timestamp time;
   std::int64_t wall_ns = 0;  ///< The server's wall clock, since the Unix epoch; 0: unknown.
@@ -95,6 +148,29 @@ struct MissionStatus {
   std::uint64_t waiting = 0;  ///< Pairs and refinements that no present worker can compute,
   std::string why_waiting;    ///< and what the last worker that tried said.
   std::vector<Word> words;    ///< The latest words.
+  template <class V>
+  void describe(V& v) {
+    v.field(1, "time", time);
+    v.field(2, "wall_ns", wall_ns);
+    v.field(3, "version", version);
+    v.field(4, "epoch", epoch);
+    v.field(5, "revision", revision);
+    v.field(6, "submaps", submaps);
+    v.field(7, "closures", closures);
+    v.field(8, "components", components);
+    v.field(9, "pending_jobs", pending_jobs);
+    v.field(10, "has_news", has_news);
+    v.field(11, "robots", robots, {.at_most = kMostRobots});
+    v.field(12, "workers", workers, {.at_most = kMostRobots});
+    v.field(13, "refusals", refusals);
+    v.field(14, "trouble", trouble);
+    v.field(15, "incarnation", incarnation, {.fixed = true});
+    v.field(20, "finder", finder);
+    v.field(21, "former_pairs", former_pairs);
+    v.field(22, "waiting", waiting);
+    v.field(23, "why_waiting", why_waiting);
+    v.field(24, "words", words);
+  }
   friend bool operator==(const MissionStatus&, const MissionStatus&) = default;
 };
 

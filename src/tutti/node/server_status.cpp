@@ -136,7 +136,7 @@ MissionStatus ServerNode::mission_status(Timestamp now) const {
   std::set<RobotId> robots = robots_;
   robots.merge(strangers_there(now));
   for (const RobotId robot : robots) {
-    if (out.robots.size() == wire::kMaxRobots) break;
+    if (out.robots.size() == MissionStatus::kMostRobots) break;
     MissionStatus::Robot& entry = out.robots.emplace_back();
     entry.robot = robot;
     if (const Receipt* const told = receipts_.find(robot)) {

@@ -666,11 +666,11 @@ TEST(Validate, Verdict) {
 TEST(Validate, Word) {
   Rng rng(8);
   using M = ClosureWord;
-  expect_refused<M>(test::any_word(rng), {{"wish 0", [](M& m) { m.wish = Wish{0}; }},
-                                          {"wish 4", [](M& m) { m.wish = Wish{4}; }},
-                                          {"0 letters", [](M& m) { m.closure.clear(); }},
-                                          {"201 letters", [](M& m) { m.closure.assign(201, 'a'); }},
-                                          {"one of 201", [](M& m) { m.by.assign(201, 'a'); }}});
+  expect_refused<M>(test::any_word(rng), {{"wish: 0", [](M& m) { m.wish = Wish{0}; }},
+                                          {"wish: 4", [](M& m) { m.wish = Wish{4}; }},
+                                          {"closure: a text of 0 bytes", [](M& m) { m.closure.clear(); }},
+                                          {"closure: a text of 201", [](M& m) { m.closure.assign(201, 'a'); }},
+                                          {"by: a text of 201", [](M& m) { m.by.assign(201, 'a'); }}});
 }
 
 }  // namespace codec_test

@@ -29,12 +29,8 @@ inline constexpr std::size_t kMaxRefinedKeyframes = 40'000;  ///< What one messa
 inline constexpr std::size_t kMaxIdBytes = 200;
 inline constexpr std::size_t kMaxReasonBytes = kPlainTextBytes;
 inline constexpr std::size_t kMaxSettingsBytes = 64U << 10U;  ///< Of a finder, in a job.
-inline constexpr std::size_t kMaxMethods = 100;               ///< Of closure finding that a worker offers.
 inline constexpr std::size_t kMaxRequested = 1'000;           ///< Submaps per request.
 inline constexpr std::size_t kMaxNameBytes = 64;              ///< Of a robot or a worker.
-inline constexpr std::size_t kMaxRobots = 10'000;             ///< Per mission status; of workers as many.
-inline constexpr std::size_t kMaxRefusalKinds = 1'000;        ///< Per mission status.
-inline constexpr std::size_t kMaxAnsweredWords = 1'000;       ///< Per mission status.
 inline constexpr std::size_t kMaxStretches = 100'000;         ///< Per receipt.
 inline constexpr std::size_t kMaxRefusals = 1'000;            ///< Per receipt, with their contents.
 

@@ -142,10 +142,13 @@ TEST(Memory, CountsUpToTheLimitsAreAcceptedAndNoMore) {
               more == 0);
     EXPECT_EQ(accepted(MessageKind::submap, field(9, field(3, zeros(kMaxCloudPoints + more)))), more == 0);
     EXPECT_EQ(accepted(MessageKind::submap, field(10, repeated(kMaxCameras + more, field(1, "")))), more == 0);
-    EXPECT_EQ(accepted(MessageKind::mission_status, repeated(kMaxRobots + more, field(11, ""))), more == 0);
     EXPECT_EQ(accepted(MessageKind::cloud, field(3, zeros(10)) + field(3, zeros(kMaxCloudPoints - 10 + more))),
               more == 0);
   }
+  const auto robots = decode_mission_status(
+      pack_frame(MessageKind::mission_status, repeated(MissionStatus::kMostRobots + 1, field(11, ""))));
+  EXPECT_NE(robots.error().message.find("robots: 10001 or more, at most 10000"), std::string::npos)
+      << robots.error().message;
   const Status status = check_counts(MessageKind::verdict, repeated(kMaxClosures + 1, field(5, "")));
   ASSERT_FALSE(status.has_value());
   EXPECT_NE(status.error().message.find("1001 closures or more, at most 1000"), std::string::npos)

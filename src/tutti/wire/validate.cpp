@@ -6,6 +6,7 @@
 
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/wire/codec.hpp"
+#include "tutti/wire/internal/field_bytes.hpp"
 #include "tutti/wire/internal/method_message.hpp"
 #include "tutti/wire/internal/visual_codec.hpp"
 #include "tutti/wire/limits.hpp"
@@ -232,10 +233,8 @@ Status validate(const ProxyGraphMessage& message) {
 }
 
 Status check_method(const MethodId& id) {
-  const auto is_plain = [](char c) { return c > ' ' && c <= '~'; };
-  if (id.name.size() <= kMaxNameBytes && std::ranges::all_of(id.name, is_plain)) return {};
-  return fail(ErrorCode::invalid, "a finder or refiner with a name of {} letters, expected at most {}, all plain",
-              id.name.size(), kMaxNameBytes);
+  if (auto ok = check_fields(id); !ok) return in_context("a finder or refiner", ok.error());
+  return {};
 }
 
 Status check_method(const MethodId& id, const std::string& settings) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <memory>
 
+#include "tutti/base/fields.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/model/closure_word.hpp"
@@ -203,75 +204,69 @@ inline SubmapCopy any_submap_copy(Rng& rng) {
   return copy;
 }
 
-inline NodeStatus any_status(Rng& rng) {
-  const auto count = [&] { return rng.bernoulli(0.3) ? 0 : rng.index(~std::uint64_t{0}); };
-  NodeStatus status{.name = rng.bernoulli(0.5) ? "alpha" : "Robot_2-b",
-                    .session = any_session(rng),
-                    .start = count(),
-                    .version = "0.9.1",
-                    .backlog_submaps = count(),
-                    .backlog_bytes = count(),
-                    .heard_epoch = count(),
-                    .heard_revision = count(),
-                    .update_age_s = {},
-                    .keyframes = count(),
-                    .T_odom_body = rng.bernoulli(0.5) ? any_pose(rng, 100.0) : Pose3{},
-                    .alerts = count(),
-                    .finished = rng.bernoulli(0.5),
-                    .jobs_done = count(),
-                    .trouble = rng.bernoulli(0.5) ? "no room: 3 bytes left" : "",
-                    .can = {}};
-  for (std::uint64_t i = rng.index(3); i > 0; --i) status.can.push_back({"visual", 2, i - 1});
-  if (rng.bernoulli(0.5)) status.update_age_s = rng.uniform(0.0, 1e4);
-  if (rng.bernoulli(0.5)) status.submaps = count();
-  return status;
+/// Fills every field with any value that its rule allows (base/fields.hpp), about every third with none.
+class AnyFields {
+ public:
+  explicit AnyFields(Rng& rng) : rng_(rng) {}
+  template <class T>
+  void field(int /*number*/, const char* name, T& value, const FieldRule& rule = {}, const char* /*help*/ = "") {
+    const bool is_needed = rule.text == FieldRule::Text::name || rule.at_least > 0 || rule.low > 0.0;
+    if (!HasFields<T> && !is_needed && rng_.bernoulli(0.3)) return;
+    if constexpr (IsOptionalField<T>) {
+      fill(value.emplace(), name, rule);
+    } else if constexpr (IsListField<T>) {
+      value.resize(rng_.index(4));
+      for (auto& element : value) fill(element, name, rule);
+    } else {
+      fill(value, name, rule);
+    }
+  }
+
+ private:
+  template <class T>
+  void fill(T& value, const std::string& name, const FieldRule& rule) {
+    if constexpr (HasFields<T>) {
+      value.describe(*this);
+    } else if constexpr (std::is_same_v<T, std::string>) {
+      value = rule.text == FieldRule::Text::any ? name + "/12-\xff/7" : "any_" + name;
+      value.resize(std::min(value.size(), rule.at_most));
+    } else if constexpr (std::is_same_v<T, Pose3>) {
+      value = any_pose(rng_, 100.0);
+    } else if constexpr (std::is_same_v<T, Timestamp>) {
+      value.ns = static_cast<std::int64_t>(rng_.index(std::uint64_t{1} << 62U));
+    } else if constexpr (std::is_same_v<T, RobotId>) {
+      value.value = static_cast<std::uint32_t>(rng_.index(1000));
+    } else if constexpr (std::is_same_v<T, double>) {
+      value = rng_.uniform(std::max(rule.low, -1e4), std::min(rule.high, 1e4));
+    } else if constexpr (std::is_enum_v<T>) {
+      value = static_cast<T>(rule.low +
+                             static_cast<double>(rng_.index(1 + static_cast<std::uint64_t>(rule.high - rule.low))));
+    } else if constexpr (std::is_same_v<T, bool>) {
+      value = true;
+    } else {
+      value = static_cast<T>(rng_.index(~std::uint64_t{0}));  // of any size, and below 0
+    }
+  }
+  Rng& rng_;
+};
+template <HasFields T>
+T any_fields(Rng& rng) {
+  AnyFields fields(rng);
+  T value;
+  value.describe(fields);
+  return value;
 }
+
+inline NodeStatus any_status(Rng& rng) { return any_fields<NodeStatus>(rng); }
 
 inline MissionStatus any_mission_status(Rng& rng) {
-  const auto stamp = [&] { return Timestamp{static_cast<std::int64_t>(rng.index(std::uint64_t{1} << 62U))}; };
-  MissionStatus status{.time = stamp(),
-                       .wall_ns = -1,
-                       .version = "0.9.1",
-                       .epoch = rng.index(1000),
-                       .incarnation = static_cast<std::uint32_t>(rng.index(std::uint64_t{1} << 32U)),
-                       .revision = rng.index(1000),
-                       .submaps = rng.index(1000),
-                       .closures = rng.index(1000),
-                       .components = rng.index(1000),
-                       .pending_jobs = rng.index(1000),
-                       .has_news = rng.bernoulli(0.5),
-                       .robots = {},
-                       .workers = {},
-                       .refusals = {},
-                       .trouble = "none",
-                       .finder = "visual 2",
-                       .former_pairs = rng.index(1000),
-                       .waiting = rng.index(2),
-                       .why_waiting = "no finder 'visual 3'",
-                       .words = {}};
-  for (std::uint32_t i = 0; i < rng.index(4); ++i) {
-    MissionStatus::Robot& robot = status.robots.emplace_back();
-    robot.robot = RobotId{3 * i};
-    if (rng.bernoulli(0.5)) robot.last_seen = stamp();
-    if (rng.bernoulli(0.5)) robot.last_update = stamp();
-    robot.submaps = rng.index(1000);
-    robot.refused = rng.index(1000);
-    robot.unread = rng.index(1000);
-    robot.conflict = rng.bernoulli(0.5) ? "two of them" : "";
-    robot.status = any_status(rng);
-  }
-  for (std::uint32_t i = 0; i < rng.index(3); ++i) status.workers.push_back({7 + i, stamp(), any_status(rng)});
-  for (std::uint64_t i = rng.index(3); i > 0; --i) status.refusals.push_back({"robot", "submap", i, "no good"});
-  for (std::uint64_t i = rng.index(3); i > 0; --i) status.words.push_back({i << 40U, i == 1 ? "no such closure" : ""});
+  auto status = any_fields<MissionStatus>(rng);
+  for (std::uint32_t i = 0; auto& robot : status.robots) robot.robot.value = 3 * i++;
+  for (std::uint32_t i = 7; auto& worker : status.workers) worker.number = i++;
   return status;
 }
 
-inline ClosureWord any_word(Rng& rng) {
-  return {.closure = "alpha/12-\xff/7",
-          .wish = static_cast<Wish>(1 + rng.index(3)),
-          .by = rng.bernoulli(0.5) ? "ada" : "",
-          .given_ns = static_cast<std::int64_t>(rng.index(1U << 30U)) - 5};
-}
+inline ClosureWord any_word(Rng& rng) { return any_fields<ClosureWord>(rng); }
 
 inline Verdicts any_verdicts(Rng& rng) {
   Verdicts out{.job = "12/0.3:4-5_6",

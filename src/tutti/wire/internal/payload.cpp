@@ -79,14 +79,6 @@ constexpr std::array kRefinement = {Field{v1::Refinement::kSubmapsFieldNumber, 1
                                     Field{v1::Refinement::kKeyframeFieldNumber, kMaxRefinedKeyframes, "keyframes"},
                                     Field{v1::Refinement::kHasStepFieldNumber, kMaxRefinedKeyframes, "keyframes"},
                                     Field{v1::Refinement::kCountFieldNumber, 100, "counts"}};
-constexpr std::array kStatus = {Field{v1::Status::kCanFieldNumber, kMaxMethods, "finders and refiners", true}};
-constexpr std::array kRobot = {Field{v1::RobotInMission::kStatusFieldNumber, 1, "statuses", true, kStatus}};
-constexpr std::array kWorker = {Field{v1::WorkerInMission::kStatusFieldNumber, 1, "statuses", true, kStatus}};
-constexpr std::array kMissionStatus = {
-    Field{v1::MissionStatus::kRobotFieldNumber, kMaxRobots, "robots", true, kRobot},
-    Field{v1::MissionStatus::kWorkerFieldNumber, kMaxRobots, "workers", true, kWorker},
-    Field{v1::MissionStatus::kRefusalsFieldNumber, kMaxRefusalKinds, "refusals", true},
-    Field{v1::MissionStatus::kWordsFieldNumber, kMaxAnsweredWords, "words", true}};
 
 std::span<const Field> fields_of(MessageKind kind) {
   switch (kind) {
@@ -114,12 +106,10 @@ std::span<const Field> fields_of(MessageKind kind) {
       return kRefinement;
     case MessageKind::submap_request:
       return kRequest;
+    case MessageKind::submap_copy:  // has no lists
+    case MessageKind::status:       // field_message.hpp
     case MessageKind::mission_status:
-      return kMissionStatus;
-    case MessageKind::status:
-      return kStatus;
-    case MessageKind::submap_copy:
-    case MessageKind::word:  // have no lists
+    case MessageKind::word:
       return {};
   }
   return {};

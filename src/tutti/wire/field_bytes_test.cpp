@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/wire/internal/field_bytes.hpp"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <regex>
+#include <sstream>
+
+#include "support/paths.hpp"
+#include "support/wire/messages.hpp"
+
+namespace tutti::wire {
+namespace field_bytes_test {
+
+/// Of a struct's list, "NUMBER [repeated|optional ]TYPE NAME" per field as a .proto file says it.
+class ProtoFields {
+ public:
+  template <class T>
+  void field(int number, const std::string& name, const T& /*value*/, const FieldRule& rule = {}, const char* = "") {
+    if constexpr (IsOptionalField<T>)
+      add(number, "optional ", type_of<typename T::value_type>(rule), name, is_time<typename T::value_type>);
+    else if constexpr (IsListField<T>)
+      add(number, "repeated ", type_of<typename T::value_type>(rule), name, false);
+    else
+      add(number, std::is_same_v<T, Pose3> ? "repeated " : "", type_of<T>(rule), name, is_time<T>);
+  }
+  std::string lines;
+  int last = 0;
+  bool ascend = true;
+
+ private:
+  template <class T>
+  static constexpr bool is_time = std::is_same_v<T, Timestamp>;
+  template <class T>
+  static std::string type_of(const FieldRule& rule) {
+    if (HasFields<T>) return "MESSAGE";
+    if (std::is_same_v<T, std::string>) return "bytes";
+    if (std::is_same_v<T, bool>) return "bool";
+    if (std::is_same_v<T, double> || std::is_same_v<T, Pose3>) return "double";
+    if (std::is_same_v<T, Timestamp> || std::is_signed_v<T>) return "sint64";
+    return (rule.fixed ? "fixed" : "uint") + std::string(sizeof(T) <= 4 ? "32" : "64");
+  }
+  void add(int number, const std::string& label, const std::string& type, const std::string& name, bool is_stamp) {
+    lines += std::to_string(number) + " " + label + type + " " + name + (is_stamp ? "_ns\n" : "\n");
+    ascend = ascend && number > last;
+    last = number;
+  }
+};
+
+/// The same of a message in proto/tutti/v1; empty when there is none.
+std::string in_proto(const std::string& file, const std::string& message) {
+  std::ifstream in(tutti::test::source_path("proto/tutti/v1/" + file));
+  const std::regex field(R"(^ +((?:repeated |optional )?)(\w+) (\w+) = (\d+);.*)");
+  std::string out;
+  bool inside = false;
+  for (std::string line; std::getline(in, line);) {
+    if (line == "message " + message + " {") inside = true;
+    if (line == "}") inside = false;
+    std::smatch found;
+    if (!inside || !std::regex_match(line, found, field)) continue;
+    const std::string type = std::isupper(static_cast<unsigned char>(found.str(2)[0])) != 0 ? "MESSAGE" : found.str(2);
+    out += found.str(4) + " " + found.str(1) + type + " " + found.str(3) + "\n";
+  }
+  return out;
+}
+
+template <class T>
+void expect_in_proto(const std::string& file, const std::string& message) {
+  ProtoFields fields;
+  visit_fields(T{}, fields);
+  EXPECT_EQ(fields.lines, in_proto(file, message)) << message;
+  EXPECT_TRUE(fields.ascend) << message << ": protobuf writes fields in the order of their numbers";
+}
+
+TEST(FieldBytes, TheFilesForOtherLanguagesHaveTheSameFields) {
+  expect_in_proto<NodeStatus>("status.proto", "Status");
+  expect_in_proto<MissionStatus>("status.proto", "MissionStatus");
+  expect_in_proto<MissionStatus::Robot>("status.proto", "RobotInMission");
+  expect_in_proto<MissionStatus::Worker>("status.proto", "WorkerInMission");
+  expect_in_proto<MissionStatus::Refusals>("status.proto", "RefusedMessages");
+  expect_in_proto<MissionStatus::Word>("status.proto", "AnsweredWord");
+  expect_in_proto<ClosureWord>("status.proto", "Word");
+  expect_in_proto<MethodId>("messages.proto", "Method");
+}
+
+struct Inside {
+  std::uint32_t number = 0;
+  template <class V>
+  void describe(V& v) {
+    v.field(1, "number", number);
+  }
+  friend bool operator==(const Inside&, const Inside&) = default;
+};
+struct Outside {
+  double share = 0.0;
+  std::int64_t change = 0;
+  std::uint32_t hash = 0;
+  std::optional<std::uint64_t> count;
+  std::vector<Inside> list;
+  Inside one;
+  template <class V>
+  void describe(V& v) {
+    v.field(1, "share", share, {.low = 0.0, .high = 1.0});
+    v.field(2, "change", change);
+    v.field(3, "hash", hash, {.fixed = true});
+    v.field(4, "count", count);
+    v.field(5, "list", list, {.at_most = 3});
+    v.field(6, "one", one);
+  }
+  friend bool operator==(const Outside&, const Outside&) = default;
+};
+
+TEST(FieldBytes, AreProtobufs) {
+  const Outside value{.share = 0.5, .change = -2, .hash = 7, .count = 0, .list = {{300}, {}}, .one = {1}};
+  // By protoc --encode of the same message.
+  const std::string bytes(
+      "\x09\0\0\0\0\0\0\xe0\x3f\x10\x03\x1d\x07\0\0\0\x20\0\x2a\x03\x08\xac\x02\x2a\0\x32\x02\x08\x01", 29);
+  EXPECT_EQ(field_bytes(value), bytes);
+  EXPECT_EQ(read_fields<Outside>(bytes).value(), value);
+}
+
+TEST(FieldBytes, OfANewerPeerWhatIsUnknownIsPassedOver) {
+  const Outside value{.change = 4};
+  const std::string newer =
+      "\x7a\x03"
+      "abc" +
+      field_bytes(value) + "\x80\x08\x05";  // fields 15 and 128
+  EXPECT_EQ(read_fields<Outside>(newer).value(), value);
+  EXPECT_EQ(read_fields<Outside>("\x0a\x01"
+                                 "a")
+                .value(),
+            Outside{})
+      << "a text where a number is expected";
+}
+
+TEST(FieldBytes, WhatIsCutOrNoMessageIsAnError) {
+  const std::string bytes = field_bytes(Outside{.share = 0.5, .list = {{300}}, .one = {1}});
+  for (std::size_t n = 1; n < bytes.size(); ++n) {
+    const auto read = read_fields<Outside>(std::string_view(bytes).substr(0, n));
+    EXPECT_TRUE(!read || field_bytes(*read).size() < bytes.size()) << n;  // or cut between two fields
+  }
+  EXPECT_FALSE(read_fields<Outside>(std::string("\x00\x01", 2)));  // number 0
+  EXPECT_FALSE(read_fields<Outside>("\x0b"));                      // a group
+  EXPECT_FALSE(read_fields<Outside>("\x2a\xff\xff\xff\xff\x0f"));  // 4 GB, they say
+}
+
+TEST(FieldBytes, RulesAreHeldWithTheNameOfTheField) {
+  const auto message = [](const Outside& value) {
+    const Status status = check_fields(value);
+    return status ? std::string() : status.error().message;
+  };
+  EXPECT_EQ(message({}), "");
+  EXPECT_EQ(message({.share = 1.5}), "share: 1.5, expected 0 to 1");
+  EXPECT_EQ(message({.list = {{}, {}, {}, {}}}), "list: 4, at most 3 are accepted");
+  const std::string four(std::string("\x2a\0\x2a\0\x2a\0\x2a\0", 8));
+  EXPECT_EQ(read_fields<Outside>(four).error().message, "list: 4 or more, at most 3 are accepted");
+  EXPECT_EQ(read_fields<Outside>(std::string("\x32\0\x32\0", 4)).error().message,
+            "one: 2 or more, at most 1 are accepted");
+}
+
+}  // namespace field_bytes_test
+}  // namespace tutti::wire
