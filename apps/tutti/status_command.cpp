@@ -7,7 +7,6 @@
 #include <chrono>
 #include <cstdio>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <thread>
@@ -18,12 +17,13 @@
 #include "tutti/bus/mission_lease.hpp"
 #include "tutti/bus/nats_port.hpp"
 #include "tutti/node/status_text.hpp"
+#include "tutti/program/field_json.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::app {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Json = FieldJson;
 using Clock = std::chrono::steady_clock;
 
 constexpr double kFresh_s = 6.0;  // three of the server's periods: it is there
@@ -83,72 +83,13 @@ class View {
   Clock::time_point came_;
 };
 
-Json json_of(const NodeStatus& status) {
-  Json out{{"name", status.name},
-           {"session", status.session},
-           {"version", status.version},
-           {"backlog_submaps", status.backlog_submaps},
-           {"backlog_bytes", status.backlog_bytes},
-           {"heard_epoch", status.heard_epoch},
-           {"heard_revision", status.heard_revision},
-           {"keyframes", status.keyframes},
-           {"alerts", status.alerts},
-           {"finished", status.finished},
-           {"jobs_done", status.jobs_done},
-           {"trouble", status.trouble}};
-  return out;
-}
-
-Json seconds_before(Timestamp time, const std::optional<Timestamp>& then) {
-  return then ? Json(time - *then) : Json(nullptr);
-}
-
-Json json_of(const MissionStatus& status, double silent_s) {
-  Json out{{"server_silent_s", silent_s},
-           {"time_s", status.time - Timestamp{}},
-           {"version", status.version},
-           {"epoch", status.epoch},
-           {"revision", status.revision},
-           {"submaps", status.submaps},
-           {"closures", status.closures},
-           {"components", status.components},
-           {"pending_jobs", status.pending_jobs},
-           {"has_news", status.has_news},
-           {"trouble", status.trouble},
-           {"finder", status.finder},
-           {"former_pairs", status.former_pairs},
-           {"waiting", status.waiting},
-           {"why_waiting", status.why_waiting},
-           {"robots", Json::array()},
-           {"workers", Json::array()},
-           {"refusals", Json::array()}};
-  for (const MissionStatus::Robot& robot : status.robots) {
-    Json entry = json_of(robot.status);
-    entry["number"] = robot.robot.value;
-    entry["last_seen_s_ago"] = seconds_before(status.time, robot.last_seen);
-    entry["last_update_s_ago"] = seconds_before(status.time, robot.last_update);
-    entry["submaps"] = robot.submaps;
-    entry["refused_submaps"] = robot.refused;
-    entry["unread_submaps"] = robot.unread;
-    entry["conflict"] = robot.conflict;
-    out["robots"].push_back(std::move(entry));
-  }
-  for (const MissionStatus::Worker& worker : status.workers) {
-    Json entry = json_of(worker.status);
-    entry["number"] = worker.number;
-    entry["last_seen_s_ago"] = status.time - worker.last_seen;
-    out["workers"].push_back(std::move(entry));
-  }
-  for (const MissionStatus::Refusals& refusals : status.refusals)
-    out["refusals"].push_back(
-        {{"from", refusals.from}, {"kind", refusals.kind}, {"count", refusals.count}, {"last_why", refusals.last_why}});
-  return out;
-}
-
 void show(const View& view, const StatusOptions& options) {
   const double silent_s = view.is_there() ? 0.0 : view.silent_s();
   if (options.json) {
-    fmt::print("{}\n", json_of(*view.status(), silent_s).dump());
+    const MissionStatus& status = *view.status();
+    Json out{{"server_silent_s", silent_s}, {"time_s", status.time - Timestamp{}}};
+    out.update(json_of_fields(status, status.time));
+    fmt::print("{}\n", out.dump());
   } else {
     if (options.watch && isatty(STDOUT_FILENO) != 0) fmt::print("\033[H\033[2J");
     fmt::print("{}", node::mission_status_text(*view.status(), silent_s));

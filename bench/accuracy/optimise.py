@@ -94,7 +94,7 @@ def main():
     span = lambda key: f"{min(run[key] for run in graphs):,} to {max(run[key] for run in graphs):,}"
     text = ["# Multi-robot pose graphs of others", "",
             f"Written by `bench/accuracy/optimise.py GRAPHS_PROGRAM TUTTI_PROGRAM --data FOLDER --seeds {arguments.seeds}`.", "",
-            "COSMO-Bench's own files are not at hand, so these are graphs made to its figures, written as its files are (PyFG):",
+            "COSMO-Bench's own files are in fleets.md; these are graphs made to its figures, written as its files are (PyFG):",
             f"{len(graphs)} simulated ones of {span('robots')} robots who walk through streets 70 m apart, {span('poses')} poses 2 m apart,",
             f"{span('closures')} closures from the truth with noise, {100 * min(wrong):.0f} to {100 * max(wrong):.0f} % of them wrong: strewn about, in blocks of",
             "neighbours that agree, and in every second graph at two stretches of 60 s that look alike, where all closures agree.",

@@ -232,6 +232,14 @@ class Reconnecting(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "expected at most 16777216"):
             scan_frame(1, np.zeros((1_500_000, 3), np.float32), None)
 
+    def test_diagnosis_has_what_the_robot_reports_of_itself(self):
+        on_map = OnMap()
+        on_map.take("situation", Feed.Situation(status=[Feed.Value(name="battery_percent", text="41"),
+                                                        Feed.Value(name="odometry", text="not this")]))
+        _, _, values = diagnosis(self.filled(), on_map, [])
+        self.assertEqual(values["battery_percent"], "41")
+        self.assertNotEqual(values["odometry"], "not this")
+
     def test_diagnosis(self):
         link, on_map = self.filled(), OnMap()
         self.assertEqual(diagnosis(link, on_map, [])[0], ERROR)

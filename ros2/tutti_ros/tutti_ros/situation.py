@@ -63,6 +63,8 @@ def diagnosis(link, on_map, trouble, is_alive=True):
         values["map"] = f"epoch {on_map.correction.map_epoch}, revision {on_map.correction.map_revision}"
         values["in_map"] = on_map.correction.in_map
         values["dropped_corrections"] = on_map.correction.dropped
+    if on_map.situation:  # what the robot reports of itself; what is counted here stands above it
+        values = {**{value.name: value.text for value in on_map.situation.status}, **values}
     mates = on_map.situation.team_mate if on_map.situation else []
     values["team_mates"] = ", ".join(mate.name + ("" if mate.same_component else " (not joined yet)") for mate in mates)
     alerts = [alert.text for alert in on_map.situation.alert] if on_map.situation else []

@@ -21,10 +21,11 @@
 ///     }
 ///   };
 ///
-/// From that list follow the bytes of a protobuf message and their checks (wire/internal/field_bytes.hpp), JSON
-/// (program/field_json.hpp), columns of tables, and random values for tests. Fields are listed in the order of their
-/// numbers. A number and its type are on the wire and in stores: never reuse one. The version of a message's kind is
-/// raised only when a reader of before would misunderstand a message; a new field, which it passes over, needs none.
+/// From that list follow the bytes of a protobuf message and their checks (wire/field_bytes.hpp), JSON
+/// (program/field_json.hpp), texts and tables (base/field_text.hpp), and random values for tests. Fields are listed in
+/// the order of their numbers. A number and its type are on the wire and in stores: never reuse one. The version of a
+/// message's kind is raised only when a reader of before would misunderstand a message; a new field, which it passes
+/// over, needs none.
 ///
 /// Types: bool, integers, double, std::string, enums with a range, Timestamp, RobotId, Pose3, structs with such a list;
 /// std::optional of a scalar; std::vector of structs.

@@ -18,6 +18,14 @@ struct MapChange {
   double rotation_rad = 0.0;
   /// The first and last moment of the nodes that move in position by at least half of `translation_m`.
   Timestamp from, until;
+  template <class V>
+  void describe(V& v) {
+    v.field(1, "significance", significance);
+    v.field(2, "translation_m", translation_m);
+    v.field(3, "rotation_rad", rotation_rad);
+    v.field(4, "from", from);
+    v.field(5, "until", until);
+  }
   [[nodiscard]] bool is_change_of_mind() const { return significance > 1.0; }
   friend bool operator==(const MapChange&, const MapChange&) = default;
 };

@@ -28,6 +28,18 @@ struct SuspectedOrigin {
   /// The difference also exceeds what the odometry's own covariance allows for: localisation failed, or the map is
   /// wrong there.
   bool alert = false;
+  template <class V>
+  void describe(V& v) {
+    v.field(1, "from", from);
+    v.field(2, "until", until);
+    v.field(3, "place_m", place_m);
+    v.field(4, "scale", scale);
+    v.field(5, "length_m", length_m);
+    v.field(6, "translation_m", translation_m);
+    v.field(7, "rotation_rad", rotation_rad);
+    v.field(8, "significance", significance);
+    v.field(9, "alert", alert);
+  }
 };
 
 /// Where, at which scale and since when a robot's raw odometry and the server's map differ. Rows are the synchronised

@@ -15,6 +15,7 @@
 #include "tutti/mission/robot_actor.hpp"
 #include "tutti/mission/runner.hpp"
 #include "tutti/program/event_log.hpp"
+#include "tutti/program/field_json.hpp"
 #include "tutti/program/robot_program.hpp"
 #include "tutti/program/server_program.hpp"
 #include "tutti/storage/sqlite_store.hpp"
@@ -83,10 +84,9 @@ mission::TrafficRecord traffic_of(const Json& row, const std::string& robot) {
 Status take(const Json& event, const std::string& name, Robot& robot) try {
   const std::string what = event.value("event", "");
   if (what == "robot_updated" && event.at("synchronised").get<std::size_t>() > 0) {
-    mission::UpdateRecord update{.time_s = event.at("time_s").get<double>(),
-                                 .revision = event.at("revision").get<std::uint64_t>()};
-    for (const Json& origin : event.at("origins")) update.origins.push_back(origin_of(origin));
-    robot.finished.updates.push_back(std::move(update));
+    auto update = update_of(event);
+    if (!update) return tl::unexpected(update.error());
+    robot.finished.updates.push_back(std::move(*update));
   }
   if (what == program::kUpdateTimed) {
     const auto add = [&](const char* key, std::vector<double>& to) {
@@ -99,6 +99,8 @@ Status take(const Json& event, const std::string& name, Robot& robot) try {
   if (what == kEnded) {
     robot.finished.traffic.clear();
     for (const Json& row : event.at("traffic")) robot.finished.traffic.push_back(traffic_of(row, name));
+    if (event.contains("status"))
+      if (const Status ok = read_json_fields(event.at("status"), robot.finished.status); !ok) return ok;
   }
   robot.troubles.take(event);
   return {};
@@ -179,17 +181,16 @@ Result<mission::MissionEvents> read_course(const fs::path& folder, std::uint64_t
       course.take(
           {time, node::MapUpdated{event.value("revision", std::uint64_t{0}), event.value("submaps", std::size_t{0}),
                                   event.value("accepted", std::size_t{0})}});
-    if (what == "change_of_mind")
+    if (what == "change_of_mind") {
+      consistency::MapChange change;
+      static_cast<void>(read_json_fields(event, change));
       course.take(mission::ChangeOfMindRecord{RobotId{event.value("robot", std::uint32_t{0})},
                                               event.value("time_s", 0.0),
                                               {},
                                               event.value("outcome", ""),
-                                              {.significance = event.value("significance", 0.0),
-                                               .translation_m = event.value("translation_m", 0.0),
-                                               .rotation_rad = event.value("rotation_rad", 0.0),
-                                               .from = {event.value("from_ns", std::int64_t{0})},
-                                               .until = {event.value("until_ns", std::int64_t{0})}},
+                                              change,
                                               event.value("reason", "")});
+    }
     const bool is_new_failure = what == "verification_failed" &&
                                 failed.insert(event.value("first", "") + " " + event.value("second", "")).second;
     if (what == "message_refused" || is_new_failure)

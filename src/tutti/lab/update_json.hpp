@@ -14,9 +14,7 @@ inline constexpr const char* kUpdateScored = "update_scored";
 
 /// An event of a robot program: what the robot made of one proxy graph, and how far the result is from the reference.
 program::Json to_json(const mission::UpdateRecord& update);
-/// Reads what program::to_json() wrote; throws what the JSON library throws.
-consistency::SuspectedOrigin origin_of(const program::Json& json);
-/// Reads what to_json() of an update wrote; fails when fields are missing.
+/// Reads what to_json() of an update wrote; fails when a field has another type.
 Result<mission::UpdateRecord> update_of(const program::Json& event);
 
 }  // namespace tutti::lab

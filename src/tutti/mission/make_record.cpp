@@ -70,6 +70,7 @@ MissionRecord make_record(const FinishedMission& mission) {
     RobotRecord& robot = record.robots[i];
     const FinishedRobot& finished = mission.robots[i];
     record_traffic(finished.traffic, robot);
+    robot.status = finished.status;
     robot.updates = finished.updates;
     robot.alerts = alerts_of(robot.updates);
     robot.explanation = finished.explanation;

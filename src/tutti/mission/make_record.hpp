@@ -25,6 +25,7 @@ struct FinishedRobot {
   std::vector<std::string> troubles;
   std::string refused_images;          ///< Why images were refused first; empty when none were.
   std::vector<TrafficRecord> traffic;  ///< bytes_per_s is not set.
+  NodeStatus status;
 };
 
 /// A mission that is over, whichever program ran it. The references must outlive it.

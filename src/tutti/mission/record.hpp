@@ -24,6 +24,7 @@
 #include "tutti/model/recording.hpp"
 #include "tutti/model/refinement.hpp"
 #include "tutti/model/refusal.hpp"
+#include "tutti/model/status.hpp"
 #include "tutti/model/trajectory.hpp"
 #include "tutti/server/fixes.hpp"
 
@@ -71,6 +72,12 @@ struct AnswerRecord {
   std::string policy;
   std::size_t constraints = 0;   ///< Held after the broadcast.
   std::optional<double> rmse_m;  ///< Of the corrected estimate; measured like UpdateRecord::onboard_rmse_m.
+  template <class V>
+  void describe(V& v) {
+    v.field(1, "policy", policy);
+    v.field(2, "constraints", constraints);
+    v.field(3, "rmse_m", rmse_m);
+  }
 };
 
 /// What one broadcast changed on a robot (default policy).
@@ -82,6 +89,15 @@ struct UpdateRecord {
   std::optional<double> server_rmse_m;
   std::vector<AnswerRecord> answers;                  ///< One per policy.
   std::vector<consistency::SuspectedOrigin> origins;  ///< Where the raw odometry was then suspected to leave the map.
+  template <class V>
+  void describe(V& v) {
+    v.field(1, "time_s", time_s);
+    v.field(2, "revision", revision);
+    v.field(3, "onboard_rmse_m", onboard_rmse_m);
+    v.field(4, "server_rmse_m", server_rmse_m);
+    v.field(5, "answers", answers);
+    v.field(6, "origins", origins);
+  }
 };
 
 /// Where a robot assumes another one to be at the end of the mission.
@@ -124,6 +140,7 @@ struct ImagesRecord {
 struct RobotRecord {
   RobotId id;
   std::string name;
+  NodeStatus status;        ///< As it reported itself at the end; without what only a program knows of itself.
   double start_s = 0.0;     ///< Mission time of its first odometry pose.
   double distance_m = 0.0;  ///< Along the raw odometry, over every pose replayed.
   double duration_s = 0.0;  ///< From the first to the last odometry pose replayed.

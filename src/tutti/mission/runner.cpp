@@ -327,7 +327,8 @@ MissionRecord MissionRun::record() const {
                               .explanation = actor.explanation(),
                               .troubles = actor.troubles(),
                               .refused_images = actor.refused_images(),
-                              .traffic = traffic_of(actor.recording())});
+                              .traffic = traffic_of(actor.recording()),
+                              .status = actor.node().status(now())});
   }
   MissionRecord record = make_record(mission);
   record_timing(record);

@@ -17,6 +17,18 @@
 /// proto/tutti/v1/status.proto, which is for other languages, names it again.
 namespace tutti {
 
+/// What a robot's body reports of itself, through its live feed or ROS.
+struct Health {
+  std::optional<double> battery_v;
+  std::optional<double> battery_percent;  ///< 100: full.
+  template <class V>
+  void describe(V& v) {
+    v.field(1, "battery_v", battery_v, {.low = 0.0, .high = 10'000.0});
+    v.field(2, "battery_percent", battery_percent, {.low = 0.0, .high = 100.0, .column = "battery %"});
+  }
+  friend bool operator==(const Health&, const Health&) = default;
+};
+
 /// From a robot or worker to the server, every two seconds: a sign of life and the state. Fields that a role does not
 /// have are 0.
 struct NodeStatus {
@@ -38,6 +50,7 @@ struct NodeStatus {
   std::uint64_t jobs_done = 0;  ///< A worker's jobs since it started.
   std::string trouble;          ///< A problem, for people; empty: none.
   std::vector<MethodId> can;    ///< A worker's finders and refiners; those without settings can be made with any.
+  Health health;                ///< The newest that its body has reported within a minute.
   template <class V>
   void describe(V& v) {
     v.field(1, "name", name, {.text = FieldRule::Text::name});
@@ -57,6 +70,7 @@ struct NodeStatus {
     v.field(15, "trouble", trouble);
     v.field(20, "can", can, {.at_most = 100});
     v.field(24, "submaps_begun", submaps);
+    v.field(25, "health", health, {.is_flat = true});
   }
   friend bool operator==(const NodeStatus&, const NodeStatus&) = default;
 };

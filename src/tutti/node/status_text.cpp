@@ -8,6 +8,8 @@
 #include <optional>
 #include <vector>
 
+#include "tutti/base/field_text.hpp"
+
 namespace tutti::node {
 namespace {
 
@@ -45,6 +47,18 @@ void append_table(const std::vector<Row>& rows, std::string& out) {
   }
 }
 
+/// The fields that ask for a column, as far as any robot has a value.
+void append_columns(const std::vector<MissionStatus::Robot>& robots, std::vector<Row>& rows) {
+  std::vector<std::vector<std::pair<std::string, std::string>>> columns;
+  for (const MissionStatus::Robot& robot : robots) columns.push_back(field_columns(robot));
+  for (std::size_t c = 0; c < columns.front().size(); ++c) {
+    if (std::ranges::all_of(columns, [c](const auto& of) { return of[c].second.empty(); })) continue;
+    rows.front().push_back(columns.front()[c].first);
+    for (std::size_t i = 0; i < robots.size(); ++i)
+      rows[i + 1].push_back(columns[i][c].second.empty() ? "-" : columns[i][c].second);
+  }
+}
+
 std::string state(const MissionStatus::Robot& robot) {
   std::string state = robot.status.finished ? "finished" : "maps";
   if (!robot.last_seen) state = "not seen since the server started";
@@ -72,12 +86,15 @@ std::string mission_status_text(const MissionStatus& status, double silent_s) {
     say("{} pairs of submaps or refinements wait for a worker that can: {}\n", status.waiting, status.why_waiting);
   if (status.robots.empty() && status.workers.empty()) say("Nobody is there: no robot and no worker.\n");
   if (!status.robots.empty()) {
-    std::vector<Row> rows{{"robot", "last seen", "backlog", "last update", "revision", "submaps", "alerts", "state"}};
+    std::vector<Row> rows{{"robot", "last seen", "backlog", "last update", "revision", "submaps", "alerts"}};
     for (const MissionStatus::Robot& robot : status.robots)
       rows.push_back({robot.status.name, ago(status.time, robot.last_seen), backlog(robot.status),
                       ago(status.time, robot.last_update),
                       robot.status.heard_epoch == status.epoch ? std::to_string(robot.status.heard_revision) : "-",
-                      std::to_string(robot.submaps), std::to_string(robot.status.alerts), state(robot)});
+                      std::to_string(robot.submaps), std::to_string(robot.status.alerts)});
+    append_columns(status.robots, rows);
+    rows.front().push_back("state");
+    for (std::size_t i = 0; i < status.robots.size(); ++i) rows[i + 1].push_back(state(status.robots[i]));
     append_table(rows, out);
   }
   if (!status.workers.empty()) {

@@ -12,7 +12,8 @@ const NodeStatus kAlpha{.name = "alpha",
                         .heard_epoch = 9,
                         .heard_revision = 41,
                         .alerts = 2,
-                        .trouble = "the disk is full"};
+                        .trouble = "the disk is full",
+                        .health = {.battery_v = 23.9, .battery_percent = 41.25}};
 
 TEST(StatusText, SaysWhoIsThereAndHowItStands) {
   const MissionStatus status{.time = Timestamp{} + 1000.0,
@@ -30,9 +31,10 @@ TEST(StatusText, SaysWhoIsThereAndHowItStands) {
                              .refusals = {{"robot", "submap", 5, "no good"}}};
   EXPECT_EQ(mission_status_text(status, 0.0),
             "server 0.9: 31 submaps, 17 closures, 2 parts that nothing joins yet; revision 42, 4 jobs wait\n"
-            "robot  last seen  backlog      last update  revision  submaps  alerts  state\n"
-            "alpha  2 s ago    12 (3.4 MB)  10 min ago   41        30       2       maps: the disk is full\n"
-            "bravo  never      -            never        -         1        0       not seen since the server started\n"
+            "robot  last seen  backlog      last update  revision  submaps  alerts  battery %  state\n"
+            "alpha  2 s ago    12 (3.4 MB)  10 min ago   41        30       2       41.25      maps: the disk is full\n"
+            "bravo  never      -            never        -         1        0       -          not seen since the "
+            "server started\n"
             "worker    last seen  jobs done  state\n"
             "worker_3  1 s ago    77\n"
             "two robots: another robot 'alpha' is there\n"

@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "tutti/program/field_json.hpp"
 #include "tutti/wire/message_kind.hpp"
 
 namespace tutti::program {
@@ -136,15 +137,12 @@ Told tell(const node::ChangeOfMind& told) {
       "the map's change of mind about robot {} ({:.2f} m, {:.1f} degrees, {:.1f} times what it allowed for)",
       told.robot.value, change.translation_m, change.rotation_rad * 180.0 / std::numbers::pi, change.significance);
   const bool waits = told.outcome == node::ChangeOutcome::waits;
-  return {{{"event", "change_of_mind"},
-           {"robot", told.robot.value},
-           {"outcome", to_string(told.outcome)},
-           {"significance", change.significance},
-           {"translation_m", change.translation_m},
-           {"rotation_rad", change.rotation_rad},
-           {"from_ns", change.from.ns},
-           {"until_ns", change.until.ns},
-           {"reason", reason}},
+  Json json{{"event", "change_of_mind"},
+            {"robot", told.robot.value},
+            {"outcome", to_string(told.outcome)},
+            {"reason", reason}};
+  json.update(json_of_fields(change));
+  return {std::move(json),
           waits
               ? fmt::format("{} waits for another update: {}", what, reason)
               : fmt::format("{} {}", what,
@@ -154,7 +152,8 @@ Told tell(const node::ChangeOfMind& told) {
 Told tell(const node::RobotUpdated& robot) {
   const robot::UpdateSummary& update = robot.summary;
   Json origins = Json::array();
-  for (const consistency::SuspectedOrigin& origin : update.explanation.origins) origins.push_back(to_json(origin));
+  for (const consistency::SuspectedOrigin& origin : update.explanation.origins)
+    origins.push_back(json_of_fields(origin));
   return {{{"event", "robot_updated"},
            {"origins", std::move(origins)},
            {"robot", robot.robot.value},
@@ -281,18 +280,6 @@ Result<Level> level_of(const std::string& word) {
   for (std::size_t i = 0; i < kLevels.size(); ++i)
     if (word == kLevels.at(i).first) return static_cast<Level>(i);
   return fail(ErrorCode::configuration, "log level '{}', expected debug, info, warning or error", word);
-}
-
-Json to_json(const consistency::SuspectedOrigin& origin) {
-  return {{"from_ns", origin.from.ns},
-          {"until_ns", origin.until.ns},
-          {"place_m", {origin.place_m.x(), origin.place_m.y(), origin.place_m.z()}},
-          {"scale", origin.scale},
-          {"length_m", origin.length_m},
-          {"translation_m", origin.translation_m},
-          {"rotation_rad", origin.rotation_rad},
-          {"significance", origin.significance},
-          {"alert", origin.alert}};
 }
 
 Json to_json(const node::Event& event) { return tell_event(event).json; }

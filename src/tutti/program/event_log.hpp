@@ -27,8 +27,6 @@ enum class Level { debug, info, warning, error };
 /// The level called "debug", "info", "warning" or "error"; fails with any other word.
 Result<Level> level_of(const std::string& word);
 
-/// A suspected origin as JSON, in the units of its fields.
-Json to_json(const consistency::SuspectedOrigin& origin);
 /// The event as JSON: "time_s", then "event" (what happened, in one word), then its fields.
 Json to_json(const node::Event& event);
 

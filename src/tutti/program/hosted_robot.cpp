@@ -8,6 +8,7 @@
 #include "tutti/base/plain_text.hpp"
 #include "tutti/model/proxy_graph.hpp"
 #include "tutti/node/status_envelope.hpp"
+#include "tutti/program/field_json.hpp"
 
 namespace tutti::program {
 namespace {
@@ -80,6 +81,7 @@ Answer HostedRobot::work(Timestamp now) {
 NodeStatus HostedRobot::node_status(Timestamp now) const {
   NodeStatus status = driver_->node().status(now);
   status.version = options_.version;
+  if (feed_) status.health = feed_->front().health();
   if (const std::string refused = feed_ ? feed_->front().odometry_trouble() : ""; !refused.empty())
     status.trouble = plain_text(refused);
   return status;
@@ -87,6 +89,7 @@ NodeStatus HostedRobot::node_status(Timestamp now) const {
 
 Answer HostedRobot::report(Timestamp now) {
   NodeStatus status = node_status(now);
+  if (feed_) feed_->front().say_status(status);
   return {{.messages = {node::to_server(bus::Endpoint::of(driver_->node().agent().robot()), std::move(status))}}, {}};
 }
 
@@ -138,21 +141,20 @@ Json HostedRobot::status(Timestamp now) const {
   const NodeStatus status = node_status(now);
   const bus::NatsState link = port_.state();
   const double time_s = now - Timestamp{};
-  Json out{{"program", "robot"},
-           {"name", status.name},
-           {"time_s", time_s},
-           {"finished", has_ended()},
-           {"backlog", status.backlog_submaps},
-           {"keyframes", status.keyframes},
-           {"revision", status.heard_revision},
-           {"connected", link.connected},
-           {"alone", alone_},
-           {"refused", driver_->node().conflict().value_or("")},
-           {"line",
-            fmt::format("{}, {} keyframes, {} submaps not stored yet, heard map revision {}{}{}", progress(time_s),
-                        status.keyframes, status.backlog_submaps, status.heard_revision,
-                        link.connected ? "" : ", no link: " + link.last_error, alone_.empty() ? "" : ", " + alone_)}};
-  if (!status.trouble.empty()) out["trouble"] = status.trouble;
+  Json out = json_of_fields(status);
+  out.update({{"program", "robot"},
+              {"time_s", time_s},
+              {"finished", has_ended()},
+              {"backlog", status.backlog_submaps},
+              {"revision", status.heard_revision},
+              {"connected", link.connected},
+              {"alone", alone_},
+              {"refused", driver_->node().conflict().value_or("")},
+              {"line", fmt::format("{}, {} keyframes, {} submaps not stored yet, heard map revision {}{}{}",
+                                   progress(time_s), status.keyframes, status.backlog_submaps, status.heard_revision,
+                                   link.connected ? "" : ", no link: " + link.last_error,
+                                   alone_.empty() ? "" : ", " + alone_)}});
+  if (status.trouble.empty()) out.erase("trouble");
   if (feed_) out["feed"] = feed_status();
   return out;
 }

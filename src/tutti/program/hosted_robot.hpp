@@ -58,8 +58,10 @@ class HostedRobot final : public Hosted {
   /// Why this program must end: another program is this robot. Nothing when it need not.
   [[nodiscard]] const std::optional<std::string>& refused() const { return refused_; }
 
- private:
+  /// What the node reports of itself, and this program of its feed.
   [[nodiscard]] NodeStatus node_status(Timestamp now) const;
+
+ private:
   Answer said(std::vector<std::uint64_t> done = {}) {
     Answer out{driver_->take_step(), std::move(done)};
     if (fed_) fed_->note(out.step);

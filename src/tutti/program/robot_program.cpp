@@ -11,6 +11,7 @@
 #include "tutti/bus/mission_lease.hpp"
 #include "tutti/bus/nats_port.hpp"
 #include "tutti/program/feed/live_feed.hpp"
+#include "tutti/program/field_json.hpp"
 #include "tutti/program/host.hpp"
 #include "tutti/program/hosted_robot.hpp"
 #include "tutti/program/incarnation.hpp"
@@ -23,7 +24,7 @@ namespace tutti::program {
 namespace {
 
 /// The last event of a program: what only it knows.
-Json last_words(const Host::TrafficTable& table) {
+Json last_words(const Host::TrafficTable& table, const std::optional<NodeStatus>& status) {
   Json rows = Json::array();
   for (const auto& [key, traffic] : table)
     rows.push_back({{"sent", key.first},
@@ -31,7 +32,9 @@ Json last_words(const Host::TrafficTable& table) {
                     {"messages", traffic.messages},
                     {"bytes", traffic.bytes},
                     {"largest", traffic.largest}});
-  return {{"event", kEnded}, {"traffic", std::move(rows)}};
+  Json out{{"event", kEnded}, {"traffic", std::move(rows)}};
+  if (status) out["status"] = json_of_fields(*status);
+  return out;
 }
 
 /// What a status may carry, and a unit of systemd, a folder and a subject of the bus can be called.
@@ -223,7 +226,7 @@ Status RobotProgram::run(const std::atomic<bool>& stop) {
   host_->run(stop);
   tell_service_manager("STOPPING=1");
   const auto* robot = dynamic_cast<const HostedRobot*>(host_->hosted());
-  log_->write(last_words(host_->traffic()));
+  log_->write(last_words(host_->traffic(), robot ? std::optional(robot->node_status(clock_->now())) : std::nullopt));
   if (robot != nullptr && robot->refused())
     return fail(ErrorCode::invalid,
                 "the server refuses this robot: {}: stop the other one, give this one another name, or name it in the "

@@ -23,7 +23,7 @@
 
 namespace tutti::program {
 
-inline constexpr const char* kEnded = "ended";  ///< The program's last event, which has its traffic.
+inline constexpr const char* kEnded = "ended";  ///< The program's last event, which has its traffic and status.
 
 /// How a client that feeds a robot's raw messages is to interpret them.
 struct DriverSettings {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/wire/internal/field_bytes.hpp"
+#include "tutti/wire/field_bytes.hpp"
 
 #include <gtest/gtest.h>
 
@@ -50,14 +50,15 @@ class ProtoFields {
 
 /// The same of a message in proto/tutti/v1; empty when there is none.
 std::string in_proto(const std::string& file, const std::string& message) {
+  const std::regex begin("^( *)message " + message + R"( \{.*)");
   std::ifstream in(tutti::test::source_path("proto/tutti/v1/" + file));
   const std::regex field(R"(^ +((?:repeated |optional )?)(\w+) (\w+) = (\d+);.*)");
   std::string out;
-  bool inside = false;
+  std::optional<std::string> inside;  // its indentation
   for (std::string line; std::getline(in, line);) {
-    if (line == "message " + message + " {") inside = true;
-    if (line == "}") inside = false;
     std::smatch found;
+    if (std::regex_match(line, found, begin)) inside = found.str(1);
+    if (inside && line == *inside + "}") inside.reset();
     if (!inside || !std::regex_match(line, found, field)) continue;
     const std::string type = std::isupper(static_cast<unsigned char>(found.str(2)[0])) != 0 ? "MESSAGE" : found.str(2);
     out += found.str(4) + " " + found.str(1) + type + " " + found.str(3) + "\n";
@@ -81,6 +82,8 @@ TEST(FieldBytes, TheFilesForOtherLanguagesHaveTheSameFields) {
   expect_in_proto<MissionStatus::Refusals>("status.proto", "RefusedMessages");
   expect_in_proto<MissionStatus::Word>("status.proto", "AnsweredWord");
   expect_in_proto<ClosureWord>("status.proto", "Word");
+  expect_in_proto<Health>("status.proto", "Health");
+  expect_in_proto<Health>("feed.proto", "Health");
   expect_in_proto<MethodId>("messages.proto", "Method");
 }
 

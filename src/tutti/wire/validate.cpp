@@ -6,7 +6,7 @@
 
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/wire/codec.hpp"
-#include "tutti/wire/internal/field_bytes.hpp"
+#include "tutti/wire/field_bytes.hpp"
 #include "tutti/wire/internal/method_message.hpp"
 #include "tutti/wire/internal/visual_codec.hpp"
 #include "tutti/wire/limits.hpp"

@@ -6,6 +6,7 @@
 #include "tutti/mission/report/json_parts.hpp"
 #include "tutti/mission/report/report.hpp"
 #include "tutti/mission/worst_moment.hpp"
+#include "tutti/program/field_json.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -185,7 +186,8 @@ Json robot_json(const RobotRecord& robot, const std::string& default_policy, boo
            {"submaps", robot.submaps},
            {"component", robot.component},
            {"mapped_share", number(robot.mapped_share)},
-           {"tied", tied}};
+           {"tied", tied},
+           {"status", json_of_fields(robot.status)}};
   add_accuracy(out, "onboard_", robot.onboard);
   add_accuracy(out, "server_", robot.server);
   out["worst_server"] = worst_json(worst_of_server(robot.updates));

@@ -9,6 +9,7 @@
 #include "tutti/base/plain_text.hpp"
 #include "tutti/program/feed/feed_frames.hpp"
 #include "tutti/v1/feed.pb.h"
+#include "tutti/wire/field_bytes.hpp"
 
 namespace tutti::program {
 namespace {
@@ -143,6 +144,13 @@ FromClient read(const v1::Feed::Fix& in) {
   return out;
 }
 
+FromClient read(const v1::Feed::Health& in) {
+  auto health = wire::read_fields<Health>(in.SerializeAsString());
+  if (!health) return BadSample{{}, health.error().message};
+  if (const Status ok = wire::check_fields(*health); !ok) return BadSample{{}, "health: " + ok.error().message};
+  return *health;
+}
+
 FromClient read(const v1::Feed::Imu& in) {
   const int samples = in.stamp_ns_size();
   const Timestamp first{samples > 0 ? in.stamp_ns(0) : 0};
@@ -204,6 +212,8 @@ Result<FromClient> decode_from_client(std::string_view payload) {
       return read(message.imu());
     case v1::Feed::kFix:
       return read(message.fix());
+    case v1::Feed::kHealth:
+      return read(message.health());
     case v1::Feed::kTime:
       return FeedTime{message.time().clock_now_ns()};
     default:

@@ -45,13 +45,14 @@ FeedAnswer answer(const v1::Feed::Correction& said) {
 }
 
 FeedSituation situation(const v1::Feed::Situation& said) {
-  FeedSituation out{.in_map = said.in_map(), .team_mates = {}, .alerts = {}};
+  FeedSituation out{.in_map = said.in_map(), .team_mates = {}, .alerts = {}, .status = {}};
   for (const auto& mate : said.team_mate())
     out.team_mates.push_back({RobotId{mate.robot()},
                               mate.name(),
                               {mate.stamp_ns()},
                               mate.same_component() ? std::optional(pose(mate.t_map_body())) : std::nullopt});
   for (const auto& alert : said.alert()) out.alerts.push_back(alert.text());
+  for (const auto& value : said.status()) out.status.emplace_back(value.name(), value.text());
   return out;
 }
 
@@ -139,6 +140,8 @@ Status FeedClient::say(const FedImages& images) { return send(internal::message_
 Status FeedClient::say(const std::vector<ImuSample>& samples) { return send(internal::message_of(samples)); }
 
 Status FeedClient::say(const PositionFix& fix) { return send(internal::message_of(fix)); }
+
+Status FeedClient::say(const Health& health) { return send(internal::message_of(health)); }
 
 Status FeedClient::say_time() {
   v1::Feed message;

@@ -41,6 +41,7 @@ struct FeedSituation {
   bool in_map = false;
   std::vector<TeamMate> team_mates;
   std::vector<std::string> alerts;
+  std::vector<std::pair<std::string, std::string>> status;  ///< FeedState::status
 };
 /// The answer to say_time().
 struct FeedProgress {
@@ -72,6 +73,7 @@ class FeedClient {
   Status say(const FedImages& images);
   Status say(const std::vector<ImuSample>& samples);
   Status say(const PositionFix& fix);
+  Status say(const Health& health);
   /// Asks which sample the robot has stored by now. The clock value in the message is a dummy, so do not use it to
   /// measure an offset.
   Status say_time();

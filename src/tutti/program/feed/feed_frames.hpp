@@ -26,8 +26,8 @@ inline constexpr std::size_t kMaxFeedBytes = 16U << 20U;
 inline constexpr std::size_t kMaxHelloBytes = 64U << 10U;
 inline constexpr std::size_t kMaxImuSamples = 10'000;  ///< Limit per message: ten seconds at 1 kHz.
 /// Names of the messages a client may send; the index is the message's number in the protocol minus one.
-inline constexpr const char* kFromClient[] = {"hello",  "odometry", "scan", "end_of_recording",
-                                              "images", "imu",      "time", "fix"};
+inline constexpr const char* kFromClient[] = {"hello", "odometry", "scan",  "end_of_recording", "images", "imu",
+                                              "time",  "fix",      "health"};
 
 /// Assembles frames from bytes as they arrive. Holds at most one incomplete frame.
 class FrameReader {
@@ -70,7 +70,7 @@ struct BadSample {
 };
 /// What a client may say.
 using FromClient = std::variant<FeedHello, node::OdometrySample, Scan, FeedEnd, FedImages, FeedImu, FeedTime,
-                                PositionFix, FeedUnknown, BadSample>;
+                                PositionFix, Health, FeedUnknown, BadSample>;
 /// Decodes untrusted bytes; an error when they are no message of the protocol.
 Result<FromClient> decode_from_client(std::string_view payload);
 

@@ -198,6 +198,7 @@ FeedState FeedFront::state() const {
                                          samples_joined_ > 0 ? ", odometry is taken together" : "");
     out.alerts.push_back({text, behind_since_, behind_since_, behind_since_});
   }
+  out.status = status_;
   return out;
 }
 

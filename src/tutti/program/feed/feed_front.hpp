@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
@@ -61,6 +62,7 @@ class FeedFront final : public FeedTarget {
   Status add_images(FedImages images) override;
   Status add_imu(const std::vector<ImuSample>& samples) override;
   Status add_fix(const PositionFix& fix) override;
+  void set_health(const Health& health) override;
   Status finish() override;
   [[nodiscard]] FeedState state() const override;
   std::vector<FeedRefusal> take_refusals() override;
@@ -91,6 +93,11 @@ class FeedFront final : public FeedTarget {
   /// Queues a way for the client; only the newest kWays wait.
   void say(FeedWay way);
   static constexpr std::size_t kWays = 4;
+  /// What the robot's body reported last, unless that is older than kHealthLasts.
+  [[nodiscard]] Health health() const;
+  static constexpr std::chrono::seconds kHealthLasts{60};
+  /// What the robot reports of itself, which clients are shown.
+  void say_status(const NodeStatus& status);
   /// Shows `trouble` to clients as an alert until it is called with an empty text.
   void say_trouble(std::string trouble);
   /// What is wrong with the odometry that comes, for people; empty when nothing is.
@@ -163,6 +170,9 @@ class FeedFront final : public FeedTarget {
   Timestamp behind_since_;
   bool wants_ways_ = false;
   std::deque<FeedWay> ways_;
+  Health health_;
+  std::chrono::steady_clock::time_point health_came_;
+  std::vector<std::pair<std::string, std::string>> status_;
   std::string trouble_;
   Timestamp trouble_since_;
   bool ended_ = false, closed_ = false;

@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "tutti/base/field_text.hpp"
 #include "tutti/program/feed/feed_front.hpp"
 
 namespace tutti::program {
@@ -106,6 +107,22 @@ Status FeedFront::may_wait(const PositionFix& fix) const {
   if (waiting() < limits_.inputs / 2) return {};
   return fail(ErrorCode::io, "the map is behind: {} inputs wait, at most {}; the {} is left out", waiting(),
               limits_.inputs / 2, where());
+}
+
+void FeedFront::set_health(const Health& health) {
+  const std::scoped_lock lock(mutex_);
+  health_ = health;
+  health_came_ = std::chrono::steady_clock::now();
+}
+
+Health FeedFront::health() const {
+  const std::scoped_lock lock(mutex_);
+  return std::chrono::steady_clock::now() - health_came_ < kHealthLasts ? health_ : Health{};
+}
+
+void FeedFront::say_status(const NodeStatus& status) {
+  const std::scoped_lock lock(mutex_);
+  status_ = field_texts(status);
 }
 
 /// Which of them are used, the robot decides (SubmapBuilder::add_fix()), as of a recording.

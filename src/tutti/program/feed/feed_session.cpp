@@ -96,6 +96,7 @@ void FeedSession::take_fed(Client client, FromClient message) {
     return take(images->stamp, [&] { return target_.add_images(std::move(*images)); });
   if (const auto* fix = std::get_if<PositionFix>(&message))
     return take(fix->stamp, [&] { return target_.add_fix(*fix); });
+  if (const auto* health = std::get_if<Health>(&message)) return target_.set_health(*health);
   const Scan& scan = std::get<Scan>(message);
   take(scan.stamp, [&] { return target_.add_scan(scan); });
 }

@@ -60,6 +60,32 @@ TEST_F(FeedSessionSensors, TakesImagesAndImuAndRefusesThemByName) {
   EXPECT_EQ(say(1, sample(20)).size(), 1U);  // the connection stays
 }
 
+TEST_F(FeedSessionSensors, WhatTheBodyReportsReachesTheRobotOrIsRefusedByName) {
+  join(1);
+  Feed good, bad;
+  good.mutable_health()->set_battery_v(24.5);
+  EXPECT_TRUE(say(1, test::framed(good)).empty());
+  EXPECT_EQ(target_.health, (Health{.battery_v = 24.5}));
+  bad.mutable_health()->set_battery_percent(101.0);
+  const auto answer = say(1, test::framed(bad));
+  ASSERT_EQ(answer.size(), 1U);
+  EXPECT_EQ(answer[0].refused().why(), "health: battery_percent: 101, expected 0 to 100");
+  EXPECT_EQ(target_.health, (Health{.battery_v = 24.5}));
+}
+
+TEST_F(FeedSessionSensors, WhatTheRobotReportsIsToldWhenItChanges) {
+  join(1);
+  target_.known.status = {{"keyframes", "7"}, {"battery_percent", "50"}};
+  session_.refresh();
+  const auto told = read(1);
+  ASSERT_EQ(told.size(), 1U);
+  ASSERT_EQ(told[0].situation().status_size(), 2);
+  EXPECT_EQ(told[0].situation().status(1).name(), "battery_percent");
+  EXPECT_EQ(told[0].situation().status(1).text(), "50");
+  session_.refresh();
+  EXPECT_TRUE(read(1).empty());
+}
+
 TEST_F(FeedSessionSensors, ImagesOfWhomNobodySetUpACamera) {
   join(1);
   const auto answer = say(1, test::images(raw(5)));
@@ -126,10 +152,10 @@ TEST_F(FeedSessionSensors, FixesComeAsTheyWereSaid) {
 
 TEST_F(FeedSessionSensors, AMessageOfANewerProtocolIsRefusedByItsNumber) {
   join(1);
-  const std::string newer("\x0a\x00\x00\x00\x4a\x08\x12\x06 later", 14);  // field 9
+  const std::string newer("\x0a\x00\x00\x00\x52\x08\x12\x06 later", 14);  // field 10
   const auto answer = say(1, newer);
   ASSERT_EQ(answer.size(), 1U);
-  EXPECT_NE(answer[0].refused().why().find("number 9"), std::string::npos) << answer[0].refused().why();
+  EXPECT_NE(answer[0].refused().why().find("number 10"), std::string::npos) << answer[0].refused().why();
   EXPECT_NE(answer[0].refused().why().find("images"), std::string::npos);
   EXPECT_EQ(say(1, sample(20)).size(), 1U);
 }

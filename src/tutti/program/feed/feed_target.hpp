@@ -11,6 +11,7 @@
 #include "tutti/base/ids.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/model/position_fix.hpp"
+#include "tutti/model/status.hpp"
 #include "tutti/model/trajectory.hpp"
 #include "tutti/node/journal.hpp"
 #include "tutti/program/feed/feed_sensors.hpp"
@@ -51,10 +52,11 @@ struct FeedState {
   bool wants_scan = false;                 ///< A scan from now on would be used.
   std::vector<TeamMate> team_mates;
   std::vector<FeedAlert> alerts;
-  std::optional<Timestamp> stored;    ///< The newest sample that a kill would not lose.
-  robot::NextKeyframe next_keyframe;  ///< Tells at which later sample a scan would be wanted.
-  robot::OdometryWatch watch;         ///< RobotAgent::watch()
-  bool ended = false;                 ///< The client has ended the recording, and everything before that is stored.
+  std::vector<std::pair<std::string, std::string>> status;  ///< field_texts() of the robot's NodeStatus.
+  std::optional<Timestamp> stored;                          ///< The newest sample that a kill would not lose.
+  robot::NextKeyframe next_keyframe;                        ///< Tells at which later sample a scan would be wanted.
+  robot::OdometryWatch watch;                               ///< RobotAgent::watch()
+  bool ended = false;  ///< The client has ended the recording, and everything before that is stored.
 };
 
 /// The robot's way and what the map says of it, as of one update of the map.
@@ -91,6 +93,8 @@ class FeedTarget {
   virtual Status add_fix(const PositionFix& fix) {
     return fail(ErrorCode::unsupported, "fix at {} ns: this robot takes none", fix.stamp.ns);
   }
+  /// What the robot's body reports of itself.
+  virtual void set_health(const Health& /*health*/) {}
   /// Ends the recording; FeedState::ended tells when that is done.
   virtual Status finish() = 0;
   /// From now on take_ways() has something to return.

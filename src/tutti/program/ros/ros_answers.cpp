@@ -47,6 +47,7 @@ bags::RosDiagnostic diagnosis(const RosSituation& situation) {
   add("fixes", situation.counts.fixes);
   add("refused", situation.counts.refused);
   add("in_map", situation.in_map);
+  for (const auto& [name, text] : situation.status) add(name, text);
   for (std::size_t i = 0; i < situation.alerts.size(); ++i) add(fmt::format("alert {}", i), situation.alerts[i]);
   for (std::size_t i = 0; i < situation.troubles.size(); ++i) add(fmt::format("trouble {}", i), situation.troubles[i]);
   const auto say = [&](std::uint8_t level, const std::string& message) {

@@ -369,6 +369,7 @@ void Robot::publish_diagnostics() {
                                              .is_connected = client_ != nullptr,
                                              .counts = intake_.counts(),
                                              .in_map = answers_ && answers_->last() && answers_->last()->in_map,
+                                             .status = situation_.status,
                                              .alerts = situation_.alerts,
                                              .troubles = complaints_.take()});
   const Timestamp now{static_cast<std::int64_t>(program::wall_clock_ns())};

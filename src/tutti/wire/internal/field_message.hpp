@@ -4,8 +4,8 @@
 #include <string>
 #include <string_view>
 
+#include "tutti/wire/field_bytes.hpp"
 #include "tutti/wire/frame.hpp"
-#include "tutti/wire/internal/field_bytes.hpp"
 #include "tutti/wire/internal/payload.hpp"
 #include "tutti/wire/message_kind.hpp"
 

@@ -44,6 +44,7 @@ class ScriptedTarget final : public FeedTarget {
     fixes.push_back(fix);
     return {};
   }
+  void set_health(const Health& of) override { health = of; }
   [[nodiscard]] FeedState state() const override { return known; }
   std::vector<FeedRefusal> take_refusals() override { return std::exchange(refusals, {}); }
 
@@ -51,6 +52,7 @@ class ScriptedTarget final : public FeedTarget {
   std::vector<Timestamp> scans, seen, felt;
   std::vector<PositionFix> fixes;
   FeedSensors sensors;
+  Health health;
   int finished = 0;
   bool ends_at_once = true;
   std::vector<FeedRefusal> refusals;

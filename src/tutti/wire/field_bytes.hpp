@@ -20,7 +20,7 @@
 ///
 /// proto3's types: bool bool, unsigned integers and enums uint32 or uint64 (fixed32, fixed64 with FieldRule::fixed),
 /// signed ones sint64, double double, text bytes, Timestamp sint64 (ns), RobotId uint32, Pose3 repeated double
-/// [x y z; quaternion x y z w], which is left out if it is the identity.
+/// [x y z; quaternion x y z w]. What has its default is left out, unless it is an optional or an element of a list.
 namespace tutti::wire {
 
 /// Appends fields to a message. Deterministic: the same value gives the same bytes.
@@ -35,7 +35,10 @@ class FieldWriter {
     } else if constexpr (IsListField<T>) {
       for (const auto& element : value) put(number, element, rule);
     } else if constexpr (HasFields<T>) {
-      put(number, value, rule);
+      std::string inside;
+      FieldWriter writer(inside);
+      visit_fields(value, writer);
+      if (!inside.empty()) put_bytes(number, inside);
     } else if (!(value == T{})) {
       put(number, value, rule);
     }
