@@ -131,6 +131,12 @@ std::shared_ptr<RosArguments> add_ros_robot_options(CLI::App& robot) {
       ->type_name("TOPIC")
       ->capture_default_str()
       ->needs(ros);
+  robot
+      .add_option("--battery", out->robot.battery,
+                  "Topic of sensor_msgs/BatteryState, below the namespace; '' for none")
+      ->type_name("TOPIC")
+      ->capture_default_str()
+      ->needs(ros);
   robot.add_option("--fixes", out->robot.fixes, "Topic of sensor_msgs/NavSatFix, below the namespace; '' for none")
       ->type_name("TOPIC")
       ->capture_default_str()

@@ -232,6 +232,18 @@ class Reconnecting(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "expected at most 16777216"):
             scan_frame(1, np.zeros((1_500_000, 3), np.float32), None)
 
+    def test_the_battery_is_said_once_to_who_takes_it(self):
+        for takes, said in (("hello", "odometry", "health"), 1), (("hello", "odometry"), 0):
+            link = Link(NOISE)
+            link.set_health(24.5, float("nan"))
+            self.welcome(link, takes=takes)
+            frames = self.parse(link.next_frame())
+            self.assertEqual([message.WhichOneof("what") for message in frames], ["health"] * said)
+            if frames:
+                self.assertEqual(frames[0].health.battery_v, 24.5)
+                self.assertFalse(frames[0].health.HasField("battery_percent"))
+            self.assertEqual(link.next_frame(), b"")
+
     def test_diagnosis_has_what_the_robot_reports_of_itself(self):
         on_map = OnMap()
         on_map.take("situation", Feed.Situation(status=[Feed.Value(name="battery_percent", text="41"),

@@ -28,6 +28,10 @@ DEFINITIONS = {
                             "geometry_msgs/Pose origin",
     "nav_msgs/OccupancyGrid": "std_msgs/Header header, nav_msgs/MapMetaData info, int8[] data",
     "nav_msgs/Path": "std_msgs/Header header, geometry_msgs/PoseStamped[] poses",
+    "sensor_msgs/BatteryState": "std_msgs/Header header, float32 voltage, float32 temperature, float32 current, float32 charge, "
+                                "float32 capacity, float32 design_capacity, float32 percentage, uint8 power_supply_status, "
+                                "uint8 power_supply_health, uint8 power_supply_technology, bool present, "
+                                "float32[] cell_voltage, float32[] cell_temperature, string location, string serial_number",
     "sensor_msgs/PointField": "string name, uint32 offset, uint8 datatype, uint32 count",
     "sensor_msgs/PointCloud2": "std_msgs/Header header, uint32 height, uint32 width, sensor_msgs/PointField[] fields, "
                                "bool is_bigendian, uint32 point_step, uint32 row_step, uint8[] data, bool is_dense",

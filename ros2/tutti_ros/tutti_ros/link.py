@@ -111,6 +111,7 @@ class Link:
         self.last = None           # the newest odometry sample
         self.stamps, self.unsure = StampWatch(), None  # a stamp and pose far ahead, until the next one confirms it
         self.last_fix_ns = None
+        self.health = None         # the newest, until it was said
         self.known_spent = None    # of the newest that the robot has; None: one that this program did not see
         self.welcome, self.goodbye, self.received = None, False, b""
 
@@ -160,6 +161,14 @@ class Link:
         self._add(Sample(stamp_ns, kind="fixes", frame=frame(fix=Feed.Fix(
             stamp_ns=stamp_ns, latitude_deg=place[0], longitude_deg=place[1], height_m=place[2],
             covariance_m2=covariance, p_body_antenna=p_body_antenna))))
+
+    def set_health(self, voltage_v, share):
+        """What is no number, or no share of 1, the robot's driver does not know."""
+        self.health = Feed.Health()
+        if voltage_v >= 0.0:
+            self.health.battery_v = voltage_v
+        if 0.0 <= share <= 1.0:
+            self.health.battery_percent = 100.0 * share
 
     def set_sensors(self, sensors):
         """What is said of cameras, depth and IMU the next time that the robot is greeted."""
@@ -239,6 +248,9 @@ class Link:
         """What to say now; empty: nothing."""
         if self.state != "feeding":
             return b""
+        health, self.health = self.health, None
+        if health is not None and "health" in self.welcome.takes:
+            return frame(health=health)
         while self.waiting:
             sample = self.waiting.popleft()
             if not sample.is_forgotten():

@@ -12,7 +12,7 @@ from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, TransformS
 from nav_msgs.msg import Odometry, Path
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
-from sensor_msgs.msg import NavSatFix, PointCloud2
+from sensor_msgs.msg import BatteryState, NavSatFix, PointCloud2
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -75,6 +75,7 @@ class TuttiNode(Node):
             self.create_subscription(PointCloud2, "points", self.take_points, qos_profile_sensor_data)
         if self.use_fixes:
             self.create_subscription(NavSatFix, "fix", self.take_fix, qos_profile_sensor_data)
+        self.create_subscription(BatteryState, "battery_state", self.take_battery, qos_profile_sensor_data)
         self.create_service(Trigger, "~/end_recording", self.end_recording)
         self.create_timer(self.path_period_s, self.publish_path)
         self.create_timer(1.0, self.publish_diagnostics)
@@ -142,6 +143,11 @@ class TuttiNode(Node):
         except ValueError as error:
             self.complain(f"fixes: {error}")
             return
+        self.connection.wake()
+
+    def take_battery(self, message):
+        with self.connection.lock:
+            self.link.set_health(message.voltage, message.percentage)
         self.connection.wake()
 
     def antenna(self, frame_id):

@@ -52,6 +52,11 @@ const std::map<std::string, std::string_view, std::less<>>& definitions() {
        "geometry_msgs/TwistWithCovariance twist\n"},
       {"nav_msgs/Path", "std_msgs/Header header\ngeometry_msgs/PoseStamped[] poses\n"},
       {"rosgraph_msgs/Clock", "builtin_interfaces/Time clock\n"},
+      {"sensor_msgs/BatteryState",
+       "std_msgs/Header header\nfloat32 voltage\nfloat32 temperature\nfloat32 current\nfloat32 charge\n"
+       "float32 capacity\nfloat32 design_capacity\nfloat32 percentage\nuint8 power_supply_status\n"
+       "uint8 power_supply_health\nuint8 power_supply_technology\nbool present\nfloat32[] cell_voltage\n"
+       "float32[] cell_temperature\nstring location\nstring serial_number\n"},
       {"sensor_msgs/CameraInfo",
        "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\nfloat64[] d\nfloat64[9] k\n"
        "float64[9] r\nfloat64[12] p\nuint32 binning_x\nuint32 binning_y\nsensor_msgs/RegionOfInterest roi\n"},

@@ -225,6 +225,22 @@ Result<RosNavSatFix> decode_nav_sat_fix(std::string_view bytes, RosEncoding enco
   });
 }
 
+Result<RosBatteryState> decode_battery_state(std::string_view bytes, RosEncoding encoding) {
+  return decode(bytes, encoding, "sensor_msgs/msg/BatteryState", [](Cursor& in) {
+    RosBatteryState out;
+    out.header = header(in);
+    out.voltage_v = in.number<float>("voltage");
+    for (const char* what : {"temperature", "current", "charge", "capacity", "design_capacity"}) in.number<float>(what);
+    out.percentage = in.number<float>("percentage");
+    for (const char* what : {"power_supply_status", "power_supply_health", "power_supply_technology", "present"})
+      in.number<std::uint8_t>(what);
+    for (const char* what : {"cell_voltage", "cell_temperature"})
+      for (std::size_t left = sequence(in, sizeof(float), what); left > 0; --left) in.number<float>(what);
+    for (const char* what : {"location", "serial_number"}) text(in, what);
+    return out;
+  });
+}
+
 Result<RosPoseStamped> decode_pose_stamped(std::string_view bytes, RosEncoding encoding) {
   return decode(bytes, encoding, "geometry_msgs/msg/PoseStamped", [](Cursor& in) {
     RosPoseStamped out;

@@ -111,6 +111,13 @@ struct RosNavSatFix {
   std::uint8_t position_covariance_type = 0;                         ///< 0: unknown.
 };
 
+/// What Tutti reads of sensor_msgs/BatteryState; NaN where the robot does not know it.
+struct RosBatteryState {
+  RosHeader header;
+  float voltage_v = 0.0F;
+  float percentage = 0.0F;  ///< 0 to 1.
+};
+
 struct RosPoseStamped {
   RosHeader header;
   RosPose pose;
@@ -126,6 +133,7 @@ Result<RosImage> decode_image(std::string_view bytes, RosEncoding encoding = Ros
 Result<RosCompressedImage> decode_compressed_image(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
 Result<RosCameraInfo> decode_camera_info(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
 Result<RosNavSatFix> decode_nav_sat_fix(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
+Result<RosBatteryState> decode_battery_state(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
 Result<RosPoseStamped> decode_pose_stamped(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
 
 }  // namespace tutti::bags

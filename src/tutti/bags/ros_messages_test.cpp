@@ -34,6 +34,9 @@ const std::map<std::string, Type>& types() {
       {"Image", {image, [](std::string_view b) { return status(decode_image(b)); }}},
       {"CompressedImage", {compressed_image, [](std::string_view b) { return status(decode_compressed_image(b)); }}},
       {"CameraInfo", {camera_info, [](std::string_view b) { return status(decode_camera_info(b)); }}},
+      {"BatteryState",
+       {[](int how) { return battery_state(24.5F, 0.5F, how); },
+        [](std::string_view b) { return status(decode_battery_state(b)); }}},
       {"NavSatFix", {nav_sat_fix, [](std::string_view b) { return status(decode_nav_sat_fix(b)); }}},
       {"PoseStamped", {pose_stamped, [](std::string_view b) { return status(decode_pose_stamped(b)); }}},
   };
@@ -142,6 +145,9 @@ TEST_P(BothOrders, SensorsAreReadFieldByField) {
   EXPECT_EQ(camera.p[11], 41.0);
   EXPECT_EQ(camera.binning_y, 2U);
 
+  const auto battery = decode_battery_state(battery_state(24.5F, 0.5F, GetParam())).value();
+  EXPECT_EQ(battery.voltage_v, 24.5F);
+  EXPECT_EQ(battery.percentage, 0.5F);
   const auto fix = decode_nav_sat_fix(nav_sat_fix(GetParam())).value();
   EXPECT_EQ(fix.status, -1);
   EXPECT_EQ(fix.service, 3U);

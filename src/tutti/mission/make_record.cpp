@@ -71,6 +71,7 @@ MissionRecord make_record(const FinishedMission& mission) {
     const FinishedRobot& finished = mission.robots[i];
     record_traffic(finished.traffic, robot);
     robot.status = finished.status;
+    robot.status.name = robot.name;
     robot.updates = finished.updates;
     robot.alerts = alerts_of(robot.updates);
     robot.explanation = finished.explanation;

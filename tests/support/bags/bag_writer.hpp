@@ -217,6 +217,28 @@ inline std::string nav_sat_fix(int how = 0) {
       .number(std::uint8_t{2})
       .done();
 }
+inline std::string battery_state(float voltage_v, float percentage, int how = 0) {
+  return CdrWriter(how)
+      .header("base_link")
+      .number(voltage_v)
+      .number(20.0F)
+      .number(-1.5F)
+      .number(3.0F)
+      .number(6.0F)
+      .number(6.5F)
+      .number(percentage)
+      .number(std::uint8_t{2})
+      .number(std::uint8_t{1})
+      .number(std::uint8_t{2})
+      .number(std::uint8_t{1})
+      .number(std::uint32_t{2})
+      .number(3.9F)
+      .number(4.0F)
+      .number(std::uint32_t{0})
+      .text("slot 1")
+      .text("")
+      .done();
+}
 inline std::string pose_stamped(int how = 0) { return CdrWriter(how).header("map").numbers(7, 1.0).done(); }
 
 }  // namespace tutti::bags::test

@@ -24,7 +24,8 @@ namespace {
 using program::Clock, program::FeedClient, program::Level;
 
 constexpr const char *kOdometryType = "nav_msgs/msg/Odometry", *kPointsType = "sensor_msgs/msg/PointCloud2",
-                     *kFixType = "sensor_msgs/msg/NavSatFix", *kTfType = "tf2_msgs/msg/TFMessage";
+                     *kFixType = "sensor_msgs/msg/NavSatFix", *kBatteryType = "sensor_msgs/msg/BatteryState",
+                     *kTfType = "tf2_msgs/msg/TFMessage";
 constexpr double kWait_s = 0.02;
 constexpr double kAnswers_s = 2.0;  // more than the robot takes for any
 constexpr double kConnectsAgain_s = 0.1;
@@ -61,6 +62,7 @@ class Robot final : public RosRobot {
   void say_sample(const node::OdometrySample& sample);
   void say_sensors() { say_fixes(), say_images(), say_scans(); }
   void say_fixes();
+  Status say_battery(std::string_view cdr);
   void say_scans();
   void say_images();
   [[nodiscard]] program::FeedSensors sensors() const;
@@ -78,7 +80,7 @@ class Robot final : public RosRobot {
   RosIntake intake_;
   std::unique_ptr<Writer> tf_out_, pose_, path_, mates_, diagnostics_;
   std::map<std::string, std::unique_ptr<Writer>> mate_poses_;
-  std::unique_ptr<Reader> odometry_, points_, fixes_, tf_, tf_static_;
+  std::unique_ptr<Reader> odometry_, points_, fixes_, battery_, tf_, tf_static_;
   std::unique_ptr<FeedClient> client_;
   std::optional<RosAnswers> answers_;
   std::optional<program::FeedWay> way_;  // heard before there was any odometry
@@ -144,6 +146,7 @@ Status Robot::subscribe() {
     if (Status ok = make(odometry_, options_.odometry, kOdometryType, in_qos(options_.lossless, kOdometryDepth)); !ok)
       return ok;
   if (Status ok = make(points_, options_.points, kPointsType, in_qos(options_.lossless, kPointsDepth)); !ok) return ok;
+  if (Status ok = make(battery_, options_.battery, kBatteryType, in_qos(false, 1)); !ok) return ok;
   return make(fixes_, options_.fixes, kFixType, in_qos(options_.lossless, kFixesDepth));
 }
 
@@ -210,6 +213,7 @@ void Robot::take_messages() {
   take(odometry_, [&](std::string_view cdr) { return intake_.add_odometry(cdr); });
   take(points_, [&](std::string_view cdr) { return intake_.add_points(cdr); });
   take(fixes_, [&](std::string_view cdr) { return intake_.add_fix(cdr); });
+  take(battery_, [&](std::string_view cdr) { return say_battery(cdr); });
   if (images_) images_->take();
 }
 
@@ -256,6 +260,18 @@ void Robot::say_sample(const node::OdometrySample& sample) {
     return true;
   });
   say_sensors();
+}
+
+/// What is no number, or no share of 1, the robot's driver does not know.
+Status Robot::say_battery(std::string_view cdr) {
+  const auto message = bags::decode_battery_state(cdr);
+  if (!message) return tl::unexpected(message.error());
+  Health health;
+  if (message->voltage_v >= 0.0F) health.battery_v = static_cast<double>(message->voltage_v);
+  if (message->percentage >= 0.0F && message->percentage <= 1.0F)
+    health.battery_percent = 100.0 * static_cast<double>(message->percentage);
+  if (client_ && !client_->say(health)) client_.reset();
+  return {};
 }
 
 void Robot::say_fixes() {

@@ -17,11 +17,12 @@ namespace tutti::ros {
 struct RosRobotOptions {
   std::string socket;  ///< Path of the robot's live feed.
   std::string name_space;
-  std::string odometry = "odom";       ///< Topic of Odometry messages, or two frames of /tf: "odom->base_link".
-  std::string points = "points";       ///< Topic of PointCloud2 messages; empty: no scans.
-  std::string fixes = "fix";           ///< Topic of NavSatFix messages; empty: no position fixes.
-  std::optional<ImagesConfig> images;  ///< Nothing: no images and no IMU.
-  std::string map_frame;               ///< Empty: derived from odometry's frame, as RosAnswers does.
+  std::string odometry = "odom";          ///< Topic of Odometry messages, or two frames of /tf: "odom->base_link".
+  std::string points = "points";          ///< Topic of PointCloud2 messages; empty: no scans.
+  std::string fixes = "fix";              ///< Topic of NavSatFix messages; empty: no position fixes.
+  std::string battery = "battery_state";  ///< Topic of BatteryState messages; empty: none.
+  std::optional<ImagesConfig> images;     ///< Nothing: no images and no IMU.
+  std::string map_frame;                  ///< Empty: derived from odometry's frame, as RosAnswers does.
   double tolerance_s = 0.1;
   /// For recordings of which nothing may be lost, however fast they are played: requests reliable publishers, waits for
   /// the robot when it is behind, and holds odometry back until the scans before it have arrived.

@@ -5,10 +5,12 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <functional>
 #include <map>
 #include <mutex>
 
+#include "support/bags/bag_writer.hpp"
 #include "support/bus/nats_network.hpp"
 #include "support/program/ros/loopback.hpp"
 #include "support/program/ros/messages.hpp"
@@ -122,6 +124,17 @@ TEST_F(RosRobots, IsFedByTopicsAndAnswersOnTopics) {
         all, [](const std::string& cdr) { return cdr.find("fed, not in a map yet") != std::string::npos; });
   }));
   EXPECT_EQ(camera->readers() + info->readers(), 0U);  // nobody wants images
+}
+
+TEST_F(RosRobots, TheBatteryIsReported) {
+  start();
+  const auto battery = publisher("/alpha/battery_state", "sensor_msgs/msg/BatteryState");
+  ASSERT_TRUE(is_heard(*battery));
+  ASSERT_TRUE(battery->write(bags::test::battery_state(24.5F, 0.5F)));
+  EXPECT_TRUE(::tutti::test::within(
+      kPatience_s, [&] { return feed_->front().health() == Health{.battery_v = 24.5, .battery_percent = 50.0}; }));
+  ASSERT_TRUE(battery->write(bags::test::battery_state(24.0F, NAN)));  // its driver does not know how full it is
+  EXPECT_TRUE(::tutti::test::within(kPatience_s, [&] { return feed_->front().health() == Health{.battery_v = 24.0}; }));
 }
 
 /// Cameras are found by type; until their place is known, odometry is answered without them.
