@@ -414,6 +414,7 @@ TEST_F(Kill, TwoHundredKillsLeaveTheSameMapAndTheSameTrajectories) {
 
 // On the way robots hear other maps than without kills: they end in the same place, by another history.
 TEST_F(Kill, WhereMapsWaitTrajectoriesEndTheSame) {
+  TUTTI_SAME_CODE();
   const bus::LinkConfig at_once{.latency_s = 0.0};
   const auto refiner = std::make_shared<const server::test::Shrinker>();
   Killer nobody;
@@ -478,6 +479,7 @@ TEST_F(Kill, FrontEndsThatBeginAnewCostNoMap) {
 }
 
 TEST_F(Kill, OnABadRadioTooTheMapIsTheSame) {
+  TUTTI_SAME_CODE();
   const bus::LinkConfig bad{
       .latency_s = 0.3, .jitter_s = 8.0, .loss = 0.2, .duplicate = 0.2, .outages = {{40.0, 70.0}, {100.0, 110.0}}};
   Killer nobody;

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "support/paths.hpp"
+#include "support/sanitized.hpp"
 #include "tutti/lab/run_mission.hpp"
 #include "tutti/mission/report/report.hpp"
 
@@ -39,6 +40,7 @@ const PolicyRecord& policy(const RobotRecord& robot, const std::string& name) {
 }
 
 TEST(Mission, ARobotDoesTheSameWithItsOwnPartOfTheMap) {
+  TUTTI_SAME_CODE();
   lab::MissionConfig config = small_mission();
   config.compare_policies = {"spectral"};
   ASSERT_EQ(config.server.broadcast, "own");
@@ -81,6 +83,7 @@ TEST(Mission, ClosesTheLoop) {
 }
 
 TEST(Mission, AMapAmongWrongClosuresIsAsGoodAsAPerfectJudges) {
+  TUTTI_SAME_CODE();
   lab::MissionConfig config = small_mission();
   config.closure_changes.reference.wrong_share = 0.2;
   const MissionRecord record = run(config);

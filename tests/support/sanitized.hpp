@@ -18,6 +18,11 @@ T seeds(T all) {
 
 }  // namespace tutti
 
+/// First line of a test whose code another test runs in the same way: only its assertions are its own, and they are
+/// those of a plain build.
+#define TUTTI_SAME_CODE() \
+  if (::tutti::kSanitized) GTEST_SKIP() << "runs no code that a sanitizer has not seen"
+
 /// First line of a test that counts over hundreds of seeds, which only a plain build does.
 #define TUTTI_STATISTIC() \
   if (::tutti::kSanitized) GTEST_SKIP() << "a statistic: says nothing that a sanitizer could see"
