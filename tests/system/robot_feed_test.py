@@ -122,6 +122,7 @@ class Client(threading.Thread):
     def feed(self):
         self.say(hello=Feed.Hello(protocol_version=1, client_name=b"test"))
         self.welcome = self.hear("welcome")
+        self.say(health=Feed.Health(battery_v=24.5))
         before_ns = self.odometry[0][0]
         for stamp_ns, *pose in self.odometry:
             if self.welcome.has_odometry and stamp_ns <= self.welcome.last_stamp_ns:
@@ -280,6 +281,7 @@ class LiveRobots(common.ProgramsTest):
         client = Client(self.path / "charlie.feed", odometry[:200], ends=False)
         client.join(common.PATIENCE_S)
         self.assertEqual(len(client.answers), 200)
+        self.wait_for(lambda: self.seen(bus).get("charlie", {}).get("battery_v") == 24.5, "what its body reports")
         self.assertEqual(robot.end()[0], 0)
         self.assertFalse((self.path / "charlie.feed").exists())
         robot = self.feed_robot("charlie", bus)
