@@ -234,6 +234,7 @@ Result<std::shared_ptr<void>> start_ros(const RosArguments& arguments, const pro
   ros.intake = {.odometry_frames = {},
                 .covariance = driver.covariance,
                 .scan_times = driver.scan_times,
+                .scan_offset_s = driver.scan_offset_s,
                 .T_body_lidar = driver.T_body_lidar,
                 .p_body_antenna = driver.p_body_antenna};
   if (takes_images)

@@ -39,6 +39,13 @@ Result<Pose3> to_pose(const Eigen::Vector3d& translation, const Eigen::Quaternio
   return Pose3{is_unit ? rotation : rotation.normalized(), translation};
 }
 
+std::string doubt_of_place(const Pose3& T_body_sensor) {
+  constexpr double kFar_m = 10.0;
+  const double far_m = T_body_sensor.translation.norm();
+  if (far_m <= kFar_m) return {};
+  return fmt::format("{:.1f} m from the body's origin, at {}: are these millimetres?", far_m, in_words(T_body_sensor));
+}
+
 Status TransformTree::add(const RosTransform& transform, bool is_static) {
   Status out = take(transform, is_static);
   if (!out) add_problem(out.error().message);

@@ -20,6 +20,9 @@ std::string frame_name(const std::string& frame);
 /// normalised. Errors say the value.
 Result<Pose3> to_pose(const Eigen::Vector3d& translation, const Eigen::Quaterniond& rotation);
 
+/// Doubts a sensor that is more than 10 m away from the body: "800.0 m from .., as if in millimetres"; else empty.
+std::string doubt_of_place(const Pose3& T_body_sensor);
+
 /// Poses between those frames of one robot that do not move against each other: the transforms of /tf_static, and those
 /// of /tf that never change.
 class TransformTree {

@@ -70,6 +70,12 @@ TEST(TransformTree, ContradictionsAreErrorsAndTheFirstCounts) {
   EXPECT_EQ(tree.problems().size(), 4U);
 }
 
+TEST(TransformTree, ASensorTensOfMetresAwayIsDoubted) {
+  EXPECT_EQ(doubt_of_place({Eigen::Quaterniond::Identity(), {300.0, 0.0, 400.0}}),
+            "500.0 m from the body's origin, at [300.000 0.000 400.000] m: are these millimetres?");
+  EXPECT_EQ(doubt_of_place({Eigen::Quaterniond::Identity(), {3.0, 0.0, 4.0}}), "");
+}
+
 TEST(TransformTree, RingsAndPosesThatAreNoneDoNoHarm) {
   TransformTree tree;
   ASSERT_TRUE(tree.add(transform("a", "b", {}), true));

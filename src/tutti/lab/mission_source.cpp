@@ -112,6 +112,7 @@ Status tell_driver(const MissionConfig& config, program::RobotOptions& options) 
   program::DriverSettings& driver = options.settings.driver;
   driver.covariance = robot->covariance;
   driver.scan_times = robot->scan_times_config();
+  driver.scan_offset_s = robot->scan_time_offset_s;
   driver.with_images = config.closures.wants_images();
   driver.most_cameras = robot->images.most_cameras;
   driver.images_offset_s = robot->images.time_offset_s;

@@ -112,6 +112,8 @@ void take_choice(const BagIndex& index, const bags::CameraChoice& choice, std::v
   for (const std::size_t i : choice.cameras) {
     take(cameras[i].topic);
     used += (used.empty() ? "" : ",") + cameras[i].topic;
+    if (const std::string doubt = bags::doubt_of_place(cameras[i].camera.T_body_camera); !doubt.empty())
+      refused.push_back(fmt::format("{}: the sensor is {}", cameras[i].topic, doubt));
     out.cameras.push_back(std::move(cameras[i]));
   }
   if (choice.depth) {

@@ -261,8 +261,8 @@ TEST_F(BagCameras, WrongDepthImagesAreLeftOutOneByOne) {
   ASSERT_TRUE(recording.images->load_depth) << notes_;
   expect_note(
       fmt::format("/depth/image_raw: 7 of 20 messages refused, the first because: message 4: stamp {} ns, "
-                  "expected after {} ns",
-                  kStart.ns, (kStart + 0.2).ns));
+                  "which another message has, too",
+                  kStart.ns));
   expect_note("13 of them have depth");
   for (std::size_t moment = 3; moment < 10; ++moment) EXPECT_EQ(first_two(recording, moment), FirstTwo{}) << moment;
   EXPECT_EQ(first_two(recording, 10), (FirstTwo{0, 1010}));

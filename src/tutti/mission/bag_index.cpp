@@ -3,6 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <utility>
+
 #include "tutti/bags/bag_info.hpp"
 #include "tutti/bags/camera.hpp"
 #include "tutti/bags/robot_namespace.hpp"
@@ -14,21 +17,31 @@ namespace {
 
 using bags::BagMessage;
 
-Status check_stamp(Timestamp stamp, Timestamp before) {
-  if (before < stamp) return {};
-  return fail(ErrorCode::invalid, "stamp {} ns, expected after {} ns", stamp.ns, before.ns);
-}
-
-void take_pose(OdometryTrack& track, Timestamp stamp, const Eigen::Vector3d& position, const Eigen::Quaterniond& q) {
+void take_pose(OdometryTrack& track, const BagMessage& message, Timestamp stamp, const Eigen::Vector3d& position,
+               const Eigen::Quaterniond& q) {
   ++track.messages;
   const auto pose = bags::to_pose(position, q);
-  const Status ok = !pose                 ? Status(tl::unexpected(pose.error()))
-                    : track.poses.empty() ? Status{}
-                                          : check_stamp(stamp, track.poses.back().stamp);
-  if (ok)
-    track.poses.push_back({stamp, *pose});
-  else
-    track.refused.add(track.messages, ok.error().message);
+  if (!pose) return track.refused.add(track.messages, pose.error().message);
+  track.poses.push_back({stamp, *pose});
+  track.arrivals.push_back({stamp, message.log_time, track.messages});
+}
+
+/// Items and arrivals are one for one.
+template <class Item>
+bags::StampOrder put_in_order(std::vector<Item>& items, std::vector<bags::Arrival>& arrivals, Refusals& refused) {
+  bags::StampOrder order = bags::order_by_stamp(arrivals);
+  for (const auto& [at, why] : order.refused) refused.add(arrivals[at].message, why);
+  std::vector<Item> sorted;
+  std::vector<bags::Arrival> sorted_arrivals;
+  sorted.reserve(order.used.size());
+  sorted_arrivals.reserve(order.used.size());
+  for (const std::size_t at : order.used) {
+    sorted.push_back(std::move(items[at]));
+    sorted_arrivals.push_back(arrivals[at]);
+  }
+  items = std::move(sorted);
+  arrivals = std::move(sorted_arrivals);
+  return order;
 }
 
 void refuse(OdometryTrack& track, const Error& error) { track.refused.add(++track.messages, error.message); }
@@ -71,14 +84,14 @@ class Indexer {
       track.frame = bags::frame_name(odometry->header.frame_id);
       track.body = bags::frame_name(odometry->child_frame_id);
     }
-    take_pose(track, odometry->header.stamp, odometry->pose.position, odometry->pose.orientation);
+    take_pose(track, message, odometry->header.stamp, odometry->pose.position, odometry->pose.orientation);
   }
 
   static void take_pose_stamped(OdometryTrack& track, const BagMessage& message) {
     const auto pose = bags::decode_pose_stamped(message.data, encoding_of(message));
     if (!pose) return refuse(track, pose.error());
     if (track.messages == 0) track.frame = bags::frame_name(pose->header.frame_id);
-    take_pose(track, pose->header.stamp, pose->pose.position, pose->pose.orientation);
+    take_pose(track, message, pose->header.stamp, pose->pose.position, pose->pose.orientation);
   }
 
   void take_transforms(const BagMessage& message, bool is_static) {
@@ -97,7 +110,7 @@ class Indexer {
       OdometryTrack& track = index.transforms[key];
       track.frame = parent;
       track.body = child;
-      take_pose(track, transform.header.stamp, transform.translation, transform.rotation);
+      take_pose(track, message, transform.header.stamp, transform.translation, transform.rotation);
     }
   }
 
@@ -107,15 +120,11 @@ class Indexer {
     if (!cloud) return track.refused.add(track.messages, cloud.error().message);
     const std::string frame = bags::frame_name(cloud->header.frame_id);
     if (track.scans.empty()) track.frame = frame;
-    const Status ok =
-        frame != track.frame
-            ? fail(ErrorCode::invalid, "frame '{:.80}', expected '{:.80}' as of the first", frame, track.frame)
-        : track.scans.empty() ? Status{}
-                              : check_stamp(cloud->header.stamp, track.scans.back().stamp);
-    if (ok)
-      track.scans.push_back({cloud->header.stamp, message.position, track.messages});
-    else
-      track.refused.add(track.messages, ok.error().message);
+    if (frame != track.frame)
+      return track.refused.add(track.messages,
+                               fmt::format("frame '{:.80}', expected '{:.80}' as of the first", frame, track.frame));
+    track.scans.push_back({cloud->header.stamp, message.position, track.messages});
+    track.arrivals.push_back({cloud->header.stamp, message.log_time, track.messages});
   }
 
   /// A receiver without a fix, or one that does not say how sure it is, is none that fails.
@@ -130,11 +139,10 @@ class Indexer {
       return;
     }
     const auto& [fix, frame, is_stated] = **said;
-    const Status ok = track.fixes.empty() ? Status() : check_stamp(fix.stamp, track.fixes.back().stamp);
-    if (!ok) return track.refused.add(track.messages, ok.error().message);
     if (track.fixes.empty()) track.frame = frame;
     track.unsure += is_stated ? 0 : 1;
     track.fixes.push_back(fix);
+    track.arrivals.push_back({fix.stamp, message.log_time, track.messages});
   }
 
   void take_sight(const BagMessage& message) {
@@ -163,12 +171,11 @@ class Indexer {
     if (track.images.empty()) {
       track.first = bags::look_of(*image);
       track.is_depth = bags::is_depth(message.channel->topic, track.first.encoding);
-    } else if (auto ok = check_stamp(stamp, track.images.back().stamp); !ok) {
-      return track.refused.add(track.messages, ok.error().message);
     }
     if (track.is_depth)
       if (auto ok = check_depth(track, *image); !ok) return track.refused.add(track.messages, ok.error().message);
     track.images.push_back({stamp, message.position, track.messages});
+    track.arrivals.push_back({stamp, message.log_time, track.messages});
   }
 
   /// What can be told without decoding it.
@@ -187,10 +194,8 @@ class Indexer {
     if (track.samples.empty()) track.frame = bags::frame_name(imu->header.frame_id);
     const auto sample = bags::to_imu_sample(*imu);
     if (!sample) return track.refused.add(track.messages, sample.error().message);
-    if (!track.samples.empty())
-      if (auto ok = check_stamp(sample->stamp, track.samples.back().stamp); !ok)
-        return track.refused.add(track.messages, ok.error().message);
     track.samples.push_back(*sample);
+    track.arrivals.push_back({sample->stamp, message.log_time, track.messages});
   }
 
   const std::string& pair_;
@@ -200,11 +205,42 @@ class Indexer {
 }  // namespace
 
 void Refusals::add(std::uint64_t message, const std::string& why) {
-  if (count++ == 0) first = fmt::format("message {}: {}", message, why);
+  if (count++ > 0 && message >= first_message) return;
+  first_message = message;
+  first = fmt::format("message {}: {}", message, why);
 }
 
 std::string note_of(const std::string& topic, const Refusals& refused, std::uint64_t of) {
   return fmt::format("{}: {} of {} messages refused, the first because: {}", topic, refused.count, of, refused.first);
+}
+
+void order_sensors(BagIndex& index, const OdometryTrack& odometry) {
+  constexpr double kApart_s = 1.0;  // by which a sensor's message may be recorded before or after odometry
+  const auto [from, to] = std::ranges::minmax(odometry.arrivals, {}, &bags::Arrival::logged);
+  const auto order = [&, first = from.logged - kApart_s, last = to.logged + kApart_s](const std::string& topic,
+                                                                                      auto& items, auto& track) {
+    std::size_t kept = 0, left_out = 0;
+    for (std::size_t i = 0; i < items.size() && !odometry.restarts.empty(); ++i) {
+      const bags::Arrival arrival = track.arrivals[i];
+      if (arrival.logged < first || last < arrival.logged) {
+        ++left_out;
+        continue;
+      }
+      items[kept] = std::move(items[i]);
+      track.arrivals[kept++] = arrival;
+    }
+    items.resize(items.size() - left_out);
+    track.arrivals.resize(items.size());
+    if (left_out > 0)
+      index.notes.push_back(
+          fmt::format("{}: {} messages were recorded with odometry that is left out, and are, too", topic, left_out));
+    if (const auto put = put_in_order(items, track.arrivals, track.refused); put.runs.size() > 1)
+      index.notes.push_back(fmt::format("{}: {}", topic, put.in_words()));
+  };
+  for (auto& [topic, track] : index.scans) order(topic, track.scans, track);
+  for (auto& [topic, track] : index.images) order(topic, track.images, track);
+  for (auto& [topic, track] : index.imu) order(topic, track.samples, track);
+  for (auto& [topic, track] : index.fixes) order(topic, track.fixes, track);
 }
 
 void keep_robot(BagIndex& index, const RobotConfig& robot) {
@@ -253,6 +289,12 @@ BagIndex index_bag(bags::BagReader& bag, const std::string& pair, bool with_imag
     if (use == bags::Use::poses) index.poses[channel->topic];
     if (use == bags::Use::scans) index.scans[channel->topic];
   }
+  for (auto* tracks : {&index.odometry, &index.poses, &index.transforms})
+    for (auto& [topic, track] : *tracks) {
+      const bags::StampOrder order = put_in_order(track.poses, track.arrivals, track.refused);
+      track.late = order.late;
+      track.restarts = order.in_words();
+    }
   index.notes = bag.notes();
   return std::move(index);
 }

@@ -10,6 +10,7 @@
 
 #include "tutti/bags/bag_reader.hpp"
 #include "tutti/bags/depth.hpp"
+#include "tutti/bags/stamp_order.hpp"
 #include "tutti/bags/transform_tree.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/mission/mission_config.hpp"
@@ -21,7 +22,7 @@ namespace tutti::mission {
 
 /// The messages of one topic that were refused.
 struct Refusals {
-  std::uint64_t count = 0;
+  std::uint64_t count = 0, first_message = 0;
   std::string first;  ///< Such as "message 17: stamp 5 ns, expected after 7 ns"; messages are numbered from 1.
   void add(std::uint64_t message, const std::string& why);
 };
@@ -30,8 +31,11 @@ std::string note_of(const std::string& topic, const Refusals& refused, std::uint
 
 /// The poses of one topic, or of one pair of frames of /tf.
 struct OdometryTrack {
-  Trajectory poses;  ///< Stamps increase; poses that would break this are refused.
+  Trajectory poses;  ///< Stamps increase: as bags::order_by_stamp() orders them.
+  std::vector<bags::Arrival> arrivals;
   std::string frame, body;
+  std::uint64_t late = 0;  ///< Poses that were sorted in.
+  std::string restarts;    ///< What of the topic is used, where its clock starts again.
   std::uint64_t messages = 0;
   Refusals refused;
 };
@@ -42,9 +46,10 @@ struct ScanPlace {
   bags::BagPosition position;
   std::uint64_t message = 0;  ///< Number in its topic, from 1.
 };
-/// The scans of one topic: only their places in the bag are kept, 48 bytes each.
+/// The scans of one topic: only their places in the bag are kept, 72 bytes each.
 struct ScanTrack {
   std::vector<ScanPlace> scans;
+  std::vector<bags::Arrival> arrivals;
   std::string frame;
   std::uint64_t messages = 0;
   Refusals refused;
@@ -53,6 +58,7 @@ struct ScanTrack {
 /// The images of one topic, by their places in the bag.
 struct ImageTrack {
   std::vector<ScanPlace> images;
+  std::vector<bags::Arrival> arrivals;
   bags::ImageLook first;
   bool is_depth = false;  ///< By the first one's encoding; then all have this one's, its frame and its size.
   bool is_compressed = false;
@@ -62,6 +68,7 @@ struct ImageTrack {
 /// The samples of one IMU.
 struct ImuTrack {
   std::vector<ImuSample> samples;  ///< In the frame `frame`.
+  std::vector<bags::Arrival> arrivals;
   std::string frame;
   std::uint64_t messages = 0;
   Refusals refused;
@@ -70,6 +77,7 @@ struct ImuTrack {
 /// The position fixes of one receiver.
 struct FixTrack {
   std::vector<PositionFix> fixes;
+  std::vector<bags::Arrival> arrivals;
   std::string frame;
   std::uint64_t messages = 0;
   std::uint64_t without = 0;  ///< Messages that report no fix.
@@ -98,6 +106,11 @@ struct BagIndex {
 /// Reads the whole bag once. `pair`, such as "map->base", is kept whatever its frames are called. Images, cameras and
 /// IMUs are only indexed `with_images`.
 BagIndex index_bag(bags::BagReader& bag, const std::string& pair, bool with_images);
+
+/// Orders the messages of all sensors by their stamps, as bags::order_by_stamp() has it; until then they are in the
+/// order of the bag. Where odometry's clock starts again, what was recorded with the part of it that is not used is
+/// left out.
+void order_sensors(BagIndex& index, const OdometryTrack& odometry);
 
 /// Leaves in the index what is the robot's: if the bag has several robots, each in a namespace, that of its own
 /// (bags::RobotNamespace), by its name or by its `topics.odometry`. Topics that `topics` names stay, wherever they are.

@@ -4,9 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "tutti/bags/bag_info.hpp"
+#include "tutti/bags/sensor_clock.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -115,6 +117,11 @@ Result<Pose3> find_lidar(const BagIndex& index, const std::string& body, const s
               lidar, body, frames.empty() ? "none" : frames);
 }
 
+void doubt_place(const std::string& topic, const Pose3& T_body_sensor, std::vector<std::string>& notes) {
+  if (const std::string doubt = bags::doubt_of_place(T_body_sensor); !doubt.empty())
+    notes.push_back(fmt::format("{}: the sensor is {}", topic, doubt));
+}
+
 /// Of several topics that have fixes none is taken unless it is said which: mostly all but one are made of that one.
 Status take_fixes(const BagIndex& index, const std::string& body, const RobotConfig& robot, BagRecording& out) {
   const std::string& wanted = robot.topics.fixes;
@@ -139,25 +146,55 @@ Status take_fixes(const BagIndex& index, const std::string& body, const RobotCon
                                 kUnknownFix_m, kUnknownFixUp_m);
   if (!robot.antenna_m.empty() || track.frame == body) return {};
   const auto antenna = body.empty() ? std::nullopt : index.tree.find(body, track.frame);
-  if (antenna)
+  if (antenna) {
     for (PositionFix& fix : out.fixes) fix.p_body_antenna = antenna->translation;
-  else
+    doubt_place(out.fix_topic, *antenna, out.notes);
+  } else {
     out.fix_note += fmt::format(
         "; where the antenna is is not known (no transform from '{}' to '{}'): robots[].antenna_m", track.frame, body);
+  }
   return {};
 }
 
-/// Scans by another clock would silently be none.
-Status check_clock(const BagRecording& bag) {
+/// By the odometry's clock (`robot.scan_time_offset_s`), without those that are by another one all the same.
+Status take_scans(const OdometryTrack& odometry, const std::string& topic, ScanTrack seen, const RobotConfig& robot,
+                  BagRecording& out) {
+  const bags::OdometryArrivals arrivals(odometry.arrivals);
+  bags::SensorClock clock("robots[].scan_time_offset_s");
+  for (std::size_t i = 0; i < seen.scans.size(); ++i) {
+    ScanPlace place = seen.scans[i];
+    place.stamp = place.stamp + robot.scan_time_offset_s;
+    if (const Status ok = clock.check(place.stamp, arrivals.newest_at(seen.arrivals[i].logged)); ok)
+      out.scans.push_back(place);
+    else
+      seen.refused.add(place.message, ok.error().message);
+  }
+  out.scan_topic = topic;
+  if (seen.refused.count > 0) out.notes.push_back(note_of(topic, seen.refused, seen.messages));
+  if (const std::string doubt = clock.take_doubt(); !doubt.empty())
+    out.notes.push_back(fmt::format("{}: {}", topic, doubt));
+  if (out.scans.empty()) return fail(ErrorCode::invalid, "{}", note_of(topic, seen.refused, seen.messages));
   const auto inside = [&](const ScanPlace& scan) {
-    return bag.odometry.front().stamp <= scan.stamp && scan.stamp <= bag.odometry.back().stamp;
+    return odometry.poses.front().stamp <= scan.stamp && scan.stamp <= odometry.poses.back().stamp;
   };
-  if (std::ranges::any_of(bag.scans, inside)) return {};
-  return fail(
-      ErrorCode::invalid,
-      "{}: of its {} stamps, {} to {} ns, none is within the odometry's, {} to {} ns: are they by another clock?",
-      bag.scan_topic, bag.scans.size(), bag.scans.front().stamp.ns, bag.scans.back().stamp.ns,
-      bag.odometry.front().stamp.ns, bag.odometry.back().stamp.ns);
+  if (std::ranges::any_of(out.scans, inside)) return {};
+  // A bag whose log times are the stamps does not tell when a scan came: then the two's beginnings are compared.
+  const double ahead_s = out.scans.front().stamp - odometry.poses.front().stamp;
+  return fail(ErrorCode::invalid,
+              "{}: of its {} stamps, {} to {} ns, none is within the odometry's, {} to {} ns, which begin {:.1f} s "
+              "{}: are they by another clock? robots[].scan_time_offset_s aligns them",
+              topic, out.scans.size(), out.scans.front().stamp.ns, out.scans.back().stamp.ns,
+              odometry.poses.front().stamp.ns, odometry.poses.back().stamp.ns, std::abs(ahead_s),
+              ahead_s > 0.0 ? "earlier" : "later");
+}
+
+/// What was left out of the odometry, and why.
+void note_odometry(const std::string& topic, const OdometryTrack& track, std::vector<std::string>& notes) {
+  if (track.refused.count > 0) notes.push_back(note_of(topic, track.refused, track.messages));
+  if (track.late > 0)
+    notes.push_back(fmt::format("{}: {} of {} messages came behind newer ones, and are sorted in", topic, track.late,
+                                track.messages));
+  if (!track.restarts.empty()) notes.push_back(fmt::format("{}: {}", topic, track.restarts));
 }
 
 }  // namespace
@@ -169,18 +206,19 @@ Result<BagRecording> read_bag(const fs::path& data, const RobotConfig& robot, bo
   if (!reader) return tl::unexpected(reader.error());
   BagIndex index = index_bag(**reader, robot.topics.odometry, with_images);
   keep_robot(index, robot);
-  out.notes = index.notes;
   if (const Refusals& bad = index.bad_records; bad.count > 0)
     out.notes.push_back(
         fmt::format("{} records, chunks or files could not be read, the first: {}", bad.count, bad.first));
   const auto odometry = choose_odometry(index, robot);
   if (!odometry) return in_context(out.file, odometry.error());
+  order_sensors(index, (*odometry)->second);
+  out.notes.insert(out.notes.begin(), index.notes.begin(), index.notes.end());
   const auto scans = choose(index.scans, robot.topics.scans, "scans", robot);
   if (!scans) return in_context(out.file, scans.error());
   const auto& [source, track] = **odometry;
   out.odometry = track.poses;
   std::string what = fmt::format("{}: odometry of {} ({})", out.file, source, in_words(track));
-  if (track.refused.count > 0) out.notes.push_back(note_of(source, track.refused, track.messages));
+  note_odometry(source, track, out.notes);
   if (auto ok = take_fixes(index, track.body, robot, out); !ok) return in_context(out.file, ok.error());
   if (with_images) take_cameras(index, track.body, robot, out);
   if (*scans == nullptr) {
@@ -189,17 +227,15 @@ Result<BagRecording> read_bag(const fs::path& data, const RobotConfig& robot, bo
     out.notes.insert(out.notes.begin(), what);
     return out;
   }
-  out.scan_topic = (*scans)->first;
-  const ScanTrack& seen = (*scans)->second;
-  out.scans = seen.scans;
-  if (seen.refused.count > 0) out.notes.push_back(note_of(out.scan_topic, seen.refused, seen.messages));
+  const auto& [topic, seen] = **scans;
   std::string where;
   const auto T_body_lidar = find_lidar(index, track.body, seen.frame, robot, where);
   if (!T_body_lidar) return in_context(out.file, T_body_lidar.error());
   out.T_body_lidar = *T_body_lidar;
-  if (auto ok = check_clock(out); !ok) return in_context(out.file, ok.error());
-  out.notes.insert(out.notes.begin(),
-                   fmt::format("{}, scans of {} ({}); {}", what, out.scan_topic, in_words(seen), where));
+  if (auto ok = take_scans(track, topic, seen, robot, out); !ok) return in_context(out.file, ok.error());
+  doubt_place(topic, out.T_body_lidar, out.notes);
+  if (robot.scan_time_offset_s != 0.0) where += fmt::format("; {:g} s added to their stamps", robot.scan_time_offset_s);
+  out.notes.insert(out.notes.begin(), fmt::format("{}, scans of {} ({}); {}", what, topic, in_words(seen), where));
   return out;
 }
 

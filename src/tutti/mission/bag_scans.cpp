@@ -18,12 +18,14 @@ constexpr std::size_t kTriedScans = 5;  // scans that may be no good before the 
 
 class BagScans final : public ScanSource {
  public:
-  BagScans(std::unique_ptr<bags::BagReader> reader, const BagRecording& bag, const Trajectory& odometry)
+  BagScans(std::unique_ptr<bags::BagReader> reader, const BagRecording& bag, const Trajectory& odometry,
+           double offset_s)
       : reader_(std::move(reader)),
         file_(bag.file),
         topic_(bag.scan_topic),
         places_(bag.scans),
         T_body_lidar_(bag.T_body_lidar),
+        offset_s_(offset_s),
         odometry_(lidar::with_ends(odometry)) {}
 
   Result<std::string> look_into(const RobotConfig& robot, const Trajectory& odometry) {
@@ -49,12 +51,15 @@ class BagScans final : public ScanSource {
   [[nodiscard]] Result<std::optional<Scan>> scan(std::size_t sample) const override {
     auto measured = read(places_.at(sample));
     if (!measured) return tl::unexpected(measured.error());
-    auto scan = lidar::deskewed(std::move(*measured), places_[sample].stamp, times_, T_body_lidar_, odometry_);
+    auto scan =
+        lidar::deskewed(std::move(*measured), sensor_stamp(sample), times_, T_body_lidar_, odometry_, offset_s_);
     if (!scan) return in_context(name_of(places_[sample]), scan.error());
     return std::optional(std::move(*scan));
   }
 
  private:
+  [[nodiscard]] Timestamp sensor_stamp(std::size_t sample) const { return places_[sample].stamp - offset_s_; }
+
   [[nodiscard]] std::string name_of(const ScanPlace& place) const {
     return fmt::format("{}: {}: message {}", file_, topic_, place.message);
   }
@@ -79,7 +84,7 @@ class BagScans final : public ScanSource {
   [[nodiscard]] Result<std::optional<lidar::PointTimes>> times_of(std::size_t sample, const RobotConfig& robot) const {
     const auto cloud = read(places_.at(sample));
     if (!cloud) return tl::unexpected(cloud.error());
-    auto times = lidar::find_message_times(*cloud, places_[sample].stamp, robot.scan_times_config());
+    auto times = lidar::find_message_times(*cloud, sensor_stamp(sample), robot.scan_times_config());
     if (!times) return in_context(name_of(places_[sample]), times.error());
     return times;
   }
@@ -89,6 +94,7 @@ class BagScans final : public ScanSource {
   std::string file_, topic_;
   std::vector<ScanPlace> places_;
   Pose3 T_body_lidar_;
+  double offset_s_ = 0.0;  // added to the sensor's stamps gives the odometry's time
   Trajectory odometry_;
   std::optional<lidar::PointTimes> times_;
 };
@@ -99,7 +105,7 @@ Result<std::shared_ptr<const ScanSource>> open_scans(const BagRecording& bag, co
                                                      const RobotConfig& robot, std::string& note) {
   auto reader = bags::open_bag(bag.file);
   if (!reader) return tl::unexpected(reader.error());
-  auto scans = std::make_shared<BagScans>(std::move(*reader), bag, odometry);
+  auto scans = std::make_shared<BagScans>(std::move(*reader), bag, odometry, robot.scan_time_offset_s);
   auto words = scans->look_into(robot, odometry);
   if (!words) return tl::unexpected(words.error());
   note = std::move(*words);

@@ -56,6 +56,8 @@ inline bool is_given(const LidarPoseConfig& pose) {
 /// T_body_lidar; fails with what is wrong in the configuration.
 Result<Pose3> to_pose(const LidarPoseConfig& config);
 
+inline constexpr double kMostOffset_s = 1e10;  ///< Clocks that count from 1970, and clocks that count from their start.
+
 /// The depth images that belong to the images of one camera.
 struct DepthConfig {
   std::string list;  ///< Empty: none.
@@ -92,7 +94,6 @@ struct ImagesConfig {
   DepthConfig depth;
   template <class V>
   void describe(V& v) {
-    constexpr double kMostOffset_s = 1e10;  // clocks that count from 1970, and clocks that count from their start
     v.field("euroc_folder", euroc_folder, any(),
             "A recording in EuRoC's (ASL's) layout: mav0/cam0 and, where they are there, cam1 and imu0, each with "
             "sensor.yaml and data.csv. Names mav0 or the folder that holds it.");
@@ -171,6 +172,7 @@ struct RobotConfig {
   std::string scans_deskewed = "auto";
   std::string scan_time_unit = "auto";
   std::string scan_pose_at = "end";
+  double scan_time_offset_s = 0.0;
   ImagesConfig images;
   std::string fixes;              ///< Read by formats::read_fixes(); empty: the fixes of the bag, if it has any.
   std::vector<double> antenna_m;  ///< Empty: as the bag says, or at the body.
@@ -209,6 +211,8 @@ struct RobotConfig {
             "Of the points' times; auto: the one in which a scan lasts 1 to 500 ms.");
     v.field("scan_pose_at", scan_pose_at, one_of({"end", "begin"}),
             "Of which moment of a sweep its odometry pose is, unless points have times of the odometry's clock.");
+    v.field("scan_time_offset_s", scan_time_offset_s, between(-kMostOffset_s, kMostOffset_s),
+            "Of a bag, and live on ROS's topics: added to the scans' stamps gives the odometry's time.");
     v.field("images", images);
     v.field("fixes", fixes, any(),
             "csv of a receiver's fixes: stamp_s,latitude_deg,longitude_deg,height_m and, all or none, sigma_east_m, "

@@ -152,5 +152,94 @@ TEST_F(StrangerBags, TransformsThatContradictEachOtherAreSaidWithNumbers) {
               "m: the first counts");
 }
 
+/// Points that have times by the LiDAR's clock are deskewed by them all the same.
+TEST_F(StrangerBags, ALidarWithAClockOfItsOwnIsSaidAndAligned) {
+  const auto with_clock = [](double ahead_s) {
+    std::vector<Sample> out = samples_of({});
+    for (Sample& sample : out) {
+      if (sample.type != kCloud) continue;
+      const Timestamp stamp = Timestamp{static_cast<std::int64_t>(sample.ns)} - 0.05 + ahead_s;
+      const double now_s = 1e-9 * static_cast<double>(stamp.ns);
+      sample.data = cloud_of(stamp, "lidar", {{1, 0, 0}, {1, 0, 0}, {1, 0, 0}}, {now_s, now_s + 0.05, now_s + 0.1},
+                             {.time_field = "timestamp", .time_type = 8});
+    }
+    return out;
+  };
+  RobotConfig robot;
+  robot.name = "alpha";
+  for (const double ahead_s : {37.0, -3600.0}) {
+    write({with_clock(ahead_s)});
+    robot.scan_time_offset_s = 0.0;
+    expect_note(read(robot), "/points: 40 of 40 messages refused, the first because: message 1: stamp ");
+    expect_note(read(robot), fmt::format("are they by another clock? ({}to align them: robots[].scan_time_offset_s={})",
+                                         ahead_s > 0 ? "as TAI is from UTC; " : "", -ahead_s));
+    robot.scan_time_offset_s = -ahead_s;
+    const auto bag = read(robot);
+    ASSERT_TRUE(bag) << bag.error().message;
+    ASSERT_EQ(bag->scans.size(), kScans);
+    EXPECT_EQ(bag->scans.front().stamp, kStart + 0.01);
+    std::string how;
+    const auto scans = open_scans(*bag, bag->odometry, robot, how);
+    ASSERT_TRUE(scans) << scans.error().message;
+    const auto scan = (*scans)->scan(10);
+    ASSERT_TRUE(scan) << scan.error().message;
+    EXPECT_EQ((*scan)->stamp, kStart + 2.01);
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR((*scan)->cloud->points[i].x(), 1.3 + 0.05 * i, 1e-3) << how;
+  }
+  write({with_clock(-2.0)});
+  robot.scan_time_offset_s = 0.0;
+  expect_note(read(robot), "/points: when they arrive, stamps are 2.0 s behind odometry's newest");
+  write({with_clock(0.0)});
+  EXPECT_EQ(notes_of(read(robot)).find("clock"), std::string::npos) << notes_of(read(robot));
+}
+
+/// As of a driver with several threads: of 200 poses 50 come behind a newer one.
+TEST_F(StrangerBags, OdometryOutOfOrderIsSortedInsteadOfDropped) {
+  std::vector<Sample> samples = samples_of({});
+  for (std::size_t i = 1; i + 1 < kPoses; i += 4) std::swap(samples[i].data, samples[i + 1].data);
+  write({samples});
+  const auto bag = read("alpha");
+  ASSERT_TRUE(bag) << bag.error().message;
+  ASSERT_EQ(bag->odometry.size(), kPoses);
+  for (int i = 0; i < kPoses; ++i) {
+    EXPECT_EQ(bag->odometry[i].stamp, kStart + kPeriod_s * i);
+    EXPECT_NEAR(bag->odometry[i].pose.translation.x(), kPeriod_s * i, 1e-9);
+  }
+  expect_note(bag, "/odom: 50 of 200 messages came behind newer ones, and are sorted in");
+}
+
+/// The robot was on for 3 s, then its clock was set back by 5 s: what is used is the longer part, of all sensors.
+TEST_F(StrangerBags, AClockThatStartsAgainIsSaidAndTheLongerPartUsed) {
+  for (const double first_s : {3.0, 7.0}) {
+    std::vector<Sample> samples = samples_of({});
+    for (Sample& sample : samples) {
+      const Timestamp logged{static_cast<std::int64_t>(sample.ns)};
+      const double since_s = logged - kStart;
+      if (since_s < first_s) continue;
+      if (sample.type == kOdometry) sample.data = odometry_of(logged - 5.0, at_x(since_s));
+      if (sample.type == kCloud) sample.data = cloud_of(logged - 5.05, "lidar", {{1, 2, 3}});
+    }
+    write({samples});
+    const auto bag = read("alpha");
+    ASSERT_TRUE(bag) << bag.error().message;
+    EXPECT_EQ(bag->odometry.size(), 140U);
+    EXPECT_NEAR(bag->odometry.front().pose.translation.x(), first_s < 5.0 ? first_s : 0.0, 1e-9);
+    EXPECT_EQ(bag->scans.size(), first_s < 5.0 ? 25U : 35U);
+    const double begin_s = first_s < 5.0 ? first_s - 5.0 : 0.0;
+    for (const ScanPlace& scan : bag->scans) EXPECT_NEAR(scan.stamp - kStart, begin_s + 3.5, 4.6);
+    expect_note(bag, first_s < 5.0 ? "/odom: its clock starts again 1 times: messages 1 to 60 last 3.0 s from "
+                                     "1700000000000000000 ns on (left out), messages 61 to 200 last 7.0 s from "
+                                     "1699999998000000000 ns on (used)"
+                                   : "messages 1 to 140 last 7.0 s from 1700000000000000000 ns on (used), messages");
+  }
+}
+
+TEST_F(StrangerBags, ALidarTensOfMetresAwayIsDoubted) {
+  write({samples_of({.lidar_x_m = 300.0})});
+  expect_note(
+      read("alpha"),
+      "/points: the sensor is 300.0 m from the body's origin, at [300.000 0.000 0.000] m: are these millimetres?");
+}
+
 }  // namespace stranger_bags_test
 }  // namespace tutti::mission

@@ -29,6 +29,7 @@ inline constexpr const char* kEnded = "ended";  ///< The program's last event, w
 struct DriverSettings {
   robot::OdometryCovarianceConfig covariance;
   lidar::ScanTimesConfig scan_times;
+  double scan_offset_s = 0.0;         ///< Added to scans' stamps gives the odometry's time.
   std::optional<Pose3> T_body_lidar;  ///< Nothing: the messages tell it.
   /// The receiver's antenna in the body frame, m; nothing: the messages tell it.
   std::optional<Eigen::Vector3d> p_body_antenna;

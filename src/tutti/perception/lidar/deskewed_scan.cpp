@@ -46,8 +46,8 @@ Trajectory with_ends(const Trajectory& odometry) {
 }
 
 Result<Scan> deskewed(formats::TimedCloud measured, Timestamp stamp, const std::optional<PointTimes>& times,
-                      const Pose3& T_body_lidar, const Trajectory& odometry) {
-  Scan scan{.stamp = stamp, .cloud = nullptr, .age_s = nullptr};
+                      const Pose3& T_body_lidar, const Trajectory& odometry, double offset_s) {
+  Scan scan{.stamp = stamp + offset_s, .cloud = nullptr, .age_s = nullptr};
   if (times) {
     auto ages = point_ages(measured, stamp, *times);
     if (!ages) return tl::unexpected(ages.error());

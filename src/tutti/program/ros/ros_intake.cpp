@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "tutti/bags/point_cloud.hpp"
@@ -138,10 +137,12 @@ Status RosIntake::take_transform(const bags::RosTransform& transform, bool is_st
 }
 
 Status RosIntake::check_stamp(Timestamp stamp, const std::optional<Timestamp>& before) const {
+  if (Status ok = bags::check_clock(stamp, stamps_.newest()); !ok) return ok;
+  return check_follows(stamp, before);
+}
+
+Status RosIntake::check_follows(Timestamp stamp, const std::optional<Timestamp>& before) const {
   const std::optional<Timestamp>& newest = stamps_.newest();
-  if (newest && std::abs(stamp - *newest) > kAnotherClock_s)
-    return fail(ErrorCode::invalid, "stamp {} ns is {:.1f} s from odometry's newest, {} ns: are they by another clock?",
-                stamp.ns, stamp - *newest, newest->ns);
   const bool was_wrong = before && newest && *before - *newest > kAhead_s;
   return was_wrong ? Status() : check_increases(stamp, before);
 }
@@ -166,17 +167,19 @@ Status RosIntake::take_fix(std::string_view cdr) {
 Status RosIntake::take_points(std::string_view cdr) {
   const auto message = bags::decode_point_cloud(cdr);
   if (!message) return tl::unexpected(message.error());
-  const Timestamp stamp = message->header.stamp;
+  const Timestamp sensor_stamp = message->header.stamp, stamp = sensor_stamp + config_.scan_offset_s;
   if (known_ && stamp <= *known_) return {};
-  if (Status ok = check_stamp(stamp, newest_scan_); !ok) return ok;
+  if (Status ok = scan_clock_.check(stamp, stamps_.newest()); !ok) return ok;
+  if (std::string doubt = scan_clock_.take_doubt(); !doubt.empty()) note_ = "scans: " + doubt;
+  if (Status ok = check_follows(stamp, newest_scan_); !ok) return ok;
   auto cloud = bags::to_timed_cloud(*message);
   if (!cloud) return tl::unexpected(cloud.error());
   if (cloud->cloud.points.empty()) return fail(ErrorCode::invalid, "holds no points");
-  auto times = lidar::find_message_times(*cloud, stamp, config_.scan_times);
+  auto times = lidar::find_message_times(*cloud, sensor_stamp, config_.scan_times);
   if (!times) return tl::unexpected(times.error());
   double after_s = 0.0;  // of the last point
   if (*times) {
-    const auto ages = lidar::point_ages(*cloud, stamp, **times);
+    const auto ages = lidar::point_ages(*cloud, sensor_stamp, **times);
     if (!ages) return tl::unexpected(ages.error());
     after_s = std::max(0.0, -double{std::ranges::min(*ages)});
   }
@@ -230,21 +233,16 @@ Result<Pose3> RosIntake::lidar_pose(const std::string& frame) const {
               found.error().message);
 }
 
-Result<std::optional<Scan>> RosIntake::to_scan(const std::string& frame, formats::TimedCloud cloud, Timestamp stamp,
-                                               const std::optional<lidar::PointTimes>& times) const {
-  const auto T_body_lidar = lidar_pose(frame);
+Result<std::optional<Scan>> RosIntake::to_scan(Waiting waiting) const {
+  const auto T_body_lidar = lidar_pose(waiting.frame);
   if (!T_body_lidar) return tl::unexpected(T_body_lidar.error());
-  if (!times)
-    return lidar::deskewed(std::move(cloud), stamp, times, *T_body_lidar, {}).map([](Scan scan) {
-      return std::optional(std::move(scan));
-    });
-  const double oldest_s = history_.empty() ? 0.0 : stamp - history_.front().stamp;
-  if (!has_whole_history_ && oldest_s < lidar::kLongestAge_s)
-    return fail(ErrorCode::invalid, "scan at {} ns comes too late, {:.1f} s after odometry of its time", stamp.ns,
-                last_->stamp - stamp);
-  auto scan = lidar::deskewed(std::move(cloud), stamp, times, *T_body_lidar, lidar::with_ends(history_));
-  if (!scan) return tl::unexpected(scan.error());
-  return std::optional(std::move(*scan));
+  const double oldest_s = history_.empty() ? 0.0 : waiting.stamp - history_.front().stamp;
+  if (waiting.times && !has_whole_history_ && oldest_s < lidar::kLongestAge_s)
+    return fail(ErrorCode::invalid, "scan at {} ns comes too late, {:.1f} s after odometry of its time",
+                waiting.stamp.ns, last_->stamp - waiting.stamp);
+  return lidar::deskewed(std::move(waiting.cloud), waiting.stamp - config_.scan_offset_s, waiting.times, *T_body_lidar,
+                         waiting.times ? lidar::with_ends(history_) : Trajectory{}, config_.scan_offset_s)
+      .map([](Scan scan) { return std::optional(std::move(scan)); });
 }
 
 Result<std::optional<Scan>> RosIntake::next_scan(bool is_wanted) {
@@ -252,8 +250,11 @@ Result<std::optional<Scan>> RosIntake::next_scan(bool is_wanted) {
     Waiting waiting = std::move(scans_.front());
     scans_.pop_front();
     if (!is_wanted || is_before_all(waiting.stamp)) continue;
-    if (std::string how = lidar::in_words(waiting.times); how != how_) note_ = how_ = std::move(how);
-    auto scan = to_scan(waiting.frame, std::move(waiting.cloud), waiting.stamp, waiting.times);
+    std::string how = lidar::in_words(waiting.times);
+    if (const auto at = lidar_pose(waiting.frame); at && !bags::doubt_of_place(*at).empty())
+      how += "; the LiDAR is " + bags::doubt_of_place(*at);
+    if (how != how_) note_ = how_ = std::move(how);
+    auto scan = to_scan(std::move(waiting));
     if (!scan) ++counts_.refused;
     return scan;
   }
@@ -281,6 +282,9 @@ std::optional<PositionFix> RosIntake::next_fix() {
                              "fixes are taken as of an antenna at the body's origin: no transform from '{}' to '{}' on "
                              "/tf_static; a mission file's robots[].antenna_m may say where it is",
                              plain(frame), plain(frames_->body));
+    if (const std::string doubt = bags::doubt_of_place({Eigen::Quaterniond::Identity(), fix.p_body_antenna});
+        !doubt.empty())
+      how += "; the antenna is " + doubt;
     if (is_unsure_)
       how += fmt::format("; those that do not say how sure they are count as {:g} m and {:g} m up", kUnknownFix_m,
                          kUnknownFixUp_m);

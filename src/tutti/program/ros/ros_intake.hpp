@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "tutti/bags/ros_fix.hpp"
+#include "tutti/bags/sensor_clock.hpp"
 #include "tutti/bags/transform_tree.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/formats/pcd.hpp"
@@ -29,6 +30,7 @@ struct IntakeConfig {
   std::string odometry_frames;  ///< Two frames of /tf, "odom->base_link"; empty: odometry is from Odometry messages.
   robot::OdometryCovarianceConfig covariance;
   lidar::ScanTimesConfig scan_times;
+  double scan_offset_s = 0.0;         ///< Added to scans' stamps gives the odometry's time.
   std::optional<Pose3> T_body_lidar;  ///< Nothing: taken from /tf_static, and from frames of /tf that never move.
   std::optional<Eigen::Vector3d> p_body_antenna;  ///< In the body frame, m. Nothing: taken from /tf_static like
                                                   ///< T_body_lidar, or else the body's origin.
@@ -51,7 +53,6 @@ struct OdometryFrames {
 class RosIntake {
  public:
   static constexpr double kHistory_s = 2.0;          ///< How long fed odometry is kept, to undistort sweeps.
-  static constexpr double kAnotherClock_s = 10.0;    ///< Scans and fixes farther than this from odometry are refused.
   static constexpr std::size_t kMostScans = 40;      ///< Scans that wait for odometry; beyond it the oldest is dropped.
   static constexpr std::size_t kMostFixes = 200;     ///< Fixes that wait for odometry; beyond it the oldest is dropped.
   static constexpr std::size_t kMostRefused = 8000;  ///< Samples that are kept until it is known whether they count.
@@ -90,6 +91,7 @@ class RosIntake {
   /// another clock than odometry's. A `before` that is far ahead of odometry does not count: it was wrong itself, and
   /// what waits and is not before `stamp` is to be dropped.
   [[nodiscard]] Status check_stamp(Timestamp stamp, const std::optional<Timestamp>& before) const;
+  [[nodiscard]] Status check_follows(Timestamp stamp, const std::optional<Timestamp>& before) const;
   static constexpr double kAhead_s = 1.0;  ///< What is farther ahead of odometry is "far ahead" for check_stamp().
   /// True for stamps from before the first odometry.
   [[nodiscard]] bool is_before_all(Timestamp stamp) const {
@@ -118,8 +120,8 @@ class RosIntake {
   Status take_transform(const bags::RosTransform& transform, bool is_static);
   Status counted(Status taken);
   [[nodiscard]] Result<Pose3> lidar_pose(const std::string& frame) const;
-  Result<std::optional<Scan>> to_scan(const std::string& frame, formats::TimedCloud cloud, Timestamp stamp,
-                                      const std::optional<lidar::PointTimes>& times) const;
+  struct Waiting;
+  Result<std::optional<Scan>> to_scan(Waiting waiting) const;
 
   struct Waiting {
     Timestamp stamp, until;  ///< Stamp of the last point.
@@ -137,6 +139,7 @@ class RosIntake {
   Trajectory history_;               ///< Samples that were fed, over the last kHistory_s.
   bool has_whole_history_ = true;    ///< history_ begins with the very first sample.
   std::deque<Waiting> scans_;
+  bags::SensorClock scan_clock_{"robots[].scan_time_offset_s"};
   std::deque<bags::ReceivedFix> fixes_;
   std::optional<Timestamp> newest_scan_, newest_fix_, known_;
   std::optional<StampedPose> last_;  ///< The sample fed last.

@@ -218,6 +218,54 @@ TEST(RosIntake, OneStampInTheFutureShutsOutNothing) {
   EXPECT_EQ(fixes, 19U);
 }
 
+TEST(RosIntake, ALidarWithAClockOfItsOwnIsSaidAndAligned) {
+  constexpr std::int64_t kAhead = 37'000'000'000;
+  for (const double offset_s : {0.0, -37.0}) {
+    RosIntake intake({.odometry_frames = {},
+                      .covariance = {},
+                      .scan_times = {},
+                      .scan_offset_s = offset_s,
+                      .T_body_lidar = {},
+                      .p_body_antenna = {}});
+    std::size_t scans = 0;
+    std::string said;
+    for (int i = 0; i < 20; ++i) {
+      ASSERT_TRUE(intake.add_odometry(odometry(kStart + i * kPeriod, 1.0 * i)));
+      if (i < 5) continue;
+      said = why(intake.add_points(points(kStart + i * kPeriod + kAhead, kSweepBefore)));
+      for (const Scan& scan : feed(intake).scans) {
+        EXPECT_EQ(scan.stamp.ns, kStart + i * kPeriod);
+        EXPECT_NEAR(scan.cloud->points[0].x(), 5.0 - 1.0, 1e-4);
+        ++scans;
+      }
+    }
+    EXPECT_EQ(scans, offset_s == 0.0 ? 0U : 15U);
+    EXPECT_EQ(said.find("to align them: robots[].scan_time_offset_s=-37)") != std::string::npos, offset_s == 0.0)
+        << said;
+  }
+}
+
+TEST(RosIntake, ScansThatLagAreDoubtedWithTheNumberAndALidarFarAwayIs) {
+  RosIntake intake({.odometry_frames = {},
+                    .covariance = {},
+                    .scan_times = {},
+                    .T_body_lidar = Pose3{Eigen::Quaterniond::Identity(), {0, 0, 800}},
+                    .p_body_antenna = {}});
+  std::string notes;
+  for (int i = 0; i < 60; ++i) {
+    ASSERT_TRUE(intake.add_odometry(odometry(kStart + i * kPeriod)));
+    if (i >= 20) {
+      ASSERT_TRUE(intake.add_points(points(kStart + (i - 20) * kPeriod, kAtOnce)));
+    }
+    notes += intake.take_note();
+    feed(intake);
+    notes += intake.take_note();
+  }
+  EXPECT_NE(notes.find("scans: when they arrive, stamps are 2.0 s behind odometry's newest"), std::string::npos)
+      << notes;
+  EXPECT_NE(notes.find("the LiDAR is 800.0 m from the body's origin"), std::string::npos) << notes;
+}
+
 // Also after the robot was started again: it knows of stamps from before.
 TEST(RosIntake, AClockThatGoesBackIsFedAsTheRobotIsToSeeIt) {
   for (const bool is_new : {false, true}) {

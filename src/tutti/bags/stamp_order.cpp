@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/bags/stamp_order.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <optional>
+
+namespace tutti::bags {
+namespace {
+
+constexpr double kFarAhead_s = 10.0;
+constexpr std::size_t kLeastConfirmed = 3, kConfirmed = 5;  // messages that must be of the same clock
+
+/// True if the messages from `at` on, a few, are all before `limit`.
+bool stays_before(std::span<const Arrival> arrivals, std::size_t at, Timestamp limit) {
+  const auto next = arrivals.subspan(at, std::min(kConfirmed, arrivals.size() - at));
+  return next.size() >= kLeastConfirmed &&
+         std::ranges::all_of(next, [&](const Arrival& arrival) { return arrival.stamp < limit; });
+}
+
+using Refused = std::vector<std::pair<std::size_t, std::string>>;
+
+/// Runs, and the positions of what is in none.
+std::pair<std::vector<StampOrder::Run>, Refused> runs_of(std::span<const Arrival> arrivals) {
+  std::vector<StampOrder::Run> runs;
+  Refused refused;
+  for (std::size_t i = 0; i < arrivals.size(); ++i) {
+    const Timestamp stamp = arrivals[i].stamp;
+    if (runs.empty()) {
+      runs.push_back({i, i + 1, stamp, stamp});
+      continue;
+    }
+    StampOrder::Run& run = runs.back();
+    const Timestamp oldest = run.last - kSortWithin_s;
+    if (stamp < oldest && stays_before(arrivals, i, oldest)) {
+      runs.push_back({i, i + 1, stamp, stamp});
+      continue;
+    }
+    run.end = i + 1;
+    const bool is_alone = stamp - run.last > kFarAhead_s && stays_before(arrivals, i + 1, stamp - kSortWithin_s);
+    if (stamp < oldest || is_alone) {
+      refused.emplace_back(
+          i, fmt::format("stamp {} ns is {:.1f} s {} {} ns, expected within {} s", stamp.ns, std::abs(stamp - run.last),
+                         is_alone ? "ahead of" : "behind", run.last.ns, is_alone ? kFarAhead_s : kSortWithin_s));
+      continue;
+    }
+    run.first = std::min(run.first, stamp);
+    run.last = std::max(run.last, stamp);
+  }
+  return {std::move(runs), std::move(refused)};
+}
+
+}  // namespace
+
+StampOrder order_by_stamp(std::span<const Arrival> arrivals) {
+  StampOrder out;
+  auto [runs, refused] = runs_of(arrivals);
+  out.runs = std::move(runs);
+  if (out.runs.empty()) return out;
+  const auto longest = std::ranges::max_element(out.runs, {}, &StampOrder::Run::duration_s);
+  out.run = static_cast<std::size_t>(longest - out.runs.begin());
+  const auto is_in = [&](std::size_t at) { return longest->begin <= at && at < longest->end; };
+  std::ranges::copy_if(refused, std::back_inserter(out.refused), [&](const auto& one) { return is_in(one.first); });
+
+  std::vector<std::size_t> order;
+  std::optional<Timestamp> newest;
+  auto next_refused = out.refused.begin();
+  for (std::size_t i = longest->begin; i < longest->end; ++i) {
+    if (next_refused != out.refused.end() && next_refused->first == i) {
+      ++next_refused;
+      continue;
+    }
+    order.push_back(i);
+    out.late += newest && arrivals[i].stamp < *newest ? 1 : 0;
+    newest = newest ? std::max(*newest, arrivals[i].stamp) : arrivals[i].stamp;
+  }
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return arrivals[i].stamp; });
+  for (const std::size_t i : order) {
+    const Timestamp stamp = arrivals[i].stamp;
+    if (out.used.empty() || arrivals[out.used.back()].stamp < stamp)
+      out.used.push_back(i);
+    else
+      out.refused.emplace_back(i, fmt::format("stamp {} ns, which another message has, too", stamp.ns));
+  }
+  std::ranges::sort(out.refused);
+  return out;
+}
+
+std::string StampOrder::in_words() const {
+  if (runs.size() < 2) return {};
+  std::string out = fmt::format("its clock starts again {} times:", runs.size() - 1);
+  for (std::size_t i = 0; i < runs.size(); ++i)
+    out += fmt::format("{} messages {} to {} last {:.1f} s from {} ns on ({})", i == 0 ? "" : ",", runs[i].begin + 1,
+                       runs[i].end, runs[i].duration_s(), runs[i].first.ns, i == run ? "used" : "left out");
+  return out;
+}
+
+}  // namespace tutti::bags
