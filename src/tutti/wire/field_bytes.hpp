@@ -23,6 +23,9 @@
 /// [x y z; quaternion x y z w]. What has its default is left out, unless it is an optional or an element of a list.
 namespace tutti::wire {
 
+template <HasFields T>
+std::string field_bytes(const T& value);
+
 /// Appends fields to a message. Deterministic: the same value gives the same bytes.
 class FieldWriter {
  public:
@@ -35,10 +38,7 @@ class FieldWriter {
     } else if constexpr (IsListField<T>) {
       for (const auto& element : value) put(number, element, rule);
     } else if constexpr (HasFields<T>) {
-      std::string inside;
-      FieldWriter writer(inside);
-      visit_fields(value, writer);
-      if (!inside.empty()) put_bytes(number, inside);
+      if (const std::string inside = field_bytes(value); !inside.empty()) put_bytes(number, inside);
     } else if (!(value == T{})) {
       put(number, value, rule);
     }
@@ -48,10 +48,7 @@ class FieldWriter {
   template <class T>
   void put(int number, const T& value, const FieldRule& rule) {
     if constexpr (HasFields<T>) {
-      std::string inside;
-      FieldWriter writer(inside);
-      visit_fields(value, writer);
-      put_bytes(number, inside);
+      put_bytes(number, field_bytes(value));
     } else if constexpr (std::is_same_v<T, std::string>) {
       put_bytes(number, value);
     } else if constexpr (std::is_same_v<T, double>) {
