@@ -107,11 +107,12 @@ std::string situation_frame(const FeedState& state, std::int64_t offset_ns) {
     to.set_from_stamp_ns(told(alert.from, offset_ns));
     to.set_until_stamp_ns(told(alert.until, offset_ns));
   }
-  for (const auto& [name, text] : state.status) {
-    auto& to = *out.add_status();
-    to.set_name(name);
-    to.set_text(plain_text(text));
-  }
+  if (state.status)
+    for (const auto& [name, text] : *state.status) {
+      auto& to = *out.add_status();
+      to.set_name(name);
+      to.set_text(plain_text(text));
+    }
   return framed(message);
 }
 

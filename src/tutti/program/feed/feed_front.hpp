@@ -172,7 +172,7 @@ class FeedFront final : public FeedTarget {
   std::deque<FeedWay> ways_;
   Health health_;
   std::chrono::steady_clock::time_point health_came_;
-  std::vector<std::pair<std::string, std::string>> status_;
+  decltype(FeedState::status) status_;
   std::string trouble_;
   Timestamp trouble_since_;
   bool ended_ = false, closed_ = false;

@@ -121,8 +121,9 @@ Health FeedFront::health() const {
 }
 
 void FeedFront::say_status(const NodeStatus& status) {
+  auto texts = field_texts(status);
   const std::scoped_lock lock(mutex_);
-  status_ = field_texts(status);
+  if (!status_ || *status_ != texts) status_ = std::make_shared<const decltype(texts)>(std::move(texts));
 }
 
 /// Which of them are used, the robot decides (SubmapBuilder::add_fix()), as of a recording.

@@ -29,6 +29,12 @@ std::optional<Timestamp> to_robot(const FeedClock& clock, FromClient& message) {
   return std::nullopt;
 }
 
+/// The situation as compared with every sample: FeedState::status changes by itself, and takes longer to write.
+std::string without_status(FeedState state) {
+  state.status.reset();
+  return situation_frame(state, 0);
+}
+
 }  // namespace
 
 FeedSession::FeedSession(FeedTarget& target, const FeedSettings& settings, Now now)
@@ -36,7 +42,7 @@ FeedSession::FeedSession(FeedTarget& target, const FeedSettings& settings, Now n
       settings_(settings),
       map_(settings, target.state().T_map_odom),
       T_odom_fed_(target.state().T_odom_fed),
-      situation_(situation_frame(target.state(), 0)),
+      situation_(without_status(target.state())),
       now_(std::move(now)) {}
 
 void FeedSession::disconnect(Client client) {
@@ -179,10 +185,11 @@ void FeedSession::refresh() {
       if (listener.wants_way)
         if (auto frame = way_frame(way, offset_ns(number))) put(listener, std::move(*frame), true);
   const FeedState state = target_.state();
-  std::string now = situation_frame(state, 0);
-  if (now == situation_) return;
+  std::string now = without_status(state);
+  if (now == situation_ && state.status == status_) return;
   situation_ = std::move(now);
-  broadcast([&](std::int64_t offset_ns) { return offset_ns == 0 ? situation_ : situation_frame(state, offset_ns); });
+  status_ = state.status;
+  broadcast([&](std::int64_t offset_ns) { return situation_frame(state, offset_ns); });
 }
 
 void FeedSession::close(Client client, const std::string& why) {

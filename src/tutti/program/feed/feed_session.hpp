@@ -102,7 +102,8 @@ class FeedSession {
   FeedSettings settings_;
   SmoothMap map_;
   Pose3 T_odom_fed_;       ///< FeedState::T_odom_fed as of `map_`; it changes where the client's odometry jumps.
-  std::string situation_;  ///< The situation's frame as sent last.
+  std::string situation_;  ///< The situation's frame as sent last, without its status,
+  decltype(FeedState::status) status_;  ///< which is this.
   std::map<Client, Connection> clients_;
   std::optional<Client> feeder_;
   Feeder last_;

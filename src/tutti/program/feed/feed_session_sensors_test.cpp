@@ -75,7 +75,8 @@ TEST_F(FeedSessionSensors, WhatTheBodyReportsReachesTheRobotOrIsRefusedByName) {
 
 TEST_F(FeedSessionSensors, WhatTheRobotReportsIsToldWhenItChanges) {
   join(1);
-  target_.known.status = {{"keyframes", "7"}, {"battery_percent", "50"}};
+  target_.known.status = std::make_shared<const decltype(FeedState::status)::element_type>(
+      decltype(FeedState::status)::element_type{{"keyframes", "7"}, {"battery_percent", "50"}});
   session_.refresh();
   const auto told = read(1);
   ASSERT_EQ(told.size(), 1U);

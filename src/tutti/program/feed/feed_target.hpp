@@ -52,11 +52,13 @@ struct FeedState {
   bool wants_scan = false;                 ///< A scan from now on would be used.
   std::vector<TeamMate> team_mates;
   std::vector<FeedAlert> alerts;
-  std::vector<std::pair<std::string, std::string>> status;  ///< field_texts() of the robot's NodeStatus.
-  std::optional<Timestamp> stored;                          ///< The newest sample that a kill would not lose.
-  robot::NextKeyframe next_keyframe;                        ///< Tells at which later sample a scan would be wanted.
-  robot::OdometryWatch watch;                               ///< RobotAgent::watch()
-  bool ended = false;  ///< The client has ended the recording, and everything before that is stored.
+  /// field_texts() of the robot's NodeStatus, another one whenever these change; null before the first. Shared, because
+  /// the state is copied for every odometry sample.
+  std::shared_ptr<const std::vector<std::pair<std::string, std::string>>> status;
+  std::optional<Timestamp> stored;    ///< The newest sample that a kill would not lose.
+  robot::NextKeyframe next_keyframe;  ///< Tells at which later sample a scan would be wanted.
+  robot::OdometryWatch watch;         ///< RobotAgent::watch()
+  bool ended = false;                 ///< The client has ended the recording, and everything before that is stored.
 };
 
 /// The robot's way and what the map says of it, as of one update of the map.
