@@ -26,7 +26,7 @@ Status check_clock(Timestamp stamp, const std::optional<Timestamp>& newest_odome
 /// What odometry was newest at a time of a bag's recorder.
 class OdometryArrivals {
  public:
-  /// Of a bag whose log times do not go on as the stamps do, which thus are none of arrivals, nothing is known.
+  /// Nothing is known if the log times of the bag do not advance as the stamps do: then they are no times of arrival.
   explicit OdometryArrivals(std::span<const Arrival> odometry);
   [[nodiscard]] std::optional<Timestamp> newest_at(Timestamp logged) const;
 

@@ -13,7 +13,7 @@
 namespace tutti::wire {
 namespace field_bytes_test {
 
-/// Of a struct's list, "NUMBER [repeated|optional ]TYPE NAME" per field as a .proto file says it.
+/// A struct's list as a .proto file has it: "NUMBER [repeated|optional ]TYPE NAME" per field.
 class ProtoFields {
  public:
   template <class T>
