@@ -76,7 +76,7 @@ World begun_anew(World world) {
 /// Before which part of a step a node is dropped, or after all.
 enum class Part { commit, send, half_sent, tell, acknowledge, end };
 constexpr std::size_t kParts = 6;
-/// Of which node, at which input.
+/// Which node, at which input.
 using Moment = std::tuple<Role, std::string, Part>;
 
 /// Which of the moments of each kind end a node.
@@ -164,7 +164,7 @@ class Mission {
   [[nodiscard]] const server::MapServer& server() const { return server_.node->map_server(); }
   [[nodiscard]] const robot::RobotAgent& agent(std::size_t r) const { return robots_[r].node->agent(); }
   [[nodiscard]] std::size_t robots() const { return robots_.size(); }
-  [[nodiscard]] int jumps() const { return jumps_; }  ///< Of odometry, as they were told.
+  [[nodiscard]] int jumps() const { return jumps_; }  ///< Odometry's, as they were told.
   [[nodiscard]] const std::vector<std::string>& refusals() const { return refusals_; }
   /// Nothing is kept back anywhere.
   void expect_settled() const {
@@ -295,7 +295,7 @@ class Mission {
     while (next_[r] < until)
       if (feed_sample(r, next_[r])) ++next_[r];
   }
-  /// Of one that it knows already, what belongs to it. False: it was dropped.
+  /// Feeds what belongs to a sample that it may know already. False: it was dropped.
   bool feed_sample(std::size_t r, std::size_t i) {
     Program<node::RobotNode>& robot = robots_[r];
     const Recording& recording = world_.recordings[r].recording;

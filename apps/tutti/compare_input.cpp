@@ -62,7 +62,7 @@ Result<std::vector<formats::VertexStamp>> numbers_as_stamps(const std::string& p
   return out;
 }
 
-/// Of every vertex of the graph: which robot, and when. `stamps_path` empty: none are known.
+/// Which robot every vertex of the graph is of, and when. `stamps_path` empty: none are known.
 Result<std::vector<formats::VertexStamp>> vertex_stamps(const std::string& path, const formats::G2oFile& file,
                                                         const std::string& stamps_path) {
   if (stamps_path.empty()) return numbers_as_stamps(path, file);

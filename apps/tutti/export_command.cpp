@@ -25,7 +25,7 @@ struct ExportOptions {
   std::string input;
   bool live = false;
   std::vector<std::string> outputs;
-  std::map<std::string_view, std::string> by_name;  ///< Of options that name the format.
+  std::map<std::string_view, std::string> by_name;  ///< What the options say that name a format.
   exports::FormatSettings settings;
 };
 

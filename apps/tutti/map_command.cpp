@@ -36,7 +36,7 @@ bool looks_like_ours(const fs::path& file) {
   return head.starts_with("SQLite format 3") && head.substr(68, 4) == "Tutt";
 }
 
-/// Of the file, and of the log that is part of it after a crash.
+/// The later change of the file and of the log that is part of it after a crash.
 std::string last_change(const fs::path& file) {
   std::error_code failure;
   fs::file_time_type last = fs::last_write_time(file, failure);

@@ -30,7 +30,7 @@ Status run_and_report(lab::MissionUpOptions& options, program::Level console) {
   return {};
 }
 
-/// Of mission up, and of whoever wants a robot's program fed as its driver would.
+/// `mission up` runs it, and whoever wants a robot's program fed as its driver would.
 void add_play_command(CLI::App& group, int& exit_code) {
   const auto options = std::make_shared<lab::FeedPlayerOptions>();
   const auto common = std::make_shared<ProgramArguments>();

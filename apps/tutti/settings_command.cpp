@@ -40,7 +40,7 @@ void list_operators(const std::vector<FieldDoc>& fields) {
       fields.size());
 }
 
-/// Of a program, or, without one, of a whole mission with all that is simulated and measured in it.
+/// A program's, or, without one, a whole mission's with all that is simulated and measured in it.
 std::vector<FieldDoc> settings_of(const std::string& program) {
   if (program == "server") return document_config(program::ServerSettings());
   if (program == "robot") return document_config(program::RobotSettings());

@@ -34,7 +34,7 @@ consistency::DisagreementTest robots_test(const ProxyGraph& graph, const ChainId
   return {graph, chain, pairs, 1, {.false_alarm_rate = 2.0 * alpha}};
 }
 
-/// Of these nodes' errors (right tangents): (6 nodes) x count, other draws than the server's own.
+/// Draws of these nodes' errors (right tangents): (6 nodes) x count, other draws than the server's own.
 Eigen::MatrixXd normal_draws(const server::MapEstimate& map, const std::vector<std::size_t>& nodes, std::size_t count,
                              Rng rng) {
   std::vector<double> weights(map.graph.edges.size(), 1.0);

@@ -37,7 +37,7 @@ double now_ms() {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-/// Of this thread: what others do on the machine is not in it.
+/// This thread's: what others do on the machine is not in it.
 double cpu_ms() {
   timespec time{};
   ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);

@@ -65,7 +65,7 @@ inline std::vector<std::vector<std::string>> read_csv(const std::string& path) {
   return out;
 }
 
-/// Of every query the row nearest to it, of equal ones that of smaller index; kNoIndex without rows.
+/// The row nearest to every query, that of smaller index among equals; kNoIndex without rows.
 inline std::vector<std::uint32_t> nearest_rows(const Descriptors& queries, const Descriptors& rows) {
   std::vector<std::uint32_t> out(queries.size(), kNoIndex);
   for (std::size_t q = 0; q < queries.size(); ++q) {

@@ -16,7 +16,7 @@ namespace {
 
 using namespace tutti;
 
-/// Of CPU: the same on a busy machine.
+/// CPU time: the same on a busy machine.
 double milliseconds(const std::function<void()>& work) {
   const std::clock_t begin = std::clock();
   work();

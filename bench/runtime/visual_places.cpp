@@ -55,7 +55,7 @@ struct Labels {
     for (const auto& row : read_csv(kFolder + "revisit_pairs.csv"))
       listed.emplace(std::stoll(row[0]), std::stoll(row[1]));
   }
-  /// Of a closure against the truth: off by more than 0.5 m or 5 degrees?
+  /// Is a closure off the truth by more than 0.5 m or 5 degrees?
   [[nodiscard]] bool is_off(const ClosureVerdict& verdict, Timestamp a, Timestamp b) const {
     const auto one = pose_at(truth, a, 0.2), other = pose_at(truth, b, 0.2);
     if (verdict.closures.empty() || !one || !other) return false;

@@ -67,7 +67,7 @@ Submap make_submap(SubmapId id, const formats::MaplabRecording& recording, std::
   return out;
 }
 
-/// Of one robot; neighbours share a keyframe.
+/// Adds one robot's; neighbours share a keyframe.
 void add_submaps(RobotId robot, const formats::MaplabRecording& recording, const Settings& settings,
                  std::vector<Submap>& out) {
   std::uint32_t index = 0;

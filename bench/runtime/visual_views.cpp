@@ -36,7 +36,7 @@ struct Pair {
   Timestamp stamp;
   Pose3 T_world_body;
   std::vector<TrackedImage> images;
-  int direction = 0;  ///< Of the optical axis, in kDirections equal parts of the circle.
+  int direction = 0;  ///< The optical axis', in kDirections equal parts of the circle.
 };
 
 std::vector<Pair> read_pairs(const std::vector<Camera>& cameras, const DescriptorConfig& config) {

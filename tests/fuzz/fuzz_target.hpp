@@ -18,7 +18,7 @@ const std::map<std::string, Target>& targets();
 inline constexpr char kNextFile = '\x1e';
 /// The graph that deltas of these inputs are against.
 const ProxyGraph& delta_base();
-/// Of fuzz_stores.cpp.
+/// In fuzz_stores.cpp.
 void fixes(std::string_view bytes);
 void meta_rows(std::string_view bytes);
 void salvage(std::string_view bytes);

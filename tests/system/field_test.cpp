@@ -68,7 +68,7 @@ class Running {
   Running(const Running&) = delete;
   Running& operator=(const Running&) = delete;
   [[nodiscard]] bool over() const { return over_; }
-  /// Of one that is over.
+  /// How it ended, once it is over.
   [[nodiscard]] const Status& ended() const { return ended_; }
 
  private:
@@ -170,7 +170,7 @@ class Field : public ::testing::Test {
     return within(seconds, [&] { return std::ranges::all_of(robots_, [](const auto& r) { return r->over(); }); });
   }
   [[nodiscard]] fs::path status_file() const { return folder_ / "server" / program::kStatusFile; }
-  /// Of the map, as the server tells it; nothing: it cannot be read.
+  /// The map's status, as the server tells it; empty: it cannot be read.
   [[nodiscard]] std::string server_status() const { return read_file(status_file().string()).value_or(""); }
   /// By a status that is written after this is asked: the one before may not know the last submaps yet.
   [[nodiscard]] bool server_ends() const {

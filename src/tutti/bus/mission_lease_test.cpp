@@ -39,7 +39,7 @@ class MissionLeases : public testing::Test {
                                                    std::optional<LeaseHolder> self = {}) const {
     return MissionLease::open({.url = bus_->url(), .mission = mission}, std::move(self), kQuick).value();
   }
-  /// Of another machine's process, so that nobody can know whether it has ended.
+  /// A process of another machine: nobody can know whether it has ended.
   static LeaseHolder holder(const std::string& state, std::uint64_t process) {
     return {.host = "base",
             .process = process,

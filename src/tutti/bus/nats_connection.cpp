@@ -22,8 +22,9 @@ constexpr std::int64_t kConnect_ms = 2000;
 constexpr std::int64_t kPing_ms = 10'000;
 constexpr int kPingsOut = 2;
 constexpr std::int64_t kWrite_ms = 15'000;  // without it a cut blocks for minutes; a part takes 1 s at 1 Mbit/s
-/// So long the bus takes one message of an id: robots send again every minute what the server has no time for, and once
-/// in so long that may take room on the bus. Shorter than the server waits for the rest of a message.
+/// For so long the bus drops a message whose id it has had. A robot repeats every minute what the server has not
+/// confirmed, and each repetition would take room on the bus. Must be shorter than the server waits for the rest of a
+/// message.
 constexpr std::int64_t kSameId_ns = 3'600'000'000'000;
 constexpr std::int64_t kAcknowledge_ns = 30'000'000'000;  // then a message comes again
 constexpr std::uint64_t kMostRemoved = 1000;              // sequences looked at in one go

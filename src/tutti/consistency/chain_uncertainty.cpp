@@ -113,8 +113,8 @@ std::vector<ScaleUncertainty> scales(const spectral::SparseMatrix& laplacian, co
   return out;
 }
 
-/// Of the spread nodes but the first, [position; rotation] in the axes of `world`, seen from the first: the map from
-/// the right tangents of all spread nodes.
+/// The linear map from the right tangents of all spread nodes to [position; rotation] of each but the first, seen from
+/// the first, in the axes of `world`.
 MatrixXd seen_from_first(std::span<const Pose3> poses) {
   const auto m = static_cast<Index>(poses.size());
   MatrixXd out = MatrixXd::Zero(6 * (m - 1), 6 * m);

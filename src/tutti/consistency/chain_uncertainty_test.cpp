@@ -74,7 +74,7 @@ class TrueCoefficients {
   [[nodiscard]] double variance_of_worst(Index node, int scale) const {
     return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance(node, scale)).eigenvalues()(2);
   }
-  /// Of errors n x (3 columns): coefficients as of spectral::exact_transform.
+  /// The coefficients of errors, n x (3 columns), as spectral::exact_transform gives them.
   [[nodiscard]] MatrixXd transformed(MatrixXd errors) const {
     for (Index c = 0; c < errors.cols(); c += 3) {
       Eigen::VectorXd x = errors.middleCols<3>(c).transpose().reshaped();

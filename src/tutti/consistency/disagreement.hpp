@@ -79,7 +79,7 @@ class DisagreementTest {
   void measure_scales(const Eigen::MatrixXd& W, Disagreement& out) const;
   [[nodiscard]] double measure_directions(std::span<const Pose3> robot) const;
 
-  std::vector<Pose3> server_;       ///< Of all nodes of the chain.
+  std::vector<Pose3> server_;       ///< All nodes of the chain.
   std::vector<std::size_t> ranks_;  ///< Positions of the synchronised nodes in server_.
   const ChainUncertainty* uncertainty_;
   double look_;  ///< False-alarm rate of this look.

@@ -31,7 +31,7 @@ class Ledger {
   /// Takes `chosen` in. A constraint between the same two nodes (in either direction) is replaced only when the new one
   /// differs by more than 0.5 mm, 0.005 degrees or a tenth of a standard deviation; otherwise it stays untouched, which
   /// keeps the robot's solution where it is. With `replaces_all`, held constraints on pairs that are not in `chosen`
-  /// are removed. Of constraints on the same pair in `chosen` the last counts.
+  /// are removed. If `chosen` has several constraints on one pair, the last counts.
   LedgerUpdate update(std::vector<Constraint> chosen, bool replaces_all);
 
   /// Drops every constraint with an end that this proxy graph has neither among its nodes nor among those that its

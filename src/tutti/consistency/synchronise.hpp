@@ -24,7 +24,7 @@ struct Synchronisation {
 };
 
 /// Chronological matching by (chain, stamp) with exactly equal stamps, as the robot makes the stamps and they travel
-/// unchanged. Of a stamp that occurs several times on a side, the first occurrences match each other, then the second
+/// unchanged. When a stamp occurs several times on a side, the first occurrences match each other, then the second
 /// ones, and so on.
 Synchronisation synchronise(const ProxyGraph& graph, const ChainId& chain, std::span<const RobotNode> nodes);
 

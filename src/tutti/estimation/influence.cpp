@@ -66,7 +66,7 @@ Pull pull_of(std::size_t e, const PoseGraphEdge& edge, std::span<const Pose3> po
 /// An edge in the units of its own standard deviations.
 struct Whitened {
   EdgeSlot slot;
-  int component = 0;  ///< Of the graph, that its ends are in.
+  int component = 0;  ///< The graph's component that its ends are in.
   Vector6d residual;
   Matrix6d J_from;
   Matrix6d J_to;

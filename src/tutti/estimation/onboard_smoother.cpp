@@ -14,8 +14,8 @@ namespace {
 
 /// Every solve ends with a step that moves no pose by more (m, rad), so that where it started does not show.
 constexpr double kStepTolerance = 1e-5;
-/// Of an edge's rotation: nearer than this to all measurements, the last poses lead to the minimum that raw odometry
-/// leads to.
+/// When every edge's rotation is nearer than this to its measurement, the last poses lead to the same minimum as raw
+/// odometry.
 constexpr double kNearby_rad = 0.3;
 
 bool is_nearby(const PoseGraph& graph, const std::vector<Pose3>& poses) {

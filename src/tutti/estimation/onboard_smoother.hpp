@@ -36,7 +36,7 @@ struct ChainConstraint {
 struct SmootherSummary {
   Termination termination = Termination::not_run;
   int iterations = 0;          ///< On the reduced graph.
-  double initial_cost = -1.0;  ///< Of the reduced graph: compounded odometry and the constraints.
+  double initial_cost = -1.0;  ///< The reduced graph's: compounded odometry and the constraints.
   double final_cost = -1.0;
   /// Polishing steps that were taken; one that would raise the cost of the full graph is not.
   int polishing_steps = 0;

@@ -48,7 +48,7 @@ struct FormatSettings {
 /// about it, one or more lines. An error of code `configuration` is one of the settings.
 struct Format {
   std::string_view name;    ///< The option --NAME writes this format, whatever the path ends in.
-  std::string_view ending;  ///< Of a path that is to be written in this format; "/": it is a folder.
+  std::string_view ending;  ///< How a path ends that is to be written in this format; "/": it is a folder.
   std::string_view help;
   using OfMap = Result<std::string>(const MapSource& map, const FormatSettings& settings,
                                     const std::filesystem::path& out);

@@ -24,7 +24,7 @@ using Json = nlohmann::json;
 
 struct Robot {
   std::string name;      ///< ROS's.
-  Timestamp first;       ///< Of its own clock,
+  Timestamp first;       ///< By its own clock,
   double start_s = 0.0;  ///< at this mission time.
   Trajectory onboard, corrected, server, reference;
 };
@@ -106,7 +106,7 @@ class Run {
  private:
   [[nodiscard]] Timestamp at(double mission_s) const { return begin_ + mission_s; }
 
-  /// Of the largest component, whose frame the ways of all have in a run's files.
+  /// For the largest component, in whose frame all trajectories of a run's files are.
   void add_earth() {
     const Json& fixes = member(member(report_, "server"), "fixes");
     const Json& origin = member(fixes, "origin");
@@ -168,7 +168,7 @@ class Run {
     add_distances(robot);
   }
 
-  /// Of raw odometry and of its correction to the server's way, each after one rigid alignment.
+  /// From raw odometry, and from its correction, to the server's trajectory, each after one rigid alignment.
   void add_distances(const Robot& robot) {
     std::map<Timestamp, std::vector<std::pair<std::string, double>>> rows;
     for (const auto& [way, name] : {std::pair{&robot.onboard, "onboard_m"}, std::pair{&robot.corrected, "corrected_m"}})
@@ -256,7 +256,7 @@ class Run {
   Json report_;
   Timestamp begin_;
   std::vector<Robot> robots_;
-  std::vector<Json> rows_;  ///< Of the report, of those robots.
+  std::vector<Json> rows_;  ///< The report's, for those robots.
   Scene out_;
 };
 

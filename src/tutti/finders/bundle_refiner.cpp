@@ -43,7 +43,7 @@ RefinementCounts counts_of(const bundle::RefinedMap& refined) {
           .rms_after_px = refined.rms_after_px};
 }
 
-/// Of every robot with IMU factors that were held back, how many, and why by the worst of them.
+/// Says for every robot how many of its IMU factors were held back, and why, by the worst of them.
 void remark_on_imu(const std::vector<bundle::ImuRun>& runs, std::vector<RefinementRemark>& out) {
   struct Held {
     std::size_t factors = 0, all = 0;

@@ -99,7 +99,7 @@ Result<ClosureVerdict> JointClosureFinder::verify(const Submap& first, const Sub
     if (!verdict) return verdict;
     std::ranges::move(verdict->closures, std::back_inserter(out.closures));
     std::ranges::move(verdict->evidence, std::back_inserter(out.evidence));
-    // Of a submap without a payload of the kind it says no more than that.
+    // "Too small" only says that a submap has no payload of this kind: any other reason takes its place.
     if (!out.refusal || out.refusal->reason == RefusalReason::too_small) out.refusal = verdict->refusal;
   }
   if (!out.closures.empty()) out.refusal.reset();

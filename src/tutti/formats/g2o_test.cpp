@@ -249,7 +249,7 @@ TEST(G2o, SingularInformationIsFine) {
   EXPECT_EQ(file->graph.edges[0].information.diagonal(), (Vector6d() << 1, 1, 1, 1, 1, 0).finished());
 }
 
-/// Published graphs have such matrices. Of all semidefinite ones the nearest is taken: nothing is nearer, whatever the
+/// Published graphs have such matrices. The nearest semidefinite one is taken: nothing is nearer, whatever the
 /// direction one goes in from there.
 RC_GTEST_PROP(G2o, IndefiniteInformationBecomesTheNearestSemidefinite, ()) {
   const bool is_2d = *rc::gen::arbitrary<bool>();

@@ -36,8 +36,8 @@ Result<DepthImage> decode_depth(std::string_view bytes, const std::string& name,
 std::string encode_depth(const DepthImage& image);
 
 /// The images of a recording as a stream that reads each file when asked. The moments are the stamps of the first
-/// camera. Of every other camera, the image nearest to a moment belongs to it if within `max_difference_s`; where there
-/// is none, the image is empty. At least one camera.
+/// camera. Every other camera's image nearest to a moment belongs to it if within `max_difference_s`; where there is
+/// none, the image is empty. At least one camera.
 ImageStream stream_images(std::vector<CameraImages> cameras, double max_difference_s = 0.005);
 using LoadDepth = std::function<Result<DepthImage>(std::size_t number)>;
 

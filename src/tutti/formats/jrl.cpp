@@ -242,7 +242,7 @@ Status JrlReader::read_truth(const JrlValue& value) {
   return {};
 }
 
-/// Of a closure that several robots have, the first report stays.
+/// When several robots report a closure, the first report stays.
 void JrlReader::join_reports() {
   std::map<std::pair<PyfgName, PyfgName>, std::vector<std::size_t>> between;
   std::vector<Edge> kept;

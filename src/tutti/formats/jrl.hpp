@@ -8,7 +8,7 @@
 #include "tutti/formats/pyfg.hpp"
 
 /// Reads multi-robot pose graphs as JRL (JSON Robot Log, github.com/DanMcGann/jrl), in which COSMO-Bench is published,
-/// into the same values as PyFG. Of the format are read:
+/// into the same values as PyFG. These parts of the format are read:
 ///   measurements: {"a": [{"stamp": ns, "measurements": [factor ..]} ..] ..}, what each robot had and when
 ///   groundtruth (optional): {"a": [{"key": .., "type": "Pose3", "translation": [x, y, z], "rotation": [w, x, y, z]}
 ///   ..]}

@@ -24,7 +24,7 @@ struct MaplabRecording {
   struct Summary {
     std::size_t keyframes = 0;
     std::size_t keypoints = 0;
-    std::size_t good_landmarks = 0;    ///< Of quality 2, counted in every submap that has them.
+    std::size_t good_landmarks = 0;    ///< Those of quality 2, counted in every submap that has them.
     std::size_t joined_landmarks = 0;  ///< Continued in the next submap under another or the same id.
     /// Tracks of maplab that carry several landmarks, and landmarks that are twice in one image.
     std::size_t conflicts = 0;

@@ -107,7 +107,7 @@ Status read_pyfg_line(const LineReader& line, PyfgLines& lines) {
   return {};
 }
 
-/// Of a file without vertices: those that odometry joins.
+/// The vertices of a file that lists none: those that odometry joins.
 std::vector<PyfgVertex> vertices_of_odometry(const std::vector<PyfgLine>& lines) {
   std::set<PyfgName> names;
   for (const PyfgLine& line : lines)

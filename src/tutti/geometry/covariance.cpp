@@ -9,7 +9,7 @@ namespace tutti {
 namespace {
 
 constexpr double kPsdTolerance = 1e-9;  // of the trace
-/// Of a correlation matrix: with less, the inverse is rounding.
+/// A correlation matrix's: with less, the inverse is rounding.
 constexpr double kLeastPivot = 1e-9;
 
 Vector6d per_axis(double translation, double rotation) {

@@ -10,7 +10,7 @@ namespace tutti {
 /// A half line. All rays of one call are in one frame, m.
 struct Ray {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
-  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  ///< Of unit length.
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  ///< Unit length.
 };
 
 /// The point with the least sum of squared distances to the lines of the rays, m; no value for fewer than two rays or

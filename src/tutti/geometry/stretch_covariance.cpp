@@ -15,7 +15,7 @@ Matrix6d moved(const Pose3& T_a_b, const Matrix6d& covariance_b) {
   return 0.5 * (out + out.transpose());
 }
 
-/// Of the block of 2^(level + 1) poses that pose k is in: the first pose of its right half.
+/// The first pose of the right half of the block of 2^(level + 1) poses that pose k is in.
 std::size_t middle_of(std::size_t k, std::size_t level) { return ((k >> (level + 1)) << (level + 1)) + (1UL << level); }
 
 }  // namespace

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kMostCells = 400'000'000;
 constexpr std::uint16_t kMostVotes = std::numeric_limits<std::uint16_t>::max();
-/// Of one say "occupied" against so many "passed": what moved away, and a wall that rays graze.
+/// One "occupied" outweighs so many "passed": what moved away against a wall that rays graze.
 constexpr int kPassesAHit = 2;
 
 }  // namespace

@@ -24,7 +24,7 @@ struct Case {
   double stated_rad = 1.0;
   std::size_t closures = 80;
   double wrong_share = 0.0;
-  double scale = 1.0;  ///< Of all lengths.
+  double scale = 1.0;  ///< All lengths'.
 };
 
 OdometryPiece chain_of(RobotId robot, const Case& c, Rng& rng, std::vector<Pose3>& truth) {

@@ -21,8 +21,9 @@ struct FailedStretch {
 
 /// The cost of a search.
 struct SearchWork {
-  std::size_t hypotheses = 0;      ///< Hypotheses tried.
-  std::size_t factorisations = 0;  ///< Of the normal equations, nearly all of them of the graph of the closures' ends.
+  std::size_t hypotheses = 0;  ///< Hypotheses tried.
+  /// How often normal equations were factorised, nearly always those of the graph of the closures' ends.
+  std::size_t factorisations = 0;
   SearchWork& operator+=(const SearchWork& other) {
     hypotheses += other.hypotheses;
     factorisations += other.factorisations;

@@ -67,7 +67,7 @@ struct Laps {
   }
 };
 
-/// Of laps without a certain closure, with what it refers to.
+/// Solves laps without a certain closure, and owns what it refers to.
 struct Solver {
   explicit Solver(const Laps& laps)
       : ways(laps.ways()),

@@ -24,8 +24,9 @@ constexpr double kNothing = 1e-9;
 /// refused by this share of all votes. Otherwise refused closures are strewn about, as wrong ones are.
 constexpr double kStrained = 1.0;
 constexpr double kManyRefused = 0.1;
-/// Where in a stretch a failure seems at most this many times as large as where it seems least, and so many seconds of
-/// usual motion more, odometry may have failed. A radian counts as much as so many seconds of motion.
+/// Closures do not tell exactly where in a stretch odometry failed. Each place is possible where the failure would be
+/// at most this many times as large as at the place where it would be smallest, plus the usual motion of so many
+/// seconds. A radian counts as much as so many seconds of motion.
 constexpr double kAboutLeast = 1.5;
 constexpr double kAboutLeast_s = 1.0;
 constexpr double kRadian_s = 5.0;

@@ -22,9 +22,9 @@ struct Case {
   double stated = 1.0;  ///< Standard deviation of rotations as stated, over the true one.
   std::size_t closures = 80;
   double wrong_share = 0.0;
-  double scale = 1.0;                  ///< Of odometry's translations.
+  double scale = 1.0;                  ///< Odometry's translations'.
   double stated_m = 1.0;               ///< As `stated`, of translations.
-  std::uint32_t longest = kKeyframes;  ///< Of the loops.
+  std::uint32_t longest = kKeyframes;  ///< The longest loop's keyframes.
 };
 
 OdometryHonesty honesty(const Case& c, std::uint64_t seed) {

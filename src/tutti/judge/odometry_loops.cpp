@@ -46,7 +46,7 @@ class Ways {
  private:
   struct Piece {
     const OdometryPiece* odometry = nullptr;
-    std::vector<Matrix6d> covariance;  ///< Of each pose, in the frame of the first.
+    std::vector<Matrix6d> covariance;  ///< Each pose's, in the frame of the first.
   };
   static Pose3 T_first_body(const OdometryPiece& odometry, std::size_t k) {
     return odometry.T_odom_body.front().inverse() * odometry.T_odom_body[k];

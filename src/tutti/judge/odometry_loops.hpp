@@ -18,7 +18,7 @@ struct OdometryPiece {
   ChainId id;
   std::uint32_t first_index = 0;          ///< KeyframeId::index of T_odom_body[0]; the others count up from it.
   std::vector<Pose3> T_odom_body;         ///< Raw odometry.
-  std::vector<Matrix6d> step_covariance;  ///< Of keyframe k -> k + 1 (right tangent); one fewer than poses.
+  std::vector<Matrix6d> step_covariance;  ///< From keyframe k to k + 1 (right tangent); one fewer than poses.
 };
 
 /// A loop over odometry and closures back to where it began.

@@ -88,7 +88,7 @@ std::shared_ptr<const server::ClosureFinder> make_reference_finder(
                                                   planted_closures(config.closure_changes.planted, recordings));
 }
 
-/// Of the recordings that the finder's answers depend on, in short.
+/// Names the recordings that the finder's answers depend on, in short.
 std::string extent_of(const MissionConfig& config, const std::vector<mission::MissionRecording>& recordings) {
   std::string out;
   if (!config.closure_changes.come_with_mission()) return out;

@@ -11,7 +11,7 @@
 namespace tutti::lab {
 
 /// The record of a mission whose programs have ended, from their stores and events in STATE/server and
-/// STATE/robots/NAME. Of timing it only has what robots measured. Fails when something is missing or cannot be read.
+/// STATE/robots/NAME. Its only times are those that robots measured. Fails when something is missing or cannot be read.
 Result<mission::MissionRecord> collect_mission(const MissionConfig& config, const MissionSource& source,
                                                const std::filesystem::path& state, const std::string& version);
 

@@ -183,7 +183,7 @@ Status Player::say_fixes(Timestamp now, bool is_known) {
   return {};
 }
 
-/// Of those that are taken at odometry's samples, the stamps are odometry's (TrackingSource).
+/// Images that are taken at odometry's samples have odometry's stamps (TrackingSource).
 Status Player::say_images(Timestamp now) {
   const ImageStream& stream = *robot_.recording.images;
   const double tolerance_s = config_.tracking.max_stamp_difference_s;

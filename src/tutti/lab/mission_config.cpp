@@ -20,7 +20,7 @@ constexpr double kEveryPose_s = 1e-6;
 
 mission::MissionConfig& of_recordings(MissionConfig& config) { return config; }
 
-/// Of each of some simulated robots; without a name they are named by place.
+/// For each simulated robot; one without a name is named by its place in the list.
 template <class Robots>
 void check_names(const Robots& robots, const char* path, std::vector<std::string>& problems) {
   for (std::size_t i = 0; i < robots.size(); ++i)

@@ -19,7 +19,7 @@ struct MissionUpOptions {
   std::filesystem::path out;  ///< State and output of the programs go to OUT/state, which must not exist yet.
   double rate = 1.0;
   int workers = 0;  ///< 0: the server verifies closures itself.
-  int threads = 1;  ///< Of the server without workers, and of each worker.
+  int threads = 1;  ///< The server's, without workers, and each worker's.
   std::string version;
   std::function<void(const std::string&)> progress;  ///< Called with one line, about twice a second.
 };

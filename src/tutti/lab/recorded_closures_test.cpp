@@ -12,7 +12,7 @@ constexpr std::int64_t kEpoch = 1'670'403'892'357'527'971;
 
 Timestamp at(std::int64_t s) { return {kEpoch + 1'000'000'000 * s}; }
 
-/// Of a keyframe a second: submap n has those of 4 n to 4 n + 4.
+/// There is a keyframe a second: submap n has those of 4 n to 4 n + 4.
 Submap submap(std::uint32_t robot, std::uint32_t index) {
   Submap out{.id = {RobotId{robot}, index}};
   for (std::uint32_t k = 4 * index; k <= 4 * index + 4; ++k) out.keyframes.push_back({k, at(k), {}, false});

@@ -223,7 +223,7 @@ class RobotWriter {
   const Recording& recording_;
   bags::BagWriter& bag_;
   std::int64_t offset_ns_;
-  Matrix6d covariance_ = Matrix6d::Zero();  ///< Of T_odom_body, right tangent.
+  Matrix6d covariance_ = Matrix6d::Zero();  ///< T_odom_body's, right tangent.
 };
 
 Result<std::vector<RobotToWrite>> walking_robots(const MissionConfig& config, std::uint64_t seed) {

@@ -32,7 +32,7 @@ struct Heard {
   std::vector<Matrix6d> increments;
   std::vector<Scan> scans;
   Pose3 T_body_lidar;
-  std::vector<Timestamp> stamps;  ///< Of all messages in their order.
+  std::vector<Timestamp> stamps;  ///< All messages' in their order.
 };
 
 Timestamp back(Timestamp stamp) { return Timestamp{stamp.ns - kBagsBegin_ns}; }

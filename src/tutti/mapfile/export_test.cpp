@@ -98,7 +98,7 @@ TEST(LevelFrame, HasTheMeanOfTheBodiesZAxesUp) {
   EXPECT_EQ(in_words(level_frame(map, 0)), "T_level_world 0 0 0 0 0 0 1 (x y z, quaternion x y z w)");
 }
 
-/// Of a small part with a camera on foot, and a large one without: there is something to see.
+/// A small part has a camera on foot and a large one has none: there is something to see.
 TEST_F(Export, WhereTheLargestPartHasNoCloudsTheCloudIsOfAnother) {
   Content content;
   server::MapEstimate map;

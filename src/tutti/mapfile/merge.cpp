@@ -79,8 +79,8 @@ Result<std::string> no_two_submaps(std::string_view key, const std::string&, con
               message ? to_string(message->submap.id) : std::string(key));
 }
 
-/// Of one finder a refusal, as the server has it; of two versions of one the later's; otherwise the first map's. The
-/// server that opens the map asks its own finder again where it is none of them.
+/// By one finder, a refusal is taken, as the server does; by two versions of one, the later's verdict; otherwise the
+/// first map's. The server that opens the map asks its own finder again where it is none of them.
 Result<std::string> newer_verdict(std::string_view, std::string a, std::string b) {
   const auto one = wire::decode_verdict(a), other = wire::decode_verdict(b);
   if (!one) return tl::unexpected(one.error());
@@ -126,8 +126,8 @@ Result<std::string> joined_refusals(std::string_view key, const std::string& a, 
   return wire::encode(*one);
 }
 
-/// Of what both know of a robot: its newest session, and that it had the others before; which submaps either refuses.
-/// Of the rest the first map's.
+/// What both know of a robot is joined: its newest session, and that it had the others before; which submaps either
+/// refuses. Everything else is the first map's.
 Result<std::string> joined_meta(std::string_view key, std::string a, std::string b) {
   if (key.starts_with(node::kRefusedPrefix)) return joined_refusals(key, a, b);
   if (!node::RobotRegistry::robot_of(key)) return a;

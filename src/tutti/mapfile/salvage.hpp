@@ -21,8 +21,8 @@ struct Salvaged {
 /// Copies every whole row of a damaged store into a new one. `in` stays as it is; `out` must not exist and appears
 /// whole or not at all. Errors are those of storage::DamagedStore and make_store().
 ///
-/// A server that opens the new map gets the missing submaps from the robots again, as far as they still have them. Of a
-/// robot's store its submaps are taken first, and what it knows of itself; its state is not, so that the robot which
+/// A server that opens the new map gets the missing submaps from the robots again, as far as they still have them. From
+/// a robot's store its submaps are taken first, and what it knows of itself; its state is not, so that the robot which
 /// opens the new store begins a session, later than `now_ns` (since the Unix epoch) and than all that the store knows,
 /// and says why.
 Result<Salvaged> salvage(const std::filesystem::path& in, const std::filesystem::path& out, std::uint64_t now_ns);

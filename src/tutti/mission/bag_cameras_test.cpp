@@ -190,7 +190,7 @@ TEST_F(BagCameras, OfASecondCameraTheNearestImageIsTaken) {
   }
 }
 
-/// Of whatever kind, depth is no second camera; what does not fit is said with what was expected.
+/// Depth of any kind is no second camera; what does not fit is said with what was expected.
 TEST_F(BagCameras, DepthThatIsNotRegisteredIsSaid) {
   const std::vector<std::pair<Depth, std::string>> cases{
       {{.width = 80}, "/depth/image_raw: 80 x 120 pixels, expected 160 x 120 as of /camera/image_raw"},

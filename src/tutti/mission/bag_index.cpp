@@ -46,7 +46,7 @@ bags::StampOrder put_in_order(std::vector<Item>& items, std::vector<bags::Arriva
 
 void refuse(OdometryTrack& track, const Error& error) { track.refused.add(++track.messages, error.message); }
 
-/// Of an encoding that is none of ROS's decoding says what it found instead of CDR.
+/// An encoding that is not ROS's counts as CDR: then decoding says what it found instead.
 bags::RosEncoding encoding_of(const BagMessage& message) {
   return bags::to_encoding(message.channel->message_encoding).value_or(bags::RosEncoding::cdr);
 }

@@ -122,7 +122,7 @@ void doubt_place(const std::string& topic, const Pose3& T_body_sensor, std::vect
     notes.push_back(fmt::format("{}: the sensor is {}", topic, doubt));
 }
 
-/// Of several topics that have fixes none is taken unless it is said which: mostly all but one are made of that one.
+/// When several topics have fixes, the user has to say which to take: mostly all but one are made of that one.
 Status take_fixes(const BagIndex& index, const std::string& body, const RobotConfig& robot, BagRecording& out) {
   const std::string& wanted = robot.topics.fixes;
   std::vector<std::string> topics;

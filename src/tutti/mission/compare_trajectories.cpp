@@ -31,7 +31,7 @@ constexpr double kLeastStep_m = 0.01;      // of way, for the covariance of a mo
 
 /// A moment that both sides know.
 struct Node {
-  std::size_t index = 0;  ///< Of B's pose.
+  std::size_t index = 0;  ///< B's pose.
   evaluation::PosePair pair;
   double way_m = 0.0;  ///< Along A, from the first pair.
 };

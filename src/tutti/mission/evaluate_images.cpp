@@ -14,7 +14,7 @@ namespace {
 /// What the submaps of one robot add up to.
 struct Sum {
   std::set<KeyframeId> keyframes;  ///< With an image.
-  std::size_t frames = 0;          ///< Of every submap: a keyframe that two share counts twice, as its landmarks do.
+  std::size_t frames = 0;          ///< Every submap's: a keyframe that two share counts twice, as its landmarks do.
   std::size_t landmarks = 0;
   std::size_t seen = 0;  ///< Landmarks of every such keyframe.
   visual::ReprojectionError error;

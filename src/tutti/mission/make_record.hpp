@@ -21,7 +21,7 @@ namespace tutti::mission {
 struct FinishedRobot {
   RobotOutcome outcome;
   std::vector<UpdateRecord> updates;
-  std::optional<consistency::Explanation> explanation;  ///< Of the last update.
+  std::optional<consistency::Explanation> explanation;  ///< The last update's.
   std::vector<std::string> troubles;
   std::string refused_images;          ///< Why images were refused first; empty when none were.
   std::vector<TrafficRecord> traffic;  ///< bytes_per_s is not set.

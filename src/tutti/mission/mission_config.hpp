@@ -256,8 +256,8 @@ struct MissionConfig {
   std::vector<std::string> notes;             ///< Shown in the report.
   double duration_s = 0.0;                    ///< 0: until the last sample.
   double odometry_hz = 0.0;                   ///< 0: as recorded or simulated.
-  evaluation::AssociationConfig association;  ///< Of estimates with the reference.
-  ClosureCheckConfig closure_check;           ///< Of accepted closures against the reference.
+  evaluation::AssociationConfig association;  ///< Which poses of an estimate and of the reference belong together.
+  ClosureCheckConfig closure_check;           ///< How accepted closures are compared with the reference.
   std::vector<RobotConfig> robots;
   visual::TrackingConfig tracking;
   robot::AgentConfig agent;

@@ -71,7 +71,7 @@ struct PolicyRecord {
 struct AnswerRecord {
   std::string policy;
   std::size_t constraints = 0;   ///< Held after the broadcast.
-  std::optional<double> rmse_m;  ///< Of the corrected estimate; measured like UpdateRecord::onboard_rmse_m.
+  std::optional<double> rmse_m;  ///< The corrected estimate's; measured like UpdateRecord::onboard_rmse_m.
   template <class V>
   void describe(V& v) {
     v.field(1, "policy", policy);
@@ -103,7 +103,7 @@ struct UpdateRecord {
 /// Where a robot assumes another one to be at the end of the mission.
 struct WhereaboutsRecord {
   RobotId other;
-  Timestamp stamp;   ///< Of the other robot's last known pose.
+  Timestamp stamp;   ///< When the other robot's last known pose was.
   Pose3 T_map_body;  ///< In the map frame of the robot that assumes it.
 };
 
@@ -317,7 +317,7 @@ struct ServerLoadRecord {
   /// the next update (or for one core to verify its pairs, if that takes longer) plus the computing time of that
   /// update.
   std::vector<double> update_latency_ms;
-  double peak_memory_mb = 0.0;    ///< Of the whole process: server, robots and simulator.
+  double peak_memory_mb = 0.0;    ///< The whole process: server, robots and simulator.
   double refinement_cpu_s = 0.0;  ///< For bundle adjustment.
 };
 
@@ -363,7 +363,7 @@ struct MissionRecord {
   std::uint64_t seed = 0;
   std::string default_policy;
   double duration_s = 0.0;                    ///< Mission time.
-  evaluation::AssociationConfig association;  ///< Of estimates with the reference.
+  evaluation::AssociationConfig association;  ///< Which poses of an estimate and of the reference belong together.
   std::string rpe_interval;                   ///< Over what RPE is measured, in words: "10 m", "1 s".
   std::string version;                        ///< Program version and commit.
   std::string effective_config_yaml;

@@ -41,7 +41,7 @@ std::string names_of(const std::pair<RobotId, RobotId>& robots, const MissionRec
                                        : fmt::format("{} with {}", one, name_of(robots.second, record));
 }
 
-/// Of closures between two robots, or of one with itself, this share and this many are more than wrong ones would be.
+/// Between two robots, or one and itself, this share of closures and this many are more than wrong ones would be.
 constexpr double kManyInconsistent = 0.4;
 constexpr std::size_t kEnoughInconsistent = 8;
 

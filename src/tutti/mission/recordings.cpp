@@ -173,7 +173,7 @@ Result<Trajectory> recorded_odometry(const Sources& sources, const RobotConfig& 
   return read_trajectory(robot.odometry, data, is_numbered ? nullptr : &left_out);
 }
 
-/// Of the samples of `odometry`, the first of which is number `from`.
+/// One for each sample of `odometry`, the first of which is number `from`.
 std::vector<Matrix6d> covariances_of(const Sources& sources, const RobotConfig& robot, const Trajectory& odometry,
                                      std::size_t from) {
   if (!sources.graph) return robot::increment_covariances(odometry, robot.covariance);

@@ -22,7 +22,7 @@ namespace tutti::mission {
 struct RecordedClosure {
   std::string from;  ///< The other robot, by its letter in the graph.
   Timestamp from_stamp;
-  Timestamp to_stamp;  ///< Of the robot that has the closure.
+  Timestamp to_stamp;  ///< By the clock of the robot that has the closure.
   RelativePose measurement;
   Timestamp arrived;
 };

@@ -88,10 +88,10 @@ class RobotActor {
   [[nodiscard]] RobotId id() const { return recording_.recording.robot; }
   [[nodiscard]] RobotOutcome outcome() const;
   [[nodiscard]] const std::vector<UpdateRecord>& updates() const { return updates_; }
-  /// Of the node's last update: raw odometry against the map.
+  /// Raw odometry against the map, at the node's last update.
   [[nodiscard]] const std::optional<consistency::Explanation>& explanation() const { return explanation_; }
   [[nodiscard]] std::vector<PolicyTiming> timing() const;
-  [[nodiscard]] double cpu_s() const { return cpu_s_; }  ///< Of the node.
+  [[nodiscard]] double cpu_s() const { return cpu_s_; }  ///< The node's.
   /// What went wrong (samples or scans refused, updates without a correction): one line per kind, with a count and the
   /// first case.
   [[nodiscard]] std::vector<std::string> troubles() const;

@@ -28,7 +28,7 @@ class ListedImages final : public VisualSource {
   std::vector<TrackedImages> moments_;
 };
 
-/// Of a robot whose images are not used: says why, once.
+/// Stands for images that are not used: says why, once.
 class NoImages final : public VisualSource {
  public:
   explicit NoImages(Error why) : why_{std::move(why)} {}
@@ -98,7 +98,7 @@ Result<formats::EurocFolder> read_folder(const ImagesConfig& config, const fs::p
   return out;
 }
 
-/// Of an RGB-D camera.
+/// Reads the depth of an RGB-D camera.
 Status read_depth(const ImagesConfig& images, const fs::path& data, ImageStream& stream) {
   const DepthConfig& config = images.depth;
   if (config.list.empty()) return {};

@@ -68,7 +68,7 @@ class RobotImages : public testing::Test {
     EXPECT_TRUE(record.has_value()) << record.error().message;
     return record ? std::move(*record) : MissionRecord{};
   }
-  /// Of the first sample's images.
+  /// What the first sample's images fail with.
   [[nodiscard]] std::string first_error() const {
     auto input = load_input(config_, folder(), 1);
     if (!input) return input.error().message;
@@ -159,7 +159,7 @@ TEST_F(RobotImages, AListWithACamerasFileIsTheSame) {
   EXPECT_FALSE(list->robots[0].recording.imu.empty());
 }
 
-/// Of the same flight, beside list.csv.
+/// Depth of the same flight, beside list.csv.
 void write_depth(const fs::path& folder, double units_per_m) {
   const Trajectory truth = simulation::simulate_flight({.duration_s = 4.0, .rate_hz = kRate_hz}, kStart);
   const auto scene = std::make_shared<const simulation::HallScene>(simulation::make_hall({}, Rng(1)));

@@ -141,7 +141,7 @@ class MissionRun {
   struct Robot {
     std::unique_ptr<RobotActor> actor;
     std::unique_ptr<bus::Port> port;
-    double worst_latency_ms = 0.0;  ///< Of its updates.
+    double worst_latency_ms = 0.0;  ///< Among its updates.
   };
 
   static std::set<RobotId> robot_ids(const std::vector<MissionRecording>& recordings) {

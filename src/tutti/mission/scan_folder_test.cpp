@@ -161,7 +161,7 @@ TEST_F(Scans, NumberedFromOneOrOfNoPoseAreRefused) {
   EXPECT_EQ(problem(), "");
   std::ofstream(folder_ / "000030.txt") << "something else";
   EXPECT_EQ(problem(), "");
-  // Of a part of a recording, all may be there.
+  // All scans of a part of a recording may be there.
   EXPECT_TRUE(ScanFolder::open(folder_, {.first = 5, .recorded = 30}, odometry_, robot_));
 }
 

@@ -8,7 +8,7 @@
 namespace tutti {
 namespace {
 
-/// Of rounding, as a share of the largest variance.
+/// What rounding makes, as a share of the largest variance.
 constexpr double kRounding = 1e-5;
 
 }  // namespace

@@ -105,7 +105,7 @@ struct ChainUncertainty {
   /// Expected root mean square error over the nodes: of positions after one rigid alignment (the RMSE of the ATE that
   /// the server expects), and of rotations after removing their mean.
   PoseSigma whole;
-  std::vector<ScaleUncertainty> scales;  ///< Of the Meyer filter bank on the chain's graph; scale 0 = largest.
+  std::vector<ScaleUncertainty> scales;  ///< Those of the Meyer filter bank on the chain's graph; scale 0 = largest.
   std::vector<KnownDirection> directions;
   /// The part of the shape that rests on a single closure contradicted by odometry, as a shift. A robot that shall not
   /// follow it moves spread node k >= 1, as seen from the first, by sigma (position_k / 127, rotation_scale rotation_k

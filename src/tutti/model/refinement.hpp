@@ -42,7 +42,7 @@ struct RefinedStep {
 
 /// Figures of a refiner's work, for people.
 struct RefinementCounts {
-  std::uint64_t keyframes = 0, landmarks = 0, observations = 0;  ///< Of the adjusted problem.
+  std::uint64_t keyframes = 0, landmarks = 0, observations = 0;  ///< In the adjusted problem.
   /// Landmarks of neighbouring submaps, merged through the keyframe that both have.
   std::uint64_t joined_by_keyframe = 0;
   std::uint64_t joined_by_closure = 0;  ///< Landmarks of other pairs of submaps that were recognised as the same point.
@@ -71,7 +71,7 @@ struct Refinement {
   std::vector<SubmapId> submaps;  ///< The free ones.
   std::vector<SubmapPair> closed;
   std::vector<RefinedStep> steps;            ///< Sorted by `from`; none between keyframes that kept their poses.
-  std::map<KeyframeId, Pose3> T_world_body;  ///< Of all keyframes of the job, in the job's `world`.
+  std::map<KeyframeId, Pose3> T_world_body;  ///< All keyframes of the job, in the job's `world`.
   RefinementCounts counts;
   std::vector<RefinementRemark> remarks;
   std::string why;      ///< Why the map could not be refined; there are no steps and poses then. Empty: it was refined.

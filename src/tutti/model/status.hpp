@@ -44,7 +44,7 @@ struct NodeStatus {
   std::optional<double> update_age_s;
   std::uint64_t keyframes = 0;
   std::optional<std::uint64_t> submaps;  ///< Number of submaps that a robot has begun in its session.
-  Pose3 T_odom_body;                     ///< Of a robot, at its newest sample.
+  Pose3 T_odom_body;                     ///< A robot's, at its newest sample.
   std::uint64_t alerts = 0;
   bool finished = false;        ///< Its recording has ended.
   std::uint64_t jobs_done = 0;  ///< A worker's jobs since it started.
@@ -154,7 +154,7 @@ struct MissionStatus {
   bool has_news = false;           ///< The next revision is due.
   std::vector<Robot> robots;       ///< Sorted by number.
   std::vector<Worker> workers;     ///< Sorted by number.
-  std::vector<Refusals> refusals;  ///< Of messages.
+  std::vector<Refusals> refusals;  ///< Messages that were refused.
   std::string trouble;             ///< A problem, for people; empty: none.
   std::string finder;              ///< to_string(MethodId) of the finder that verifies closures.
   /// Pairs with closures of other finders, which stay in the map until the present finder has answered.

@@ -139,8 +139,8 @@ struct ImuPreintegration {
   Matrix9d covariance = Matrix9d::Zero();                    ///< In rad, m/s, m.
   /// Derivative by [gyro bias; accelerometer bias].
   Eigen::Matrix<double, 9, 6> d_bias = Eigen::Matrix<double, 9, 6>::Zero();
-  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();           ///< Of the linearisation, rad/s.
-  Eigen::Vector3d accelerometer_bias = Eigen::Vector3d::Zero();  ///< Of the linearisation, m/s^2.
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();           ///< The linearisation's, rad/s.
+  Eigen::Vector3d accelerometer_bias = Eigen::Vector3d::Zero();  ///< The linearisation's, m/s^2.
 };
 
 /// What one robot's cameras saw along one submap.

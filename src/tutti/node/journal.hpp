@@ -21,7 +21,7 @@ namespace tutti::node {
 struct OdometrySample {
   Timestamp stamp;
   Pose3 T_odom_body;
-  Matrix6d increment_covariance = Matrix6d::Zero();  ///< Of the step since the previous sample, right tangent.
+  Matrix6d increment_covariance = Matrix6d::Zero();  ///< The step since the previous sample, right tangent.
 };
 /// A proxy graph that the robot received.
 struct HeardGraph {

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::string_view kKey = "robot/";
 
-/// Of too many the oldest are forgotten.
+/// When there are too many, the oldest are forgotten.
 void remember(std::set<std::uint64_t>& sessions, std::uint64_t session) {
   sessions.insert(session);
   if (sessions.size() > RobotRow::kMostSessions) sessions.erase(sessions.begin());

@@ -36,7 +36,7 @@ class OtherFinder final : public server::ClosureFinder {
   MethodId id_;
 };
 
-/// Of a name, so that its jobs are for it alone.
+/// Its name makes its jobs for it alone.
 class NamedShrinker final : public server::MapRefiner {
  public:
   [[nodiscard]] MethodId id() const override { return {"shrinker", 1, 7}; }

@@ -62,7 +62,8 @@ void ServerNode::receive_verdicts(const bus::Envelope& envelope, Timestamp now, 
   step.tell(now, VerdictsTaken{answer->job, answer->verdicts.size()});
 }
 
-/// Of another finder than the server's, as of a program of another version: believed when the server's is that one.
+/// Verdicts of another finder than the server's, as of a program of another version: believed once the server has that
+/// finder.
 /// Closures are kept until then, one answer for each pair.
 void ServerNode::set_aside(const bus::Envelope& envelope, const std::vector<ClosureVerdict>& verdicts, Timestamp now,
                            Step& step) {
@@ -104,8 +105,8 @@ void ServerNode::keep(const Verdicts& refused, Step& step) {
   if (!refused.verdicts.empty()) step.writes.push_back({"answers", refused.job, wire::encode(refused)});
 }
 
-/// It has ended every worker that had it (bus::Port::receive()). Of many pairs one may have done that: each is asked
-/// alone then.
+/// It has ended every worker that had it (bus::Port::receive()). If the job has many pairs, one of them may have
+/// done that: then each is asked alone.
 void ServerNode::receive_returned_job(const bus::Envelope& envelope, Timestamp now, Step& step) {
   const auto job = wire::decode_job(*envelope.bytes);
   if (!job) return refuse(envelope, job.error().message, now, step);

@@ -158,7 +158,7 @@ class StrangeAnswers : public ServerJobs {
     return receive({Endpoint::worker(9), Endpoint::server(), MessageKind::verdicts, said.job,
                     std::make_shared<const std::string>(wire::encode(said))});
   }
-  /// Of the pair of job, refused.
+  /// A verdict that refuses the job's pair.
   [[nodiscard]] Verdicts refusal_of(const std::string& job, const SubmapPair& pair = kBad) const {
     return {.job = job,
             .verdicts = {{.pair = pair,

@@ -48,7 +48,7 @@ class ServerStatus : public testing::Test {
     envelope.id = id;
     return receive(envelope);
   }
-  /// Of whose session the robot's proxy nodes are; nothing: it was sent none.
+  /// The session whose proxy nodes the robot was sent; nothing: it was sent none.
   std::optional<std::uint64_t> graph_of(RobotId robot) {
     now_ = now_ + 30.0;
     const Step step = done(node_->on_timer(now_));
@@ -258,8 +258,8 @@ TEST_F(ServerStatus, WhatItNeverTakesIsInTheReceiptAndSurvivesARestart) {
   check();
 }
 
-/// Of numbers that the robot has not used, what is refused is not its own, and is not told as that; it was told for
-/// ever.
+/// What is refused under numbers that the robot has not used is not the robot's, and is not told as that. It was told
+/// for ever.
 TEST_F(ServerStatus, GarbageUnderNumbersThatARobotNeverUsedIsNotTheRobots) {
   const ChainId chain{kAlpha, 7};
   receive(test::envelope(test::submap(chain, 0)));

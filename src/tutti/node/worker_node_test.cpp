@@ -19,7 +19,7 @@ const bus::Endpoint kWorker = bus::Endpoint::worker(0);
 
 class WorkerNodeTest : public testing::Test {
  protected:
-  /// Of submaps below 4.
+  /// Frames of the submaps below 4.
   static std::shared_ptr<SubmapFrames> frames() {
     return std::make_shared<SubmapFrames>([](SubmapId id) -> Result<std::string> {
       if (id.index >= 4) return fail(ErrorCode::io, "no submap {}", to_string(id));
@@ -255,7 +255,7 @@ TEST(FrameCache, KeepsTheNewestAndWhatIsNeeded) {
   EXPECT_EQ(cache.bytes(), 6U);
 }
 
-// Of those used last not one would be there.
+// A cache of the most recently used ones would have none of them.
 TEST(FrameCache, ScannedAgainAndAgainItHasWhatFits) {
   constexpr std::uint32_t kSubmaps = 100, kRoom = 60;
   FrameCache cache(kRoom);

@@ -65,7 +65,7 @@ struct UpdateSummary {
   /// The optimisation failed. The ledger then holds what it held before, without withdrawn constraints; or nothing if
   /// that fails too.
   bool taken_back = false;
-  /// Of raw odometry against the server's map; empty unless AgentConfig::explain.
+  /// Where raw odometry differs from the server's map; empty unless AgentConfig::explain.
   consistency::Explanation explanation;
 };
 
@@ -77,7 +77,7 @@ using StageObserver = std::function<void(UpdateStage)>;
 /// The part of an agent's state whose size does not grow with the length of the run.
 struct AgentHead {
   std::uint64_t session = 0;   ///< ChainId::session; a restored state goes on with it.
-  std::uint64_t sequence = 0;  ///< Of the next message.
+  std::uint64_t sequence = 0;  ///< The next message's.
   std::uint64_t epoch = 0;     ///< ProxyGraph::age() of the newest graph heard.
   std::uint64_t revision = 0;
   std::uint64_t comparisons = 0;  ///< Number of proxy graphs that were compared.

@@ -80,7 +80,7 @@ ProxyGraphMessage everybodys(const RobotAgent& agent, std::uint64_t revision, bo
   return message;
 }
 
-// Of the whole graph nothing else matters to it, not even what is closer than the radius or reduced together.
+// Nothing else in the whole graph matters to it, not even what is closer than the radius or reduced together.
 TEST_P(AgentPolicies, DoesTheSameWithItsOwnPartOfTheGraph) {
   for (const bool reduced : {false, true}) {
     AgentConfig config;

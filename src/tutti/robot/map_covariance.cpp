@@ -18,7 +18,7 @@ struct Variances {
   double position_m2 = 0.0, rotation_rad2 = 0.0;
 };
 
-/// Of one node against the whole chain: what the map says of all scales together, and never less than the chain's mean.
+/// One node against the whole chain: what the map says of all scales together, and never less than the chain's mean.
 Variances at_node(const ChainUncertainty& known, std::size_t node) {
   Variances out;
   for (const ScaleUncertainty& scale : known.scales) {
@@ -53,7 +53,7 @@ Matrix6d end_to_end(const ChainUncertainty& known, std::span<const ProxyNode> no
   return out.asDiagonal();
 }
 
-/// Of T_from^-1 T_to by the map: the better of two ways to say it, neither of which says too little.
+/// The map's covariance of T_from^-1 T_to: the smaller of two bounds.
 Matrix6d by_map(const ProxyGraph& graph, const ChainId& chain, Timestamp from_stamp, Timestamp to_stamp) {
   const std::span<const ProxyNode> nodes = nodes_of(graph, chain);
   if (nodes.empty()) return Matrix6d::Zero();

@@ -6,8 +6,8 @@
 namespace tutti::robot {
 namespace {
 
-/// A step less sure than this says nothing about a run of many: the few links of a graph of runs hold it or do not.
-/// With 100 m and 3 rad that graph is often without a solution; a robot moves less from one sample to the next.
+/// A step that states larger errors gets these: a robot moves less from one sample to the next. With 100 m and 3 rad
+/// the graph of long runs of steps is so loose that it often has no solution.
 constexpr double kUnknownStep_m = 10.0;
 constexpr double kUnknownStep_rad = 0.3;
 

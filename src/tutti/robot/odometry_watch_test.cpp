@@ -20,7 +20,7 @@ Pose3 ahead(double x_m, double yaw_rad = 0.0) {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ())), {x_m, 0.0, 0.0}};
 }
 
-/// Of odometry at this speed and rate: how many jumps are told when from some time on it is elsewhere by `jump`.
+/// How many jumps are told when odometry at this speed and rate is elsewhere by `jump` from some time on.
 int jumps(double speed_mps, double rate_hz, const Pose3& jump, double seconds = 20.0) {
   OdometryWatch watch;
   int told = 0;

@@ -81,7 +81,7 @@ struct PlacedFix {
 /// All that a builder remembers.
 struct SubmapBuilderState {
   std::uint32_t next_submap = 0;
-  std::vector<Keyframe> keyframes;     ///< Of the open submap.
+  std::vector<Keyframe> keyframes;     ///< Those of the open submap.
   std::vector<RelativePose> odometry;  ///< Between those keyframes.
   std::vector<lidar::PosedCloud> scans;
   std::vector<TrackedImages> images;     ///< At keyframes.

@@ -21,16 +21,16 @@ namespace {
 
 using Eigen::Matrix3d, Eigen::Vector3d;
 
-/// Of pairs and of triples, as many: with half of the points wrong, one of 2^3 triples is right.
+/// So many pairs are tried, and as many triples: with half of the points wrong, one of 2^3 triples is right.
 constexpr int kHypotheses = 150;
-/// The median of so many points tells it as well as that of more.
+/// More points are thinned: the median by which a hypothesis is scored hardly changes.
 constexpr std::size_t kMostPoints = 600;
 constexpr int kRefinements = 10;
 constexpr std::size_t kFewestSubmaps = 3;
 constexpr double kTiltKnown_rad = 3.0 * kRadPerDeg;
 constexpr double kYawKnown_rad = 5.0 * kRadPerDeg;
 constexpr double kWorstFit = 1.0 / 7.0;
-/// Of misfits that are so many times their variance, noise is not the reason.
+/// Noise does not explain misfits that are so many times their variance.
 constexpr double kNotNoise = 9.0;
 /// Up is down: the points are mirrored, which a turn about a level axis undoes.
 constexpr double kUpsideDown = -0.7;  // cosine

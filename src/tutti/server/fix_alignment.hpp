@@ -15,7 +15,7 @@ namespace tutti::server {
 struct FixedPoint {
   Eigen::Vector3d p_world;
   Eigen::Vector3d p_enu;
-  Eigen::Matrix3d covariance;  ///< Of p_enu, m^2.
+  Eigen::Matrix3d covariance;  ///< p_enu's, m^2.
   double weight = 1.0;         ///< The number of independent fixes that this point counts as.
   std::size_t submap = 0;      ///< Position of the point's submap in the caller's list; ascending.
 };

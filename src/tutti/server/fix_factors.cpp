@@ -18,7 +18,7 @@ using Eigen::Matrix3d, Eigen::Vector3d;
 constexpr int kRaises = 4;
 /// A lever arm is turned by the map, whose heading its fix is to correct: so far that may be off, round after round.
 constexpr std::array kHeadings_rad{0.2, 0.05, 0.0};
-/// Of least squares, at the end.
+/// Iterations of least squares, at the end.
 constexpr int kTurns = 2;
 
 class Bender {

@@ -18,7 +18,7 @@ constexpr double kBeyondWay_m = 100.0;
 
 /// A part of the map without a gap, and how it lies on the earth.
 struct Part {
-  std::vector<std::size_t> submaps;  ///< Of PlacedFixes.
+  std::vector<std::size_t> submaps;  ///< Indices in PlacedFixes.
   FixAlignment alignment;
   double way_m = 0.0;
   [[nodiscard]] bool is_aligned() const { return alignment.why_not.empty(); }
@@ -68,7 +68,7 @@ void join_parts(const Parts& parts, MapEstimate& map) {
   }
 }
 
-/// Of a part that is laid on the earth as it is: one edge, from enu to the node nearest to the middle.
+/// A part that is laid on the earth as it is gets one edge, from enu to the node nearest to the middle.
 PoseGraphEdge tie(const Part& part, const PlacedFixes& placed, const MapEstimate& map, const Pose3& T_enu_world) {
   const Vector3d& middle = part.alignment.middle_enu;
   const auto from_middle = [&](std::size_t s) {
@@ -85,7 +85,7 @@ PoseGraphEdge tie(const Part& part, const PlacedFixes& placed, const MapEstimate
           .information = judge::information_of(to_body * part.alignment.covariance * to_body.transpose())};
 }
 
-/// Of submaps in no part that counts.
+/// For submaps in no part that counts.
 FixFactors nothing_yet(const PlacedFixes& placed, const Pose3& T_enu_world) {
   return {.objections = std::vector<FixObjection>(placed.submaps.size(), FixObjection::unaligned),
           .joined = std::vector<OneFix>(placed.submaps.size()),
@@ -134,7 +134,7 @@ void bend_what_does_not_fit(const PlacedFixes& placed, const estimation::GncConf
   }
 }
 
-/// Of parts that stay as they are: a submap's fixes count where half of them fit the alignment.
+/// In parts that stay as they are, a submap's fixes count where half of them fit the alignment.
 void judge_as_it_is(const PlacedFixes& placed, const Parts& parts, const MapEstimate& map, FixFactors& factors) {
   for (const auto& [component, part] : parts) {
     if (!part.is_aligned()) continue;

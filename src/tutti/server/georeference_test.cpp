@@ -20,12 +20,12 @@ using simulation::ReceiverConfig;
 
 struct Robot {
   std::uint32_t id = 0;
-  double side_m = 120.0;           ///< Of the square that it goes round once, at 1 m/s.
+  double side_m = 120.0;           ///< The square's that it goes round once, at 1 m/s.
   Eigen::Vector3d start{0, 0, 0};  ///< In the truth.
-  double drift_deg_per_m = 0.0;    ///< Of yaw.
-  double sigma_deg = 0.5;          ///< Of a step's turn, as stated.
+  double drift_deg_per_m = 0.0;    ///< In yaw.
+  double sigma_deg = 0.5;          ///< A step's turn, as stated.
   double slip_deg = 0.0;           ///< Half way, and stated nowhere.
-  double tilt_deg = 0.0;           ///< Of its odometry frame.
+  double tilt_deg = 0.0;           ///< Its odometry frame's.
   ReceiverConfig receiver{.sigma_m = 0.5, .sigma_up_m = 1.0};
 };
 
@@ -89,7 +89,7 @@ struct World {
   [[nodiscard]] MapEstimate map(const GeoreferenceConfig& config = {}) const {
     return georeferenced(estimate_map(submaps, {}, {}), submaps, config, {});
   }
-  /// Of the positions of all nodes of a component, after one rigid alignment.
+  /// Compares the positions of all nodes of a component, after one rigid alignment.
   [[nodiscard]] double rmse(const MapEstimate& map, std::optional<RobotId> robot = {}) const {
     std::vector<Eigen::Vector3d> expected, estimate;
     for (const MapNode& node : map.nodes) {

@@ -24,7 +24,7 @@ struct RobotGraph {
 struct JudgedEdge {
   bool odometry = false;
   bool accepted = true;                                    ///< Always true for odometry, even where it failed.
-  judge::Objection objection = judge::Objection::none;     ///< Of a closure that is not accepted.
+  judge::Objection objection = judge::Objection::none;     ///< Why a closure is not accepted.
   double price = std::numeric_limits<double>::infinity();  ///< JudgedClosure::price
 };
 

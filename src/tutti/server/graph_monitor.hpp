@@ -12,7 +12,7 @@ namespace tutti::server {
 
 /// The cost of monitor_graph().
 struct MonitorWork {
-  std::size_t factorisations = 0;  ///< Of the whole graph, and of the graph of the closures' ends.
+  std::size_t factorisations = 0;  ///< The whole graph's, and the graph's of the closures' ends.
   std::size_t products = 0;        ///< Columns of samples times products with the graph's Laplacian.
 };
 

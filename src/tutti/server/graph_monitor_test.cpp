@@ -81,7 +81,7 @@ TEST(MonitorGraph, ARobotWhosePosesAreOpenIsLeftOutAlone) {
   for (const ProxyNode& node : graph.nodes) EXPECT_TRUE(node.covariance.allFinite());
 }
 
-// Of nine submaps the second never arrives, so that the robot's way is in two pieces that nothing joins.
+// The second of nine submaps never arrives, so that the robot's trajectory is in two pieces that nothing joins.
 TEST(MonitorGraph, AGapNearTheStartLeavesTheLargerPiece) {
   SubmapSet submaps;
   for (const std::uint32_t robot : {0U, 1U})
@@ -294,7 +294,7 @@ void expect_calibrated(const Calibration& found) {
   for (std::size_t s = 0; s < 4; ++s) {
     if (found.coefficient_m[s].count == 0) continue;
     ++said;
-    // Of the worst direction and of the worst node of ten: of three axes together between some of one and three.
+    // The worst direction of the worst of ten nodes has between a third and all of what three axes have together.
     for (const Mean& coefficient : {found.coefficient_m[s], found.coefficient_rad[s]}) {
       EXPECT_GT(coefficient(), 0.5) << s;
       EXPECT_LT(coefficient(), 3.0) << s;

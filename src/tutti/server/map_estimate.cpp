@@ -217,7 +217,7 @@ bool raise_understated(const std::map<ChainId, judge::OdometryHonesty>& honesty,
   return !map.understated.empty();
 }
 
-/// Of submaps that do not contradict each other.
+/// The map of submaps that do not contradict each other.
 MapEstimate estimate_together(const SubmapSet& submaps, const VerdictSet& verdicts, const MapConfig& config,
                               const WordSet& words, const std::set<SubmapPair>& refuted) {
   MapEstimate map;

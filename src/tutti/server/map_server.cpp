@@ -85,8 +85,8 @@ Status check_alone(const ClosureVerdict& verdict, const std::set<RobotId>& robot
   return {};
 }
 
-/// Of two verdicts of one finder on one pair, does `a` hold, whichever came first? In doubt there is no closure. More
-/// closures are those of a finder that knows them one after the other.
+/// Does `a` hold rather than `b`, both by one finder on one pair, whichever came first? In doubt there is no closure.
+/// More closures are those of a finder that knows them one after the other.
 bool holds_over(const ClosureVerdict& a, const ClosureVerdict& b) {
   if (a.closures.empty() || b.closures.empty()) return a.closures.empty() && !b.closures.empty();
   if (a.closures.size() != b.closures.size()) return a.closures.size() > b.closures.size();

@@ -65,7 +65,7 @@ struct VerificationJob {
 /// from this with the same store goes on with the same map.
 struct MapServerState {
   SubmapSet submaps;                              ///< Without payloads.
-  std::map<SubmapId, PayloadSize> payload_sizes;  ///< Of the submaps that carry any.
+  std::map<SubmapId, PayloadSize> payload_sizes;  ///< Only submaps that carry any.
   /// The verdicts with closures: those of `finder`, and those of earlier finders on pairs that `finder` has not
   /// answered. Refusals are only counted: a pair that is in `answered` and not here was refused, or is not to be
   /// verified.
@@ -117,15 +117,16 @@ class MapServer {
   /// the sender; the submap is malformed, or differs from the one with its id in the map; the robot has no room for
   /// another session (ProxyGraph::kMostChains); or the store cannot keep the payload, and the submap may be sent again.
   Status receive(const SubmapMessage& message);
-  /// Takes the answer to a job; answers may come in any order and any number of times. Of two verdicts on one pair a
-  /// refusal wins, then more closures, then those with the smaller numbers, so that the order does not matter. A
-  /// verdict that comes before its submaps waits for them. On an error nothing changes: the verdict is of another
-  /// finder than the server's; a closure joins anything else than a keyframe of pair.first to one of pair.second; the
-  /// finder would not verify the pair; or kMostWaiting verdicts wait already, and the pair is verified again.
+  /// Takes the answer to a job; answers may come in any order and any number of times. If two verdicts on one pair
+  /// differ, a refusal wins, then more closures, then those with the smaller numbers, so that the order does not
+  /// matter. A verdict that comes before its submaps waits for them. On an error nothing changes: the verdict is of
+  /// another finder than the server's; a closure joins anything else than a keyframe of pair.first to one of
+  /// pair.second; the finder would not verify the pair; or kMostWaiting verdicts wait already, and the pair is verified
+  /// again.
   Status receive(const ClosureVerdict& verdict);
   static constexpr std::size_t kMostWaiting = 1000;
-  /// Takes an operator's word on the closures of a pair, any number of times; the next optimise() follows it. Of two
-  /// words on one pair the later one counts. When an operator accepts closures, their verdict stays, whatever other
+  /// Takes an operator's word on the closures of a pair, any number of times; the next optimise() follows it. The
+  /// later of two words on one pair counts. When an operator accepts closures, their verdict stays, whatever other
   /// finders say. On an error nothing changes: the map lacks one of the submaps, or there are no closures to accept.
   Status receive(const SubmapPair& pair, const ClosureWord& word);
   /// Takes the answer to a refinement job, in any order, any number of times, however late; the next optimise() follows

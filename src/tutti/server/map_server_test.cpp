@@ -267,7 +267,7 @@ class BrokenStore final : public PayloadStore {
   MemoryPayloadStore inner_;
 };
 
-/// Of robot 0; the odd ones have clouds.
+/// Submaps of robot 0; the odd ones have clouds.
 std::vector<SubmapMessage> submaps_with_some_clouds() {
   std::vector<SubmapMessage> messages;
   for (Submap& submap : test::make_submaps(RobotId{0}, {}, Rng(1))) {

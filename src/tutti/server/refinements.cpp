@@ -44,7 +44,7 @@ void put_steps(const Refinements& refinements, MapEstimate& map) {
   }
 }
 
-/// Of the keyframes that closures join: the submaps that have them, two where they are shared.
+/// The submaps that have the keyframes that closures join: two for a keyframe that is shared.
 std::map<KeyframeId, std::vector<SubmapId>> submaps_of_closures(const MapEstimate& map, const SubmapSet& submaps) {
   std::map<KeyframeId, std::vector<SubmapId>> out;
   for (std::size_t e = map.odometry_edges; e < map.graph.edges.size(); ++e)
@@ -87,7 +87,7 @@ bool has_all(const MapEstimate& map, const Submap& submap) {
   });
 }
 
-/// Of one that the map has all of.
+/// Where the map has the keyframes of a submap, all of which it has.
 std::vector<Pose3> poses_of(const Submap& submap, const MapEstimate& map) {
   std::vector<Pose3> out;
   for (const Keyframe& keyframe : submap.keyframes)
@@ -109,7 +109,7 @@ std::set<SubmapId> difference(const RefinementScope& scope, const RefinementScop
   return out;
 }
 
-/// Of these, those right before and after `id` in its chain.
+/// Those in `submaps` that are right before and after `id` in its chain.
 std::vector<SubmapId> neighbours(const SubmapId& id, const std::set<SubmapId>& submaps) {
   std::vector<SubmapId> out;
   const auto at = submaps.lower_bound(id);

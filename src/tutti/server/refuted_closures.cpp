@@ -14,8 +14,8 @@ constexpr double kRefuted = 5.0;
 /// One wrong join gone, another may be believed.
 constexpr int kRounds = 3;
 
-/// Of a place on a session that lies by itself on the earth. What half of its fixes miss by is what drift and their own
-/// errors make.
+/// How well the fixes alone say where on the earth a place on a session is: what half of its fixes miss by is what
+/// drift and their own errors make.
 double sigma_m(const FixAlignment& session, const Eigen::Vector3d& p_enu) {
   return session.sigma_m() + session.sigma_yaw_rad() * (p_enu - session.middle_enu).norm() + session.median_miss_m;
 }

@@ -16,14 +16,14 @@ using Eigen::Matrix3d, Eigen::Vector3d;
 
 /// What is farther from most fixes than this is no origin: there, another direction is up.
 constexpr double kSamePlace_m = 20e3;
-/// Of a fix in one submap with another.
+/// The probability with which two right fixes of one submap agree.
 constexpr double kAgree = 0.99;
-/// Each is compared with each; more of one submap are thinned.
+/// More fixes of one submap are thinned, because each is compared with each.
 constexpr std::size_t kMostFixes = 60;
-/// So far the map's heading may be off before fixes have corrected it.
+/// The map's heading may be off by so much before fixes have corrected it.
 constexpr double kHeading_rad = 0.2;
-/// A quarter of a receiver's errors are so many times what a quarter may be: it says too little of them. Three wrong
-/// fixes in ten spoil half of the differences between two.
+/// A receiver states too small errors where the lower quartile of what its fixes miss by is so many times what it
+/// should be. The median would not do: three wrong fixes in ten spoil half of the differences between two fixes.
 constexpr double kTooSure = 2.0;
 constexpr double kQuarter = 0.25;
 

@@ -14,7 +14,7 @@ namespace tutti::server {
 /// The fixes of one submap, placed on the map's nodes.
 struct SubmapFixes {
   SubmapId submap;
-  std::uint32_t component = 0;  ///< Of the map, that the submap is in.
+  std::uint32_t component = 0;  ///< The map's component that the submap is in.
   struct Fix {
     std::size_t node = 0;  ///< Index of the map's node.
     Eigen::Vector3d p_node_antenna;

@@ -17,7 +17,7 @@ double any_magnitude(Rng& rng, double least, double most) {
   return std::exp(rng.uniform(std::log(least), std::log(most)));
 }
 
-/// Of any size, correlated in any way, not always of full rank.
+/// Has any size, is correlated in any way, and is not always of full rank.
 Matrix6d any_covariance(Rng& rng) {
   const auto columns = static_cast<Eigen::Index>(1 + rng.index(6));
   Eigen::Matrix<double, 6, Eigen::Dynamic> root(6, columns);

@@ -16,7 +16,7 @@ namespace {
 constexpr int kStack = 256;  ///< Ranges are halved, so that this is enough.
 constexpr float kFar = std::numeric_limits<float>::infinity();
 constexpr float kSlack = 1.000002F;     ///< A few ulp: rounding may shrink a flat box's slab to less than nothing.
-constexpr float kTriangleEdge = 1e-5F;  ///< Of a triangle's size.
+constexpr float kTriangleEdge = 1e-5F;  ///< As a share of a triangle's size.
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
 struct Bounds {

@@ -64,7 +64,7 @@ RC_GTEST_PROP(Bvh, FindsWhatTryingAllTrianglesFinds, (std::uint32_t seed)) {
     const Eigen::Vector3f direction = any_direction(rng);
     const auto range = static_cast<float>(rng.bernoulli(0.5) ? 100.0 : rng.uniform(0.0, 10.0));
     const auto hit = bvh.cast(origin, direction, range);
-    double nearest = std::numeric_limits<double>::infinity();  // Of those the ray certainly meets.
+    double nearest = std::numeric_limits<double>::infinity();  // Among those that the ray certainly meets.
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
       const Truth truth = crossing(mesh, t, origin, direction);
       if (truth.inside > 1e-3 && truth.distance > 1e-3 && truth.distance < range - 1e-3)

@@ -19,8 +19,8 @@ struct Passage {
   Eigen::Vector3d a, b;  ///< Middle of the floor at the ends.
   double half_width = 0.0;
   double height = 0.0;
-  double top_radius = 0.0;     ///< Of the upper corners of the cross-section.
-  double bottom_radius = 0.0;  ///< Of the lower corners.
+  double top_radius = 0.0;     ///< The cross-section's upper corners'.
+  double bottom_radius = 0.0;  ///< The lower corners'.
   double roughness = 0.0;      ///< How far walls deviate from smooth.
   double variation = 0.0;      ///< Share by which the width varies.
 };

@@ -68,7 +68,7 @@ struct FlownRecording {
 
 /// The recordings of a simulated hall, and the hall's surface.
 struct SimulatedHall {
-  std::vector<FlownRecording> robots;           ///< Of robots 0, 1, ...
+  std::vector<FlownRecording> robots;           ///< Robots 0, 1, ...
   std::shared_ptr<const TriangleMesh> surface;  ///< What a survey would measure.
 };
 

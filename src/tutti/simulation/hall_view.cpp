@@ -19,7 +19,7 @@ constexpr float kRounding = 1e-6F;  // of a cosine
 /// Neighbouring rays, row by row; those beyond the image's edge are zero.
 struct Tile {
   std::array<float, kRays> dx{}, dy{}, dz{};
-  Eigen::Vector3f axis = Eigen::Vector3f::Zero();  ///< Of the cone round them, unit,
+  Eigen::Vector3f axis = Eigen::Vector3f::Zero();  ///< Axis of the cone round them, unit,
   float cosine = 1.0F, sine = 0.0F;                ///< and half of its opening angle.
 
   Tile(std::span<const Eigen::Vector3f> rays, int width_px, int x_px, int y_px) {

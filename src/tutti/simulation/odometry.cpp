@@ -229,7 +229,7 @@ class RunErrors {
         failure_(draw_failure(truth, surroundings, config.failure, rng.fork("failure"))),
         scripted_(place_scripted(truth, config.scripted)) {}
 
-  /// Of increment k; call in order.
+  /// The error of increment k; call in order.
   IncrementError next(std::size_t k, const Eigen::Vector3d& translation) {
     const double distance = translation.norm();
     IncrementError out{white_sigma(config_, distance), honest_covariance(config_, translation)};

@@ -129,7 +129,7 @@ std::vector<Surroundings> surroundings_along(const CorridorWorld& world, const T
 /// Simulated odometry with the errors that were put into it.
 struct OdometrySimulation {
   Trajectory odometry;                         ///< T_odom_body at the stamps of the truth, in its own odom frame.
-  std::vector<Matrix6d> increment_covariance;  ///< Of the step k -> k + 1, right tangent; one fewer than odometry.
+  std::vector<Matrix6d> increment_covariance;  ///< The step's k -> k + 1, right tangent; one fewer than odometry.
   std::vector<DriftOrigin> drift_origins;      ///< Slips, featureless corridors and failures, in time order.
 };
 

@@ -63,7 +63,7 @@ std::vector<SimulatedRobotConfig> single_robots(const std::vector<SimulatedRobot
 /// The recordings of a simulated mission, and the world in which they were made.
 struct SimulatedWorld {
   CorridorWorld network;
-  std::vector<Recording> recordings;            ///< Of robots 0, 1, ... in the order of single_robots().
+  std::vector<Recording> recordings;            ///< Robots 0, 1, ... in the order of single_robots().
   std::shared_ptr<const TriangleMesh> surface;  ///< What a survey would measure; null without sensors.
 };
 

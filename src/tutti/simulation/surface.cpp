@@ -116,7 +116,7 @@ class SurfaceNets {
       if (found == vertex_of_.end()) return;
       quad[crossing.into_rock ? 3 - i : i] = found->second;
     }
-    const auto error = [&](std::size_t i) {  // Of the diagonal from corner i.
+    const auto error = [&](std::size_t i) {  // That of the diagonal from corner i.
       const Eigen::Vector3f middle = 0.5F * (mesh_.vertices[quad[i]] + mesh_.vertices[quad[i + 2]]);
       return std::abs(space_.value(middle.cast<double>()));
     };

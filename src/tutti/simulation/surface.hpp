@@ -13,7 +13,7 @@ namespace tutti::simulation {
 
 class FreeSpace;
 
-inline constexpr double kHeight_m = 2.8;  ///< Of rough and featureless corridors.
+inline constexpr double kHeight_m = 2.8;  ///< Rough and featureless corridors'.
 inline constexpr double kOfficeHeight_m = 2.6;
 inline constexpr double kRoofMargin_m = 4.0;  ///< Distance from the outermost open corridors to the roof's edge.
 

@@ -173,7 +173,8 @@ Status check_size(const WalkConfig& config) {
   return {};
 }
 
-/// Of the places the walk leads to, along x or y: wherever the robot is, one is at least half of this away.
+/// How far apart the places are that the walk leads to, along x or y: wherever the robot is, one of them is at least
+/// half of this away.
 double width_of(const CorridorWorld& world, const std::vector<int>& route) {
   Eigen::AlignedBox2d box;
   if (route.empty())

@@ -11,7 +11,7 @@
 namespace tutti::simulation {
 namespace {
 
-constexpr double kJunctionSpacing = 10.0;  ///< Of both loops of the terrace.
+constexpr double kJunctionSpacing = 10.0;  ///< Along both loops of the terrace.
 constexpr double kJunctionJitter = 1.5;    ///< Along the office's corridors: no two are alike.
 
 void join(CorridorWorld& world, std::size_t a, std::size_t b, CorridorKind kind) {

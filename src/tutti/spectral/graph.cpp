@@ -91,7 +91,7 @@ double proximity_weight(double distance_m, double sigma_m) {
   return std::exp(-distance_m / (2.0 * sigma_m * sigma_m));  // eq. (1)
 }
 
-/// Of edges whose weight is their length: those among the `most` shortest of either end.
+/// Keeps edges, whose weight is their length, that are among the `most` shortest of either end.
 void keep_nearest(std::size_t nodes, std::size_t most, EdgeList& edges) {
   struct Neighbour {
     double distance_m;

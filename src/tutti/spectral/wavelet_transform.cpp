@@ -178,7 +178,7 @@ ChebyshevResult chebyshev_transform(const SparseMatrix& laplacian, const MeyerFi
 
 namespace {
 
-/// Of frequencies as shares of the largest, which is all that the kernels of a Meyer bank depend on: made once.
+/// Takes frequencies as shares of the largest, which is all that the kernels of a Meyer bank depend on: made once.
 const Expansion& unit_expansion(int scales) {
   constexpr Index kTerms = 2048;
   static std::mutex mutex;
@@ -253,8 +253,8 @@ struct WaveletFilter::Prepared {
   SparseMatrix laplacian;
   Layout layout;
   MeyerFilterBank bank;
-  const Expansion* expansion = nullptr;  ///< Of the bank over domain * h_s; null: no edges.
-  std::vector<Index> degrees;            ///< Of its polynomials.
+  const Expansion* expansion = nullptr;  ///< The bank's over domain * h_s; null: no edges.
+  std::vector<Index> degrees;            ///< Its polynomials'.
 };
 
 WaveletFilter::WaveletFilter(const SparseMatrix& laplacian, int scales, double tolerance) {

@@ -27,7 +27,7 @@ std::string log_header(const fs::path& log) {
 
 }  // namespace
 
-/// Of a log, SQLite writes only the end, and it writes pages to the file that are in the log. So, as after a crash,
+/// SQLite writes only at the end of a log, and it writes pages to the file that are in the log. So, as after a crash,
 /// whatever a copy of the file has in the middle of a page, the log has whole, provided that it is the same log
 /// throughout and is copied last. Frames at its end that are not whole do not have their checksums, and do not count.
 Status copy_sqlite_store(const fs::path& from, const fs::path& to) {

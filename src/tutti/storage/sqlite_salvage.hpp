@@ -27,8 +27,8 @@ using TakeRow = std::function<Status(std::string_view table, std::string_view ke
 /// changed, so pass a copy, with its -wal. Takes time and memory in proportion to the file, whatever is in it.
 class DamagedStore {
  public:
-  /// Of one of these schemas. Errors: no SQLite file, one of another program, kind or newer version, or none of its
-  /// tables can be found.
+  /// Opens a copy of a file that has one of these schemas. Errors: no SQLite file, one of another program, kind or
+  /// newer version, or none of its tables can be found.
   static Result<DamagedStore> open(const std::filesystem::path& copy, std::span<const Schema> schemas);
   ~DamagedStore();
   DamagedStore(DamagedStore&& other) noexcept;

@@ -65,13 +65,15 @@ const char* name(MessageKind kind) {
   return kUnknown.data();
 }
 
-// What changed: submap: only the number, which all kinds shared up to 4; 5 has sessions, 6 what cameras saw. Verdict:
-// up to 4 it said why a pair was refused in words only, and not by which version of the finder; 6 has sessions, 7
-// evidence. Verdicts of a job: from 2 on with evidence. Proxy graph: up to 5 it told what it is unsure of in other
-// terms, which no robot compares any more, up to 6 not where others were last seen, and 7 said more of whole scales
-// than anybody needs; nobody keeps one. Cloud: came with 2, the same since. Receipt: 2 says what is refused, and whose
-// the number is. Agent state: 1 did not say how sure the robot is of where it is, 2 knew no images; 4 is rows; 5 has
-// what grew under 4: waiting sensors, the watch of odometry's jumps, fixes.
+// What each version changed:
+//   submap       2 to 4 nothing (all kinds shared one number up to 4), 5 sessions, 6 what cameras saw
+//   verdict      5 why a pair was refused as a word of a list, and the finder's version; 6 sessions; 7 evidence
+//   verdicts     2 evidence
+//   proxy graph  6 uncertainty in today's terms, 7 where others were last seen, 8 less about whole scales. Nobody keeps
+//                a graph, so the older ones are not read.
+//   cloud        came with 2, and is the same since
+//   receipt      2 what is refused, and whose the number is
+//   agent state  2 how sure the robot is of its pose, 3 images, 4 rows; 5 waiting sensors, odometry's jumps, fixes
 Versions versions(MessageKind kind) {
   switch (kind) {
     case MessageKind::submap:

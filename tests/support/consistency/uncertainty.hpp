@@ -51,10 +51,10 @@ class WalkWithClosures {
         root_rotation_(rotation_.llt().matrixL()) {}
 
   [[nodiscard]] std::size_t nodes() const { return static_cast<std::size_t>(position_.rows()); }
-  /// Of every axis.
+  /// The same for every axis.
   [[nodiscard]] const Eigen::MatrixXd& position_covariance() const { return position_; }
   [[nodiscard]] const Eigen::MatrixXd& rotation_covariance() const { return rotation_; }
-  /// Of the whole run, which is this chain of the graph.
+  /// What is known of the whole run, which is this chain of the graph.
   [[nodiscard]] ChainKnowledge knowledge(const ProxyGraph& graph, const ChainId& chain) const {
     ChainKnowledge out = test::knowledge(
         graph, chain, [this](std::vector<Pose3> poses, Rng rng) { return displace(std::move(poses), rng); });

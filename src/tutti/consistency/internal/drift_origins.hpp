@@ -19,7 +19,7 @@ struct DriftStretch {
 /// Scan statistic (Kulldorff 1997; Arias-Castro, Donoho, Huo 2005): over stretches of all places and of lengths in
 /// steps of half an octave, what odometry misses by against its covariance; the stretch that stands out most, its ends
 /// then moved node by node, then the rest that do not overlap with it, as long as they stand out: chi-square with 6
-/// degrees of freedom beyond `probability` shared by all stretches. Of stretches that stand out nearly alike the
+/// degrees of freedom beyond `probability` shared by all stretches. When several stand out nearly alike, the
 /// shortest is meant. Odometry's covariance is taken as it usually is (per metre, median over the run: a covariance
 /// that odometry itself has inflated does not hide anything), plus the server's own uncertainty over the stretch, whose
 /// scales speak of these lengths (DisagreementTest::scale_length_m()).

@@ -73,7 +73,7 @@ RC_GTEST_PROP(ImuPreintegration, PartsMakeTheWhole, ()) {
   RC_ASSERT(std::abs(whole.duration_s - first.duration_s - t) < 1e-9);
 }
 
-/// Of the scene's motion, from exact samples.
+/// Follows the scene's motion, from exact samples.
 TEST(ImuPreintegration, FollowsTheMotion) {
   std::vector<ImuSample> samples;
   for (int i = -2; i < 300; ++i) samples.push_back(scene_imu(i / 200.0, 20));

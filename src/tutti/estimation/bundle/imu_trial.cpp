@@ -25,7 +25,7 @@ std::vector<std::size_t> runs_of(const BundleProblem& problem) {
   return out;
 }
 
-constexpr double kRounding = 1e-9;  ///< Of a way between keyframes that all keep their poses.
+constexpr double kRounding = 1e-9;  ///< A trajectory's between keyframes that all keep their poses.
 
 BundleProblem started_at(BundleProblem problem, const BundleSolution& solution) {
   for (std::size_t k = 0; k < problem.keyframes.size(); ++k)

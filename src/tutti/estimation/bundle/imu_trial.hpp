@@ -13,7 +13,7 @@ namespace tutti::bundle {
 struct ImuRun {
   ChainId chain;
   std::size_t factors = 0;
-  /// Of the accelerometer's bias in the middle of the run, in its least certain direction.
+  /// The accelerometer's bias in the middle of the run, in its least certain direction.
   double bias_sigma_mps2 = 0.0;
   double scale = 1.0;        ///< Length of the run's way adjusted with all IMU factors, over its length without any.
   double scale_sigma = 0.0;  ///< Standard deviation of the length without IMU factors, as a share of it.

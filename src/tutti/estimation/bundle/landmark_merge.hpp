@@ -60,7 +60,7 @@ struct MergeConfig {
 
 /// Counts of what became of the submaps' landmarks in the merge.
 struct MergeSummary {
-  std::size_t landmarks_in = 0, views_in = 0;  ///< Of all payloads.
+  std::size_t landmarks_in = 0, views_in = 0;  ///< In all payloads.
   std::size_t neighbour_joins = 0;             ///< Landmarks of neighbouring submaps with a keypoint in common.
   std::size_t closure_joins = 0;               ///< Landmarks joined by matches.
   std::size_t two_positions = 0;  ///< Joined landmarks whose positions in the submaps differ by more than 3 sigma.
@@ -71,7 +71,7 @@ struct MergeSummary {
   std::size_t landmarks_uncertain = 0;  ///< Dropped: too few views, no parallax or behind a camera.
   std::size_t landmarks_thinned = 0;
   std::size_t redundant_keyframes = 0;
-  std::size_t landmarks_out = 0, views_out = 0;  ///< Of the problem.
+  std::size_t landmarks_out = 0, views_out = 0;  ///< In the problem.
 };
 
 struct MergedMap {

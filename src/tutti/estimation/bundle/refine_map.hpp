@@ -28,7 +28,7 @@ struct RefinementConfig {
 };
 
 struct RefinementInput {
-  /// Of any robots; a submap without a visual payload contributes its odometry alone.
+  /// Any robots' submaps; one without a visual payload contributes its odometry alone.
   std::vector<PosedSubmap> submaps;
   /// Pairs tied by accepted closures, in which guided_matches() looks for common landmarks.
   std::vector<SubmapPair> closed;
@@ -50,7 +50,7 @@ struct RefinedMap {
   std::vector<Eigen::Vector3d> landmarks;         ///< World frame, m.
   std::vector<CameraResiduals> residuals_before;  ///< MergedMap::residuals.
   std::vector<CameraResiduals> residuals_after;
-  double rms_before_px = 0.0;  ///< Of the adjusted problem's views, without those of landmarks behind their camera.
+  double rms_before_px = 0.0;  ///< All views of the adjusted problem but those of landmarks behind their camera.
   double rms_after_px = 0.0;
   std::vector<ImuRun> imu;
   std::vector<StereoScale> stereo;

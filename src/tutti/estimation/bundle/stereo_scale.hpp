@@ -26,7 +26,7 @@ struct StereoConfig {
 struct StereoScale {
   RobotId robot;
   double ratio = 1.0;
-  double sigma = 0.0;       ///< Of the ratio: pixels, the odometry's covariance and BundleConfig::odometry_scale_sigma.
+  double sigma = 0.0;       ///< The ratio's: pixels, the odometry's covariance and BundleConfig::odometry_scale_sigma.
   bool is_refused = false;  ///< Contradicted, and only the views of its first camera are left in the problem.
   bool is_corrected = false;  ///< Contradicted, and the baselines in the problem are divided by the ratio.
 };

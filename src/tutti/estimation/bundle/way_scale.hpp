@@ -22,7 +22,7 @@ struct ComparedStep {
 /// does not count as way.
 struct WayScale {
   double scale = 1.0;
-  double variance = 0.0;  ///< Of `scale`, by the posterior.
+  double variance = 0.0;  ///< That of `scale`, by the posterior.
   double way_m = 0.0;     ///< Root of the weighted sum of squared expected lengths; 0 means that there is no way and
                           ///< `scale` has no meaning.
 };

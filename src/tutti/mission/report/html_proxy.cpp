@@ -52,7 +52,7 @@ struct Plan {
   std::vector<std::uint32_t> component;  ///< Per proxy node.
   std::uint32_t shown = 0;
   MapView map;
-  Points2d pixels;  ///< Of the proxy nodes.
+  Points2d pixels;  ///< The proxy nodes'.
 };
 
 Plan plan_of(const MissionRecord& record) {

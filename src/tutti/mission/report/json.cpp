@@ -322,7 +322,7 @@ Json work_json(const ServerWorkRecord& work) {
           {"sample_products", work.sample_products}};
 }
 
-/// Of report.json and timing.json; keys are added without a new one.
+/// The format's version in report.json and timing.json; keys are added without a new one.
 constexpr int kFormat = 2;
 
 /// Foreign text with broken UTF-8 must not make the writer throw.

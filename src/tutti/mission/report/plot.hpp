@@ -75,7 +75,7 @@ class PlanView {
 
 /// One line of a legend: a coloured square and a label; HTML.
 struct LegendEntry {
-  std::string css_class;  ///< Of the stroke.
+  std::string css_class;  ///< The stroke's.
   std::string label;
 };
 std::string legend_html(const std::vector<LegendEntry>& entries);

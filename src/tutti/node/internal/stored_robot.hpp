@@ -15,7 +15,7 @@ namespace tutti::node::internal {
 /// What a robot finds in its store, but for its journal and its submaps.
 struct StoredRobot {
   std::uint64_t starts = 0;
-  std::uint64_t newest_session = 0;  ///< Of those that the store says itself, and of submaps that wait; 0: none.
+  std::uint64_t newest_session = 0;  ///< That the store or a waiting submap names; 0: none.
   std::optional<std::string> lost;   ///< Why there is no checkpoint.
   wire::StateRows checkpoint;        ///< Without what was set aside.
 };

@@ -50,7 +50,7 @@ std::vector<double> wall_directions(const BirdsEyeView& view, int count);
 /// A view turned so that one of its wall directions is the x axis, ready to be correlated.
 struct TurnedView {
   double direction = 0.0;  ///< rad, level frame.
-  ComplexImage spectrum;   ///< Of the wall normals (x + i y), whitened; the sum of its squares is 1.
+  ComplexImage spectrum;   ///< The wall normals' (x + i y), whitened; the sum of its squares is 1.
 };
 
 /// One turned view per wall direction; none when the view is empty. Whitening (all wavelengths count alike, down to

@@ -14,7 +14,7 @@ namespace tutti::lidar {
 struct Middle {
   std::size_t index = 0;
   Pose3 T_submap_keyframe;
-  Matrix6d covariance = Matrix6d::Zero();  ///< Of the keyframe against the cloud, right tangent.
+  Matrix6d covariance = Matrix6d::Zero();  ///< The keyframe's against the cloud, right tangent.
 };
 
 /// The covariance is the mean, over all keyframes k, of that of the odometry from the middle to k, because the shared

@@ -123,7 +123,7 @@ Pose3 refine(const Problem& problem, const std::vector<std::uint32_t>& chosen, P
 /// Three different sightings of one camera, which is drawn by how many it has.
 struct Sample {
   std::size_t camera = 0;
-  std::array<std::size_t, 3> which{};  ///< Of the camera's.
+  std::array<std::size_t, 3> which{};  ///< Indices of the camera's sightings.
 };
 std::optional<Sample> draw(const std::vector<Prepared>& prepared, Rng& rng) {
   std::size_t total = 0;

@@ -19,7 +19,7 @@ Pose3 pose(double time_s, bool turns) {
   return {so3_exp(yaw_rad * Eigen::Vector3d::UnitZ()), {1.5 + 0.25 * time_s, 2.0, 1.4}};
 }
 
-/// Of images taken `late_s` after their stamps, every 0.2 s for 16 s.
+/// Has seen images taken `late_s` after their stamps, every 0.2 s for 16 s.
 ClockCheck watched(double late_s, bool turns = true, const Camera& stated = kCamera) {
   ClockCheck check(stated);
   Rng rng(2);

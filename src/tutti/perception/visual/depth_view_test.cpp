@@ -18,7 +18,7 @@ const Camera kFirst{{CameraKind::pinhole, 640, 480, 525.0, 525.0, 319.5, 239.5, 
 const DepthSensor kSensor{.unit_m = 1.0 / 5000.0, .sigma_m = 0.0, .sigma_per_m2 = 0.0014};
 constexpr double kSigma_px = 0.5;
 
-/// Of a wall that leans away to the right.
+/// Sees a wall that leans away to the right.
 DepthImage wall(double near_m, double far_m) {
   DepthImage out{640, 480, std::vector<std::uint16_t>(640U * 480U)};
   for (std::size_t i = 0; i < out.value.size(); ++i)

@@ -10,7 +10,7 @@
 namespace tutti::visual {
 namespace {
 
-/// Of one table: which bits of which word make the key; no two of them at one place of their words.
+/// Which bits of which word make one table's key; no two of them are at one place of their words.
 std::vector<std::uint64_t> masks_of(std::uint32_t words, Rng& rng) {
   std::array<std::uint32_t, 64> places{};
   std::iota(places.begin(), places.end(), 0U);

@@ -11,7 +11,7 @@
 namespace tutti::visual {
 namespace {
 
-/// Of the epipolar constraint of one point: the angle between the second ray and the plane, and its derivative by turn.
+/// The epipolar constraint of one point: the angle between the second ray and the plane, and its derivative by turn.
 struct Equation {
   double error_rad;
   Eigen::RowVector3d by_turn;

@@ -32,7 +32,7 @@ class StereoCheck {
   /// Standard deviation of any calibration: 0.05 degrees (EuRoC's cameras are 0.025 off).
   static constexpr double kTold_rad = 0.0009;
   static constexpr double kMaxSigmas = 4.0;
-  static constexpr double kMax_px = 1.0;  ///< Of the median distance (EuRoC 0.07, simulated cameras 0.2).
+  static constexpr double kMax_px = 1.0;  ///< The median distance's limit (EuRoC 0.07, simulated cameras 0.2).
   StereoCheck(Camera first, Camera second) : first_(std::move(first)), second_(std::move(second)) {}
   /// Adds the keypoints of one moment; keypoints of one track are views of one point.
   void add(const TrackedImage& first, const TrackedImage& second);

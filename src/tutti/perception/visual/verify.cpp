@@ -28,10 +28,10 @@ struct Localised {
   std::optional<LoopClosure> closure;
 };
 
-/// Of one keyframe: what its images see of the map.
+/// What the images of one keyframe see of the map.
 struct SeenMap {
   std::vector<Sighting> sightings;
-  std::vector<std::uint32_t> landmarks;  ///< Of each sighting.
+  std::vector<std::uint32_t> landmarks;  ///< Each sighting's.
 };
 
 /// `matches` of each image of the keyframe.
@@ -78,7 +78,7 @@ double largest_sigma(const Eigen::Matrix3d& covariance) {
   return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues()[2]);
 }
 
-/// Of each keyframe of the map, how many of the landmarks it saw.
+/// How many of the landmarks each keyframe of the map saw.
 std::vector<double> counts_of(const SubmapFeatures& map, std::vector<std::uint32_t> landmarks) {
   std::ranges::sort(landmarks);
   std::vector<double> out;
@@ -177,7 +177,7 @@ std::pair<std::size_t, double> progress(const Evidence& gates) {
   return {gates.size(), at_least ? last.value / last.limit : last.limit / last.value};
 }
 
-/// Of each gate the value that was nearest to its limit.
+/// Keeps each gate's value that was nearest to its limit.
 void weaken(Evidence& evidence, const Evidence& other) {
   if (evidence.empty()) evidence = other;
   for (std::size_t i = 0; i < evidence.size(); ++i)

@@ -17,7 +17,7 @@ inline constexpr std::uint32_t kFinderVersion = 3;
 /// Counts of what verifying pairs costs.
 struct VerificationWork {
   std::size_t keyframes = 0;  ///< Keyframes of both submaps.
-  std::size_t looked_at = 0;  ///< Of these, keyframes that were matched with all landmarks of the other submap.
+  std::size_t looked_at = 0;  ///< Those among them that were matched with all landmarks of the other submap.
   std::size_t distances = 0;  ///< Descriptor distances, which are nearly all of the cost.
   std::size_t samples = 0;    ///< RANSAC samples of three sightings.
   VerificationWork& operator+=(const VerificationWork& other);

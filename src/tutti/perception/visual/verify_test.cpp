@@ -37,7 +37,7 @@ ClosureVerdict verify(const Submap& a, const Submap& b, const VisualClosureConfi
   return verify_pair(extract_features(a, config), extract_features(b, config), config);
 }
 
-/// Of closures between flights A and B.
+/// For closures between flights A and B.
 Vector6d error_of(const LoopClosure& closure) {
   const Pose3 T_true = true_pose(kFlightA, closure.from.index).inverse() *
                        true_pose(kFlightB, closure.to.index - kFlightB.first_keyframe);

@@ -150,8 +150,8 @@ void FeedFront::push(FeedInput input) {
   inputs_.push_back(std::move(input));
 }
 
-/// The way evenly, as fine as it can be, until there is room for a while. Scans are half of what waits at most, and
-/// behind the last of them all is odometry.
+/// Drops waiting odometry samples until a quarter of the room is free. Those that stay are evenly spaced, so that the
+/// trajectory stays as fine as the room allows. There is always odometry to drop: scans may take half of the room.
 void FeedFront::thin() {
   double span_s = 0.0;
   std::size_t first = inputs_.size();  // where the odometry of a session begins

@@ -31,7 +31,7 @@ class ColumnSlabs {
 
   struct Entry {
     float coefficient = 0.0F;
-    int first = 0;  ///< Of the lanes of its column.
+    int first = 0;  ///< First lane of its column.
   };
 
  private:

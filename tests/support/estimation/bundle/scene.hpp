@@ -23,8 +23,8 @@ struct SceneOptions {
   int points = 300;
   double pixel_sigma = 1.0;
   double odometry_sigma_m = 0.02, odometry_sigma_rad = 0.005;  ///< Per step.
-  double odometry_scale_sigma = 0.0;                           ///< Of all its steps together, beside that.
-  double start_sigma_m = 0.03, start_sigma_rad = 0.005;        ///< Of the poses that a refinement starts from.
+  double odometry_scale_sigma = 0.0;                           ///< All its steps' together, beside that.
+  double start_sigma_m = 0.03, start_sigma_rad = 0.005;        ///< The poses' that a refinement starts from.
   ImuNoise imu_noise;
   estimation::ImuBias imu_bias{{0.02, -0.05, 0.08}, {0.1, -0.2, 0.05}};
   bool imu = false;

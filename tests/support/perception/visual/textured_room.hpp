@@ -83,7 +83,7 @@ struct Flight {
   double start_s = 0.0;
   double pixel_noise_px = 0.5;
   double bit_flips = 0.05;        ///< Probability of each bit.
-  double odometry_noise_m = 0.0;  ///< Of each keyframe's position.
+  double odometry_noise_m = 0.0;  ///< Each keyframe's position.
   Pose3 T_odom_world;
 };
 

@@ -43,7 +43,7 @@ inline std::string points(std::int64_t ns, const std::vector<float>& times, cons
                           .data = data,
                           .is_dense = true});
 }
-/// Of a receiver that knows its place to 1 m.
+/// As a receiver says it that knows its place to 1 m.
 inline std::string fix(std::int64_t ns, const std::string& frame = "base_link", double latitude_deg = 46.5) {
   bags::RosNavSatFix out = bags::to_ros({{ns}, frame}, {latitude_deg, 7.9, 600.0});
   for (const std::size_t i : {0U, 4U, 8U}) out.position_covariance[i] = 1.0;
@@ -66,7 +66,7 @@ inline bags::RosCameraInfo calibration(std::uint32_t width = 4, std::uint32_t he
   out.k = {3, 0, 2, 0, 3, 1.5, 0, 0, 1};
   return out;
 }
-/// Of the same camera, its depth: 1280 mm everywhere (two bytes, 0 and 5).
+/// The same camera's depth: 1280 mm everywhere (two bytes, 0 and 5).
 inline bags::RosImage depth_image(std::int64_t ns, const std::string& frame = "camera") {
   static const std::string bytes = [] {
     std::string out;

@@ -69,7 +69,7 @@ class VisualTracker {
   TrackerConfig config_;
   std::shared_ptr<const internal::Pyramid> last_;  ///< Null before the first image.
   std::vector<TrackedKeypoint> tracks_;            ///< In the last image of the first camera.
-  std::vector<Eigen::Vector2f> motion_px_;         ///< Of each track, how far it moved to get there.
+  std::vector<Eigen::Vector2f> motion_px_;         ///< How far each track moved to get there.
   std::uint64_t next_track_ = 1;
 };
 

@@ -327,7 +327,7 @@ void pass(A& a, SubmapFix& fix) {
   pass(a, fix.antenna);
   pass(a, fix.covariance);
 }
-/// Of a receiver: after pass_watch(), and as that not in older states.
+/// Fixes stand behind what pass_watch() writes. Like that, older states do not have them.
 template <class A>
 void pass_fixes(A& a, robot::SubmapBuilderState& builder) {
   if (!a.has_more()) return;
