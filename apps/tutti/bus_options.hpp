@@ -7,21 +7,22 @@
 #include <string>
 
 #include "tutti/base/file.hpp"
-#include "tutti/bus/bus_address.hpp"
+#include "tutti/bus/transport.hpp"
 
+/// The options of all commands that join a bus.
 namespace tutti::app {
 
 /// The one place where a user's credentials enter: a file, else the environment, else the URL, from which they are
 /// taken out, so that nothing prints them.
-inline void take_credentials(const std::string& file, std::string& url, bus::BusCredentials& credentials) {
+inline void take_credentials(const std::string& file, bus::BusOptions& options) {
   const auto refuse = [](const char* option, const Error& error) {
     throw CLI::ValidationError(option, error.message);  // of CLI11's errors of usage
   };
-  if (!url.empty()) {
-    auto parsed = bus::parse_bus_url(url);
+  if (!options.url.empty()) {
+    auto parsed = bus::parse_bus_url(options.url);
     if (!parsed) refuse("--bus", parsed.error());
-    url = std::move(parsed->plain);
-    credentials = std::move(parsed->credentials);
+    options.url = std::move(parsed->plain);
+    options.credentials = std::move(parsed->credentials);
   }
   const char* const given = std::getenv("TUTTI_CREDENTIALS");
   if (file.empty() && (given == nullptr || *given == '\0')) return;
@@ -30,18 +31,38 @@ inline void take_credentials(const std::string& file, std::string& url, bus::Bus
   auto parsed = bus::parse_credentials(*text);
   if (!parsed && file.empty()) refuse("TUTTI_CREDENTIALS", parsed.error());
   if (!parsed) refuse("--credentials", in_context(file, parsed.error()).value());
-  credentials = std::move(*parsed);
+  options.credentials = std::move(*parsed);
 }
 
-/// Adds --credentials. When the command's words are all read, `url` is without credentials and these are taken.
-inline void add_credentials_option(CLI::App& command, std::string& url, bus::BusCredentials& credentials) {
+inline constexpr const char* kBusHelp = "The bus, as the server prints it";
+inline constexpr const char* kBusInsecureHelp = "Use a bus on another machine although there is no TLS yet";
+
+/// Adds --bus, which is returned, --insecure and --credentials. When the command's words are all read, the URL is
+/// without credentials and these are taken.
+inline CLI::Option* add_bus_options(CLI::App& command, bus::BusOptions& options, const std::string& help = kBusHelp,
+                                    const std::string& insecure_help = kBusInsecureHelp) {
   const auto file = std::make_shared<std::string>();
+  CLI::Option* const bus =
+      command.add_option("--bus", options.url, help + "; " + bus::transports_help())->type_name("URL");
+  command.add_flag("--insecure", options.allow_insecure, insecure_help);
   command
       .add_option("--credentials", *file,
                   "A file whose first line is USER:PASSWORD, or a token, for a bus that asks for them; else the "
                   "environment's TUTTI_CREDENTIALS is that line")
       ->type_name("FILE");
-  command.parse_complete_callback([file, &url, &credentials] { take_credentials(*file, url, credentials); });
+  command.parse_complete_callback([file, &options] { take_credentials(*file, options); });
+  return bus;
 }
+
+/// Adds --mission.
+inline void add_mission_name(CLI::App& command, std::string& name, const std::string& otherwise) {
+  command
+      .add_option("--mission", name,
+                  "What the mission is called on the bus: programs of other missions are not heard. Letters, digits, "
+                  "'-' and '_'; default: " +
+                      otherwise)
+      ->type_name("NAME");
+}
+inline constexpr const char* kServedMission = "the one that has a server on this bus";
 
 }  // namespace tutti::app

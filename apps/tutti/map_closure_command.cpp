@@ -20,7 +20,6 @@
 #include "map_command.hpp"
 #include "options.hpp"
 #include "tutti/bus/mission_lease.hpp"
-#include "tutti/bus/nats_port.hpp"
 #include "tutti/mapfile/closures.hpp"
 #include "tutti/node/word_sender.hpp"
 #include "tutti/wire/codec.hpp"
@@ -33,9 +32,9 @@ constexpr double kSaySoon_s = 1.5;
 constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 
 struct ClosureOptions {
-  std::string map, closure, by, bus, mission;
-  bus::BusCredentials credentials;
-  bool insecure = false, rejected = false;
+  std::string map, closure, by;
+  bus::BusOptions bus{.url = {}, .mission = {}};
+  bool rejected = false;
   double wait_s = 60.0;
 };
 
@@ -124,7 +123,7 @@ std::optional<std::string> heard_answer(bus::Port& port, const node::WordSender&
 
 void say_waiting(const std::string& what) { fmt::print(stderr, "tutti {}: {}\n", kCommand, what); }
 
-std::string waits_for(const bus::NatsState& state) {
+std::string waits_for(const bus::LinkState& state) {
   const std::string why = state.denied.empty() ? state.last_error : state.denied;
   if (!state.connected)
     return fmt::format("waits for a link to the bus {}{}{}", state.url, why.empty() ? "" : ": ", why);
@@ -136,14 +135,11 @@ std::string waits_for(const bus::NatsState& state) {
 /// To the server that has the map open, until it has answered.
 Status send(const ClosureOptions& options, const ClosureWord& word) {
   const auto self = bus::Endpoint::viewer(static_cast<std::uint32_t>(getpid()));
-  bus::NatsPortOptions where{
-      .url = options.bus, .allow_insecure = options.insecure, .credentials = options.credentials};
-  auto mission = options.mission.empty()
-                     ? bus::served_mission(where, std::min(bus::kLookForServer_s, options.wait_s), say_waiting)
-                     : options.mission;
+  bus::BusOptions where = options.bus;
+  auto mission = bus::served_mission(where, std::min(bus::kLookForServer_s, options.wait_s), say_waiting);
   if (!mission) return tl::unexpected(mission.error());
   where.mission = std::move(*mission);
-  auto port = bus::open_nats_port(self, where);
+  auto port = bus::open_port(self, where);
   if (!port) return tl::unexpected(port.error());
   node::WordSender sender(self, word);
   const auto begin = std::chrono::steady_clock::now();
@@ -152,15 +148,15 @@ Status send(const ClosureOptions& options, const ClosureWord& word) {
     const double now_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     if (const auto answer = heard_answer(**port, sender))
       return answer->empty() ? Status() : fail(ErrorCode::invalid, "the server does not take it: {}", *answer);
-    const bus::NatsState state = (*port)->state();
+    const bus::LinkState state = (*port)->state();
     if (now_s > options.wait_s && state.waiting_messages > 0)
-      return fail(ErrorCode::io, "{}: the bus has not taken the word for mission '{}' within {} s: {}", options.bus,
+      return fail(ErrorCode::io, "{}: the bus has not taken the word for mission '{}' within {} s: {}", where.url,
                   where.mission, options.wait_s, state.last_error);
     if (now_s > options.wait_s)
       return fail(ErrorCode::io,
                   "{}: the bus has the word, but the server has not said within {} s that it has it; say it again if "
                   "`tutti map closure show` does not know it later",
-                  options.bus, options.wait_s);
+                  where.url, options.wait_s);
     if (now_s > kSaySoon_s && std::exchange(said, waits_for(state)) != waits_for(state))
       say_waiting(fmt::format("{}, at most {:g} s", said, options.wait_s));
     if (state.waiting_messages > 0) continue;  // it has not left yet
@@ -170,13 +166,13 @@ Status send(const ClosureOptions& options, const ClosureWord& word) {
 }
 
 int say(const ClosureOptions& options, Wish wish) {
-  if (options.map.empty() == options.bus.empty())
+  if (options.map.empty() == options.bus.url.empty())
     return complain(kCommand, "expected a map's file, or --bus URL of the server that has it open", 2);
   const auto now = std::chrono::system_clock::now().time_since_epoch();
   const ClosureWord word{options.closure, wish, options.by,
                          std::chrono::duration_cast<std::chrono::nanoseconds>(now).count()};
   if (auto ok = wire::validate(word); !ok) return complain(kCommand, ok.error().message, 2);
-  if (!options.bus.empty()) {
+  if (!options.bus.url.empty()) {
     if (auto sent = send(options, word); !sent) return complain(kCommand, sent.error().message);
     fmt::print("{} {}: stored by the server; the map follows at its next update\n", to_string(wish), options.closure);
     return 0;
@@ -198,12 +194,8 @@ void add_word(CLI::App& command, Wish wish, const std::string& help, int& exit_c
       ->required();
   word->add_option("map", options->map, "The map's file (a server's STATE/map.tutti), when no server has it open.")
       ->type_name("MAP");
-  word->add_option("--bus", options->bus, "The bus of the server that has the map open, instead of a file.")
-      ->type_name("nats://HOST:PORT");
-  word->add_option("--mission", options->mission, "Of several on that bus; default: the one that has a server.")
-      ->type_name("NAME");
-  word->add_flag("--insecure", options->insecure, "Use a bus on another machine although there is no TLS yet.");
-  add_credentials_option(*word, options->bus, options->credentials);
+  add_bus_options(*word, options->bus, "The bus of the server that has the map open, instead of a file");
+  add_mission_name(*word, options->bus.mission, kServedMission);
   add_number(*word, "--wait", options->wait_s, "How long to say it again until the server has answered", "S");
   word->add_option("--by", options->by, "Who says so, for the record.")->type_name("NAME")->capture_default_str();
   word->callback([options, wish, &exit_code] { exit_code = say(*options, wish); });

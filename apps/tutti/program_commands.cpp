@@ -22,15 +22,6 @@ namespace {
 
 constexpr const char* kFilesName = "as the mission file says (mission: NAME), else 'tutti'";
 
-template <class Options>
-void add_bus_option(CLI::App& command, Options& options) {
-  command.add_option("--bus", options.bus, "The bus, as the server prints it")
-      ->type_name("nats://HOST:PORT")
-      ->required();
-  command.add_flag("--insecure", options.insecure, "Use a bus on another machine although there is no TLS yet");
-  add_credentials_option(command, options.bus, options.credentials);
-}
-
 void add_state_option(CLI::App& command, std::filesystem::path& state, const std::string& what) {
   command.add_option("--state", state, what)->type_name("DIR")->required();
 }
@@ -52,16 +43,13 @@ void add_server_command(CLI::App& app, int& exit_code) {
       *command, options->state,
       "Folder of this server: map, log, events, bus; made if missing. In a new one a map.tutti from elsewhere goes "
       "on");
-  command->add_option("--bus", options->bus, "A NATS bus that runs already")->type_name("nats://HOST:PORT");
-  add_credentials_option(*command, options->bus, options->credentials);
+  add_bus_options(*command, options->bus, "A bus that runs already",
+                  "Let other machines in although there is no TLS yet: whoever reaches the port can write to the map");
   command
       ->add_option("--listen", options->listen,
                    "Where the server's own bus is to be reached; default: from this machine only, the port of the last "
                    "time, else any from 20000 on")
       ->type_name("HOST[:PORT]");
-  command->add_flag(
-      "--insecure", options->insecure,
-      "Let other machines in although there is no TLS yet: whoever reaches the port can write to the map");
   add_mission_argument(*command, *common, "Names of the robots and all settings; without it any robot is welcome");
   add_mission_name(*command, common->mission.name, kFilesName);
   command->add_option("--threads", options->threads, "Threads that verify loop closures here; 0 = only workers do")
@@ -104,7 +92,7 @@ void add_robot_command(CLI::App& app, int& exit_code) {
   command->add_option("--name", options->name, "Its name in the mission; with --feed any, another for each robot")
       ->type_name("NAME")
       ->required();
-  add_bus_option(*command, *options);
+  add_bus_options(*command, options->bus)->required();
   add_state_option(*command, options->state,
                    "Folder of this robot: what it knows, and what is not sent yet; made if missing");
   add_mission_argument(*command, *common,
@@ -174,10 +162,10 @@ void add_worker_command(CLI::App& app, int& exit_code) {
       "Keeps nothing: killed in the middle of a job it costs time only, the job goes to another. SIGTERM or Ctrl-C "
       "stop "
       "it.");
-  add_bus_option(*command, *options);
+  add_bus_options(*command, options->bus)->required();
   add_mission_argument(*command, *common,
                        "Needed only where closures come from its reference: all else the server says with each job");
-  add_mission_name(*command, common->mission.name, "the one that has a server on this bus");
+  add_mission_name(*command, common->mission.name, kServedMission);
   command->add_option("--threads", options->threads, "Pairs that are verified at a time; 0 = one on each core")
       ->type_name("N")
       ->check(CLI::Range(0, 1024))

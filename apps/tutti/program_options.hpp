@@ -20,15 +20,6 @@ struct ProgramArguments {
   int parent = 0;  ///< Process number of the program with which this one ends; 0: none.
 };
 
-inline CLI::Option* add_mission_name(CLI::App& command, std::string& name, const std::string& otherwise) {
-  return command
-      .add_option("--mission", name,
-                  "What the mission is called on the bus: programs of other missions are not heard. Letters, digits, "
-                  "'-' and '_'; default: " +
-                      otherwise)
-      ->type_name("NAME");
-}
-
 inline CLI::Option* add_mission_argument(CLI::App& command, ProgramArguments& arguments, const std::string& what) {
   command.add_option("--data", arguments.mission.data, "Folder that the mission's file names are relative to")
       ->type_name("DIR");

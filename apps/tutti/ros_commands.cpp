@@ -226,7 +226,7 @@ Result<std::shared_ptr<void>> start_ros(const RosArguments& arguments, const pro
           "{} is '{}', but no images are taken that it could go with: expected --images, or a mission that finds "
           "closures from images",
           option, topic);
-  const auto participant = join_domain(options.insecure);
+  const auto participant = join_domain(options.bus.allow_insecure);
   if (!participant) return tl::unexpected(participant.error());
   ros::RosRobotOptions ros = arguments.robot;
   ros.socket = options.feed;
@@ -256,7 +256,7 @@ Result<std::shared_ptr<void>> start_ros(const RosArguments& arguments, const pro
 }
 
 Status show_on_ros(const RosArguments& arguments, program::ServerOptions& options) {
-  const auto participant = join_domain(options.insecure);
+  const auto participant = join_domain(options.bus.allow_insecure);
   if (!participant) return tl::unexpected(participant.error());
   ros::RosServerOptions ros = arguments.server;
   ros.name_space = arguments.name_space;

@@ -15,7 +15,6 @@
 #include "commands.hpp"
 #include "options.hpp"
 #include "tutti/bus/mission_lease.hpp"
-#include "tutti/bus/nats_port.hpp"
 #include "tutti/node/status_text.hpp"
 #include "tutti/program/field_json.hpp"
 #include "tutti/wire/codec.hpp"
@@ -29,10 +28,7 @@ using Clock = std::chrono::steady_clock;
 constexpr double kFresh_s = 6.0;  // three of the server's periods: it is there
 
 struct StatusOptions {
-  std::string bus;
-  bus::BusCredentials credentials;
-  std::string mission;
-  bool insecure = false;
+  bus::BusOptions bus{.url = {}, .mission = {}};
   bool json = false;
   bool watch = false;
   double wait_s = 6.0;
@@ -98,7 +94,7 @@ void show(const View& view, const StatusOptions& options) {
 }
 
 /// Until something is to be seen, or it is clear that nothing is. The exit code.
-int look_once(bus::NatsPort& port, View& view, const StatusOptions& options) {
+int look_once(bus::Port& port, View& view, const StatusOptions& options) {
   bool connected = false;
   for (const auto begin = Clock::now(); since(begin) < options.wait_s && !view.is_there();
        std::this_thread::sleep_for(std::chrono::milliseconds(20))) {
@@ -110,13 +106,14 @@ int look_once(bus::NatsPort& port, View& view, const StatusOptions& options) {
     return view.is_there() ? 0 : 1;
   }
   const std::string error = view.problem().empty() ? port.state().last_error : view.problem();
-  if (!connected) return complain("status", fmt::format("no bus at {} ({})", options.bus, error));
-  return complain("status", fmt::format("there is a bus at {}, but no server{} has said anything on it{}", options.bus,
-                                        options.mission.empty() ? "" : " of mission '" + options.mission + "'",
-                                        error.empty() ? "" : " (" + error + ")"));
+  if (!connected) return complain("status", fmt::format("no bus at {} ({})", options.bus.url, error));
+  return complain("status",
+                  fmt::format("there is a bus at {}, but no server{} has said anything on it{}", options.bus.url,
+                              options.bus.mission.empty() ? "" : " of mission '" + options.bus.mission + "'",
+                              error.empty() ? "" : " (" + error + ")"));
 }
 
-int watch(bus::NatsPort& port, View& view, const StatusOptions& options) {
+int watch(bus::Port& port, View& view, const StatusOptions& options) {
   if (const int code = look_once(port, view, options); code != 0 && !view.status()) return code;
   for (auto shown = Clock::now();; std::this_thread::sleep_for(std::chrono::milliseconds(50))) {
     if (!view.look(port) && since(shown) < kFresh_s) continue;  // of a silent server, how long it is silent
@@ -126,14 +123,11 @@ int watch(bus::NatsPort& port, View& view, const StatusOptions& options) {
 }
 
 int run(const StatusOptions& options) {
-  bus::NatsPortOptions where{
-      .url = options.bus, .allow_insecure = options.insecure, .credentials = options.credentials};
-  const auto mission = options.mission.empty()
-                           ? bus::served_mission(where, std::min(bus::kLookForServer_s, options.wait_s))
-                           : options.mission;
+  bus::BusOptions where = options.bus;
+  auto mission = bus::served_mission(where, std::min(bus::kLookForServer_s, options.wait_s));
   if (!mission) return complain("status", mission.error().message, 2);
-  where.mission = *mission;
-  auto port = bus::open_nats_port(bus::Endpoint::viewer(static_cast<std::uint32_t>(getpid())), where);
+  where.mission = std::move(*mission);
+  auto port = bus::open_port(bus::Endpoint::viewer(static_cast<std::uint32_t>(getpid())), where);
   if (!port) return complain("status", port.error().message, 2);
   View view;
   return options.watch ? watch(**port, view, options) : look_once(**port, view, options);
@@ -148,15 +142,10 @@ void add_status_command(CLI::App& app, int& exit_code) {
   command->footer(
       "Exit codes: 0 the server is there; 1 no bus, or no server (then what it said last); 2 usage.\n"
       "Example: tutti status --bus nats://127.0.0.1:4222 --watch\n");
-  command->add_option("--bus", options->bus, "The bus, as the server prints it")
-      ->type_name("nats://HOST:PORT")
-      ->required();
-  command->add_flag("--insecure", options->insecure, "Use a bus on another machine although there is no TLS yet");
-  add_credentials_option(*command, options->bus, options->credentials);
+  add_bus_options(*command, options->bus)->required();
   command->add_flag("--json", options->json, "One JSON object on a line instead of a table");
   command->add_flag("--watch", options->watch, "Go on, and show it again whenever something is new");
-  command->add_option("--mission", options->mission, "Of several missions on one bus; default: the one with a server")
-      ->type_name("NAME");
+  add_mission_name(*command, options->bus.mission, kServedMission);
   add_number(*command, "--wait", options->wait_s, "How long to listen for a server at most", "S");
   command->callback([options, &exit_code] { exit_code = run(*options); });
 }

@@ -158,7 +158,7 @@ class Field : public ::testing::Test {
   void start_robot(const lab::MissionSource& source, double rate, const std::string& name, int port) {
     robots_.push_back(std::make_unique<Running>([=, this](const std::atomic<bool>& stop) {
       program::RobotOptions options{.name = name,
-                                    .bus = fmt::format("nats://127.0.0.1:{}", port),
+                                    .bus = {.url = fmt::format("nats://127.0.0.1:{}", port)},
                                     .state = folder_ / name,
                                     .rate = rate,
                                     .session = kSession};

@@ -116,8 +116,8 @@ Result<BusUrl> parse_bus_url(std::string_view url) {
   const auto refuse = [&](const std::string& why) {
     return fail(ErrorCode::configuration, "bus {}: {}", plain_text(without_credentials(url)), why);
   };
-  if (scheme != "nats" && scheme != "tls") return refuse("expected nats://HOST:PORT");
-  BusUrl out;
+  if (scheme.empty() || !std::ranges::all_of(scheme, is_letter_or_digit)) return refuse("expected nats://HOST:PORT");
+  BusUrl out{.scheme = std::string(scheme), .plain = {}, .at = {}, .credentials = {}};
   if (const std::size_t at = rest.rfind('@'); at != std::string_view::npos) {
     auto credentials = parse_credentials(rest.substr(0, at));
     if (!credentials) return refuse("before the '@': " + credentials.error().message);

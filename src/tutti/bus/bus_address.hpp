@@ -27,8 +27,10 @@ Result<HostPort> parse_host_port(std::string_view text);
 /// As parse_host_port() reads it; without a port only the host.
 std::string to_string(const HostPort& at);
 
-/// "nats://HOST:PORT", maybe with "USER:PASSWORD@" or "TOKEN@" before the host, maybe with another scheme.
+/// "nats://HOST:PORT", maybe with "USER:PASSWORD@" or "TOKEN@" before the host, maybe with another scheme; without a
+/// scheme that of NATS.
 struct BusUrl {
+  std::string scheme;
   std::string plain;  ///< Without credentials: for libnats, and for people.
   HostPort at;
   BusCredentials credentials;

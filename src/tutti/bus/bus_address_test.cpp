@@ -31,6 +31,7 @@ TEST(BusAddressTest, HostsAndPortsAreRead) {
 TEST(BusAddressTest, CredentialsLeaveAUrlWhereItIsRead) {
   const BusUrl url = parse_bus_url("tls://alpha:se:cr@t@base:4222").value();
   EXPECT_EQ(url.plain, "tls://base:4222");
+  EXPECT_EQ(url.scheme, "tls");
   EXPECT_EQ(url.at, (HostPort{"base", 4222}));
   EXPECT_EQ(url.credentials, (BusCredentials{"alpha", "se:cr@t"}));
   EXPECT_EQ(parse_bus_url("nats://token@base:4222")->credentials, (BusCredentials{"", "token"}));
@@ -41,7 +42,7 @@ TEST(BusAddressTest, CredentialsLeaveAUrlWhereItIsRead) {
 TEST(BusAddressTest, WhatIsNoUrlIsRefusedWithoutItsPassword) {
   for (const std::string text :
        {"nats://alpha:hidden@", "nats://alpha:hidden@a b:1", "nats://:hidden@base:1", "na ts://alpha:hidden@base:1",
-        "http://alpha:hidden@base:1", "alpha:hidden@base/elsewhere:1"}) {
+        "://alpha:hidden@base:1", "alpha:hidden@base/elsewhere:1"}) {
     const auto read = parse_bus_url(text);
     ASSERT_FALSE(read.has_value()) << text;
     EXPECT_EQ(read.error().message.find("hidden"), std::string::npos) << read.error().message;

@@ -3,68 +3,31 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <chrono>
-#include <string_view>
 #include <utility>
 #include <vector>
-
-#include "tutti/bus/internal/nats_connection.hpp"
-#include "tutti/bus/internal/nats_names.hpp"
 
 namespace tutti::bus {
 namespace {
 
-constexpr const char* kBucket = "TUTTI_SERVERS";
-constexpr std::size_t kMostMissions = 1000;
 constexpr double kTryAgain_s = 0.5;
 constexpr double kSaySoon_s = 1.5;
 
-struct EntryFree {
-  void operator()(kvEntry* entry) const { kvEntry_Destroy(entry); }
-};
-
-struct Value {
-  std::optional<LeaseHolder> holder;  ///< Nothing: it is no lease.
-  std::uint64_t revision = 0;
-};
-
-std::optional<Value> read_value(kvStore* leases, const std::string& mission) {
-  kvEntry* read = nullptr;
-  if (kvStore_Get(&read, leases, mission.c_str()) != NATS_OK) return std::nullopt;
-  const std::unique_ptr<kvEntry, EntryFree> entry(read);
-  const auto* value = static_cast<const char*>(kvEntry_Value(read));
-  const std::string_view text(value == nullptr ? "" : value, static_cast<std::size_t>(kvEntry_ValueLen(read)));
-  return Value{lease_of(text), kvEntry_Revision(read)};
-}
-
-std::map<std::string, LeaseHolder> read_leases(kvStore* leases) {
-  std::map<std::string, LeaseHolder> out;
-  kvKeysList keys{};
-  if (kvStore_Keys(&keys, leases, nullptr) != NATS_OK) return out;  // there is none, too
-  for (int i = 0; i < keys.Count && out.size() < kMostMissions; ++i)
-    if (auto found = read_value(leases, keys.Keys[i]); found && found->holder && is_mission_name(keys.Keys[i]))
-      out.emplace(keys.Keys[i], std::move(*found->holder));
-  kvKeysList_Destroy(&keys);
-  return out;
-}
-
 }  // namespace
 
-Status check_mission_name(const std::string& name) {
-  if (is_mission_name(name)) return {};
-  return fail(ErrorCode::configuration, "mission '{}': 1 to 32 letters, digits, '-' and '_' were expected", name);
-}
-
-Result<std::unique_ptr<MissionLease>> MissionLease::open(const NatsPortOptions& where, std::optional<LeaseHolder> self,
+Result<std::unique_ptr<MissionLease>> MissionLease::open(const BusOptions& where, std::optional<LeaseHolder> self,
                                                          const LeaseTimes& times) {
-  if (const Status checked = check(where); !checked) return tl::unexpected(checked.error());
+  const auto transport = transport_of(where);
+  if (!transport) return tl::unexpected(transport.error());
   if (self) self = lease_of(lease_text(*self));
-  return std::unique_ptr<MissionLease>(new MissionLease(where, std::move(self), times));
+  return std::unique_ptr<MissionLease>(new MissionLease(**transport, where, std::move(self), times));
 }
 
-MissionLease::MissionLease(NatsPortOptions where, std::optional<LeaseHolder> self, const LeaseTimes& times)
-    : where_(std::move(where)), self_(std::move(self)), times_(times), thread_([this] { run(); }) {}
+MissionLease::MissionLease(const Transport& transport, BusOptions where, std::optional<LeaseHolder> self,
+                           const LeaseTimes& times)
+    : transport_(transport), where_(std::move(where)), self_(std::move(self)), times_(times), thread_([this] {
+        run();
+      }) {}
 
 MissionLease::~MissionLease() {
   {
@@ -109,20 +72,13 @@ std::string MissionLease::why_alone() const {
 }
 
 void MissionLease::run() {
-  std::shared_ptr<NatsConnection> connection;
+  std::unique_ptr<LeaseBoard> board;
   std::unique_lock guard(mutex_);
   while (!stopping_) {
     guard.unlock();
-    Status done;
-    if (!connection || connection->closed()) {
-      auto opened = NatsConnection::open(where_, fmt::format("lease_{}", where_.mission));
-      if (opened)
-        connection = std::move(*opened);
-      else
-        done = tl::unexpected(opened.error());
-    }
-    if (done) done = look(*connection);
-    if (done && !self_) connection.reset();  // a radio has better things to carry
+    if (!board) board = transport_.open_leases(where_);
+    const Status done = look(*board);
+    if (done && !self_) board.reset();  // a radio has better things to carry
     guard.lock();
     state_.last_error = done ? "" : done.error().message;
     changed_.notify_all();
@@ -132,7 +88,7 @@ void MissionLease::run() {
   }
   const bool held = state_.held;
   guard.unlock();
-  if (held && connection && connection->connected()) give_up(*connection);
+  if (held && board) give_up(*board);
 }
 
 bool MissionLease::may_take(const std::optional<LeaseHolder>& there, std::uint64_t revision) {
@@ -165,50 +121,47 @@ bool MissionLease::may_take(const std::optional<LeaseHolder>& there, std::uint64
   return false;
 }
 
-/// Takes or renews the lease, or reads the others'.
-Status MissionLease::look(const NatsConnection& connection) {
-  auto leases = connection.bucket(kBucket, self_ ? std::optional(times_.lease_s) : std::nullopt);
-  if (!leases) return tl::unexpected(leases.error());
+Status MissionLease::look(LeaseBoard& board) {
+  const auto read = board.read(where_.mission);
+  if (!read) return tl::unexpected(read.error());
+  const auto there = read->has_value() ? lease_of((*read)->text) : std::nullopt;
+  const std::uint64_t revision = read->has_value() ? (*read)->revision : 0;
   State seen{.has_looked = true};
-  if (*leases) {
-    const auto there = read_value(leases->get(), where_.mission);
-    if (self_) {
-      const std::string mine = lease_text(*self_);
-      std::uint64_t revision = 0;
-      if (there && !may_take(there->holder, there->revision)) {
-        const std::scoped_lock guard(mutex_);
-        state_.has_looked = true;
-        return {};
-      }
-      const natsStatus status =
-          there ? kvStore_UpdateString(&revision, leases->get(), where_.mission.c_str(), mine.c_str(), there->revision)
-                : kvStore_CreateString(&revision, leases->get(), where_.mission.c_str(), mine.c_str());
-      if (status != NATS_OK)
-        return connection.failure(status, fmt::format("the lease of mission '{}'", where_.mission));
-      written_ = Clock::now();
-      other_.reset();
-      seen.held = true;
-    } else if (there && there->holder) {
-      seen.missions.emplace(where_.mission, *there->holder);
-    } else {
-      seen.missions = read_leases(leases->get());
+  if (self_) {
+    if (revision != 0 && !may_take(there, revision)) {
+      const std::scoped_lock guard(mutex_);
+      state_.has_looked = true;
+      return {};
     }
+    if (Status done = board.write(where_.mission, {lease_text(*self_), revision}, times_.lease_s); !done) return done;
+    written_ = Clock::now();
+    other_.reset();
+    seen.held = true;
+  } else if (there) {
+    seen.missions.emplace(where_.mission, *there);
+  } else {
+    const auto all = board.read_all();
+    if (!all) return tl::unexpected(all.error());
+    for (const auto& [mission, value] : *all)
+      if (auto holder = lease_of(value.text); holder && check_mission_name(mission))
+        seen.missions.emplace(mission, std::move(*holder));
   }
   const std::scoped_lock guard(mutex_);
   state_ = std::move(seen);
   return {};
 }
 
-void MissionLease::give_up(const NatsConnection& connection) const {
-  const auto leases = connection.bucket(kBucket, std::nullopt);
-  if (!leases || !*leases) return;
-  const auto there = read_value(leases->get(), where_.mission);
-  if (there && there->holder == self_) kvStore_Delete(leases->get(), where_.mission.c_str());
+void MissionLease::give_up(LeaseBoard& board) const {
+  const auto there = board.read(where_.mission);
+  if (there && *there && lease_of((*there)->text) == self_) board.remove(where_.mission);
 }
 
-Result<std::string> served_mission(const NatsPortOptions& where, double wall_s,
+Result<std::string> served_mission(const BusOptions& where, double wall_s,
                                    const std::function<void(const std::string&)>& say) {
-  auto lease = MissionLease::open(where, std::nullopt, {.look_s = kTryAgain_s});
+  if (!where.mission.empty()) return where.mission;
+  BusOptions any = where;
+  any.mission = kDefaultMission;
+  auto lease = MissionLease::open(any, std::nullopt, {.look_s = kTryAgain_s});
   if (!lease) return tl::unexpected(lease.error());
   const auto begin = std::chrono::steady_clock::now();
   const auto since_s = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(); };
@@ -220,7 +173,7 @@ Result<std::string> served_mission(const NatsPortOptions& where, double wall_s,
                     seen.last_error.empty() ? "" : ": " + seen.last_error));
     has_said = true;
   }
-  if (seen.missions.empty() || seen.server_of(where.mission) != nullptr) return where.mission;
+  if (seen.missions.empty() || seen.server_of(any.mission) != nullptr) return any.mission;
   if (seen.missions.size() == 1) return seen.missions.begin()->first;
   std::vector<std::string> names;
   for (const auto& [mission, holder] : seen.missions) names.push_back(mission);

@@ -13,14 +13,9 @@
 #include <thread>
 
 #include "tutti/bus/lease_holder.hpp"
-#include "tutti/bus/nats_port.hpp"
+#include "tutti/bus/transport.hpp"
 
 namespace tutti::bus {
-
-class NatsConnection;
-
-/// 1 to 32 letters, digits, '-' and '_'; the error says so.
-Status check_mission_name(const std::string& name);
 
 /// How leases are kept, in seconds.
 struct LeaseTimes {
@@ -41,7 +36,7 @@ class MissionLease {
  public:
   /// With `self`, takes and renews the lease of where.mission for it. Without, only looks. Does not wait for the bus;
   /// errors are those of the options.
-  static Result<std::unique_ptr<MissionLease>> open(const NatsPortOptions& where, std::optional<LeaseHolder> self,
+  static Result<std::unique_ptr<MissionLease>> open(const BusOptions& where, std::optional<LeaseHolder> self,
                                                     const LeaseTimes& times = {});
   ~MissionLease();
   MissionLease(const MissionLease&) = delete;
@@ -71,14 +66,16 @@ class MissionLease {
 
  private:
   using Clock = std::chrono::steady_clock;
-  MissionLease(NatsPortOptions where, std::optional<LeaseHolder> self, const LeaseTimes& times);
+  MissionLease(const Transport& transport, BusOptions where, std::optional<LeaseHolder> self, const LeaseTimes& times);
   void run();
-  Status look(const NatsConnection& connection);
+  /// Takes or renews the lease, or reads the others'.
+  Status look(LeaseBoard& board);
   /// Whether the lease is to be written; otherwise state_ says who has it.
   bool may_take(const std::optional<LeaseHolder>& there, std::uint64_t revision);
-  void give_up(const NatsConnection& connection) const;
+  void give_up(LeaseBoard& board) const;
 
-  const NatsPortOptions where_;
+  const Transport& transport_;
+  const BusOptions where_;
   const std::optional<LeaseHolder> self_;  // as it reads on the bus
   const LeaseTimes times_;
   // Of the thread alone: what of another holder stands in the place of the own lease, and since when.
@@ -101,11 +98,11 @@ class MissionLease {
 /// servers have reconnected and renewed theirs (LeaseTimes::renew_s).
 inline constexpr double kLookForServer_s = 10.0;
 
-/// The mission that is served on a bus, for a program that was not told which to join. Waits at most `wall_s` for a
-/// lease; then, and when where.mission is among several served ones, it is where.mission, because servers of older
-/// versions have no lease. An error when several other missions are served. `say`, if given, is told once what is
-/// waited for, when that takes long.
-Result<std::string> served_mission(const NatsPortOptions& where, double wall_s,
+/// where.mission, or when that is empty the mission that is served on the bus. Waits at most `wall_s` for a lease;
+/// then, and when kDefaultMission is among several served ones, it is that, because servers of older versions have no
+/// lease. An error when several other missions are served. `say`, if given, is told once what is waited for, when that
+/// takes long.
+Result<std::string> served_mission(const BusOptions& where, double wall_s,
                                    const std::function<void(const std::string&)>& say = {});
 
 }  // namespace tutti::bus

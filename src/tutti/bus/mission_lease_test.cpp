@@ -6,14 +6,11 @@
 #include <unistd.h>
 
 #include <chrono>
-#include <filesystem>
 #include <string>
 #include <thread>
 
-#include "support/bus/nats_server.hpp"
+#include "support/bus/port_networks.hpp"
 #include "support/bus/tcp_relay.hpp"
-#include "tutti/bus/internal/nats_connection.hpp"
-#include "tutti/bus/nats_child.hpp"
 
 namespace tutti::bus {
 namespace mission_lease_test {
@@ -22,22 +19,16 @@ using namespace std::chrono_literals;
 
 constexpr std::uint64_t kNoProcess = 0x7fff'fff0;
 
-class MissionLeases : public testing::Test {
+class MissionLeases : public testing::TestWithParam<test::PortImplementation> {
  protected:
   void SetUp() override {
-    TUTTI_SKIP_WITHOUT_NATS_SERVER();
-    folder_ = std::filesystem::path(testing::TempDir()) / ("mission_lease_" + std::to_string(getpid()));
-    auto started = NatsChild::start(folder_, {.max_store_bytes = 64U << 20U, .min_free_bytes = 0});
-    ASSERT_TRUE(started.has_value()) << started.error().message;
-    bus_ = std::move(*started);
-  }
-  void TearDown() override {
-    bus_.reset();
-    std::filesystem::remove_all(folder_);
+    if (GetParam().needs_nats) TUTTI_SKIP_WITHOUT_NATS_SERVER();
+    network_ = GetParam().make();
+    url_ = network_->url();
   }
   [[nodiscard]] std::unique_ptr<MissionLease> open(const std::string& mission,
                                                    std::optional<LeaseHolder> self = {}) const {
-    return MissionLease::open({.url = bus_->url(), .mission = mission}, std::move(self), kQuick).value();
+    return MissionLease::open({.url = url_, .mission = mission}, std::move(self), kQuick).value();
   }
   /// A process of another machine: nobody can know whether it has ended.
   static LeaseHolder holder(const std::string& state, std::uint64_t process) {
@@ -48,16 +39,21 @@ class MissionLeases : public testing::Test {
             .seat = state,
             .mark = "elsewhere " + std::to_string(process)};
   }
+  [[nodiscard]] std::unique_ptr<LeaseBoard> open_board() const {
+    const BusOptions where{.url = url_};
+    return transport_of(where).value()->open_leases(where);
+  }
   /// Somebody puts a value in the place of a lease, as anybody can.
-  void put(const std::string& mission, const std::string& value) const {
-    const auto connection = NatsConnection::open({.url = bus_->url()}, "somebody").value();
-    ASSERT_TRUE(connection->publish("$KV.TUTTI_SERVERS." + mission, "", "", value).has_value());
-    connection->flush();
+  void put(const std::string& mission, const std::string& text) const {
+    const auto board = open_board();
+    EXPECT_TRUE(comes([&] {
+      const auto there = board->read(mission).value();
+      return board->write(mission, {text, there ? there->revision : 0}, kQuick.lease_s).has_value();
+    }));
   }
   [[nodiscard]] std::optional<LeaseHolder> written(const std::string& mission) const {
-    const auto connection = NatsConnection::open({.url = bus_->url()}, "somebody").value();
-    const auto value = connection->retained("TUTTI_SERVERS", "$KV.TUTTI_SERVERS." + mission).value();
-    return value ? lease_of(*value) : std::nullopt;
+    const auto value = open_board()->read(mission).value();
+    return value ? lease_of(value->text) : std::nullopt;
   }
   static constexpr LeaseTimes kQuick{.lease_s = 4.0, .renew_s = 0.2, .unrenewed_s = 1.0, .look_s = 0.5, .rest_s = 60.0};
 
@@ -69,11 +65,35 @@ class MissionLeases : public testing::Test {
     return condition();
   }
 
-  std::filesystem::path folder_;
-  std::unique_ptr<NatsChild> bus_;
+  std::unique_ptr<test::PortNetwork> network_;
+  std::string url_;
 };
+using MissionLeasesOverNats = MissionLeases;
 
-TEST_F(MissionLeases, AreOfOneServerEach) {
+const auto kName = [](const auto& of) { return std::string(of.param.name); };
+INSTANTIATE_TEST_SUITE_P(Transports, MissionLeases, testing::ValuesIn(test::kTransports), kName);
+INSTANTIATE_TEST_SUITE_P(Transports, MissionLeasesOverNats, testing::Values(test::kTransports[0]), kName);
+
+TEST_P(MissionLeases, ValuesAreComparedAndSetAndExpire) {
+  constexpr double kLasts_s = 1.0;
+  const auto board = open_board(), other = open_board();
+  EXPECT_FALSE(board->read("alps").value().has_value());
+  EXPECT_TRUE(board->read_all().value().empty());
+  ASSERT_TRUE(board->write("alps", {"first", 0}, kLasts_s));
+  const auto first = other->read("alps").value().value();
+  EXPECT_EQ(first.text, "first");
+  EXPECT_FALSE(other->write("alps", {"second", 0}, kLasts_s));
+  ASSERT_TRUE(other->write("alps", {"second", first.revision}, kLasts_s));
+  EXPECT_FALSE(board->write("alps", {"third", first.revision}, kLasts_s));
+  EXPECT_EQ(board->read_all().value().at("alps").text, "second");
+  ASSERT_TRUE(board->write("jura", {"removed", 0}, kLasts_s));
+  board->remove("jura");
+  EXPECT_FALSE(board->read("jura").value().has_value());
+  EXPECT_TRUE(comes([&] { return !board->read("alps").value().has_value(); }));
+  EXPECT_TRUE(board->write("alps", {"fourth", 0}, kLasts_s));
+}
+
+TEST_P(MissionLeases, AreOfOneServerEach) {
   const LeaseHolder first = holder("/var/lib/a", 17);
   auto lease = open("alps", first);
   EXPECT_TRUE(lease->wait(10.0).held);
@@ -88,7 +108,7 @@ TEST_F(MissionLeases, AreOfOneServerEach) {
   EXPECT_TRUE(comes([&] { return second->state().held; }));
 }
 
-TEST_F(MissionLeases, GoToTheSuccessorOnTheSameSeatAtOnceWhenTheFirstHasCertainlyEnded) {
+TEST_P(MissionLeases, GoToTheSuccessorOnTheSameSeatAtOnceWhenTheFirstHasCertainlyEnded) {
   LeaseHolder self = holder("/var/lib/a", static_cast<std::uint64_t>(getpid())), first = self;
   self.mark = process_mark(1);
   first.mark = process_mark(2);
@@ -101,7 +121,7 @@ TEST_F(MissionLeases, GoToTheSuccessorOnTheSameSeatAtOnceWhenTheFirstHasCertainl
   EXPECT_LT(std::chrono::steady_clock::now() - begin, 900ms);
 }
 
-TEST_F(MissionLeases, GoToTheSuccessorOnTheSameSeatWhenTheFirstRenewsNoMore) {
+TEST_P(MissionLeases, GoToTheSuccessorOnTheSameSeatWhenTheFirstRenewsNoMore) {
   const auto made = open("jura", holder("/var/lib/b", 18));
   ASSERT_TRUE(made->wait(10.0).held);
   put("alps", lease_text(holder("/var/lib/a", 17)));
@@ -115,7 +135,7 @@ TEST_F(MissionLeases, GoToTheSuccessorOnTheSameSeatWhenTheFirstRenewsNoMore) {
 }
 
 // A state folder and its copy in two containers of one machine.
-TEST_F(MissionLeases, AreOfOneOfTwoServersWithOneSeat) {
+TEST_P(MissionLeases, AreOfOneOfTwoServersWithOneSeat) {
   const auto first = open("alps", holder("/state", 1));
   ASSERT_TRUE(first->wait(10.0).held);
   LeaseHolder copy = holder("/state", 1);
@@ -127,11 +147,11 @@ TEST_F(MissionLeases, AreOfOneOfTwoServersWithOneSeat) {
   EXPECT_TRUE(first->state().held);
 }
 
-TEST_F(MissionLeases, AValueThatIsNoLeaseIsOverwritten) {
+TEST_P(MissionLeases, AValueThatIsNoLeaseIsOverwritten) {
   const auto made = open("jura", holder("/var/lib/b", 18));
   ASSERT_TRUE(made->wait(10.0).held);
   put("alps", "x");
-  EXPECT_EQ(served_mission({.url = bus_->url()}, 10.0).value(), "jura");  // it is no server
+  EXPECT_EQ(served_mission({.url = url_, .mission = ""}, 10.0).value(), "jura");  // it is no server
   const auto lease = open("alps", holder("/var/lib/a", 17));
   EXPECT_TRUE(lease->wait(10.0).held);  // of a server that starts,
   put("alps", "x");
@@ -139,7 +159,7 @@ TEST_F(MissionLeases, AValueThatIsNoLeaseIsOverwritten) {
   EXPECT_TRUE(lease->state().held);
 }
 
-TEST_F(MissionLeases, AHolderTakesBackALeaseThatNobodyRenews) {
+TEST_P(MissionLeases, AHolderTakesBackALeaseThatNobodyRenews) {
   const auto lease = open("alps", holder("/var/lib/a", 17));
   ASSERT_TRUE(lease->wait(10.0).held);
   put("alps", lease_text(holder("/var/lib/b", 18)));
@@ -150,7 +170,7 @@ TEST_F(MissionLeases, AHolderTakesBackALeaseThatNobodyRenews) {
   EXPECT_TRUE(lease->state().held);
 }
 
-TEST_F(MissionLeases, AHolderGivesWayToALeaseThatIsRenewed) {
+TEST_P(MissionLeases, AHolderGivesWayToALeaseThatIsRenewed) {
   const auto lease = open("alps", holder("/var/lib/a", 17));
   ASSERT_TRUE(lease->wait(10.0).held);
   const auto renewed = [&] {
@@ -161,9 +181,8 @@ TEST_F(MissionLeases, AHolderGivesWayToALeaseThatIsRenewed) {
   EXPECT_NE(lease->state().server_of("alps"), nullptr);
 }
 
-TEST_F(MissionLeases, GoToAnotherServerWhenTheFirstIsOutOfReach) {
-  const std::string url = bus_->url();
-  test::TcpRelay relay(std::stoi(url.substr(url.rfind(':') + 1)), {});
+TEST_P(MissionLeasesOverNats, GoToAnotherServerWhenTheFirstIsOutOfReach) {
+  test::TcpRelay relay(std::stoi(url_.substr(url_.rfind(':') + 1)), {});
   const auto first = MissionLease::open({.url = "nats://127.0.0.1:" + std::to_string(relay.port()), .mission = "alps"},
                                         holder("/var/lib/a", 17), kQuick)
                          .value();
@@ -180,11 +199,11 @@ TEST_F(MissionLeases, GoToAnotherServerWhenTheFirstIsOutOfReach) {
   EXPECT_EQ(first->state().server_of("alps")->state, "/var/lib/b");
 }
 
-TEST_F(MissionLeases, AreSeenByWhoLooks) {
-  EXPECT_EQ(served_mission({.url = bus_->url()}, 0.3).value(), "tutti");  // nobody is there
+TEST_P(MissionLeases, AreSeenByWhoLooks) {
+  EXPECT_EQ(served_mission({.url = url_, .mission = ""}, 0.3).value(), "tutti");  // nobody is there
   const auto alps = open("alps", holder("/var/lib/a", 17));
   ASSERT_TRUE(alps->wait(10.0).held);
-  EXPECT_EQ(served_mission({.url = bus_->url()}, 10.0).value(), "alps");
+  EXPECT_EQ(served_mission({.url = url_, .mission = ""}, 10.0).value(), "alps");
   const auto member = open("alps"), stranger = open("tutti");
   EXPECT_NE(member->wait(10.0).server_of("alps"), nullptr);
   EXPECT_EQ(member->why_alone(), "");
@@ -193,7 +212,7 @@ TEST_F(MissionLeases, AreSeenByWhoLooks) {
     EXPECT_NE(stranger->why_alone().find(word), std::string::npos) << stranger->why_alone();
   const auto jura = open("jura", holder("/var/lib/b", 18));
   ASSERT_TRUE(jura->wait(10.0).held);
-  const auto several = served_mission({.url = bus_->url()}, 10.0);
+  const auto several = served_mission({.url = url_, .mission = ""}, 10.0);
   ASSERT_FALSE(several.has_value());
   EXPECT_NE(several.error().message.find("alps, jura"), std::string::npos) << several.error().message;
   EXPECT_EQ(alps->why_alone(), "");

@@ -12,6 +12,7 @@
 #include "tutti/base/plain_text.hpp"
 #include "tutti/bus/bus_address.hpp"
 #include "tutti/bus/internal/nats_names.hpp"
+#include "tutti/bus/internal/transports.hpp"
 
 namespace tutti::bus {
 namespace {
@@ -34,7 +35,7 @@ constexpr std::int64_t kDeliveries = 5;                   // of a job: what ends
 void say_nothing(natsConnection* /*connection*/, natsSubscription* /*subscription*/, natsStatus /*status*/,
                  void* /*closure*/) {}
 
-NatsOwned<natsOptions> make_options(const NatsPortOptions& where, const std::string& name) {
+NatsOwned<natsOptions> make_options(const BusOptions& where, const std::string& name) {
   natsOptions* made = nullptr;
   if (natsOptions_Create(&made) != NATS_OK) return nullptr;
   NatsOwned<natsOptions> options(made);
@@ -80,19 +81,13 @@ tl::unexpected<Error> NatsConnection::failure(natsStatus status, std::string_vie
               refused.empty() ? "" : " (the bus does not allow it: " + refused + ")");
 }
 
-Status check(const NatsPortOptions& options) {
-  if (!is_mission_name(options.mission))
-    return fail(ErrorCode::configuration, "mission '{}': 1 to 32 letters, digits, '-' and '_' were expected",
-                options.mission);
-  const auto url = parse_bus_url(options.url);
-  if (!url) return tl::unexpected(url.error());
-  if (!options.allow_insecure && !is_loopback(url->at.host))
-    return fail(ErrorCode::configuration, "{}: another machine, and no TLS yet: allow_insecure (--insecure) forces it",
-                url->plain);
-  return {};
+Status check_nats(const BusOptions& options, const BusUrl& url) {
+  if (options.allow_insecure || is_loopback(url.at.host)) return {};
+  return fail(ErrorCode::configuration, "{}: another machine, and no TLS yet: allow_insecure (--insecure) forces it",
+              url.plain);
 }
 
-Result<std::shared_ptr<NatsConnection>> NatsConnection::open(const NatsPortOptions& options, const std::string& name) {
+Result<std::shared_ptr<NatsConnection>> NatsConnection::open(const BusOptions& options, const std::string& name) {
   std::shared_ptr<NatsConnection> made(new NatsConnection(without_credentials(options.url), name));
   const auto settings = make_options(options, name);
   if (!settings) return fail(ErrorCode::configuration, "{}: not an address that NATS understands", made->url_);
@@ -153,7 +148,7 @@ Status NatsConnection::add_stream(jsStreamConfig& stream) const {
   return {};
 }
 
-Status NatsConnection::prepare(const NatsPortOptions& options) const {
+Status NatsConnection::prepare(const BusOptions& options) const {
   const std::string& mission = options.mission;
   const auto most = static_cast<std::int64_t>(options.max_stream_bytes);
   const std::array<std::vector<std::string>, 3> subjects{

@@ -12,7 +12,7 @@
 #include <string>
 
 #include "support/bus/nats_network.hpp"
-#include "tutti/bus/nats_port.hpp"
+#include "tutti/bus/transport.hpp"
 
 namespace tutti::bus {
 namespace nats_damage_test {
@@ -27,10 +27,10 @@ class NatsDamage : public ::testing::Test {
  protected:
   void SetUp() override { TUTTI_SKIP_WITHOUT_NATS_SERVER(); }
 
-  static std::unique_ptr<NatsPort> open_hub(const NatsNetwork& network, double stranded_s) {
-    NatsPortOptions options = network.options(kServer);
+  static std::unique_ptr<Port> open_hub(const NatsNetwork& network, double stranded_s) {
+    BusOptions options = network.options(kServer);
     options.stranded_s = stranded_s;
-    return std::move(open_nats_port(kServer, options).value());
+    return std::move(open_port(kServer, options).value());
   }
   static void send(Port& port, Endpoint to, MessageKind kind, int number) {
     const Endpoint from = kind == MessageKind::job ? kServer : kRobot;
@@ -184,10 +184,10 @@ TEST_F(NatsDamage, AJobThatEndsEveryWorkerComesBackAndTheOthersStay) {
 /// A server that takes nothing for a while, and messages that come faster than it looks, are no damage.
 TEST_F(NatsDamage, NothingIsMendedThatIsWhole) {
   NatsNetwork network;
-  NatsPortOptions options = network.options(kServer);
+  BusOptions options = network.options(kServer);
   options.stranded_s = 0.4;
   options.max_held_bytes = 100'000;
-  const auto hub = std::move(open_nats_port(kServer, options).value());
+  const auto hub = std::move(open_port(kServer, options).value());
   const auto robot = network.open(kRobot);
   for (int i = 0; i < 50; ++i) send(*robot, kServer, MessageKind::submap, i);
   within(2.0, [] { return false; });

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/bus/nats_port.hpp"
-
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -11,6 +9,7 @@
 #include "tutti/base/content_hash.hpp"
 #include "tutti/bus/delivery.hpp"
 #include "tutti/bus/internal/jetstream_port.hpp"
+#include "tutti/bus/internal/transports.hpp"
 
 namespace tutti::bus {
 namespace {
@@ -24,7 +23,7 @@ std::string name_of(Endpoint end) { return fmt::format("{}_{}", name(end.role), 
 
 }  // namespace
 
-JetStreamPort::JetStreamPort(Endpoint self, NatsPortOptions options)
+JetStreamPort::JetStreamPort(Endpoint self, BusOptions options)
     : self_(self),
       options_(std::move(options)),
       answer_to_(fmt::format("_INBOX_{}.sent_{}_{}", name_of(self), getpid(), Clock::now().time_since_epoch().count())),
@@ -94,10 +93,10 @@ void JetStreamPort::still_busy(std::uint64_t ticket) {
   changed_.notify_all();
 }
 
-NatsState JetStreamPort::state() const {
+LinkState JetStreamPort::state() const {
   const std::scoped_lock guard(mutex_);
   const bool listening = listening_ + 1 == threads_.size();  // all but the sender's thread
-  NatsState state{.url = without_credentials(options_.url),
+  LinkState state{.url = without_credentials(options_.url),
                   .connected = listening && session_ && session_->connection->connected(),
                   .reconnects = cuts_ == 0 ? 0 : cuts_ - 1,
                   .waiting_messages = outbox_.messages(),
@@ -276,8 +275,7 @@ void JetStreamPort::say_farewell() {
   connection.flush();
 }
 
-Result<std::unique_ptr<NatsPort>> open_nats_port(Endpoint endpoint, const NatsPortOptions& options) {
-  if (const Status checked = check(options); !checked) return tl::unexpected(checked.error());
+std::unique_ptr<Port> open_nats_port(Endpoint endpoint, const BusOptions& options) {
   return std::make_unique<JetStreamPort>(endpoint, options);
 }
 

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What port_conformance_test.cpp does not try: kills, limits, garbage, and links that break.
-#include "tutti/bus/nats_port.hpp"
-
 #include <gtest/gtest.h>
 #include <nats/nats.h>
 #include <sys/prctl.h>
@@ -16,6 +14,7 @@
 
 #include "support/bus/nats_network.hpp"
 #include "tutti/base/random.hpp"
+#include "tutti/bus/transport.hpp"
 
 namespace tutti::bus {
 namespace nats_port_test {
@@ -132,9 +131,9 @@ TEST_F(NatsPortTest, OverALinkThatBreaksAgainAndAgainNothingIsLost) {
 TEST_F(NatsPortTest, AServerWhoseLinkStallsTakesEverything) {
   constexpr std::size_t kMessages = 700;
   NatsNetwork network({.delay_s = 0.12});
-  NatsPortOptions far = network.options(kRobot), near = network.options(kServer);  // the server is behind the relay
-  const auto hub = std::move(open_nats_port(kServer, far).value());
-  const auto robot = std::move(open_nats_port(kRobot, near).value());
+  BusOptions far = network.options(kRobot), near = network.options(kServer);  // the server is behind the relay
+  const auto hub = std::move(open_port(kServer, far).value());
+  const auto robot = std::move(open_port(kRobot, near).value());
   ASSERT_TRUE(within(10.0, [&] { return hub->state().connected; }));
   for (std::size_t i = 0; i < kMessages; ++i)
     ASSERT_TRUE(send_submap(*robot, std::to_string(i), std::string(1000, 'x')));
@@ -149,7 +148,7 @@ TEST_F(NatsPortTest, AServerWhoseLinkStallsTakesEverything) {
 
 TEST_F(NatsPortTest, ABusThatIsFullTakesTheRestWhenThereIsRoom) {
   NatsNetwork network;
-  NatsPortOptions options = network.options(kServer);
+  BusOptions options = network.options(kServer);
   options.max_stream_bytes = 1U << 20U;
   test::prepare(options);
   const auto robot = network.open(kRobot);
@@ -157,7 +156,7 @@ TEST_F(NatsPortTest, ABusThatIsFullTakesTheRestWhenThereIsRoom) {
   EXPECT_TRUE(within(10.0, [&] { return robot->state().last_error.find("maximum bytes") != std::string::npos; }))
       << robot->state().last_error;
   EXPECT_GT(robot->state().waiting_messages, 0U);
-  const auto hub = open_nats_port(kServer, options);
+  const auto hub = open_port(kServer, options);
   ASSERT_TRUE(hub.has_value());
   Receiver receiver(200'000);
   EXPECT_TRUE(within(20.0, [&] { return receiver.take(**hub), receiver.heard() == 30; }));
@@ -166,10 +165,10 @@ TEST_F(NatsPortTest, ABusThatIsFullTakesTheRestWhenThereIsRoom) {
 
 TEST_F(NatsPortTest, AMissionForWhichTheBusHasNoRoomIsToldWhatToDo) {
   NatsNetwork network;  // 256 MB, of which mission "test" has set 176 aside
-  NatsPortOptions options = network.options(kServer);
+  BusOptions options = network.options(kServer);
   options.mission = "other";
   {
-    const auto refused = open_nats_port(kServer, options);
+    const auto refused = open_port(kServer, options);
     ASSERT_TRUE(refused.has_value());
     EXPECT_TRUE(within(10.0, [&] { return !(*refused)->state().last_error.empty(); }));
     for (const char* word : {"SUBMAPS_other", "128 MB", "max_file", "nats stream rm"})
@@ -179,15 +178,15 @@ TEST_F(NatsPortTest, AMissionForWhichTheBusHasNoRoomIsToldWhatToDo) {
   }
   options.max_stream_bytes = 32U << 20U;
   test::prepare(options);
-  EXPECT_GE(NatsChildOptions{}.max_store_bytes, 5 * 11 * NatsPortOptions{}.max_stream_bytes / 8);  // five missions
+  EXPECT_GE(NatsChildOptions{}.max_store_bytes, 5 * 11 * BusOptions{}.max_stream_bytes / 8);  // five missions
 }
 
 TEST_F(NatsPortTest, HoldsNoMoreThanItMayAndTheRestStaysOnTheBus) {
   NatsNetwork network;
   const auto robot = network.open(kRobot);
-  NatsPortOptions options = network.options(kServer);
+  BusOptions options = network.options(kServer);
   options.max_held_bytes = 500'000;
-  auto hub = open_nats_port(kServer, options);
+  auto hub = open_port(kServer, options);
   ASSERT_TRUE(hub.has_value());
   for (int i = 0; i < 100; ++i) ASSERT_TRUE(send_submap(*robot, std::to_string(i), std::string(50'000, 'x')));
   EXPECT_TRUE(within(10.0, [&] { return robot->state().waiting_messages == 0; }));
@@ -209,8 +208,8 @@ TEST_F(NatsPortTest, HoldsNoMoreThanItMayAndTheRestStaysOnTheBus) {
 
 /// Not a test: a server that takes everything, acknowledges nothing, and is killed.
 TEST(NatsPortOwner, DISABLED_AcknowledgesNothing) {
-  const auto hub = open_nats_port(
-      kServer, {.url = std::getenv("TUTTI_NATS_URL"), .mission = "test", .max_stream_bytes = 128U << 20U});
+  const auto hub =
+      open_port(kServer, {.url = std::getenv("TUTTI_NATS_URL"), .mission = "test", .max_stream_bytes = 128U << 20U});
   ASSERT_TRUE(hub.has_value());
   const int told = std::atoi(std::getenv("TUTTI_NATS_PIPE"));
   while (true)
@@ -336,9 +335,9 @@ TEST_F(NatsPortTest, WhoUsesARobotsIdsBeforeItDoesIsNotInItsWay) {
   }));
 }
 
-TEST(NatsPortOptionsTest, OtherMachinesNeedTlsAndMissionsAName) {
-  const auto refusal = [](const NatsPortOptions& options) {
-    const auto port = open_nats_port(kRobot, options);
+TEST(BusOptionsTest, OtherMachinesNeedTlsAndMissionsAName) {
+  const auto refusal = [](const BusOptions& options) {
+    const auto port = open_port(kRobot, options);
     return port ? "" : port.error().message;
   };
   EXPECT_NE(refusal({.url = "nats://10.0.0.1:4222"}).find("10.0.0.1"), std::string::npos);

@@ -127,7 +127,7 @@ void JetStreamPort::watch() {
   };
   const auto note_given = [&](std::uint64_t given, std::uint64_t deliveries) {
     const std::scoped_lock guard(mutex_);
-    given_in_vain_ = given > 0 && deliveries >= NatsState::kGivenInVain * given ? deliveries : 0;
+    given_in_vain_ = given > 0 && deliveries >= LinkState::kGivenInVain * given ? deliveries : 0;
   };
   const auto is_there = [&](const std::string& stream, const NatsConnection& connection) {
     const auto there = connection.has_stream(stream);

@@ -68,11 +68,11 @@ TEST_F(NatsStrangers, WhatTheBusDoesNotAllowIsSaidAsThat) {
   test::NatsProcess bus(folder, R"(authorization { users: [
     { user: hub, password: all },
     { user: robot, password: some, permissions: { publish: { deny: "mission.*.robot.*.submap" } } } ] })");
-  NatsPortOptions options{.url = bus.url(), .mission = "test", .max_stream_bytes = 16U << 20U};
+  BusOptions options{.url = bus.url(), .mission = "test", .max_stream_bytes = 16U << 20U};
   options.credentials = {"hub", "all"};
   test::prepare(options);
   options.credentials = {"robot", "some"};
-  const auto robot = open_nats_port(kRobot, options).value();
+  const auto robot = open_port(kRobot, options).value();
   const auto submap = std::make_shared<const std::string>("submap");
   ASSERT_TRUE(robot->send({kRobot, kServer, MessageKind::submap, "7", submap}));
   EXPECT_TRUE(within(10.0, [&] { return !robot->state().denied.empty(); })) << robot->state().last_error;
@@ -83,11 +83,11 @@ TEST_F(NatsStrangers, WhatTheBusDoesNotAllowIsSaidAsThat) {
     const Status held = lease->check_held();
     return !held && held.error().message.find("Authentication Violation") != std::string::npos;
   })) << lease->check_held().error().message;
-  const auto refused = open_nats_port(kRobot, options).value();
+  const auto refused = open_port(kRobot, options).value();
   EXPECT_TRUE(within(10.0, [&] { return !refused->state().last_error.empty(); }));
   options.credentials = {};
   options.url.replace(0, 7, "nats://robot:wrong@");
-  const auto in_url = open_nats_port(kRobot, options).value();
+  const auto in_url = open_port(kRobot, options).value();
   EXPECT_TRUE(within(10.0, [&] { return !in_url->state().last_error.empty(); }));
   EXPECT_EQ((in_url->state().url + in_url->state().last_error).find("wrong"), std::string::npos)
       << in_url->state().last_error;

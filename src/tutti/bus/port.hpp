@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "tutti/base/result.hpp"
@@ -15,6 +17,29 @@ struct Received {
   std::uint64_t ticket = 0;
 };
 
+/// State of a port's link to its bus. What a transport does not have stays 0 or empty.
+struct LinkState {
+  std::string url = {};    ///< Without credentials.
+  bool connected = false;  ///< Connected, and subscribed to all that this port receives.
+  std::uint64_t reconnects = 0;
+  std::size_t waiting_messages = 0;  ///< Parts of messages that are not sent, or not confirmed by the bus.
+  std::uint64_t waiting_bytes = 0;
+  std::size_t waiting_acknowledgements = 0;
+  std::uint64_t refused = 0;            ///< Messages that arrived and could not be understood, or never became whole.
+  std::uint64_t streams_made_anew = 0;  ///< Server's port only: streams that the bus had lost, or gave nothing of.
+  std::uint64_t jobs_removed = 0;       ///< Server's port only: jobs that no worker gets any more.
+  std::uint64_t strange_jobs = 0;       ///< Server's port only: jobs that it has not sent, and has removed.
+  /// For how long a connected bus has confirmed nothing of what was sent.
+  double unconfirmed_s = 0.0;
+  /// What the bus does not let this program do, in the bus's words, since it connected; empty: nothing was refused.
+  std::string denied = {};
+  /// Server's port only: how often jobs were given to workers since one was last answered, once every job that is out
+  /// was given kGivenInVain times on average. 0: jobs are answered.
+  std::uint64_t given_in_vain = 0;
+  static constexpr std::uint64_t kGivenInVain = 3;
+  std::string last_error = {};
+};
+
 /// Connects one endpoint to the others; an endpoint has one port at a time. bus/delivery.hpp says what is guaranteed
 /// for each kind of message. A port is used by one thread. port_conformance_test.cpp holds every implementation to this
 /// contract.
@@ -26,8 +51,8 @@ class Port {
   virtual ~Port() = default;
   /// Takes a message, which leaves when it can; never waits for the network. `envelope.from` is this endpoint. A
   /// retained message takes the place of the last one to the same receiver. Any other message with the kind and id of
-  /// one that has not left yet changes nothing. On an error the message was not taken, because too many wait, and must
-  /// be sent again later.
+  /// one that has not left yet changes nothing. On an error the message was not taken, because too many wait or the
+  /// port may not connect yet, and must be sent again later.
   [[nodiscard]] virtual Status send(Envelope envelope) = 0;
   /// Returns what has come, without waiting. A worker gets one job at a time: the next one comes when the last is
   /// acknowledged. A job that has ended every worker that had it may come back to the server, from any_worker(), and
@@ -40,6 +65,8 @@ class Port {
   /// Says that work on this message goes on. If a worker does not call this every few seconds during
   /// a long job, another worker gets the job, too.
   virtual void still_busy(std::uint64_t ticket) = 0;
+  /// A port whose link cannot be lost is always connected.
+  [[nodiscard]] virtual LinkState state() const { return {.connected = true}; }
 };
 
 }  // namespace tutti::bus

@@ -13,100 +13,18 @@
 #include <utility>
 #include <vector>
 
-#include "support/bus/nats_network.hpp"
+#include "support/bus/port_networks.hpp"
 #include "tutti/bus/port.hpp"
-#include "tutti/bus/simulated_network.hpp"
 
 namespace tutti::bus {
 namespace port_conformance_test {
 
-/// A network of its own for one test.
-class PortNetwork {
- public:
-  virtual ~PortNetwork() = default;
-  /// Destroying the port is what the end of a program is, killed or not.
-  virtual std::unique_ptr<Port> connect(Endpoint endpoint) = 0;
-  /// Long enough that whatever is to come has come.
-  virtual void settle() = 0;
-  /// Nothing gets from robots to the server or back until it is mended.
-  virtual void cut() = 0;
-  virtual void mend() = 0;
-};
-
-constexpr double kCutFrom_s = 1000.0, kCutUntil_s = 2000.0;
-
-class Simulated final : public PortNetwork {
- public:
-  std::unique_ptr<Port> connect(Endpoint endpoint) override { return network_.connect(endpoint); }
-  void settle() override { advance(now_s_ + 10.0); }
-  void cut() override { advance(kCutFrom_s); }
-  void mend() override { advance(kCutUntil_s); }
-
- private:
-  void advance(double now_s) {
-    now_s_ = now_s;
-    network_.advance(Timestamp{} + now_s_);
-  }
-  SimulatedNetwork network_{SimulatedRadio(Timestamp{}, {.jitter_s = 0.5, .outages = {{kCutFrom_s, kCutUntil_s}}}, 1),
-                            Timestamp{}};
-  double now_s_ = 0.0;
-};
-
-class OverNats final : public PortNetwork {
- public:
-  std::unique_ptr<Port> connect(Endpoint endpoint) override {
-    auto port = network_.open(endpoint);
-    ports_.push_back(port.get());
-    return std::make_unique<Tracked>(*this, std::move(port));
-  }
-  /// Everything sent is on the bus, everything acknowledged is so there; then what is under way has a moment.
-  void settle() override {
-    const auto idle = [](const NatsPort* port) {
-      const NatsState state = port->state();
-      return state.connected && state.waiting_messages == 0 && state.waiting_acknowledgements == 0;
-    };
-    EXPECT_TRUE(cut_ || test::within(10.0, [&] { return std::ranges::all_of(ports_, idle); }));
-    std::this_thread::sleep_for(std::chrono::milliseconds(200));
-  }
-  void cut() override { network_.relay().hold(cut_ = true); }
-  void mend() override { network_.relay().hold(cut_ = false); }
-
- private:
-  /// Says when it ends.
-  class Tracked final : public Port {
-   public:
-    Tracked(OverNats& network, std::unique_ptr<NatsPort> port) : network_(network), port_(std::move(port)) {}
-    ~Tracked() override { std::erase(network_.ports_, port_.get()); }
-    Status send(Envelope envelope) override { return port_->send(std::move(envelope)); }
-    std::vector<Received> receive() override { return port_->receive(); }
-    void acknowledge(std::uint64_t ticket) override { port_->acknowledge(ticket); }
-    void still_busy(std::uint64_t ticket) override { port_->still_busy(ticket); }
-
-   private:
-    OverNats& network_;
-    std::unique_ptr<NatsPort> port_;
-  };
-  test::NatsNetwork network_;
-  std::vector<const NatsPort*> ports_;
-  bool cut_ = false;
-};
-
-template <class T>
-std::unique_ptr<PortNetwork> make() {
-  return std::make_unique<T>();
-}
-
-struct Implementation {
-  const char* name;
-  std::unique_ptr<PortNetwork> (*make)();
-};
-
-class PortConformance : public ::testing::TestWithParam<Implementation> {
+class PortConformance : public ::testing::TestWithParam<test::PortImplementation> {
  protected:
   using Messages = std::multiset<std::string>;
 
   void SetUp() override {
-    if (GetParam().name == std::string("nats")) TUTTI_SKIP_WITHOUT_NATS_SERVER();
+    if (GetParam().needs_nats) TUTTI_SKIP_WITHOUT_NATS_SERVER();
     network = GetParam().make();
   }
 
@@ -150,7 +68,7 @@ class PortConformance : public ::testing::TestWithParam<Implementation> {
     return bytes;
   }
 
-  std::unique_ptr<PortNetwork> network;
+  std::unique_ptr<test::PortNetwork> network;
   Endpoint server = Endpoint::server(), alpha = Endpoint::of(RobotId{0}), bravo = Endpoint::of(RobotId{1});
   Endpoint first = Endpoint::worker(0), second = Endpoint::worker(1);
 };
@@ -390,10 +308,9 @@ TEST_P(PortConformance, WithoutContactNothingWaitsAndNothingIsLost) {
   EXPECT_EQ(newest(*robot, MessageKind::proxy_graph), "graph");
 }
 
-INSTANTIATE_TEST_SUITE_P(Port, PortConformance,
-                         ::testing::Values(Implementation{"simulated", &make<Simulated>},
-                                           Implementation{"nats", &make<OverNats>}),
-                         [](const auto& of) { return std::string(of.param.name); });
+const auto kName = [](const auto& of) { return std::string(of.param.name); };
+INSTANTIATE_TEST_SUITE_P(Simulated, PortConformance, ::testing::Values(test::kSimulated), kName);
+INSTANTIATE_TEST_SUITE_P(Transports, PortConformance, ::testing::ValuesIn(test::kTransports), kName);
 
 }  // namespace port_conformance_test
 }  // namespace tutti::bus

@@ -5,9 +5,9 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <set>
 #include <utility>
 
+#include "tutti/bus/broker.hpp"
 #include "tutti/bus/port.hpp"
 #include "tutti/bus/simulated_radio.hpp"
 
@@ -15,8 +15,7 @@ namespace tutti::bus {
 
 /// Ports in virtual time: the simulated radio joins robots to a broker beside the server; workers, viewers and the
 /// server reach the broker without delay. Messages at the broker outlive the ports; messages that wait at a robot for
-/// its radio are lost with the robot's port. An endpoint without a port receives nothing; when it connects again
-/// retained values are sent to it. One thread at a time.
+/// its radio are lost with the robot's port. One thread at a time.
 class SimulatedNetwork {
  public:
   explicit SimulatedNetwork(SimulatedRadio radio, Timestamp start) : radio_(std::move(radio)), now_(start) {}
@@ -33,26 +32,15 @@ class SimulatedNetwork {
 
  private:
   class SimulatedPort;
-  struct Message {
-    Envelope envelope;
-    bool given = false;  ///< Whether the receiver's present port has returned it from receive(); for a job the receiver
-                         ///< is then `envelope.to`.
-  };
   void send(Envelope envelope);
-  void arrive(Envelope envelope);
-  void show(Endpoint viewer, Envelope envelope);
+  void carry(Envelope envelope);
   /// True for a retained value that arrives after a newer one.
   [[nodiscard]] bool is_overtaken(const Arrival& arrival);
-  [[nodiscard]] std::vector<Received> receive(Endpoint endpoint);
-  void acknowledge(std::uint64_t ticket) { messages_.erase(ticket); }
   void disconnect(Endpoint endpoint);
 
   SimulatedRadio radio_;
   Timestamp now_;
-  std::set<Endpoint> connected_;
-  std::uint64_t next_ticket_ = 0;
-  std::map<std::uint64_t, Message> messages_;  ///< By ticket: messages at the broker that are not acknowledged.
-  std::map<std::pair<Endpoint, MessageKind>, Envelope> retained_;
+  Broker broker_;
   /// Number of the newest retained message that has arrived.
   std::map<std::pair<Endpoint, MessageKind>, std::uint64_t> newest_;
 };

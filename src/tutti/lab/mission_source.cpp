@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "tutti/base/config_io.hpp"
-#include "tutti/bus/mission_lease.hpp"
+#include "tutti/bus/transport.hpp"
 #include "tutti/lab/closure_finders.hpp"
 #include "tutti/lab/mission_input.hpp"
 #include "tutti/lab/replayed_robot.hpp"
@@ -33,7 +33,7 @@ Result<std::string> name_on_bus(const MissionSource& source, const MissionConfig
   std::string name = source.name;
   const bool is_in_file = name.empty() && config.mission != MissionConfig{}.mission;
   if (is_in_file) name = config.mission;
-  if (name.empty()) return bus::NatsPortOptions{}.mission;
+  if (name.empty()) return bus::kDefaultMission;
   if (auto ok = bus::check_mission_name(name); !ok)
     return fail(ErrorCode::configuration, "{}{}", ok.error().message,
                 is_in_file ? "; that is what the mission file calls it, --mission NAME gives another name" : "");

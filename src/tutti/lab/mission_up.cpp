@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "tutti/base/file.hpp"
-#include "tutti/bus/nats_port.hpp"
+#include "tutti/bus/transport.hpp"
 #include "tutti/lab/children.hpp"
 #include "tutti/lab/collect_mission.hpp"
 #include "tutti/mission/load_meter.hpp"
@@ -147,7 +147,7 @@ Status MissionUp::start(const std::atomic<bool>& stop) {
 
 Status MissionUp::watch(const std::atomic<bool>& stop) {
   const auto port =
-      bus::open_nats_port(bus::Endpoint::viewer(static_cast<std::uint32_t>(getpid())), {.url = bus_, .mission = name_});
+      bus::open_port(bus::Endpoint::viewer(static_cast<std::uint32_t>(getpid())), {.url = bus_, .mission = name_});
   if (!port) return tl::unexpected(port.error());
   while (true) {
     for (const bus::Received& message : (*port)->receive()) {

@@ -12,7 +12,6 @@
 #include "tutti/base/check.hpp"
 #include "tutti/base/own_file.hpp"
 #include "tutti/bus/delivery.hpp"
-#include "tutti/bus/nats_port.hpp"
 #include "tutti/program/state_folder.hpp"
 
 namespace tutti::program {
@@ -290,10 +289,7 @@ void Host::look_at_link() {
   for (const auto& [level, sentence] : link_.look(*state, clock_.wall_s())) log_.say(level, sentence);
 }
 
-std::optional<bus::NatsState> Host::link() const {
-  const auto* port = dynamic_cast<const bus::NatsPort*>(port_.get());
-  return port == nullptr ? std::nullopt : std::optional(port->state());
-}
+std::optional<bus::LinkState> Host::link() const { return port_ ? std::optional(port_->state()) : std::nullopt; }
 
 std::string Host::all_trouble() const {
   if (parts_.trouble)

@@ -12,7 +12,6 @@
 #include <utility>
 #include <vector>
 
-#include "tutti/bus/nats_port.hpp"
 #include "tutti/bus/port.hpp"
 #include "tutti/node/step.hpp"
 #include "tutti/program/clock.hpp"
@@ -119,8 +118,8 @@ class Host {
   /// Traffic by direction (true: sent) and kind.
   using TrafficTable = std::map<std::pair<bool, bus::MessageKind>, Traffic>;
   [[nodiscard]] const TrafficTable& traffic() const { return traffic_; }
-  /// The state of a port to NATS; nothing when there is no port, or another kind of port.
-  [[nodiscard]] std::optional<bus::NatsState> link() const;
+  /// The state of the port; nothing when there is none.
+  [[nodiscard]] std::optional<bus::LinkState> link() const;
   /// Everything that is wrong comes to this: what the program says, else trouble(), else the link. Empty: nothing is.
   [[nodiscard]] std::string all_trouble() const;
   /// The port and the node are made anew at the next turn.

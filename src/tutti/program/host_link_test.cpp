@@ -16,13 +16,13 @@ namespace host_link_test {
 namespace fs = std::filesystem;
 
 /// Of a bus that is gone.
-class DeadPort final : public bus::NatsPort {
+class DeadPort final : public bus::Port {
  public:
   Status send(bus::Envelope) override { return {}; }
   std::vector<bus::Received> receive() override { return {}; }
   void acknowledge(std::uint64_t) override {}
   void still_busy(std::uint64_t) override {}
-  [[nodiscard]] bus::NatsState state() const override { return {.url = "nats://127.0.0.1:1"}; }
+  [[nodiscard]] bus::LinkState state() const override { return {.url = "nats://127.0.0.1:1"}; }
 };
 
 class Idler final : public Hosted {

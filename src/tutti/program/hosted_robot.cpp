@@ -139,7 +139,7 @@ Json HostedRobot::feed_status() const {
 
 Json HostedRobot::status(Timestamp now) const {
   const NodeStatus status = node_status(now);
-  const bus::NatsState link = port_.state();
+  const bus::LinkState link = port_.state();
   const double time_s = now - Timestamp{};
   Json out = json_of_fields(status);
   out.update({{"program", "robot"},

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "tutti/bus/nats_port.hpp"
+#include "tutti/bus/port.hpp"
 #include "tutti/program/fed_robot.hpp"
 #include "tutti/program/feed/live_feed.hpp"
 #include "tutti/program/host.hpp"
@@ -23,7 +23,7 @@ class HostedRobot final : public Hosted {
   static constexpr double kWaitsForMap_s = 60.0;
 
   HostedRobot(std::unique_ptr<RobotDriver> driver, double duration_s, const RobotOptions& options, const Clock& clock,
-              const bus::NatsPort& port, EventLog& log, const std::string& alone)
+              const bus::Port& port, EventLog& log, const std::string& alone)
       : driver_(std::move(driver)),
         duration_s_(duration_s),
         options_(options),
@@ -76,7 +76,7 @@ class HostedRobot final : public Hosted {
   double duration_s_;
   const RobotOptions& options_;
   const Clock& clock_;
-  const bus::NatsPort& port_;
+  const bus::Port& port_;
   EventLog& log_;
   const std::string& alone_;  // why it hears no server
   double begin_s_;

@@ -10,7 +10,7 @@ namespace tutti::program {
 namespace {
 
 /// ": why", without the bus's address, which most errors of a port begin with and the sentence has already.
-std::string why_of(const bus::NatsState& state) {
+std::string why_of(const bus::LinkState& state) {
   const std::string_view error = state.last_error;
   const std::string address = state.url + ": ";
   return error.empty() ? "" : fmt::format(": {}", error.starts_with(address) ? error.substr(address.size()) : error);
@@ -18,7 +18,7 @@ std::string why_of(const bus::NatsState& state) {
 
 }  // namespace
 
-std::vector<LinkWatch::Said> LinkWatch::look(const bus::NatsState& state, double wall_s) {
+std::vector<LinkWatch::Said> LinkWatch::look(const bus::LinkState& state, double wall_s) {
   std::vector<Said> said;
   const auto say = [&](Level level, std::string sentence) { said.push_back({level, std::move(sentence)}); };
   trouble_.clear();
@@ -43,7 +43,7 @@ std::vector<LinkWatch::Said> LinkWatch::look(const bus::NatsState& state, double
   const bool is_in_vain = state.given_in_vain > 0;
   if (is_in_vain)
     trouble_ = fmt::format("jobs were given to workers {} times since one was last answered, each of them at least {}",
-                           state.given_in_vain, bus::NatsState::kGivenInVain);
+                           state.given_in_vain, bus::LinkState::kGivenInVain);
   if (is_in_vain && !said_in_vain_) say(Level::error, trouble_);
   if (!is_in_vain && said_in_vain_) say(Level::info, "jobs are answered again");
   said_in_vain_ = is_in_vain;

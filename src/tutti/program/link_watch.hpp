@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "tutti/bus/nats_port.hpp"
+#include "tutti/bus/port.hpp"
 #include "tutti/program/event_log.hpp"
 
 namespace tutti::program {
@@ -23,7 +23,7 @@ class LinkWatch {
     std::string sentence;
   };
   /// The sentences to report now. To be called about once a second.
-  std::vector<Said> look(const bus::NatsState& state, double wall_s);
+  std::vector<Said> look(const bus::LinkState& state, double wall_s);
   /// What is wrong now; empty when nothing is.
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
 
@@ -39,7 +39,7 @@ class LinkWatch {
 };
 
 /// Decides when a worker's port is to connect anew: the bus gives jobs to workers and gets no answers
-/// (NatsState::given_in_vain), and this worker has none. So they are given to an old request, or over a connection that
+/// (LinkState::given_in_vain), and this worker has none. So they are given to an old request, or over a connection that
 /// the bus takes for a good one.
 class AnewWatch {
  public:

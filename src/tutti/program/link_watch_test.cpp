@@ -10,7 +10,7 @@ bool has(const std::string& text, const std::string& part) { return text.find(pa
 
 TEST(LinkWatch, SaysOnceThatThereIsNoLinkAndThatItIsBack) {
   LinkWatch watch;
-  bus::NatsState state{.url = "nats://base:4222", .last_error = "connecting: no server"};
+  bus::LinkState state{.url = "nats://base:4222", .last_error = "connecting: no server"};
   for (int s = 0; s < 5; ++s) EXPECT_TRUE(watch.look(state, s).empty()) << s;
   EXPECT_EQ(watch.trouble(), "");
   auto said = watch.look(state, 5);
@@ -34,7 +34,7 @@ TEST(LinkWatch, SaysOnceThatThereIsNoLinkAndThatItIsBack) {
 
 TEST(LinkWatch, TheAddressOfTheBusIsSaidOnce) {
   LinkWatch watch;
-  const bus::NatsState state{.url = "nats://base:4222", .last_error = "nats://base:4222: connecting: no server"};
+  const bus::LinkState state{.url = "nats://base:4222", .last_error = "nats://base:4222: connecting: no server"};
   watch.look(state, 0);
   const auto said = watch.look(state, 5);
   ASSERT_EQ(said.size(), 1U);
@@ -54,7 +54,7 @@ TEST(AnewWatch, ConnectsAnIdleWorkerAnewOnceAMinute) {
 
 TEST(LinkWatch, ACutThatNobodyNoticesIsNotSaid) {
   LinkWatch watch;
-  bus::NatsState state{.url = "nats://base:4222", .connected = true};
+  bus::LinkState state{.url = "nats://base:4222", .connected = true};
   for (int s = 0; s < 100; ++s) {
     state.connected = s % 6 != 0;
     EXPECT_TRUE(watch.look(state, s).empty()) << s;
@@ -63,7 +63,7 @@ TEST(LinkWatch, ACutThatNobodyNoticesIsNotSaid) {
 
 TEST(LinkWatch, ABusThatStoresNothingIsSaidToBeFull) {
   LinkWatch watch;
-  bus::NatsState state{.url = "nats://base:4222", .connected = true, .unconfirmed_s = 20.0};
+  bus::LinkState state{.url = "nats://base:4222", .connected = true, .unconfirmed_s = 20.0};
   EXPECT_TRUE(watch.look(state, 0).empty());
   state.unconfirmed_s = 26.0;
   auto said = watch.look(state, 6);
@@ -86,7 +86,7 @@ TEST(LinkWatch, ABusThatStoresNothingIsSaidToBeFull) {
 
 TEST(LinkWatch, JobsGivenInVainAndWhatTheBusDoesNotAllowAreAlerts) {
   LinkWatch watch;
-  bus::NatsState state{.url = "nats://base:4222", .connected = true, .given_in_vain = 60};
+  bus::LinkState state{.url = "nats://base:4222", .connected = true, .given_in_vain = 60};
   auto said = watch.look(state, 0);
   ASSERT_EQ(said.size(), 1U);
   EXPECT_EQ(said[0].level, Level::error);

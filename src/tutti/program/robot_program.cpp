@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "tutti/bus/mission_lease.hpp"
-#include "tutti/bus/nats_port.hpp"
 #include "tutti/program/feed/live_feed.hpp"
 #include "tutti/program/field_json.hpp"
 #include "tutti/program/host.hpp"
@@ -119,8 +118,8 @@ Result<std::unique_ptr<Hosted>> RobotProgram::open_node(bus::Port& port) {
   auto driver = open_driver();
   if (!driver) return in_context((folder_->path() / kRobotFile).string(), driver.error());
   auto* const live = dynamic_cast<LiveRobot*>(driver->get());
-  auto robot = std::make_unique<HostedRobot>(std::move(*driver), options_.duration_s, options_, *clock_,
-                                             dynamic_cast<const bus::NatsPort&>(port), *log_, alone_);
+  auto robot =
+      std::make_unique<HostedRobot>(std::move(*driver), options_.duration_s, options_, *clock_, port, *log_, alone_);
   if (feed_) robot->feed_live(*feed_, *live, *host_, view());
   return robot;
 }
@@ -190,17 +189,13 @@ Status RobotProgram::start() {
   const auto driver = open_driver();  // where the recording stood
   if (!driver) return in_context((folder_->path() / kRobotFile).string(), driver.error());
   clock_.emplace(options_.rate, begin_s(**driver));
-  const bus::NatsPortOptions where{.url = options_.bus,
-                                   .mission = options_.settings.mission,
-                                   .allow_insecure = options_.insecure,
-                                   .credentials = options_.credentials};
+  bus::BusOptions where = options_.bus;
+  where.mission = options_.settings.mission;
   auto lease = bus::MissionLease::open(where, std::nullopt);
   if (!lease) return tl::unexpected(lease.error());
   lease_ = std::move(*lease);
   host_.emplace(Host::Parts{.store = store_.get(),
-                            .open_port = [this, where]() -> Result<std::unique_ptr<bus::Port>> {
-                              return bus::open_nats_port(bus::Endpoint::of(robot_), where);
-                            },
+                            .open_port = [this, where] { return bus::open_port(bus::Endpoint::of(robot_), where); },
                             .open_node = [this](bus::Port& port) { return open_node(port); },
                             .each_second =
                                 [this] {
@@ -215,7 +210,7 @@ Status RobotProgram::start() {
   // On a full disk there is no map, but clients are told where they are.
   if (Status opened = host_->open(); !opened && !(feed_ && host_->tries_again())) return opened;
   log_->say(Level::info, fmt::format("robot {} runs in {}, bus {}, {}, {}", robot_.value, folder_->path().string(),
-                                     bus::without_credentials(options_.bus),
+                                     bus::without_credentials(options_.bus.url),
                                      options_.feed.empty() ? "replays" : "is fed at " + options_.feed,
                                      folder_->is_new() ? "a new session" : "goes on"));
   return {};

@@ -10,7 +10,7 @@
 
 #include "tutti/base/random.hpp"
 #include "tutti/base/result.hpp"
-#include "tutti/bus/bus_address.hpp"
+#include "tutti/bus/transport.hpp"
 #include "tutti/model/image_stream.hpp"
 #include "tutti/perception/lidar/scan_times.hpp"
 #include "tutti/perception/visual/frontend/tracking_source.hpp"
@@ -57,10 +57,8 @@ struct RobotSettings {
 
 /// How a robot program runs.
 struct RobotOptions {
-  std::string name;  ///< One of the mission's robots; any name when the robot is fed.
-  std::string bus;   ///< "nats://HOST:PORT"
-  bool insecure = false;
-  bus::BusCredentials credentials;
+  std::string name;     ///< One of the mission's robots; any name when the robot is fed.
+  bus::BusOptions bus;  ///< The mission is that of the settings.
   std::filesystem::path state;
   RobotSettings settings;
   std::string feed;         ///< Path of the Unix socket on which samples are fed; empty: they are from a recording.

@@ -16,7 +16,6 @@
 #include "tutti/base/file.hpp"
 #include "tutti/bus/mission_lease.hpp"
 #include "tutti/bus/nats_child.hpp"
-#include "tutti/bus/nats_port.hpp"
 #include "tutti/node/map_meta.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/status_envelope.hpp"
@@ -102,25 +101,24 @@ Json HostedServer::status(Timestamp now) const {
 /// The server's own worker: on a thread of its own, over a port of its own, with the map's file at hand.
 class OwnWorker {
  public:
-  OwnWorker(const bus::NatsPortOptions& where, std::shared_ptr<const server::ClosureFinder> finder,
+  OwnWorker(const bus::BusOptions& where, std::shared_ptr<const server::ClosureFinder> finder,
             std::shared_ptr<const server::MapRefiner> refiner, const storage::TableStore& map,
             const std::string& version, std::size_t threads, const Clock& clock, EventLog& log)
-      : host_(
-            {.store = nullptr,
-             .open_port = [where]() -> Result<std::unique_ptr<bus::Port>> { return bus::open_nats_port(kSelf, where); },
-             .open_node = [this, finder, refiner, version, threads,
-                           &map](bus::Port& port) -> Result<std::unique_ptr<Hosted>> {
-               const auto make = [&](node::WorkerNode::ForEach for_each) {
-                 node::WorkerNode node(kSelf, finder, node::SubmapFrames::of(map), std::move(for_each));
-                 node.refine_with(refiner);
-                 node.rest_for(0.0);
-                 return node;
-               };
-               return std::make_unique<HostedWorker>(kSelf, version, make, threads, port, stop_);
-             },
-             .each_second = [this] { look_whether_in_vain(); },
-             .status_file = {}},
-            clock, log),
+      : host_({.store = nullptr,
+               .open_port = [where] { return bus::open_port(kSelf, where); },
+               .open_node = [this, finder, refiner, version, threads,
+                             &map](bus::Port& port) -> Result<std::unique_ptr<Hosted>> {
+                 const auto make = [&](node::WorkerNode::ForEach for_each) {
+                   node::WorkerNode node(kSelf, finder, node::SubmapFrames::of(map), std::move(for_each));
+                   node.refine_with(refiner);
+                   node.rest_for(0.0);
+                   return node;
+                 };
+                 return std::make_unique<HostedWorker>(kSelf, version, make, threads, port, stop_);
+               },
+               .each_second = [this] { look_whether_in_vain(); },
+               .status_file = {}},
+              clock, log),
         clock_(clock),
         log_(log) {}
   ~OwnWorker() {
@@ -164,14 +162,14 @@ Result<bus::HostPort> address_of(const std::string& listen) {
 
 Result<std::unique_ptr<bus::NatsChild>> start_bus(const ServerOptions& options, const bus::HostPort& address,
                                                   const std::filesystem::path& folder) {
-  return bus::NatsChild::start(folder,
-                               {.host = address.host, .port = address.port, .allow_insecure = options.insecure});
+  return bus::NatsChild::start(
+      folder, {.host = address.host, .port = address.port, .allow_insecure = options.bus.allow_insecure});
 }
 
 Status check_addresses(const ServerOptions& options, const bus::HostPort& address) {
-  if (!options.bus.empty() && !options.listen.empty())
+  if (!options.bus.url.empty() && !options.listen.empty())
     return fail(ErrorCode::configuration, "--bus and --listen: either a bus that runs, or one of its own");
-  if (options.insecure || bus::is_loopback(address.host)) return {};
+  if (options.bus.allow_insecure || bus::is_loopback(address.host)) return {};
   return fail(ErrorCode::configuration,
               "--listen {}: anybody who reaches this address could write to the map: there is no TLS yet; --insecure "
               "forces it",
@@ -221,7 +219,7 @@ class ServerProgram {
   std::optional<StateFolder> folder_;
   std::unique_ptr<EventLog> log_;
   std::unique_ptr<bus::NatsChild> child_;
-  bus::NatsPortOptions bus_;
+  bus::BusOptions bus_;
   std::shared_ptr<const bus::MissionLease> lease_;
   bool is_over_ = false;  // the lease is another's
   std::unique_ptr<storage::TableStore> store_;
@@ -296,10 +294,8 @@ Status ServerProgram::start() {
   const auto address = address_of(options_.listen);
   if (!address) return tl::unexpected(address.error());
   if (Status ok = check_addresses(options_, *address); !ok) return ok;
-  bus_ = {.url = options_.bus,
-          .mission = settings_.mission,
-          .allow_insecure = options_.insecure,
-          .credentials = options_.credentials};
+  bus_ = options_.bus;
+  bus_.mission = settings_.mission;
   auto folder = StateFolder::open(options_.state, "server", kMapFile);
   if (!folder) return tl::unexpected(folder.error());
   folder_.emplace(std::move(*folder));
@@ -310,7 +306,7 @@ Status ServerProgram::start() {
   auto store = storage::open_sqlite_store(folder_->path() / kMapFile, storage::map_schema());
   if (!store) return tl::unexpected(store.error());
   store_ = std::move(*store);
-  if (options_.bus.empty()) {
+  if (options_.bus.url.empty()) {
     auto child = start_bus(options_, *address, folder_->path() / "bus");
     if (!child) return tl::unexpected(child.error());
     child_ = std::move(*child);
@@ -319,9 +315,7 @@ Status ServerProgram::start() {
   if (Status taken = take_lease(); !taken) return taken;
   clock_.emplace(options_.rate, options_.rate * folder_->age_s());
   host_.emplace(Host::Parts{.store = store_.get(),
-                            .open_port = [this]() -> Result<std::unique_ptr<bus::Port>> {
-                              return bus::open_nats_port(bus::Endpoint::server(), bus_);
-                            },
+                            .open_port = [this] { return bus::open_port(bus::Endpoint::server(), bus_); },
                             .open_node = [this](bus::Port&) { return open_node(); },
                             .each_second = [this] { tend(); },
                             .status_file = folder_->path() / kStatusFile,

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "tutti/base/result.hpp"
-#include "tutti/bus/bus_address.hpp"
+#include "tutti/bus/transport.hpp"
 #include "tutti/mapfile/content.hpp"
 #include "tutti/program/event_log.hpp"
 #include "tutti/program/finder_settings.hpp"
@@ -65,10 +65,8 @@ class MapViewer {
 /// How a server program runs.
 struct ServerOptions {
   std::filesystem::path state;
-  std::string bus;     ///< "nats://HOST:PORT"; empty: the program starts its own nats-server,
-  std::string listen;  ///< at this "HOST" or "HOST:PORT"; empty: on this machine only, at any free port.
-  bool insecure = false;
-  bus::BusCredentials credentials;  ///< For `bus`.
+  bus::BusOptions bus;  ///< The mission is that of the settings. No URL: the program starts its own nats-server,
+  std::string listen;   ///< at this "HOST" or "HOST:PORT"; empty: on this machine only, at any free port.
   ServerSettings settings;
   int threads = 1;    ///< Threads that verify closures in this program; 0: workers do it.
   double rate = 1.0;  ///< Mission time per wall time.

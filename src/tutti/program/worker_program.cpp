@@ -14,7 +14,6 @@
 #include "tutti/base/random.hpp"
 #include "tutti/bus/delivery.hpp"
 #include "tutti/bus/mission_lease.hpp"
-#include "tutti/bus/nats_port.hpp"
 #include "tutti/finders/parallel.hpp"
 #include "tutti/node/status_envelope.hpp"
 #include "tutti/program/stop.hpp"
@@ -32,14 +31,6 @@ struct Stopped {};
 std::uint32_t any_number() {
   const Rng rng = Rng(wall_clock_ns()).fork(static_cast<std::uint64_t>(getpid()));
   return static_cast<std::uint32_t>(1 + Rng(rng).index(std::numeric_limits<std::uint32_t>::max() - 1));
-}
-
-/// Who was told no mission works for the one that is there.
-Result<std::string> mission_of(const WorkerOptions& options) {
-  if (!options.settings.mission.empty()) return options.settings.mission;
-  return bus::served_mission(
-      {.url = options.bus, .allow_insecure = options.insecure, .credentials = options.credentials},
-      bus::kLookForServer_s);
 }
 
 }  // namespace
@@ -106,10 +97,11 @@ Status run_worker(const WorkerOptions& options, const std::atomic<bool>& stop) {
   const auto finder = settings.finder();
   const auto log = EventLog::on_console("worker", options.console);
   const bus::Endpoint self = bus::Endpoint::worker(any_number());
-  const auto mission = mission_of(options);
+  bus::BusOptions where = options.bus;
+  where.mission = options.settings.mission;
+  auto mission = bus::served_mission(where, bus::kLookForServer_s);
   if (!mission) return tl::unexpected(mission.error());
-  const bus::NatsPortOptions where{
-      .url = options.bus, .mission = *mission, .allow_insecure = options.insecure, .credentials = options.credentials};
+  where.mission = std::move(*mission);
   const auto lease = bus::MissionLease::open(where, std::nullopt);
   if (!lease) return tl::unexpected(lease.error());
   std::string alone;
@@ -129,7 +121,7 @@ Status run_worker(const WorkerOptions& options, const std::atomic<bool>& stop) {
   };
   const Clock clock;
   Host host({.store = nullptr,
-             .open_port = [&]() -> Result<std::unique_ptr<bus::Port>> { return bus::open_nats_port(self, where); },
+             .open_port = [&] { return bus::open_port(self, where); },
              .open_node = [&](bus::Port& port) -> Result<std::unique_ptr<Hosted>> {
                return std::make_unique<HostedWorker>(self, options.version, make, threads, port, stop);
              },
@@ -137,8 +129,8 @@ Status run_worker(const WorkerOptions& options, const std::atomic<bool>& stop) {
              .status_file = {}},
             clock, *log);
   if (Status opened = host.open(); !opened) return opened;
-  log->say(Level::info, fmt::format("worker {} runs, mission {}, bus {}, {} threads", self.number, *mission,
-                                    bus::without_credentials(options.bus), threads));
+  log->say(Level::info, fmt::format("worker {} runs, mission {}, bus {}, {} threads", self.number, where.mission,
+                                    bus::without_credentials(where.url), threads));
   tell_service_manager("READY=1");
   host.run(stop);
   tell_service_manager("STOPPING=1");

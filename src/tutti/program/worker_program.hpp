@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "tutti/bus/bus_address.hpp"
+#include "tutti/bus/transport.hpp"
 #include "tutti/node/worker_node.hpp"
 #include "tutti/program/finder_settings.hpp"
 #include "tutti/program/host.hpp"
@@ -27,9 +27,7 @@ struct WorkerSettings {
 
 /// How a worker program runs.
 struct WorkerOptions {
-  std::string bus;  ///< "nats://HOST:PORT"
-  bool insecure = false;
-  bus::BusCredentials credentials;
+  bus::BusOptions bus;  ///< The mission is that of the settings.
   WorkerSettings settings;
   int threads = 1;  ///< 0: as many as the machine has.
   Level console = Level::warning;

@@ -17,7 +17,7 @@
 #include "support/bus/nats_server.hpp"
 #include "support/bus/tcp_relay.hpp"
 #include "tutti/bus/nats_child.hpp"
-#include "tutti/bus/nats_port.hpp"
+#include "tutti/bus/transport.hpp"
 
 namespace tutti::test {
 
@@ -31,8 +31,8 @@ bool within(double seconds, Condition&& condition) {
 }
 
 /// Makes what the mission needs on the bus as programs do: by a server's port, which ends again.
-inline void prepare(const bus::NatsPortOptions& options) {
-  const auto server = bus::open_nats_port(bus::Endpoint::server(), options);
+inline void prepare(const bus::BusOptions& options) {
+  const auto server = bus::open_port(bus::Endpoint::server(), options);
   ASSERT_TRUE(server.has_value()) << server.error().message;
   EXPECT_TRUE(within(10.0, [&] { return (*server)->state().connected; })) << (*server)->state().last_error;
 }
@@ -58,12 +58,12 @@ class NatsNetwork {
   NatsNetwork(const NatsNetwork&) = delete;
   NatsNetwork& operator=(const NatsNetwork&) = delete;
 
-  [[nodiscard]] bus::NatsPortOptions options(bus::Endpoint endpoint) const {
+  [[nodiscard]] bus::BusOptions options(bus::Endpoint endpoint) const {
     const std::string url = endpoint.robot() ? "nats://127.0.0.1:" + std::to_string(relay_->port()) : child_->url();
     return {.url = url, .mission = "test", .max_stream_bytes = 128U << 20U};
   }
-  [[nodiscard]] std::unique_ptr<bus::NatsPort> open(bus::Endpoint endpoint) const {
-    auto port = bus::open_nats_port(endpoint, options(endpoint));
+  [[nodiscard]] std::unique_ptr<bus::Port> open(bus::Endpoint endpoint) const {
+    auto port = bus::open_port(endpoint, options(endpoint));
     EXPECT_TRUE(port.has_value()) << port.error().message;
     return std::move(*port);
   }

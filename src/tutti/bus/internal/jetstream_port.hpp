@@ -29,9 +29,9 @@ struct Session {
   natsSubscription* confirmations = nullptr;
 };
 
-class JetStreamPort final : public NatsPort {
+class JetStreamPort final : public Port {
  public:
-  JetStreamPort(Endpoint self, NatsPortOptions options);
+  JetStreamPort(Endpoint self, BusOptions options);
   ~JetStreamPort() override;
   JetStreamPort(const JetStreamPort&) = delete;
   JetStreamPort& operator=(const JetStreamPort&) = delete;
@@ -40,7 +40,7 @@ class JetStreamPort final : public NatsPort {
   std::vector<Received> receive() override;
   void acknowledge(std::uint64_t ticket) override;
   void still_busy(std::uint64_t ticket) override;
-  [[nodiscard]] NatsState state() const override;
+  [[nodiscard]] LinkState state() const override;
 
  private:
   // The sender's thread.
@@ -89,7 +89,7 @@ class JetStreamPort final : public NatsPort {
   }
 
   Endpoint self_;
-  NatsPortOptions options_;
+  BusOptions options_;
   std::string answer_to_;  ///< Confirmation of piece 7 comes to "ANSWER_TO.7".
   std::atomic<bool> stopping_ = false;
   std::atomic<std::uint64_t> cuts_ = 0;     ///< Sessions and reconnections so far.

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "tutti/base/result.hpp"
-#include "tutti/bus/nats_port.hpp"
+#include "tutti/bus/transport.hpp"
 
 /// The one place with libnats's options, and its objects with owners. No callbacks of libnats's threads: whoever waits
 /// for a message asks for it, so that nothing is called when its owner is gone.
@@ -37,12 +37,10 @@ inline constexpr std::chrono::milliseconds kNatsAnswer{5000};
 /// Parts that a consumer has been given and has not acknowledged; then the bus waits. More than an inbox can hold.
 inline constexpr std::uint64_t kMostUnacknowledged = 65'536;
 
-Status check(const NatsPortOptions& options);
-
 class NatsConnection {
  public:
   /// Once it is there it comes back by itself, however long it was gone. `name` in the bus's logs and of its inboxes.
-  static Result<std::shared_ptr<NatsConnection>> open(const NatsPortOptions& options, const std::string& name);
+  static Result<std::shared_ptr<NatsConnection>> open(const BusOptions& options, const std::string& name);
   ~NatsConnection();
   NatsConnection(const NatsConnection&) = delete;
   NatsConnection& operator=(const NatsConnection&) = delete;
@@ -57,7 +55,7 @@ class NatsConnection {
   [[nodiscard]] tl::unexpected<Error> failure(natsStatus status, std::string_view doing, int code = 0) const;
 
   /// Streams and the bucket of retained values.
-  [[nodiscard]] Status prepare(const NatsPortOptions& options) const;
+  [[nodiscard]] Status prepare(const BusOptions& options) const;
   /// The server's consumer of a stream, anew: whatever is not acknowledged comes at once.
   [[nodiscard]] Status renew_consumer(const std::string& stream, const std::string& consumer) const;
   /// What a stream has, and what its consumer is to get of it.

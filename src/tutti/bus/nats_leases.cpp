@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <memory>
+#include <utility>
+
+#include "tutti/bus/internal/nats_connection.hpp"
+#include "tutti/bus/internal/transports.hpp"
+
+namespace tutti::bus {
+namespace {
+
+constexpr const char* kBucket = "TUTTI_SERVERS";
+constexpr int kMostLeases = 1000;
+
+struct EntryFree {
+  void operator()(kvEntry* entry) const { kvEntry_Destroy(entry); }
+};
+
+std::optional<LeaseBoard::Value> value_of(kvStore* bucket, const std::string& mission) {
+  kvEntry* read = nullptr;
+  if (kvStore_Get(&read, bucket, mission.c_str()) != NATS_OK) return std::nullopt;
+  const std::unique_ptr<kvEntry, EntryFree> entry(read);
+  const auto* text = static_cast<const char*>(kvEntry_Value(read));
+  return LeaseBoard::Value{text == nullptr ? "" : std::string(text, static_cast<std::size_t>(kvEntry_ValueLen(read))),
+                           kvEntry_Revision(read)};
+}
+
+class NatsLeases final : public LeaseBoard {
+ public:
+  explicit NatsLeases(BusOptions where) : where_(std::move(where)) {}
+
+  Result<std::optional<Value>> read(const std::string& mission) override {
+    const auto there = bucket(std::nullopt);
+    if (!there) return tl::unexpected(there.error());
+    return *there ? value_of(there->get(), mission) : std::nullopt;
+  }
+
+  Result<std::map<std::string, Value>> read_all() override {
+    const auto there = bucket(std::nullopt);
+    if (!there) return tl::unexpected(there.error());
+    std::map<std::string, Value> all;
+    kvKeysList keys{};
+    if (!*there || kvStore_Keys(&keys, there->get(), nullptr) != NATS_OK) return all;  // it is empty, too
+    for (int i = 0; i < std::min(keys.Count, kMostLeases); ++i)
+      if (auto value = value_of(there->get(), keys.Keys[i])) all.emplace(keys.Keys[i], std::move(*value));
+    kvKeysList_Destroy(&keys);
+    return all;
+  }
+
+  Status write(const std::string& mission, const Value& value, double lasts_s) override {
+    const auto there = bucket(lasts_s);
+    if (!there) return tl::unexpected(there.error());
+    std::uint64_t revision = 0;
+    const natsStatus status =
+        value.revision == 0
+            ? kvStore_CreateString(&revision, there->get(), mission.c_str(), value.text.c_str())
+            : kvStore_UpdateString(&revision, there->get(), mission.c_str(), value.text.c_str(), value.revision);
+    return status == NATS_OK ? Status()
+                             : connection_->failure(status, fmt::format("the lease of mission '{}'", mission));
+  }
+
+  void remove(const std::string& mission) override {
+    if (!connection_ || !connection_->connected()) return;
+    if (const auto there = bucket(std::nullopt); there && *there) kvStore_Delete(there->get(), mission.c_str());
+  }
+
+ private:
+  Result<NatsOwned<kvStore>> bucket(std::optional<double> lasts_s) {
+    if (!connection_ || connection_->closed()) {
+      auto opened = NatsConnection::open(where_, "lease_" + where_.mission);
+      if (!opened) return tl::unexpected(opened.error());
+      connection_ = std::move(*opened);
+    }
+    return connection_->bucket(kBucket, lasts_s);
+  }
+
+  const BusOptions where_;
+  std::shared_ptr<NatsConnection> connection_;
+};
+
+}  // namespace
+
+std::unique_ptr<LeaseBoard> open_nats_leases(const BusOptions& options) {
+  return std::make_unique<NatsLeases>(options);
+}
+
+}  // namespace tutti::bus
