@@ -127,7 +127,7 @@ py::dict decode(const BagChannel& channel, std::string_view data) {
   if (type == "nav_msgs/msg/Odometry") return dict_of(value_of(decode_odometry(data, encoding)));
   if (type == "tf2_msgs/msg/TFMessage" || type == "tf/msg/tfMessage")
     return dict_of(value_of(decode_tf(data, encoding)));
-  if (type == "sensor_msgs/msg/PointCloud2") return dict_of(value_of(decode_point_cloud(data, encoding)));
+  if (is_scan_type(type)) return dict_of(value_of(decode_scan(type, data, encoding)));
   if (type == "sensor_msgs/msg/Imu") return dict_of(value_of(decode_imu(data, encoding)));
   if (type == "sensor_msgs/msg/Image") return dict_of(value_of(decode_image(data, encoding)));
   if (type == "sensor_msgs/msg/CompressedImage") return dict_of(value_of(decode_compressed_image(data, encoding)));

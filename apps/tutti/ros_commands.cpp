@@ -127,7 +127,9 @@ std::shared_ptr<RosArguments> add_ros_robot_options(CLI::App& robot) {
       ->type_name("TOPIC")
       ->capture_default_str()
       ->needs(ros);
-  robot.add_option("--points", out->robot.points, "Topic of sensor_msgs/PointCloud2, below the namespace; '' for none")
+  robot
+      .add_option("--points", out->robot.points,
+                  "Topic of sensor_msgs/PointCloud2, or of a Livox's CustomMsg, below the namespace; '' for none")
       ->type_name("TOPIC")
       ->capture_default_str()
       ->needs(ros);

@@ -124,7 +124,7 @@ void add_bags(std::map<std::string, std::vector<std::string>>& out) {
     char type = '\0';
     for (const std::string& bytes :
          {odometry("odom", "base_link", how), transforms(how), point_cloud(how), imu(how), image(how),
-          compressed_image(how), camera_info(how), nav_sat_fix(how), pose_stamped(how)}) {
+          compressed_image(how), camera_info(how), nav_sat_fix(how), pose_stamped(how), livox(how)}) {
       out[how == 2 ? "ros1_message" : "cdr"].push_back(joined({std::string_view(&type, 1), bytes}));
       ++type;
     }

@@ -209,7 +209,7 @@ void yaml(std::string_view bytes) {
 void message(std::string_view bytes, bags::RosEncoding encoding) {
   if (bytes.empty()) return;
   const std::string_view rest = bytes.substr(1);
-  switch (static_cast<unsigned char>(bytes.front()) % 9) {
+  switch (static_cast<unsigned char>(bytes.front()) % 10) {
     case 0:
       return static_cast<void>(bags::decode_odometry(rest, encoding));
     case 1:
@@ -231,8 +231,10 @@ void message(std::string_view bytes, bags::RosEncoding encoding) {
       return static_cast<void>(bags::decode_camera_info(rest, encoding));
     case 7:
       return static_cast<void>(bags::decode_nav_sat_fix(rest, encoding));
-    default:
+    case 8:
       return static_cast<void>(bags::decode_pose_stamped(rest, encoding));
+    default:
+      if (const auto cloud = bags::decode_livox(rest, encoding)) static_cast<void>(bags::to_timed_cloud(*cloud));
   }
 }
 void cdr(std::string_view bytes) { message(bytes, bags::RosEncoding::cdr); }

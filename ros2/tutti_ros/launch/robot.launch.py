@@ -16,7 +16,7 @@ def generate_launch_description():
     arguments = {
         "namespace": ("r1", "of the robot, and its name in the map"),
         "odom": ("odom", "topic of nav_msgs/Odometry, relative to the namespace"),
-        "points": ("points", "topic of sensor_msgs/PointCloud2, relative to the namespace"),
+        "points": ("points", "topic of sensor_msgs/PointCloud2, or of a Livox's CustomMsg, relative to the namespace"),
         "fix": ("fix", "topic of sensor_msgs/NavSatFix, relative to the namespace"),
         "images": ("", "topics of one camera or two, relative to the namespace: left/image_raw,right/image_raw; empty: none"),
         "depth": ("", "topic of depth images registered to the one camera; empty: none"),

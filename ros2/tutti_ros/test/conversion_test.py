@@ -3,6 +3,7 @@
 import math
 import pathlib
 import random
+import struct
 import subprocess
 import tempfile
 import unittest
@@ -10,7 +11,7 @@ import unittest
 import mcap_reader
 import numpy as np
 import ros_stub
-from made_messages import cloud, fix, odometry
+from made_messages import cloud, fix, livox, odometry
 from paths import SHARED, SOURCE, TUTTI
 from tutti_ros import from_ros, poses
 from tutti_ros.link import Link
@@ -89,6 +90,29 @@ class Conversion(unittest.TestCase):
         for numbers in ([0.0, 2.0, 700.0], [5000.0, 5000.05, 5000.1]):
             with self.assertRaisesRegex(ValueError, "points' times go from"):
                 from_ros.scan_of(cloud(xyz + [("t", 8, numbers)]), T_body_lidar)
+
+    def test_a_livox_is_a_cloud_with_the_same_points_and_times(self):
+        draw = random.Random(1)
+        for count in (1, 2, 50):
+            xyz = [[draw.uniform(-20.0, 20.0) for _ in range(count)] for _ in range(3)]
+            times_ns = [draw.randrange(10**8) for _ in range(count)]
+            expected = cloud([(n, 7, xyz[i]) for i, n in enumerate("xyz")] + [("offset_time", 6, times_ns)])
+            for order in "<>":
+                for frame_id in ("lidar", "livox_frame", "r1/livox"):
+                    got = from_ros.cloud_of_livox(livox(list(zip(*xyz)), times_ns, 10**9, frame_id, order))
+                    self.assertEqual(got.header.frame_id, frame_id)
+                    for a, b in zip(from_ros.scan_of(got, poses.IDENTITY), from_ros.scan_of(expected, poses.IDENTITY)):
+                        np.testing.assert_array_equal(a, b)
+
+    def test_a_livox_that_lies_is_told(self):
+        whole = livox([(1.0, 2.0, 3.0)] * 3, [0, 1, 10**8])
+        for size in range(len(whole)):
+            with self.assertRaises(ValueError):
+                from_ros.points_of(from_ros.cloud_of_livox(whole[:size]))
+        with self.assertRaisesRegex(ValueError, "3 points, expected 4 as point_num says"):
+            from_ros.cloud_of_livox(whole.replace(struct.pack("<I", 3), struct.pack("<I", 4), 1))
+        with self.assertRaisesRegex(ValueError, "bytes of points"):
+            from_ros.points_of(from_ros.cloud_of_livox(whole.replace(struct.pack("<I", 3), b"\xff" * 4)))
 
     def test_covariance_of_the_body(self):
         """Against what perturbing T_map_odom does to the body, in the axes of the map."""

@@ -35,6 +35,15 @@ def cloud(columns, rows=1, order="<", padding=0, stamp_ns=10**9, frame_id="r1/li
     return ros_stub.decode("sensor_msgs/PointCloud2", ros_stub.encode("sensor_msgs/PointCloud2", out))
 
 
+def livox(points, times_ns, stamp_ns=10**9, frame_id="r1/lidar", order="<"):
+    """CDR of a Livox's CustomMsg."""
+    name = frame_id.encode() + b"\0"
+    out = struct.pack(order + "iII", *divmod(stamp_ns, 10**9), len(name)) + name
+    out += bytes(-len(out) % 8) + struct.pack(order + "QIB3xI", stamp_ns, len(points), 192, len(points))
+    each = [struct.pack(order + "IfffBBB", t, *xyz, 100, 0, 3) for t, xyz in zip(times_ns, points)]
+    return (b"\0\1\0\0" if order == "<" else b"\0\0\0\0") + out + b"\0".join(each)
+
+
 def fix(stamp_ns, latitude=46.5, variances=(1.0, 1.0, 4.0), frame_id="r1/gnss", status=0):
     out = ros_stub.TYPES["sensor_msgs/NavSatFix"]()
     out.header.stamp.sec, out.header.stamp.nanosec = divmod(stamp_ns, 10**9)

@@ -6,7 +6,7 @@ import time
 import unittest
 
 import ros_stub
-from made_messages import cloud, fix, odometry, pose_at
+from made_messages import cloud, fix, livox, odometry, pose_at
 from paths import SOURCE
 from programs import HAS_NATS, PATIENCE_S, WithPrograms
 from tutti_ros import from_ros
@@ -81,6 +81,32 @@ class Programs(WithPrograms):
         self.assertEqual(robot.wait(PATIENCE_S), 0)
         self.assertEqual(node.qos["odom"], "sensor data")
         self.assertEqual(node.qos["corrected_path"]["durability"], "transient local")
+
+    def test_scans_of_a_livox(self):
+        self.start_robot("r1", "nats://127.0.0.1:1")
+        node = self.node("r1", T_body_lidar="0 0 0 0 0 0 1")
+        look = lambda: (node.callbacks["look_for_scans"](), node.raw["points"])[1]
+        self.assertFalse(look())  # nobody publishes yet
+        node.published["points"] = ["livox_ros_driver/msg/CustomMsg"]
+        self.assertFalse(look())  # there is no such package
+        node.callbacks["publish_diagnostics"]()
+        said = node.made["/diagnostics"].said[-1].status[0]
+        self.assertIn("whose package is not sourced here", "".join(pair.value for pair in said.values))
+        node.published["points"] = ["livox_ros_driver2/msg/CustomMsg"]
+        self.assertTrue(look())
+        self.assertEqual(len(node.destroyed), 1)
+        self.assertTrue(look())
+        self.assertEqual(len(node.destroyed), 1)
+        draw = random.Random(1)
+        points = [tuple(draw.uniform(-10.0, 10.0) for _ in range(3)) for _ in range(500)]
+        for i in range(20):
+            node.callbacks["odom"](odometry((1 + i) * 10**8, pose_at(0.1 * i)))
+            node.callbacks["points"](livox(points, [i * 200_000 for i in range(500)], (1 + i) * 10**8))
+        self.wait_for(lambda: node.link.counts["scans"] == 20, "scans")
+        self.wait_for(lambda: node.link.counts["corrections"] == 20, "an answer for each sample")
+        self.assertEqual(node.link.counts["refused"], 0, node.link.why)
+        node.published["points"] = ["sensor_msgs/msg/PointCloud2"]
+        self.assertFalse(look())
 
     @unittest.skipUnless(HAS_NATS, "nats-server is not installed")
     def test_two_robots_find_each_other(self):

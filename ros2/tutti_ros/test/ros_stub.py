@@ -203,7 +203,8 @@ class Node:
     given = {}  # parameters
 
     def __init__(self, name):
-        self.name, self.made, self.callbacks, self.qos = name, {}, {}, {}
+        self.name, self.made, self.callbacks, self.qos, self.raw = name, {}, {}, {}, {}
+        self.published, self.destroyed = {}, []  # {topic: types}, subscriptions
 
     def declare_parameter(self, name, value):
         return types.SimpleNamespace(value=self.given.get(name, value))
@@ -212,8 +213,15 @@ class Node:
         self.made[topic], self.qos[topic] = Publisher(), qos
         return self.made[topic]
 
-    def create_subscription(self, kind, topic, callback, qos):
-        self.callbacks[topic], self.qos[topic] = callback, qos
+    def create_subscription(self, kind, topic, callback, qos, raw=False):
+        self.callbacks[topic], self.qos[topic], self.raw[topic] = callback, qos, raw
+        return topic, kind
+
+    def destroy_subscription(self, subscription):
+        self.destroyed.append(subscription)
+
+    def get_publishers_info_by_topic(self, topic):
+        return [types.SimpleNamespace(topic_type=kind) for kind in self.published.get(topic, [])]
 
     def create_service(self, kind, name, callback):
         self.callbacks[name] = callback
@@ -277,6 +285,7 @@ def install():
     module("tf2_ros", **{name: getattr(Tf, name) for name in
                          ("TransformException", "TransformBroadcaster", "Buffer", "TransformListener")})
     module("std_srvs.srv", Trigger=object)
+    module("livox_ros_driver2.msg", CustomMsg=type("CustomMsg", (), {}))  # whose messages are taken as bytes
     for name, made in TYPES.items():
         package, word = name.split("/")
         found = sys.modules.get(package + ".msg") or module(package + ".msg")

@@ -4,6 +4,8 @@ sensor_msgs' PointCloud2, NavSatFix, CameraInfo, Image and Imu; what is no sampl
 images and IMU samples are taken as by src/tutti/bags/camera.cpp."""
 import dataclasses
 import math
+import struct
+import types
 
 import numpy as np
 
@@ -104,6 +106,28 @@ def points_of(message):
     points = np.stack([cloud[name].astype(np.float32) for name in "xyz"], axis=1)
     finite = np.isfinite(points).all(axis=1)
     return points[finite], cloud[time].astype(np.float64)[finite] if time else None
+
+
+def cloud_of_livox(cdr):
+    """The CDR bytes of a Livox's CustomMsg as the PointCloud2 that they are: a row for each point (20 bytes, the last 19)."""
+    cloud = types.SimpleNamespace(header=types.SimpleNamespace(stamp=types.SimpleNamespace()))
+    cloud.is_bigendian = len(cdr) > 1 and cdr[1] & 1 == 0
+    order = ">" if cloud.is_bigendian else "<"
+    try:
+        stamp = cloud.header.stamp
+        stamp.sec, stamp.nanosec, length = struct.unpack_from(order + "iII", cdr, 4)
+        cloud.header.frame_id = bytes(cdr[16:16 + length]).rstrip(b"\0").decode()
+        at = 16 + length + -(12 + length) % 8  # of timebase
+        stated, cloud.height = struct.unpack_from(order + "I4xI", cdr, at + 8)
+    except struct.error as error:
+        raise ValueError(f"a CustomMsg of {len(cdr)} bytes: {error}") from error
+    if stated != cloud.height:
+        raise ValueError(f"{cloud.height} points, expected {stated} as point_num says")
+    cloud.width, cloud.point_step, cloud.row_step = 1, 19, 20
+    cloud.fields = [types.SimpleNamespace(name=name, offset=offset, datatype=datatype, count=1)
+                    for name, offset, datatype in (("offset_time", 0, 6), ("x", 4, 7), ("y", 8, 7), ("z", 12, 7))]
+    cloud.data = memoryview(cdr)[at + 20:]
+    return cloud
 
 
 def seconds_after_stamp(times, stamp_ns):

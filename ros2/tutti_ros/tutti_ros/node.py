@@ -12,16 +12,17 @@ from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, TransformS
 from nav_msgs.msg import Odometry, Path
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
-from sensor_msgs.msg import BatteryState, NavSatFix, PointCloud2
+from sensor_msgs.msg import BatteryState, NavSatFix
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
 from tutti_ros import poses
 from tutti_ros.camera_topics import CameraTopics
 from tutti_ros.connection import Connection
-from tutti_ros.from_ros import OdometryNoise, fix_of, odometry_of, pose_of, scan_of
+from tutti_ros.from_ros import OdometryNoise, cloud_of_livox, fix_of, odometry_of, pose_of, scan_of
 from tutti_ros.link import Link, pose_from
 from tutti_ros.ros_node import LATCHED, diagnostics, run
+from tutti_ros.scan_topic import ScanTopic
 from tutti_ros.situation import OnMap, diagnosis
 from tutti_ros.to_ros import set_header, set_pose, set_transform, topic_part
 
@@ -72,7 +73,8 @@ class TuttiNode(Node):
         self.diagnostics_publisher = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self.create_subscription(Odometry, "odom", self.take_odometry, qos_profile_sensor_data)
         if self.use_scans:
-            self.create_subscription(PointCloud2, "points", self.take_points, qos_profile_sensor_data)
+            self.scan_topic = ScanTopic(self, self.take_points, self.take_livox)
+            self.create_timer(1.0, self.look_for_scans)
         if self.use_fixes:
             self.create_subscription(NavSatFix, "fix", self.take_fix, qos_profile_sensor_data)
         self.create_subscription(BatteryState, "battery_state", self.take_battery, qos_profile_sensor_data)
@@ -129,6 +131,18 @@ class TuttiNode(Node):
             self.complain(f"points: {error}")
             return
         self.connection.wake()
+
+    def take_livox(self, cdr):
+        try:
+            self.take_points(cloud_of_livox(cdr))
+        except ValueError as error:
+            self.complain(f"points: {error}")
+
+    def look_for_scans(self):
+        try:
+            self.scan_topic.look()
+        except ValueError as error:
+            self.complain(f"points: {error}")
 
     def take_fix(self, message):
         if self.frames is None:

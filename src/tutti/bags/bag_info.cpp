@@ -18,9 +18,8 @@ constexpr std::string_view kImageType = "sensor_msgs/msg/Image";
 constexpr std::size_t kMostSaid = 10;
 constexpr std::size_t kMostFrames = 4;
 
-constexpr std::array<std::pair<std::string_view, Use>, 9> kTypes{{
+constexpr std::array<std::pair<std::string_view, Use>, 8> kTypes{{
     {"nav_msgs/msg/Odometry", Use::odometry},
-    {"sensor_msgs/msg/PointCloud2", Use::scans},
     {kImageType, Use::images},
     {"sensor_msgs/msg/CompressedImage", Use::images},
     {"sensor_msgs/msg/CameraInfo", Use::calibration},
@@ -59,7 +58,7 @@ Result<std::string> frames_of(TopicInfo& topic, std::string_view bytes, RosEncod
       return fmt::format("{} -> {}", message->header.frame_id, message->child_frame_id);
     }
     case Use::scans:
-      return frame_of(decode_point_cloud(bytes, encoding));
+      return frame_of(decode_scan(topic.type, bytes, encoding));
     case Use::images:
       return topic.type == kImageType ? image_frame(decode_image(bytes, encoding))
                                       : image_frame(decode_compressed_image(bytes, encoding));
@@ -175,6 +174,7 @@ std::string depth_in_words(const BagInfo& info) {
 }  // namespace
 
 Use use_of(std::string_view type) {
+  if (is_scan_type(type)) return Use::scans;
   const auto at = std::ranges::find(kTypes, type, [](const auto& entry) { return entry.first; });
   return at == kTypes.end() ? Use::nothing : at->second;
 }
@@ -230,7 +230,7 @@ std::vector<std::string> uses(const BagInfo& info) {
     const char* without;
   };
   constexpr std::array kRows{
-      Row{"scans", Use::scans, "none (no sensor_msgs/msg/PointCloud2): no closures by LiDAR"},
+      Row{"scans", Use::scans, "none (no sensor_msgs/msg/PointCloud2, no CustomMsg of a Livox): no closures by LiDAR"},
       Row{"images", Use::images, "none (no sensor_msgs/msg/Image or CompressedImage): no closures by camera"},
       Row{"calibration", Use::calibration, nullptr},
       Row{"imu", Use::imu, nullptr},

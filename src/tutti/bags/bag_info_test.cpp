@@ -49,6 +49,7 @@ TEST(BagInfo, EveryKnownTypeSaysItsFrame) {
   const std::map<std::string, std::pair<std::string, std::string>> of_type{
       {"nav_msgs/msg/Odometry", {odometry(), "odom -> base_link"}},
       {"sensor_msgs/msg/PointCloud2", {point_cloud(), "lidar"}},
+      {"livox_ros_driver2/msg/CustomMsg", {livox(), "livox_frame"}},
       {"sensor_msgs/msg/Image", {image(), "camera"}},
       {"sensor_msgs/msg/CompressedImage", {compressed_image(), "camera"}},
       {"sensor_msgs/msg/CameraInfo", {camera_info(), "camera"}},

@@ -2,6 +2,7 @@
 #include "tutti/bags/point_cloud.hpp"
 
 #include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
 
 #include <array>
 #include <ctime>
@@ -38,6 +39,30 @@ TEST(PointCloud, PointsAndTimesAreReadInEveryShape) {
               for (std::size_t i = 0; i < cloud->times.size(); ++i)
                 EXPECT_NEAR(cloud->times[i] * unit_s, kTimes[i], 1e-8);
             }
+}
+
+/// As a PointCloud2 that has the same points and times, whoever wrote them.
+RC_GTEST_PROP(PointCloud, PointsAndTimesOfALivoxAreThoseOfACloud, ()) {
+  const auto count = *rc::gen::inRange<std::size_t>(0, 40);
+  Rng rng(*rc::gen::arbitrary<std::uint64_t>());
+  std::vector<Eigen::Vector3f> points;
+  std::vector<double> times;
+  for (std::size_t i = 0; i < count; ++i) {
+    points.emplace_back(rng.uniform(-50.0, 50.0), rng.uniform(-50.0, 50.0), rng.uniform(-5.0, 5.0));
+    times.push_back(1e-9 * static_cast<double>(rng.index(100'000'000)));
+  }
+  const CloudShape shape{.time_field = "offset_time", .time_type = 6, .time_unit_s = 1e-9};
+  const std::string bytes = cloud_of(Timestamp{5}, "lidar", points, times, shape);
+  const auto expected = to_timed_cloud(decode_point_cloud(bytes).value()).value();
+  for (const int how : {0, 1, 2}) {
+    const std::string written = livox_of(Timestamp{5}, "lidar", points, times, how);
+    const auto message = decode_livox(written, how == 2 ? RosEncoding::ros1 : RosEncoding::cdr);
+    RC_ASSERT(message.has_value());
+    RC_ASSERT(message->header.stamp.ns == 5 && message->header.frame_id == "lidar");
+    const auto cloud = to_timed_cloud(*message).value();
+    RC_ASSERT(cloud.cloud.points == expected.cloud.points && cloud.cloud.points == points);
+    RC_ASSERT(cloud.times == expected.times && cloud.time_field == expected.time_field);
+  }
 }
 
 TEST(PointCloud, PointsThatAreNoneAreLeftOutWithTheirTimes) {

@@ -138,6 +138,8 @@ TEST(Ros1, EveryKnownTypeIsDecoded) {
   const std::map<std::string, std::string> of_type{
       {"nav_msgs/msg/Odometry", odometry("odom", "base_link", 2)},
       {"sensor_msgs/msg/PointCloud2", point_cloud(2)},
+      {"livox_ros_driver2/msg/CustomMsg", livox(2)},
+      {"livox_ros_driver/msg/CustomMsg", livox(2)},
       {"sensor_msgs/msg/Image", image(2)},
       {"sensor_msgs/msg/CompressedImage", compressed_image(2)},
       {"sensor_msgs/msg/CameraInfo", camera_info(2)},

@@ -20,6 +20,14 @@ namespace {
 
 constexpr std::string_view kPose = "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n";
 constexpr std::string_view kXyz = "float64 x\nfloat64 y\nfloat64 z\n";
+constexpr std::string_view kLivoxPoint =
+    "uint32 offset_time\nfloat32 x\nfloat32 y\nfloat32 z\nuint8 reflectivity\nuint8 tag\nuint8 line\n";
+constexpr std::string_view kLivox1Msg =
+    "std_msgs/Header header\nuint64 timebase\nuint32 point_num\nuint8 lidar_id\nuint8[3] rsvd\n"
+    "livox_ros_driver/CustomPoint[] points\n";
+constexpr std::string_view kLivox2Msg =
+    "std_msgs/Header header\nuint64 timebase\nuint32 point_num\nuint8 lidar_id\nuint8[3] rsvd\n"
+    "livox_ros_driver2/CustomPoint[] points\n";
 constexpr std::string_view kTimeSpan = "int32 sec\nuint32 nanosec\n";
 
 /// By short names, as definitions refer to each other: "nav_msgs/Odometry".
@@ -43,6 +51,10 @@ const std::map<std::string, std::string_view, std::less<>>& definitions() {
       {"geometry_msgs/Twist", "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n"},
       {"geometry_msgs/TwistWithCovariance", "geometry_msgs/Twist twist\nfloat64[36] covariance\n"},
       {"geometry_msgs/Vector3", kXyz},
+      {"livox_ros_driver/CustomMsg", kLivox1Msg},
+      {"livox_ros_driver/CustomPoint", kLivoxPoint},
+      {"livox_ros_driver2/CustomMsg", kLivox2Msg},
+      {"livox_ros_driver2/CustomPoint", kLivoxPoint},
       {"nav_msgs/MapMetaData",
        "builtin_interfaces/Time map_load_time\nfloat32 resolution\nuint32 width\nuint32 height\n"
        "geometry_msgs/Pose origin\n"},

@@ -3,11 +3,11 @@
 
 #include <string>
 
-/// The definitions of the ROS 2 types that Tutti writes: fields alone, without constants and comments.
+/// The definitions of the ROS 2 types that Tutti writes or subscribes: fields alone, without constants and comments.
 namespace tutti::bags {
 
 /// The fields of a type and of all types that it contains, as MCAP files carry them (schema encoding "ros2msg").
-/// `type`: "nav_msgs/msg/Odometry", one of those that ros_encode.hpp writes.
+/// `type`: "nav_msgs/msg/Odometry", one that has_ros_definition() knows.
 std::string ros_definition(const std::string& type);
 
 /// True for the types that ros_definition() knows.

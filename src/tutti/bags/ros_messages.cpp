@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/bags/ros_messages.hpp"
 
+#include <algorithm>
 #include <cstddef>
 #include <span>
 #include <utility>
@@ -150,6 +151,39 @@ Result<RosPointCloud> decode_point_cloud(std::string_view bytes, RosEncoding enc
     out.is_dense = in.number<std::uint8_t>("is_dense") != 0;
     return out;
   });
+}
+
+/// Rows of one point each, so that the bytes that CDR puts between two points are the rows' padding.
+Result<RosPointCloud> decode_livox(std::string_view bytes, RosEncoding encoding) {
+  constexpr std::uint32_t kPointBytes = 19, kAlignedBytes = 20;
+  constexpr std::uint8_t kUint32 = 6, kFloat32 = 7;
+  return decode(bytes, encoding, "livox_ros_driver2/msg/CustomMsg", [](Cursor& in) {
+    RosPointCloud out{.header = header(in)};
+    in.number<std::uint64_t>("timebase");
+    const auto stated = in.number<std::uint32_t>("point_num");
+    for (const char* what : {"lidar_id", "rsvd[0]", "rsvd[1]", "rsvd[2]"}) in.number<std::uint8_t>(what);
+    out.height = sequence(in, kPointBytes, "points");
+    if (out.height != stated) in.complain(fmt::format("{} points, expected {} as point_num says", out.height, stated));
+    out.width = 1;
+    out.fields = {{"offset_time", 0, kUint32, 1}, {"x", 4, kFloat32, 1}, {"y", 8, kFloat32, 1}, {"z", 12, kFloat32, 1}};
+    out.is_bigendian = in.order() == Cursor::Order::big;
+    out.point_step = kPointBytes;
+    out.row_step = in.layout() == Cursor::Layout::aligned ? kAlignedBytes : kPointBytes;
+    const std::uint64_t before_last = out.height > 0 ? out.height - 1 : 0;
+    out.data = in.take(before_last * out.row_step + (out.height > 0 ? kPointBytes : 0), "points");
+    return out;
+  });
+}
+
+bool is_scan_type(std::string_view type) {
+  return std::ranges::find(kScanTypes, type, &ScanType::name) != kScanTypes.end();
+}
+
+Result<RosPointCloud> decode_scan(std::string_view type, std::string_view bytes, RosEncoding encoding) {
+  const auto at = std::ranges::find(kScanTypes, type, &ScanType::name);
+  if (at != kScanTypes.end()) return at->decode(bytes, encoding);
+  return fail(ErrorCode::unsupported, "type '{:.200}', expected one that holds scans: {}, {} or {}", type,
+              kScanTypes[0].name, kScanTypes[1].name, kScanTypes[2].name);
 }
 
 Result<RosImu> decode_imu(std::string_view bytes, RosEncoding encoding) {

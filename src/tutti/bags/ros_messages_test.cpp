@@ -30,6 +30,7 @@ const std::map<std::string, Type>& types() {
         [](std::string_view b) { return status(decode_odometry(b)); }}},
       {"TFMessage", {transforms, [](std::string_view b) { return status(decode_tf(b)); }}},
       {"PointCloud2", {point_cloud, [](std::string_view b) { return status(decode_point_cloud(b)); }}},
+      {"CustomMsg", {livox, [](std::string_view b) { return status(decode_livox(b)); }}},
       {"Imu", {imu, [](std::string_view b) { return status(decode_imu(b)); }}},
       {"Image", {image, [](std::string_view b) { return status(decode_image(b)); }}},
       {"CompressedImage", {compressed_image, [](std::string_view b) { return status(decode_compressed_image(b)); }}},
@@ -82,6 +83,41 @@ TEST(RosMessages, LengthsThatLieAreRefused) {
   }
 }
 
+/// Where its points' number stands: of 4 bytes behind header (8 + 4 + 12), timebase (at 24), point_num, id and rsvd.
+TEST(RosMessages, PointsOfALivoxThatLieAreRefused) {
+  const std::string good = livox();
+  constexpr std::size_t kNumber = 4 + 32, kCount = 4 + 40;
+  std::string bad = good;
+  bad.replace(kCount, 4, "\xff\xff\xff\xff");
+  EXPECT_EQ(
+      decode_livox(bad).error().message,
+      "livox_ros_driver2/msg/CustomMsg: byte 44: points has 4294967295 elements of 19 bytes at least, 59 bytes are "
+      "left");
+  bad = good;
+  bad[kNumber] = 4;
+  EXPECT_EQ(decode_livox(bad).error().message,
+            "livox_ros_driver2/msg/CustomMsg: byte 44: 3 points, expected 4 as point_num says");
+  bad[kCount] = 4;
+  EXPECT_FALSE(decode_livox(bad));
+  bad[kNumber] = bad[kCount] = 2;
+  EXPECT_EQ(decode_livox(bad).error().message,
+            "livox_ros_driver2/msg/CustomMsg: byte 83: 20 bytes are left, expected the end: another definition of the "
+            "type?");
+}
+
+TEST(RosMessages, ScansAreDecodedByTheirType) {
+  for (const ScanType& type : kScanTypes) {
+    EXPECT_TRUE(is_scan_type(type.name));
+    const bool is_livox = type.name.ends_with("CustomMsg");
+    EXPECT_EQ(decode_scan(type.name, livox()).has_value(), is_livox) << type.name;
+    EXPECT_EQ(decode_scan(type.name, point_cloud()).has_value(), !is_livox) << type.name;
+  }
+  EXPECT_FALSE(is_scan_type("sensor_msgs/msg/LaserScan"));
+  EXPECT_EQ(decode_scan("sensor_msgs/msg/LaserScan", livox()).error().message,
+            "type 'sensor_msgs/msg/LaserScan', expected one that holds scans: sensor_msgs/msg/PointCloud2, "
+            "livox_ros_driver2/msg/CustomMsg or livox_ros_driver/msg/CustomMsg");
+}
+
 class BothOrders : public ::testing::TestWithParam<bool> {};
 INSTANTIATE_TEST_SUITE_P(LittleAndBig, BothOrders, ::testing::Bool());
 
@@ -121,6 +157,13 @@ TEST_P(BothOrders, SensorsAreReadFieldByField) {
   EXPECT_EQ(cloud.row_step, 24U);
   EXPECT_EQ(cloud.data, "abcdefghijklmnopqrstuvwx");
   EXPECT_TRUE(cloud.is_dense);
+
+  const std::string livox_bytes = livox(GetParam());
+  const auto custom = decode_livox(livox_bytes).value();
+  EXPECT_EQ(custom.header.stamp.ns, kStampNs);
+  EXPECT_EQ(custom.header.frame_id, "livox_frame");
+  EXPECT_EQ(custom.height, 3U);
+  EXPECT_EQ(custom.is_bigendian, GetParam());
 
   const auto inertial = decode_imu(imu(GetParam())).value();
   EXPECT_EQ(inertial.orientation.w(), 4.0);

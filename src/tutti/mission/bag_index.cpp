@@ -116,7 +116,7 @@ class Indexer {
 
   static void take_scan(ScanTrack& track, const BagMessage& message) {
     ++track.messages;
-    const auto cloud = bags::decode_point_cloud(message.data, encoding_of(message));
+    const auto cloud = bags::decode_scan(message.channel->type, message.data, encoding_of(message));
     if (!cloud) return track.refused.add(track.messages, cloud.error().message);
     const std::string frame = bags::frame_name(cloud->header.frame_id);
     if (track.scans.empty()) track.frame = frame;

@@ -222,7 +222,8 @@ Result<BagRecording> read_bag(const fs::path& data, const RobotConfig& robot, bo
   if (auto ok = take_fixes(index, track.body, robot, out); !ok) return in_context(out.file, ok.error());
   if (with_images) take_cameras(index, track.body, robot, out);
   if (*scans == nullptr) {
-    if (robot.topics.scans.empty() && index.scans.empty()) what += ", no scans (sensor_msgs/PointCloud2)";
+    if (robot.topics.scans.empty() && index.scans.empty())
+      what += ", no scans (sensor_msgs/PointCloud2, or CustomMsg of a Livox)";
     if (!index.scans.empty()) what += fmt::format(", no scans: {}", list_of(index.scans));
     out.notes.insert(out.notes.begin(), what);
     return out;

@@ -47,7 +47,7 @@ struct BagRecording {
 };
 
 /// Reads `robot.bag` once. Topics are found by type. Odometry is nav_msgs/Odometry, else a pair of frames of /tf called
-/// odom and something, else geometry_msgs/PoseStamped; scans are sensor_msgs/PointCloud2. When several topics would do,
+/// odom and something, else geometry_msgs/PoseStamped; scans are bags::kScanTypes. When several topics would do,
 /// or `robot.topics` names one that does not exist, the error lists them. In a bag of several robots, what is in the
 /// robot's namespace counts (keep_robot()). The LiDAR's pose is `robot.T_body_lidar`,
 /// else from /tf_static (and frames of /tf that never move); having neither is an error that says what to do. Invalid

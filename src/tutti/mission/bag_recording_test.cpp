@@ -55,16 +55,25 @@ class Bags : public testing::Test {
 
   /// What stands still is measured as it is seen in the meantime. `absolute`: times by the clock of the stamps.
   [[nodiscard]] std::string cloud(std::size_t scan, CloudShape shape, bool absolute = false) const {
+    const auto [points, times] = sweep(scan, shape.time_field.empty() ? 0.0 : kSweep_s);
+    std::vector<double> written = times;
+    if (absolute)
+      for (double& time : written) time += 1e-9 * static_cast<double>(stamp_of(scan).ns);
+    return cloud_of(stamp_of(scan), "lidar", points, written, shape);
+  }
+  [[nodiscard]] Timestamp stamp_of(std::size_t scan) const { return kStart + scan_time(scan); }
+  /// Points and the times after the stamp.
+  [[nodiscard]] std::pair<std::vector<Eigen::Vector3f>, std::vector<double>> sweep(std::size_t scan,
+                                                                                   double duration_s) const {
     std::vector<Eigen::Vector3f> points;
     std::vector<double> times;
-    const Timestamp stamp = kStart + scan_time(scan);
     for (std::size_t i = 0; i < kPoints; ++i) {
-      const double after_s = shape.time_field.empty() ? 0.0 : kSweep_s * static_cast<double>(i) / (kPoints - 1);
-      const Pose3 T_odom_lidar = *pose_at(odometry_, stamp + after_s) * kBodyLidar;
+      const double after_s = duration_s * static_cast<double>(i) / (kPoints - 1);
+      const Pose3 T_odom_lidar = *pose_at(odometry_, stamp_of(scan) + after_s) * kBodyLidar;
       points.push_back((T_odom_lidar.inverse() * world_[i]).cast<float>());
-      times.push_back(after_s + (absolute ? 1e-9 * static_cast<double>(stamp.ns) : 0.0));
+      times.push_back(after_s);
     }
-    return cloud_of(stamp, "lidar", points, times, shape);
+    return {points, times};
   }
 
   [[nodiscard]] std::vector<Sample> robot(const CloudShape& shape, bool absolute = false) const {
@@ -144,6 +153,42 @@ TEST_F(Bags, ScansAreDeskewedByWhateverTimesPointsHave) {
     EXPECT_EQ(input->robots.front().recording.scan_stamps.size(), kScans);
     EXPECT_LT(error_of(*input), 1e-3) << said;
   }
+}
+
+/// A Livox says the same in a message of its own, from ROS 2 and ROS 1: scans are equal to the bit.
+TEST_F(Bags, ScansOfALivoxAreThoseOfACloudWithTheSamePointsAndTimes) {
+  const auto scans_in = [&](const std::string& type, int how) {
+    std::vector<Sample> samples{
+        sample_of("/tf_static", kTf, kStart, tf_of(kStart, {{"base_link", "lidar", kBodyLidar}}, how))};
+    for (const StampedPose& sample : odometry_)
+      samples.push_back(sample_of("/odom", kOdometry, sample.stamp,
+                                  odometry_of(sample.stamp, sample.pose, "odom", "base_link", 0.0, how)));
+    const CloudShape shape{.time_field = "offset_time", .time_type = 6, .time_unit_s = 1e-9, .how = how};
+    for (std::size_t i = 0; i < kScans; ++i) {
+      const auto [points, times] = sweep(i, kSweep_s);
+      samples.push_back(
+          sample_of("/livox/lidar", type, stamp_of(i) + kSweep_s,
+                    type == kCloud ? cloud(i, shape) : livox_of(stamp_of(i), "lidar", points, times, how)));
+    }
+    std::ranges::stable_sort(samples, {}, &Sample::ns);
+    if (how == 2)
+      write_bytes(folder_ / "bag", ros1_bag(samples, "lz4", 37));
+    else
+      write(samples);
+    const auto input = load();
+    EXPECT_TRUE(input) << input.error().message;
+    EXPECT_NE(notes_of(*input).find("'offset_time' is taken as ns after the message's stamp"), std::string::npos);
+    EXPECT_LT(error_of(*input), 1e-3) << type;
+    std::vector<std::vector<Eigen::Vector3f>> out;
+    for (std::size_t i = 0; i < kScans; ++i)
+      out.push_back(input->robots.front().recording.scans->scan(i).value().value().cloud->points);
+    return out;
+  };
+  const auto expected = scans_in(kCloud, 0);
+  EXPECT_EQ(scans_in(kLivox, 0), expected);
+  EXPECT_EQ(scans_in(kLivox, 2), expected);
+  EXPECT_EQ(scans_in(kOldLivox, 0), expected);
+  EXPECT_EQ(scans_in(kOldLivox, 2), expected);
 }
 
 /// With the antenna's place, without what is no fix, and with what no covariance is given for as unknown.
@@ -379,8 +424,10 @@ TEST_F(Bags, WithoutScansThereIsNothingToCloseOn) {
   std::vector<Sample> samples = robot({});
   std::erase_if(samples, [](const Sample& sample) { return sample.type == kCloud; });
   write(samples);
-  EXPECT_NE(problem().find("no scans (sensor_msgs/PointCloud2); but closures.finder is 'lidar', expected"),
-            std::string::npos)
+  EXPECT_NE(
+      problem().find(
+          "no scans (sensor_msgs/PointCloud2, or CustomMsg of a Livox); but closures.finder is 'lidar', expected"),
+      std::string::npos)
       << problem();
 }
 

@@ -73,7 +73,7 @@ class BagScans final : public ScanSource {
       return fail(ErrorCode::io, "{}: is not there any more: has the bag changed?", name_of(place));
     const auto encoding = bags::to_encoding((*message)->channel->message_encoding);
     if (!encoding) return in_context(name_of(place), encoding.error());
-    const auto decoded = bags::decode_point_cloud((*message)->data, *encoding);
+    const auto decoded = bags::decode_scan((*message)->channel->type, (*message)->data, *encoding);
     if (!decoded) return in_context(name_of(place), decoded.error());
     auto cloud = bags::to_timed_cloud(*decoded);
     if (!cloud) return in_context(name_of(place), cloud.error());

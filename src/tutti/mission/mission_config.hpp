@@ -130,7 +130,7 @@ struct BagTopicsConfig {
   void describe(V& v) {
     v.field("odometry", odometry, any(),
             "A topic of nav_msgs/Odometry or geometry_msgs/PoseStamped, or two frames of /tf: \"odom->base_link\".");
-    v.field("scans", scans, any(), "A topic of sensor_msgs/PointCloud2.");
+    v.field("scans", scans, any(), "A topic of sensor_msgs/PointCloud2, or of CustomMsg as a Livox has it.");
     v.field("images", images, any(),
             "Topics of sensor_msgs/Image or CompressedImage: of one camera, or of two with a comma between them.");
     v.field("depth", depth, any(),

@@ -5,10 +5,13 @@
 #include <lz4frame.h>
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "tutti/bags/internal/chunk.hpp"
 
@@ -165,6 +168,23 @@ inline std::string point_cloud(int how = 0) {
       .number(std::uint32_t{24})
       .bytes("abcdefghijklmnopqrstuvwx")
       .number(std::uint8_t{1})
+      .done();
+}
+/// CustomMsg of livox_ros_driver2, of points {offset_time in ns, {x, y, z}}.
+inline CdrWriter& put_livox(CdrWriter& out, const std::vector<std::pair<std::uint32_t, std::array<float, 3>>>& points) {
+  const auto count = static_cast<std::uint32_t>(points.size());
+  out.number(std::uint64_t{7'000'000'005}).number(count);
+  out.number(std::uint8_t{192}).numbers(3, std::uint8_t{0}).number(count);
+  for (const auto& [offset_ns, xyz] : points) {
+    out.number(offset_ns);
+    for (const float value : xyz) out.number(value);
+    out.number(std::uint8_t{100}).number(std::uint8_t{0}).number(std::uint8_t{3});  // reflectivity, tag, line
+  }
+  return out;
+}
+inline std::string livox(int how = 0) {
+  CdrWriter out(how);
+  return put_livox(out.header("livox_frame"), {{0, {1, 2, 3}}, {4'976, {-4, 5.5F, 6}}, {100'000'000, {7, 8, -9}}})
       .done();
 }
 inline std::string imu(int how = 0) {

@@ -117,10 +117,23 @@ inline std::string cloud_of(Timestamp stamp, std::string_view frame, const std::
   return out.bytes(data).number(std::uint8_t{1}).done();
 }
 
+/// The same points and times as CustomMsg of a Livox, whose times are whole nanoseconds after the stamp.
+inline std::string livox_of(Timestamp stamp, std::string_view frame, const std::vector<Eigen::Vector3f>& points,
+                            const std::vector<double>& times, int how = 0) {
+  std::vector<std::pair<std::uint32_t, std::array<float, 3>>> timed;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    timed.push_back(
+        {static_cast<std::uint32_t>(std::llround(1e9 * times[i])), {points[i].x(), points[i].y(), points[i].z()}});
+  CdrWriter out(how);
+  write_header(out, stamp, frame);
+  return put_livox(out, timed).done();
+}
+
 inline Sample sample_of(std::string topic, std::string type, Timestamp stamp, std::string data) {
   return {std::move(topic), std::move(type), static_cast<std::uint64_t>(stamp.ns), std::move(data)};
 }
 inline const std::string kOdometry = "nav_msgs/msg/Odometry", kCloud = "sensor_msgs/msg/PointCloud2",
+                         kLivox = "livox_ros_driver2/msg/CustomMsg", kOldLivox = "livox_ros_driver/msg/CustomMsg",
                          kTf = "tf2_msgs/msg/TFMessage", kPose = "geometry_msgs/msg/PoseStamped";
 
 /// A recording of files as messages: odometry, and of each of its poses a scan of the folder.

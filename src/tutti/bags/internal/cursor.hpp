@@ -26,6 +26,7 @@ class Cursor {
       : bytes_(bytes), order_(order), layout_(layout) {}
 
   [[nodiscard]] Layout layout() const { return layout_; }
+  [[nodiscard]] Order order() const { return order_; }
   [[nodiscard]] std::size_t at() const { return at_; }
   [[nodiscard]] std::size_t left() const { return bytes_.size() - at_; }
   [[nodiscard]] bool ok() const { return !error_; }

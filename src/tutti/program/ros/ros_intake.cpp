@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "tutti/bags/point_cloud.hpp"
-#include "tutti/bags/ros_messages.hpp"
 #include "tutti/base/plain_text.hpp"
 #include "tutti/perception/lidar/deskewed_scan.hpp"
 
@@ -48,7 +47,7 @@ Status RosIntake::counted(Status taken) {
 }
 
 Status RosIntake::add_odometry(std::string_view cdr) { return counted(take_odometry(cdr)); }
-Status RosIntake::add_points(std::string_view cdr) { return counted(take_points(cdr)); }
+Status RosIntake::add_points(std::string_view cdr, std::string_view type) { return counted(take_points(cdr, type)); }
 Status RosIntake::add_fix(std::string_view cdr) { return counted(take_fix(cdr)); }
 
 Status RosIntake::take_odometry(std::string_view cdr) {
@@ -164,8 +163,8 @@ Status RosIntake::take_fix(std::string_view cdr) {
   return {};
 }
 
-Status RosIntake::take_points(std::string_view cdr) {
-  const auto message = bags::decode_point_cloud(cdr);
+Status RosIntake::take_points(std::string_view cdr, std::string_view type) {
+  const auto message = bags::decode_scan(type, cdr);
   if (!message) return tl::unexpected(message.error());
   const Timestamp sensor_stamp = message->header.stamp, stamp = sensor_stamp + config_.scan_offset_s;
   if (known_ && stamp <= *known_) return {};

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "tutti/bags/ros_fix.hpp"
+#include "tutti/bags/ros_messages.hpp"
 #include "tutti/bags/sensor_clock.hpp"
 #include "tutti/bags/transform_tree.hpp"
 #include "tutti/base/result.hpp"
@@ -66,7 +67,8 @@ class RosIntake {
   /// Stamps are judged as by the robot (StampWatch): what it would refuse is refused here. Where the clock began anew,
   /// what was refused of the new time is fed after all, so that the robot sees it, too.
   Status add_odometry(std::string_view cdr);
-  Status add_points(std::string_view cdr);
+  /// `type`: one of bags::kScanTypes.
+  Status add_points(std::string_view cdr, std::string_view type = bags::kScanTypes.front().name);
   /// Adds a fix; ignores messages in which the receiver reports that it has none.
   Status add_fix(std::string_view cdr);
   /// Adds the transforms of one message, and returns the first of their errors.
@@ -114,7 +116,7 @@ class RosIntake {
   void queue(const StampedPose& sample);
   void begin_anew();
   Status take_odometry(std::string_view cdr);
-  Status take_points(std::string_view cdr);
+  Status take_points(std::string_view cdr, std::string_view type);
   Status take_fix(std::string_view cdr);
   [[nodiscard]] std::optional<Eigen::Vector3d> antenna_of(const std::string& frame) const;
   Status take_transform(const bags::RosTransform& transform, bool is_static);

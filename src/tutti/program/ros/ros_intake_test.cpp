@@ -79,6 +79,24 @@ TEST(RosIntake, ScansWaitForTheOdometryOfTheirSweepAndLoseItsMotion) {
   }
 }
 
+/// As a cloud with the same points and times.
+TEST(RosIntake, ScansOfALivoxLoseTheMotionOfTheirSweep) {
+  RosIntake intake({});
+  ASSERT_TRUE(intake.add_points(test::livox(kStart), "livox_ros_driver2/msg/CustomMsg"));
+  EXPECT_NE(why(intake.add_points(test::livox(kStart + kPeriod))).find("sensor_msgs/msg/PointCloud2: "),
+            std::string::npos);
+  std::vector<Scan> scans;
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE(intake.add_odometry(odometry(kStart + i * kPeriod, 1.0 * i)));  // 10 m/s
+    for (const Scan& scan : feed(intake).scans) scans.push_back(scan);
+  }
+  ASSERT_EQ(scans.size(), 1U);
+  ASSERT_EQ(scans[0].cloud->points.size(), 3U);
+  const std::vector<Eigen::Vector3f> expected{{5, 0, 0}, {5.5F, 1, 0}, {6, 2, 0}};
+  for (std::size_t k = 0; k < 3; ++k) EXPECT_LT((scans[0].cloud->points[k] - expected[k]).norm(), 1e-4F);
+  EXPECT_NE(intake.take_note().find("'offset_time' is taken as ns after the message's stamp"), std::string::npos);
+}
+
 TEST(RosIntake, TheLidarIsWhereStaticTransformsSay) {
   RosIntake intake({});
   const Pose3 T_base_mast{Eigen::Quaterniond::Identity(), {0, 0, 1}},

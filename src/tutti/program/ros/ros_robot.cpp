@@ -23,9 +23,8 @@ namespace {
 
 using program::Clock, program::FeedClient, program::Level;
 
-constexpr const char *kOdometryType = "nav_msgs/msg/Odometry", *kPointsType = "sensor_msgs/msg/PointCloud2",
-                     *kFixType = "sensor_msgs/msg/NavSatFix", *kBatteryType = "sensor_msgs/msg/BatteryState",
-                     *kTfType = "tf2_msgs/msg/TFMessage";
+constexpr const char *kOdometryType = "nav_msgs/msg/Odometry", *kFixType = "sensor_msgs/msg/NavSatFix",
+                     *kBatteryType = "sensor_msgs/msg/BatteryState", *kTfType = "tf2_msgs/msg/TFMessage";
 constexpr double kWait_s = 0.02;
 constexpr double kAnswers_s = 2.0;  // more than the robot takes for any
 constexpr double kConnectsAgain_s = 0.1;
@@ -54,6 +53,7 @@ class Robot final : public RosRobot {
   [[nodiscard]] bool by_tf() const { return !options_.intake.odometry_frames.empty(); }
   Result<std::unique_ptr<Writer>> writer(const std::string& topic, const std::string& type, const Qos& qos);
   Status subscribe();
+  Status subscribe_points();
   void run(const std::stop_token& stop);
   void turn();
   bool connect();
@@ -138,16 +138,32 @@ Status Robot::subscribe() {
     out = std::move(*made);
     return {};
   };
-  constexpr int kOdometryDepth = 1000, kPointsDepth = 10, kFixesDepth = 100;  // how long this thread may be held up
+  constexpr int kOdometryDepth = 1000, kFixesDepth = 100;  // how long this thread may be held up
   const Qos tf = by_tf() && options_.lossless ? in_qos(true, 0) : kTfQos;
   if (Status ok = make(tf_static_, "/tf_static", kTfType, kStaticTfQos); !ok) return ok;
   if (Status ok = make(tf_, "/tf", kTfType, tf); !ok) return ok;
   if (!by_tf())
     if (Status ok = make(odometry_, options_.odometry, kOdometryType, in_qos(options_.lossless, kOdometryDepth)); !ok)
       return ok;
-  if (Status ok = make(points_, options_.points, kPointsType, in_qos(options_.lossless, kPointsDepth)); !ok) return ok;
+  if (Status ok = subscribe_points(); !ok) return ok;
   if (Status ok = make(battery_, options_.battery, kBatteryType, in_qos(false, 1)); !ok) return ok;
   return make(fixes_, options_.fixes, kFixType, in_qos(options_.lossless, kFixesDepth));
+}
+
+/// A reader hears messages of one type only, and scans come in several: while nobody publishes what this one hears, it
+/// gives way to one of the type that somebody does.
+Status Robot::subscribe_points() {
+  constexpr int kDepth = 10;  // how long this thread may be held up
+  if (options_.points.empty() || (points_ && points_->writers() > 0)) return {};
+  const auto name = resolve(options_.points, options_.name_space);
+  std::string type = points_ ? points_->type() : std::string(bags::kScanTypes.front().name);
+  for (const Publication& publication : participant_->publications())
+    if (publication.topic == *name && bags::is_scan_type(publication.type)) type = publication.type;
+  if (points_ && points_->type() == type) return {};
+  auto made = participant_->reader(*name, type, in_qos(options_.lossless, kDepth), bags::ros_type_hash(type));
+  if (!made) return tl::unexpected(made.error());
+  points_ = std::move(*made);
+  return {};
 }
 
 void Robot::run(const std::stop_token& stop) {
@@ -166,6 +182,7 @@ void Robot::turn() {
   if (!client_ && !connect()) return std::this_thread::sleep_for(std::chrono::duration<double>(kConnectsAgain_s));
   if (waits_for_robot()) return;
   participant_->wait(kWait_s);
+  if (const Status ok = subscribe_points(); !ok) complain(options_.points, ok);
   take_messages();
   if (images_ && client_ && sensors() != sensors_) client_.reset();  // a robot is told of cameras when it is greeted
   if (!client_ && !connect()) return;
@@ -211,7 +228,7 @@ void Robot::take_messages() {
   take(tf_static_, [&](std::string_view cdr) { return intake_.add_tf(cdr, true); });
   take(tf_, [&](std::string_view cdr) { return intake_.add_tf(cdr, false); });
   take(odometry_, [&](std::string_view cdr) { return intake_.add_odometry(cdr); });
-  take(points_, [&](std::string_view cdr) { return intake_.add_points(cdr); });
+  take(points_, [&](std::string_view cdr) { return intake_.add_points(cdr, points_->type()); });
   take(fixes_, [&](std::string_view cdr) { return intake_.add_fix(cdr); });
   take(battery_, [&](std::string_view cdr) { return say_battery(cdr); });
   if (images_) images_->take();

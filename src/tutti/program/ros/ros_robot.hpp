@@ -18,7 +18,7 @@ struct RosRobotOptions {
   std::string socket;  ///< Path of the robot's live feed.
   std::string name_space;
   std::string odometry = "odom";          ///< Topic of Odometry messages, or two frames of /tf: "odom->base_link".
-  std::string points = "points";          ///< Topic of PointCloud2 messages; empty: no scans.
+  std::string points = "points";          ///< Topic of scans (bags::kScanTypes); empty: none.
   std::string fixes = "fix";              ///< Topic of NavSatFix messages; empty: no position fixes.
   std::string battery = "battery_state";  ///< Topic of BatteryState messages; empty: none.
   std::optional<ImagesConfig> images;     ///< Nothing: no images and no IMU.

@@ -64,6 +64,7 @@ class RosRobots : public ::testing::Test {
   const std::string socket_ = ::testing::TempDir() + "ros_robot_" + std::to_string(getpid());
   std::shared_ptr<Participant> me_ = test::join_loopback();
   std::mutex mutex_;
+  std::int64_t stamp_ = kStart;
   std::string said_;
   std::unique_ptr<program::LiveFeed> feed_;
   std::unique_ptr<RosRobot> robot_;
@@ -124,6 +125,32 @@ TEST_F(RosRobots, IsFedByTopicsAndAnswersOnTopics) {
         all, [](const std::string& cdr) { return cdr.find("fed, not in a map yet") != std::string::npos; });
   }));
   EXPECT_EQ(camera->readers() + info->readers(), 0U);  // nobody wants images
+}
+
+/// The robot is there first, and hears scans in whichever type they are published later.
+TEST_F(RosRobots, ScansOfALivoxAreFed) {
+  start();
+  const auto odom = publisher("/alpha/odom", kOdometry);
+  ASSERT_TRUE(is_heard(*odom));
+  for (const char* const type : {"livox_ros_driver2/msg/CustomMsg", "livox_ros_driver/msg/CustomMsg", kPoints}) {
+    const auto lidar = publisher("/alpha/points", type);
+    ASSERT_TRUE(is_heard(*lidar)) << type << said();
+    bool is_fed = false;
+    EXPECT_TRUE(::tutti::test::within(
+        kPatience_s,
+        [&] {
+          stamp_ += kPeriod;
+          EXPECT_TRUE(lidar->write(std::string(type) == kPoints ? points(stamp_, kAtOnce) : test::livox(stamp_)));
+          EXPECT_TRUE(odom->write(odometry(stamp_)));
+          while (const auto input = feed_->front().take(0.0)) {
+            const auto* scan = std::get_if<Scan>(&*input);
+            is_fed = is_fed || (scan != nullptr && scan->cloud->points.at(0) == Eigen::Vector3f(5, 0, 0));
+            feed_->front().note_heard();
+          }
+          return is_fed;
+        }))
+        << type << said();
+  }
 }
 
 TEST_F(RosRobots, TheBatteryIsReported) {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "support/bags/bag_writer.hpp"
 #include "tutti/bags/ros_encode.hpp"
 #include "tutti/geometry/pose3.hpp"
 
@@ -42,6 +43,12 @@ inline std::string points(std::int64_t ns, const std::vector<float>& times, cons
                           .row_step = 16 * count,
                           .data = data,
                           .is_dense = true});
+}
+/// Three points of a Livox, of which the first is measured at the stamp, 5 m in front, the last 0.1 s later.
+inline std::string livox(std::int64_t ns, const std::string& frame = "base_link") {
+  bags::test::CdrWriter out;
+  out.header(frame, static_cast<std::int32_t>(ns / kSecond), static_cast<std::uint32_t>(ns % kSecond));
+  return bags::test::put_livox(out, {{0, {5, 0, 0}}, {50'000'000, {5, 1, 0}}, {100'000'000, {5, 2, 0}}}).done();
 }
 /// As a receiver says it that knows its place to 1 m.
 inline std::string fix(std::int64_t ns, const std::string& frame = "base_link", double latitude_deg = 46.5) {
