@@ -60,6 +60,11 @@ class Conversion(unittest.TestCase):
         xyz[1][4] = math.nan
         points, _ = from_ros.points_of(cloud([(n, 7, xyz[i]) for i, n in enumerate("xyz")]))
         np.testing.assert_array_equal(points, np.delete(expected, 4, axis=0))
+        xyz[1][4] = 1.0
+        for row in xyz:
+            row[7] = 0.0
+        points, _ = from_ros.points_of(cloud([(n, 7, xyz[i]) for i, n in enumerate("xyz")]))
+        self.assertEqual(len(points), 11)  # one beam had no echo
         empty = cloud([(n, 7, []) for n in "xyz"])
         self.assertEqual(len(from_ros.scan_of(empty, poses.IDENTITY)[1]), 0)
 
@@ -76,7 +81,7 @@ class Conversion(unittest.TestCase):
 
     def test_times_of_points_in_every_unit(self):
         T_body_lidar = (1.0, 2.0, 3.0, 0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))  # 90 degrees about z
-        stamp_ns, xyz = 1_767_225_600_500_000_000, [(n, 7, [1.0, 0.0, 2.0]) for n in "xyz"]
+        stamp_ns, xyz = 1_767_225_600_500_000_000, [(n, 7, [1.0, 0.5, 2.0]) for n in "xyz"]
         after_s = [0.0, 0.03, 0.1]
         for name, datatype, numbers in (("t", 6, [0, 30_000_000, 100_000_000]), ("time", 7, after_s),
                                         ("offset_time", 6, [0, 30_000, 100_000]), ("t", 7, [0.0, 30.0, 100.0]),

@@ -77,7 +77,7 @@ def fix_of(message):
 
 def points_of(message):
     """(points Nx3 float32 in the sensor's frame, their times as they stand there, or None); without points that are not
-    finite. Reads rows with padding and both byte orders."""
+    finite, or at 0, 0, 0: beams without an echo. Reads rows with padding and both byte orders."""
     fields = {field.name: field for field in message.fields}
     order = ">" if message.is_bigendian else "<"
     time = next((name for name in TIME_FIELDS if name in fields and fields[name].count <= 1), None)
@@ -104,7 +104,7 @@ def points_of(message):
     layout = np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": step})
     cloud = np.ndarray((rows, columns), layout, data, strides=(row_step, step)).reshape(-1)
     points = np.stack([cloud[name].astype(np.float32) for name in "xyz"], axis=1)
-    finite = np.isfinite(points).all(axis=1)
+    finite = np.isfinite(points).all(axis=1) & points.any(axis=1)
     return points[finite], cloud[time].astype(np.float64)[finite] if time else None
 
 

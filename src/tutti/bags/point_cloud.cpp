@@ -109,7 +109,8 @@ Result<formats::TimedCloud> to_timed_cloud(const RosPointCloud& message) {
         point[i] = static_cast<float>(number(at + field.offset, field.datatype, swapped));
       }
       const double when = time ? number(at + time->offset, time->datatype, swapped) : 0.0;
-      if (!point.allFinite() || !std::isfinite(when)) continue;
+      const bool has_echo = point != Eigen::Vector3f::Zero();
+      if (!point.allFinite() || !has_echo || !std::isfinite(when)) continue;
       out.cloud.points.push_back(point);
       if (time) out.times.push_back(when);
     }

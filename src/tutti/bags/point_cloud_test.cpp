@@ -73,6 +73,16 @@ TEST(PointCloud, PointsThatAreNoneAreLeftOutWithTheirTimes) {
   EXPECT_EQ(cloud.times, (std::vector<double>{0.0, 0.02, 0.1}));
 }
 
+TEST(PointCloud, BeamsWithoutAnEchoAreLeftOutWithTheirTimes) {
+  auto points = kPoints;
+  points[2] = Eigen::Vector3f::Zero();
+  const auto cloud = cloud_in({.time_field = "time", .time_type = 8}, points).value();
+  EXPECT_EQ(cloud.cloud.points, (std::vector<Eigen::Vector3f>{kPoints[0], kPoints[1], kPoints[3]}));
+  EXPECT_EQ(cloud.times, (std::vector<double>{0.0, 0.01, 0.1}));
+  const std::string bytes = livox_of(Timestamp{5}, "lidar", points, kTimes);
+  EXPECT_EQ(to_timed_cloud(decode_livox(bytes).value())->cloud.points, cloud.cloud.points);
+}
+
 TEST(PointCloud, WhatIsWrongIsNamed) {
   const auto error_of = [](const RosPointCloud& message) { return to_timed_cloud(message).error().message; };
   EXPECT_EQ(cloud_in({.without = "z"}).error().message, "no field 'z', expected x, y and z among 'x y'");
