@@ -18,6 +18,8 @@ def generate_launch_description():
         "odom": ("odom", "topic of nav_msgs/Odometry, relative to the namespace"),
         "points": ("points", "topic of sensor_msgs/PointCloud2, or of a Livox's CustomMsg, relative to the namespace"),
         "fix": ("fix", "topic of sensor_msgs/NavSatFix, relative to the namespace"),
+        "tf": ("/tf", "topic of transforms: tf, where they are in the namespace"),
+        "tf_static": ("/tf_static", "topic of transforms that do not move: tf_static, where they are in the namespace"),
         "images": ("", "topics of one camera or two, relative to the namespace: left/image_raw,right/image_raw; empty: none"),
         "depth": ("", "topic of depth images registered to the one camera; empty: none"),
         "imu": ("", "topic of sensor_msgs/Imu, which goes with images; empty: none"),
@@ -42,5 +44,6 @@ def generate_launch_description():
         respawn=True, respawn_delay=2.0,
         parameters=[{name: ParameterValue(value(name), value_type=str) for name in ("images", "depth", "imu")},
                     value("params"), {"socket": value("socket"), "use_sim_time": value("use_sim_time")}],
-        remappings=[("odom", value("odom")), ("points", value("points")), ("fix", value("fix"))])
+        remappings=[("odom", value("odom")), ("points", value("points")), ("fix", value("fix")),
+                    ("/tf", value("tf")), ("/tf_static", value("tf_static"))])
     return LaunchDescription([*declared, robot, node])

@@ -109,30 +109,40 @@ void RosIntake::begin_anew() {
   fixes_.clear();
 }
 
-Status RosIntake::add_tf(std::string_view cdr, bool is_static) {
+Status RosIntake::add_tf(std::string_view cdr, bool is_static, TfOf of) {
   const auto transforms = bags::decode_tf(cdr);
   if (!transforms) return counted(tl::unexpected(transforms.error()));
   Status first;
   for (const bags::RosTransform& transform : *transforms)
-    if (Status ok = take_transform(transform, is_static); !ok) {
+    if (Status ok = take_transform(transform, is_static, of); !ok) {
       ++counts_.refused;
       if (first) first = std::move(ok);
     }
   return first;
 }
 
-Status RosIntake::take_transform(const bags::RosTransform& transform, bool is_static) {
+Status RosIntake::take_transform(const bags::RosTransform& transform, bool is_static, TfOf of) {
   const std::string parent = bags::frame_name(transform.header.frame_id),
                     child = bags::frame_name(transform.child_frame_id);
   if (!config_.odometry_frames.empty() && !is_static && parent + "->" + child == config_.odometry_frames) {
+    if (of == TfOf::all && has_own_odometry_) return {};  // another robot's, by the same names
+    has_own_odometry_ = of == TfOf::robot;
     const auto pose = bags::to_pose(transform.translation, transform.rotation);
     if (!pose) return tl::unexpected(pose.error());
     return add_sample(transform.header.stamp, *pose, parent, child);
   }
-  if (!known_frames_.contains(child) && known_frames_.size() >= kMostFrames)
+  std::set<std::string>& known = of == TfOf::robot ? own_frames_ : known_frames_;
+  if (!known.contains(child) && known.size() >= kMostFrames)
     return fail(ErrorCode::invalid, "frame '{}' is one more than {}", plain(child), kMostFrames);
-  known_frames_.insert(child);
-  return tree_.add(transform, is_static);
+  known.insert(child);
+  return (of == TfOf::robot ? own_tree_ : tree_).add(transform, is_static);
+}
+
+/// As from a bag of several robots (mission/bag_index.hpp): what is not in the own tree is looked up in that of all.
+bags::TransformTree RosIntake::tree() const {
+  bags::TransformTree out = own_tree_;
+  out.merge(tree_);
+  return out;
 }
 
 Status RosIntake::check_stamp(Timestamp stamp, const std::optional<Timestamp>& before) const {
@@ -216,8 +226,10 @@ Result<Pose3> RosIntake::pose_on_body(const std::string& frame) const {
   if (!frames_) return fail(ErrorCode::invalid, "no odometry has said yet which frame is the body");
   const std::string from = bags::frame_name(frame), &body = frames_->body;
   if (from == body) return Pose3{};
-  if (const auto found = tree_.find(body, from)) return *found;
-  const std::string frames = tree_.frames();
+  if (const auto found = own_tree_.find(body, from)) return *found;
+  const bags::TransformTree all = tree();
+  if (const auto found = all.find(body, from)) return *found;
+  const std::string frames = all.frames();
   return fail(ErrorCode::invalid, "no transform from '{}' to '{}' on /tf_static, frames that do not move are: {}",
               plain(from), plain(body), frames.empty() ? "none" : frames.substr(0, 500));
 }

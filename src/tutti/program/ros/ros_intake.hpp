@@ -71,8 +71,10 @@ class RosIntake {
   Status add_points(std::string_view cdr, std::string_view type = bags::kScanTypes.front().name);
   /// Adds a fix; ignores messages in which the receiver reports that it has none.
   Status add_fix(std::string_view cdr);
+  /// Whose transforms a topic has: everybody's (/tf), or those of this robot alone (/alpha/tf), which count first.
+  enum class TfOf { all, robot };
   /// Adds the transforms of one message, and returns the first of their errors.
-  Status add_tf(std::string_view cdr, bool is_static);
+  Status add_tf(std::string_view cdr, bool is_static, TfOf of = TfOf::all);
 
   /// The next odometry sample to feed, in order of arrival. With `wait_for_scans` it is held back until a scan with its
   /// stamp or a later one has arrived.
@@ -119,7 +121,8 @@ class RosIntake {
   Status take_points(std::string_view cdr, std::string_view type);
   Status take_fix(std::string_view cdr);
   [[nodiscard]] std::optional<Eigen::Vector3d> antenna_of(const std::string& frame) const;
-  Status take_transform(const bags::RosTransform& transform, bool is_static);
+  Status take_transform(const bags::RosTransform& transform, bool is_static, TfOf of);
+  [[nodiscard]] bags::TransformTree tree() const;
   Status counted(Status taken);
   [[nodiscard]] Result<Pose3> lidar_pose(const std::string& frame) const;
   struct Waiting;
@@ -133,8 +136,9 @@ class RosIntake {
   };
   IntakeConfig config_;
   std::optional<OdometryFrames> frames_;
-  bags::TransformTree tree_;
-  std::set<std::string> known_frames_;
+  bags::TransformTree tree_, own_tree_;  ///< Of all, and of this robot alone.
+  bool has_own_odometry_ = false;        ///< A pair of frames of this robot alone has given odometry.
+  std::set<std::string> known_frames_, own_frames_;
   robot::StampWatch stamps_;         ///< Of odometry.
   std::deque<StampedPose> samples_;  ///< Samples that are not fed yet.
   std::deque<StampedPose> refused_;  ///< The last ones in a row that were refused for their stamps.

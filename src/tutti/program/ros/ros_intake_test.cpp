@@ -118,6 +118,26 @@ TEST(RosIntake, TheLidarIsWhereStaticTransformsSay) {
   EXPECT_LT((fed.scans[0].cloud->points[0] - Eigen::Vector3f(0, 5, 1.5F)).norm(), 1e-5F);
 }
 
+/// Two robots may use the same frames, each in its own namespace.
+TEST(RosIntake, TransformsOfTheRobotAloneCountBeforeThoseOfAll) {
+  using Of = RosIntake::TfOf;
+  RosIntake intake({.odometry_frames = "odom->base_link"});
+  const auto at = [](double x) { return Pose3{Eigen::Quaterniond::Identity(), {x, 0, 0}}; };
+  ASSERT_TRUE(intake.add_tf(transform(0, "base_link", "lidar", at(9)), true, Of::all));
+  ASSERT_TRUE(intake.add_tf(transform(0, "base_link", "mast", at(1)), true, Of::all));
+  ASSERT_TRUE(intake.add_tf(transform(0, "base_link", "lidar", at(2)), true, Of::robot));
+  ASSERT_TRUE(intake.add_tf(transform(0, "mast", "gnss", at(3)), true, Of::robot));
+  ASSERT_TRUE(intake.add_tf(transform(kStart, "odom", "base_link", at(0)), false, Of::robot));
+  ASSERT_TRUE(intake.add_tf(transform(kStart + kPeriod, "odom", "base_link", at(70)), false, Of::all));
+  ASSERT_TRUE(intake.add_tf(transform(kStart + 2 * kPeriod, "odom", "base_link", at(0.1)), false, Of::robot));
+  const Fed fed = feed(intake);
+  ASSERT_EQ(fed.samples.size(), 2U);
+  EXPECT_EQ(fed.samples[1].T_odom_body, at(0.1));
+  EXPECT_EQ(intake.pose_on_body("lidar").value(), at(2));
+  EXPECT_EQ(intake.pose_on_body("mast").value(), at(1));  // in that of all only
+  EXPECT_EQ(intake.pose_on_body("gnss").value(), at(4));  // by both
+}
+
 TEST(RosIntake, FixesWaitForTheirOdometryAndTheirAntennaIsWhereStaticTransformsSay) {
   RosIntake intake({});
   ASSERT_TRUE(intake.add_fix(fix(kStart - kPeriod, "gnss")));

@@ -54,6 +54,7 @@ class Robot final : public RosRobot {
   Result<std::unique_ptr<Writer>> writer(const std::string& topic, const std::string& type, const Qos& qos);
   Status subscribe();
   Status subscribe_points();
+  void open_own_tf();
   void run(const std::stop_token& stop);
   void turn();
   bool connect();
@@ -78,9 +79,9 @@ class Robot final : public RosRobot {
   RosRobotOptions options_;
   std::shared_ptr<Participant> participant_;
   RosIntake intake_;
-  std::unique_ptr<Writer> tf_out_, pose_, path_, mates_, diagnostics_;
+  std::unique_ptr<Writer> tf_out_, own_tf_out_, pose_, path_, mates_, diagnostics_;
   std::map<std::string, std::unique_ptr<Writer>> mate_poses_;
-  std::unique_ptr<Reader> odometry_, points_, fixes_, battery_, tf_, tf_static_;
+  std::unique_ptr<Reader> odometry_, points_, fixes_, battery_, tf_, tf_static_, own_tf_, own_tf_static_;
   std::unique_ptr<FeedClient> client_;
   std::optional<RosAnswers> answers_;
   std::optional<program::FeedWay> way_;  // heard before there was any odometry
@@ -142,6 +143,10 @@ Status Robot::subscribe() {
   const Qos tf = by_tf() && options_.lossless ? in_qos(true, 0) : kTfQos;
   if (Status ok = make(tf_static_, "/tf_static", kTfType, kStaticTfQos); !ok) return ok;
   if (Status ok = make(tf_, "/tf", kTfType, tf); !ok) return ok;
+  if (resolve("tf", options_.name_space).value() != "/tf") {
+    if (Status ok = make(own_tf_static_, "tf_static", kTfType, kStaticTfQos); !ok) return ok;
+    if (Status ok = make(own_tf_, "tf", kTfType, tf); !ok) return ok;
+  }
   if (!by_tf())
     if (Status ok = make(odometry_, options_.odometry, kOdometryType, in_qos(options_.lossless, kOdometryDepth)); !ok)
       return ok;
@@ -164,6 +169,14 @@ Status Robot::subscribe_points() {
   if (!made) return tl::unexpected(made.error());
   points_ = std::move(*made);
   return {};
+}
+
+/// Who has a tree of its own looks for map -> odom there.
+void Robot::open_own_tf() {
+  auto made = writer("tf", kTfType, kTfQos);
+  if (!made) return complain("tf", tl::unexpected(made.error()));
+  own_tf_out_ = std::move(*made);
+  options_.say(Level::info, fmt::format("transforms come on {}: map -> odom is published there", own_tf_->topic()));
 }
 
 void Robot::run(const std::stop_token& stop) {
@@ -227,6 +240,11 @@ void Robot::take_messages() {
   };
   take(tf_static_, [&](std::string_view cdr) { return intake_.add_tf(cdr, true); });
   take(tf_, [&](std::string_view cdr) { return intake_.add_tf(cdr, false); });
+  take(own_tf_static_, [&](std::string_view cdr) { return intake_.add_tf(cdr, true, RosIntake::TfOf::robot); });
+  take(own_tf_, [&](std::string_view cdr) {
+    if (!own_tf_out_) open_own_tf();
+    return intake_.add_tf(cdr, false, RosIntake::TfOf::robot);
+  });
   take(odometry_, [&](std::string_view cdr) { return intake_.add_odometry(cdr); });
   take(points_, [&](std::string_view cdr) { return intake_.add_points(cdr, points_->type()); });
   take(fixes_, [&](std::string_view cdr) { return intake_.add_fix(cdr); });
@@ -272,7 +290,8 @@ void Robot::say_sample(const node::OdometrySample& sample) {
     if (answer == nullptr || answer->stamp != sample.stamp) return refused != nullptr && refused->stamp == sample.stamp;
     wants_scan_ = answer->wants_scan;
     answers_->hear(*answer, sample.T_odom_body);
-    if (const auto transform = answers_->transform()) complain("/tf", tf_out_->write(*transform));
+    if (const auto transform = answers_->transform())
+      complain("map -> odom", (own_tf_out_ ? own_tf_out_ : tf_out_)->write(*transform));
     complain("corrected_pose", pose_->write(answers_->pose()));
     return true;
   });

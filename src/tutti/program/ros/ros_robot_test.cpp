@@ -203,6 +203,36 @@ TEST_F(RosRobots, ImagesAndImuAreFedOnceTheirPlaceIsKnown) {
   EXPECT_GT(feed_->front().imu({kStart}, {stamp}).size(), 5U);
 }
 
+/// As Nav2 starts several robots: frames without prefixes, transforms in the robot's namespace.
+TEST_F(RosRobots, TransformsInTheNamespaceAreHeardAndAnsweredThere) {
+  const auto all = me_->reader("/tf", kTf, test::kKeepAll, "").value(),
+             own = me_->reader("/alpha/tf", kTf, test::kKeepAll, "").value();
+  start({.odometry = "", .intake = {.odometry_frames = "odom->base_link"}});
+  const auto tf = publisher("/alpha/tf", kTf, kTfQos), still = publisher("/alpha/tf_static", kTf, kStaticTfQos);
+  const auto cloud = publisher("/alpha/points", kPoints);
+  ASSERT_TRUE(is_heard(*tf) && is_heard(*still) && is_heard(*cloud));
+  ASSERT_TRUE(still->write(test::transform(0, "base_link", "lidar", {Eigen::Quaterniond::Identity(), {0, 0, 2}})));
+  std::size_t scans = 0, answers = 0;
+  EXPECT_TRUE(::tutti::test::within(kPatience_s,
+                                    [&] {
+                                      stamp_ += kPeriod;
+                                      EXPECT_TRUE(cloud->write(points(stamp_, kAtOnce, "lidar")));
+                                      EXPECT_TRUE(tf->write(test::transform(stamp_, "odom", "base_link", {})));
+                                      while (const auto input = feed_->front().take(0.0)) {
+                                        if (const auto* scan = std::get_if<Scan>(&*input); scan != nullptr) {
+                                          EXPECT_EQ(scan->cloud->points.at(0), Eigen::Vector3f(5, 0, 2));
+                                          ++scans;
+                                        }
+                                        feed_->front().note_heard();
+                                      }
+                                      for (const std::string& cdr : taken(*own))
+                                        answers += bags::decode_tf(cdr).value().at(0).header.frame_id == "map" ? 1 : 0;
+                                      return scans > 2 && answers > 2;
+                                    }))
+      << scans << " " << answers << said();
+  EXPECT_TRUE(taken(*all).empty());
+}
+
 TEST_F(RosRobots, WhyThereIsNoOdometryIsSaid) {
   const auto other = publisher("/bravo/odom", kOdometry);
   start();
