@@ -86,7 +86,7 @@ void print_origin(const mapfile::ClosureInfo& info) {
   if (info.verdict) {
     const ClosureVerdict& verdict = *info.verdict;
     fmt::print("verified     by {}{}, finder {}\n",
-               verdict.worker ? fmt::format("worker {}", *verdict.worker) : "an unknown worker",
+               verdict.worker > 0 ? fmt::format("worker {}", verdict.worker - 1) : "an unknown worker",
                verdict.verified_ns != 0 ? " at " + time_of(verdict.verified_ns) : "", to_string(verdict.finder));
     for (const Refusal& measured : verdict.evidence) {
       const RefusalKind& kind = kind_of(measured.reason);

@@ -27,8 +27,10 @@
 /// message's kind is raised only when a reader of before would misunderstand a message; a new field, which it passes
 /// over, needs none.
 ///
-/// Types: bool, integers, double, std::string, enums with a range, Timestamp, RobotId, Pose3, structs with such a list;
-/// std::optional of a scalar; std::vector of structs.
+/// Types: bool, integers, double, std::string, enums with a range, Timestamp, RobotId, Pose3, Matrix6d (symmetric),
+/// structs with such a list, std::optional and std::vector of all these, and NumberSets by session (std::map).
+/// A struct that says `using InColumns = void;` and has scalars only is coded in columns where it is in a list: of each
+/// of its fields all values, side by side.
 namespace tutti {
 
 struct FieldRule {
@@ -43,8 +45,12 @@ struct FieldRule {
   std::size_t at_most = kPlainTextBytes;                  ///< Bytes of a text, elements of a list.
   double low = -std::numeric_limits<double>::infinity();  ///< Range of a number, both ends included.
   double high = std::numeric_limits<double>::infinity();
-  bool fixed = false;       ///< An integer that uses all its bits, such as a hash: takes all its bytes on the wire.
-  bool is_flat = false;     ///< JSON has the fields of this struct beside those of its owner.
+  bool fixed = false;    ///< An integer that uses all its bits, such as a hash: takes all its bytes on the wire.
+  bool always = false;   ///< On the wire also with its default; a pose or covariance must be there.
+  bool is_flat = false;  ///< JSON has the fields of this struct beside those of its owner.
+  /// On the wire the fields of this struct, or the columns of this list, are beside those of their owner, with this
+  /// field's number added to theirs; this number itself says whether an optional one is there.
+  bool is_spread = false;
   const char* column = "";  ///< Heading in tables for people; empty: in none.
 };
 
@@ -74,6 +80,12 @@ template <class T>
 concept IsOptionalField = std::same_as<T, std::optional<typename fields_internal::element_of<T>::type>>;
 template <class T>
 concept IsListField = std::same_as<T, std::vector<typename fields_internal::element_of<T>::type>>;
+template <class T>
+concept IsColumnsField = IsListField<T> && requires {
+  typename T::value_type::InColumns;
+};
+template <class T>
+concept IsNumbersField = IsListField<T> && std::is_arithmetic_v<typename fields_internal::element_of<T>::type>;
 
 /// Shows a visitor that changes nothing every field of a value.
 template <HasFields T, class V>

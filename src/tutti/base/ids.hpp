@@ -41,6 +41,13 @@ struct KeyframeId {
 struct SubmapId {
   ChainId chain;
   std::uint32_t index = 0;
+  using InColumns = void;
+  template <class V>
+  void describe(V& v) {  // base/fields.hpp
+    v.field(1, "robot", chain.robot);
+    v.field(2, "session", chain.session);
+    v.field(3, "index", index);
+  }
   friend auto operator<=>(const SubmapId&, const SubmapId&) = default;
 };
 

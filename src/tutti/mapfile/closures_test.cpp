@@ -54,7 +54,7 @@ TEST_F(ClosuresOfAMap, AreExplainedAsTheServerJudgedThem) {
     ASSERT_EQ(info.closures.size(), 1U);
     EXPECT_TRUE(info.name.starts_with("alpha/") || info.name.starts_with("bravo/")) << info.name;
     ASSERT_TRUE(info.verdict.has_value());
-    EXPECT_EQ(info.verdict->worker, 2U);
+    EXPECT_EQ(info.verdict->worker, 1U + 2U);
     EXPECT_EQ(info.verdict->evidence, (std::vector<Refusal>{{RefusalReason::overlap, 0.75, 0.3}}));
     ASSERT_TRUE(info.closures.front().misfit.has_value());
     if (info.state == ClosureState::accepted) {

@@ -120,7 +120,7 @@ Result<std::string> joined_refusals(std::string_view key, const std::string& a, 
     return in_context(fmt::format("the row '{}' of table 'meta'", key), one ? other.error() : one.error());
   for (const auto& [session, refused] : other->refused) one->refused[session] = both(one->refused[session], refused);
   for (const Receipt::Refusal& refusal : other->refusals)
-    one->refuse({{one->robot, refusal.session}, refusal.index}, refusal.content, wire::kMaxRefusals);
+    one->refuse({{one->robot, refusal.session}, refusal.index}, refusal.content, Receipt::kMostRefusals);
   if (one->why_refused.empty()) one->why_refused = other->why_refused;
   if (auto ok = wire::validate(*one); !ok) return tl::unexpected(ok.error());
   return wire::encode(*one);

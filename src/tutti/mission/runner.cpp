@@ -69,7 +69,7 @@ class MissionRun {
         store_(storage::map_schema()),
         server_(node::ServerNode::open(robot_ids(recordings_), meter_.finder(),
                                        {.server = config.server,
-                                        .pairs_per_job = wire::kMaxPairs,
+                                        .pairs_per_job = SubmapPair::kMost,
                                         .job_timeout_s = 0.0,
                                         .refiner = meter_.refiner()},
                                        kEpoch, store_)

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "tutti/model/status.hpp"
+
 namespace tutti {
 
 bool Receipt::has_refusal_of(std::uint64_t session, std::uint32_t index) const {
@@ -40,6 +42,14 @@ void Receipt::remove_refused(std::uint64_t session, std::uint32_t index) {
   if (numbers == refused.end()) return;
   numbers->second.erase(index);
   if (numbers->second.stretches().empty()) refused.erase(numbers);
+}
+
+Status MissionStatus::check() const {
+  const auto not_after = [](const auto& a, const auto& b) { return a >= b; };
+  if (std::ranges::adjacent_find(robots, not_after, &Robot::robot) == robots.end() &&
+      std::ranges::adjacent_find(workers, not_after, &Worker::number) == workers.end())
+    return {};
+  return fail(ErrorCode::invalid, "robots or workers are not in the order of their numbers");
 }
 
 }  // namespace tutti

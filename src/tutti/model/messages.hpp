@@ -44,6 +44,12 @@ struct Receipt {
     std::uint64_t session = 0;  ///< The session that is refused,
     std::uint64_t start = 0;    ///< and its start (NodeStatus::start): other programs are not meant.
     std::string why;
+    template <class V>
+    void describe(V& v) {
+      v.field(1, "session", session);
+      v.field(2, "start", start);
+      v.field(3, "why", why);
+    }
     friend bool operator==(const Conflict&, const Conflict&) = default;
   };
   /// A submap that was refused, identified by the content_hash() of its bytes: other content under the same id is not.
@@ -51,8 +57,15 @@ struct Receipt {
     std::uint64_t session = 0;
     std::uint32_t index = 0;
     std::uint64_t content = 0;
+    template <class V>
+    void describe(V& v) {
+      v.field(1, "session", session);
+      v.field(2, "index", index);
+      v.field(3, "content", content, {.fixed = true});
+    }
     friend bool operator==(const Refusal&, const Refusal&) = default;
   };
+  static constexpr std::size_t kMostRefusals = 1'000;
   RobotId robot;
   std::uint32_t incarnation = 0;               ///< ProxyGraph::incarnation
   std::map<std::uint64_t, NumberSet> stored;   ///< Indices of submaps, by session.
@@ -65,6 +78,18 @@ struct Receipt {
   std::optional<std::uint64_t> owner_session;
   std::optional<Conflict> conflict;
   std::vector<Refusal> refusals;  ///< The latest refusals by content; older servers do not send them.
+  template <class V>
+  void describe(V& v) {
+    v.field(1, "robot", robot);
+    v.field(2, "stored", stored, {.at_most = ProxyGraph::kMostChains});
+    v.field(3, "refused", refused, {.at_most = ProxyGraph::kMostChains});
+    v.field(4, "why_refused", why_refused);
+    v.field(5, "owner_session", owner_session);
+    v.field(6, "conflict", conflict);
+    v.field(7, "incarnation", incarnation, {.fixed = true});
+    v.field(8, "unread", unread, {.at_most = ProxyGraph::kMostChains});
+    v.field(9, "refusals", refusals, {.at_most = kMostRefusals});
+  }
 
   [[nodiscard]] bool contains(SubmapId id) const { return has(stored, id); }
   [[nodiscard]] bool refuses(SubmapId id) const { return has(refused, id); }
@@ -95,6 +120,13 @@ struct Job {
   MethodId finder{};       ///< Only this finder may verify them. Without a name (from an older server) any finder may.
   std::string settings{};  ///< Settings to make the finder with (server::ClosureFinder::settings()); empty: only a
                            ///< worker that has the finder can.
+  template <class V>
+  void describe(V& v) {
+    v.field(1, "id", id, kJobId);
+    v.field(2, "pairs", pairs, {.at_most = SubmapPair::kMost, .always = true});
+    v.field(3, "finder", finder);
+    v.field(4, "settings", settings, kMethodSettings);
+  }
   friend bool operator==(const Job&, const Job&) = default;
 };
 
@@ -105,6 +137,14 @@ struct Verdicts {
   std::vector<SubmapPair> failed;  ///< Pairs without a verdict, say because a cloud could not be read.
   std::string why;                 ///< Why the first of `failed` has no verdict.
   bool cannot = false;  ///< Every pair failed because this worker does not have the job's finder; another worker may.
+  template <class V>
+  void describe(V& v) {
+    v.field(1, "job", job, kJobId);
+    v.field(2, "verdict", verdicts, {.at_most = SubmapPair::kMost});
+    v.field(3, "failed", failed, {.at_most = SubmapPair::kMost, .always = true});
+    v.field(4, "why", why, {.text = FieldRule::Text::any});
+    v.field(5, "cannot", cannot);
+  }
   friend bool operator==(const Verdicts&, const Verdicts&) = default;
 };
 

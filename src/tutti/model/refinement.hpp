@@ -60,6 +60,12 @@ struct RefinementCounts {
 struct RefinementRemark {
   RobotId robot;
   std::string text;
+  using InColumns = void;
+  template <class V>
+  void describe(V& v) {
+    v.field(1, "robot", robot);
+    v.field(2, "text", text);
+  }
   friend bool operator==(const RefinementRemark&, const RefinementRemark&) = default;
 };
 

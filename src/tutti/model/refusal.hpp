@@ -9,6 +9,8 @@
 #include <string>
 #include <string_view>
 
+#include "tutti/base/fields.hpp"
+
 namespace tutti {
 
 /// Why a pair of submaps, or a closure, was refused. The numbers are sent and stored, so they are never reused.
@@ -106,6 +108,13 @@ struct Refusal {
   RefusalReason reason = RefusalReason::other;
   double value = 0.0;  ///< In the unit of the reason; 0, like the limit, when nothing is measured.
   double limit = 0.0;
+  using InColumns = void;
+  template <class V>
+  void describe(V& v) {
+    v.field(1, "reason", reason, {.low = 0, .high = kRefusalKinds.size() - 1});
+    v.field(2, "value", value);
+    v.field(3, "limit", limit);
+  }
   friend bool operator==(const Refusal&, const Refusal&) = default;
 };
 

@@ -8,6 +8,7 @@
 
 #include "tutti/base/fields.hpp"
 #include "tutti/base/ids.hpp"
+#include "tutti/base/result.hpp"
 #include "tutti/base/timestamp.hpp"
 #include "tutti/geometry/pose3.hpp"
 #include "tutti/model/method_id.hpp"
@@ -185,6 +186,7 @@ struct MissionStatus {
     v.field(23, "why_waiting", why_waiting);
     v.field(24, "words", words);
   }
+  [[nodiscard]] Status check() const;  ///< Lists have the order that is promised above.
   friend bool operator==(const MissionStatus&, const MissionStatus&) = default;
 };
 

@@ -48,7 +48,7 @@ void ServerNode::receive_verdicts(const bus::Envelope& envelope, Timestamp now, 
     const bool is_workers = envelope.from.role == bus::Endpoint::Role::worker && !verdict.closures.empty();
     failed_.forget(verdict.pair);
     waiting_.erase(verdict.pair);
-    verdict.worker = is_workers ? std::optional(envelope.from.number) : std::nullopt;
+    verdict.worker = is_workers ? std::uint64_t{envelope.from.number} + 1 : 0;
     if (const Status taken = take(verdict, refused, step); !taken) {
       refuse(envelope, taken.error().message, now, step);
       unanswered.insert(verdict.pair);

@@ -42,7 +42,7 @@ Result<WordSet> read_words(const storage::TableStore& map, const std::function<v
 
 ClosureVerdict without_evidence(ClosureVerdict verdict) {
   verdict.evidence.clear();
-  verdict.worker.reset();
+  verdict.worker = 0;
   verdict.verified_ns = 0;
   return verdict;
 }

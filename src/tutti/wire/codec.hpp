@@ -59,7 +59,7 @@ Result<std::optional<ProxyGraphMessage>> decode_delta(std::string_view bytes, co
 std::string encode(const ClosureVerdict& verdict);
 Result<ClosureVerdict> decode_verdict(std::string_view bytes);
 
-/// Exact. Names of jobs must have 1 to kMaxIdBytes printable ASCII letters without blanks; reasons in receipts must be
+/// Exact. Names of jobs must have 1 to 200 printable ASCII letters without blanks (kJobId); reasons in receipts must be
 /// as tutti::plain_text() returns them.
 std::string encode(const Receipt& receipt);
 Result<Receipt> decode_receipt(std::string_view bytes);
@@ -74,7 +74,7 @@ Result<NodeStatus> decode_status(std::string_view bytes);
 std::string encode(const MissionStatus& status);
 Result<MissionStatus> decode_mission_status(std::string_view bytes);
 
-/// Exact. The closure's name has 1 to kMaxIdBytes bytes.
+/// Exact. The closure's name has 1 to 200 bytes.
 std::string encode(const ClosureWord& word);
 Result<ClosureWord> decode_word(std::string_view bytes);
 

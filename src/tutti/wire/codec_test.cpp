@@ -380,7 +380,7 @@ RC_GTEST_PROP(JobCodec, RequestsAndCopiesOfSubmapsComeBackExactly, ()) {
 }
 
 TEST(JobCodec, RequestsAndCopiesHaveLimits) {
-  SubmapRequest request{.submaps = std::vector<SubmapId>(kMaxRequested)};
+  SubmapRequest request{.submaps = std::vector<SubmapId>(1'000)};
   EXPECT_TRUE(decode_submap_request(encode(request)).has_value());
   request.submaps.emplace_back();
   EXPECT_FALSE(validate(request).has_value());
@@ -646,18 +646,18 @@ TEST(Validate, Verdict) {
                               m.refusal.emplace();
                             }},
                            {"0 closures without", [](M& m) { m.closures.clear(); }},
-                           {"evidence of",
+                           {"evidence: value: nan, expected a finite number",
                             [](M& m) {
                               m.evidence = {{RefusalReason::overlap, kNan, 0.3}};
                             }},
-                           {"values as evidence", [](M& m) { m.evidence.resize(100); }},
+                           {"evidence: 100, at most", [](M& m) { m.evidence.resize(100); }},
                            {"with evidence",
                             [](M& m) {
                               m.closures.clear();
                               m.refusal = Refusal{RefusalReason::overlap, 0.1, 0.3};
                               m.verified_ns = 1;
                             }},
-                           {"finite", [](M& m) {
+                           {"refused: value: nan", [](M& m) {
                               m.closures.clear();
                               m.refusal = Refusal{RefusalReason::overlap, kNan, 0.3};
                             }}});

@@ -9,6 +9,9 @@
 
 #include "support/paths.hpp"
 #include "support/wire/messages.hpp"
+#include "tutti/v1/messages.pb.h"
+#include "tutti/wire/frame.hpp"
+#include "tutti/wire/refinement_codec.hpp"
 
 namespace tutti::wire {
 namespace field_bytes_test {
@@ -18,12 +21,34 @@ class ProtoFields {
  public:
   template <class T>
   void field(int number, const std::string& name, const T& /*value*/, const FieldRule& rule = {}, const char* = "") {
-    if constexpr (IsOptionalField<T>)
-      add(number, "optional ", type_of<typename T::value_type>(rule), name, is_time<typename T::value_type>);
+    if constexpr (HasFields<T>)
+      if (rule.is_spread) return spread(number, "", T{});
+    if constexpr (IsOptionalStruct<T>)
+      if (rule.is_spread) return add(number, "", "bool", name, false), spread(number, name + "_", *T(std::in_place));
+    if constexpr (IsColumnsField<T>)
+      return rule.is_spread ? spread(number, name + "_", typename T::value_type{}, "repeated ")
+                            : add(number, "", "MESSAGE", name, false);
+    else if constexpr (IsOptionalField<T>)
+      add(number, HasFields<typename T::value_type> ? "" : "optional ", type_of<typename T::value_type>(rule), name,
+          is_time<typename T::value_type>);
     else if constexpr (IsListField<T>)
       add(number, "repeated ", type_of<typename T::value_type>(rule), name, false);
+    else if constexpr (std::is_same_v<T, NumberSets>)
+      add(number, "repeated ", "MESSAGE", name, false);
     else
-      add(number, std::is_same_v<T, Pose3> ? "repeated " : "", type_of<T>(rule), name, is_time<T>);
+      add(number, kNumbers<T> > 0 ? "repeated " : each_, type_of<T>(rule), name, is_time<T>);
+  }
+  /// The fields of a struct as they are in its list's columns.
+  template <class T>
+  void spread(int number, const std::string& prefix, const T& value, const std::string& each = "") {
+    const ProtoFields outside = *this;
+    offset_ += number;
+    prefix_ = prefix == "_" ? "" : prefix;
+    each_ = each;
+    visit_fields(value, *this);
+    offset_ = outside.offset_;
+    prefix_ = outside.prefix_;
+    each_ = outside.each_;
   }
   std::string lines;
   int last = 0;
@@ -37,15 +62,18 @@ class ProtoFields {
     if (HasFields<T>) return "MESSAGE";
     if (std::is_same_v<T, std::string>) return "bytes";
     if (std::is_same_v<T, bool>) return "bool";
-    if (std::is_same_v<T, double> || std::is_same_v<T, Pose3>) return "double";
+    if (std::is_same_v<T, double> || kNumbers < T >> 0) return "double";
     if (std::is_same_v<T, Timestamp> || std::is_signed_v<T>) return "sint64";
     return (rule.fixed ? "fixed" : "uint") + std::string(sizeof(T) <= 4 ? "32" : "64");
   }
   void add(int number, const std::string& label, const std::string& type, const std::string& name, bool is_stamp) {
-    lines += std::to_string(number) + " " + label + type + " " + name + (is_stamp ? "_ns\n" : "\n");
-    ascend = ascend && number > last;
-    last = number;
+    const int at = number + offset_;
+    lines += std::to_string(at) + " " + label + type + " " + prefix_ + name + (is_stamp ? "_ns\n" : "\n");
+    ascend = ascend && at > last;
+    last = at;
   }
+  int offset_ = 0;
+  std::string prefix_, each_;
 };
 
 /// The same of a message in proto/tutti/v1; empty when there is none.
@@ -67,9 +95,9 @@ std::string in_proto(const std::string& file, const std::string& message) {
 }
 
 template <class T>
-void expect_in_proto(const std::string& file, const std::string& message) {
+void expect_in_proto(const std::string& file, const std::string& message, const std::string& each = "") {
   ProtoFields fields;
-  visit_fields(T{}, fields);
+  fields.spread(0, "", T{}, each);
   EXPECT_EQ(fields.lines, in_proto(file, message)) << message;
   EXPECT_TRUE(fields.ascend) << message << ": protobuf writes fields in the order of their numbers";
 }
@@ -85,6 +113,16 @@ TEST(FieldBytes, TheFilesForOtherLanguagesHaveTheSameFields) {
   expect_in_proto<Health>("status.proto", "Health");
   expect_in_proto<Health>("feed.proto", "Health");
   expect_in_proto<MethodId>("messages.proto", "Method");
+  expect_in_proto<LoopClosure>("messages.proto", "LoopClosure");
+  expect_in_proto<ClosureVerdict>("messages.proto", "Verdict");
+  expect_in_proto<SubmapId>("messages.proto", "SubmapIds", "repeated ");
+  expect_in_proto<SubmapPair>("messages.proto", "SubmapPairs", "repeated ");
+  expect_in_proto<Job>("messages.proto", "Job");
+  expect_in_proto<Verdicts>("messages.proto", "Verdicts");
+  expect_in_proto<Receipt>("messages.proto", "Receipt");
+  expect_in_proto<Receipt::Conflict>("messages.proto", "Conflict");
+  expect_in_proto<Receipt::Refusal>("messages.proto", "RefusedSubmap");
+  expect_in_proto<SubmapCopy>("messages.proto", "SubmapCopy");
 }
 
 struct Inside {
@@ -121,6 +159,35 @@ TEST(FieldBytes, AreProtobufs) {
       "\x09\0\0\0\0\0\0\xe0\x3f\x10\x03\x1d\x07\0\0\0\x20\0\x2a\x03\x08\xac\x02\x2a\0\x32\x02\x08\x01", 29);
   EXPECT_EQ(field_bytes(value), bytes);
   EXPECT_EQ(read_fields<Outside>(bytes).value(), value);
+}
+
+/// What protobuf itself writes of a message with these bytes.
+template <class Message>
+std::string again(const std::string& bytes) {
+  Message message;
+  EXPECT_TRUE(message.ParseFromString(bytes));
+  return message.SerializeAsString();
+}
+template <class Message, HasFields T>
+void expect_protobufs(const T& value) {
+  EXPECT_EQ(field_bytes(value), again<Message>(field_bytes(value)));
+}
+
+TEST(FieldBytes, AreWhatProtobufWrites) {
+  for (std::uint64_t seed = 0; seed < 50; ++seed) {
+    Rng rng(seed);
+    expect_protobufs<v1::Verdict>(test::any_verdict(rng, rng.index(3)));
+    expect_protobufs<v1::Verdicts>(test::any_verdicts(rng));
+    expect_protobufs<v1::Job>(Job{"a", test::any_pairs(rng, rng.index(9)), {"lidar", 1, rng.index(2)}});
+    expect_protobufs<v1::Receipt>(test::any_receipt(rng));
+    expect_protobufs<v1::SubmapIds>(test::any_submap_request(rng));
+    expect_protobufs<v1::SubmapCopy>(test::any_submap_copy(rng));
+    const auto payload = [](MessageKind kind, const std::string& frame) { return unpack_frame(kind, frame)->payload; };
+    const std::string job = payload(MessageKind::refinement_job, encode(test::any_refinement_job(rng)));
+    EXPECT_EQ(job, again<v1::RefinementJob>(job));
+    const std::string refinement = payload(MessageKind::refinement, encode(test::any_refinement(rng)));
+    EXPECT_EQ(refinement, again<v1::Refinement>(refinement));
+  }
 }
 
 TEST(FieldBytes, OfANewerPeerWhatIsUnknownIsPassedOver) {
@@ -160,6 +227,15 @@ TEST(FieldBytes, RulesAreHeldWithTheNameOfTheField) {
   EXPECT_EQ(read_fields<Outside>(four).error().message, "list: 4 or more, at most 3 are accepted");
   EXPECT_EQ(read_fields<Outside>(std::string("\x32\0\x32\0", 4)).error().message,
             "one: 2 or more, at most 1 are accepted");
+  const auto refused = [](const std::string& bytes) { return read_fields<Verdicts>(bytes).error().message; };
+  EXPECT_EQ(refused(std::string("\x1a\x05\x0a\x01\0\x12\0", 7)),
+            "failed: first_session: a column of 0, expected 1 as in the first");
+  EXPECT_EQ(refused(std::string("\x1a\x03\x0a\x01\x80", 5)), "failed: first_robot: not the protobuf message expected");
+  EXPECT_EQ(refused("\x12\x02\x2a" + std::string(1, '\0')), "verdict: closure: pose: 0 numbers, expected 7");
+  EXPECT_EQ(refused("\x12\x03\x72\x01\x05"), "verdict: evidence: value: a column of 0, expected 1 as in the first");
+  const Verdicts unknown = read_fields<Verdicts>("\x12\x05\x38\x01\x40\xac\x02").value();
+  EXPECT_EQ(check_fields(unknown.verdicts.at(0)).error().message,
+            "submaps 0/0 and 0/0: refused: reason: 255, expected 0 to 30");
 }
 
 }  // namespace field_bytes_test

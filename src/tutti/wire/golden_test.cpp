@@ -212,7 +212,7 @@ TEST(Golden, Verdict) {
   };
   ClosureVerdict explained = of_session(1'700'000'123);
   explained.evidence = {{RefusalReason::overlap, 0.625, 0.3}, {RefusalReason::misfit, 1.25, 2.5}};
-  explained.worker = 4;
+  explained.worker = 1 + 4;
   explained.verified_ns = 1'700'000'000'000'000'000;
   for_every_version(MessageKind::verdict, encode(explained), decode_verdict,
                     [&](const ClosureVerdict& decoded, unsigned version) {

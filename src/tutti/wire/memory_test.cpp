@@ -74,6 +74,9 @@ Status decode(MessageKind kind, std::string_view bytes) {
   if (kind == MessageKind::submap) return status(decode_submap(bytes));
   if (kind == MessageKind::proxy_graph) return status(decode_proxy_graph(bytes));
   if (kind == MessageKind::verdict) return status(decode_verdict(bytes));
+  if (kind == MessageKind::verdicts) return status(decode_verdicts(bytes));
+  if (kind == MessageKind::receipt) return status(decode_receipt(bytes));
+  if (kind == MessageKind::job) return status(decode_job(bytes));
   if (kind == MessageKind::mission_status) return status(decode_mission_status(bytes));
   return status(decode_cloud(bytes));
 }
@@ -98,6 +101,12 @@ TEST(Memory, NoPayloadOfALegalSizeTakesMuchMoreThanItsBytes) {
        field(5, filled(varint(5U << 3U | 1U) + zeros(8)).substr(0, 9'000'000))},
       {MessageKind::verdict, "unknown fields", filled(field(99, ""))},
       {MessageKind::verdict, "unknown fields of closures", filled(field(5, filled(field(99, "")).substr(0, 15'000)))},
+      {MessageKind::verdict, "evidence", field(14, zeros(kMaxMessageBytes - 5))},
+      {MessageKind::verdicts, "verdicts", filled(field(2, ""))},
+      {MessageKind::verdicts, "pairs", field(3, field(1, zeros(kMaxMessageBytes - 10)))},
+      {MessageKind::job, "pairs one by one", field(2, filled(std::string("\x08\x00", 2)).substr(0, 16'000'000))},
+      {MessageKind::receipt, "sessions", filled(field(2, ""))},
+      {MessageKind::receipt, "stretches", field(2, field(2, zeros(kMaxMessageBytes - 10)))},
       {MessageKind::proxy_graph, "runs", filled(field(5, ""))},
       {MessageKind::proxy_graph, "components", field(11, zeros(kMaxMessageBytes - 5))},
       {MessageKind::proxy_graph, "components one by one", filled(std::string("\x58\x00", 2))},
@@ -135,7 +144,6 @@ TEST(Memory, CountsUpToTheLimitsAreAcceptedAndNoMore) {
   };
   const std::size_t covariances = 21 * kMaxKeyframes;
   for (const std::size_t more : {0U, 1U}) {
-    EXPECT_EQ(accepted(MessageKind::verdict, repeated(kMaxClosures + more, field(5, ""))), more == 0);
     EXPECT_EQ(accepted(MessageKind::proxy_graph, repeated(ProxyGraph::kMostChains + more, field(5, ""))), more == 0);
     EXPECT_EQ(accepted(MessageKind::submap, field(4, zeros(kMaxKeyframes + more))), more == 0);
     EXPECT_EQ(accepted(MessageKind::submap, field(8, zeros(9) + repeated(covariances - 9 + more, "\xff\x01"))),
@@ -149,10 +157,19 @@ TEST(Memory, CountsUpToTheLimitsAreAcceptedAndNoMore) {
       pack_frame(MessageKind::mission_status, repeated(MissionStatus::kMostRobots + 1, field(11, ""))));
   EXPECT_NE(robots.error().message.find("robots: 10001 or more, at most 10000"), std::string::npos)
       << robots.error().message;
-  const Status status = check_counts(MessageKind::verdict, repeated(kMaxClosures + 1, field(5, "")));
-  ASSERT_FALSE(status.has_value());
-  EXPECT_NE(status.error().message.find("1001 closures or more, at most 1000"), std::string::npos)
-      << status.error().message;
+  const std::string closure = field(5, field(5, zeros(7 * 8)) + field(6, zeros(21 * 8)));
+  const auto verdict = decode_verdict(pack_frame(MessageKind::verdict, repeated(1001, closure)));
+  EXPECT_NE(verdict.error().message.find("closure: 1001 or more, at most 1000"), std::string::npos)
+      << verdict.error().message;
+  for (const std::string& pairs : {zeros(10'001), zeros(kMaxMessageBytes - 100)}) {
+    const std::string job = pack_frame(MessageKind::job, field(2, field(1, pairs)));
+    const std::string many = std::to_string(pairs.size()) + " or more, at most 10000";
+    EXPECT_NE(decode_job(job).error().message.find("pairs: first_robot: " + many), std::string::npos)
+        << decode_job(job).error().message;
+  }
+  const auto stretches = decode_receipt(pack_frame(MessageKind::receipt, field(2, field(2, zeros(200'001)))));
+  EXPECT_NE(stretches.error().message.find("stored: 200001 or more, at most 200000"), std::string::npos)
+      << stretches.error().message;
 }
 
 TEST(Memory, LargeMessagesPass) {

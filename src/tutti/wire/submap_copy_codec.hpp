@@ -15,7 +15,7 @@ Result<SubmapRequest> decode_submap_request(std::string_view bytes);
 std::string encode(const SubmapCopy& copy);
 Result<SubmapCopy> decode_submap_copy(std::string_view bytes);
 
-/// A request names at most kMaxRequested submaps.
+/// A request names at most 1000 submaps.
 Status validate(const SubmapRequest& request);
 /// A copy carries a frame that is not empty and for which a message has room. The content of the frame is checked by
 /// decode_submap(), not here.

@@ -7,7 +7,6 @@
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/field_bytes.hpp"
-#include "tutti/wire/internal/method_message.hpp"
 #include "tutti/wire/internal/visual_codec.hpp"
 #include "tutti/wire/limits.hpp"
 
@@ -19,24 +18,6 @@ Status at_most(std::size_t count, std::size_t limit, const char* what) {
   return fail(ErrorCode::invalid, "{} {}, at most {} are accepted", count, what, limit);
 }
 
-Status check_pose(const Pose3& T) {
-  if (!is_valid(T))
-    return fail(ErrorCode::invalid, "pose is not finite or its quaternion has norm {}, expected 1", T.rotation.norm());
-  const double largest = T.translation.cwiseAbs().maxCoeff();
-  if (largest > kMaxCoordinate_m)
-    return fail(ErrorCode::invalid, "coordinate of {} m, at most {} m", largest, kMaxCoordinate_m);
-  return {};
-}
-
-/// A covariance that the codec can carry, too.
-Status check_coded_covariance(const Matrix6d& covariance) {
-  if (auto ok = check_covariance(covariance); !ok) return ok;
-  const double largest = covariance.cwiseAbs().maxCoeff();
-  if (largest > kMaxVariance)
-    return fail(ErrorCode::invalid, "covariance entry of {}, at most {}", largest, kMaxVariance);
-  return {};
-}
-
 Status check_submap(const Submap& submap) {
   if (submap.keyframes.empty()) return fail(ErrorCode::invalid, "no keyframes, expected at least one");
   if (auto ok = at_most(submap.keyframes.size(), kMaxKeyframes, "keyframes"); !ok) return ok;
@@ -46,7 +27,7 @@ Status check_submap(const Submap& submap) {
   for (std::size_t k = 0; k < submap.keyframes.size(); ++k) {
     const Keyframe& keyframe = submap.keyframes[k];
     const auto where = [&] { return "keyframe " + std::to_string(keyframe.index); };
-    if (auto ok = check_pose(keyframe.T_odom_body); !ok) return in_context(where(), ok.error());
+    if (auto ok = FieldChecker::check_value(keyframe.T_odom_body); !ok) return in_context(where(), ok.error());
     if (k == 0) continue;
     const Keyframe& previous = submap.keyframes[k - 1];
     if (previous.index == 0xffffffffU || keyframe.index != previous.index + 1)
@@ -56,8 +37,9 @@ Status check_submap(const Submap& submap) {
       return fail(ErrorCode::invalid, "{}: stamp {} ns is not after {} ns", where(), keyframe.stamp.ns,
                   previous.stamp.ns);
     const RelativePose& odometry = submap.odometry[k - 1];
-    if (auto ok = check_pose(odometry.T_a_b); !ok) return in_context("odometry to " + where(), ok.error());
-    if (auto ok = check_coded_covariance(odometry.covariance); !ok)
+    if (auto ok = FieldChecker::check_value(odometry.T_a_b); !ok)
+      return in_context("odometry to " + where(), ok.error());
+    if (auto ok = FieldChecker::check_value(odometry.covariance); !ok)
       return in_context("odometry to " + where(), ok.error());
   }
   if (auto ok = at_most(submap.fixes.size(), kMaxFixes, "fixes"); !ok) return ok;
@@ -107,8 +89,8 @@ Status check_edges(const ProxyGraph& graph) {
 Status check_nodes(const ProxyGraph& graph) {
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
     const auto where = [&] { return "node " + std::to_string(i); };
-    if (auto ok = check_pose(graph.nodes[i].T_world_body); !ok) return in_context(where(), ok.error());
-    if (auto ok = check_coded_covariance(graph.nodes[i].covariance); !ok) return in_context(where(), ok.error());
+    if (auto ok = FieldChecker::check_value(graph.nodes[i].T_world_body); !ok) return in_context(where(), ok.error());
+    if (auto ok = FieldChecker::check_value(graph.nodes[i].covariance); !ok) return in_context(where(), ok.error());
   }
   return check_order(graph.nodes, "node");
 }
@@ -179,7 +161,7 @@ Status check_last_seen(const ProxyGraph& graph) {
       return fail(ErrorCode::invalid, "{} does not come after robot {}", where,
                   to_string(graph.last_seen[i - 1].chain));
     if (!component_of(graph, seen.chain)) return fail(ErrorCode::invalid, "{} has no component", where);
-    if (auto ok = check_pose(seen.T_world_body); !ok) return in_context(where, ok.error());
+    if (auto ok = FieldChecker::check_value(seen.T_world_body); !ok) return in_context(where, ok.error());
   }
   return {};
 }
@@ -229,48 +211,6 @@ Status validate(const PointCloud& cloud) {
 Status validate(const ProxyGraphMessage& message) {
   if (auto ok = check_graph(message.graph); !ok)
     return in_context(fmt::format("proxy graph {}", message.graph.revision), ok.error());
-  return {};
-}
-
-Status check_method(const MethodId& id) {
-  if (auto ok = check_fields(id); !ok) return in_context("a finder or refiner", ok.error());
-  return {};
-}
-
-Status check_method(const MethodId& id, const std::string& settings) {
-  if (auto ok = check_method(id); !ok) return ok;
-  if (auto ok = at_most(settings.size(), kMaxSettingsBytes, "bytes of settings"); !ok) return ok;
-  return {};
-}
-
-Status validate(const ClosureVerdict& verdict) {
-  const auto& [first, second] = verdict.pair;
-  // Only of what is no good: of millions of verdicts in a large map all are.
-  const auto where = [&] { return fmt::format("verdict on submaps {} and {}", to_string(first), to_string(second)); };
-  if (!(first < second)) return fail(ErrorCode::invalid, "{}: expected the first to be the smaller", where());
-  if (auto ok = check_method(verdict.finder); !ok) return in_context(where(), ok.error());
-  if (auto ok = at_most(verdict.closures.size(), kMaxClosures, "closures"); !ok) return in_context(where(), ok.error());
-  if (verdict.closures.empty() != verdict.refusal.has_value())
-    return fail(ErrorCode::invalid, "{}: {} closures {} a refusal, expected one of the two", where(),
-                verdict.closures.size(), verdict.refusal ? "and" : "without");
-  if (verdict.refusal && !(std::isfinite(verdict.refusal->value) && std::isfinite(verdict.refusal->limit)))
-    return fail(ErrorCode::invalid, "{}: refused for a value of {} at a limit of {}, expected finite ones", where(),
-                verdict.refusal->value, verdict.refusal->limit);
-  if (auto ok = at_most(verdict.evidence.size(), kRefusalKinds.size(), "values as evidence"); !ok)
-    return in_context(where(), ok.error());
-  if (verdict.refusal && (!verdict.evidence.empty() || verdict.worker || verdict.verified_ns != 0))
-    return fail(ErrorCode::invalid, "{}: a refusal with evidence, expected it with closures", where());
-  for (const Refusal& measured : verdict.evidence)
-    if (!std::isfinite(measured.value) || !std::isfinite(measured.limit))
-      return fail(ErrorCode::invalid, "{}: evidence of {} at a limit of {}, expected finite ones", where(),
-                  measured.value, measured.limit);
-  for (const LoopClosure& closure : verdict.closures) {
-    if (closure.from.chain != first.chain || closure.to.chain != second.chain)
-      return fail(ErrorCode::invalid, "{}: closure from robot {} to robot {}", where(), to_string(closure.from.chain),
-                  to_string(closure.to.chain));
-    if (auto ok = check_pose(closure.measurement.T_a_b); !ok) return in_context(where(), ok.error());
-    if (auto ok = check_coded_covariance(closure.measurement.covariance); !ok) return in_context(where(), ok.error());
-  }
   return {};
 }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <memory>
 
 #include "tutti/base/fields.hpp"
@@ -157,7 +158,7 @@ inline ClosureVerdict any_verdict(Rng& rng, std::size_t closures) {
     verdict.finder = {rng.bernoulli(0.5) ? "lidar" : "", static_cast<std::uint32_t>(rng.index(3)), rng.index(3)};
   if (closures > 0 && rng.bernoulli(0.7)) {
     verdict.evidence = {{RefusalReason::overlap, rng.uniform(0.3, 1.0), 0.3}, {RefusalReason::plane_rmse, 0.02, 0.1}};
-    verdict.worker = static_cast<std::uint32_t>(rng.index(3));
+    verdict.worker = 1 + rng.index(3);
     verdict.verified_ns = 1'700'000'000'000'000'000;
   }
   return verdict;
@@ -171,37 +172,6 @@ inline std::vector<SubmapPair> any_pairs(Rng& rng, std::size_t count) {
     pairs.push_back(pair);
   }
   return pairs;
-}
-
-inline Receipt any_receipt(Rng& rng) {
-  Receipt receipt{.robot = RobotId{static_cast<std::uint32_t>(rng.index(5))}, .stored = {}};
-  for (std::uint64_t sessions = rng.index(4); sessions > 0; --sessions) {
-    NumberSet& numbers = receipt.stored[any_session(rng)];
-    for (int i = 0; i < 20; ++i) numbers.insert(rng.index(40));
-  }
-  for (std::uint64_t sessions = rng.index(3); sessions > 0; --sessions) receipt.refused[any_session(rng)].insert(7);
-  if (!receipt.refused.empty()) receipt.why_refused = "its odometry is no odometry";
-  if (rng.bernoulli(0.5)) receipt.incarnation = static_cast<std::uint32_t>(rng.index(std::uint64_t{1} << 32U));
-  if (rng.bernoulli(0.5)) receipt.unread[any_session(rng)].insert(rng.index(40));
-  for (const auto& [session, numbers] : receipt.refused)
-    if (rng.bernoulli(0.5)) receipt.refusals.push_back({session, 7, rng.index(100) << 40U});
-  if (rng.bernoulli(0.5)) receipt.owner_session = any_session(rng);
-  if (rng.bernoulli(0.5)) receipt.conflict = {any_session(rng), rng.index(9), "somebody else is alpha"};
-  return receipt;
-}
-
-inline SubmapRequest any_submap_request(Rng& rng) {
-  SubmapRequest request;
-  for (std::uint64_t count = 1 + rng.index(5); count > 0; --count)
-    request.submaps.push_back({{RobotId{static_cast<std::uint32_t>(rng.index(5))}, any_session(rng)},
-                               static_cast<std::uint32_t>(rng.index(1000))});
-  return request;
-}
-
-inline SubmapCopy any_submap_copy(Rng& rng) {
-  SubmapCopy copy{.id = any_submap_request(rng).submaps.front(), .frame = "TU"};
-  for (int i = 0; i < 50; ++i) copy.frame.push_back(static_cast<char>(rng.index(256)));
-  return copy;
 }
 
 /// Fills every field with any value that its rule allows (base/fields.hpp), about every third with none.
@@ -230,6 +200,9 @@ class AnyFields {
     } else if constexpr (std::is_same_v<T, std::string>) {
       value = rule.text == FieldRule::Text::any ? name + "/12-\xff/7" : "any_" + name;
       value.resize(std::min(value.size(), rule.at_most));
+    } else if constexpr (std::is_same_v<T, std::map<std::uint64_t, NumberSet>>) {
+      for (std::uint64_t sessions = rng_.index(4); sessions > 0; --sessions)
+        for (int i = 0; i < 20; ++i) value[any_session(rng_)].insert(rng_.index(40));
     } else if constexpr (std::is_same_v<T, Pose3>) {
       value = any_pose(rng_, 100.0);
     } else if constexpr (std::is_same_v<T, Timestamp>) {
@@ -267,6 +240,9 @@ inline MissionStatus any_mission_status(Rng& rng) {
 }
 
 inline ClosureWord any_word(Rng& rng) { return any_fields<ClosureWord>(rng); }
+inline Receipt any_receipt(Rng& rng) { return any_fields<Receipt>(rng); }
+inline SubmapRequest any_submap_request(Rng& rng) { return any_fields<SubmapRequest>(rng); }
+inline SubmapCopy any_submap_copy(Rng& rng) { return any_fields<SubmapCopy>(rng); }
 
 inline Verdicts any_verdicts(Rng& rng) {
   Verdicts out{.job = "12/0.3:4-5_6",
@@ -281,7 +257,7 @@ inline Verdicts any_verdicts(Rng& rng) {
 inline RefinementJob any_refinement_job(Rng& rng) {
   RefinementJob job{.id = "12/0/7", .revision = rng.index(1000), .whole = rng.bernoulli(0.5)};
   for (std::uint64_t i = rng.index(5); i > 0; --i) {
-    RefinementJob::Part part{any_submap_request(rng).submaps.front(), rng.bernoulli(0.5), {}};
+    RefinementJob::Part part{any_submap_copy(rng).id, rng.bernoulli(0.5), {}};
     for (std::uint64_t k = rng.index(4); k > 0; --k) part.T_world_body.push_back(any_pose(rng, 100.0));
     job.parts.push_back(std::move(part));
   }

@@ -9,7 +9,7 @@
 #include "tutti/wire/internal/payload.hpp"
 #include "tutti/wire/message_kind.hpp"
 
-/// Messages that are a list of fields. validate(T) may ask more of them than the list says.
+/// Messages that are a list of fields.
 namespace tutti::wire {
 
 template <HasFields T>
@@ -20,7 +20,7 @@ Status check_message(MessageKind kind, const T& message) {
 
 template <HasFields T>
 std::string encode_fields(MessageKind kind, const T& message) {
-  expect_valid(validate(message));
+  expect_valid(check_message(kind, message));
   return pack_frame(kind, field_bytes(message));
 }
 
@@ -30,7 +30,7 @@ Result<T> decode_fields(MessageKind kind, std::string_view bytes) {
   if (!frame) return tl::unexpected(frame.error());
   auto message = read_fields<T>(frame->payload);
   if (!message) return in_context(name(kind), message.error());
-  if (auto ok = validate(*message); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_message(kind, *message); !ok) return tl::unexpected(ok.error());
   return message;
 }
 

@@ -44,41 +44,7 @@ constexpr std::array kProxyGraph = {
     Field{v1::ProxyGraph::kComponentRobotFieldNumber, kMostChains, "robots of components"},
     Field{v1::ProxyGraph::kComponentSessionFieldNumber, kMostChains, "sessions of components"},
     Field{v1::ProxyGraph::kComponentFieldNumber, kMostChains, "components"}};
-constexpr std::array kVerdict = {Field{v1::Verdict::kClosureFieldNumber, kMaxClosures, "closures", true},
-                                 Field{v1::Verdict::kGateFieldNumber, kMaxClosures, "values as evidence"}};
-
-constexpr std::array kNumbers = {Field{v1::NumbersOfSession::kBoundFieldNumber, 2 * kMaxStretches, "bounds"}};
-constexpr std::array kReceipt = {Field{v1::Receipt::kStoredFieldNumber, kMostChains, "sessions", true, kNumbers},
-                                 Field{v1::Receipt::kRefusedFieldNumber, kMostChains, "sessions", true, kNumbers},
-                                 Field{v1::Receipt::kRefusalsFieldNumber, kMaxRefusals, "refusals", true}};
-constexpr std::array kPairs = {Field{v1::SubmapPairs::kFirstRobotFieldNumber, kMaxPairs, "pairs"},
-                               Field{v1::SubmapPairs::kFirstSessionFieldNumber, kMaxPairs, "pairs"},
-                               Field{v1::SubmapPairs::kFirstIndexFieldNumber, kMaxPairs, "pairs"},
-                               Field{v1::SubmapPairs::kSecondRobotFieldNumber, kMaxPairs, "pairs"},
-                               Field{v1::SubmapPairs::kSecondSessionFieldNumber, kMaxPairs, "pairs"},
-                               Field{v1::SubmapPairs::kSecondIndexFieldNumber, kMaxPairs, "pairs"}};
-constexpr std::array kJob = {Field{v1::Job::kPairsFieldNumber, 1, "lists of pairs", true, kPairs}};
-constexpr std::array kVerdicts = {Field{v1::Verdicts::kVerdictFieldNumber, kMaxPairs, "verdicts", true, kVerdict},
-                                  Field{v1::Verdicts::kFailedFieldNumber, 1, "lists of pairs", true, kPairs}};
 constexpr std::array kAgentState = {Field{v1::AgentState::kIntegerFieldNumber, kMaxStateBytes / 32, "integers"}};
-
-constexpr std::array kRequest = {Field{v1::SubmapIds::kRobotFieldNumber, kMaxRequested, "submaps"},
-                                 Field{v1::SubmapIds::kSessionFieldNumber, kMaxRequested, "submaps"},
-                                 Field{v1::SubmapIds::kIndexFieldNumber, kMaxRequested, "submaps"}};
-constexpr std::array kIds = {Field{v1::SubmapIds::kRobotFieldNumber, kMaxRefinedSubmaps, "submaps"},
-                             Field{v1::SubmapIds::kSessionFieldNumber, kMaxRefinedSubmaps, "submaps"},
-                             Field{v1::SubmapIds::kIndexFieldNumber, kMaxRefinedSubmaps, "submaps"}};
-constexpr std::array kRefinementJob = {Field{v1::RefinementJob::kSubmapsFieldNumber, 1, "lists of submaps", true, kIds},
-                                       Field{v1::RefinementJob::kIsFreeFieldNumber, kMaxRefinedSubmaps, "submaps"},
-                                       Field{v1::RefinementJob::kKeyframesFieldNumber, kMaxRefinedSubmaps, "submaps"},
-                                       Field{v1::RefinementJob::kClosedFieldNumber, 1, "lists of pairs", true, kPairs}};
-constexpr std::array kRefinement = {Field{v1::Refinement::kSubmapsFieldNumber, 1, "lists of submaps", true, kIds},
-                                    Field{v1::Refinement::kClosedFieldNumber, 1, "lists of pairs", true, kPairs},
-                                    Field{v1::Refinement::kRobotFieldNumber, kMaxRefinedKeyframes, "keyframes"},
-                                    Field{v1::Refinement::kSessionFieldNumber, kMaxRefinedKeyframes, "keyframes"},
-                                    Field{v1::Refinement::kKeyframeFieldNumber, kMaxRefinedKeyframes, "keyframes"},
-                                    Field{v1::Refinement::kHasStepFieldNumber, kMaxRefinedKeyframes, "keyframes"},
-                                    Field{v1::Refinement::kCountFieldNumber, 100, "counts"}};
 
 std::span<const Field> fields_of(MessageKind kind) {
   switch (kind) {
@@ -87,32 +53,14 @@ std::span<const Field> fields_of(MessageKind kind) {
     case MessageKind::proxy_graph:
     case MessageKind::proxy_graph_delta:
       return kProxyGraph;
-    case MessageKind::verdict:
-      return kVerdict;
     case MessageKind::cloud:
       return kCloud;
     case MessageKind::agent_state:
     case MessageKind::tracked_images:
       return kAgentState;
-    case MessageKind::receipt:
-      return kReceipt;
-    case MessageKind::job:
-      return kJob;
-    case MessageKind::verdicts:
-      return kVerdicts;
-    case MessageKind::refinement_job:
-      return kRefinementJob;
-    case MessageKind::refinement:
-      return kRefinement;
-    case MessageKind::submap_request:
-      return kRequest;
-    case MessageKind::submap_copy:  // has no lists
-    case MessageKind::status:       // field_message.hpp
-    case MessageKind::mission_status:
-    case MessageKind::word:
-      return {};
+    default:
+      return {};  // field_message.hpp
   }
-  return {};
 }
 
 /// Every integer, a length too, ends with a byte below 128.
