@@ -3,27 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 #include <vector>
 
 #include "tutti/base/check.hpp"
-#include "tutti/geometry/so3.hpp"
 #include "tutti/model/pose_at.hpp"
 
 namespace tutti::simulation {
 namespace {
-
-/// Unit directions of all beams at azimuth 0 (ahead), sensor frame.
-std::vector<Eigen::Vector3d> beam_directions(const LidarConfig& config) {
-  std::vector<Eigen::Vector3d> directions;
-  for (int i = 0; i < config.beams; ++i) {
-    const double share = config.beams == 1 ? 0.5 : static_cast<double>(i) / (config.beams - 1);
-    const double elevation = kRadPerDeg * std::lerp(config.lowest_deg, config.highest_deg, share);
-    directions.emplace_back(std::cos(elevation), 0.0, std::sin(elevation));
-  }
-  return directions;
-}
 
 /// Measured range along a ray of unit length; nothing when there is no echo.
 std::optional<double> measure(const Bvh& surface, const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,
@@ -42,25 +29,25 @@ std::optional<double> measure(const Bvh& surface, const Eigen::Vector3f& origin,
 
 std::optional<Scan> simulate_sweep(const Bvh& surface, const Trajectory& truth, Timestamp end,
                                    const LidarConfig& config, Rng rng) {
-  const double turn_s = 1.0 / config.rate_hz;
-  const Timestamp begin = end - turn_s;
+  const double sweep_s = 1.0 / config.rate_hz;
+  const Timestamp begin = end - sweep_s;
   if (truth.size() < 2 || begin < truth.front().stamp || truth.back().stamp < end) return std::nullopt;
 
-  const auto firings = static_cast<std::size_t>(std::lround(360.0 / config.azimuth_step_deg));
-  const std::vector<Eigen::Vector3d> beams = beam_directions(config);
+  const ScanPattern& pattern = scan_pattern(config.pattern);
+  const std::size_t firings = pattern.firings(config);
+  const Firing fire = pattern.sweep(config, end);
+  std::vector<Eigen::Vector3d> directions;
   const Eigen::Vector3d mount(0.0, 0.0, config.mount_height_m);
   auto cloud = std::make_shared<PointCloud>();
   auto ages = std::make_shared<std::vector<float>>();
   for (std::size_t i = 0; i < firings; ++i) {
     const double share = static_cast<double>(i + 1) / static_cast<double>(firings);  // The last one fires at `end`.
-    const double age_s = (1.0 - share) * turn_s;
+    const double age_s = (1.0 - share) * sweep_s;
     const Pose3 T_reference_body = *pose_at(truth, end - age_s);
     const Eigen::Matrix3d R_reference_body = T_reference_body.rotation.toRotationMatrix();
     const Eigen::Vector3f origin = (T_reference_body * mount).cast<float>();
-    const double azimuth = std::numbers::pi * (1.0 - 2.0 * share);
-    const Eigen::AngleAxisd turned(azimuth, Eigen::Vector3d::UnitZ());
-    for (const Eigen::Vector3d& beam : beams) {
-      const Eigen::Vector3d direction = turned * beam;
+    fire(share, directions);
+    for (const Eigen::Vector3d& direction : directions) {
       const auto range = measure(surface, origin, (R_reference_body * direction).cast<float>(), config, rng);
       if (!range) continue;
       cloud->points.push_back((mount + *range * direction).cast<float>());

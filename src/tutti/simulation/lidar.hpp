@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "tutti/base/config.hpp"
 #include "tutti/base/random.hpp"
@@ -14,16 +15,19 @@
 #include "tutti/model/trajectory.hpp"
 #include "tutti/simulation/bounds.hpp"
 #include "tutti/simulation/bvh.hpp"
+#include "tutti/simulation/scan_pattern.hpp"
 
 namespace tutti::simulation {
 
-/// A spinning multi-beam LiDAR whose axis is along the body's z.
+/// A multi-beam LiDAR whose axis is along the body's z.
 struct LidarConfig {
+  std::string pattern = "spinning";
   int beams = 16;
   double lowest_deg = -15.0;
   double highest_deg = 15.0;
   double rate_hz = 10.0;
   double azimuth_step_deg = 0.4;
+  double points_per_s = 200'000.0;
   double min_range_m = 0.4;
   double max_range_m = 60.0;
   double range_sigma_m = 0.02;
@@ -32,11 +36,13 @@ struct LidarConfig {
   double mount_height_m = 0.25;
   template <class V>
   void describe(V& v) {
-    v.field("beams", beams, between(1, 128), "Beams, evenly spaced from lowest_deg to highest_deg.");
-    v.field("lowest_deg", lowest_deg, between(-90.0, 90.0), "Elevation of the lowest beam.");
-    v.field("highest_deg", highest_deg, between(-90.0, 90.0), "Elevation of the highest beam.");
-    v.field("rate_hz", rate_hz, between(0.5, 100.0), "Turns per second.");
-    v.field("azimuth_step_deg", azimuth_step_deg, between(0.05, 30.0), "Between two firings of all beams.");
+    v.field("pattern", pattern, one_of(scan_pattern_names()), scan_pattern_help());
+    v.field("beams", beams, between(1, 128), "Beams; of a spinning one evenly spaced from lowest_deg to highest_deg.");
+    v.field("lowest_deg", lowest_deg, between(-90.0, 90.0), "Elevation of the lowest ray.");
+    v.field("highest_deg", highest_deg, between(-90.0, 90.0), "Elevation of the highest ray.");
+    v.field("rate_hz", rate_hz, between(0.5, 100.0), "Sweeps per second.");
+    v.field("azimuth_step_deg", azimuth_step_deg, between(0.05, 30.0), "spinning: between two firings of all beams.");
+    v.field("points_per_s", points_per_s, between(1.0, 1e7), "rosette: rays per second, of all beams.");
     v.field("min_range_m", min_range_m, between(0.0, 1e4), "Nothing is measured nearer than this.");
     v.field("max_range_m", max_range_m, above_zero_to(1e4), "Nothing is measured farther than this.");
     v.field("range_sigma_m", range_sigma_m, between(0.0, 1e4), "Noise of a range.");
@@ -49,9 +55,9 @@ struct LidarConfig {
   [[nodiscard]] Pose3 pose() const { return {Eigen::Quaterniond::Identity(), {0.0, 0.0, mount_height_m}}; }
 };
 
-/// One turn that begins 1 / rate_hz before `end`, clockwise seen from above, starting and ending behind the body.
+/// One sweep that begins 1 / rate_hz before `end`, of the configuration's pattern.
 /// `truth` (T_reference_body, in the frame of `surface`) is interpolated at every firing; Scan::age_s tells its time.
-/// Nothing when `truth` does not cover the turn.
+/// Nothing when `truth` does not cover the sweep.
 std::optional<Scan> simulate_sweep(const Bvh& surface, const Trajectory& truth, Timestamp end,
                                    const LidarConfig& config, Rng rng);
 

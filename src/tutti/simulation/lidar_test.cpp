@@ -102,6 +102,75 @@ TEST(Lidar, BeamsAndAzimuthsAreSpreadAsConfigured) {
   EXPECT_EQ(*elevations.rbegin(), 15);
 }
 
+LidarConfig mid360() {
+  LidarConfig config = ideal();
+  config.pattern = "rosette";
+  config.beams = 4;
+  config.lowest_deg = -7.0;
+  config.highest_deg = 52.0;
+  return config;
+}
+
+TEST(Lidar, ARosetteLooksEverywhereButNeverTheSameWayTwice) {
+  const LidarConfig config = mid360();
+  const ScanPattern& pattern = scan_pattern(config.pattern);
+  ASSERT_EQ(pattern.firings(config), 5000U);
+  constexpr int kColumns = 36, kRows = 6;  // of 10 by 10 degrees
+  std::set<int> seen_ever;
+  std::vector<std::vector<Eigen::Vector3d>> sweeps;
+  for (int sweep = 0; sweep < 5; ++sweep) {
+    const Firing fire = pattern.sweep(config, Timestamp{1'767'225'600'000'000'000} + 0.1 * sweep);
+    std::vector<Eigen::Vector3d> directions, all;
+    std::set<int> seen;
+    for (int i = 0; i < 5000; ++i) {
+      fire((i + 1) / 5000.0, directions);
+      ASSERT_EQ(directions.size(), 4U);
+      for (const Eigen::Vector3d& d : directions) {
+        const double elevation = std::asin(d.z()) / kRadPerDeg, azimuth = std::atan2(d.y(), d.x()) / kRadPerDeg;
+        ASSERT_NEAR(d.norm(), 1.0, 1e-12);
+        ASSERT_GE(elevation, -7.0 - 1e-9);
+        ASSERT_LE(elevation, 52.0 + 1e-9);
+        seen.insert(std::clamp(static_cast<int>((azimuth + 180.0) / 10.0), 0, kColumns - 1) * kRows +
+                    std::clamp(static_cast<int>((elevation + 7.0) / 10.0), 0, kRows - 1));
+      }
+      all.insert(all.end(), directions.begin(), directions.end());
+    }
+    EXPECT_GT(seen.size(), kColumns * kRows * 9U / 10U);
+    seen_ever.insert(seen.begin(), seen.end());
+    sweeps.push_back(std::move(all));
+  }
+  EXPECT_EQ(seen_ever.size(), static_cast<std::size_t>(kColumns * kRows));
+  // How near rays of the second sweep come to any of the first: those of a spinning LiDAR come to 0.
+  double sum = 0.0;
+  for (std::size_t i = 0; i < 200; ++i) {
+    const Eigen::Vector3d& ray = sweeps[1][100 * i + 7];
+    double nearest = 1.0;
+    for (const Eigen::Vector3d& other : sweeps[0]) nearest = std::min(nearest, (ray - other).norm());
+    sum += nearest;
+  }
+  EXPECT_GT(sum / 200.0, 0.25 * kRadPerDeg);
+}
+
+TEST(Lidar, ASweepOfARosetteGoesOnWhereTheLastHasEnded) {
+  const LidarConfig config = mid360();
+  const ScanPattern& pattern = scan_pattern(config.pattern);
+  const Timestamp end{1'767'225'600'000'000'000};
+  std::vector<Eigen::Vector3d> last, next;
+  pattern.sweep(config, end)(1.0, last);
+  pattern.sweep(config, end + 0.1)(1e-9, next);
+  for (std::size_t i = 0; i < last.size(); ++i) EXPECT_LT((last[i] - next[i]).norm(), 1e-3) << i;
+}
+
+TEST(Lidar, PointsOfARosetteLieOnTheWallsOnceTheMotionIsUndone) {
+  const Trajectory truth = walk();
+  const SimulatedLidar lidar(room(), truth, mid360(), Rng(1));
+  const Scan scan = (*lidar.scan(40)).value();
+  ASSERT_EQ(scan.cloud->points.size(), 20'000U);
+  for (std::size_t i = 0; i < scan.cloud->points.size(); ++i)
+    ASSERT_LT(distance_to_walls(pose_at(truth, scan.stamp - (*scan.age_s)[i]) * scan.cloud->points[i].cast<double>()),
+              1e-4);
+}
+
 TEST(Lidar, NoiseAndDropoutsHaveTheConfiguredSize) {
   LidarConfig config = ideal();
   const Trajectory truth = walk();
