@@ -23,7 +23,7 @@ CONFINED = [
     (r"opencv2/", r"perception/visual/frontend/.*\.cpp$", "perception/visual/frontend/*.cpp"),
     (r"lz4|bzlib", r"(tests/support/)?bags/", "bags/"),
     (r"dds/", r"program/ros/(dds|internal/raw_type)\.cpp$", "program/ros/dds.cpp and internal/raw_type.cpp"),
-    (r"openssl/", r"bags/internal/sha256\.cpp$", "bags/internal/sha256.cpp"),
+    (r"openssl/", r"(bags/internal/sha256|pki/.*)\.cpp$", "bags/internal/sha256.cpp and pki/*.cpp"),
     (r"turbojpeg", r"formats/.*\.cpp$", "formats/*.cpp"),
     (r"CLI/", r"(?!)", "apps/"),
     (r"pybind11/", r"(?!)", "python/"),

@@ -32,10 +32,11 @@ inline void take_credentials(const std::string& file, bus::BusOptions& options) 
   if (!parsed && file.empty()) refuse("TUTTI_CREDENTIALS", parsed.error());
   if (!parsed) refuse("--credentials", in_context(file, parsed.error()).value());
   options.credentials = std::move(*parsed);
+  options.credentials.file = file;
 }
 
 inline constexpr const char* kBusHelp = "The bus, as the server prints it";
-inline constexpr const char* kBusInsecureHelp = "Use a bus on another machine although there is no TLS yet";
+inline constexpr const char* kBusInsecureHelp = "Use a bus on another machine without TLS";
 
 /// Adds --bus, which is returned, --insecure and --credentials. When the command's words are all read, the URL is
 /// without credentials and these are taken.
@@ -47,8 +48,8 @@ inline CLI::Option* add_bus_options(CLI::App& command, bus::BusOptions& options,
   command.add_flag("--insecure", options.allow_insecure, insecure_help);
   command
       .add_option("--credentials", *file,
-                  "A file whose first line is USER:PASSWORD, or a token, for a bus that asks for them; else the "
-                  "environment's TUTTI_CREDENTIALS is that line")
+                  "A file that `tutti pki` has made, for a bus with rights (docs/security.md); or whose first line is "
+                  "USER:PASSWORD, or a token. Else the environment's TUTTI_CREDENTIALS is that text")
       ->type_name("FILE");
   command.parse_complete_callback([file, &options] { take_credentials(*file, options); });
   return bus;

@@ -26,6 +26,7 @@ void add_server_command(CLI::App& app, int& exit_code);
 void add_robot_command(CLI::App& app, int& exit_code);
 void add_worker_command(CLI::App& app, int& exit_code);
 void add_mission_command(CLI::App& app, int& exit_code);
+void add_pki_command(CLI::App& app, int& exit_code);
 void add_manual_command(CLI::App& app, int& exit_code);
 
 }  // namespace tutti::app

@@ -24,6 +24,7 @@
 #include "tutti/bus/delivery.hpp"
 #include "tutti/bus/internal/nats_names.hpp"
 #include "tutti/bus/lease_holder.hpp"
+#include "tutti/bus/nats_log.hpp"
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/graph_stamps.hpp"
 #include "tutti/formats/image_file.hpp"
@@ -259,14 +260,16 @@ void maplab(std::string_view bytes) {
 /// A subject and an id, of a stranger's message on the bus.
 void bus_names(std::string_view bytes) {
   if (const auto address = bus::address_of(bytes)) {
-    const bus::Envelope envelope{address->end, address->end, address->kind, {}, {}};
+    const bus::Envelope envelope{address->end, address->end, address->kind, {}, {}, address->user};
     const auto again = bus::address_of(bus::subject_of("fuzz", envelope));
-    TUTTI_CHECK(bus::delivery_of(address->kind) == bus::Delivery::work_queue ||
-                    (again && again->end == address->end && again->kind == address->kind),
-                "a subject that was read is not read again");
+    TUTTI_CHECK(
+        bus::delivery_of(address->kind) == bus::Delivery::work_queue ||
+            (again && again->end == address->end && again->kind == address->kind && again->user == address->user),
+        "a subject that was read is not read again");
   }
   if (const auto part = bus::part_of(bytes))
     TUTTI_CHECK(bus::part_of(bus::to_string(*part)) == part, "an id that was read is not read again");
+  static_cast<void>(bus::refusal_of("[ERR] 10.0.0.7:1 - cid:1 - " + std::string(bytes)));  // a subject is in it, too
 }
 
 void lease(std::string_view bytes) {

@@ -18,7 +18,6 @@ namespace tutti::bus {
 namespace {
 
 constexpr std::size_t kLongestName = 253;  // of the domain name system
-constexpr std::size_t kLongestSecret = 4096;
 
 bool is_letter_or_digit(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9'); }
 
@@ -52,20 +51,6 @@ bool is_loopback(const sockaddr& address) {
 }
 
 }  // namespace
-
-Result<BusCredentials> parse_credentials(std::string_view text) {
-  text = text.substr(0, text.find('\n'));
-  if (text.ends_with('\r')) text.remove_suffix(1);
-  const auto fits = [](char c) { return c > ' ' && c != '\x7f'; };
-  if (text.empty() || text.size() > kLongestSecret || !std::ranges::all_of(text, fits))
-    return fail(ErrorCode::configuration, "expected a line USER:PASSWORD, or a token, without blanks");
-  const std::size_t colon = text.find(':');
-  if (colon == std::string_view::npos) return BusCredentials{"", std::string(text)};
-  BusCredentials out{std::string(text.substr(0, colon)), std::string(text.substr(colon + 1))};
-  if (out.user.empty() || out.secret.empty())
-    return fail(ErrorCode::configuration, "expected a line USER:PASSWORD, of which one is missing");
-  return out;
-}
 
 Result<HostPort> parse_host_port(std::string_view text) {
   const auto refuse = [&] {

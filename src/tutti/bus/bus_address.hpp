@@ -5,17 +5,9 @@
 #include <string_view>
 
 #include "tutti/base/result.hpp"
+#include "tutti/bus/bus_credentials.hpp"
 
 namespace tutti::bus {
-
-/// What a bus asks of those who connect. Never printed.
-struct BusCredentials {
-  std::string user;    ///< Empty: `secret` is a token.
-  std::string secret;  ///< Empty: there are none.
-  friend bool operator==(const BusCredentials&, const BusCredentials&) = default;
-};
-/// "USER:PASSWORD" or "TOKEN", in the first line of a text. Errors do not repeat it.
-Result<BusCredentials> parse_credentials(std::string_view text);
 
 struct HostPort {
   std::string host;  ///< Without brackets.

@@ -48,6 +48,8 @@ struct Envelope {
   /// most 200 letters, digits and any of "./:-_". Empty for retained messages.
   std::string id;
   std::shared_ptr<const std::string> bytes;  ///< Never null. Shared by all receivers of a broadcast.
+  /// The operator who has sent it, as a bus with rights has proved; empty: nobody has proved anything.
+  std::string user = {};
 };
 
 /// "server", "robot", "worker", "viewer"

@@ -159,6 +159,7 @@ void MissionLease::give_up(LeaseBoard& board) const {
 Result<std::string> served_mission(const BusOptions& where, double wall_s,
                                    const std::function<void(const std::string&)>& say) {
   if (!where.mission.empty()) return where.mission;
+  if (where.credentials.known) return where.credentials.known->mission;
   BusOptions any = where;
   any.mission = kDefaultMission;
   auto lease = MissionLease::open(any, std::nullopt, {.look_s = kTryAgain_s});

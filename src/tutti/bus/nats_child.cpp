@@ -3,19 +3,20 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <nats/nats.h>
 #include <sys/file.h>
 #include <sys/prctl.h>
 #include <sys/statvfs.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <condition_variable>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
+#include <fstream>
 #include <mutex>
 #include <thread>
 #include <utility>
@@ -24,6 +25,7 @@
 #include "tutti/base/file.hpp"
 #include "tutti/base/own_file.hpp"
 #include "tutti/bus/bus_address.hpp"
+#include "tutti/bus/internal/nats_connection.hpp"
 
 namespace tutti::bus {
 namespace {
@@ -35,6 +37,8 @@ constexpr auto kWaitForPort = std::chrono::seconds(2);
 constexpr auto kLookAgain = std::chrono::milliseconds(3);
 constexpr auto kPolitely = std::chrono::seconds(3);      // then it is killed
 constexpr auto kOthersMayEnd = std::chrono::seconds(2);  // the nats-server of a killed process ends a moment later
+constexpr std::uintmax_t kMostLog = 8U << 20U;           // then it begins again: strangers make it grow
+constexpr const char* kConfiguration = "configuration";  // in its folder
 constexpr const char* kElsewhere = "/usr/sbin/nats-server";
 
 struct ToBeClosed {
@@ -46,7 +50,8 @@ struct ToBeClosed {
 
 /// Messages of up to 8 MB pass, which copies of submaps need. The default write_deadline of 10 s cuts off a receiver of
 /// 2 MB over 1 Mbit/s.
-std::string configuration(const fs::path& folder, const NatsChildOptions& options, int port) {
+std::string configuration(const fs::path& folder, const NatsChildOptions& options, int port,
+                          const std::string& rights) {
   const std::string host = to_string(HostPort{parse_host_port(options.host).value_or(HostPort{options.host}).host});
   const std::string listen_at = fmt::format("{}:{}", host, port == 0 ? -1 : port);
   return fmt::format(R"(server_name: tutti
@@ -56,8 +61,8 @@ max_payload: 8388608
 max_pending: 67108864
 write_deadline: "60s"
 jetstream {{ store_dir: "{}", max_mem: 64MB, max_file: {} }}
-)",
-                     listen_at, folder.string(), (folder / "js").string(), options.max_store_bytes);
+{})",
+                     listen_at, folder.string(), (folder / "js").string(), options.max_store_bytes, rights);
 }
 
 /// The last lines that say that something is wrong, or the last ones.
@@ -74,7 +79,7 @@ std::string url_in(const fs::path& ports) {
   std::error_code none;
   if (!fs::exists(ports, none)) return {};
   const std::string text = read_file(ports.string()).value_or("");
-  const std::size_t begin = text.find("nats://");
+  const std::size_t begin = std::min(text.find("nats://"), text.find("tls://"));
   const std::size_t end = text.find('"', begin);
   return begin == std::string::npos || end == std::string::npos ? "" : text.substr(begin, end - begin);
 }
@@ -82,20 +87,10 @@ std::string url_in(const fs::path& ports) {
 int port_of(const std::string& url) { return std::atoi(url.substr(url.rfind(':') + 1).c_str()); }
 
 /// JetStream answers.
-bool is_ready(const std::string& url) {
-  natsConnection* connection = nullptr;
-  jsCtx* stream = nullptr;
-  jsAccountInfo* account = nullptr;
-  jsOptions options;
-  jsOptions_Init(&options);
-  options.Wait = 500;
-  const bool ready = natsConnection_ConnectTo(&connection, url.c_str()) == NATS_OK &&
-                     natsConnection_JetStream(&stream, connection, &options) == NATS_OK &&
-                     js_GetAccountInfo(&account, stream, &options, nullptr) == NATS_OK;
-  jsAccountInfo_Destroy(account);
-  jsCtx_Destroy(stream);
-  natsConnection_Destroy(connection);
-  return ready;
+bool is_ready(const std::string& url, const NatsChildOptions& child) {
+  const BusOptions where{.url = url, .allow_insecure = true, .credentials = child.credentials};
+  const auto connection = NatsConnection::open(where, "child");
+  return connection && (*connection)->has_jetstream();
 }
 
 }  // namespace
@@ -233,7 +228,7 @@ Status NatsChild::wait_until_ready() {
   const auto end = Clock::now() + std::chrono::duration<double>(options_.start_timeout_s);
   const fs::path ports = folder_ / fmt::format("nats-server_{}.ports", pid_);
   while (true) {
-    if (const std::string url = url_in(ports); !url.empty() && is_ready(url)) {
+    if (const std::string url = url_in(ports); !url.empty() && is_ready(url, options_)) {
       url_ = url;
       return replace_file(folder_ / "port", std::to_string(port_of(url)), false);
     }
@@ -246,16 +241,27 @@ Status NatsChild::wait_until_ready() {
   }
 }
 
+Result<bool> NatsChild::configure(int port) {
+  const auto rights = options_.rights.empty() ? Result<std::string>("") : read_file(options_.rights.string());
+  if (!rights) return tl::unexpected(rights.error());
+  std::string text = configuration(folder_, options_, port, *rights);
+  if (text == configured_) return false;
+  if (Status written = replace_file(folder_ / kConfiguration, text, false, 0600); !written)
+    return tl::unexpected(written.error());
+  configured_ = std::move(text);
+  return true;
+}
+
 Status NatsChild::launch(int port) {
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(folder_, ignored))
     if (entry.path().extension() == ".ports") fs::remove(entry.path(), ignored);  // of killed ones
-  const fs::path file = folder_ / "configuration";
-  if (Status written = replace_file(file, configuration(folder_, options_, port), false, 0600); !written)
-    return written;
+  if (const auto written = configure(port); !written) return tl::unexpected(written.error());
+  const fs::path file = folder_ / kConfiguration;
   process_.reset();
-  const auto log = open_own_file(folder_ / "log", O_CREAT | O_WRONLY | O_TRUNC, 0600);
+  const auto log = open_own_file(folder_ / "log", O_CREAT | O_WRONLY | O_TRUNC | O_APPEND, 0600);
   if (!log) return tl::unexpected(log.error());
+  log_read_ = 0;
   process_ = std::make_unique<Process>(options_.program, file, *log, lock_);
   pid_ = process_->pid();
   if (const int error = process_->failure(); error == ENOENT)
@@ -270,11 +276,11 @@ Status NatsChild::launch(int port) {
 Result<std::unique_ptr<NatsChild>> NatsChild::start(const fs::path& folder, const NatsChildOptions& options) {
   const auto at = parse_host_port(options.host);
   if (!at) return tl::unexpected(at.error());
-  if (!options.allow_insecure && !is_loopback(at->host))
-    return fail(ErrorCode::configuration,
-                "host {}: others than this machine could write to it: needs TLS, or "
-                "allow_insecure",
-                options.host);
+  if (!options.allow_insecure && options.rights.empty() && !is_loopback(at->host))
+    return fail(
+        ErrorCode::configuration,
+        "host {}: others than this machine could write to it: needs TLS and rights (tutti pki), or allow_insecure",
+        options.host);
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) return fail(ErrorCode::io, "{}: cannot be made: {}", folder.string(), error.message());
@@ -308,7 +314,30 @@ Status NatsChild::tend() {
     process_.reset();
     return room;
   }
-  return running() ? Status() : launch(port_of(url_));
+  if (!running()) return launch(port_of(url_));
+  if (options_.rights.empty()) return {};
+  const auto changed = configure(port_of(url_));
+  if (!changed) return tl::unexpected(changed.error());
+  if (*changed) kill(pid_, SIGHUP);
+  return {};
+}
+
+NatsChild::Refusals NatsChild::take_refusals() {
+  Refusals out;
+  const std::string file = (folder_ / "log").string();
+  std::ifstream log(file);
+  log.seekg(static_cast<std::streamoff>(log_read_));
+  std::string line;
+  while (std::getline(log, line) && !log.eof()) {  // what ends without a newline is not whole yet
+    log_read_ += line.size() + 1;
+    auto refusal = refusal_of(line);
+    if (refusal && out.all.size() < kMostRefusals)
+      out.all.push_back(std::move(*refusal));
+    else if (refusal)
+      ++out.more;
+  }
+  if (log_read_ > kMostLog && truncate(file.c_str(), 0) == 0) log_read_ = 0;
+  return out;
 }
 
 }  // namespace tutti::bus

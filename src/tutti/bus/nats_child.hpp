@@ -5,9 +5,12 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "tutti/base/config.hpp"
 #include "tutti/base/result.hpp"
+#include "tutti/bus/bus_credentials.hpp"
+#include "tutti/bus/nats_log.hpp"
 
 namespace tutti::bus {
 
@@ -16,6 +19,10 @@ struct NatsChildOptions {
   std::string host = "127.0.0.1";
   int port = 0;
   bool allow_insecure = false;
+  /// A file of `tutti pki` with the blocks `tls` and `authorization` of nats-server's configuration, and the server's
+  /// own credential; empty: whoever reaches the bus may do all.
+  std::filesystem::path rights = {};
+  BusCredentials credentials = {};
   std::uint64_t max_store_bytes = std::uint64_t{4} << 30U;
   std::uint64_t min_free_bytes = std::uint64_t{1} << 30U;
   double start_timeout_s = 30.0;
@@ -45,12 +52,20 @@ class NatsChild {
   NatsChild(const NatsChild&) = delete;
   NatsChild& operator=(const NatsChild&) = delete;
 
-  [[nodiscard]] const std::string& url() const { return url_; }  ///< "nats://127.0.0.1:40123"
+  [[nodiscard]] const std::string& url() const { return url_; }  ///< "nats://127.0.0.1:40123", with rights "tls://.."
   [[nodiscard]] int pid() const { return pid_; }
   [[nodiscard]] bool running() const;
-  /// To be called about once a second: starts a child that has ended again, at the same address, and stops it for as
-  /// long as less than half of min_free_bytes are free. An error says why it is not running now.
+  /// To be called about once a second: starts a child that has ended again, at the same address, stops it for as
+  /// long as less than half of min_free_bytes are free, and lets it read its rights anew when they have changed, which
+  /// cuts off those who have none any more. An error says why it is not running now, or has not got its rights.
   Status tend();
+  /// What it has refused since this was last called, at most kMostRefusals, and how many more.
+  struct Refusals {
+    std::vector<BusRefusal> all;
+    std::uint64_t more = 0;
+  };
+  static constexpr std::size_t kMostRefusals = 1000;
+  [[nodiscard]] Refusals take_refusals();
 
  private:
   class Process;
@@ -60,11 +75,15 @@ class NatsChild {
   Status launch_anywhere();
   [[nodiscard]] Status check_disk(std::uint64_t needed) const;
   [[nodiscard]] Status wait_until_ready();
+  /// Writes its configuration. True: it is another than before.
+  Result<bool> configure(int port);
 
   std::filesystem::path folder_;
   NatsChildOptions options_;
   int lock_ = -1;  ///< The lock file, open and locked; the child inherits it and holds the lock until it ends.
   std::unique_ptr<Process> process_;
+  std::string configured_;       ///< Its configuration.
+  std::uintmax_t log_read_ = 0;  ///< So much of its log.
   std::string url_;
   int pid_ = -1;
 };

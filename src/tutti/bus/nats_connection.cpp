@@ -17,12 +17,6 @@
 namespace tutti::bus {
 namespace {
 
-constexpr std::int64_t kReconnect_ms = 500;
-constexpr std::int64_t kReconnectJitter_ms = 200;
-constexpr std::int64_t kConnect_ms = 2000;
-constexpr std::int64_t kPing_ms = 10'000;
-constexpr int kPingsOut = 2;
-constexpr std::int64_t kWrite_ms = 15'000;  // without it a cut blocks for minutes; a part takes 1 s at 1 Mbit/s
 /// For so long the bus drops a message whose id it has had. A robot repeats every minute what the server has not
 /// confirmed, and each repetition would take room on the bus. Must be shorter than the server waits for the rest of a
 /// message.
@@ -30,36 +24,6 @@ constexpr std::int64_t kSameId_ns = 3'600'000'000'000;
 constexpr std::int64_t kAcknowledge_ns = 30'000'000'000;  // then a message comes again
 constexpr std::uint64_t kMostRemoved = 1000;              // sequences looked at in one go
 constexpr std::int64_t kDeliveries = 5;                   // of a job: what ends five workers is not given to a sixth
-
-/// Errors are in what calls return, and in NatsConnection::denied(); without a handler libnats prints them.
-void say_nothing(natsConnection* /*connection*/, natsSubscription* /*subscription*/, natsStatus /*status*/,
-                 void* /*closure*/) {}
-
-NatsOwned<natsOptions> make_options(const BusOptions& where, const std::string& name) {
-  natsOptions* made = nullptr;
-  if (natsOptions_Create(&made) != NATS_OK) return nullptr;
-  NatsOwned<natsOptions> options(made);
-  const std::string inbox = "_INBOX_" + name;
-  const auto url = parse_bus_url(where.url);
-  if (!url) return nullptr;
-  const BusCredentials& credentials = where.credentials.secret.empty() ? url->credentials : where.credentials;
-  const char* const secret = credentials.secret.c_str();
-  if (!credentials.secret.empty() &&
-      (credentials.user.empty() ? natsOptions_SetToken(made, secret)
-                                : natsOptions_SetUserInfo(made, credentials.user.c_str(), secret)) != NATS_OK)
-    return nullptr;
-  const bool all =
-      natsOptions_SetURL(made, url->plain.c_str()) == NATS_OK && natsOptions_SetName(made, name.c_str()) == NATS_OK &&
-      natsOptions_SetCustomInboxPrefix(made, inbox.c_str()) == NATS_OK &&
-      natsOptions_SetMaxReconnect(made, -1) == NATS_OK &&
-      natsOptions_SetReconnectWait(made, kReconnect_ms) == NATS_OK &&
-      natsOptions_SetReconnectJitter(made, kReconnectJitter_ms, kReconnectJitter_ms) == NATS_OK &&
-      natsOptions_SetTimeout(made, kConnect_ms) == NATS_OK && natsOptions_SetPingInterval(made, kPing_ms) == NATS_OK &&
-      natsOptions_SetMaxPingsOut(made, kPingsOut) == NATS_OK &&
-      natsOptions_SetWriteDeadline(made, kWrite_ms) == NATS_OK &&
-      natsOptions_SetErrorHandler(made, &say_nothing, nullptr) == NATS_OK;
-  return all ? std::move(options) : nullptr;
-}
 
 }  // namespace
 
@@ -81,16 +45,15 @@ tl::unexpected<Error> NatsConnection::failure(natsStatus status, std::string_vie
               refused.empty() ? "" : " (the bus does not allow it: " + refused + ")");
 }
 
-Status check_nats(const BusOptions& options, const BusUrl& url) {
-  if (options.allow_insecure || is_loopback(url.at.host)) return {};
-  return fail(ErrorCode::configuration, "{}: another machine, and no TLS yet: allow_insecure (--insecure) forces it",
-              url.plain);
-}
-
 Result<std::shared_ptr<NatsConnection>> NatsConnection::open(const BusOptions& options, const std::string& name) {
-  std::shared_ptr<NatsConnection> made(new NatsConnection(without_credentials(options.url), name));
-  const auto settings = make_options(options, name);
-  if (!settings) return fail(ErrorCode::configuration, "{}: not an address that NATS understands", made->url_);
+  const auto url = parse_bus_url(options.url);
+  if (!url) return tl::unexpected(url.error());
+  const bool is_in_url = options.credentials.secret.empty() && !options.credentials.known;
+  std::shared_ptr<NatsConnection> made(new NatsConnection(
+      without_credentials(options.url), name, is_in_url ? url->credentials : read_again(options.credentials)));
+  const auto settings = make_options(*url, made->credentials_, name);
+  if (!settings)
+    return fail(ErrorCode::configuration, "{}: not an address or a credential that NATS understands", made->url_);
   natsStatus status = natsConnection_Connect(&made->connection_, settings.get());
   if (status != NATS_OK) return made->failure(status, "connecting");
   jsOptions streams;
@@ -154,7 +117,7 @@ Status NatsConnection::prepare(const BusOptions& options) const {
   const std::array<std::vector<std::string>, 3> subjects{
       {{fmt::format("mission.{}.robot.*.submap", mission)},
        {fmt::format("mission.{}.worker.*.verdicts", mission), fmt::format("mission.{}.worker.*.refinement", mission),
-        fmt::format("mission.{}.viewer.*.word", mission)},
+        fmt::format("mission.{}.viewer.*.word", mission), fmt::format("mission.{}.operator.*.word", mission)},
        {fmt::format("mission.{}.jobs.loop", mission)}}};
   const std::array names{submap_stream(mission), verdict_stream(mission), job_stream(mission)};
   for (std::size_t i = 0; i < names.size(); ++i) {
@@ -173,6 +136,7 @@ Status NatsConnection::prepare(const BusOptions& options) const {
     stream.Duplicates = kSameId_ns;
     if (const Status done = add_stream(stream); !done) return done;
   }
+  if (const Status shared = add_consumer(job_stream(mission), "workers"); !shared) return shared;
   const std::string bucket = retained_bucket(mission);
   kvConfig values;
   kvConfig_Init(&values);
@@ -214,8 +178,8 @@ Status NatsConnection::add_consumer(const std::string& stream, const std::string
 /// Below the prefix that the connection has in make_options().
 std::string NatsConnection::make_inbox() const {
   static std::atomic<std::uint64_t> number = 0;
-  return fmt::format("_INBOX_{}.{}_{}_{}", name_, getpid(), std::chrono::steady_clock::now().time_since_epoch().count(),
-                     ++number);
+  return fmt::format("{}.{}_{}_{}", inbox_of(credentials_, name_), getpid(),
+                     std::chrono::steady_clock::now().time_since_epoch().count(), ++number);
 }
 
 Result<natsSubscription*> NatsConnection::subscribe(const std::string& subject) {
@@ -275,6 +239,16 @@ Status NatsConnection::publish(const std::string& subject, const std::string& an
   if (status == NATS_OK && !id.empty()) status = natsMsgHeader_Set(made, "Nats-Msg-Id", id.c_str());
   if (status == NATS_OK) status = natsConnection_PublishMsg(connection_, made);
   return status == NATS_OK ? Status() : failure(status, "sending to " + subject);
+}
+
+bool NatsConnection::has_jetstream() const {
+  jsOptions options;
+  jsOptions_Init(&options);
+  options.Wait = 500;
+  jsAccountInfo* account = nullptr;
+  const natsStatus status = js_GetAccountInfo(&account, streams_, &options, nullptr);
+  jsAccountInfo_Destroy(account);
+  return status == NATS_OK;
 }
 
 Result<bool> NatsConnection::has_stream(const std::string& stream) const {

@@ -30,16 +30,24 @@ class NatsLeases final : public LeaseBoard {
  public:
   explicit NatsLeases(BusOptions where) : where_(std::move(where)) {}
 
+  /// Who has a credential and is no server may look at the lease of its mission alone, and without the bucket.
   Result<std::optional<Value>> read(const std::string& mission) override {
+    if (is_member()) {
+      if (Status done = connect(); !done) return tl::unexpected(done.error());
+      auto text = connection_->retained(kBucket, fmt::format("$KV.{}.{}", kBucket, mission));
+      if (!text) return tl::unexpected(text.error());
+      return *text ? std::optional(Value{std::move(**text), 1}) : std::nullopt;
+    }
     const auto there = bucket(std::nullopt);
     if (!there) return tl::unexpected(there.error());
     return *there ? value_of(there->get(), mission) : std::nullopt;
   }
 
   Result<std::map<std::string, Value>> read_all() override {
+    std::map<std::string, Value> all;
+    if (is_member()) return all;
     const auto there = bucket(std::nullopt);
     if (!there) return tl::unexpected(there.error());
-    std::map<std::string, Value> all;
     kvKeysList keys{};
     if (!*there || kvStore_Keys(&keys, there->get(), nullptr) != NATS_OK) return all;  // it is empty, too
     for (int i = 0; i < std::min(keys.Count, kMostLeases); ++i)
@@ -66,12 +74,19 @@ class NatsLeases final : public LeaseBoard {
   }
 
  private:
+  [[nodiscard]] bool is_member() const {
+    return where_.credentials.known && where_.credentials.known->role != BusRole::server;
+  }
+  Status connect() {
+    if (connection_ && !connection_->connected() && connection_->is_outdated()) connection_.reset();
+    if (connection_ && !connection_->closed()) return {};
+    auto opened = NatsConnection::open(where_, "lease_" + where_.mission);
+    if (!opened) return tl::unexpected(opened.error());
+    connection_ = std::move(*opened);
+    return {};
+  }
   Result<NatsOwned<kvStore>> bucket(std::optional<double> lasts_s) {
-    if (!connection_ || connection_->closed()) {
-      auto opened = NatsConnection::open(where_, "lease_" + where_.mission);
-      if (!opened) return tl::unexpected(opened.error());
-      connection_ = std::move(*opened);
-    }
+    if (Status done = connect(); !done) return tl::unexpected(done.error());
     return connection_->bucket(kBucket, lasts_s);
   }
 

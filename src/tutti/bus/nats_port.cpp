@@ -26,7 +26,8 @@ std::string name_of(Endpoint end) { return fmt::format("{}_{}", name(end.role), 
 JetStreamPort::JetStreamPort(Endpoint self, BusOptions options)
     : self_(self),
       options_(std::move(options)),
-      answer_to_(fmt::format("_INBOX_{}.sent_{}_{}", name_of(self), getpid(), Clock::now().time_since_epoch().count())),
+      answer_to_(fmt::format("{}.sent_{}_{}", inbox_of(options_.credentials, name_of(self)), getpid(),
+                             Clock::now().time_since_epoch().count())),
       outbox_(options_.mission, options_.max_waiting_bytes),
       inbox_(self) {
   threads_.emplace_back([this] { send_all(); });
@@ -70,6 +71,8 @@ Status JetStreamPort::send(Envelope envelope) {
   const Delivery delivery = delivery_of(envelope.kind);
   if (delivery == Delivery::work_queue)  // before it can be in the stream
     jobs_sent_.insert(content_hash(to_string(whole_part(envelope))));
+  if (const auto& known = options_.credentials.known; known && known->role == BusRole::operates)
+    envelope.user = known->name;
   Status added = outbox_.add(envelope);
   if (added && delivery == Delivery::retained) retained_sent_.insert_or_assign({envelope.to, envelope.kind}, envelope);
   changed_.notify_all();
@@ -203,6 +206,7 @@ void JetStreamPort::send_all() {
     }
     const NatsConnection& connection = *present->connection;
     const bool connected = connection.connected();
+    if (!connected && connection.is_outdated()) connection.close();
     const std::uint64_t reconnects = connection.reconnects();
     if (reconnects != reconnects_ || !connected) {
       const std::scoped_lock guard(mutex_);

@@ -91,7 +91,8 @@ void JetStreamPort::pull(const std::string& stream, const std::string& consumer)
   keep(
       [&](Session& present) -> Result<std::unique_ptr<NatsPull>> {
         if (is_stranded(stream)) return fail(ErrorCode::io, "{}: being made anew", stream);
-        if (Status made = present.connection->add_consumer(stream, consumer); !made)
+        const bool makes = self_.role == Endpoint::Role::server;  // those that workers share, too: prepare()
+        if (Status made = makes ? present.connection->add_consumer(stream, consumer) : Status(); !made)
           return tl::unexpected(made.error());
         const std::string inbox = present.connection->make_inbox();
         const auto subscription = present.connection->subscribe(inbox + ".*");
@@ -140,6 +141,7 @@ void JetStreamPort::watch() {
     const auto look = connection.look_at(stream, consumer);
     if (!look) return note(look.error().message);
     Watched& watched = all[stream];
+    if (!*look && stream == jobs) static_cast<void>(connection.add_consumer(stream, consumer));  // it may be gone
     if (!*look) return;
     const bool is_left = (*look)->messages > (*look)->pending + (*look)->given;
     const bool is_held_back = (*look)->pending > 0 && (*look)->asked && (*look)->deliveries == watched.deliveries &&
@@ -227,7 +229,8 @@ void JetStreamPort::take_in(natsMsg* message, const NatsConnection& connection) 
   bool ours = part && (job ? delivery_of(part->kind) == Delivery::work_queue : address && address->kind == part->kind);
   std::unique_lock guard(mutex_);
   if (ours)
-    ours = inbox_.add_part(job ? Endpoint::server() : address->end, *part, bytes_of(message), reply, Clock::now());
+    ours = inbox_.add_part(job ? Endpoint::server() : address->end, *part, bytes_of(message), reply, Clock::now(),
+                           job ? "" : address->user);
   if (ours) return;
   ++refused_;
   last_error_ = fmt::format("{}: id '{}' is none of ours", natsMsg_GetSubject(message), id == nullptr ? "" : id);

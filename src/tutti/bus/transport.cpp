@@ -9,6 +9,24 @@
 #include "tutti/bus/internal/transports.hpp"
 
 namespace tutti::bus {
+namespace {
+
+/// The server has a worker of its own, number 0.
+bool is_for(const BusUser& user, Endpoint end) {
+  switch (end.role) {
+    case Endpoint::Role::server:
+      return user.role == BusRole::server;
+    case Endpoint::Role::robot:
+      return user.role == BusRole::robot && user.number == end.number;
+    case Endpoint::Role::worker:
+      return end.number == 0 ? user.role == BusRole::server : user.role == BusRole::worker && user.number == end.number;
+    case Endpoint::Role::viewer:
+      return user.role == BusRole::views || user.role == BusRole::operates;
+  }
+  return false;
+}
+
+}  // namespace
 
 const std::vector<Transport>& transports() {
   static const std::vector<Transport> rows{
@@ -38,6 +56,9 @@ Result<const Transport*> transport_of(const BusOptions& options) {
   if (found == transports().end())
     return fail(ErrorCode::configuration, "bus {}: no transport is called '{}', expected {}", url->plain, url->scheme,
                 transports_help());
+  if (const auto& known = options.credentials.known; known && known->mission != options.mission)
+    return fail(ErrorCode::configuration, "the credential of {} is for mission '{}', expected one for '{}'",
+                to_string(*known), known->mission, options.mission);
   if (found->check != nullptr)
     if (const Status checked = found->check(options, *url); !checked) return tl::unexpected(checked.error());
   return &*found;
@@ -46,6 +67,9 @@ Result<const Transport*> transport_of(const BusOptions& options) {
 Result<std::unique_ptr<Port>> open_port(Endpoint endpoint, const BusOptions& options) {
   const auto transport = transport_of(options);
   if (!transport) return tl::unexpected(transport.error());
+  if (const auto& known = options.credentials.known; known && !is_for(*known, endpoint))
+    return fail(ErrorCode::configuration, "the credential of {} (number {}) does not let this program be {} {}",
+                to_string(*known), known->number, name(endpoint.role), endpoint.number);
   return (*transport)->open_port(endpoint, options);
 }
 

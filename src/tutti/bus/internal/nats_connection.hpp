@@ -37,6 +37,9 @@ inline constexpr std::chrono::milliseconds kNatsAnswer{5000};
 /// Parts that a consumer has been given and has not acknowledged; then the bus waits. More than an inbox can hold.
 inline constexpr std::uint64_t kMostUnacknowledged = 65'536;
 
+/// Null: libnats does not take them. `credentials` must outlive the connection.
+NatsOwned<natsOptions> make_options(const BusUrl& url, const BusCredentials& credentials, const std::string& name);
+
 class NatsConnection {
  public:
   /// Once it is there it comes back by itself, however long it was gone. `name` in the bus's logs and of its inboxes.
@@ -49,6 +52,9 @@ class NatsConnection {
   [[nodiscard]] bool connected() const { return natsConnection_Status(connection_) == NATS_CONN_STATUS_CONNECTED; }
   [[nodiscard]] bool closed() const { return natsConnection_IsClosed(connection_); }
   [[nodiscard]] std::uint64_t reconnects() const;
+  /// The credentials' file has others than this connection, which it will never use.
+  [[nodiscard]] bool is_outdated() const { return read_again(credentials_) != credentials_; }
+  void close() const { natsConnection_Close(connection_); }
   /// What the bus does not let this connection do, in its words; empty: it has refused nothing.
   [[nodiscard]] std::string denied() const;
   /// An error of libnats as one of ours: where, while doing what, why.
@@ -69,6 +75,7 @@ class NatsConnection {
     std::uint64_t done_up_to = 0;  ///< What is in the stream up to this sequence is given to nobody any more.
     bool asked = false;            ///< Somebody waits for messages.
   };
+  [[nodiscard]] bool has_jetstream() const;
   /// False: a bus that has lost its store. An error: it does not answer.
   [[nodiscard]] Result<bool> has_stream(const std::string& stream) const;
   /// Nothing: there is no consumer, or the stream does not hold still for long enough.
@@ -104,11 +111,13 @@ class NatsConnection {
   void flush() const { natsConnection_FlushTimeout(connection_, kNatsAnswer.count()); }
 
  private:
-  NatsConnection(std::string url, std::string name) : url_(std::move(url)), name_(std::move(name)) {}
+  NatsConnection(std::string url, std::string name, BusCredentials credentials)
+      : url_(std::move(url)), name_(std::move(name)), credentials_(std::move(credentials)) {}
   [[nodiscard]] Status add_stream(jsStreamConfig& stream) const;
 
   std::string url_;
   std::string name_;
+  const BusCredentials credentials_;  ///< Libnats signs with them at every reconnection.
   natsConnection* connection_ = nullptr;
   jsCtx* streams_ = nullptr;
   std::mutex mutex_;  ///< For what follows.

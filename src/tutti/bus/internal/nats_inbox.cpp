@@ -17,8 +17,9 @@ constexpr std::size_t kMostDone = 10'000;
 
 }  // namespace
 
-bool Inbox::add_part(Endpoint from, const Part& part, std::string_view bytes, std::string reply, Time now) {
-  const Name name{from, part.kind, part.id, part.content};
+bool Inbox::add_part(Endpoint from, const Part& part, std::string_view bytes, std::string reply, Time now,
+                     const std::string& user) {
+  const Name name{from, part.kind, part.id, part.content, user};
   if (part.count > 1 && bytes.size() > kPartBytes) return false;
   if (done_.contains(name)) {
     strays_.push_back(std::move(reply));
@@ -47,7 +48,7 @@ bool Inbox::add_part(Endpoint from, const Part& part, std::string_view bytes, st
   message.size = whole->size();
   held_bytes_ += message.size;
   held_.emplace(message.ticket, name);
-  untaken_.push_back({{from, self_, part.kind, part.id, std::move(whole)}, message.ticket});
+  untaken_.push_back({{from, self_, part.kind, part.id, std::move(whole), user}, message.ticket});
   return true;
 }
 

@@ -38,8 +38,9 @@ class Inbox {
   explicit Inbox(Endpoint self) : self_(self) {}
 
   /// A part of a durable message or a job; `reply`: where the bus awaits its acknowledgement. False: it does not fit to
-  /// the parts that came before, or the whole is not what its id says.
-  bool add_part(Endpoint from, const Part& part, std::string_view bytes, std::string reply, Time now = {});
+  /// the parts that came before, or the whole is not what its id says. `user`: Envelope::user.
+  bool add_part(Endpoint from, const Part& part, std::string_view bytes, std::string reply, Time now = {},
+                const std::string& user = {});
   /// In the place of one of its kind that is not taken yet.
   void put_retained(Endpoint from, MessageKind kind, std::string bytes);
   /// A job of ours that no worker gets any more.
@@ -77,7 +78,8 @@ class Inbox {
   [[nodiscard]] std::uint64_t given_up() const { return given_up_; }
 
  private:
-  using Name = std::tuple<Endpoint, MessageKind, std::string, std::optional<std::uint64_t>>;  ///< From; of the part.
+  /// From; of the part; Envelope::user.
+  using Name = std::tuple<Endpoint, MessageKind, std::string, std::optional<std::uint64_t>, std::string>;
   struct Message {
     Assembly assembly;
     std::uint64_t ticket = 0;  ///< 0: not whole yet.

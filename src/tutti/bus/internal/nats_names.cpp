@@ -90,6 +90,8 @@ std::string subject_of(const std::string& mission, const Envelope& envelope) {
     case Delivery::best_effort:
       break;
   }
+  if (!envelope.user.empty())
+    return fmt::format("mission.{}.operator.{}.{}", mission, envelope.user, word_of(envelope.kind));
   const Endpoint& other = envelope.from.role == Endpoint::Role::server ? envelope.to : envelope.from;
   return fmt::format("mission.{}.{}.{}", mission, path_of(other), word_of(envelope.kind));
 }
@@ -98,8 +100,13 @@ std::optional<Address> address_of(std::string_view subject) {
   const auto words = split(subject, '.');
   if (words.size() < 3) return std::nullopt;
   const std::string_view role = words[words.size() - 3];
-  const auto number = number_of(words[words.size() - 2]);
   const auto kind = kind_of(words.back());
+  if (role == "operator") {
+    const std::string_view user = words[words.size() - 2];
+    if (kind != MessageKind::word || user.empty()) return std::nullopt;
+    return Address{Endpoint::all_viewers(), *kind, std::string(user)};
+  }
+  const auto number = number_of(words[words.size() - 2]);
   if (!number || !kind) return std::nullopt;
   if (role == "viewer") return Address{Endpoint::all_viewers(), *kind};
   if (role != "robot" && role != "worker") return std::nullopt;

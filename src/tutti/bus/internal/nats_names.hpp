@@ -23,7 +23,8 @@ inline constexpr std::size_t kLargestWhole =
 bool is_mission_name(std::string_view mission);
 
 /// "mission.M.robot.3.submap", "mission.M.worker.7.verdicts", "mission.M.jobs.loop", "$KV.GRAPH_M.robot.3.proxy_graph",
-/// "$KV.GRAPH_M.viewer.0.mission_status" for all viewers.
+/// "$KV.GRAPH_M.viewer.0.mission_status" for all viewers; "mission.M.operator.NAME.word" of an operator whom the bus
+/// knows, else "mission.M.viewer.0.word".
 std::string subject_of(const std::string& mission, const Envelope& envelope);
 /// "proxy_graph"
 std::string word_of(MessageKind kind);
@@ -32,6 +33,7 @@ std::string word_of(MessageKind kind);
 struct Address {
   Endpoint end;  ///< Who sent it, or of retained ones to whom.
   MessageKind kind = MessageKind::submap;
+  std::string user = {};  ///< Envelope::user
 };
 std::optional<Address> address_of(std::string_view subject);
 

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/bus/bus_rights.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+
+namespace tutti::bus {
+namespace {
+
+constexpr BusRight publishes(BusRole role, const char* subject, const char* purpose) {
+  return {role, BusRight::To::publish, subject, purpose};
+}
+constexpr BusRight listens(BusRole role, const char* subject, const char* purpose) {
+  return {role, BusRight::To::subscribe, subject, purpose};
+}
+
+constexpr BusRole kRobotUser = BusRole::robot, kWorkerUser = BusRole::worker, kViewerUser = BusRole::views,
+                  kOperatorUser = BusRole::operates, kServerUser = BusRole::server;
+
+constexpr const char* kOwnInbox = "answers to what it asks";
+constexpr const char* kLease = "whether the mission has a server";
+constexpr const char* kStreams = "makes and watches the mission's streams";
+constexpr const char* kConsumers = "takes what robots, workers and operators send";
+
+/// Docs/security.md has the same table (bus_rights_test).
+constexpr std::array kRights{
+    publishes(kRobotUser, "mission.{mission}.robot.{number}.submap", "its own submaps"),
+    publishes(kRobotUser, "mission.{mission}.robot.{number}.status", "its own status"),
+    publishes(kRobotUser, "$JS.API.DIRECT.GET.KV_GRAPH_{mission}.$KV.GRAPH_{mission}.robot.{number}.*",
+              "asks for its last graph and receipt"),
+    publishes(kRobotUser, "$JS.API.DIRECT.GET.KV_TUTTI_SERVERS.$KV.TUTTI_SERVERS.{mission}", kLease),
+    listens(kRobotUser, "$KV.GRAPH_{mission}.robot.{number}.*", "its own graphs and receipts"),
+    listens(kRobotUser, "_INBOX.robot.{number}.>", kOwnInbox),
+
+    publishes(kWorkerUser, "$JS.API.CONSUMER.MSG.NEXT.JOBS_{mission}.workers", "asks for a job"),
+    publishes(kWorkerUser, "$JS.ACK.JOBS_{mission}.workers.>", "says that a job is done, or goes on"),
+    publishes(kWorkerUser, "mission.{mission}.worker.{number}.status", "its own status"),
+    publishes(kWorkerUser, "mission.{mission}.worker.{number}.verdicts", "its answers"),
+    publishes(kWorkerUser, "mission.{mission}.worker.{number}.refinement", "its refinements of the map"),
+    publishes(kWorkerUser, "mission.{mission}.worker.{number}.submap_request",
+              "asks for submaps, and gets those of jobs that are out"),
+    publishes(kWorkerUser, "$JS.API.DIRECT.GET.KV_TUTTI_SERVERS.$KV.TUTTI_SERVERS.{mission}", kLease),
+    listens(kWorkerUser, "mission.{mission}.worker.{number}.submap_copy", "the submaps that it asked for"),
+    listens(kWorkerUser, "_INBOX.worker.{number}.>", kOwnInbox),
+
+    publishes(kViewerUser, "$JS.API.DIRECT.GET.KV_GRAPH_{mission}.$KV.GRAPH_{mission}.viewer.0.mission_status",
+              "asks for the mission's last status"),
+    publishes(kViewerUser, "$JS.API.DIRECT.GET.KV_TUTTI_SERVERS.$KV.TUTTI_SERVERS.{mission}", kLease),
+    listens(kViewerUser, "$KV.GRAPH_{mission}.viewer.0.*", "the mission's status"),
+    listens(kViewerUser, "_INBOX.viewer.{number}.>", kOwnInbox),
+
+    publishes(kOperatorUser, "mission.{mission}.operator.{name}.word", "decisions, under the name that the key proves"),
+    publishes(kOperatorUser, "$JS.API.DIRECT.GET.KV_GRAPH_{mission}.$KV.GRAPH_{mission}.viewer.0.mission_status",
+              "asks for the mission's last status"),
+    publishes(kOperatorUser, "$JS.API.DIRECT.GET.KV_TUTTI_SERVERS.$KV.TUTTI_SERVERS.{mission}", kLease),
+    listens(kOperatorUser, "$KV.GRAPH_{mission}.viewer.0.*", "the mission's status"),
+    listens(kOperatorUser, "_INBOX.operator.{number}.>", kOwnInbox),
+
+    publishes(kServerUser, "$JS.API.INFO", "whether the bus is ready"),
+    publishes(kServerUser, "$JS.API.STREAM.*.SUBMAPS_{mission}", kStreams),
+    publishes(kServerUser, "$JS.API.STREAM.*.VERDICTS_{mission}", kStreams),
+    publishes(kServerUser, "$JS.API.STREAM.*.JOBS_{mission}", kStreams),
+    publishes(kServerUser, "$JS.API.STREAM.MSG.*.JOBS_{mission}", "removes jobs that are not its own"),
+    publishes(kServerUser, "$JS.API.STREAM.*.KV_GRAPH_{mission}", kStreams),
+    publishes(kServerUser, "$JS.API.STREAM.*.KV_TUTTI_SERVERS", kStreams),
+    publishes(kServerUser, "$JS.API.CONSUMER.*.SUBMAPS_{mission}.server", kConsumers),
+    publishes(kServerUser, "$JS.API.CONSUMER.*.*.SUBMAPS_{mission}.server", kConsumers),
+    publishes(kServerUser, "$JS.API.CONSUMER.*.VERDICTS_{mission}.server", kConsumers),
+    publishes(kServerUser, "$JS.API.CONSUMER.*.*.VERDICTS_{mission}.server", kConsumers),
+    publishes(kServerUser, "$JS.API.CONSUMER.*.JOBS_{mission}.workers", "makes what workers take jobs from"),
+    publishes(kServerUser, "$JS.API.CONSUMER.*.*.JOBS_{mission}.workers", "the same, and jobs for its own worker"),
+    publishes(kServerUser, "$JS.ACK.SUBMAPS_{mission}.server.>", "says what is stored"),
+    publishes(kServerUser, "$JS.ACK.VERDICTS_{mission}.server.>", "says what is stored"),
+    publishes(kServerUser, "$JS.ACK.JOBS_{mission}.workers.>", "of its own worker's jobs"),
+    publishes(kServerUser, "$KV.GRAPH_{mission}.>", "graphs, receipts and the mission's status"),
+    publishes(kServerUser, "$KV.TUTTI_SERVERS.{mission}", "the lease of the mission"),
+    publishes(kServerUser, "$JS.API.DIRECT.GET.KV_TUTTI_SERVERS.$KV.TUTTI_SERVERS.{mission}",
+              "the lease of the mission"),
+    publishes(kServerUser, "mission.{mission}.jobs.loop", "jobs"),
+    publishes(kServerUser, "mission.{mission}.worker.*.submap_copy", "the submaps that workers ask for"),
+    publishes(kServerUser, "mission.{mission}.worker.0.*", "its own worker"),
+    listens(kServerUser, "mission.{mission}.*.*.status", "statuses of robots and workers"),
+    listens(kServerUser, "mission.{mission}.worker.*.submap_request", "what workers ask for"),
+    listens(kServerUser, "mission.{mission}.worker.0.submap_copy", "its own worker"),
+    listens(kServerUser, "_INBOX.server.{number}.>", kOwnInbox),
+};
+
+std::string quoted(const std::vector<std::string>& subjects) {
+  std::string out;
+  for (const std::string& subject : subjects) out += fmt::format("{}\"{}\"", out.empty() ? "" : ", ", subject);
+  return out;
+}
+
+}  // namespace
+
+std::span<const BusRight> bus_rights() { return kRights; }
+
+std::vector<std::string> subjects_of(const BusUser& user, BusRight::To to) {
+  std::vector<std::string> out;
+  for (const BusRight& right : kRights)
+    if (right.role == user.role && right.to == to)
+      out.push_back(fmt::format(fmt::runtime(right.subject), fmt::arg("mission", user.mission),
+                                fmt::arg("number", user.number), fmt::arg("name", user.name)));
+  return out;
+}
+
+std::string authorization(const std::vector<KeyedUser>& users) {
+  std::string out = "authorization {\n  timeout: 2\n  users: [\n";
+  for (const KeyedUser& one : users)
+    out += fmt::format(
+        "    # {}\n    {{ nkey: {}, permissions: {{\n      publish: {{ allow: [{}] }}\n      subscribe: {{ allow: [{}] "
+        "}} }} }}\n",
+        to_string(one.user), one.key, quoted(subjects_of(one.user, BusRight::To::publish)),
+        quoted(subjects_of(one.user, BusRight::To::subscribe)));
+  return out + "  ]\n}\n";
+}
+
+}  // namespace tutti::bus

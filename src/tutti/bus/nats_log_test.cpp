@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/bus/nats_log.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace tutti::bus {
+namespace nats_log_test {
+
+const std::string kKey = "UCXYRB4Y6HXXGBBENM4Z6QI36344KE7AS7ASEL36IQO6MKAEOSVYC2BU";
+const std::string kBegin = "[17] 2026/11/25 08:40:55.809955 [ERR] 10.0.0.7:35536 - cid:4 - ";
+
+BusRefusal refusal(const std::string& line) { return refusal_of(line).value_or(BusRefusal{}); }
+
+TEST(NatsLogTest, SaysWhoWasRefusedWhat) {
+  EXPECT_EQ(refusal(kBegin + "\"v1:C:robot_3\" - Publish Violation - Nkey \"" + kKey + "\", Subject \"b.x\""),
+            (BusRefusal{"10.0.0.7:35536", kKey, "publish b.x"}));
+  EXPECT_EQ(refusal(kBegin + "\"v1:C:a\" - Subscription Violation - Nkey \"" + kKey + "\", Subject \"c.>\", SID 1"),
+            (BusRefusal{"10.0.0.7:35536", kKey, "subscribe c.>"}));
+  EXPECT_EQ(refusal(kBegin + "TLS handshake error: tls: client didn't provide a certificate"),
+            (BusRefusal{"10.0.0.7:35536", "", "TLS handshake error: tls: client didn't provide a certificate"}));
+}
+
+/// Who has proved nothing chooses the key, and who has chooses the client's name: neither accuses another.
+TEST(NatsLogTest, NobodyIsAccusedByWhatAStrangerWrites) {
+  const std::string violation = " - Publish Violation - Nkey \"" + kKey + "\", Subject \"b.x\"";
+  EXPECT_EQ(refusal(kBegin + "\"v1:C:x\" - authentication error - Nkey \"U\"" + violation + "\"").key, "");
+  EXPECT_EQ(refusal(kBegin + "\"v1:C:x" + violation + " \" - Publish Violation - Nkey \"UOTHER\", Subject \"a\"").key,
+            "UOTHER");
+  const std::string odd = refusal(kBegin + "TLS handshake error: \x1b[31m" + std::string(1000, 'x')).what;
+  EXPECT_EQ(odd.find('\x1b'), std::string::npos);
+  EXPECT_LT(odd.size(), 300U);
+}
+
+TEST(NatsLogTest, OtherLinesAreNothing) {
+  for (const char* line : {"", "[17] 2026/11/25 08:40:55.258113 [INF] Starting nats-server", "[ERR] ", "[ERR] - cid:4",
+                           "[17] [WRN] 10.0.0.7:1 - cid:4 - TLS handshake error"})
+    EXPECT_FALSE(refusal_of(line)) << line;
+}
+
+}  // namespace nats_log_test
+}  // namespace tutti::bus

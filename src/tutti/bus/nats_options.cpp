@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// How a connection to a bus is to be made.
+#include <string>
+#include <utility>
+
+#include "tutti/bus/bus_address.hpp"
+#include "tutti/bus/internal/nats_connection.hpp"
+#include "tutti/bus/internal/transports.hpp"
+
+namespace tutti::bus {
+namespace {
+
+constexpr std::int64_t kReconnect_ms = 500;
+constexpr std::int64_t kReconnectJitter_ms = 200;
+constexpr std::int64_t kConnect_ms = 2000;
+constexpr std::int64_t kPing_ms = 10'000;
+constexpr int kPingsOut = 2;
+constexpr std::int64_t kWrite_ms = 15'000;  // without it a cut blocks for minutes; a part takes 1 s at 1 Mbit/s
+
+/// Errors are in what calls return, and in NatsConnection::denied(); without a handler libnats prints them.
+void say_nothing(natsConnection* /*connection*/, natsSubscription* /*subscription*/, natsStatus /*status*/,
+                 void* /*closure*/) {}
+
+/// Proves to the bus who this is; `closure` is the seed of the user's key.
+natsStatus sign(char** /*why*/, unsigned char** signature, int* size, const char* nonce, void* closure) {
+  return nats_Sign(static_cast<const char*>(closure), nonce, signature, size);
+}
+
+/// TLS alone, or with what `tutti pki` has made.
+bool secure(natsOptions* made, const BusUrl& url, const BusCredentials& credentials) {
+  if (!credentials.known) return url.scheme != "tls" || natsOptions_SetSecure(made, true) == NATS_OK;
+  const Certificate& own = credentials.certificate;
+  return natsOptions_SetSecure(made, true) == NATS_OK &&
+         natsOptions_SetCATrustedCertificates(made, credentials.authority.c_str()) == NATS_OK &&
+         natsOptions_SetCertificatesChain(made, own.text.c_str(), own.key.c_str()) == NATS_OK &&
+         natsOptions_SetExpectedHostname(made, kBusName) == NATS_OK &&
+         natsOptions_SetIgnoreDiscoveredServers(made, true) == NATS_OK &&
+         natsOptions_SetNKey(made, credentials.key.open.c_str(), &sign,
+                             const_cast<char*>(credentials.key.seed.c_str())) == NATS_OK;
+}
+
+}  // namespace
+
+NatsOwned<natsOptions> make_options(const BusUrl& url, const BusCredentials& credentials, const std::string& name) {
+  natsOptions* made = nullptr;
+  if (natsOptions_Create(&made) != NATS_OK) return nullptr;
+  NatsOwned<natsOptions> options(made);
+  const std::string inbox = inbox_of(credentials, name);
+  const char* const secret = credentials.secret.c_str();
+  if (!credentials.secret.empty() &&
+      (credentials.user.empty() ? natsOptions_SetToken(made, secret)
+                                : natsOptions_SetUserInfo(made, credentials.user.c_str(), secret)) != NATS_OK)
+    return nullptr;
+  const bool all = secure(made, url, credentials) && natsOptions_SetURL(made, url.plain.c_str()) == NATS_OK &&
+                   natsOptions_SetName(made, name.c_str()) == NATS_OK &&
+                   natsOptions_SetCustomInboxPrefix(made, inbox.c_str()) == NATS_OK &&
+                   natsOptions_SetMaxReconnect(made, -1) == NATS_OK &&
+                   natsOptions_SetReconnectWait(made, kReconnect_ms) == NATS_OK &&
+                   natsOptions_SetReconnectJitter(made, kReconnectJitter_ms, kReconnectJitter_ms) == NATS_OK &&
+                   natsOptions_SetTimeout(made, kConnect_ms) == NATS_OK &&
+                   natsOptions_SetPingInterval(made, kPing_ms) == NATS_OK &&
+                   natsOptions_SetMaxPingsOut(made, kPingsOut) == NATS_OK &&
+                   natsOptions_SetWriteDeadline(made, kWrite_ms) == NATS_OK &&
+                   natsOptions_SetErrorHandler(made, &say_nothing, nullptr) == NATS_OK;
+  return all ? std::move(options) : nullptr;
+}
+
+Status check_nats(const BusOptions& options, const BusUrl& url) {
+  const bool is_secure = url.scheme == "tls" || options.credentials.known;
+  if (options.allow_insecure || is_secure || is_loopback(url.at.host)) return {};
+  return fail(ErrorCode::configuration,
+              "{}: another machine, without TLS: needs a credential of `tutti pki` (--credentials), or allow_insecure "
+              "(--insecure), which forces it",
+              url.plain);
+}
+
+}  // namespace tutti::bus

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What members and strangers try that is not theirs to do, on a real bus: nothing of it arrives, each attempt is in
+// what the bus says, and those who belong go on.
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "support/pki/pki_bus.hpp"
+#include "tutti/base/random.hpp"
+#include "tutti/bus/internal/nats_connection.hpp"
+#include "tutti/bus/internal/nats_names.hpp"
+#include "tutti/bus/mission_lease.hpp"
+
+namespace tutti::pki {
+namespace intruders_test {
+
+using bus::BusRole;
+using bus::Endpoint;
+using bus::MessageKind;
+using test::bytes;
+using test::within;
+
+/// One that connects, and says what it likes or nothing.
+class Stranger {
+ public:
+  explicit Stranger(int port) : file_(socket(AF_INET, SOCK_STREAM, 0)) {
+    sockaddr_in to{};
+    to.sin_family = AF_INET;
+    to.sin_port = htons(static_cast<std::uint16_t>(port));
+    to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    connected_ = connect(file_, reinterpret_cast<const sockaddr*>(&to), sizeof to) == 0;
+  }
+  ~Stranger() { close(file_); }
+  Stranger(const Stranger&) = delete;
+  Stranger& operator=(const Stranger&) = delete;
+  [[nodiscard]] bool connected() const { return connected_; }
+  /// False: the bus has had enough.
+  [[nodiscard]] bool say(const std::string& text) const {
+    return send(file_, text.data(), text.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(text.size());
+  }
+  [[nodiscard]] bool is_closed() const {
+    char any[4096];
+    const ssize_t got = recv(file_, any, sizeof any, MSG_DONTWAIT);
+    return got == 0 || (got < 0 && errno != EAGAIN);
+  }
+
+ private:
+  int file_;
+  bool connected_ = false;
+};
+
+class Intruders : public test::PkiBus {
+ protected:
+  void SetUp() override {
+    test::PkiBus::SetUp();
+    if (IsSkipped() || HasFatalFailure()) return;
+    start_bus();
+    alpha_ = add(BusRole::robot, "alpha", 3);
+    bravo_ = add(BusRole::robot, "bravo", 4);
+    worker_ = add(BusRole::worker, "w");
+    anna_ = add(BusRole::operates, "anna");
+    vera_ = add(BusRole::views, "vera");
+    lease_ = bus::MissionLease::open(options(credentials("server")),
+                                     bus::LeaseHolder{.host = "base", .state = "/s", .seat = "a"})
+                 .value();
+    hub_ = open(Endpoint::server(), credentials("server"));
+    robot_ = open(Endpoint::of(RobotId{4}), bravo_);
+    EXPECT_TRUE(within(20.0, [&] { return hub_->state().connected && robot_->state().connected; }));
+    EXPECT_TRUE(lease_->wait(10.0).held);
+    static_cast<void>(child_->take_refusals());
+  }
+  /// Bravo's submap arrives, and nothing else has.
+  void expect_all_is_well() {
+    static int number = 0;
+    const std::string id = "own/" + std::to_string(++number);
+    ASSERT_TRUE(robot_->send({Endpoint::of(RobotId{4}), Endpoint::server(), MessageKind::submap, id, bytes(id)}));
+    const auto came = heard(*hub_, 1);
+    ASSERT_EQ(came.size(), 1U);
+    EXPECT_EQ(came.front().id, id);
+    EXPECT_EQ(*came.front().bytes, id);
+    EXPECT_TRUE(robot_->receive().empty());
+    EXPECT_TRUE(lease_->state().held);
+    EXPECT_EQ(hub_->state().streams_made_anew, 0U);
+    EXPECT_EQ(hub_->state().strange_jobs, 0U);
+  }
+  /// Publishes to these subjects, or subscribes to them, and expects the bus to refuse each, and to say who it was.
+  void expect_refused(const bus::BusCredentials& who, const std::string& verb,
+                      const std::vector<std::string>& subjects) {
+    const auto connection = bus::NatsConnection::open(options(who), "intruder").value();
+    std::set<std::string> expected;
+    for (const std::string& subject : subjects) {
+      expected.insert(verb + " " + subject);
+      const bool publishes = verb == "publish";
+      EXPECT_TRUE(publishes ? connection->publish(subject, "_INBOX.any", "submap/4/1/9/0.1", "forged").has_value()
+                            : connection->subscribe(subject).has_value());
+    }
+    connection->flush();
+    std::set<std::string> said;
+    within(10.0, [&] {
+      for (const bus::BusRefusal& refusal : child_->take_refusals().all) {
+        EXPECT_EQ(refusal.key, who.key.open) << refusal.what;
+        said.insert(refusal.what);
+      }
+      return said.size() >= expected.size();
+    });
+    EXPECT_EQ(said, expected);
+    EXPECT_NE(connection->denied(), "");
+  }
+  [[nodiscard]] int port() const { return std::atoi(child_->url().substr(child_->url().rfind(':') + 1).c_str()); }
+
+  bus::BusCredentials alpha_, bravo_, worker_, anna_, vera_;
+  std::unique_ptr<bus::MissionLease> lease_;
+  std::unique_ptr<bus::Port> hub_, robot_;
+};
+
+/// What makes, changes and removes what the bus keeps, and the lease of the server.
+const std::vector<std::string> kOfTheServerAlone{"$JS.API.STREAM.DELETE.SUBMAPS_cave",
+                                                 "$JS.API.STREAM.PURGE.SUBMAPS_cave",
+                                                 "$JS.API.STREAM.UPDATE.VERDICTS_cave",
+                                                 "$JS.API.STREAM.CREATE.OWN",
+                                                 "$JS.API.STREAM.MSG.GET.SUBMAPS_cave",
+                                                 "$JS.API.STREAM.MSG.DELETE.SUBMAPS_cave",
+                                                 "$JS.API.DIRECT.GET.SUBMAPS_cave",
+                                                 "$JS.API.CONSUMER.DELETE.SUBMAPS_cave.server",
+                                                 "$JS.API.CONSUMER.DURABLE.CREATE.SUBMAPS_cave.server",
+                                                 "$JS.API.CONSUMER.CREATE.SUBMAPS_cave",
+                                                 "$JS.API.CONSUMER.MSG.NEXT.SUBMAPS_cave.server",
+                                                 "$JS.API.CONSUMER.DURABLE.CREATE.JOBS_cave.workers",
+                                                 "$JS.ACK.SUBMAPS_cave.server.1.1.1.1.0",
+                                                 "$KV.TUTTI_SERVERS.cave",
+                                                 "$KV.GRAPH_cave.robot.3.receipt",
+                                                 "$KV.GRAPH_cave.robot.4.receipt",
+                                                 "$KV.GRAPH_cave.robot.4.proxy_graph",
+                                                 "$KV.GRAPH_cave.viewer.0.mission_status",
+                                                 "mission.cave.jobs.loop",
+                                                 "mission.cave.worker.1.submap_copy",
+                                                 "_INBOX.server.0.anything"};
+const std::vector<std::string> kOfOthers{"mission.cave.robot.4.submap",   "mission.cave.robot.4.status",
+                                         "mission.cave.worker.2.status",  "mission.cave.worker.2.verdicts",
+                                         "mission.cave.viewer.0.word",    "mission.cave.operator.berta.word",
+                                         "mission.tunnel.robot.3.submap", "mission.tunnel.worker.1.verdicts"};
+
+TEST_F(Intruders, NobodyButTheServerTouchesStreamsReceiptsAndTheLease) {
+  for (const auto* who : {&alpha_, &worker_, &anna_, &vera_}) {
+    expect_refused(*who, "publish", kOfTheServerAlone);
+    expect_refused(*who, "publish", kOfOthers);
+  }
+  expect_all_is_well();
+}
+
+TEST_F(Intruders, NobodyReadsWhatIsOthers) {
+  for (const auto* who : {&alpha_, &worker_, &anna_, &vera_})
+    expect_refused(
+        *who, "subscribe",
+        {">", "mission.>", "mission.cave.robot.4.submap", "mission.*.*.*.status", "$KV.>", "$KV.GRAPH_cave.robot.4.*",
+         "_INBOX.>", "_INBOX.robot.4.>", "_INBOX.server.0.>", "$JS.>", "$SYS.>"});
+  expect_all_is_well();
+}
+
+TEST_F(Intruders, AViewerDoesNotDecideAndAnOperatorOnlyUnderOneName) {
+  expect_refused(vera_, "publish", {"mission.cave.operator.vera.word", "mission.cave.operator.anna.word"});
+  const auto desk = open(Endpoint::viewer(1), anna_);
+  ASSERT_TRUE(
+      desk->send({Endpoint::viewer(1), Endpoint::server(), MessageKind::word, "w", bytes("by berta"), "berta"}));
+  const auto came = heard(*hub_, 1);
+  ASSERT_EQ(came.size(), 1U);
+  EXPECT_EQ(came.front().user, "anna");
+  expect_all_is_well();
+}
+
+/// A robot that says once more what it has said, or under the id of another's: of one id the bus takes one.
+TEST_F(Intruders, WhatIsReplayedArrivesOnce) {
+  const auto connection = bus::NatsConnection::open(options(alpha_), "intruder").value();
+  const bus::Envelope submap{Endpoint::of(RobotId{3}), Endpoint::server(), MessageKind::submap, "3/1/1", bytes("own")};
+  for (int i = 0; i < 200; ++i)
+    ASSERT_TRUE(connection->publish(bus::subject_of("cave", submap), "", to_string(bus::whole_part(submap)), "own"));
+  connection->flush();
+  EXPECT_EQ(heard(*hub_, 1).size(), 1U);
+  expect_all_is_well();
+}
+
+/// 10 MB of garbage, and 500 who say nothing, before and after the bus's first line: it closes them all in time.
+TEST_F(Intruders, GarbageAndSilenceEndAtTheDoor) {
+  std::vector<std::unique_ptr<Stranger>> silent;
+  for (int i = 0; i < 500; ++i) silent.push_back(std::make_unique<Stranger>(port()));
+  Rng random(1);
+  std::size_t said = 0, refused = 0;
+  while (said < 10U << 20U) {
+    const Stranger one(port());
+    ASSERT_TRUE(one.connected());
+    std::string text(256U << 10U, '\0');
+    for (char& letter : text) letter = static_cast<char>(random.index(256));
+    if (!one.say(text)) ++refused;
+    said += text.size();
+  }
+  expect_all_is_well();
+  EXPECT_TRUE(within(30.0, [&] {
+    std::erase_if(silent, [](const auto& one) { return one->is_closed(); });
+    return silent.empty();
+  })) << silent.size();
+  std::size_t told = 0;
+  within(10.0, [&] {
+    const auto refusals = child_->take_refusals();
+    for (const bus::BusRefusal& refusal : refusals.all) EXPECT_EQ(refusal.key, "");
+    told += refusals.all.size() + refusals.more;
+    return told >= 540;
+  });
+  EXPECT_GE(told, 540U) << "500 silent ones and 40 with garbage";
+  EXPECT_EQ(robot_->state().reconnects, 0U);
+  EXPECT_EQ(hub_->state().reconnects, 0U);
+}
+
+}  // namespace intruders_test
+}  // namespace tutti::pki

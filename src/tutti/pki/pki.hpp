@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tutti/base/result.hpp"
+#include "tutti/bus/bus_credentials.hpp"
+
+namespace tutti::pki {
+
+/// Somebody whom the bus of a mission knows, or knew.
+struct Member {
+  bus::BusUser user;
+  std::string key;  ///< bus::NatsKey::open
+  bool is_revoked = false;
+  std::string until;  ///< valid_until() of the certificate.
+};
+
+/// How long certificates are valid.
+inline constexpr int kAuthorityDays = 3650;
+inline constexpr int kDays = 397;
+
+/// A folder that says who may use the bus of one mission: an authority and the bus's certificate, a credential for each
+/// member, and the configuration of nats-server with everyone's rights (bus/bus_rights.hpp). All files are this user's
+/// alone. Whatever changes it writes the configuration anew; a server that runs with it follows within two seconds
+/// (bus::NatsChild::tend()). Processes change it one after the other.
+class Pki {
+ public:
+  /// Makes the folder, which must not be one already, and the server's own credential.
+  static Result<Pki> make(const std::filesystem::path& folder, const std::string& mission, int days = kDays);
+  static Result<Pki> open(const std::filesystem::path& folder);
+
+  /// Makes a member, and returns the file with its credential. `number` is a robot's; others are counted. Fails when
+  /// there is a member of that name or, among robots, number.
+  Result<std::filesystem::path> add(bus::BusRole role, const std::string& name, std::optional<std::uint32_t> number,
+                                    int days = kDays);
+  /// Its key opens nothing any more; the credential is removed.
+  Status revoke(const std::string& name);
+  /// A new certificate for a member, with the key that it has; with no name for the bus. Whoever is connected stays so.
+  Status renew(const std::string& name, int days = kDays);
+
+  [[nodiscard]] const std::string& mission() const { return mission_; }
+  [[nodiscard]] const std::vector<Member>& members() const { return members_; }
+  /// Until when the bus's certificate is valid.
+  [[nodiscard]] Result<std::string> bus_until() const;
+  [[nodiscard]] std::filesystem::path credential(const std::string& name) const;
+
+ private:
+  explicit Pki(std::filesystem::path folder) : folder_(std::move(folder)) {}
+  /// Holds the folder's lock, and has read what others have written.
+  class Turn;
+  Status read();
+  [[nodiscard]] Status write() const;
+  Status make_bus_certificate(int days) const;
+  [[nodiscard]] Status write_credential(const bus::BusUser& user, const bus::NatsKey& key, int days,
+                                        std::string& until) const;
+  [[nodiscard]] Member* find(const std::string& name);
+
+  std::filesystem::path folder_;
+  std::string mission_;
+  std::vector<Member> members_;
+};
+
+/// In the folder: the file for bus::NatsChildOptions::rights, and the name of the server's own credential.
+inline constexpr const char* kBusConfiguration = "bus.conf";
+inline constexpr const char* kServer = "server";
+
+}  // namespace tutti::pki

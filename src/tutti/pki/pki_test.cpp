@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A real nats-server with the rights that a folder of `tutti pki` gives.
+#include "tutti/pki/pki.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <chrono>
+#include <filesystem>
+#include <string>
+
+#include "support/pki/pki_bus.hpp"
+#include "tutti/base/file.hpp"
+#include "tutti/bus/mission_lease.hpp"
+#include "tutti/bus/transport.hpp"
+
+namespace tutti::pki {
+namespace pki_test {
+
+namespace fs = std::filesystem;
+using bus::BusRole;
+using bus::Endpoint;
+using bus::MessageKind;
+using test::within;
+
+using test::bytes;
+
+class PkiTest : public test::PkiBus {};
+
+/// All roles at once, over TLS.
+TEST_F(PkiTest, EverybodyDoesWhatTheyAreFor) {
+  start_bus();
+  const auto alpha = add(BusRole::robot, "alpha", 3), worker = add(BusRole::worker, "w"),
+             anna = add(BusRole::operates, "anna"), vera = add(BusRole::views, "vera");
+  const auto lease = bus::MissionLease::open(options(credentials("server")),
+                                             bus::LeaseHolder{.host = "base", .state = "/s", .seat = "a"})
+                         .value();
+  EXPECT_TRUE(lease->wait(10.0).held) << lease->state().last_error;
+  const auto hub = open(Endpoint::server(), credentials("server"));
+  const auto robot = open(Endpoint::of(RobotId{3}), alpha);
+  const auto helper = open(Endpoint::worker(1), worker);
+  const auto own = open(Endpoint::worker(0), credentials("server"));
+  const auto desk = open(Endpoint::viewer(17), anna), screen = open(Endpoint::viewer(18), vera);
+  ASSERT_TRUE(robot->send({Endpoint::of(RobotId{3}), Endpoint::server(), MessageKind::submap, "s", bytes("submap")}));
+  ASSERT_TRUE(desk->send({Endpoint::viewer(17), Endpoint::server(), MessageKind::word, "w", bytes("word")}));
+  for (const bus::Envelope& message : heard(*hub, 2))
+    EXPECT_EQ(message.user, message.kind == MessageKind::word ? "anna" : "");
+  ASSERT_TRUE(hub->send({Endpoint::server(), Endpoint::any_worker(), MessageKind::job, "j1", bytes("job")}));
+  ASSERT_TRUE(hub->send({Endpoint::server(), Endpoint::any_worker(), MessageKind::job, "j2", bytes("job")}));
+  EXPECT_EQ(heard(*helper, 1).size() + heard(*own, 1).size(), 2U);
+  ASSERT_TRUE(helper->send({Endpoint::worker(1), Endpoint::server(), MessageKind::verdicts, "v", bytes("verdicts")}));
+  EXPECT_EQ(heard(*hub, 1).size(), 1U);
+  ASSERT_TRUE(hub->send({Endpoint::server(), Endpoint::of(RobotId{3}), MessageKind::receipt, "", bytes("receipt")}));
+  EXPECT_EQ(heard(*robot, 1).size(), 1U);
+  ASSERT_TRUE(hub->send({Endpoint::server(), Endpoint::all_viewers(), MessageKind::mission_status, "", bytes("all")}));
+  EXPECT_EQ(heard(*desk, 1).size() + heard(*screen, 1).size(), 2U);
+  const auto look = bus::MissionLease::open(options(vera), std::nullopt).value();
+  EXPECT_NE(look->wait(10.0).server_of("cave"), nullptr) << look->state().last_error;
+  for (const auto* port : {&hub, &robot, &helper, &own, &desk, &screen}) EXPECT_EQ((*port)->state().denied, "");
+  const auto refusals = child_->take_refusals();
+  EXPECT_TRUE(refusals.all.empty()) << refusals.all.front().what;
+}
+
+TEST_F(PkiTest, WhoIsRevokedIsCutOffAndOthersStay) {
+  start_bus();
+  const auto alpha = add(BusRole::robot, "alpha", 3), bravo = add(BusRole::robot, "bravo", 4);
+  test::prepare(options(credentials("server")));
+  const auto lost = open(Endpoint::of(RobotId{3}), alpha), other = open(Endpoint::of(RobotId{4}), bravo);
+  ASSERT_TRUE(within(10.0, [&] { return lost->state().connected && other->state().connected; }));
+  ASSERT_TRUE(pki_->revoke("alpha"));
+  EXPECT_FALSE(fs::exists(pki_->credential("alpha")));
+  const auto since = std::chrono::steady_clock::now();
+  ASSERT_TRUE(child_->tend());  // a server does so once a second
+  EXPECT_TRUE(within(10.0, [&] { return !lost->state().connected; }));
+  EXPECT_LT(std::chrono::steady_clock::now() - since, std::chrono::seconds(1)) << "with 1 s of tend(): 2 s";
+  EXPECT_TRUE(within(10.0, [&] {
+    return lost->state().last_error.find("Authentication Violation") != std::string::npos;
+  })) << lost->state().last_error;
+  EXPECT_TRUE(other->state().connected);
+  EXPECT_EQ(other->state().reconnects, 0U);
+  const auto refusals = child_->take_refusals();
+  ASSERT_FALSE(refusals.all.empty());
+  EXPECT_NE(refusals.all.front().what.find("authentication error"), std::string::npos) << refusals.all.front().what;
+}
+
+/// The bus's certificate and a member's: nobody starts again, and nobody is cut off.
+TEST_F(PkiTest, WhatIsRenewedCutsNobodyOff) {
+  start_bus();
+  const auto alpha = add(BusRole::robot, "alpha", 3);
+  test::prepare(options(credentials("server")));
+  const auto robot = open(Endpoint::of(RobotId{3}), alpha);
+  ASSERT_TRUE(within(10.0, [&] { return robot->state().connected; }));
+  ASSERT_TRUE(pki_->renew(""));
+  ASSERT_TRUE(pki_->renew("alpha"));
+  ASSERT_TRUE(child_->tend());
+  const auto renewed = credentials("alpha");
+  EXPECT_EQ(renewed.key, alpha.key);
+  EXPECT_NE(renewed.certificate, alpha.certificate);
+  for (const bus::BusCredentials& one : {alpha, renewed}) {
+    const auto again = open(Endpoint::of(RobotId{3}), one);
+    EXPECT_TRUE(within(10.0, [&] { return again->state().connected; })) << again->state().last_error;
+  }
+  EXPECT_TRUE(robot->state().connected);
+  EXPECT_EQ(robot->state().reconnects, 0U);
+}
+
+/// A robot whose certificate has expired meanwhile, and whose file is then renewed, comes back by itself.
+TEST_F(PkiTest, ARenewedFileIsTakenWithoutAStart) {
+  start_bus();
+  auto alpha = add(BusRole::robot, "alpha", 3, -1);
+  alpha.file = pki_->credential("alpha").string();
+  test::prepare(options(credentials("server")));
+  const auto robot = open(Endpoint::of(RobotId{3}), alpha);
+  EXPECT_TRUE(within(10.0, [&] { return !robot->state().last_error.empty(); }));
+  EXPECT_FALSE(robot->state().connected);
+  ASSERT_TRUE(pki_->renew("alpha"));
+  EXPECT_TRUE(within(20.0, [&] { return robot->state().connected; })) << robot->state().last_error;
+}
+
+/// No certificate, that of another authority, one that has expired, and a bus that is not ours.
+TEST_F(PkiTest, WhoHasNoCertificateOfOursIsNotLetIn) {
+  start_bus();
+  const auto alpha = add(BusRole::robot, "alpha", 3);
+  auto foreign = Pki::make(folder_ / "foreign", "cave").value();
+  auto stranger = alpha, without = alpha;
+  stranger.certificate = bus::parse_credentials(read_file(foreign.credential("server").string()).value())->certificate;
+  const auto expired = add(BusRole::robot, "old", 5, -1);
+  auto astray = alpha;
+  astray.authority = read_file((folder_ / "foreign" / "authority.pem").string()).value();
+  const auto why = [&](const bus::BusCredentials& credentials) {
+    const auto port = bus::open_port(Endpoint::of(RobotId{credentials.known->number}), options(credentials));
+    EXPECT_TRUE(port.has_value());
+    EXPECT_TRUE(within(10.0, [&] { return !(*port)->state().last_error.empty() || (*port)->state().connected; }));
+    EXPECT_FALSE((*port)->state().connected);
+    return (*port)->state().last_error;
+  };
+  for (const bus::BusCredentials& one : {stranger, expired, astray}) EXPECT_NE(why(one), "");
+  const auto plain = bus::open_port(Endpoint::of(RobotId{3}), options({})).value();
+  EXPECT_TRUE(within(10.0, [&] { return !plain->state().last_error.empty(); }));
+  EXPECT_FALSE(plain->state().connected);
+  const auto refusals = child_->take_refusals();
+  EXPECT_GE(refusals.all.size(), 3U);
+  for (const bus::BusRefusal& refusal : refusals.all) EXPECT_EQ(refusal.key, "");
+}
+
+TEST_F(PkiTest, ACredentialIsOfOneEndpointAndOneMission) {
+  start_bus();
+  const auto alpha = add(BusRole::robot, "alpha", 3);
+  const auto refusal = [&](Endpoint endpoint, const std::string& mission) {
+    auto where = options(alpha);
+    where.mission = mission;
+    const auto port = bus::open_port(endpoint, where);
+    return port ? "" : port.error().message;
+  };
+  EXPECT_NE(refusal(Endpoint::of(RobotId{4}), "cave").find("robot alpha (number 3)"), std::string::npos);
+  for (const Endpoint other : {Endpoint::server(), Endpoint::worker(3), Endpoint::viewer(3)})
+    EXPECT_NE(refusal(other, "cave"), "");
+  EXPECT_NE(refusal(Endpoint::of(RobotId{3}), "tunnel").find("'cave'"), std::string::npos);
+}
+
+TEST_F(PkiTest, FilesAreThisUsersAlone) {
+  add(BusRole::robot, "alpha", 3);
+  for (const auto& entry : fs::recursive_directory_iterator(folder_ / "pki")) {
+    struct stat status {};
+    ASSERT_EQ(stat(entry.path().c_str(), &status), 0);
+    EXPECT_EQ(status.st_mode & 077U, 0U) << entry.path();
+  }
+}
+
+TEST_F(PkiTest, NamesAndNumbersAreOfOneMemberEach) {
+  add(BusRole::robot, "alpha", 3);
+  EXPECT_FALSE(pki_->add(BusRole::robot, "alpha", 4));
+  EXPECT_FALSE(pki_->add(BusRole::robot, "bravo", 3));
+  for (const char* name : {"", "a b", "a/b", "a.b", "*"}) EXPECT_FALSE(pki_->add(BusRole::views, name, {})) << name;
+  EXPECT_FALSE(pki_->revoke("nobody"));
+  EXPECT_FALSE(pki_->revoke("server"));
+  EXPECT_FALSE(Pki::make(folder_ / "pki", "cave"));
+  EXPECT_FALSE(Pki::make(folder_ / "other", "no mission"));
+  const auto before = credentials("alpha").key;
+  ASSERT_TRUE(pki_->revoke("alpha"));
+  EXPECT_FALSE(pki_->renew("alpha"));
+  EXPECT_NE(add(BusRole::robot, "alpha", 3).key, before);
+  const auto again = Pki::open(folder_ / "pki");
+  ASSERT_TRUE(again.has_value()) << again.error().message;
+  EXPECT_EQ(again->members().size(), 2U);
+  EXPECT_EQ(again->members().back().user, (bus::BusUser{BusRole::robot, "alpha", 3, "cave"}));
+}
+
+}  // namespace pki_test
+}  // namespace tutti::pki

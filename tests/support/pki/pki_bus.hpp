@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "support/bus/nats_network.hpp"
+#include "tutti/base/file.hpp"
+#include "tutti/bus/nats_child.hpp"
+#include "tutti/bus/transport.hpp"
+#include "tutti/pki/pki.hpp"
+
+namespace tutti::test {
+
+inline std::shared_ptr<const std::string> bytes(const std::string& text) {
+  return std::make_shared<const std::string>(text);
+}
+
+/// A folder of `tutti pki` and, when it is started, a nats-server with the rights that are in it.
+class PkiBus : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    TUTTI_SKIP_WITHOUT_NATS_SERVER();
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+    auto made = pki::Pki::make(folder_ / "pki", "cave");
+    ASSERT_TRUE(made.has_value()) << made.error().message;
+    pki_.emplace(std::move(*made));
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+  void start_bus() {
+    auto started = bus::NatsChild::start(folder_ / "bus", {.rights = folder_ / "pki" / pki::kBusConfiguration,
+                                                           .credentials = credentials("server"),
+                                                           .max_store_bytes = 256U << 20U,
+                                                           .min_free_bytes = 0});
+    ASSERT_TRUE(started.has_value()) << started.error().message;
+    child_ = std::move(*started);
+  }
+  bus::BusCredentials add(bus::BusRole role, const std::string& name, std::optional<std::uint32_t> number = {},
+                          int days = pki::kDays) {
+    const auto file = pki_->add(role, name, number, days);
+    EXPECT_TRUE(file.has_value()) << file.error().message;
+    if (child_) {
+      EXPECT_TRUE(child_->tend());
+    }
+    return credentials(name);
+  }
+  [[nodiscard]] bus::BusCredentials credentials(const std::string& name) const {
+    return bus::parse_credentials(read_file(pki_->credential(name).string()).value()).value();
+  }
+  [[nodiscard]] bus::BusOptions options(const bus::BusCredentials& credentials) const {
+    return {.url = child_->url(), .mission = "cave", .credentials = credentials, .max_stream_bytes = 16U << 20U};
+  }
+  [[nodiscard]] std::unique_ptr<bus::Port> open(bus::Endpoint endpoint, const bus::BusCredentials& credentials) const {
+    auto port = bus::open_port(endpoint, options(credentials));
+    EXPECT_TRUE(port.has_value()) << port.error().message;
+    return port ? std::move(*port) : nullptr;
+  }
+  /// What a port gets within a while.
+  static std::vector<bus::Envelope> heard(bus::Port& port, std::size_t count) {
+    std::vector<bus::Envelope> all;
+    test::within(10.0, [&] {
+      for (const bus::Received& received : port.receive()) {
+        all.push_back(received.envelope);
+        port.acknowledge(received.ticket);
+      }
+      return all.size() >= count;
+    });
+    return all;
+  }
+
+  std::filesystem::path folder_ = std::filesystem::path(::testing::TempDir()) / ("pki_" + std::to_string(getpid()));
+  std::optional<pki::Pki> pki_;
+  std::unique_ptr<bus::NatsChild> child_;
+};
+
+}  // namespace tutti::test
