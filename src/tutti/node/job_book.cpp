@@ -45,6 +45,15 @@ std::optional<JobBook::OpenJob> JobBook::find(std::string_view name) const {
   return found == open_.end() ? std::nullopt : std::optional(found->second);
 }
 
+bool JobBook::needs(SubmapId submap) const {
+  const auto is_in = [&](const OpenJob& job) {
+    const auto is_of_pair = [&](const SubmapPair& pair) { return pair.first == submap || pair.second == submap; };
+    if (std::ranges::any_of(job.pairs, is_of_pair)) return true;
+    return job.refinement && std::ranges::count(job.refinement->parts, submap, &RefinementJob::Part::submap) > 0;
+  };
+  return std::ranges::any_of(open_, is_in, [](const auto& entry) -> const OpenJob& { return entry.second; });
+}
+
 Timestamp JobBook::due(const OpenJob& job) const {
   return job.since + timeout_s_ * static_cast<double>(1U << std::min(job.asked, kMostDoubled));
 }

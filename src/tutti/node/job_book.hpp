@@ -55,6 +55,8 @@ class JobBook {
         std::ranges::count(open_, false, [](const auto& job) { return job.second.is_replaced; }));
   }
 
+  /// True if an open job needs this submap.
+  [[nodiscard]] bool needs(SubmapId submap) const;
   /// The job of this name, which stays open; nothing likewise.
   [[nodiscard]] std::optional<OpenJob> find(std::string_view name) const;
   /// True if this book has given the name, whether or not the job is open.

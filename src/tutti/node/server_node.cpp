@@ -254,14 +254,16 @@ void ServerNode::note_refused(SubmapId id, const bus::Envelope& envelope, const 
   send_receipt(*receipt, step);
 }
 
-/// What a worker asked for; what it does not get it asks for again. A copy without a frame says that the map does not
-/// have it.
+/// What a worker asked for, of jobs that are out; what it does not get it asks for again. A copy without a frame says
+/// that the map does not have it, or no job that is out needs it.
 void ServerNode::send_copies(const bus::Envelope& envelope, Timestamp now, Step& step) {
   if (envelope.from.role != bus::Endpoint::Role::worker) return refuse(envelope, "only workers get copies", now, step);
   const auto request = wire::decode_submap_request(*envelope.bytes);
   if (!request) return refuse(envelope, request.error().message, now, step);
   for (std::size_t i = 0; i < std::min(request->submaps.size(), WorkerNode::kMostAsked); ++i) {
-    auto frame = frames_->find(request->submaps[i]);
+    const bool is_given = jobs_.needs(request->submaps[i]);
+    if (!is_given) note_refusal(envelope.from.role, envelope.kind, "of a submap that no job needs which is out");
+    auto frame = is_given ? frames_->find(request->submaps[i]) : Result<std::optional<std::string>>(std::nullopt);
     if (!frame) return refuse(envelope, frame.error().message, now, step);
     step.messages.push_back({bus::Endpoint::server(),
                              envelope.from,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -46,6 +47,9 @@ struct ServerNodeConfig {
   /// Robots that the server does not know join the mission with their first submap, up to ProxyGraph::kMostChains
   /// robots.
   bool accepts_others = false;
+  /// Why the robot of this number cannot be called so, by what the bus proves; empty text: it can. Empty: nothing is
+  /// proved.
+  std::function<std::string(RobotId, const std::string&)> name_objection = {};
 };
 
 /// The server as a node: MapServer with its store and messages. It takes submaps, verdicts and operators' words, and

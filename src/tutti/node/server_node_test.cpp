@@ -59,6 +59,7 @@ class ServerNodeTest : public test::StoredServer {
 TEST_F(ServerNodeTest, GivesWorkersCopiesOfWhatItHasStored) {
   const SubmapMessage stored = test::submap(kAlpha, 0);
   receive(stored);
+  const Step asked = receive(test::submap(kBravo, 0));
   bus::Envelope request{
       Endpoint::worker(5),
       Endpoint::server(),
@@ -73,6 +74,11 @@ TEST_F(ServerNodeTest, GivesWorkersCopiesOfWhatItHasStored) {
   EXPECT_EQ(wire::decode_submap_copy(*step.messages[1].bytes).value(), (SubmapCopy{{kBravo, 7}, ""}));  // not there
   request.from = Endpoint::of(RobotId{0});
   EXPECT_TRUE(receive(request).messages.empty());
+  answer(asked);  // no job is out that needs it
+  request.from = Endpoint::worker(5);
+  const Step late = receive(request);
+  ASSERT_EQ(late.messages.size(), 2U);
+  EXPECT_EQ(wire::decode_submap_copy(*late.messages[0].bytes).value(), (SubmapCopy{stored.submap.id, ""}));
 }
 
 TEST_F(ServerNodeTest, SaysWhatItHasStoredAndAsksForTheNewPairs) {

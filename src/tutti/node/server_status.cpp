@@ -57,6 +57,8 @@ void ServerNode::receive_status(const bus::Envelope& envelope, Timestamp now, St
   if (!robot) return refuse(envelope, "the status of neither a robot nor a worker", now, step);
   if (const std::string why = objection_to(*robot); !why.empty())
     return refuse_robot(envelope, *status, why, now, step);
+  if (const std::string why = config_.name_objection ? config_.name_objection(*robot, status->name) : ""; !why.empty())
+    return refuse_robot(envelope, *status, why, now, step);
   receive_status_of_robot(*robot, *status, now, step);
 }
 

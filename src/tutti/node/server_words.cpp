@@ -9,11 +9,17 @@
 #include <string>
 #include <vector>
 
+#include "tutti/base/plain_text.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/words.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::node {
+namespace {
+
+constexpr std::size_t kLongestName = 64;  // of `tutti pki`
+
+}  // namespace
 
 /// An operator's word is not a robot's or a worker's to give.
 void ServerNode::receive_word(const bus::Envelope& envelope, Timestamp now, Step& step) {
@@ -21,8 +27,9 @@ void ServerNode::receive_word(const bus::Envelope& envelope, Timestamp now, Step
     return refuse(envelope,
                   fmt::format("a word on closures from a {}, which is for operators to say", name(envelope.from.role)),
                   now, step);
-  const auto word = wire::decode_word(*envelope.bytes);
+  auto word = wire::decode_word(*envelope.bytes);
   if (!word) return refuse(envelope, word.error().message, now, step);
+  if (!envelope.user.empty()) word->by = plain_text(envelope.user, kLongestName);  // whatever it claims
   const auto is_late = take_word(envelope, *word, now, step);
   if (!is_late) refuse(envelope, is_late.error().message, now, step);
   note_word(*envelope.bytes, !is_late   ? is_late.error().message
@@ -38,7 +45,7 @@ Result<bool> ServerNode::take_word(const bus::Envelope& envelope, const ClosureW
   const auto before = known == words.end() ? std::nullopt : std::optional(known->second);
   if (auto taken = server_.receive(*pair, word); !taken) return tl::unexpected(taken.error());
   if (before == words.at(*pair)) return before != word;
-  step.writes.push_back({"words", key_of(*pair), *envelope.bytes});
+  step.writes.push_back({"words", key_of(*pair), envelope.user.empty() ? *envelope.bytes : wire::encode(word)});
   step.tell(now, WordTaken{*pair, word.wish});
   operator_spoke_ = true;
   send_jobs(std::nullopt, now, 0, config_.pairs_per_job, step);
