@@ -1,10 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/bags/ros1_reader.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
+#include <unistd.h>
 
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
 #include <map>
+#include <regex>
 #include <sstream>
 
 #include "support/bags/ros1_writer.hpp"
@@ -132,6 +138,26 @@ TEST(Ros1, WhatIsWrongIsNamed) {
   damaged[damaged.size() - 20] ^= 1;
   EXPECT_EQ(error_of(damaged).substr(0, at.size() + 11), at + "chunk: bz2:");
   EXPECT_NE(read_all("#ROSBAG V1.2\n").errors.at(0).find("expected '#ROSBAG V2.0'"), std::string::npos);
+}
+
+/// The independent reader of what is written here: ROS 1's own.
+TEST(Ros1, ARealRosbagReadsWhatTestsWrite) {
+  const char* const command = std::getenv("TUTTI_ROSBAG_INFO");
+  if (command == nullptr) GTEST_SKIP() << "needs ROS 1's rosbag, which scripts/test_ros1.sh has";
+  const std::string path = ::testing::TempDir() + "real_rosbag_" + std::to_string(getpid()) + ".bag";
+  for (const std::string compression : {"none", "bz2", "lz4"}) {
+    write_bytes(path, ros1_bag(samples(), compression, 4));
+    FILE* const pipe = popen(fmt::format("{} '{}' 2>&1", command, path).c_str(), "r");
+    ASSERT_NE(pipe, nullptr);
+    std::string said(10'000, '\0');
+    said.resize(fread(said.data(), 1, said.size(), pipe));
+    EXPECT_EQ(pclose(pipe), 0) << said;
+    for (const std::string& line :
+         {fmt::format("compression: +{} \\[3/3 chunks", compression), std::string("messages: +9\n"),
+          std::string("/a +6 msgs +: pkg/A"), std::string("/b +3 msgs +: pkg/B")})
+      EXPECT_TRUE(std::regex_search(said, std::regex(line))) << line << "\n" << said;
+  }
+  std::filesystem::remove(path);
 }
 
 TEST(Ros1, EveryKnownTypeIsDecoded) {
