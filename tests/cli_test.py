@@ -47,7 +47,7 @@ class CommandLine(unittest.TestCase):
 
     def test_help_of_every_command(self):
         self.expect(tutti("--help"), 0, "run", "demo", "eval", "optimise", "compare")
-        for command in ("run", "demo", "eval", "optimise", "world", "simulate", "export", "compare", "settings", "status", "map", "server", "robot", "worker"):
+        for command in ("run", "demo", "eval", "optimise", "world", "simulate", "export", "compare", "settings", "status", "map", "server", "robot", "worker", "pki"):
             self.expect(tutti(command, "--help"), 0, "--help")
         self.expect(tutti("mission", "up", "--help"), 0, "--workers")
         for command in ("list", "info", "export", "merge", "closure"):
@@ -109,6 +109,35 @@ class CommandLine(unittest.TestCase):
         self.expect(tutti("status", "--bus", "nats://127.0.0.1.example.invalid:1"), 2, "another machine", "TLS")
         self.expect(tutti("status", "--bus", "nats://127.0.0.1:one"), 2, "expected nats://HOST:PORT")
         self.expect(tutti("status", "--bus", "nats://127.0.0.1:1", "--credentials", self.path / "none"), 2, "none")
+
+    def test_pki_says_who_may_use_a_bus(self):
+        pki = self.path / "pki"
+
+        def run(*words):
+            return tutti("pki", *words, "--pki", pki)
+
+        self.expect(run("list"), 1, "users", "tutti pki init")
+        self.expect(run("init", "--mission", "cave"), 0, "mission cave")
+        self.expect(run("init", "--mission", "cave"), 2, "already")
+        alpha = pathlib.Path(run("add-robot", "alpha").stdout.strip())
+        self.assertEqual(alpha.stat().st_mode & 0o777, 0o600)
+        self.assertIn("BEGIN USER NKEY SEED", alpha.read_text())
+        self.expect(run("add-robot", "bravo", "--number", "3"), 0, "bravo.cred")
+        self.expect(run("add-robot", "carla", "--number", "3"), 2, "bravo")
+        for role in ("worker", "operator", "viewer"):
+            self.expect(run(f"add-{role}", f"a-{role}"), 0, f"a-{role}.cred")
+        self.expect(run("renew"), 0)
+        self.expect(run("renew", "alpha", "--days", "5"), 0, "alpha.cred")
+        self.expect(run("revoke", "alpha"), 0)
+        self.expect(run("revoke", "nobody"), 2, "nobody")
+        lines = run("list").stdout.splitlines()
+        self.assertEqual([line.split()[:2] + line.split()[3:4] for line in lines[2:]],
+                         [["server", "server", "valid"], ["robot", "alpha", "revoked"], ["robot", "bravo", "valid"],
+                          ["worker", "a-worker", "valid"], ["operator", "a-operator", "valid"], ["viewer", "a-viewer", "valid"]])
+        self.expect(tutti("status", "--bus", "tls://127.0.0.1:1", "--credentials", pki / "credentials/bravo.cred"), 2,
+                    "robot bravo (number 3)", "viewer")
+        self.expect(tutti("server", "--state", self.path / "s", "--listen", "0.0.0.0", "--mission", "cave"), 2, "--pki")
+        self.expect(tutti("server", "--state", self.path / "s", "--pki", pki, "--mission", "tunnel"), 2, "'cave'", "'tunnel'")
 
     def test_passwords_are_not_printed(self):
         done = tutti("status", "--bus", "nats://alpha:hidden@127.0.0.1:1", "--wait", "0.3")

@@ -169,7 +169,8 @@ int say(const ClosureOptions& options, Wish wish) {
   if (options.map.empty() == options.bus.url.empty())
     return complain(kCommand, "expected a map's file, or --bus URL of the server that has it open", 2);
   const auto now = std::chrono::system_clock::now().time_since_epoch();
-  const ClosureWord word{options.closure, wish, options.by,
+  const auto& known = options.bus.credentials.known;
+  const ClosureWord word{options.closure, wish, known ? known->name : options.by,
                          std::chrono::duration_cast<std::chrono::nanoseconds>(now).count()};
   if (auto ok = wire::validate(word); !ok) return complain(kCommand, ok.error().message, 2);
   if (!options.bus.url.empty()) {

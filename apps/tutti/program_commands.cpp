@@ -44,12 +44,17 @@ void add_server_command(CLI::App& app, int& exit_code) {
       "Folder of this server: map, log, events, bus; made if missing. In a new one a map.tutti from elsewhere goes "
       "on");
   add_bus_options(*command, options->bus, "A bus that runs already",
-                  "Let other machines in although there is no TLS yet: whoever reaches the port can write to the map");
+                  "Let other machines in without --pki: whoever reaches the port can write to the map");
   command
       ->add_option("--listen", options->listen,
                    "Where the server's own bus is to be reached; default: from this machine only, the port of the last "
                    "time, else any from 20000 on")
       ->type_name("HOST[:PORT]");
+  command
+      ->add_option(
+          "--pki", options->pki,
+          "The folder of `tutti pki`: TLS and rights for the server's own bus, which other machines can then use")
+      ->type_name("DIR");
   add_mission_argument(*command, *common, "Names of the robots and all settings; without it any robot is welcome");
   add_mission_name(*command, common->mission.name, kFilesName);
   command->add_option("--threads", options->threads, "Threads that verify loop closures here; 0 = only workers do")

@@ -19,6 +19,7 @@
 #include "tutti/node/map_meta.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/status_envelope.hpp"
+#include "tutti/program/bus_guard.hpp"
 #include "tutti/program/host.hpp"
 #include "tutti/program/incarnation.hpp"
 #include "tutti/program/link_watch.hpp"
@@ -161,18 +162,24 @@ Result<bus::HostPort> address_of(const std::string& listen) {
 }
 
 Result<std::unique_ptr<bus::NatsChild>> start_bus(const ServerOptions& options, const bus::HostPort& address,
+                                                  const std::optional<BusGuard>& guard,
                                                   const std::filesystem::path& folder) {
-  return bus::NatsChild::start(
-      folder, {.host = address.host, .port = address.port, .allow_insecure = options.bus.allow_insecure});
+  bus::NatsChildOptions child{.host = address.host, .port = address.port, .allow_insecure = options.bus.allow_insecure};
+  if (guard) child.rights = guard->rights();
+  if (guard) child.credentials = guard->credentials();
+  return bus::NatsChild::start(folder, child);
 }
 
 Status check_addresses(const ServerOptions& options, const bus::HostPort& address) {
   if (!options.bus.url.empty() && !options.listen.empty())
     return fail(ErrorCode::configuration, "--bus and --listen: either a bus that runs, or one of its own");
-  if (options.bus.allow_insecure || bus::is_loopback(address.host)) return {};
+  if (!options.bus.url.empty() && !options.pki.empty())
+    return fail(ErrorCode::configuration,
+                "--bus and --pki: a bus that runs has its own rights; --credentials says who this server is there");
+  if (options.bus.allow_insecure || !options.pki.empty() || bus::is_loopback(address.host)) return {};
   return fail(ErrorCode::configuration,
-              "--listen {}: anybody who reaches this address could write to the map: there is no TLS yet; --insecure "
-              "forces it",
+              "--listen {}: anybody who reaches this address could write to the map: needs --pki DIR (tutti pki init); "
+              "--insecure forces it",
               options.listen);
 }
 
@@ -218,6 +225,7 @@ class ServerProgram {
   const ServerSettings& settings_ = options_.settings;
   std::optional<StateFolder> folder_;
   std::unique_ptr<EventLog> log_;
+  std::optional<BusGuard> guard_;
   std::unique_ptr<bus::NatsChild> child_;
   bus::BusOptions bus_;
   std::shared_ptr<const bus::MissionLease> lease_;
@@ -235,6 +243,8 @@ Result<std::unique_ptr<Hosted>> ServerProgram::open_node() {
   node::ServerNodeConfig config{
       .server = settings_.server, .refiner = settings_.finders.refiner(), .accepts_others = settings_.accepts_others};
   config.incarnation = any_incarnation();
+  if (guard_)
+    config.name_objection = [this](RobotId robot, const std::string& name) { return guard_->objection(robot, name); };
   config.job_timeout_s *= std::max(1.0, options_.rate);  // a bus waits in wall time
   std::set<RobotId> robots;
   for (std::uint32_t i = 0; i < settings_.robots.size(); ++i) robots.insert(RobotId{i});
@@ -283,17 +293,27 @@ void ServerProgram::tend_bus() {
   if (!runs && trouble_.empty()) log_->say(Level::error, "the bus does not run: " + runs.error().message);
   if (runs && !trouble_.empty()) log_->say(Level::info, "the bus runs again");
   trouble_ = runs ? "" : "the bus does not run: " + runs.error().message;
+  if (!guard_) return;
+  guard_->look();
+  for (const std::string& line : guard_->lines(child_->take_refusals(), clock_->wall_s()))
+    log_->say(Level::warning, line);
 }
 
 std::string ServerProgram::robot_command() const {
-  return fmt::format("tutti robot --name NAME --bus {} --mission {} --state DIR {}", bus::without_credentials(bus_.url),
-                     bus_.mission, settings_.robot_arguments);
+  return fmt::format("tutti robot --name NAME --bus {} --mission {} --state DIR {}{}",
+                     bus::without_credentials(bus_.url), bus_.mission, guard_ ? "--credentials NAME.cred " : "",
+                     settings_.robot_arguments);
 }
 
 Status ServerProgram::start() {
   const auto address = address_of(options_.listen);
   if (!address) return tl::unexpected(address.error());
   if (Status ok = check_addresses(options_, *address); !ok) return ok;
+  if (!options_.pki.empty()) {
+    auto guard = BusGuard::open(options_.pki, settings_.mission);
+    if (!guard) return tl::unexpected(guard.error());
+    guard_.emplace(std::move(*guard));
+  }
   bus_ = options_.bus;
   bus_.mission = settings_.mission;
   auto folder = StateFolder::open(options_.state, "server", kMapFile);
@@ -307,10 +327,13 @@ Status ServerProgram::start() {
   if (!store) return tl::unexpected(store.error());
   store_ = std::move(*store);
   if (options_.bus.url.empty()) {
-    auto child = start_bus(options_, *address, folder_->path() / "bus");
+    auto child = start_bus(options_, *address, guard_, folder_->path() / "bus");
     if (!child) return tl::unexpected(child.error());
     child_ = std::move(*child);
     bus_.url = child_->url();
+    if (guard_) bus_.credentials = guard_->credentials();
+    if (!guard_ && !bus::is_loopback(address->host))
+      log_->say(Level::warning, "--insecure: whoever reaches this server's bus can write to the map and decide");
   }
   if (Status taken = take_lease(); !taken) return taken;
   clock_.emplace(options_.rate, options_.rate * folder_->age_s());

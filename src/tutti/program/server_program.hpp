@@ -65,8 +65,9 @@ class MapViewer {
 /// How a server program runs.
 struct ServerOptions {
   std::filesystem::path state;
-  bus::BusOptions bus;  ///< The mission is that of the settings. No URL: the program starts its own nats-server,
-  std::string listen;   ///< at this "HOST" or "HOST:PORT"; empty: on this machine only, at any free port.
+  bus::BusOptions bus;        ///< The mission is that of the settings. No URL: the program starts its own nats-server,
+  std::string listen;         ///< at this "HOST" or "HOST:PORT"; empty: on this machine only, at any free port.
+  std::filesystem::path pki;  ///< Of `tutti pki`, for its own nats-server; empty: whoever reaches that may do all.
   ServerSettings settings;
   int threads = 1;    ///< Threads that verify closures in this program; 0: workers do it.
   double rate = 1.0;  ///< Mission time per wall time.

@@ -96,7 +96,8 @@ Status run_worker(const WorkerOptions& options, const std::atomic<bool>& stop) {
   const FinderSettings& settings = options.settings.finders;
   const auto finder = settings.finder();
   const auto log = EventLog::on_console("worker", options.console);
-  const bus::Endpoint self = bus::Endpoint::worker(any_number());
+  const auto& known = options.bus.credentials.known;
+  const bus::Endpoint self = bus::Endpoint::worker(known ? known->number : any_number());
   bus::BusOptions where = options.bus;
   where.mission = options.settings.mission;
   auto mission = bus::served_mission(where, bus::kLookForServer_s);

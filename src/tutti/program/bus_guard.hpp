@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "tutti/base/ids.hpp"
+#include "tutti/bus/nats_child.hpp"
+#include "tutti/program/throttle.hpp"
+
+namespace tutti::program {
+
+/// The folder of `tutti pki` as a server uses it: what its bus needs, and who is who on it.
+class BusGuard {
+ public:
+  /// Fails when the folder is that of another mission.
+  static Result<BusGuard> open(const std::filesystem::path& folder, const std::string& mission);
+
+  [[nodiscard]] std::filesystem::path rights() const;
+  /// The server's own.
+  [[nodiscard]] const bus::BusCredentials& credentials() const { return credentials_; }
+  /// Reads the folder again, in which members come and go. Called once a second.
+  void look();
+  /// What the bus has refused, as lines for the log: who, what, and how many so far; of each member, and of all
+  /// strangers together, as Throttle lets through.
+  [[nodiscard]] std::vector<std::string> lines(const bus::NatsChild::Refusals& refusals, double wall_s);
+  [[nodiscard]] std::uint64_t refused() const { return refused_; }
+  /// Why a robot of this number does not have this name; empty: it may have it.
+  [[nodiscard]] std::string objection(RobotId robot, const std::string& name) const;
+
+ private:
+  explicit BusGuard(std::filesystem::path folder) : folder_(std::move(folder)) {}
+
+  std::filesystem::path folder_;
+  bus::BusCredentials credentials_;
+  std::map<std::string, bus::BusUser> users_;  // by key
+  std::map<RobotId, std::string> robots_;
+  Throttle throttle_;
+  std::uint64_t refused_ = 0;
+};
+
+}  // namespace tutti::program
