@@ -11,10 +11,8 @@
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <thread>
 #include <utility>
@@ -22,116 +20,23 @@
 
 #include "support/bus/nats_network.hpp"
 #include "support/bus/tcp_relay.hpp"
-#include "support/paths.hpp"
+#include "support/lab/small_mission.hpp"
 #include "tutti/base/file.hpp"
-#include "tutti/lab/mission_input.hpp"
 #include "tutti/lab/mission_source.hpp"
-#include "tutti/mission/robot_actor.hpp"
-#include "tutti/mission/runner.hpp"
-#include "tutti/node/server_node.hpp"
-#include "tutti/node/worker_node.hpp"
 #include "tutti/program/robot_program.hpp"
 #include "tutti/program/server_program.hpp"
-#include "tutti/storage/memory_store.hpp"
-#include "tutti/storage/sqlite_store.hpp"
 
 namespace tutti {
 namespace field_test {
 
 namespace fs = std::filesystem;
+using test::kNames;
+using test::kPatience_s;
+using test::kSession;
+using test::mission_of;
+using test::Running;
 using test::TcpRelay;
 using test::within;
-
-constexpr std::uint64_t kSession = 1'700'000'000;
-constexpr double kPatience_s = 120.0;  // a busy machine
-const std::vector<std::string> kNames{"alpha", "bravo"};
-
-/// Submaps of `submap_s`: few of them keep the map small, and the test fast.
-lab::MissionSource mission_of(int duration_s, int submap_s) {
-  lab::MissionSource source{.file = test::source_path("tests/system/small_mission.yaml").string()};
-  source.assignments = {"server.update_period_s=50", fmt::format("agent.submap.duration_s={}", submap_s),
-                        fmt::format("agent.submap.distance_m={}", submap_s)};
-  for (const char* robot : {"0", "1"})
-    source.assignments.push_back(fmt::format("simulation.robots.{}.walk.duration_s={}", robot, duration_s));
-  return source;
-}
-
-/// A program on a thread.
-class Running {
- public:
-  template <class Run>
-  explicit Running(Run run) : thread_([this, run] { ended_ = run(stop_), over_ = true; }) {}
-  ~Running() {
-    stop_ = true;
-    thread_.join();
-  }
-  Running(const Running&) = delete;
-  Running& operator=(const Running&) = delete;
-  [[nodiscard]] bool over() const { return over_; }
-  /// How it ended, once it is over.
-  [[nodiscard]] const Status& ended() const { return ended_; }
-
- private:
-  std::atomic<bool> stop_ = false, over_ = false;
-  Status ended_;
-  std::thread thread_;
-};
-
-using Rows = std::map<std::string, std::string>;
-Rows rows_of(const storage::TableStore& map, const char* table) {
-  Rows rows;
-  EXPECT_TRUE(map.scan(table, {}, [&](std::string_view key, std::string_view bytes) {
-    rows.emplace(key, bytes);
-    return true;
-  }));
-  return rows;
-}
-
-struct World {
-  explicit World(const lab::MissionSource& source) : config(lab::load(source).value()) {
-    auto input = lab::load_input(config, {}, source.seed);
-    EXPECT_TRUE(input.has_value());
-    recordings = std::move(input->robots);
-    finder = lab::make_finder(config, source).value();
-  }
-  [[nodiscard]] std::unique_ptr<node::ServerNode> open(const storage::TableStore& map) const {
-    auto node = node::ServerNode::open({RobotId{0}, RobotId{1}}, finder, {.server = config.server}, 1, map);
-    EXPECT_TRUE(node.has_value()) << node.error().message;
-    return std::move(*node);
-  }
-  lab::MissionConfig config;
-  std::vector<mission::MissionRecording> recordings;
-  std::shared_ptr<const server::ClosureFinder> finder;
-};
-
-/// All submaps, one after the other, and every job done at once.
-std::unique_ptr<storage::MemoryStore> undisturbed(const World& world) {
-  auto map = std::make_unique<storage::MemoryStore>(storage::map_schema());
-  const auto server = world.open(*map);
-  node::WorkerNode worker(bus::Endpoint::worker(0), world.finder, node::SubmapFrames::of(*map));
-  const auto serve = [&](const auto& self, const node::Step& step) -> void {
-    EXPECT_TRUE(map->commit(step.writes));
-    for (const bus::Envelope& message : step.messages)
-      if (message.kind == bus::MessageKind::job)
-        for (const bus::Envelope& answer : worker.receive(message, {}).messages)
-          self(self, server->receive(answer, {}));
-  };
-  for (const mission::MissionRecording& recording : world.recordings) {
-    storage::MemoryStore store(storage::robot_schema());
-    node::RobotNodeConfig config{.agent = world.config.agent};
-    config.uplink.max_under_way_bytes = 0;
-    auto robot =
-        std::move(mission::RobotActor::open(recording, config, world.config.association, kSession, store).value());
-    robot->resume({});
-    while (robot->next_time() < 1e9) {
-      robot->replay_next({});
-      const node::Step step = robot->take_step();
-      EXPECT_TRUE(store.commit(step.writes));
-      for (const bus::Envelope& message : step.messages) serve(serve, server->receive(message, {}));
-    }
-  }
-  return map;
-}
 
 class Field : public ::testing::Test {
  protected:
@@ -172,35 +77,6 @@ class Field : public ::testing::Test {
   [[nodiscard]] fs::path status_file() const { return folder_ / "server" / program::kStatusFile; }
   /// The map's status, as the server tells it; empty: it cannot be read.
   [[nodiscard]] std::string server_status() const { return read_file(status_file().string()).value_or(""); }
-  /// By a status that is written after this is asked: the one before may not know the last submaps yet.
-  [[nodiscard]] bool server_ends() const {
-    const auto asked = fs::file_time_type::clock::now() + std::chrono::milliseconds(100);
-    return within(kPatience_s, [&] {
-      std::error_code replaced;
-      const auto written = fs::last_write_time(status_file(), replaced);
-      return !replaced && written > asked && server_status().find("\"pending_jobs\":0") != std::string::npos;
-    });
-  }
-  /// When the server has ended.
-  void expect_undisturbed_map(const World& world) {
-    const auto expected = undisturbed(world);
-    const auto opened = storage::open_sqlite_store(folder_ / "server" / program::kMapFile, storage::map_schema(),
-                                                   {.min_free_bytes = 0});
-    ASSERT_TRUE(opened.has_value()) << opened.error().message;
-    const Rows submaps = rows_of(*expected, "submaps");
-    EXPECT_GT(submaps.size(), 5U);
-    EXPECT_TRUE(rows_of(**opened, "submaps") == submaps);  // which are long
-    const auto a = world.open(**opened), b = world.open(*expected);
-    EXPECT_EQ(a->map_server().state().verdicts, b->map_server().state().verdicts);
-    const Timestamp later = Timestamp{} + 1e6;
-    EXPECT_TRUE(std::ranges::none_of(a->resume(later).messages, [](const auto& message) {
-      return message.kind == bus::MessageKind::job;
-    })) << "a pair has no answer";
-    static_cast<void>(b->resume(later)), static_cast<void>(a->on_timer(later + 1e3)), b->on_timer(later + 1e3);
-    const auto &nodes = a->map_server().map().nodes, &others = b->map_server().map().nodes;
-    ASSERT_EQ(nodes.size(), others.size());
-    for (std::size_t i = 0; i < nodes.size(); ++i) ASSERT_EQ(nodes[i].T_world_body, others[i].T_world_body) << i;
-  }
 
   fs::path folder_;
   std::atomic<int> bus_port_ = 0;
@@ -226,10 +102,10 @@ TEST_F(Field, AfterTenMinutesOutOfRangeOnABadLinkNothingIsLost) {
   for (const auto& robot : robots_) EXPECT_TRUE(robot->over() && robot->ended().has_value());
   RecordProperty("cuts", static_cast<int>(relay.cuts()));
   EXPECT_GE(relay.cuts(), 1U);
-  EXPECT_TRUE(server_ends()) << server_status();
+  EXPECT_TRUE(test::server_ends(folder_ / "server")) << server_status();
   robots_.clear();
   server_.reset();
-  expect_undisturbed_map(World(source));
+  test::expect_undisturbed_map(test::World(source), folder_ / "server");
 }
 
 /// A disk of memory, for root.
@@ -285,10 +161,10 @@ TEST_F(Field, OnFullDisksEverythingWaitsAndGoesOnWhenThereIsRoom) {
   EXPECT_TRUE(within(kPatience_s, bus_runs));
   EXPECT_TRUE(robots_end(kPatience_s)) << server_status();
   for (const auto& robot : robots_) EXPECT_TRUE(robot->over() && robot->ended().has_value());
-  EXPECT_TRUE(server_ends()) << server_status();
+  EXPECT_TRUE(test::server_ends(folder_ / "server")) << server_status();
   robots_.clear();
   server_.reset();
-  expect_undisturbed_map(World(source));
+  test::expect_undisturbed_map(test::World(source), folder_ / "server");
 }
 
 }  // namespace field_test
