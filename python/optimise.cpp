@@ -182,7 +182,7 @@ poses stay, or else the first of a connected component. ValueError: the edges do
       "optimise_robust", &optimise_robust, "graph"_a, py::call_guard<py::gil_scoped_release>(),
       R"(Decides as the mapping server does which closures, and which odometry, are wrong, and optimises: `tutti optimise --robust`.
 
-Of one robot or several. Edges from a robot's pose to its next one are odometry, all others closures. Robots are told by
+The graph is of one robot or several. Edges from a robot's pose to its next one are odometry, all others closures. Robots are told by
 PoseGraph.robots, by GTSAM's symbol keys among the ids (letter << 56 | number), or begin where no edge joins a pose to the
 one before it. Without stamps the n-th pose of a robot counts as at n seconds. ValueError: it cannot be solved.)");
 }

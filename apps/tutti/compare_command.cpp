@@ -79,12 +79,12 @@ int run(const CompareOptions& options) {
 /// What is known of either side's errors.
 void add_noise_options(CLI::App& command, CompareOptions& options) {
   add_number(command, "--tolerance", options.config.tolerance_m,
-             "How sure A is of its positions, over stretches of any length: standard deviation", "METRES");
+             "How sure A is of its positions, over segments of any length: standard deviation", "METRES");
   add_number(command, "--tolerance-deg", options.tolerance_deg,
              fmt::format("The same of its rotations; default: what moves a point {:g} m away by --tolerance", kArm_m),
              "DEGREES");
   add_number(command, "--odometry-sigma", options.config.odometry_m,
-             "Standard deviation of B's motion over 1 m, growing with the square root of the way; says where\n"
+             "Standard deviation of B's motion over 1 m, growing with the square root of the distance; says where\n"
              "B failed rather than drifted, and how constraints bend it. A .g2o file brings its own",
              "METRES");
   add_number(command, "--odometry-sigma-deg", options.config.odometry_deg, "The same of its rotation", "DEGREES");
@@ -101,8 +101,8 @@ void add_compare_command(CLI::App& app, int& exit_code) {
   command->footer(
       "REF, called A, judges; EST, called B, is judged, as a robot judges its odometry by the server's map. Both are "
       "cut into nodes along A;\n"
-      "wavelets along the way separate scales, and what stands out of A's tolerance at a node and scale is a\n"
-      "disagreement. Told are the stretches where it was born, and the fewest relative poses of A that would bring B\n"
+      "wavelets along the trajectory separate scales, and what stands out of A's tolerance at a node and scale is a\n"
+      "disagreement. It shows the segments where it was born, and the fewest relative poses of A that would bring B\n"
       "into agreement. B need not be aligned.\n\n"
       "Files: TUM, EuRoC csv, KITTI, or g2o (times and robots from x_stamps.csv beside x.g2o; two graphs without it:\n"
       "vertex n is at n seconds). Folders: what `tutti run --out` wrote; every robot that both have is compared. How a "
@@ -121,7 +121,7 @@ void add_compare_command(CLI::App& app, int& exit_code) {
   command->add_flag("--json", options->json, "Print JSON instead of tables; with the whole disagreement map");
   add_noise_options(*command, *options);
   add_number(*command, "--spacing", options->config.spacing_m,
-             "Way between two nodes; default: a 500th of the way, at least 0.1 m", "METRES")
+             "Distance between two nodes; default: a 500th of the trajectory's length, at least 0.1 m", "METRES")
       ->default_str("");
   add_number(*command, "--max-gap", options->config.association.max_gap_s,
              "Interpolate A only between poses at most this far apart", "SECONDS", finite(true));

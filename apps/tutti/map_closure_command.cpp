@@ -81,7 +81,7 @@ void print(const mapfile::ClosureFit& fit) {
 /// Who says what of it, and what was measured.
 void print_origin(const mapfile::ClosureInfo& info) {
   if (info.word)
-    fmt::print("word         {}{} at {}\n", to_string(info.word->wish),
+    fmt::print("decision     {}{} at {}\n", to_string(info.word->wish),
                info.word->by.empty() ? "" : " by " + info.word->by, time_of(info.word->given_ns));
   if (info.verdict) {
     const ClosureVerdict& verdict = *info.verdict;
@@ -128,8 +128,8 @@ std::string waits_for(const bus::LinkState& state) {
   if (!state.connected)
     return fmt::format("waits for a link to the bus {}{}{}", state.url, why.empty() ? "" : ": ", why);
   if (state.waiting_messages > 0)
-    return fmt::format("waits for the bus {} to store the word{}{}", state.url, why.empty() ? "" : ": ", why);
-  return fmt::format("the bus {} has the word: waits for the server to say that it is stored", state.url);
+    return fmt::format("waits for the bus {} to store the decision{}{}", state.url, why.empty() ? "" : ": ", why);
+  return fmt::format("the bus {} has the decision: waits for the server to say that it is stored", state.url);
 }
 
 /// To the server that has the map open, until it has answered.
@@ -150,11 +150,11 @@ Status send(const ClosureOptions& options, const ClosureWord& word) {
       return answer->empty() ? Status() : fail(ErrorCode::invalid, "the server does not take it: {}", *answer);
     const bus::LinkState state = (*port)->state();
     if (now_s > options.wait_s && state.waiting_messages > 0)
-      return fail(ErrorCode::io, "{}: the bus has not taken the word for mission '{}' within {} s: {}", where.url,
+      return fail(ErrorCode::io, "{}: the bus has not taken the decision for mission '{}' within {} s: {}", where.url,
                   where.mission, options.wait_s, state.last_error);
     if (now_s > options.wait_s)
       return fail(ErrorCode::io,
-                  "{}: the bus has the word, but the server has not said within {} s that it has it; say it again if "
+                  "{}: the bus has the decision, but the server has not confirmed it within {} s; give it again if "
                   "`tutti map closure show` does not know it later",
                   where.url, options.wait_s);
     if (now_s > kSaySoon_s && std::exchange(said, waits_for(state)) != waits_for(state))
@@ -206,11 +206,12 @@ void add_word(CLI::App& command, Wish wish, const std::string& help, int& exit_c
 
 void add_map_closure_command(CLI::App& map, int& exit_code) {
   CLI::App* closure =
-      map.add_subcommand("closure", "Loop closures: why they are in the map or not, and your word on them.");
+      map.add_subcommand("closure", "Loop closures: why they are in the map or not, and your decisions on them.");
   closure->require_subcommand(1);
   closure->footer(
       "A closure's name is that of its two submaps: alpha/12-bravo/7; alpha.2/3 is of alpha's second session.\n"
-      "Your word stands above the server's judgement, survives restarts, and the map follows at its next update.\n");
+      "Your decision stands above the server's judgement, survives restarts, and the map follows at its next "
+      "update.\n");
   const auto listing = std::make_shared<ClosureOptions>(), showing = std::make_shared<ClosureOptions>();
   CLI::App* all = closure->add_subcommand("list", "Every pair of submaps with closures, accepted or not, and why.");
   all->add_option("map", listing->map, "The map's file.")->type_name("MAP")->required();
@@ -223,7 +224,7 @@ void add_map_closure_command(CLI::App& map, int& exit_code) {
   one->callback([showing, &exit_code] { exit_code = show(*showing); });
   add_word(*closure, Wish::accept, "It is right: in the map, with its covariance, whatever contradicts it.", exit_code);
   add_word(*closure, Wish::reject, "It is wrong: never in the map.", exit_code);
-  add_word(*closure, Wish::withdraw, "Take your word back: the server judges again.", exit_code);
+  add_word(*closure, Wish::withdraw, "Take your decision back: the server judges again.", exit_code);
 }
 
 }  // namespace tutti::app

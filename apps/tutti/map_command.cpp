@@ -183,8 +183,8 @@ int show_map(const fs::path& file) {
     ++states[to_string(info.state)];
     if (info.word && info.word->wish != Wish::withdraw) ++by_operator;
   }
-  fmt::print("\nclosures     {} accepted, {} rejected, {} candidates; {} by an operator's word\n", states["accepted"],
-             states["rejected"], states["candidate"], by_operator);
+  fmt::print("\nclosures     {} accepted, {} rejected, {} candidates; {} by an operator's decision\n",
+             states["accepted"], states["rejected"], states["candidate"], by_operator);
   fmt::print("joint map    {} keyframes, {} components\n", estimate.nodes.size(), estimate.components);
   if (const auto& earth = estimate.fixes.georeference)
     fmt::print(

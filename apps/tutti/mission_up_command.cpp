@@ -40,7 +40,7 @@ void add_play_command(CLI::App& group, int& exit_code) {
                                            "driver would: odometry, scans, images and IMU samples when they are due.");
   add_mission_argument(*command, *common, "The mission, or 'demo'")->required();
   command->add_option("--name", options->robot, "The robot, as the mission calls it")->type_name("NAME")->required();
-  command->add_option("--feed", options->socket, "Of the robot's program")->type_name("SOCKET")->required();
+  command->add_option("--feed", options->socket, "The socket of the robot's program")->type_name("SOCKET")->required();
   command
       ->add_option(
           "--scores", options->scores,

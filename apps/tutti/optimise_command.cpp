@@ -160,7 +160,7 @@ void add_optimise_command(CLI::App& app, int& exit_code) {
       "SE(2) graphs are optimised lifted to SE(3). With a robust loss or gnc, edges between vertices that follow each\n"
       "other in the file count as odometry and are trusted; gnc decides for each other edge whether it is wrong.\n"
       "IN_stamps.csv, if it is there, is copied beside the output.\n\n"
-      "--robust decides as the mapping server does which closures, and which stretches of odometry, are wrong: of g2o\n"
+      "--robust decides as the mapping server does which closures, and which segments of odometry, are wrong: of g2o\n"
       "files, and of PyFG and JRL as COSMO-Bench has them (names are a letter per robot and a number). Edges between\n"
       "vertices that follow each other in one robot are odometry. OUT holds odometry and the accepted closures, each "
       "with the\n"

@@ -23,7 +23,7 @@ struct ProgramArguments {
 inline CLI::Option* add_mission_argument(CLI::App& command, ProgramArguments& arguments, const std::string& what) {
   command.add_option("--data", arguments.mission.data, "Folder that the mission's file names are relative to")
       ->type_name("DIR");
-  command.add_option("--seed", arguments.mission.seed, "Of everything random in a mission")
+  command.add_option("--seed", arguments.mission.seed, "Seed of everything random in a mission")
       ->type_name("N")
       ->check(whole_number())
       ->capture_default_str();

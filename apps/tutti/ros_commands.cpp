@@ -108,7 +108,7 @@ std::shared_ptr<RosArguments> add_ros_robot_options(CLI::App& robot) {
   auto out = std::make_shared<RosArguments>();
   auto* const ros = robot.add_flag("--ros", out->wanted,
                                    "Take odometry, scans, images, IMU samples and position fixes from ROS 2's topics, "
-                                   "and publish map -> odom, the corrected way and "
+                                   "and publish map -> odom, the corrected trajectory and "
                                    "team-mates, over DDS and without ROS, on this machine; with --insecure on the "
                                    "networks that CYCLONEDDS_URI names, else on all (docs/ros.md)");
   robot
@@ -196,7 +196,9 @@ std::shared_ptr<RosArguments> add_ros_server_options(CLI::App& server) {
                                     "Publish the map as ROS 2's topics map (nav_msgs/OccupancyGrid) and map_points "
                                     "(sensor_msgs/PointCloud2), over DDS and without ROS, on this machine; with "
                                     "--insecure on the networks that CYCLONEDDS_URI names, else on all (docs/ros.md)");
-  server.add_option("--namespace", out->name_space, "Of these topics; default: none")->type_name("NAME")->needs(ros);
+  server.add_option("--namespace", out->name_space, "Namespace of these topics; default: none")
+      ->type_name("NAME")
+      ->needs(ros);
   server.add_option("--map-frame", out->server.frame, "Frame that they are in")
       ->type_name("FRAME")
       ->capture_default_str()

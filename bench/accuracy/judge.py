@@ -57,10 +57,10 @@ def main():
     everything = [m for of in maps.values() for m in of]
     text = ["# Who is wrong, in places of every scale", "",
             f"Written by `bench/accuracy/judge.py JUDGE_PROGRAM --seeds {arguments.seeds} --places {' '.join(arguments.places)}`.",
-            "Simulated: two robots walk or drive through a network of ways (room: 2.5 m between junctions, 0.7 m/s; hall: 8 m, 1 m/s;",
+            "Simulated: two robots walk or drive through a network of corridors (room: 2.5 m between junctions, 0.7 m/s; hall: 8 m, 1 m/s;",
             "tunnel: 60 m, 2 m/s; street: 120 m, 12 m/s), closures from the truth with noise. Every place with odometry that is honest,",
             "three times too sure and three times too unsure of itself, holds or fails once (over up to 20 s, by as far as the robot",
-            "gets in a second or so and 5 to 25 degrees), and with no wrong closures, 10 % and a group at two stretches that look",
+            "gets in a second or so and 5 to 25 degrees), and with no wrong closures, 10 % and a group at two segments that look",
             "alike (18 or 32 s), or 30 %. RMSE of the whole map over that of a judge who is told which closures are wrong.", "",
             row("maps", "how many", "median", "p90", "worst", "wrong accepted", "right kept", "failures made up"),
             row(*["---"] * 8), line("all", everything)]

@@ -97,7 +97,7 @@ def main():
             "COSMO-Bench's own files are in fleets.md; these are graphs made to its figures, written as its files are (PyFG):",
             f"{len(graphs)} simulated ones of {span('robots')} robots who walk through streets 70 m apart, {span('poses')} poses 2 m apart,",
             f"{span('closures')} closures from the truth with noise, {100 * min(wrong):.0f} to {100 * max(wrong):.0f} % of them wrong: strewn about, in blocks of",
-            "neighbours that agree, and in every second graph at two stretches of 60 s that look alike, where all closures agree.",
+            "neighbours that agree, and in every second graph at two segments of 60 s that look alike, where all closures agree.",
             "ATE: RMSE of all robots' positions after one alignment. GNC with Geman-McClure (Yang et al. 2020) has the same solver,",
             "threshold (chi-square, 0.99) and reduction to the closures' ends as ours, and begins at odometry from where every robot",
             "truly started, which ours is not told. Precision: of the accepted closures, those that are right; Geman-McClure has",

@@ -412,7 +412,7 @@ class Programs(ProgramsTest):
         word = self.start("map", "closure", "reject", closure, "--bus", bus)
         stream = self.path / "bus/jetstream/$G/streams"
         self.wait_for(lambda: any(b"reject" in block.read_bytes() for block in stream.glob("VERDICTS_*/msgs/*.blk")),
-                      "the word in the stream")
+                      "the decision in the stream")
         first.kill()
         start_bus(self.path / "another bus")
         server.process.send_signal(signal.SIGCONT)
@@ -424,7 +424,7 @@ class Programs(ProgramsTest):
         self.assertIn("nobody", done.stderr)
         self.assertEqual(server.end()[0], 0)
         show = run("map", "closure", "show", closure, self.path / "server/map.tutti").stdout
-        self.assertRegex(show, r"word +reject")
+        self.assertRegex(show, r"decision +reject")
 
     def test_sigterm_is_a_clean_stop(self):
         slow = ["--rate", "5"]  # nobody has ended by then, however slow the machine is

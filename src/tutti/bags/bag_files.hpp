@@ -39,11 +39,11 @@ class BagFiles final : public BagReader {
   const BagChannel* own(const BagChannel* channel);
 
   std::vector<std::string> files_;
-  std::vector<std::string> notes_;  ///< Of the folder, and of the files that have been read.
+  std::vector<std::string> notes_;  ///< The folder's, and those of the files that have been read.
   std::optional<std::uint64_t> stated_messages_;
   std::size_t file_ = 0;  ///< Position of the open file, or of the next one.
   std::unique_ptr<BagReader> reader_;
-  std::set<BagChannel> channels_;  ///< Of all files, so that messages of one topic have one channel.
+  std::set<BagChannel> channels_;  ///< All files', so that messages of one topic have one channel.
   std::map<const BagChannel*, const BagChannel*> of_file_;  ///< From the open file's channels to ours.
   std::set<std::size_t> packed_;                            ///< Files that are compressed as a whole.
   bool messages_packed_ = false;

@@ -33,7 +33,7 @@ struct TopicInfo {
 
 struct BagInfo {
   std::vector<TopicInfo> topics;  ///< Sorted by name, then by type.
-  TransformTree tree;             ///< Of all topics of transforms.
+  TransformTree tree;             ///< From all topics of transforms.
   std::set<std::string> robots;   ///< Namespaces that have odometry.
   std::uint64_t messages = 0;
   std::uint64_t errors = 0;        ///< Records and chunks that could not be read.
@@ -45,8 +45,8 @@ struct BagInfo {
 BagInfo inspect(BagReader& bag);
 
 /// What Tutti would take from the bag, for people, a line per kind of input: "odometry     /odom (odom -> base_link)".
-/// All topics of a kind are named; where a kind is missing the line says what that means. Of depth it says which camera
-/// it goes with, or why with none.
+/// All topics of a kind are named; where a kind is missing the line says what that means. A topic of depth is named
+/// with its camera, or with why it has none.
 std::vector<std::string> uses(const BagInfo& info);
 
 }  // namespace tutti::bags

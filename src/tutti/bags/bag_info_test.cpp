@@ -141,7 +141,7 @@ TEST(BagInfo, WithoutOdometryThatIsSaid) {
   EXPECT_EQ(uses(info_of(kMagic)).at(0), "odometry     missing: without odometry nothing can be made of this bag");
 }
 
-/// Of shared/data/mcap, what its SOURCES file says.
+/// What the SOURCES file of shared/data/mcap says.
 TEST(BagInfo, RealBagsHaveTheCountsOfTheirSources) {
   TUTTI_REQUIRE_SHARED("data/mcap");
   const std::map<std::string, std::uint64_t> of_file{

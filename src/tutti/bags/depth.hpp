@@ -13,7 +13,7 @@
 /// Depth images of ROS (REP 118), and how to tell them from a camera's.
 namespace tutti::bags {
 
-inline constexpr double kDepthUnit_m = 0.001;  ///< Of what to_depth() returns.
+inline constexpr double kDepthUnit_m = 0.001;  ///< Unit of what to_depth() returns.
 
 /// What a message says of its image before it is decoded.
 struct ImageLook {

@@ -32,8 +32,8 @@ struct McapSummary {
 /// Reads files with or without chunks and with or without a summary. A chunk whose CRC does not match is an error. A
 /// file that is cut off is read up to the last whole message, also within its last chunk, and a note says so. Errors
 /// name byte and record. A record that cannot be costs what follows in its chunk, as nothing says where the next one
-/// begins. Of records that are well formed and wrong, as messages of an unknown channel are, only the first of each
-/// channel or schema and chunk is an error, and the others are passed over.
+/// begins. When records are well formed and wrong, as messages of an unknown channel are, the first of each channel
+/// or schema and chunk is an error, and the others are passed over.
 class McapReader final : public BagReader {
  public:
   static Result<McapReader> open(const std::string& path);
@@ -84,7 +84,7 @@ class McapReader final : public BagReader {
                                               Args&&... args) const;
 
   internal::FileBytes file_;
-  std::uint64_t offset_ = 0;  ///< Of the next record.
+  std::uint64_t offset_ = 0;  ///< The next record's.
   bool ended_ = false;
   std::string record_;              ///< Content of the last record that was read from the file.
   std::string chunk_;               ///< Decompressed records of the chunk that is being read.

@@ -140,7 +140,7 @@ TEST(Mcap, AChunkThatHasChangedIsLostAlone) {
   }
 }
 
-/// Of several blocks of both compressions, which refer to what is before them.
+/// Chunks have several blocks of both compressions, which refer to what is before them.
 TEST(Mcap, LongChunksAreReadAndCutOnesInPart) {
   constexpr std::uint64_t kCount = 20'000;
   const std::string first = kMagic + header(), records = kDefinitions + messages(0, kCount);

@@ -17,7 +17,7 @@
 namespace tutti::bags {
 
 struct McapWriterOptions {
-  std::string profile = "ros2";                    ///< Of the whole file; empty if its channels are not ROS's.
+  std::string profile = "ros2";                    ///< The whole file's; empty if its channels are not ROS's.
   bool zstd = true;                                ///< Whether chunks are compressed.
   std::size_t chunk_bytes = std::size_t{1} << 20;  ///< A chunk ends with the message that makes it this long.
 };
@@ -73,7 +73,7 @@ class McapWriter {
   std::string name_;
   McapWriterOptions options_;
   std::uint64_t written_ = 0;
-  std::uint32_t crc_ = 0;                        ///< Of all bytes written.
+  std::uint32_t crc_ = 0;                        ///< Over all bytes written.
   std::vector<std::string> schemas_, channels_;  ///< Their records; an id is the position, from 1 on.
   std::map<std::string, std::uint16_t> schema_ids_;
   std::vector<std::uint64_t> counts_;  ///< Messages of each channel.

@@ -115,7 +115,7 @@ class Chooser {
 
   std::span<const ImageTopic> cameras_, depths_;
   const CameraWishes& wishes_;
-  std::vector<std::vector<std::size_t>> registered_;  ///< Of each camera the topics of depth.
+  std::vector<std::vector<std::size_t>> registered_;  ///< Each camera's topics of depth.
   std::string why_;                                   ///< Those that are not the first camera's are not.
 };
 

@@ -137,8 +137,8 @@ Result<Ros1Reader::Record> Ros1Reader::parse_header(std::string_view header, con
   return record;
 }
 
-/// Of the file; its data is in data_ unless nobody wants it. Nothing at the end; then, and of a record that the file
-/// ends in, cut_ is set and a note says so.
+/// The file's next record; its data is in data_ unless nobody wants it. Nothing at the end. When the file ends within a
+/// record, cut_ is set and a note says so.
 Result<std::optional<Ros1Reader::Record>> Ros1Reader::next_record() {
   const BagPosition position{.at = offset_};
   const auto cut_off = [&](std::string_view what, std::uint64_t wants, std::uint64_t left) {

@@ -21,7 +21,7 @@ namespace tutti::bags {
 /// Reads ROS 1 bags, format 2.0 (http://wiki.ros.org/Bags/Format/2.0), with chunks compressed by bz2, lz4 or not at
 /// all. Types get ROS 2's names. A bag that was never closed, or is cut off, is read up to the last whole message, also
 /// within its last chunk, and a note says so. Errors name the byte. A record that cannot be costs what follows in its
-/// chunk. Of records that are well formed and wrong, as messages of an unknown connection are, only the first of each
+/// chunk. When records are well formed and wrong, as messages of an unknown connection are, the first of each
 /// connection and chunk is an error, and the others are passed over.
 class Ros1Reader final : public BagReader {
  public:
@@ -45,7 +45,7 @@ class Ros1Reader final : public BagReader {
     std::uint32_t connection = 0;
     Timestamp time;
     std::string topic, compression;
-    std::uint32_t size = 0;  ///< Of a chunk, decompressed.
+    std::uint32_t size = 0;  ///< A chunk's, decompressed.
     std::uint64_t index_at = 0;
     std::uint32_t chunks = 0;  ///< Number of chunks, in the bag's header.
     std::uint64_t data_size = 0;
@@ -70,7 +70,7 @@ class Ros1Reader final : public BagReader {
                                               fmt::format_string<Args...> format, Args&&... args) const;
 
   internal::FileBytes file_;
-  std::uint64_t offset_ = 0;  ///< Of the next record.
+  std::uint64_t offset_ = 0;  ///< The next record's.
   bool ended_ = false;
   bool cut_ = false;  ///< The file ends in the record that was read last.
   std::string data_;  ///< Data of the last record that was read from the file.

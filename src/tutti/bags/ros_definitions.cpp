@@ -124,9 +124,9 @@ std::string full_name(std::string_view name) {
 }
 
 struct Field {
-  std::string type;  ///< Of one element.
+  std::string type;  ///< One element's.
   std::string name;
-  std::optional<std::uint64_t> length;  ///< Of an array,
+  std::optional<std::uint64_t> length;  ///< An array's,
   bool is_sequence = false;             ///< or it has as many as it says.
 };
 

@@ -39,7 +39,7 @@ TEST(RosEncode, StampsBefore1970Return) {
   }
 }
 
-/// Of shared/data/mcap: what a real ROS 2 system wrote. Padding of /tf is whatever stood there, so that is not
+/// shared/data/mcap is what a real ROS 2 system wrote. Padding of /tf is whatever stood there, so that is not
 /// compared.
 TEST(RosEncode, OdometryOfARealBagIsIdentical) {
   TUTTI_REQUIRE_SHARED("data/mcap");

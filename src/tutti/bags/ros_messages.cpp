@@ -16,7 +16,7 @@ using internal::Cursor;
 constexpr std::size_t kEncapsulationBytes = 4;
 constexpr std::size_t kMostPadding = 3;
 
-/// Of CDR the length counts the NUL behind the text; some writers give an empty string no NUL.
+/// CDR's length counts the NUL behind the text; some writers give an empty string no NUL.
 std::string text(Cursor& in, std::string_view what) {
   std::string_view bytes = in.counted(what);
   if (bytes.empty() || in.layout() == Cursor::Layout::packed) return std::string(bytes);

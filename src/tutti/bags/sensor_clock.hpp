@@ -46,7 +46,7 @@ class SensorClock {
 
  private:
   std::string setting_;
-  std::deque<double> ahead_s_;  ///< Of the last messages.
+  std::deque<double> ahead_s_;  ///< By the last messages.
   bool is_said_ = false;
 };
 

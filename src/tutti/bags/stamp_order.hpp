@@ -30,7 +30,7 @@ struct StampOrder {
     [[nodiscard]] double duration_s() const { return last - first; }
   };
   std::vector<std::size_t> used;  ///< Positions in the order of their stamps, which increase.
-  std::size_t late = 0;           ///< Of these, those that came behind a newer one.
+  std::size_t late = 0;           ///< Those among them that came behind a newer one.
   std::vector<std::pair<std::size_t, std::string>> refused;  ///< Positions within the run, and why.
   std::vector<Run> runs;
   std::size_t run = 0;  ///< The one that is used; its messages are `used` and `refused`.

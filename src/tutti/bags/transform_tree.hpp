@@ -27,8 +27,8 @@ std::string doubt_of_place(const Pose3& T_body_sensor);
 /// of /tf that never change.
 class TransformTree {
  public:
-  /// Adds a transform; one that to_pose() refuses is an error and changes nothing. Of several transforms of one child
-  /// frame the first counts; if a later one of /tf (not `is_static`) differs by 1 mm, 1 mrad or its parent, the frame
+  /// Adds a transform; one that to_pose() refuses is an error and changes nothing. The first of several transforms of
+  /// one child frame counts; if a later one of /tf (not `is_static`) differs by 1 mm, 1 mrad or its parent, the frame
   /// moves, and find() does not go through it. Transforms that contradict each other are an error, too, with both: of
   /// one frame in two parents, and of a frame that is static and differs.
   Status add(const RosTransform& transform, bool is_static);

@@ -17,7 +17,7 @@
 ///   struct Battery {
 ///     double voltage_v = 0.0;
 ///     template <class V> void describe(V& v) {
-///       v.field(1, "voltage_v", voltage_v, {.low = 0.0}, "Of the main battery.");
+///       v.field(1, "voltage_v", voltage_v, {.low = 0.0}, "The main battery's voltage.");
 ///     }
 ///   };
 ///

@@ -59,7 +59,7 @@ BusCredentials read_again(const BusCredentials& credentials);
 /// "USER:PASSWORD" or "TOKEN" in the first line of a text, or the text of a file of `tutti pki`. Errors do not repeat
 /// it.
 Result<BusCredentials> parse_credentials(std::string_view text);
-/// Of credentials of `tutti pki`, the text that parse_credentials() reads.
+/// Writes the credentials of `tutti pki` as the text that parse_credentials() reads.
 std::string credentials_text(const BusCredentials& credentials);
 
 /// The name in the certificate of every bus that `tutti pki` sets up, whatever its address: its authority signs no

@@ -46,7 +46,7 @@ TEST(BusRightsTest, AnOperatorDecidesUnderOneName) {
   }
 }
 
-/// Of the bus's own subjects, only a server may name what makes, changes or removes streams and consumers, and the
+/// Only a server may name those of the bus's own subjects that make, changes or removes streams and consumers, and the
 /// wildcard of all that follows stands only behind what is its own.
 TEST(BusRightsTest, OnlyTheServerChangesStreams) {
   for (const BusRight& right : bus_rights()) {

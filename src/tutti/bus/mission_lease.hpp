@@ -78,7 +78,7 @@ class MissionLease {
   const BusOptions where_;
   const std::optional<LeaseHolder> self_;  // as it reads on the bus
   const LeaseTimes times_;
-  // Of the thread alone: what of another holder stands in the place of the own lease, and since when.
+  // Only the thread uses it: what another holder has in the place of the own lease, and since when.
   struct Other {
     LeaseHolder holder;
     std::uint64_t revision = 0;

@@ -110,8 +110,8 @@ void JetStreamPort::pull(const std::string& stream, const std::string& consumer)
 }
 
 /// A bus may have lost its streams, with its disk. And nats-server 2.9 takes a damaged end of a stream for none, and
-/// may go on with sequences that its consumer has behind it: what is stored then is neither pending nor given. Of jobs
-/// it keeps those that were given for the last time.
+/// may go on with sequences that its consumer has behind it: what is stored then is neither pending nor given. The
+/// stream of jobs keeps those that were given for the last time.
 void JetStreamPort::watch() {
   struct Watched {
     std::optional<Clock::time_point> since;  // they have been in this state

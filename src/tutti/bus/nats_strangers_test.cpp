@@ -27,7 +27,7 @@ class NatsStrangers : public ::testing::Test {
   void SetUp() override { TUTTI_SKIP_WITHOUT_NATS_SERVER(); }
 };
 
-/// Of strangers, and of earlier starts of this server.
+/// Jobs by strangers, and by earlier starts of this server.
 TEST_F(NatsStrangers, JobsThatTheServerHasNotSentDoNotKeepItsOwnWaiting) {
   constexpr int kStrange = 2000;
   NatsNetwork network;

@@ -208,7 +208,7 @@ TEST(SimulatedRadio, TenMinutesOutOfRangeCostNoSubmapAndAnotherRobotNothing) {
     EXPECT_EQ(up.dropped + up.lost, 0U);
     EXPECT_EQ(up.largest_message, 30'003U);
   }
-  // Of the proxy graphs of the ten minutes only the last is worth sending.
+  // Only the last proxy graph of the ten minutes is worth sending.
   EXPECT_EQ(graphs.size(), 51U - 29U);
   EXPECT_TRUE(std::ranges::find(graphs, 88) != graphs.end());
   EXPECT_EQ(radio.statistics().at({kServer, kAlpha, MessageKind::proxy_graph}).superseded, 29U);

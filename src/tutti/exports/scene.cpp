@@ -186,7 +186,8 @@ std::string ros_name(std::string name) {
 
 Result<WrittenScene> write_scene(const Scene& scene, const std::string& path) {
   const auto [first, last] = span_of(scene);
-  if (first > last) return fail(ErrorCode::invalid, "{}: there is nothing to write: no way, closure or number", path);
+  if (first > last)
+    return fail(ErrorCode::invalid, "{}: there is nothing to write: no trajectory, closure or number", path);
   const std::int64_t shift_ns = first.ns < 0 ? -first.ns : 0;
   auto bag = bags::RosWriter::create(path);
   if (!bag) return tl::unexpected(bag.error());

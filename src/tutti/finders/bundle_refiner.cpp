@@ -59,11 +59,12 @@ void remark_on_imu(const std::vector<bundle::ImuRun>& runs, std::vector<Refineme
   }
   for (const auto& [robot, held] : by_robot) {
     if (held.factors == 0) continue;
-    out.push_back({robot, fmt::format("{} of {} IMU factors are held back: motion tells the accelerometer's bias to "
-                                      "{:.2f} m/s^2, and with them the way is {:.3f} times as long as odometry and "
-                                      "images have it to {:.3f}",
-                                      held.factors, held.all, held.worst.bias_sigma_mps2, held.worst.scale,
-                                      held.worst.scale_sigma)});
+    out.push_back(
+        {robot,
+         fmt::format("{} of {} IMU factors are held back: motion tells the accelerometer's bias to "
+                     "{:.2f} m/s^2, and with them the trajectory is {:.3f} times as long as odometry and "
+                     "images have it to {:.3f}",
+                     held.factors, held.all, held.worst.bias_sigma_mps2, held.worst.scale, held.worst.scale_sigma)});
   }
 }
 
@@ -72,12 +73,13 @@ void remark_on_stereo(const std::vector<bundle::StereoScale>& scales, std::vecto
     if (!scale.is_refused && !scale.is_corrected) continue;
     out.push_back(
         {scale.robot,
-         fmt::format("its cameras together have its way {:.3f} times as long as its odometry, +-{:.3f}: check the "
-                     "baseline, the rotation between the cameras and the focal lengths, the scale of depth images, or "
-                     "the odometry's scale; the adjustment {}",
-                     scale.ratio, scale.sigma,
-                     scale.is_refused ? "believes its first camera alone"
-                                      : fmt::format("divides the baseline by {:.3f}", scale.ratio))});
+         fmt::format(
+             "its cameras together have its trajectory {:.3f} times as long as its odometry, +-{:.3f}: check the "
+             "baseline, the rotation between the cameras and the focal lengths, the scale of depth images, or "
+             "the odometry's scale; the adjustment {}",
+             scale.ratio, scale.sigma,
+             scale.is_refused ? "believes its first camera alone"
+                              : fmt::format("divides the baseline by {:.3f}", scale.ratio))});
   }
 }
 

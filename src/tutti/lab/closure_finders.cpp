@@ -110,7 +110,7 @@ struct DrawnSettings {
   void describe(V& v) {
     v.field("closures", closures);
     v.field("changes", changes);
-    v.field("seed", seed, any(), "Of what is drawn.");
+    v.field("seed", seed, any(), "Seed of what is drawn.");
   }
 };
 

@@ -158,8 +158,8 @@ Status put_word(storage::TableStore& map, const ClosureWord& word) {
     return fail(ErrorCode::invalid, "{}: no closure was found there that could be accepted", word.closure);
   const auto known = content->words.find(*pair);
   if (known != content->words.end() && !holds_over(word, known->second))
-    return fail(ErrorCode::invalid, "{}: a later word holds: {} of {} ns", word.closure, to_string(known->second.wish),
-                known->second.given_ns);
+    return fail(ErrorCode::invalid, "{}: a later decision holds: {} of {} ns", word.closure,
+                to_string(known->second.wish), known->second.given_ns);
   node::MapMeta meta = content->meta;
   meta.news = true;  // whoever opens it makes the next revision
   const std::vector<storage::Write> writes{{"words", node::key_of(*pair), wire::encode(word)}, node::to_row(meta)};

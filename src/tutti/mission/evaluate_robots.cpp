@@ -117,10 +117,10 @@ void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapE
     out.component = component;
     out.server_estimate = std::move(server_estimate);
     if (left_out > 0)
-      record.notes.push_back(
-          fmt::format("{}: the server holds pieces of its way that nothing joins; {} of {} keyframes are not in the "
-                      "largest and left out of its figures",
-                      out.name, left_out, left_out + out.server_estimate.size()));
+      record.notes.push_back(fmt::format(
+          "{}: the server holds parts of its trajectory that nothing joins; {} of {} keyframes are not in the "
+          "largest and left out of its figures",
+          out.name, left_out, left_out + out.server_estimate.size()));
     if (!out.server_estimate.empty()) out.mapped_share = share_of(scoring.way, out.server_estimate);
     if (const auto factor = map.rotation_factors.find(out.id); factor != map.rotation_factors.end())
       out.rotation_factor = factor->second;

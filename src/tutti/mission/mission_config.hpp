@@ -188,7 +188,7 @@ struct RobotConfig {
     v.field("name", name, any(), "Unique name.");
     v.field("bag", bag, any(),
             "Instead of odometry and scans: what rosbag2 recorded (a folder, .mcap or .db3), or ROS 1's .bag.");
-    v.field("topics", topics, any(), "Of the bag, where their types do not tell which.");
+    v.field("topics", topics, any(), "Names of the bag's topics, where their types do not tell which.");
     v.field("graph", graph);
     v.field("odometry", odometry);
     v.field("reference", reference);

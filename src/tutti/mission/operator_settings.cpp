@@ -15,7 +15,7 @@ std::span<const OperatorSetting> operator_settings() {
        "wrong."},
       {"robots[].covariance.rotation_deg_per_sqrt_m", "The same in rotation."},
       {"agent.submap.duration_s", "A submap is sent after this time; odometry must not bend within it."},
-      {"agent.submap.distance_m", "... or after this way, whichever comes first."},
+      {"agent.submap.distance_m", "... or after this distance, whichever comes first."},
       {"agent.submap.voxel_m", "Clouds of submaps are thinned to voxels of this edge; it decides the bytes uplink."},
       {"agent.submap.max_range_m", "LiDAR points farther away than this are dropped."},
       {"agent.policy.name", "The rule by which a robot chooses constraints from the server's proxy graph."},

@@ -118,7 +118,7 @@ TEST_F(RobotImages, ABaselineThatOdometryContradictsIsTold) {
   EXPECT_FALSE(has_note(run(), "its cameras together"));
   config_.robots[0].images.euroc_folder = "wrong";
   const MissionRecord record = run();
-  EXPECT_TRUE(has_note(record, "a: its cameras together have its way 1.")) << all_notes(record);
+  EXPECT_TRUE(has_note(record, "a: its cameras together have its trajectory 1.")) << all_notes(record);
 }
 
 /// The calibration has the second camera turned by 0.9 degrees about the upright axis, which bends depths.
@@ -199,7 +199,7 @@ TEST_F(RobotImages, DepthImagesThatAreNoneAreTold) {
   expect(told(), "are there 1000 of their numbers to a metre?");
   write_depth(folder(), 1000.0);
   images.depth.scale = 1100.0;
-  expect(told(), "its cameras together have its way 0.9");
+  expect(told(), "its cameras together have its trajectory 0.9");
   images.depth.scale = 1000.0;
   const auto replace = [&](const DepthImage& depth) {
     for (std::size_t i = 0; i <= 32; ++i)

@@ -29,7 +29,7 @@ struct MethodId {
   friend bool operator==(const MethodId&, const MethodId&) = default;
 };
 
-/// Of the name of a job that a method does, and of the text of its settings.
+/// Limits of the name of a job that a method does, and of the text of its settings.
 inline constexpr FieldRule kJobId{.text = FieldRule::Text::word, .at_least = 1, .at_most = 200};
 inline constexpr FieldRule kMethodSettings{.text = FieldRule::Text::any, .at_most = std::size_t{64} << 10U};
 

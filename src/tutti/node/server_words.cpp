@@ -24,17 +24,16 @@ constexpr std::size_t kLongestName = 64;  // of `tutti pki`
 /// An operator's word is not a robot's or a worker's to give.
 void ServerNode::receive_word(const bus::Envelope& envelope, Timestamp now, Step& step) {
   if (envelope.from.role != bus::Endpoint::Role::viewer)
-    return refuse(envelope,
-                  fmt::format("a word on closures from a {}, which is for operators to say", name(envelope.from.role)),
-                  now, step);
+    return refuse(
+        envelope,
+        fmt::format("a decision on closures from a {}, which only operators may make", name(envelope.from.role)), now,
+        step);
   auto word = wire::decode_word(*envelope.bytes);
   if (!word) return refuse(envelope, word.error().message, now, step);
   if (!envelope.user.empty()) word->by = plain_text(envelope.user, kLongestName);  // whatever it claims
   const auto is_late = take_word(envelope, *word, now, step);
   if (!is_late) refuse(envelope, is_late.error().message, now, step);
-  note_word(*envelope.bytes, !is_late   ? is_late.error().message
-                             : *is_late ? "another word on it, given later, holds"
-                                        : "");
+  note_word(*envelope.bytes, !is_late ? is_late.error().message : *is_late ? "a later decision on it holds" : "");
 }
 
 Result<bool> ServerNode::take_word(const bus::Envelope& envelope, const ClosureWord& word, Timestamp now, Step& step) {

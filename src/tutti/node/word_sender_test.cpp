@@ -82,7 +82,7 @@ TEST_F(Words, WhatIsNotTakenIsAnsweredWithTheReason) {
   };
   EXPECT_NE(answer({"nobody/0-0/2", Wish::reject, "ada", 5}).find("nobody"), std::string::npos);
   EXPECT_EQ(answer({"0/0-0/2", Wish::reject, "ada", 5}), "");
-  EXPECT_EQ(answer({"0/0-0/2", Wish::accept, "eve", 4}), "another word on it, given later, holds");
+  EXPECT_EQ(answer({"0/0-0/2", Wish::accept, "eve", 4}), "a later decision on it holds");
   EXPECT_EQ(answer({"0/0-0/2", Wish::accept, "eve", 6}), "");
   EXPECT_EQ(words(), 1U);
 }

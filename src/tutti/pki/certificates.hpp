@@ -11,9 +11,9 @@ namespace tutti::pki {
 /// Certificates by OpenSSL: keys of the curve P-256, signed with SHA-256. `days` is how long they are valid from now
 /// on. Errors are OpenSSL's.
 
-/// Of an authority, which signs the others.
+/// Makes that of an authority, which signs the others.
 Result<bus::Certificate> make_authority(const std::string& name, int days);
-/// Of a bus under `name`, or of somebody who connects to it.
+/// Makes that of a bus under `name`, or of somebody who connects to it.
 Result<bus::Certificate> make_certificate(const bus::Certificate& authority, const std::string& name, bool is_bus,
                                           int days);
 /// "2027-01-31 12:00:00 UTC", until when a certificate is valid.

@@ -90,8 +90,8 @@ Told tell(const node::WordTaken& taken) {
            {"first", to_string(taken.pair.first)},
            {"second", to_string(taken.pair.second)},
            {"wish", to_string(taken.wish)}},
-          fmt::format("an operator's word on the closures between submaps {} and {}: {}", to_string(taken.pair.first),
-                      to_string(taken.pair.second), to_string(taken.wish))};
+          fmt::format("an operator's decision on the closures between submaps {} and {}: {}",
+                      to_string(taken.pair.first), to_string(taken.pair.second), to_string(taken.wish))};
 }
 Told tell(const node::VerificationFailed& failed) {
   const std::string pair = to_string(failed.pair.first) + " and " + to_string(failed.pair.second);
@@ -256,8 +256,8 @@ Told tell_event(const node::Event& event) {
   return told;
 }
 
-/// Of events that others can cause as often as they like; empty: of another one. Who it was is not in it: they can say
-/// that, too.
+/// The kind of an event that others can cause as often as they like; empty: another event. Who it was is not in it:
+/// they can say that, too.
 std::string throttled_kind(const node::Event& event) {
   if (const auto* refused = std::get_if<node::MessageRefused>(&event.what))
     return fmt::format("message {} {}", name(refused->from.role), wire::name(refused->kind));

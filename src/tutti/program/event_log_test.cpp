@@ -22,7 +22,7 @@ class EventLogTest : public testing::Test {
     fs::create_directories(folder_);
   }
   void TearDown() override { fs::remove_all(folder_); }
-  /// Of some 50 bytes each, into files of 1 kB.
+  /// Writes lines of some 50 bytes each, into files of 1 kB.
   void write(int first, int count) const {
     const auto log = EventLog::open(folder_, "test", Level::error, 1000);
     ASSERT_TRUE(log.has_value()) << log.error().message;

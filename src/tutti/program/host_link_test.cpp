@@ -15,7 +15,7 @@ namespace host_link_test {
 
 namespace fs = std::filesystem;
 
-/// Of a bus that is gone.
+/// The bus is gone.
 class DeadPort final : public bus::Port {
  public:
   Status send(bus::Envelope) override { return {}; }

@@ -51,7 +51,7 @@ struct RobotSettings {
   template <class V>
   void describe(V& v) {
     v.field("agent", agent);
-    v.field("tracking", tracking, any(), "Of the images that are fed.");
+    v.field("tracking", tracking, any(), "How the images that are fed are tracked.");
   }
 };
 

@@ -27,7 +27,7 @@ constexpr std::size_t kCacheBytes = std::size_t{512} << 20U;
 /// Thrown through the verification of a job when the program is to end.
 struct Stopped {};
 
-/// Of this start and no other, nor the server's own worker, which is 0.
+/// No other start has it, nor the server's own worker, which is 0.
 std::uint32_t any_number() {
   const Rng rng = Rng(wall_clock_ns()).fork(static_cast<std::uint64_t>(getpid()));
   return static_cast<std::uint32_t>(1 + Rng(rng).index(std::numeric_limits<std::uint32_t>::max() - 1));

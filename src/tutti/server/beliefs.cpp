@@ -58,8 +58,8 @@ std::string to_string(const ChangeReason& reason) {
   add(reason.found, "of its closures are new");
   add(reason.taken_up, "of its closures that were refused are accepted");
   add(reason.dropped, "of its closures that were accepted are refused");
-  add(reason.failed, "stretches of its odometry are taken to have failed");
-  add(reason.recovered, "stretches of its odometry are believed again");
+  add(reason.failed, "segments of its odometry are taken to have failed");
+  add(reason.recovered, "segments of its odometry are believed again");
   if (parts.empty()) add(reason.elsewhere, "closures of other robots changed");
   if (parts.empty()) parts.emplace_back("what its odometry and closures are worth was judged anew");
   if (reason.lone > 0) parts.push_back(fmt::format("and all of it rests on one place ({} closures)", reason.lone));

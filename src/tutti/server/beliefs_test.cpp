@@ -22,11 +22,10 @@ TEST(Beliefs, EveryDifferenceIsCountedOnceAndOnItsOwnSide) {
   const ChangeReason reason = reason_of_change(beliefs_of(older), beliefs_of(newer), kAlpha);
   EXPECT_EQ(reason,
             (ChangeReason{.found = 1, .taken_up = 1, .dropped = 1, .failed = 1, .recovered = 1, .elsewhere = 1}));
-  EXPECT_EQ(
-      to_string(reason),
-      "1 of its closures are new, 1 of its closures that were refused are accepted, 1 of its closures that were "
-      "accepted are refused, 1 stretches of its odometry are taken to have failed, 1 stretches of its odometry are "
-      "believed again");
+  EXPECT_EQ(to_string(reason),
+            "1 of its closures are new, 1 of its closures that were refused are accepted, 1 of its closures that were "
+            "accepted are refused, 1 segments of its odometry are taken to have failed, 1 segments of its odometry are "
+            "believed again");
   EXPECT_EQ(reason_of_change(beliefs_of(newer), beliefs_of(newer), kAlpha), ChangeReason{});
   EXPECT_EQ(to_string(ChangeReason{.elsewhere = 3}), "3 closures of other robots changed");
 }

@@ -190,16 +190,16 @@ std::string why_uncertain(std::span<const FixedPoint> points, const FixAlignment
   const double spread = spread_m(points, at);
   if (at.median_miss_m > kWorstFit * spread && spread_factor(points, at.T_enu_world) > kNotNoise)
     return fmt::format(
-        "its fixes do not have the shape of its way: half of them are {:.1f} m off or more, and it spreads "
+        "its fixes do not have the shape of its trajectory: half of them are {:.1f} m off or more, and it spreads "
         "by {:.1f} m (latitude and longitude swapped? stamps of another clock?)",
         at.median_miss_m, spread);
   if (!(at.sigma_yaw_rad() <= kYawKnown_rad))
     return fmt::format(
         "its heading is known to {:.0f} degrees only, expected {:.0f}: it has not moved far enough for "
-        "what its fixes are worth (its way spreads by {:.1f} m)",
+        "what its fixes are worth (its trajectory spreads by {:.1f} m)",
         std::min(180.0, at.sigma_yaw_rad() / kRadPerDeg), kYawKnown_rad / kRadPerDeg, spread);
   if ((at.T_enu_world.rotation * Vector3d::UnitZ()).z() < kUpsideDown)
-    return "its fixes are a mirror image of its way: are latitude and longitude swapped?";
+    return "its fixes are a mirror image of its trajectory: are latitude and longitude swapped?";
   return {};
 }
 

@@ -281,7 +281,7 @@ void MapServer::take(const ClosureVerdict& verdict) {
 
 Status MapServer::receive(const SubmapPair& pair, const ClosureWord& word) {
   const auto where = [&] {
-    return fmt::format("word on submaps {} and {}", to_string(pair.first), to_string(pair.second));
+    return fmt::format("decision on submaps {} and {}", to_string(pair.first), to_string(pair.second));
   };
   if (!(pair.first < pair.second)) return fail(ErrorCode::invalid, "{}: expected the first to be the smaller", where());
   for (const SubmapId& id : {pair.first, pair.second})

@@ -50,7 +50,8 @@ struct HallMissionConfig {
   template <class V>
   void describe(V& v) {
     v.field("world", world, any(), "Where they fly.");
-    v.field("cameras", cameras, between(1, 2), "Of a robot with any; the second is 11 cm to the right of the first.");
+    v.field("cameras", cameras, between(1, 2),
+            "How many a robot with cameras has; the second is 11 cm to the right of the first.");
     v.field("depth", depth, any(),
             "The camera, of one, is an RGB-D camera: depth within 8 m, 1.4 mm off at 1 m, growing with its square.");
     v.field("imu", imu, any(), "Robots with a camera have an IMU, too.");

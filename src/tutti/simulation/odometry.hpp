@@ -40,7 +40,7 @@ struct FailureConfig {
   double drift_m = 0.0;
   template <class V>
   void describe(V& v) {
-    v.field("after_m", after_m, between(0.0, kFarthest_m), "Begins after this way in the open.");
+    v.field("after_m", after_m, between(0.0, kFarthest_m), "Begins after this distance in the open.");
     v.field("length_m", length_m, above_zero_to(kFarthest_m), "Lasts this long, or until the robot is back inside.");
     v.field("yaw_deg", yaw_deg, between(0.0, 180.0), "Yaw error it ends with, to either side.");
     v.field("drift_m", drift_m, between(0.0, kFarthest_m),
@@ -61,7 +61,7 @@ struct ScriptedErrorConfig {
   double up_m = 0.0;
   template <class V>
   void describe(V& v) {
-    v.field("after_m", after_m, between(0.0, kFarthest_m), "After this way of the run.");
+    v.field("after_m", after_m, between(0.0, kFarthest_m), "After this distance of the run.");
     v.field("at_start", at_start, any(), "... waits until the robot next passes where it started.");
     v.field("length_m", length_m, between(0.0, kFarthest_m), "Way over which the error grows; 0 = all at once.");
     v.field("yaw_deg", yaw_deg, between(-180.0, 180.0), "Size it ends with: a turn to the left");

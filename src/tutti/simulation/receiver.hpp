@@ -19,7 +19,7 @@ struct PlaceConfig {
   double yaw_deg = 25.0;
   template <class V>
   void describe(V& v) {
-    v.field("latitude_deg", latitude_deg, between(-90.0, 90.0), "Of the truth's origin; WGS 84.");
+    v.field("latitude_deg", latitude_deg, between(-90.0, 90.0), "Where the truth's origin is; WGS 84.");
     v.field("longitude_deg", longitude_deg, between(-180.0, 180.0), "The same.");
     v.field("height_m", height_m, between(-1e4, 1e4), "Above the ellipsoid.");
     v.field("yaw_deg", yaw_deg, between(-180.0, 180.0), "The truth's x axis points so far north of east.");

@@ -21,7 +21,7 @@ using Firing = std::function<void(double share, std::vector<Eigen::Vector3d>& di
 /// Where a LiDAR looks while it sweeps.
 struct ScanPattern {
   std::string_view name, help;
-  std::size_t (*firings)(const LidarConfig& config);          ///< Of one sweep.
+  std::size_t (*firings)(const LidarConfig& config);          ///< In one sweep.
   Firing (*sweep)(const LidarConfig& config, Timestamp end);  ///< Depends on these two alone.
 };
 

@@ -31,8 +31,8 @@ struct SurfaceConfig {
     v.field("cell_m", cell_m, between(0.05, 1.0), "Grid the surface is built on: details below it are lost.");
     v.field("body_height_m", body_height_m, above_zero_to(kLargestRoom_m),
             "Height of the network's lines above the floor.");
-    v.field("width_m", width_m, above_zero_to(kLargestRoom_m), "Of rough and featureless corridors.");
-    v.field("office_width_m", office_width_m, above_zero_to(kLargestRoom_m), "Of office corridors.");
+    v.field("width_m", width_m, above_zero_to(kLargestRoom_m), "Width of rough and featureless corridors.");
+    v.field("office_width_m", office_width_m, above_zero_to(kLargestRoom_m), "Width of office corridors.");
     v.field("doors_per_100m", doors_per_100m, between(0.0, kMostPer100m),
             "Office: door niches; every third stands open to a room.");
     v.field("parapet_height_m", parapet_height_m, between(0.0, kLargestRoom_m), "Roof: wall around its edge.");

@@ -195,7 +195,7 @@ Status FieldReader::read_set(std::string_view bytes, NumberSets& sets) {
   for (std::size_t i = 0; i + 1 < bounds->size(); i += 2) {
     const std::uint64_t begin = last + (*bounds)[i];
     last = begin + (*bounds)[i + 1];
-    if (!numbers->second.append({begin, last})) return fail(ErrorCode::invalid, "stretches that touch");
+    if (!numbers->second.append({begin, last})) return fail(ErrorCode::invalid, "segments that touch");
   }
   return {};
 }
@@ -261,8 +261,8 @@ Status FieldChecker::check_value(const NumberSets& sets, const FieldRule& rule) 
       return fail(ErrorCode::invalid, "a submap with a number of more than 32 bits");
   }
   if (sets.size() <= rule.at_most && stretches <= kMaxStretches) return {};
-  return fail(ErrorCode::invalid, "{} sessions and {} stretches, at most {} and {} are accepted", sets.size(),
-              stretches, rule.at_most, kMaxStretches);
+  return fail(ErrorCode::invalid, "{} sessions and {} segments, at most {} and {} are accepted", sets.size(), stretches,
+              rule.at_most, kMaxStretches);
 }
 
 Status FieldChecker::too_many(std::size_t count, std::size_t at_most) {

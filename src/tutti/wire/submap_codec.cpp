@@ -42,7 +42,7 @@ void write_odometry(const Submap& submap, v1::Submap& out) {
   if (!odometry_follows_from_poses(submap)) write_columns(poses, *out.mutable_odometry());
 }
 
-/// Of v1::Submap or its outline, as what follows.
+/// `In`, here and below, is v1::Submap or its outline.
 template <class In>
 Status read_keyframes(const In& in, Submap& submap) {
   const auto count = static_cast<std::size_t>(in.stamp_ns_size());
@@ -101,7 +101,7 @@ void write_fixes(const Submap& submap, v1::Fixes& out) {
   write_columns(positions, *out.mutable_position());
 }
 
-/// Of any number, before memory is taken for them; their values are checked with the message.
+/// Checks how many there are before memory is taken for them; their values are checked with the message.
 Status read_fixes(const v1::Fixes& in, Submap& submap) {
   const auto count = static_cast<std::size_t>(in.keyframe_size());
   if (count > kMaxFixes) return fail(ErrorCode::invalid, "{} fixes, at most {} are accepted", count, kMaxFixes);

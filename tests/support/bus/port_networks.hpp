@@ -26,7 +26,7 @@ class PortNetwork {
   /// Nothing gets from robots to the server or back until it is mended.
   virtual void cut() = 0;
   virtual void mend() = 0;
-  /// Of the bus beside the server; empty: it is no transport.
+  /// The URL of the bus beside the server; empty: it is no transport.
   [[nodiscard]] virtual std::string url() const { return {}; }
 };
 

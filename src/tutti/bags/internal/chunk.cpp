@@ -26,7 +26,7 @@ struct Progress {
   const char* error = nullptr;  ///< As the library says it.
 };
 
-/// `step(in, out, room)` unpacks some of `in`. Of a chunk that is cut off as much as may come of what is there.
+/// `step(in, out, room)` unpacks some of `in`. A chunk that is cut off gives as much as what is there holds.
 template <class Step>
 Result<std::string> unpack(std::string_view packed, std::uint64_t size, bool cut, std::string out, const char* name,
                            const Step& step) {

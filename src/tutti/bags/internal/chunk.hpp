@@ -28,7 +28,7 @@ std::string pack_zstd(std::string_view bytes);
 
 /// Unpacks the records of a chunk: compression "" (none), "zstd", "lz4" (its frame format) or "bz2" (ROS 1's), `size`
 /// bytes unpacked. Memory grows with what really comes out, so that a length that lies costs nothing, and not beyond
-/// most_unpacked(). Of a chunk that is `cut` off, what comes out before the cut. The error says what was
+/// most_unpacked(). A chunk that is `cut` off gives what comes out before the cut. The error says what was
 /// expected. `memory` is used again, whatever is in it: to take it from the system anew costs more than to unpack.
 Result<std::string> unpack_chunk(std::string_view packed, std::string_view compression, std::uint64_t size, bool cut,
                                  std::string memory = {});

@@ -49,7 +49,7 @@ class JetStreamPort final : public Port {
   bool send_one(const NatsConnection& connection);
   bool acknowledge_one(const NatsConnection& connection);
   void say_farewell();
-  /// Of this thread alone: no acknowledgement is on its way to a stream that is being made anew.
+  /// Only this thread calls it: no acknowledgement is on its way to a stream that is being made anew.
   void make_stream_anew(const NatsConnection& connection);
 
   // The receivers' threads.
@@ -95,7 +95,7 @@ class JetStreamPort final : public Port {
   std::atomic<std::uint64_t> cuts_ = 0;     ///< Sessions and reconnections so far.
   std::atomic<std::size_t> listening_ = 0;  ///< Threads with a subscription.
   bool renewed_ = false;                    ///< The server's consumers were.
-  std::uint64_t reconnects_ = 0;            ///< Of the present session that the sender knows of.
+  std::uint64_t reconnects_ = 0;            ///< Since the present session, as far as the sender knows.
   std::map<std::uint64_t, int> tries_;      ///< To acknowledge, by ticket.
 
   mutable std::mutex mutex_;  ///< For what follows.

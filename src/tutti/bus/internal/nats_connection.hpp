@@ -68,7 +68,7 @@ class NatsConnection {
   struct Look {
     std::uint64_t first = 0;       ///< Sequence in the stream.
     std::uint64_t messages = 0;    ///< In the stream.
-    std::uint64_t pending = 0;     ///< Of these: to be given for the first time;
+    std::uint64_t pending = 0;     ///< Those to be given for the first time;
     std::uint64_t given = 0;       ///< given and not acknowledged.
     std::uint64_t deliveries = 0;  ///< So far.
     std::uint64_t gone = 0;        ///< Messages that were once in the stream, and are not any more.

@@ -28,7 +28,7 @@ namespace tutti::bus {
 class Inbox {
  public:
   using Time = std::chrono::steady_clock::time_point;
-  static constexpr std::size_t kMostHalves = 16;                         ///< Of a sender.
+  static constexpr std::size_t kMostHalves = 16;                         ///< A sender's.
   static constexpr std::size_t kMostHalfBytes = std::size_t{20} << 20U;  ///< Likewise; more than one message has.
   static constexpr std::size_t kMostHalvesInAll = 4096;
   static constexpr std::size_t kMostHalfBytesInAll = std::size_t{128} << 20U;
@@ -45,8 +45,8 @@ class Inbox {
   void put_retained(Endpoint from, MessageKind kind, std::string bytes);
   /// A job of ours that no worker gets any more.
   void put_returned(MessageKind kind, std::string id, std::string bytes);
-  /// Of status the newest of each sender; of those not taken the oldest go when there are too many, of a sender or in
-  /// all.
+  /// Keeps the newest status of each sender. When there are too many that nobody has taken, of a sender or in all, the
+  /// oldest go.
   void put_best_effort(Endpoint from, MessageKind kind, std::string bytes);
 
   std::vector<Received> take();
@@ -68,10 +68,10 @@ class Inbox {
   /// Where messages that came again although they are acknowledged are to be acknowledged once more.
   [[nodiscard]] std::vector<std::string> take_strays() { return std::exchange(strays_, {}); }
   [[nodiscard]] std::size_t acknowledgements() const { return acknowledged_.size(); }
-  /// Of all that is not acknowledged, whole or not.
+  /// Everything that is not acknowledged, whole or not.
   [[nodiscard]] std::vector<std::string> unacknowledged() const;
 
-  /// Of whole messages; those that the bus was not told to forget.
+  /// Whole messages that the bus was not told to forget.
   [[nodiscard]] std::uint64_t held_bytes() const { return held_bytes_; }
   [[nodiscard]] std::size_t held_messages() const { return held_.size(); }
   /// Messages so far that never became whole.

@@ -15,9 +15,8 @@ namespace tutti::bus {
 /// A message is cut into parts of this size, so that each gets through a slow link within the time for one write
 /// (1 Mbit/s: 1 s).
 inline constexpr std::size_t kPartBytes = 128U << 10U;
-inline constexpr std::uint32_t kMostParts = 128;  ///< 16 MiB
-inline constexpr std::size_t kLargestWhole =
-    (8U << 20U) - (8U << 10U);  ///< Of what is not cut; NATS counts headers too.
+inline constexpr std::uint32_t kMostParts = 128;                         ///< 16 MiB
+inline constexpr std::size_t kLargestWhole = (8U << 20U) - (8U << 10U);  ///< What is not cut; NATS counts headers too.
 
 /// 1 to 32 letters, digits, '-' or '_'.
 bool is_mission_name(std::string_view mission);
@@ -63,7 +62,7 @@ class Assembly {
   [[nodiscard]] std::string take_bytes();
   /// Where each part is acknowledged: that of its newest delivery.
   [[nodiscard]] const std::map<std::uint32_t, std::string>& replies() const { return replies_; }
-  /// Of one that is complete.
+  /// Once the message is complete.
   void forget_replies() { replies_.clear(); }
 
  private:

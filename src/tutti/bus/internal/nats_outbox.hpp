@@ -17,7 +17,7 @@
 
 namespace tutti::bus {
 
-/// What a port has to send, in parts, until the bus has confirmed each. Of time it knows what it is told.
+/// What a port has to send, in parts, until the bus has confirmed each. It has no clock: callers say what time it is.
 class Outbox {
  public:
   using Time = std::chrono::steady_clock::time_point;
@@ -45,7 +45,7 @@ class Outbox {
   void confirm(std::uint64_t number);
   /// The bus does not take it: again, after a while.
   void refuse(std::uint64_t number, Time now);
-  /// Of what is under way.
+  /// Everything under way counts as refused.
   void refuse_all(Time now);
   /// What was under way for too long waits again.
   void expire(Time now);
@@ -77,7 +77,7 @@ class Outbox {
 
   std::string mission_;
   std::uint64_t max_waiting_bytes_;
-  std::uint64_t bytes_ = 0;  ///< Of all pieces.
+  std::uint64_t bytes_ = 0;  ///< All parts'.
   std::uint64_t next_number_ = 0;
   Time not_before_{};
   std::optional<Time> unconfirmed_since_;

@@ -28,7 +28,7 @@ Envelope envelope(MessageKind kind, const std::string& id, std::size_t size, cha
           .bytes = std::make_shared<const std::string>(size, content)};
 }
 
-/// Of envelope(MessageKind::submap, id, size).
+/// A part's id in envelope(MessageKind::submap, id, size).
 std::string part_id(const std::string& id, std::size_t size, std::uint32_t index = 0, std::uint32_t count = 1) {
   return to_string(Part{MessageKind::submap, id, index, count, content_hash(std::string(size, 'x'))});
 }

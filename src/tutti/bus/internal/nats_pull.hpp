@@ -40,9 +40,9 @@ class NatsPull {
   std::shared_ptr<NatsConnection> connection_;
   std::string ask_;  ///< Where to.
   natsSubscription* subscription_;
-  std::string inbox_;  ///< Of all requests; each has a number behind it.
+  std::string inbox_;  ///< All requests'; each has a number behind it.
   std::uint64_t requests_ = 0;
-  int left_ = 0;        ///< Of the last request.
+  int left_ = 0;        ///< The last request's.
   int unanswered_ = 0;  ///< Requests, the last ones.
   std::chrono::steady_clock::time_point until_;
 };

@@ -27,7 +27,7 @@ struct BundleConfig {
   void describe(V& v) {
     v.field("loss", loss, one_of({"none", "huber", "cauchy", "geman_mcclure"}), "Robust loss on the views.");
     v.field("odometry_scale_sigma", odometry_scale_sigma, greater_than(0.0),
-            "By how much odometry may be wrong in scale all along its way, beside its covariance.");
+            "By how much odometry may be wrong in scale all along its trajectory, beside its covariance.");
   }
 };
 

@@ -33,9 +33,9 @@ std::string scales_table(const TrajectoryComparison& c, const PictureClock& cloc
 
 std::string origins_table(const TrajectoryComparison& c, const PictureClock& clock) {
   const auto& origins = c.explanation.origins;
-  if (origins.empty()) return "  No stretch stands out from the rest of the way: B drifts all along.\n";
+  if (origins.empty()) return "  No segment stands out from the rest of the trajectory: B drifts all along.\n";
   TextTable table(0);
-  table.add({"from", "until", "where", "way", "translation", "rotation", "scale", "over threshold", ""});
+  table.add({"from", "until", "where", "distance", "translation", "rotation", "scale", "over threshold", ""});
   table.rule();
   for (std::size_t i = 0; i < std::min(origins.size(), kMostRows); ++i) {
     const auto& o = origins[i];
@@ -43,7 +43,7 @@ std::string origins_table(const TrajectoryComparison& c, const PictureClock& clo
                fmt::format("{:.1f} m", o.length_m), format_metres(o.translation_m), degrees(o.rotation_rad),
                format_scale(c.explanation, o.scale), format_significance(o.significance), o.alert ? "failure?" : ""});
   }
-  return table.str() + more(origins.size(), "stretches");
+  return table.str() + more(origins.size(), "segments");
 }
 
 std::string constraints_table(const TrajectoryComparison& c, const PictureClock& clock) {
@@ -80,7 +80,7 @@ std::string robot_text(const CompareReport& report, const TrajectoryComparison& 
     return out + "\n  They agree: nothing stands out of that at any scale.\n\n" + scales_table(c, clock);
   out += fmt::format("\n  They disagree, by up to {} the threshold.\n\n", format_significance(largest_significance(e)));
   out += scales_table(c, clock);
-  out += "\n  Where it was born (relative motion of B against A's over the stretch)\n\n" + origins_table(c, clock);
+  out += "\n  Where it was born (relative motion of B against A's over the segment)\n\n" + origins_table(c, clock);
   out += fmt::format("\n  Relative poses of A that would fix B: {}\n\n", c.constraints.size());
   out += constraints_table(c, clock);
   if (c.constraints.empty()) return out;

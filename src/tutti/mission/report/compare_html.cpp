@@ -55,7 +55,7 @@ std::string scales_html(const TrajectoryComparison& c, const PictureClock& clock
 std::string origins_html(const TrajectoryComparison& c, const PictureClock& clock) {
   if (c.explanation.origins.empty()) return "";
   HtmlTable table{
-      {"suspected", "from", "until", "where", "way", "translation", "rotation", "scale", "over threshold"}, {}, 1};
+      {"suspected", "from", "until", "where", "distance", "translation", "rotation", "scale", "over threshold"}, {}, 1};
   for (const auto& o : c.explanation.origins)
     table.rows.push_back({o.alert ? "<b>localisation failure</b>" : "drift", format_moment(clock(o.from)),
                           format_moment(clock(o.until)), format_place(o.place_m), fmt::format("{:.1f} m", o.length_m),

@@ -173,7 +173,7 @@ std::string explanation_svg(const ExplanationPicture& picture, double width_px) 
     svg.text({kLeft_px - 8.0, top + 0.5 * row + 4.0}, format_scale(e, static_cast<int>(s)), "tick", "end");
   }
   svg.segments(rows, "rowline");
-  svg.vertical_text({13.0, 0.5 * (kTop_px + map_bottom)}, "scale: length of way", "axis");
+  svg.vertical_text({13.0, 0.5 * (kTop_px + map_bottom)}, "scale: distance", "axis");
   draw_hover_cells(svg, picture, x);
 
   Strokes grid;

@@ -60,7 +60,7 @@ std::string clouds_html(const MissionRecord& record) {
       "<div class=\"figures\">\n" + panels_html(top, false) + panels_html(section_picture, true) + "</div>\n";
   if (surveyed) body = distance_scale() + body + "<br>\n" + error_table(record);
   std::string lead = fmt::format(
-      "From above, then a vertical slice {:.0f} m thick across their ways. Every picture shows the same "
+      "From above, then a vertical slice {:.0f} m thick across their trajectories. Every picture shows the same "
       "place "
       "at the same scale.",
       kSliceThickness_m);

@@ -25,7 +25,8 @@ std::string origins_table(const RobotRecord& robot) {
   const consistency::Explanation& e = *robot.explanation;
   if (e.origins.empty()) return "";
   const bool truth = !robot.drift_origins.empty();
-  HtmlTable table{{"suspected", "when", "where", "way", "translation", "rotation", "scale", "over threshold"}, {}, 3};
+  HtmlTable table{
+      {"suspected", "when", "where", "distance", "translation", "rotation", "scale", "over threshold"}, {}, 3};
   if (truth) table.head.push_back("really");
   for (const auto& origin : e.origins) {
     std::vector<std::string> row{origin.alert ? "<b>localisation failure</b>" : "drift",
@@ -86,7 +87,7 @@ std::string explanation_html(const MissionRecord& record) {
   body = significance_scale_html() + legend_html(legend) + figures;
   return section(
       "Where odometry and map part",
-      "Raw odometry against the last broadcast, stretch by stretch and scale by scale, in units of what the "
+      "Raw odometry against the last broadcast, segment by segment and scale by scale, in units of what the "
       "server is unsure of: above 1 it is not chance. White frames: where the map says the drift was born. Missed: two "
       "places that closures tie together, and odometry does not.",
       body);

@@ -38,7 +38,7 @@ std::string partial_figures(const RobotRecord& robot, const PolicyRecord* policy
   std::string out;
   const auto add = [&](std::string_view what, std::optional<double> rmse_m, std::optional<double> share) {
     if (rmse_m && is_partial(share))
-      out += fmt::format("<br>partial, scored on {} of its way only: {} {}", format_scored(share), what,
+      out += fmt::format("<br>partial, scored on {} of its trajectory only: {} {}", format_scored(share), what,
                          format_error(rmse_m, share));
   };
   add("onboard", robot.onboard.rmse_m, robot.onboard.scored_share);
@@ -100,7 +100,7 @@ std::vector<Card> map_cards(const MissionRecord& record) {
     const std::string figure = format_metres(figure_m);
     if (partial)
       cards.push_back({what, "-",
-                       fmt::format("partial, scored on {} of all robots' way only: ({}), {}",
+                       fmt::format("partial, scored on {} of all robots' trajectories only: ({}), {}",
                                    format_scored(server.joint.scored_share), figure, detail)});
     else
       cards.push_back({what, figure, detail});

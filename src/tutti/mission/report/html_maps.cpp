@@ -72,7 +72,7 @@ std::string component_figure(const MissionRecord& record, std::uint32_t componen
   std::vector<Points2d> box = layers;
   box.push_back(cloud_corners(clouds, ground, layers));
   const PlanView view(box, kWide_px, 0.56 * kWide_px);
-  Svg svg(view.width(), view.height(), "The joint map from above: every robot's way in the server's estimate");
+  Svg svg(view.width(), view.height(), "The joint map from above: every robot's trajectory in the server's estimate");
   draw_clouds(svg, view, ground, std::move(clouds));
   const auto [intra, inter] = closure_strokes(record, component, {T_display_world, ground, view});
   svg.segments(thinned(intra), "intra", fmt::format("{} loop closures within one robot", intra.size()));

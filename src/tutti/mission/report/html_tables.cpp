@@ -106,7 +106,7 @@ std::string policies_html(const MissionRecord& record) {
   if (record.robots.empty()) return "";
   std::string body =
       "<div class=\"scroll\"><table>\n<thead><tr><th class=\"left\">estimate or policy</th><th>RMSE</th><th>largest "
-      "error</th><th>RPE</th><th>RPE, 10 m</th><th>scored</th><th>kink</th><th>RMSE to "
+      "error</th><th>RPE</th><th>RPE, 10 m</th><th>scored</th><th>discontinuity</th><th>RMSE to "
       "server</th><th>constraints</th><th>of "
       "odometry</th><th>update, ms</th>"
       "</tr></thead>\n<tbody>\n";
@@ -116,7 +116,8 @@ std::string policies_html(const MissionRecord& record) {
       several ? "Policies side by side" : "Each robot in figures",
       fmt::format(
           "{} RMSE and largest error at keyframes after one rigid alignment, without scale{}. Scored: the share "
-          "of the way that these figures were scored on; below 95 % they are partial, in brackets. Kink: the "
+          "of the trajectory that these figures were scored on; below 95 % they are partial, in brackets. "
+          "Discontinuity: the "
           "most that correcting changed any motion over 1 s. Update: median / largest.",
           several ? fmt::format("Every policy answers the very same broadcasts; {} is the one the robot follows.",
                                 record.default_policy)
@@ -181,7 +182,7 @@ std::string transforms_html(const MissionRecord& record) {
   }
   return section("How the robots' frames lie",
                  "Nobody told the server where the robots started. The difference to the reference is measured at the "
-                 "centroid of the second robot's way.",
+                 "centroid of the second robot's trajectory.",
                  html(table));
 }
 

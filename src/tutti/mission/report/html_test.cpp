@@ -316,7 +316,7 @@ TEST(ReportHtml, APartialFigureIsMarkedAndNoHeadline) {
   const std::string html = report_html(record);
   expect_good_page(html);
   EXPECT_NE(headline(html).find("<small>server -</small>"), std::string::npos);
-  EXPECT_NE(headline(html).find("partial, scored on 6 % of its way only: server (0.017 m)"), std::string::npos);
+  EXPECT_NE(headline(html).find("partial, scored on 6 % of its trajectory only: server (0.017 m)"), std::string::npos);
   for (const char* figure : {"0.018 m", "0.050 m"}) {  // of the joint map: RMSE, and mean distance to the survey
     EXPECT_EQ(headline(html).find(std::string("<p class=\"value\">") + figure), std::string::npos) << figure;
     EXPECT_NE(headline(html).find(std::string("of all robots' way only: (") + figure), std::string::npos) << figure;

@@ -109,11 +109,11 @@ std::string server_lines(const MissionRecord& record) {
                                  plural(record.robots.size(), "robot"), plural(closures.accepted(), "loop closure"),
                                  closures.accepted_inter, closures.rejected());
   if (is_partial(server.joint.scored_share))
-    text += fmt::format("; partial: RMSE ({}) over {} at once is scored on {} of all robots' way",
+    text += fmt::format("; partial: RMSE ({}) over {} at once is scored on {} of all robots' trajectories",
                         format_metres(server.joint.rmse_m), format_mapped_robots(record),
                         format_scored(server.joint.scored_share));
   else if (server.joint.rmse_m)
-    text += fmt::format(", RMSE {} over {} at once (max {}; scored on {} of the way)",
+    text += fmt::format(", RMSE {} over {} at once (max {}; scored on {} of the trajectory)",
                         format_metres(server.joint.rmse_m), format_mapped_robots(record),
                         format_metres(server.joint.max_error_m), format_scored(server.joint.scored_share));
   if (const auto& check = server.closure_check)
@@ -148,7 +148,7 @@ std::string correction_lines(const RobotRecord& robot, const PolicyRecord& polic
   if (!policy.kink || policy.constraints_added == 0) return "";
   return wrap(fmt::format("{}: correcting changed no motion over 1 s by more than {} and {:.3f} deg.", robot.name,
                           format_metres(policy.kink->translation_m), policy.kink->rotation_deg),
-              "  kink     ");
+              "  change   ");
 }
 
 /// Less harm than this is not worth a line, m.
@@ -213,7 +213,7 @@ std::string report_text(const MissionRecord& record, const std::string& report_h
                   "  RMSE, max: against the reference, after one rigid alignment per robot. RPE: over {} and 10 m.\n",
                   record.rpe_interval)
             : std::string("  No reference: no error could be measured, only how far corrected and server agree.\n");
-    out += "  scored: share of the way that these figures were scored on.";
+    out += "  scored: share of the trajectory that these figures were scored on.";
     if (has_partial_figures(record))
       out += fmt::format(" In brackets: partial, below {:.0f} %.", 100.0 * kPartialBelow);
     out += "\n  to server: RMSE of corrected against server, no accuracy. update ms: median / max, wall clock.\n";

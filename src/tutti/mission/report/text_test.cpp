@@ -74,7 +74,7 @@ TEST(ReportText, TellsOfAlertsAndKinks) {
             std::string::npos)
       << text;
   EXPECT_NE(text.find("compare  bravo: odometry and map part by up to"), std::string::npos) << text;
-  EXPECT_NE(text.find("kink     alpha: correcting changed no motion over 1 s by more than 0.010 m and 0.400 deg"),
+  EXPECT_NE(text.find("change   alpha: correcting changed no motion over 1 s by more than 0.010 m and 0.400 deg"),
             std::string::npos)
       << text;
   ASSERT_EQ(text.find("better than it says"), std::string::npos);
@@ -92,7 +92,7 @@ TEST(ReportText, TellsOfAlertsAndKinks) {
   const std::string quiet = report_text(record, "x");
   EXPECT_EQ(quiet.find("localisation failure"), std::string::npos);
   EXPECT_NE(quiet.find("agree within what the server is sure of; nothing was added"), std::string::npos) << quiet;
-  EXPECT_EQ(quiet.find("kink  "), std::string::npos);
+  EXPECT_EQ(quiet.find("  change   "), std::string::npos);
 }
 
 TEST(ReportText, SaysWhenThereIsNoReference) {
@@ -118,7 +118,7 @@ TEST(ReportText, APartialFigureIsMarkedAndNoHeadline) {
   const std::string whole = report_text(record, "x");
   EXPECT_EQ(whole.find("partial"), std::string::npos) << whole;
   EXPECT_NE(unwrapped(whole).find("server 0.017 m 0.050 m 0.024 m 0.026 m 100 %"), std::string::npos) << whole;
-  EXPECT_NE(unwrapped(whole).find("at once (max 0.061 m; scored on 100 % of the way)"), std::string::npos);
+  EXPECT_NE(unwrapped(whole).find("at once (max 0.061 m; scored on 100 % of the trajectory)"), std::string::npos);
   record.robots[1].server.scored_share = record.robots[1].mapped_share = 0.0699;
   record.server.joint.scored_share = 0.5349;
   const std::string text = report_text(record, "x");

@@ -82,7 +82,8 @@ struct LidarClosureConfig {
     v.field("candidates", candidates, any(), "Rough alignment.");
     v.field("min_overlap", min_overlap, between(0.0, 1.0), "Mean overlap of both directions.");
     v.field("max_viewpoint_distance_m", max_viewpoint_distance_m, greater_than(0.0),
-            "Between the middles of the two ways; closures from farther apart are not looked for. In a network that is "
+            "Between the middles of the two trajectories; closures from farther apart are not looked for. In a network "
+            "that is "
             "walked for an hour a few metres leave more than enough closures.");
     v.field(
         "sure_eigenvalue", sure_eigenvalue, between(0.0, 0.34),

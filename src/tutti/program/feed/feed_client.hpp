@@ -29,7 +29,7 @@ struct FeedAnswer {
   bool wants_scan = false;          ///< A scan at or after this sample would be used.
   std::optional<Timestamp> stored;  ///< The newest sample that the robot has on its disk.
   Pose3 T_map_body, T_map_odom;
-  Matrix6d covariance = Matrix6d::Zero();           ///< Of T_map_odom, right tangent.
+  Matrix6d covariance = Matrix6d::Zero();           ///< T_map_odom's, right tangent.
   std::pair<std::uint64_t, std::uint64_t> map_age;  ///< ProxyGraph::age() of the newest map heard: epoch, revision.
   bool in_map = false;                              ///< The map knows this robot's chain.
 };

@@ -133,7 +133,7 @@ void FeedFront::note_behind(Timestamp stamp) {
   if (samples_joined_ + scans_left_out_ + images_left_out_ == 0) behind_since_ = stamp;
 }
 
-/// Of samples that are closer than finest_s_, as SensorTimeline::add() does, two become one; never across a jump.
+/// Two samples that are closer than finest_s_ become one, as in SensorTimeline::add(); never across a jump.
 void FeedFront::push(FeedInput input) {
   const auto* sample = std::get_if<node::OdometrySample>(&input);
   if (sample != nullptr && waiting() >= 2) {
@@ -181,7 +181,7 @@ FeedState FeedFront::state() const {
   out.covariance = localiser_.covariance();
   out.stored = stored_;
   out.ended = ended_ && inputs_.empty();
-  // Of samples that the robot has not heard yet it would want one where it wanted one, or a keyframe is due.
+  // It would want a scan at samples that it has not heard yet where it wanted one, or where a keyframe is due.
   if (localiser_.steps() > 0 || (out.newest && !robot_.newest))
     out.wants_scan =
         robot_.wants_scan || robot_.next_keyframe.is_due({out.newest->stamp, localiser_.watch().T_odom_body()});

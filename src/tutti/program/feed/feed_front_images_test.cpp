@@ -18,7 +18,7 @@ node::OdometrySample sample(std::size_t i) {
   return {kOdometry[i].stamp, kOdometry[i].pose, robot::test::kStepCovariance};
 }
 
-/// Of one camera of 8 x 4 pixels, with an IMU.
+/// One camera of 8 x 4 pixels, with an IMU.
 FeedSensors eyes() {
   FeedSensors out;
   out.cameras.resize(1);

@@ -20,8 +20,8 @@ namespace tutti::program {
 /// The live feed of one robot, without sockets: takes bytes from clients and gives bytes for them. One client feeds,
 /// the others listen. A client that does not read holds up nobody: beyond FeedSettings::max_queue_kb it loses its
 /// oldest corrections (and is told how many); when the messages that must not be dropped alone exceed that, it is
-/// disconnected. Of frames that are not complete at most kMaxFeedBytes are held for the client that feeds, and
-/// kMaxHelloBytes for each other one.
+/// disconnected. Incomplete frames take at most kMaxFeedBytes for the client that feeds, and kMaxHelloBytes for each
+/// other one.
 class FeedSession {
  public:
   using Client = std::uint64_t;
@@ -54,7 +54,7 @@ class FeedSession {
   /// The client has ended the recording, and the answer to that is still to come.
   [[nodiscard]] bool waits_for_end(Client client) const { return clients_.at(client).waits_for_end; }
   [[nodiscard]] bool has_feeder() const { return feeder_.has_value(); }
-  /// Of the client that feeds, or fed last.
+  /// The client that feeds, or fed last.
   struct Feeder {
     std::string name;
     FeedClock clock;

@@ -48,7 +48,7 @@ struct FeedState {
   Matrix6d covariance = Matrix6d::Zero();  ///< RobotAgent::covariance(): of T_map_odom * newest, right tangent.
   std::pair<std::uint64_t, std::uint64_t>
       map_age;                             ///< ProxyGraph::age() of the newest graph heard; zeros before the first.
-  std::optional<std::uint32_t> component;  ///< Of the server's map; nothing while the map does not know this chain.
+  std::optional<std::uint32_t> component;  ///< The server's map's; nothing while the map does not know this chain.
   bool wants_scan = false;                 ///< A scan from now on would be used.
   std::vector<TeamMate> team_mates;
   std::vector<FeedAlert> alerts;

@@ -31,7 +31,7 @@ void Localiser::carry(const RelativePose& motion) {
 void Localiser::correct(const robot::OdometryWatch& watch, const Matrix6d& covariance) {
   const auto& heard = watch.state().newest;
   while (!steps_.empty() && heard && steps_.front().end <= heard->stamp) steps_.pop_front();
-  // Of samples that were taken together the agent may make something else.
+  // The agent may make something else of samples that were taken together.
   if (!newest() || (heard && heard->stamp >= newest()->stamp)) watch_ = watch;
   covariance_ = covariance;
   for (const Step& step : steps_) carry(step.motion);

@@ -33,7 +33,7 @@ class Localiser {
   /// T_odom_body in the client's frame, as it was fed.
   [[nodiscard]] const std::optional<StampedPose>& newest() const { return watch_.state().newest; }
   [[nodiscard]] const robot::OdometryWatch& watch() const { return watch_; }
-  [[nodiscard]] const Matrix6d& covariance() const { return covariance_; }  ///< Of T_map_body, right tangent.
+  [[nodiscard]] const Matrix6d& covariance() const { return covariance_; }  ///< T_map_body's, right tangent.
   /// Number of samples since the agent's newest; at most kMostSteps.
   [[nodiscard]] std::size_t steps() const { return steps_.size(); }
 

@@ -43,10 +43,11 @@ void RobotView::note(const node::Event& event, const node::RobotNode& node) {
   for (const consistency::Alert& alert : consistency::follow_alerts(updates_)) {
     if (alert.withdrawn_s) continue;
     const consistency::SuspectedOrigin& origin = alert.origin;
-    alerts_.push_back({fmt::format("odometry and map part by {:.2f} m and {:.1f} degrees within {:.1f} m of way, more "
-                                   "than odometry allows for: localisation failed there, or the map is wrong",
-                                   origin.translation_m, origin.rotation_rad / kRadPerDeg, origin.length_m),
-                       *first_ + alert.known_since_s, origin.from, origin.until});
+    alerts_.push_back(
+        {fmt::format("odometry and map part by {:.2f} m and {:.1f} degrees within {:.1f} m of trajectory, more "
+                     "than odometry allows for: localisation failed there, or the map is wrong",
+                     origin.translation_m, origin.rotation_rad / kRadPerDeg, origin.length_m),
+         *first_ + alert.known_since_s, origin.from, origin.until});
   }
   if (alerts_.empty()) updates_.clear();
 }

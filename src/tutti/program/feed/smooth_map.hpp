@@ -22,7 +22,7 @@ class SmoothMap {
   };
   struct Answer {
     Pose3 T_map_odom;
-    /// Of T_map_odom, right tangent: the robot's own uncertainty, plus what is left to go to its own correction.
+    /// T_map_odom's, right tangent: the robot's own uncertainty, plus what is left to go to its own correction.
     Matrix6d covariance = Matrix6d::Zero();
     std::optional<Jump> jump;  ///< The jump that this answer makes.
   };

@@ -33,7 +33,7 @@ void sleep_s(double wall_s) { std::this_thread::sleep_for(std::chrono::duration<
 
 bool is_of_all(const std::string& topic) { return topic == "/tf" || topic == "/tf_static" || topic == "/clock"; }
 
-/// Of what is said once: ROS's publishers of these offer it to who comes late.
+/// ROS's publishers of what is said once offer it to who comes late.
 Qos qos_of(const bags::BagChannel& channel) {
   if (channel.topic.ends_with("/tf_static")) return kStaticTfQos;
   if (channel.type == "nav_msgs/msg/OccupancyGrid" || channel.topic.ends_with("/robot_description")) return kLatchedQos;
@@ -42,7 +42,7 @@ Qos qos_of(const bags::BagChannel& channel) {
 
 std::string hash_of(const std::string& type) { return bags::has_ros_definition(type) ? bags::ros_type_hash(type) : ""; }
 
-/// Of several bags the messages by the time at which they were logged.
+/// The messages of several bags by the time at which they were logged.
 class Merged {
  public:
   static Result<Merged> open(const std::vector<std::string>& bags) {

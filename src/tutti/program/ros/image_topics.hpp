@@ -20,12 +20,12 @@ struct ImagesConfig {
   std::string depth;                      ///< A topic; empty: found by what messages show, within the namespace.
   bool with_depth = true;                 ///< False: depth is not used.
   std::string imu;                        ///< A topic; empty: found by type, within the namespace.
-  std::string within = "/";               ///< Of the namespace's topics the beginning, "/alpha/"; set by resolve().
+  std::string within = "/";               ///< How the namespace's topics begin, "/alpha/"; set by resolve().
   int most_cameras = 2;                   ///< RobotConfig::images.most_cameras
   double time_offset_s = 0.0;             ///< Added to the images' stamps gives the odometry's time.
-  double most_difference_s = 0.005;       ///< Of the stamps of two cameras' images of one moment.
+  double most_difference_s = 0.005;       ///< Between the stamps of two cameras' images of one moment.
   DepthSensor depth_sensor = {};          ///< Its unit is not read: ROS's depth is in millimetres or metres.
-  double most_depth_difference_s = 0.02;  ///< Of the stamps of an image and of its depth.
+  double most_depth_difference_s = 0.02;  ///< Between the stamps of an image and of its depth.
 };
 
 /// Sets `within`, and makes all topics' names full ones. Fails when one is no valid name in ROS.
@@ -43,8 +43,8 @@ struct CameraTopics {
   friend bool operator==(const CameraTopics&, const CameraTopics&) = default;
 };
 
-/// Of published topics, those that may be the robot's cameras and their depth, in the order of their names: those that
-/// `config` names, or all that have a CameraInfo beside them (of which a compressed topic counts only where there is no
+/// Published topics that may be the robot's cameras and their depth, in the order of their names: those that `config`
+/// names, or all that have a CameraInfo beside them (of which a compressed topic counts only where there is no
 /// other). Which is which tell their messages. Where one camera is named, the others may be its depth. None while those
 /// that are named are not all published; an error when two cameras that are named are one.
 Result<std::vector<CameraTopics>> find_images(std::span<const Publication> published, const ImagesConfig& config);

@@ -303,7 +303,7 @@ bool ImagesIntake::reaches(Timestamp stamp) const {
          (imu_.empty() || (newest_imu_ && *newest_imu_ >= stamp));
 }
 
-/// Of the second camera's images that have arrived the nearest.
+/// The nearest of the second camera's images that have arrived.
 std::optional<program::EncodedImage> ImagesIntake::second_of(Timestamp moment) {
   if (cameras_.size() < 2) return std::nullopt;
   OneTopic& of = topics_[cameras_.back()];
@@ -314,7 +314,7 @@ std::optional<program::EncodedImage> ImagesIntake::second_of(Timestamp moment) {
   return of.pop().image;
 }
 
-/// Of the depth images that have arrived the nearest; it may be the next image's, too.
+/// The nearest of the depth images that have arrived; it may be the next image's, too.
 Result<std::optional<program::EncodedImage>> ImagesIntake::depth_of(Timestamp moment) {
   std::optional<program::EncodedImage> none;
   if (!depth_) return none;

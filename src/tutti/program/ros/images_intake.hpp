@@ -81,7 +81,7 @@ class ImagesIntake {
   };
   struct OneTopic {
     CameraTopics topics;
-    std::optional<bags::ImageLook> first;  ///< Of the first message.
+    std::optional<bags::ImageLook> first;  ///< The first message's.
     std::optional<bags::RosCameraInfo> info;
     std::optional<CameraModel> model;
     std::optional<Timestamp> newest;
@@ -107,7 +107,7 @@ class ImagesIntake {
 
   ImagesConfig config_;
   std::vector<OneTopic> topics_;
-  Numbers cameras_;  ///< Of topics_; none before the choice.
+  Numbers cameras_;  ///< Positions in topics_; none before the choice.
   std::optional<std::size_t> depth_;
   std::string note_;
   std::string imu_;

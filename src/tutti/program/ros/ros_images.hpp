@@ -56,7 +56,7 @@ class RosImages {
   std::unique_ptr<Reader> imu_;
   std::vector<CameraTopics> seen_;  ///< The topics that were published when it was looked last.
   std::vector<CameraTopics> refused_;
-  Status why_refused_;  ///< Of `refused_`, of which cameras could not be chosen.
+  Status why_refused_;  ///< Why cameras could not be chosen, by `refused_`.
   std::string seen_imu_, said_;
   double begin_s_, looked_s_ = 0.0, first_image_s_ = 0.0;
 };

@@ -136,10 +136,10 @@ class RosIntake {
   };
   IntakeConfig config_;
   std::optional<OdometryFrames> frames_;
-  bags::TransformTree tree_, own_tree_;  ///< Of all, and of this robot alone.
+  bags::TransformTree tree_, own_tree_;  ///< All robots', and this one's alone.
   bool has_own_odometry_ = false;        ///< A pair of frames of this robot alone has given odometry.
   std::set<std::string> known_frames_, own_frames_;
-  robot::StampWatch stamps_;         ///< Of odometry.
+  robot::StampWatch stamps_;         ///< Odometry's.
   std::deque<StampedPose> samples_;  ///< Samples that are not fed yet.
   std::deque<StampedPose> refused_;  ///< The last ones in a row that were refused for their stamps.
   Trajectory history_;               ///< Samples that were fed, over the last kHistory_s.

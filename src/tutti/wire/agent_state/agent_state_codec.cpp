@@ -23,7 +23,7 @@ std::string encode_part(T&& value) {
   return pack_frame(MessageKind::agent_state, out.SerializeAsString());
 }
 
-/// Of a whole frame: its numbers, all of them.
+/// Reads the numbers of a whole frame; none may be left over.
 template <class T>
 Status decode_part(std::string_view bytes, T& value) {
   const auto parsed = parse_frame<v1::AgentState>(MessageKind::agent_state, bytes);

@@ -23,7 +23,7 @@ using robot::test::at;
 
 constexpr RobotId kRobot{1};
 
-/// Of one camera that tracks a few points.
+/// What one camera saw that tracks a few points.
 TrackedImages images_at(Timestamp stamp, Rng& rng) {
   TrackedImage image;
   for (std::uint64_t track = 0; track < 5; ++track)

@@ -15,7 +15,7 @@ namespace tutti::wire {
 /// Probability that a bit is 0: learnt fast at first (a mean), then forgetting what is long ago.
 class BitModel {
  public:
-  [[nodiscard]] std::uint32_t zero() const { return 1U + static_cast<std::uint32_t>(zero_) / 4101U; }  ///< Of 4096.
+  [[nodiscard]] std::uint32_t zero() const { return 1U + static_cast<std::uint32_t>(zero_) / 4101U; }  ///< Out of 4096.
   void learn(bool bit) {
     zero_ += ((bit ? 0 : kOne) - zero_) / weight_;
     if (weight_ < kMemory) ++weight_;

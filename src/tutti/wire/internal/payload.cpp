@@ -23,7 +23,7 @@ struct Field {
   std::size_t at_most = 0;  ///< Elements, in one message.
   const char* what = nullptr;
   bool is_message = false;
-  std::span<const Field> inside = {};  ///< Of a message.
+  std::span<const Field> inside = {};  ///< If it is a message: its fields.
 };
 
 constexpr std::size_t kMostChains = tutti::ProxyGraph::kMostChains;

@@ -22,7 +22,7 @@ inline void expect_valid(const Status& valid) { TUTTI_CHECK(valid.has_value(), "
 
 template <class Message>
 struct Parsed {
-  std::uint16_t version = 0;  ///< Of the kind; what the message means may depend on it.
+  std::uint16_t version = 0;  ///< The kind's; what the message means may depend on it.
   Message message;
 };
 

@@ -72,8 +72,8 @@ class KnownNodes {
   };
   KnownNodes() = default;
   explicit KnownNodes(std::span<const ProxyNode> nodes) : nodes_(nodes) {}
-  /// Of the node at this stamp, to be asked in the order of stamps; nothing unless it and the one asked for before are
-  /// neighbours there.
+  /// What is expected of the node at this stamp. Stamps must be asked for in order; nothing unless this one and the one
+  /// before are neighbours there.
   std::optional<Expected> at(Timestamp stamp) {
     while (next_ < nodes_.size() && nodes_[next_].stamp < stamp) skip();
     const bool is_known = next_ < nodes_.size() && nodes_[next_].stamp == stamp;
@@ -166,7 +166,7 @@ class EdgeColumns {
     out.weight = std::exp(static_cast<double>(log_weight) * kLogWeightStep);
     return out;
   }
-  std::int64_t a = 0, b = 0, log_weight = 0;  ///< Of the last edge.
+  std::int64_t a = 0, b = 0, log_weight = 0;  ///< The last edge's.
 
  private:
   static constexpr double kLogWeightStep = 1.0 / 2048.0;

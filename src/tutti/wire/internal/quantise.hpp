@@ -18,11 +18,11 @@ using CovarianceCode = std::array<std::int64_t, 21>;
 struct PoseSteps {
   double translation_m = 0.0;
   double rotation_rad = 0.0;
-  double largest_m = kMaxCoordinate_m;  ///< Of the translation, per axis.
+  double largest_m = kMaxCoordinate_m;  ///< The translation's, per axis.
 };
 /// Errors: 0.87e-5 m, 1e-6 rad.
 inline constexpr PoseSteps kKeyframePoseSteps{1e-5, 5e-7};
-/// Errors: 0.44e-3 m, 1e-4 rad. Of the motion from one pose to another, each within kMaxCoordinate_m per axis.
+/// For the motion from one pose to another, each within kMaxCoordinate_m per axis. Errors: 0.44e-3 m, 1e-4 rad.
 inline constexpr PoseSteps kProxyPoseSteps{5e-4, 5e-5, 4.0 * kMaxCoordinate_m};  // 2 sqrt(3), with room for rounding
 
 /// Translation and rotation vector, rounded; the rotation vector stays shorter than pi, so that it is unique.
@@ -30,7 +30,7 @@ PoseCode quantise(const Pose3& T, const PoseSteps& steps);
 /// Nothing when a coordinate exceeds the steps' largest or the rotation vector pi.
 std::optional<Pose3> dequantise(const PoseCode& code, const PoseSteps& steps);
 
-/// Of the logarithm of the Cholesky factor's diagonal, and of its rows divided by their diagonal. With both s,
+/// Steps of the logarithm of the Cholesky factor's diagonal, and of its rows divided by their diagonal. With both s,
 /// (1 - e) C <= C' <= (1 + e) C in every direction, e ~ 4.6 s. Measured with the proxy's, which are not equal, on the
 /// simulated tunnels: 3.3 % root mean square over directions, 10 % at worst; variance of an axis 1.4 % and 7 %.
 struct CovarianceSteps {

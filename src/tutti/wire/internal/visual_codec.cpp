@@ -19,7 +19,8 @@ namespace {
 constexpr double kPixelStep = 1.0 / 16.0;
 constexpr double kLandmarkStep_m = 1.0 / 1024.0;
 static_assert(kMaxLandmarkRange_m / kLandmarkStep_m < 0x1p24);
-/// Of sigmas: steps from one to its double, and the code of 1. What is smaller than code 1 becomes it; 0 is 0.
+/// How sigmas are coded: steps from one to its double, and the code of 1. What is smaller than code 1 becomes it; 0 is
+/// 0.
 constexpr double kSigmaSteps = 64.0;
 constexpr std::int64_t kSigmaOne = 20 * 64;
 
@@ -227,7 +228,7 @@ void for_each_number(Camera& camera, Number number) {
 }
 int camera_numbers(CameraKind kind) { return 11 + static_cast<int>(distortion_numbers(kind)); }
 
-/// Of the covariance the lower triangle, so whatever arrives is symmetric.
+/// Only the lower triangle of the covariance is sent, so whatever arrives is symmetric.
 template <class Number>
 void for_each_number(ImuPreintegration& imu, Number number) {
   number(imu.duration_s);

@@ -36,7 +36,7 @@ struct TrackerConfig {
     v.field("threshold", threshold, between(1, 255),
             "Grey values by which a new corner differs from what is round it.");
     v.field("levels", levels, between(0, 6), "How often the image is halved: how far a point may move at once.");
-    v.field("descriptors", descriptors, any(), "Of keyframes.");
+    v.field("descriptors", descriptors, any(), "How keyframes are described.");
   }
 };
 

@@ -35,7 +35,7 @@ ddsi_serdata* no_data(const ddsi_sertype* type) { return new RawData(type, SDK_K
 
 bool is_taken(std::size_t size) { return size >= kHeaderBytes && size <= kMaxMessageBytes; }
 
-/// Of a message that came from the network in parts, which may overlap. Cyclone drops it when this is null.
+/// Joins a message that came from the network in parts, which may overlap. Cyclone drops it when this is null.
 ddsi_serdata* from_fragments(const ddsi_sertype* type, ddsi_serdata_kind kind, const nn_rdata* part, std::size_t size) {
   if (kind != SDK_DATA) return no_data(type);
   if (!is_taken(size)) return nullptr;

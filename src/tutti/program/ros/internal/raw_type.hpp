@@ -24,7 +24,7 @@ ddsi_sertype* make_raw_type(const std::string& dds_type);
 /// With one reference, which dds_writecdr() takes.
 ddsi_serdata* make_raw_data(const ddsi_sertype* type, std::string_view cdr);
 
-/// Of data of such a type, valid as long as these: with the 4-byte header, filled up to a multiple of four.
+/// The bytes of data of such a type, valid as long as these: with the 4-byte header, filled up to a multiple of four.
 std::string_view bytes_of(const ddsi_serdata* data);
 
 }  // namespace tutti::ros::internal

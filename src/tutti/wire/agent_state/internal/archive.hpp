@@ -154,7 +154,7 @@ void pass(A& a, std::optional<T>& optional) {
   pass(a, value);
   optional = is_there ? std::optional(std::move(value)) : std::nullopt;
 }
-/// Of nothing and of an empty value, the same is written: nobody tells them apart.
+/// Writes the same for nothing and for an empty value: nobody tells them apart.
 template <class A, class T>
 void pass(A& a, std::shared_ptr<const T>& shared) {
   T value;

@@ -5,7 +5,7 @@
 
 namespace tutti::wire {
 
-/// Of what an agent relies on in the state that it goes on from. Null: nothing.
+/// What is wrong with a state that an agent is to go on from; null: nothing.
 const char* what_is_wrong(const robot::AgentState& state);
 
 }  // namespace tutti::wire
