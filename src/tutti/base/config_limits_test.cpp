@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <ctime>
 
 #include "tutti/base/config_io.hpp"
 #include "tutti/base/file.hpp"
@@ -21,31 +20,25 @@ struct Few {
   }
 };
 
-double seconds_since(std::clock_t begin) { return static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC; }
-
 std::string error_of(const std::string& text) {
   const auto node = parse_yaml(text, "x.yaml");
   return node ? "" : node.error().message;
 }
 
-/// 50 MB took 25 s.
+/// 50 MB took 25 s. This text is no YAML, which nobody finds out.
 TEST(ConfigLimits, LongTextIsRefusedBeforeItIsParsed) {
-  const std::string text = "a: " + std::string(50'000'000, 'x');
-  const std::clock_t begin = std::clock();
+  const std::string text = "]: " + std::string(50'000'000, 'x');
   EXPECT_EQ(error_of(text), "x.yaml: 50000003 bytes, expected at most 4194304");
   const std::string path = testing::TempDir() + "config_limits_test.yaml";
   ASSERT_TRUE(write_file(path, text));
   EXPECT_EQ(load_yaml(path).error().message, path + ": has more than 4194304 bytes");
-  EXPECT_LT(seconds_since(begin), 1.0);
 }
 
-/// Before a tree is made of them, which takes most of the time.
+/// Before a tree is made of them, which takes most of the time: nobody gets to the mistake behind them.
 TEST(ConfigLimits, ValuesAreCountedFirst) {
   std::string list = "[";
   for (int i = 0; i < 500'000; ++i) list += "1,";
-  const std::clock_t begin = std::clock();
-  EXPECT_EQ(error_of(list + "]"), "x.yaml:1: more than 200000 values");
-  EXPECT_LT(seconds_since(begin), 2.0);
+  EXPECT_EQ(error_of(list + "}"), "x.yaml:1: more than 200000 values");
 }
 
 TEST(ConfigLimits, LongValuesDoNotUnfold) {

@@ -299,7 +299,7 @@ TEST_P(PortConformance, WithoutContactNothingWaitsAndNothingIsLost) {
     EXPECT_TRUE(robot->receive().empty());
   }
   send(*hub, server, alpha, MessageKind::proxy_graph, "", "graph");
-  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(2));
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(10));  // 400 calls, none waits
   EXPECT_FALSE(sent.empty());
   network->mend();
   Messages heard;
