@@ -39,11 +39,16 @@ node::OdometrySample joined(const node::OdometrySample& first, const node::Odome
 }  // namespace
 
 Timestamp stamp_of(const FeedInput& input) {
-  if (const auto* sample = std::get_if<node::OdometrySample>(&input)) return sample->stamp;
-  if (const auto* images = std::get_if<std::shared_ptr<const FedImages>>(&input)) return (*images)->stamp;
-  if (const auto* fix = std::get_if<PositionFix>(&input)) return fix->stamp;
-  const auto* scan = std::get_if<Scan>(&input);
-  return scan != nullptr ? scan->stamp : Timestamp{};
+  struct Stamp {
+    Timestamp operator()(const node::OdometrySample& sample) const { return sample.stamp; }
+    Timestamp operator()(const Scan& scan) const { return scan.stamp; }
+    Timestamp operator()(const std::shared_ptr<const FedImages>& images) const { return images->stamp; }
+    Timestamp operator()(const PositionFix& fix) const { return fix.stamp; }
+    Timestamp operator()(const FeedEnded&) const { return {}; }
+    Timestamp operator()(const std::shared_ptr<const FeedSensors>&) const { return {}; }
+    Timestamp operator()(const FeedAnew&) const { return {}; }
+  };
+  return std::visit(Stamp{}, input);  // does not compile with a kind of input that is not named above
 }
 
 FeedFront::FeedFront(FeedState robot, const Limits& limits)

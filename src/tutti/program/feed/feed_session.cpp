@@ -11,23 +11,35 @@ namespace tutti::program {
 
 namespace {
 
-/// By the robot's clock; what it was if there is no such time by it.
-std::optional<Timestamp> to_robot(const FeedClock& clock, FromClient& message) {
-  const auto shift = [&](Timestamp& stamp) -> std::optional<Timestamp> {
+/// Moves the stamps of a message to the robot's clock. Returns the stamp for which there is no such time; nothing when
+/// all is well. Does not compile with a kind of message that is not named here.
+struct ToRobot {
+  using Wrong = std::optional<Timestamp>;
+  const FeedClock& clock;
+
+  [[nodiscard]] Wrong shift(Timestamp& stamp) const {
     const auto moved = clock.to_robot(stamp);
     if (!moved) return stamp;
     stamp = *moved;
     return std::nullopt;
-  };
-  if (auto* sample = std::get_if<node::OdometrySample>(&message)) return shift(sample->stamp);
-  if (auto* scan = std::get_if<Scan>(&message)) return shift(scan->stamp);
-  if (auto* images = std::get_if<FedImages>(&message)) return shift(images->stamp);
-  if (auto* fix = std::get_if<PositionFix>(&message)) return shift(fix->stamp);
-  if (auto* imu = std::get_if<FeedImu>(&message))
-    for (ImuSample& sample : imu->samples)
-      if (const auto wrong = shift(sample.stamp)) return wrong;
-  return std::nullopt;
-}
+  }
+  Wrong operator()(node::OdometrySample& sample) const { return shift(sample.stamp); }
+  Wrong operator()(Scan& scan) const { return shift(scan.stamp); }
+  Wrong operator()(FedImages& images) const { return shift(images.stamp); }
+  Wrong operator()(PositionFix& fix) const { return shift(fix.stamp); }
+  Wrong operator()(FeedImu& imu) const {
+    for (ImuSample& sample : imu.samples)
+      if (const Wrong wrong = shift(sample.stamp)) return wrong;
+    return std::nullopt;
+  }
+  // Without a stamp, or answered by the client's clock.
+  Wrong operator()(const FeedHello&) const { return std::nullopt; }
+  Wrong operator()(const FeedEnd&) const { return std::nullopt; }
+  Wrong operator()(const FeedTime&) const { return std::nullopt; }
+  Wrong operator()(const Health&) const { return std::nullopt; }
+  Wrong operator()(const FeedUnknown&) const { return std::nullopt; }
+  Wrong operator()(const BadSample&) const { return std::nullopt; }
+};
 
 /// The situation as compared with every sample: FeedState::status changes by itself, and takes longer to write.
 std::string without_status(FeedState state) {
@@ -86,7 +98,7 @@ void FeedSession::take(Client client, FromClient message) {
 
 void FeedSession::take_fed(Client client, FromClient message) {
   Connection& connection = clients_.at(client);
-  if (const auto stamp = to_robot(last_.clock, message))
+  if (const auto stamp = std::visit(ToRobot{last_.clock}, message))
     return put(
         connection,
         refused_frame(
