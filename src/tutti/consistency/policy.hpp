@@ -4,10 +4,12 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tutti/base/config.hpp"
 #include "tutti/base/result.hpp"
+#include "tutti/base/rows.hpp"
 #include "tutti/consistency/compare.hpp"
 #include "tutti/consistency/constraint.hpp"
 #include "tutti/consistency/disagreement.hpp"
@@ -41,11 +43,20 @@ struct Selection {
 class ConstraintPolicy {
  public:
   virtual ~ConstraintPolicy() = default;
-  [[nodiscard]] virtual std::string name() const = 0;
   /// True if choose() uses PolicyInput::test.
   [[nodiscard]] virtual bool needs_test() const { return false; }
   [[nodiscard]] virtual Selection choose(const PolicyInput& input) const = 0;
 };
+
+struct PolicyConfig;
+/// A policy that can be chosen.
+struct PolicyKind {
+  std::string_view name;
+  std::string_view help;
+  /// `compare` is used by `spectral`.
+  std::unique_ptr<ConstraintPolicy> (*make)(const PolicyConfig& config, const CompareConfig& compare);
+};
+const std::vector<PolicyKind>& policies();
 
 /// Which policy, and its parameters. The thresholds of `spectral` were set once, on simulated corridor missions
 /// (bench/runtime/closed_loop.cpp; five seeds with 1295 nodes in one hour, an update every 7 nodes, onboard
@@ -68,9 +79,8 @@ struct PolicyConfig {
 
   template <class V>
   void describe(V& v) {
-    v.field("name", name, one_of({"none", "every_node", "spectral", "adaptive"}),
-            "How a robot chooses constraints; 'spectral' is the paper's, 'adaptive' the product's default, "
-            "'none' leaves it alone.");
+    v.field("name", name, one_of(names_of(policies())),
+            "How a robot chooses constraints. " + help_of(policies()) + ".");
     v.field("classifier", classifier, one_of({"thresholds", "top"}),
             "spectral: label nodes above a threshold per group (the paper) or the largest ones (the authors' code).");
     v.field("threshold_large_m", threshold_large_m, at_least(0.0),
@@ -87,8 +97,7 @@ struct PolicyConfig {
   }
 };
 
-/// The policy named `config.name`; `compare` is used by `spectral`. Fails with ErrorCode::configuration when the
-/// product has no policy of this name.
+/// The policy named `config.name`. Fails with ErrorCode::configuration when the product has none of this name.
 Result<std::unique_ptr<ConstraintPolicy>> make_policy(const PolicyConfig& config, const CompareConfig& compare);
 
 }  // namespace tutti::consistency

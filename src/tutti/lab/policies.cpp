@@ -2,6 +2,9 @@
 #include "tutti/lab/policies.hpp"
 
 #include <algorithm>
+#include <iterator>
+#include <span>
+#include <string_view>
 #include <vector>
 
 #include "tutti/consistency/links.hpp"
@@ -18,6 +21,18 @@ using consistency::Selection;
 constexpr std::size_t kDefaultBudget = 25;  ///< Until one is set.
 /// Draws per link wanted; a graph that yields less than one new link in so many draws has none left.
 constexpr std::size_t kDrawsPerLink = 50;
+
+struct LabPolicy {
+  std::string_view name;
+  std::unique_ptr<consistency::ConstraintPolicy> (*make)(const Rng& rng);
+};
+using Made = std::unique_ptr<consistency::ConstraintPolicy>;
+constexpr LabPolicy kPolicies[] = {
+    {"every_node_2", [](const Rng&) -> Made { return std::make_unique<EveryNode2Policy>(); }},
+    {"uniform", [](const Rng&) -> Made { return std::make_unique<UniformPolicy>(kDefaultBudget); }},
+    {"random", [](const Rng& rng) -> Made { return std::make_unique<RandomPolicy>(kDefaultBudget, rng); }},
+    {"skeleton", [](const Rng&) -> Made { return std::make_unique<SkeletonPolicy>(); }},
+};
 
 }  // namespace
 
@@ -57,16 +72,13 @@ Selection EveryNode2Policy::choose(const PolicyInput& input) const {
 
 Result<std::unique_ptr<consistency::ConstraintPolicy>> make_policy(const std::string& name,
                                                                    const robot::AgentConfig& config, const Rng& rng) {
-  if (name == "every_node_2") return std::make_unique<EveryNode2Policy>();
-  if (name == "uniform") return std::make_unique<UniformPolicy>(kDefaultBudget);
-  if (name == "random") return std::make_unique<RandomPolicy>(kDefaultBudget, rng);
-  if (name == "skeleton") return std::make_unique<SkeletonPolicy>();
+  if (const LabPolicy* own = row_of(std::span(kPolicies), name)) return own->make(rng);
   consistency::PolicyConfig of_product = config.policy;
   of_product.name = name;
-  auto policy = consistency::make_policy(of_product, config.compare);
-  if (!policy)
-    return fail(ErrorCode::configuration, "{}, every_node_2, uniform, random or skeleton", policy.error().message);
-  return policy;
+  if (auto policy = consistency::make_policy(of_product, config.compare)) return policy;
+  std::vector<std::string> known = names_of(consistency::policies());
+  std::ranges::move(names_of(kPolicies), std::back_inserter(known));
+  return fail(ErrorCode::configuration, "policy '{}' is unknown, expected {}", name, or_list(known));
 }
 
 }  // namespace tutti::lab

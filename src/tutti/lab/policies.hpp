@@ -32,7 +32,6 @@ class BudgetedPolicy : public consistency::ConstraintPolicy {
 class UniformPolicy final : public BudgetedPolicy {
  public:
   explicit UniformPolicy(std::size_t budget) : BudgetedPolicy(budget) {}
-  [[nodiscard]] std::string name() const override { return "uniform"; }
   [[nodiscard]] consistency::Selection choose(const consistency::PolicyInput& input) const override;
 };
 
@@ -42,7 +41,6 @@ class RandomPolicy final : public BudgetedPolicy {
  public:
   /// `rng` is forked by the map's revision at every update.
   RandomPolicy(std::size_t budget, Rng rng) : BudgetedPolicy(budget), rng_(std::move(rng)) {}
-  [[nodiscard]] std::string name() const override { return "random"; }
   [[nodiscard]] consistency::Selection choose(const consistency::PolicyInput& input) const override;
 
  private:
@@ -52,7 +50,6 @@ class RandomPolicy final : public BudgetedPolicy {
 /// `every_node_2`, the paper's denser baseline: every node is linked to the next two.
 class EveryNode2Policy final : public consistency::ConstraintPolicy {
  public:
-  [[nodiscard]] std::string name() const override { return "every_node_2"; }
   [[nodiscard]] consistency::Selection choose(const consistency::PolicyInput& input) const override;
 };
 
@@ -63,7 +60,6 @@ class EveryNode2Policy final : public consistency::ConstraintPolicy {
 class SkeletonPolicy final : public consistency::ConstraintPolicy {
  public:
   explicit SkeletonPolicy(double tolerance_m = 0.01) : tolerance_m_(tolerance_m) {}
-  [[nodiscard]] std::string name() const override { return "skeleton"; }
   [[nodiscard]] consistency::Selection choose(const consistency::PolicyInput& input) const override;
 
  private:

@@ -50,7 +50,7 @@ std::optional<std::size_t> corridor_between(const CorridorWorld& world, int a, i
   return std::nullopt;
 }
 
-CorridorWorld make_tunnel(const WorldConfig& config, Rng& rng) {
+CorridorWorld make_tunnel(const WorldConfig& config, Rng rng) {
   CorridorWorld world = make_corridor_world(config.network, rng.fork("network"));
   std::vector<std::size_t> order(world.corridors.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -64,7 +64,7 @@ CorridorWorld make_tunnel(const WorldConfig& config, Rng& rng) {
   return world;
 }
 
-CorridorWorld make_terrace(const WorldConfig& config, Rng& rng) {
+CorridorWorld make_terrace(const WorldConfig& config, Rng rng) {
   CorridorWorld world;
   const double length = config.office_length_m, width = config.office_width_m;
   const std::size_t along = pieces(length), across = pieces(width);
@@ -90,10 +90,18 @@ CorridorWorld make_terrace(const WorldConfig& config, Rng& rng) {
 
 }  // namespace
 
+const std::vector<WorldKind>& world_kinds() {
+  static const std::vector<WorldKind> rows{
+      {"tunnel", "a network of rough corridors", &make_tunnel},
+      {"terrace", "an office loop and a rooftop with almost nothing to see", &make_terrace},
+  };
+  return rows;
+}
+
 CorridorWorld make_world(const WorldConfig& config, Rng rng) {
-  if (config.kind == "tunnel") return make_tunnel(config, rng);
-  TUTTI_CHECK(config.kind == "terrace", "kind is {}", config.kind);
-  return make_terrace(config, rng);
+  const WorldKind* kind = row_of(world_kinds(), config.kind);
+  TUTTI_CHECK(kind != nullptr, "world.kind is {}", config.kind);
+  return kind->make(config, std::move(rng));
 }
 
 Status check_world(const CorridorWorld& world, const WorldConfig& config) {

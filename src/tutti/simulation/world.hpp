@@ -5,17 +5,28 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tutti/base/config.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/base/result.hpp"
+#include "tutti/base/rows.hpp"
 #include "tutti/simulation/bounds.hpp"
 #include "tutti/simulation/corridor_world.hpp"
 
 namespace tutti::simulation {
 
 inline constexpr double kLongestLoop_m = 1000.0;
+
+struct WorldConfig;
+/// A kind of world that can be chosen.
+struct WorldKind {
+  std::string_view name;
+  std::string_view help;
+  CorridorWorld (*make)(const WorldConfig& config, Rng rng);
+};
+const std::vector<WorldKind>& world_kinds();
 
 /// Which world robots walk in; each field says for which `kind` it is.
 struct WorldConfig {
@@ -31,8 +42,7 @@ struct WorldConfig {
   double ramp_rise_m = 0.6;
   template <class V>
   void describe(V& v) {
-    v.field("kind", kind, one_of({"tunnel", "terrace"}),
-            "tunnel: a network of rough corridors; terrace: an office loop and a rooftop with almost nothing to see.");
+    v.field("kind", kind, one_of(names_of(world_kinds())), help_of(world_kinds()) + ".");
     v.field("network", network, any(), "tunnel: the corridors.");
     v.field("featureless_share", featureless_share, between(0.0, 1.0),
             "tunnel: share of the corridors that are straight, smooth and empty: the longest.");

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <string>
-
 #include "tutti/consistency/policy.hpp"
 
 namespace tutti::consistency::internal {
@@ -10,14 +8,12 @@ namespace tutti::consistency::internal {
 /// No feedback: what a robot is without Tutti.
 class NonePolicy final : public ConstraintPolicy {
  public:
-  [[nodiscard]] std::string name() const override { return "none"; }
   [[nodiscard]] Selection choose(const PolicyInput&) const override { return {}; }
 };
 
 /// The paper's baseline: every node linked to the next, whatever the two maps say.
 class EveryNodePolicy final : public ConstraintPolicy {
  public:
-  [[nodiscard]] std::string name() const override { return "every_node"; }
   [[nodiscard]] Selection choose(const PolicyInput& input) const override;
 };
 
@@ -26,7 +22,6 @@ class EveryNodePolicy final : public ConstraintPolicy {
 class SpectralPolicy final : public ConstraintPolicy {
  public:
   SpectralPolicy(const PolicyConfig& config, const CompareConfig& compare) : config_(config), compare_(compare) {}
-  [[nodiscard]] std::string name() const override { return "spectral"; }
   [[nodiscard]] Selection choose(const PolicyInput& input) const override;
 
  private:
@@ -49,7 +44,6 @@ Selection links_where(const PolicyInput& input, const Eigen::MatrixXd& disagreem
 class AdaptivePolicy final : public ConstraintPolicy {
  public:
   explicit AdaptivePolicy(const PolicyConfig& config) : config_(config) {}
-  [[nodiscard]] std::string name() const override { return "adaptive"; }
   [[nodiscard]] bool needs_test() const override { return true; }
   [[nodiscard]] Selection choose(const PolicyInput& input) const override;
 
