@@ -1,13 +1,38 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
+#include <memory>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "tutti/base/config.hpp"
+#include "tutti/base/rows.hpp"
 #include "tutti/perception/lidar/closure_config.hpp"
 #include "tutti/perception/visual/closure_config.hpp"
 
+namespace tutti::server {
+class ClosureFinder;
+}
 namespace tutti::finders {
+
+struct FinderConfig;
+
+/// A loop-closure verifier that can be chosen.
+struct FinderKind {
+  std::string_view name;
+  std::string_view help;
+  std::uint32_t version = 0;  ///< Of what it computes.
+  bool uses_scans = false;    ///< A pair of submaps can be compared when both carry this,
+  bool uses_images = false;   ///< or this.
+  /// All fields of FinderConfig that its verdicts depend on, beside its name: these and no others are in its id, so
+  /// that another finder's settings do not change it.
+  std::vector<std::string_view> settings;
+  /// Its id does not cover its settings yet.
+  std::shared_ptr<const server::ClosureFinder> (*make)(const FinderConfig& config) = nullptr;
+};
+const std::vector<FinderKind>& finder_kinds();
 
 /// Which finder finds closures from what sensors saw, and its settings.
 struct FinderConfig {
@@ -17,11 +42,11 @@ struct FinderConfig {
   double feature_cache_mb = 1000.0;  ///< For lidar about 2,400 submaps of 5,000 points.
   lidar::LidarClosureConfig lidar;
   visual::VisualClosureConfig visual;
-  [[nodiscard]] bool wants_images() const { return finder != "lidar"; }
+  /// The chosen row of finder_kinds().
+  [[nodiscard]] const FinderKind& kind() const;
   template <class V>
   void describe(V& v) {
-    v.field("finder", finder, one_of({"lidar", "visual", "sensors"}),
-            "lidar: from the submap clouds; visual: from images; sensors: from whatever two submaps both carry.");
+    v.field("finder", finder, one_of(names_of(finder_kinds())), help_of(finder_kinds()) + ".");
     describe_sensors(v);
   }
 

@@ -20,12 +20,6 @@ struct FinderSettings {
   }
 };
 
-/// What the finder that is configured does not look at.
-bool is_idle(const FinderConfig& config, std::string_view key) {
-  if (key == "feature_cache_mb") return true;  // memory for time
-  return (key == "lidar" || key == "visual") && config.finder != key && config.finder != "sensors";
-}
-
 bool is_of(const MethodId& can, const MethodId& id) { return can.name == id.name && can.version == id.version; }
 
 Status check_known(const MethodId& id, const std::vector<MethodId>& can, const std::string& settings) {
@@ -46,12 +40,15 @@ tl::unexpected<Error> other_settings(const MethodId& id, const MethodId& made) {
 
 std::string settings_of(const FinderConfig& config) {
   ConfigNode node = dump_config(FinderSettings{config});
-  std::erase_if(node.map.front().second.map, [&](const auto& entry) { return is_idle(config, entry.first); });
+  const std::vector<std::string_view>& used = config.kind().settings;
+  std::erase_if(node.map.front().second.map, [&](const auto& entry) {
+    return entry.first != "finder" && std::ranges::find(used, entry.first) == used.end();
+  });
   return to_yaml(node);
 }
 
 std::shared_ptr<const server::ClosureFinder> make_finder(const FinderConfig& config) {
-  auto finder = make_unnamed_finder(config);
+  auto finder = config.kind().make(config);
   std::string settings = settings_of(config);
   MethodId id = finder->id();
   id.settings = settings_hash(settings);
@@ -60,17 +57,17 @@ std::shared_ptr<const server::ClosureFinder> make_finder(const FinderConfig& con
 
 std::shared_ptr<const server::MapRefiner> make_refiner(const FinderConfig& finder,
                                                        const bundle::RefinementConfig& config) {
-  if (finder.finder != "visual" && finder.finder != "sensors") return nullptr;
+  if (!finder.kind().uses_images) return nullptr;
   return std::make_shared<const BundleRefiner>(config);
 }
 
 std::string settings_of(const bundle::RefinementConfig& config) { return to_yaml(dump_config(config)); }
 
 std::vector<MethodId> SensorFinderMaker::can() const {
-  return {{"lidar", lidar::kFinderVersion, 0},
-          {"visual", visual::kFinderVersion, 0},
-          {"sensors", JointClosureFinder::kVersion, 0},
-          {BundleRefiner::kName, BundleRefiner::kVersion, 0}};
+  std::vector<MethodId> out;
+  for (const FinderKind& kind : finder_kinds()) out.push_back({std::string(kind.name), kind.version, 0});
+  out.push_back({BundleRefiner::kName, BundleRefiner::kVersion, 0});
+  return out;
 }
 
 Result<std::shared_ptr<const server::ClosureFinder>> SensorFinderMaker::finder(const MethodId& id,

@@ -3,9 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
 #include <set>
 #include <string>
+#include <string_view>
 
+#include "tutti/base/config_io.hpp"
 #include "tutti/finders/bundle_refiner.hpp"
 #include "tutti/finders/sensor_finders.hpp"
 
@@ -22,8 +25,8 @@ FinderConfig config_of(const std::string& finder) {
 
 TEST(FinderMaker, MakesWhatTheServerHasOfItsSettings) {
   const SensorFinderMaker maker(100.0);
-  for (const char* name : {"lidar", "visual", "sensors"}) {
-    FinderConfig config = config_of(name);
+  for (const FinderKind& kind : finder_kinds()) {
+    FinderConfig config = config_of(std::string(kind.name));
     config.min_submap_gap = 5;
     config.lidar.min_overlap += 0.0625;
     const auto served = make_finder(config);
@@ -46,7 +49,7 @@ TEST(FinderMaker, NamesDifferWithEverythingThatAnswersDependOn) {
   const auto expect_new = [&](const FinderConfig& config) {
     EXPECT_TRUE(ids.insert(id_of(config)).second) << settings_of(config);
   };
-  for (const char* name : {"lidar", "visual", "sensors"}) expect_new(config_of(name));
+  for (const FinderKind& kind : finder_kinds()) expect_new(config_of(std::string(kind.name)));
   FinderConfig config = config_of("lidar");
   config.min_submap_gap += 1;
   expect_new(config);
@@ -61,6 +64,29 @@ TEST(FinderMaker, NamesStayTheSameWithWhatTheyDoNotDependOn) {
   config.visual.min_matches += 3;
   config.feature_cache_mb = 20.0;
   EXPECT_EQ(id_of(config), lidar);
+}
+
+/// The hashes of 0.2.0: with another one every map asks all of its pairs again.
+TEST(FinderMaker, HashesOfDefaultSettingsStay) {
+  const std::map<std::string, std::uint64_t> hashes{{"lidar", 14103240146950850373ULL}, {"visual", 332046118994442543ULL}, {"sensors", 11320756827162014096ULL}};
+  EXPECT_EQ(hashes.size(), finder_kinds().size());
+  for (const FinderKind& kind : finder_kinds()) {
+    const std::string name(kind.name);
+    EXPECT_EQ(id_of(config_of(name)).settings, hashes.at(name)) << name << "\n" << settings_of(config_of(name));
+  }
+}
+
+TEST(FinderMaker, EverySettingIsOfAFinderOrOfNone) {
+  std::set<std::string, std::less<>> of_none{"finder", "feature_cache_mb"}, of_finders;
+  std::set<std::string, std::less<>> there;
+  for (const auto& [key, value] : dump_config(FinderConfig{}).map) there.insert(key);
+  for (const FinderKind& kind : finder_kinds())
+    for (const std::string_view key : kind.settings) {
+      EXPECT_TRUE(there.contains(key)) << kind.name << " has a setting " << key << " that is not in FinderConfig";
+      of_finders.emplace(key);
+    }
+  for (const std::string& key : there)
+    EXPECT_NE(of_none.contains(key), of_finders.contains(key)) << key << " is in no row of finder_kinds(), or wrongly";
 }
 
 TEST(FinderMaker, SaysWhatIsMissing) {

@@ -106,19 +106,55 @@ Result<ClosureVerdict> JointClosureFinder::verify(const Submap& first, const Sub
   return out;
 }
 
-std::shared_ptr<const server::ClosureFinder> make_unnamed_finder(const FinderConfig& config) {
-  const auto cache_bytes = static_cast<std::size_t>(config.feature_cache_mb * 1e6);
-  const auto lidar = [&] {
-    return std::make_shared<LidarClosureFinder>(config.lidar, config.min_submap_gap, cache_bytes);
+namespace {
+
+using Made = std::shared_ptr<const server::ClosureFinder>;
+
+std::size_t cache_bytes(const FinderConfig& config) { return static_cast<std::size_t>(config.feature_cache_mb * 1e6); }
+
+Made make_lidar(const FinderConfig& config) {
+  return std::make_shared<LidarClosureFinder>(config.lidar, config.min_submap_gap, cache_bytes(config));
+}
+
+Made make_visual(const FinderConfig& config) {
+  return std::make_shared<VisualClosureFinder>(config.visual, config.min_submap_gap, cache_bytes(config));
+}
+
+Made make_joint(const FinderConfig& config) {
+  return std::make_shared<JointClosureFinder>(std::vector<Made>{make_lidar(config), make_visual(config)});
+}
+
+}  // namespace
+
+const std::vector<FinderKind>& finder_kinds() {
+  static const std::vector<FinderKind> rows{
+      {.name = LidarClosureFinder::kName,
+       .help = "from the submap clouds",
+       .version = lidar::kFinderVersion,
+       .uses_scans = true,
+       .settings = {"min_submap_gap", "lidar"},
+       .make = &make_lidar},
+      {.name = VisualClosureFinder::kName,
+       .help = "from images",
+       .version = visual::kFinderVersion,
+       .uses_images = true,
+       .settings = {"min_submap_gap", "visual"},
+       .make = &make_visual},
+      {.name = JointClosureFinder::kName,
+       .help = "from whatever two submaps both carry",
+       .version = JointClosureFinder::kVersion,
+       .uses_scans = true,
+       .uses_images = true,
+       .settings = {"min_submap_gap", "lidar", "visual"},
+       .make = &make_joint},
   };
-  const auto visual = [&] {
-    return std::make_shared<VisualClosureFinder>(config.visual, config.min_submap_gap, cache_bytes);
-  };
-  if (config.finder == "lidar") return lidar();
-  if (config.finder == "visual") return visual();
-  TUTTI_CHECK(config.finder == "sensors", "finder '{}'", config.finder);
-  return std::make_shared<JointClosureFinder>(
-      std::vector<std::shared_ptr<const server::ClosureFinder>>{lidar(), visual()});
+  return rows;
+}
+
+const FinderKind& FinderConfig::kind() const {
+  const FinderKind* found = row_of(finder_kinds(), finder);
+  TUTTI_CHECK(found != nullptr, "finder '{}'", finder);
+  return *found;
 }
 
 }  // namespace tutti::finders

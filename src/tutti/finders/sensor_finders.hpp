@@ -23,7 +23,8 @@ namespace tutti::finders {
 class LidarClosureFinder final : public server::ClosureFinder {
  public:
   LidarClosureFinder(const lidar::LidarClosureConfig& config, int min_submap_gap, std::size_t cache_bytes);
-  [[nodiscard]] MethodId id() const override { return {"lidar", lidar::kFinderVersion, 0}; }
+  static constexpr const char* kName = "lidar";
+  [[nodiscard]] MethodId id() const override { return {kName, lidar::kFinderVersion, 0}; }
   [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
     return first.points > 0 && second.points > 0;
   }
@@ -45,7 +46,8 @@ class LidarClosureFinder final : public server::ClosureFinder {
 class VisualClosureFinder final : public server::ClosureFinder {
  public:
   VisualClosureFinder(const visual::VisualClosureConfig& config, int min_submap_gap, std::size_t cache_bytes);
-  [[nodiscard]] MethodId id() const override { return {"visual", visual::kFinderVersion, 0}; }
+  static constexpr const char* kName = "visual";
+  [[nodiscard]] MethodId id() const override { return {kName, visual::kFinderVersion, 0}; }
   [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
     return first.observations > 0 && second.observations > 0;
   }
@@ -67,8 +69,9 @@ class VisualClosureFinder final : public server::ClosureFinder {
 class JointClosureFinder final : public server::ClosureFinder {
  public:
   explicit JointClosureFinder(std::vector<std::shared_ptr<const server::ClosureFinder>> finders);
+  static constexpr const char* kName = "sensors";
   static constexpr std::uint32_t kVersion = 1000 * lidar::kFinderVersion + visual::kFinderVersion;
-  [[nodiscard]] MethodId id() const override { return {"sensors", kVersion, 0}; }
+  [[nodiscard]] MethodId id() const override { return {kName, kVersion, 0}; }
   [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override;
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override;
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
@@ -107,8 +110,5 @@ class NamedFinder final : public server::ClosureFinder {
   MethodId id_;
   std::string settings_;
 };
-
-/// The configured finder, with an id that does not cover its settings.
-std::shared_ptr<const server::ClosureFinder> make_unnamed_finder(const FinderConfig& config);
 
 }  // namespace tutti::finders

@@ -114,19 +114,36 @@ struct DrawnSettings {
   }
 };
 
+std::shared_ptr<const server::ClosureFinder> make_recorded_finder(
+    const MissionConfig& /*config*/, const std::vector<mission::MissionRecording>& recordings, std::uint64_t /*seed*/) {
+  return std::make_shared<RecordedClosureFinder>(recordings);
+}
+
 }  // namespace
+
+const std::vector<LabFinder>& lab_finders() {
+  static const std::vector<LabFinder> rows{
+      {.name = "reference",
+       .help = "true relative poses plus noise and a share of wrong ones",
+       .needs = "reference.file",
+       .has =
+           [](const mission::RobotConfig& robot) { return !robot.reference.file.empty() || !robot.graph.file.empty(); },
+       .make = &make_reference_finder},
+      {.name = "recorded",
+       .help = "those of robots[].graph, when they arrived",
+       .needs = "graph.file",
+       .has = [](const mission::RobotConfig& robot) { return !robot.graph.file.empty(); },
+       .make = &make_recorded_finder},
+  };
+  return rows;
+}
 
 std::shared_ptr<const server::ClosureFinder> make_closure_finder(
     const MissionConfig& config, const std::vector<mission::MissionRecording>& recordings, std::uint64_t seed) {
   const ClosureChanges& changes = config.closure_changes;
-  if (!changes.come_with_mission() && changes.wrong_share == 0.0) return finders::make_finder(config.closures);
-  std::shared_ptr<const server::ClosureFinder> finder;
-  if (changes.finder == "recorded")
-    finder = std::make_shared<RecordedClosureFinder>(recordings);
-  else if (changes.finder == "reference")
-    finder = make_reference_finder(config, recordings, seed);
-  else
-    finder = finders::make_unnamed_finder(config.closures);
+  const LabFinder* own = changes.lab_finder();
+  if (own == nullptr && changes.wrong_share == 0.0) return finders::make_finder(config.closures);
+  auto finder = own != nullptr ? own->make(config, recordings, seed) : config.closures.kind().make(config.closures);
   MethodId id = finder->id();
   if (changes.wrong_share > 0.0)
     finder = std::make_shared<SpoiledClosureFinder>(std::move(finder), changes.wrong_share, changes.wrong, seed);

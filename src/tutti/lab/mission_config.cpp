@@ -36,13 +36,10 @@ void check_closures(const MissionConfig& config, std::vector<std::string>& probl
   if (!closures.planted.empty() && closures.finder != "reference")
     problems.push_back(
         fmt::format("closures.planted: given, but closures.finder is '{}', expected 'reference'", closures.finder));
-  for (std::size_t i = 0; i < config.robots.size(); ++i) {
-    const mission::RobotConfig& robot = config.robots[i];
-    if (closures.finder == "reference" && robot.reference.file.empty() && robot.graph.file.empty())
-      problems.push_back(fmt::format("robots.{}.reference.file: missing, but closures.finder is 'reference'", i));
-    if (closures.finder == "recorded" && robot.graph.file.empty())
-      problems.push_back(fmt::format("robots.{}.graph.file: missing, but closures.finder is 'recorded'", i));
-  }
+  for (std::size_t i = 0; i < config.robots.size(); ++i)
+    if (const LabFinder* kind = closures.lab_finder(); kind != nullptr && !kind->has(config.robots[i]))
+      problems.push_back(
+          fmt::format("robots.{}.{}: missing, but closures.finder is '{}'", i, kind->needs, closures.finder));
   if (closures.finder == "recorded" && config.source != "recordings")
     problems.push_back(fmt::format("closures.finder: is 'recorded', but source is '{}'", config.source));
   if (config.source == "simulation" && closures.finder == "lidar" && config.simulation.sensors != "lidar")

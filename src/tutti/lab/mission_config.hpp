@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
+#include <cstdint>
 #include <filesystem>
+#include <iterator>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -15,6 +19,9 @@
 #include "tutti/simulation/recordings.hpp"
 #include "tutti/simulation/reference_closures.hpp"
 
+namespace tutti::mission {
+struct MissionRecording;
+}
 namespace tutti::lab {
 
 /// How recorded odometry is changed before it is replayed.
@@ -28,6 +35,19 @@ struct RobotChanges {
   }
 };
 
+struct MissionConfig;
+/// A finder whose closures are made of the mission's recordings, not of what sensors saw.
+struct LabFinder {
+  std::string_view name;
+  std::string_view help;
+  std::string_view needs;                          ///< The setting that every replayed robot must have,
+  bool (*has)(const mission::RobotConfig& robot);  ///< and whether this one has it.
+  std::shared_ptr<const server::ClosureFinder> (*make)(const MissionConfig& config,
+                                                       const std::vector<mission::MissionRecording>& recordings,
+                                                       std::uint64_t seed);
+};
+const std::vector<LabFinder>& lab_finders();
+
 /// Closures that come with the mission, and ways to make found closures wrong.
 struct ClosureChanges {
   std::string finder = mission::MissionConfig().closures.finder;
@@ -37,19 +57,24 @@ struct ClosureChanges {
   std::vector<PlantedClosureConfig> planted;
   template <class V>
   void describe(V& v) {
-    v.field(
-        "finder", finder, one_of({"lidar", "visual", "sensors", "reference", "recorded"}),
-        "lidar: from the submap clouds; visual: from images; sensors: from whatever two submaps both carry; "
-        "reference: true relative poses plus noise and a share of wrong ones; recorded: those of robots[].graph, when "
-        "they arrived.");
+    v.field("finder", finder, one_of(all_finders()),
+            help_of(finders::finder_kinds()) + "; " + help_of(lab_finders()) + ".");
     v.field("reference", reference);
     v.field("wrong_share", wrong_share, between(0.0, 0.9),
             "Share of the closures found that are made wrong on purpose.");
     v.field("wrong", wrong, any(), "How wrong these are.");
     v.field("planted", planted, any(), "reference: wrong closures at given places and times.");
   }
-  /// Closures are made of the mission's recordings, not of what sensors saw.
-  [[nodiscard]] bool come_with_mission() const { return finder == "reference" || finder == "recorded"; }
+  /// The chosen row of lab_finders(); null: sensors' closures are found.
+  [[nodiscard]] const LabFinder* lab_finder() const { return row_of(lab_finders(), finder); }
+  [[nodiscard]] bool come_with_mission() const { return lab_finder() != nullptr; }
+
+ private:
+  static std::vector<std::string> all_finders() {
+    std::vector<std::string> names = names_of(finders::finder_kinds());
+    std::ranges::move(names_of(lab_finders()), std::back_inserter(names));
+    return names;
+  }
 };
 
 /// A mission file: robots with recordings, or a simulation, and what the laboratory does to either.

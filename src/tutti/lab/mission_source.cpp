@@ -113,7 +113,7 @@ Status tell_driver(const MissionConfig& config, program::RobotOptions& options) 
   driver.covariance = robot->covariance;
   driver.scan_times = robot->scan_times_config();
   driver.scan_offset_s = robot->scan_time_offset_s;
-  driver.with_images = config.closures.wants_images();
+  driver.with_images = config.closures.kind().uses_images;
   driver.most_cameras = robot->images.most_cameras;
   driver.images_offset_s = robot->images.time_offset_s;
   driver.depth = robot->images.depth.sensor;

@@ -132,11 +132,15 @@ std::vector<std::string> problems_of(const MissionConfig& config) {
 
 std::vector<std::string> problems_of_finder(const MissionConfig& config) {
   std::vector<std::string> problems;
+  const finders::FinderKind& kind = config.closures.kind();
   for (std::size_t i = 0; i < config.robots.size(); ++i) {
-    if (config.closures.finder == "lidar" && config.robots[i].scans.empty() && config.robots[i].bag.empty())
-      problems.push_back(fmt::format("robots.{}.scans: missing, but closures.finder is 'lidar'", i));
-    if (config.closures.finder == "visual" && !config.robots[i].images.is_given() && config.robots[i].bag.empty())
-      problems.push_back(fmt::format("robots.{}.images: missing, but closures.finder is 'visual'", i));
+    const RobotConfig& robot = config.robots[i];
+    const auto note = [&](const char* what) {
+      problems.push_back(fmt::format("robots.{}.{}: missing, but closures.finder is '{}'", i, what, kind.name));
+    };
+    if (!robot.bag.empty()) continue;
+    if (!kind.uses_images && robot.scans.empty()) note("scans");
+    if (!kind.uses_scans && !robot.images.is_given()) note("images");
   }
   return problems;
 }

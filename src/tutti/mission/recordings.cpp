@@ -125,18 +125,16 @@ void align_starts(std::vector<MissionRecording>& robots) {
 }
 
 /// A bag without what closures are found from would silently have none.
-Status check_bag(const RobotConfig& robot, const std::string& finder, const MissionRecording& loaded) {
-  const bool has = finder == "lidar"    ? loaded.recording.scans != nullptr
-                   : finder == "visual" ? loaded.recording.visual != nullptr
-                                        : loaded.recording.scans != nullptr || loaded.recording.visual != nullptr;
+Status check_bag(const RobotConfig& robot, const finders::FinderKind& finder, const MissionRecording& loaded) {
+  const bool has = (finder.uses_scans && loaded.recording.scans != nullptr) ||
+                   (finder.uses_images && loaded.recording.visual != nullptr);
   if (robot.bag.empty() || has) return {};
   std::string said;
   for (const std::string& text : loaded.notes) said += (said.empty() ? "" : "; ") + text;
-  return fail(
-      ErrorCode::invalid,
-      "robot {}: {}; but closures.finder is '{}', expected lidar of scans, visual of images, sensors of what is "
-      "there (--set closures.finder=..)",
-      robot.name, said, finder);
+  return fail(ErrorCode::invalid,
+              "robot {}: {}; but closures.finder is '{}', expected one that uses what is there (--set "
+              "closures.finder=..; {})",
+              robot.name, said, finder.name, help_of(finders::finder_kinds()));
 }
 
 /// What a robot's odometry is from, where that has more than odometry.
@@ -157,7 +155,7 @@ Status put(Result<T> read, std::optional<T>& out) {
 Status read_sources(const RobotConfig& robot, const fs::path& data, const MissionConfig& config, Sources& out) {
   if (!robot.images.maplab_submaps.empty()) return put(read_maplab(robot.images, data), out.maplab);
   if (!robot.bag.empty())
-    return put(read_bag(data, robot, config.closures.wants_images() && !robot.images.is_given()), out.bag);
+    return put(read_bag(data, robot, config.closures.kind().uses_images && !robot.images.is_given()), out.bag);
   if (!robot.graph.file.empty())
     return put(read_graph_recording((data / robot.graph.file).string(), letter_of(robot)), out.graph);
   return {};
@@ -246,7 +244,7 @@ Result<std::vector<MissionRecording>> replay_all(const MissionConfig& config, co
     loaded->recording.robot = RobotId{static_cast<std::uint32_t>(out.size())};
     loaded->recording.name = robot.name;
     loaded->start_s = robot.start_s;
-    if (auto ok = check_bag(robot, config.closures.finder, *loaded); !ok) return tl::unexpected(ok.error());
+    if (auto ok = check_bag(robot, config.closures.kind(), *loaded); !ok) return tl::unexpected(ok.error());
     loaded->score_against_reference = robot.score_against_reference && !loaded->recording.reference.empty();
     out.push_back(std::move(*loaded));
   }
