@@ -76,6 +76,9 @@ class CommandLine(unittest.TestCase):
         self.expect(tutti("mission", "up", "--out", self.path / "up", "--set", "closures.finder=magic", mission), 2, "magic", "lidar")
 
     def test_the_demo_is_a_mission_of_every_command(self):
+        for program, settings in (("server", "judge"), ("robot", "agent:"), ("worker", "refinement:")):
+            self.expect(tutti(program, "--print-config", "--set", "closures.finder=visual"), 0, settings)
+        self.expect(tutti("server", "--print-config", "--set", "closures.finder=visual"), 0, "finder: visual")
         self.expect(tutti("run", "demo", "--print-config", cwd=self.path), 0, "mission: demo\n")
         self.assertEqual(tutti("run", "demo", "--print-config").stdout, tutti("demo", "--print-config").stdout)
         self.expect(tutti("world", "demo", "-o", self.path / "walls.ply"), 0, "world of demo")

@@ -73,6 +73,7 @@ void add_server_command(CLI::App& app, int& exit_code) {
     exit_code = run_program("server", *common, options->console, [&]() -> Status {
       auto settings = lab::server_settings(common->mission);
       if (!settings) return tl::unexpected(settings.error());
+      if (common->print_config) return print_settings(*settings);
       if (wants_ros(*ros))
         if (Status shown = show_on_ros(*ros, *options); !shown) return shown;
       options->settings = std::move(*settings);
@@ -142,6 +143,13 @@ void add_robot_command(CLI::App& app, int& exit_code) {
   const auto ros = add_ros_robot_options(*command);
   add_program_options(*command, *common);
   command->callback([options, common, ros, &exit_code] {
+    if (common->print_config) {
+      exit_code = run_program("robot", *common, options->console, [&]() -> Status {
+        const auto settings = lab::robot_settings(common->mission);
+        return settings ? print_settings(*settings) : Status(tl::unexpected(settings.error()));
+      });
+      return;
+    }
     if (wants_ros(*ros) && options->feed.empty()) options->feed = (options->state / "feed").string();
     if (options->feed.empty() && common->mission.file.empty()) {
       exit_code = complain("robot", "expected a mission, whose recording is replayed, --feed SOCKET or --ros", 2);
@@ -180,6 +188,7 @@ void add_worker_command(CLI::App& app, int& exit_code) {
     exit_code = run_program("worker", *common, options->console, [&]() -> Status {
       auto settings = lab::worker_settings(common->mission);
       if (!settings) return tl::unexpected(settings.error());
+      if (common->print_config) return print_settings(*settings);
       options->settings = std::move(*settings);
       return program::run_worker(*options, program::stop_asked());
     });

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "options.hpp"
+#include "tutti/base/config_io.hpp"
 #include "tutti/lab/mission_source.hpp"
 #include "tutti/program/event_log.hpp"
 #include "tutti/program/stop.hpp"
@@ -17,6 +18,7 @@ namespace tutti::app {
 struct ProgramArguments {
   lab::MissionSource mission;
   std::string log_level = "warning";
+  bool print_config = false;
   int parent = 0;  ///< Process number of the program with which this one ends; 0: none.
 };
 
@@ -44,7 +46,20 @@ inline void add_program_options(CLI::App& command, ProgramArguments& arguments) 
       ->check(CLI::IsMember({"debug", "info", "warning", "error"}))
       ->type_name("LEVEL")
       ->capture_default_str();
+  const auto print = [&command, &arguments] {
+    arguments.print_config = true;
+    for (CLI::Option* option : command.get_options()) option->required(false);
+  };
+  command.add_flag_callback("--print-config", print,
+                            "Print every setting that this program has of a mission, with its value, and stop");
   command.add_option("--end-with-parent", arguments.parent, "")->group("");
+}
+
+/// What --print-config prints.
+template <class Settings>
+Status print_settings(const Settings& settings) {
+  fmt::print("{}", to_yaml(dump_config(settings)));
+  return {};
 }
 
 /// Calls `run`, which returns when it has ended or a signal has asked it to; returns the exit code.

@@ -2,8 +2,10 @@
 // What a bus in memory does beyond the contract of a port, and how transports are chosen.
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <memory>
 #include <string>
+#include <thread>
 
 #include "tutti/bus/transport.hpp"
 
@@ -66,6 +68,25 @@ TEST(MemoryBus, APortConnectsWhenItMay) {
   EXPECT_EQ(hub->state().last_error, "not yet");
   may = true;
   EXPECT_EQ(hub->receive().size(), 1U);
+}
+
+TEST(MemoryBus, PortsAreOfDifferentThreads) {
+  constexpr std::size_t kMessages = 500;
+  const BusOptions options{.url = "memory://threads"};
+  std::thread robot([&] {
+    const auto port = open_port(kRobot, options).value();
+    for (std::size_t i = 0; i < kMessages; ++i) EXPECT_TRUE(send(*port, MessageKind::submap, std::to_string(i), 10));
+  });
+  const auto hub = open_port(kServer, options).value();
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  std::size_t came = 0;
+  while (came < kMessages && std::chrono::steady_clock::now() < end)
+    for (const Received& received : hub->receive()) {
+      hub->acknowledge(received.ticket);
+      ++came;
+    }
+  robot.join();
+  EXPECT_EQ(came, kMessages);
 }
 
 TEST(Transports, AreChosenByTheUrl) {

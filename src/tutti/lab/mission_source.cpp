@@ -126,18 +126,30 @@ Status tell_driver(const MissionConfig& config, program::RobotOptions& options) 
   return {};
 }
 
+Result<program::RobotSettings> settings_of_robot(const MissionSource& source, const MissionConfig& config) {
+  auto name = name_on_bus(source, config);
+  if (!name) return tl::unexpected(name.error());
+  return program::RobotSettings{.mission = std::move(*name),
+                                .robots = robot_names(config),
+                                .agent = config.agent,
+                                .tracking = config.tracking,
+                                .driver = {}};
+}
+
 }  // namespace
+
+Result<program::RobotSettings> robot_settings(const MissionSource& source) {
+  const auto config = load(source);
+  if (!config) return tl::unexpected(config.error());
+  return settings_of_robot(source, *config);
+}
 
 Status tell_robot(const MissionSource& source, program::RobotOptions& options) {
   const auto config = load(source);
   if (!config) return tl::unexpected(config.error());
-  auto name = name_on_bus(source, *config);
-  if (!name) return tl::unexpected(name.error());
-  options.settings = {.mission = std::move(*name),
-                      .robots = robot_names(*config),
-                      .agent = config->agent,
-                      .tracking = config->tracking,
-                      .driver = {}};
+  auto settings = settings_of_robot(source, *config);
+  if (!settings) return tl::unexpected(settings.error());
+  options.settings = std::move(*settings);
   if (!options.feed.empty()) return tell_driver(*config, options);
   const auto number = program::number_of(options.name, options.settings.robots, false);
   if (!number) return tl::unexpected(number.error());

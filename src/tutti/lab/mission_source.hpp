@@ -43,6 +43,7 @@ Result<std::shared_ptr<const server::ClosureFinder>> make_finder(const MissionCo
 /// The settings that the mission gives its server and workers.
 Result<program::ServerSettings> server_settings(const MissionSource& source);
 Result<program::WorkerSettings> worker_settings(const MissionSource& source);
+Result<program::RobotSettings> robot_settings(const MissionSource& source);
 /// Sets the settings, replay and duration_s of a robot, and reads its recording for that unless the robot is fed
 /// (RobotOptions::feed).
 Status tell_robot(const MissionSource& source, program::RobotOptions& options);
