@@ -109,7 +109,7 @@ class IntrudersSystem : public ::testing::Test {
   std::vector<std::unique_ptr<Running>> robots_;
 };
 
-/// Of a robot that was lost, a worker and a viewer, again and again while the mission runs.
+/// What a robot that was lost, a worker and a viewer send, again and again while the mission runs.
 void intrude(const bus::NatsConnection& connection) {
   NodeStatus bravo{.name = "bravo", .version = "0"};
   bravo.session = test::kSession + 1;

@@ -23,7 +23,7 @@ struct FinderConfig;
 struct FinderKind {
   std::string_view name;
   std::string_view help;
-  std::uint32_t version = 0;  ///< Of what it computes.
+  std::uint32_t version = 0;  ///< Raised with every change of what it computes.
   bool uses_scans = false;    ///< A pair of submaps can be compared when both carry this,
   bool uses_images = false;   ///< or this.
   /// All fields of FinderConfig that its verdicts depend on, beside its name: these and no others are in its id, so

@@ -68,7 +68,8 @@ TEST(FinderMaker, NamesStayTheSameWithWhatTheyDoNotDependOn) {
 
 /// The hashes of 0.2.0: with another one every map asks all of its pairs again.
 TEST(FinderMaker, HashesOfDefaultSettingsStay) {
-  const std::map<std::string, std::uint64_t> hashes{{"lidar", 14103240146950850373ULL}, {"visual", 332046118994442543ULL}, {"sensors", 11320756827162014096ULL}};
+  const std::map<std::string, std::uint64_t> hashes{
+      {"lidar", 14103240146950850373ULL}, {"visual", 332046118994442543ULL}, {"sensors", 11320756827162014096ULL}};
   EXPECT_EQ(hashes.size(), finder_kinds().size());
   for (const FinderKind& kind : finder_kinds()) {
     const std::string name(kind.name);

@@ -247,7 +247,7 @@ struct ChangeOfMindRecord {
 struct RobotFixesRecord {
   std::string robot;
   std::size_t fixes = 0, used = 0;
-  std::size_t submaps = 0, submaps_used = 0;  ///< Submaps with fixes. Of those that are not used, why:
+  std::size_t submaps = 0, submaps_used = 0;  ///< Submaps with fixes. Why some are not used:
   std::size_t contradictory = 0, misfit = 0, unaligned = 0;
   double understated = 1.0;  ///< Ratio of the fixes' errors to what they state.
 };
