@@ -492,7 +492,7 @@ class Programs(ProgramsTest):
 
         state = self.path / "server"
         refused(2, "--state", args=["server"])
-        refused(2, "TLS", "--insecure", args=["server", "--state", state, "--listen", "0.0.0.0:4222"])
+        refused(2, "--pki", "--insecure", args=["server", "--state", state, "--listen", "0.0.0.0:4222"])
         refused(2, "TLS", args=["server", "--state", state, "--bus", "nats://192.0.2.1:4222"])
         refused(2, "TLS", args=["robot", "--name", "alpha", "--bus", "nats://192.0.2.1:4222", "--state",
                                 self.path / "alpha", MISSION])

@@ -35,7 +35,7 @@ std::string origins_table(const TrajectoryComparison& c, const PictureClock& clo
   const auto& origins = c.explanation.origins;
   if (origins.empty()) return "  No segment stands out from the rest of the trajectory: B drifts all along.\n";
   TextTable table(0);
-  table.add({"from", "until", "where", "distance", "translation", "rotation", "scale", "over threshold", ""});
+  table.add({"from", "until", "where", "over", "translation", "rotation", "scale", "over threshold", ""});
   table.rule();
   for (std::size_t i = 0; i < std::min(origins.size(), kMostRows); ++i) {
     const auto& o = origins[i];

@@ -319,7 +319,8 @@ TEST(ReportHtml, APartialFigureIsMarkedAndNoHeadline) {
   EXPECT_NE(headline(html).find("partial, scored on 6 % of its trajectory only: server (0.017 m)"), std::string::npos);
   for (const char* figure : {"0.018 m", "0.050 m"}) {  // of the joint map: RMSE, and mean distance to the survey
     EXPECT_EQ(headline(html).find(std::string("<p class=\"value\">") + figure), std::string::npos) << figure;
-    EXPECT_NE(headline(html).find(std::string("of all robots' way only: (") + figure), std::string::npos) << figure;
+    EXPECT_NE(headline(html).find(std::string("of all robots' trajectories only: (") + figure), std::string::npos)
+        << figure;
   }
   EXPECT_NE(html.find("server (0.017 m, partial: on 6 %)"), std::string::npos) << "over the curves";
   EXPECT_NE(html.find("<td class=\"left\">server</td><td>(0.017 m)</td>"), std::string::npos) << "in the table";

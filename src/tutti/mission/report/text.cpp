@@ -213,7 +213,7 @@ std::string report_text(const MissionRecord& record, const std::string& report_h
                   "  RMSE, max: against the reference, after one rigid alignment per robot. RPE: over {} and 10 m.\n",
                   record.rpe_interval)
             : std::string("  No reference: no error could be measured, only how far corrected and server agree.\n");
-    out += "  scored: share of the trajectory that these figures were scored on.";
+    out += "  scored: share of the trajectory that these figures cover.";
     if (has_partial_figures(record))
       out += fmt::format(" In brackets: partial, below {:.0f} %.", 100.0 * kPartialBelow);
     out += "\n  to server: RMSE of corrected against server, no accuracy. update ms: median / max, wall clock.\n";

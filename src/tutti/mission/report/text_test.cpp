@@ -126,9 +126,9 @@ TEST(ReportText, APartialFigureIsMarkedAndNoHeadline) {
   EXPECT_NE(unwrapped(text).find("server (0.017 m) (0.050 m) 0.024 m 0.026 m 6 %"), std::string::npos) << text;
   EXPECT_NE(text.find("In brackets: partial, below 95 %."), std::string::npos);
   EXPECT_NE(line_with(text, "spectral *").find("(0.020 m)"), std::string::npos) << "bravo's distance to the server";
-  EXPECT_NE(
-      unwrapped(text).find("partial: RMSE (0.018 m) over all robots at once is scored on 53 % of all robots' way"),
-      std::string::npos)
+  EXPECT_NE(unwrapped(text).find(
+                "partial: RMSE (0.018 m) over all robots at once is scored on 53 % of all robots' trajectories"),
+            std::string::npos)
       << text;
   record.robots[1].server.scored_share = kPartialBelow;
   EXPECT_EQ(report_text(record, "x").find("(0.017 m)"), std::string::npos);
