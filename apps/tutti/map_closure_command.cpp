@@ -123,8 +123,12 @@ std::optional<std::string> heard_answer(bus::Port& port, const node::WordSender&
 
 void say_waiting(const std::string& what) { fmt::print(stderr, "tutti {}: {}\n", kCommand, what); }
 
+const std::string& why_not(const bus::LinkState& state) {
+  return state.denied.empty() ? state.last_error : state.denied;
+}
+
 std::string waits_for(const bus::LinkState& state) {
-  const std::string why = state.denied.empty() ? state.last_error : state.denied;
+  const std::string& why = why_not(state);
   if (!state.connected)
     return fmt::format("waits for a link to the bus {}{}{}", state.url, why.empty() ? "" : ": ", why);
   if (state.waiting_messages > 0)
@@ -151,7 +155,7 @@ Status send(const ClosureOptions& options, const ClosureWord& word) {
     const bus::LinkState state = (*port)->state();
     if (now_s > options.wait_s && state.waiting_messages > 0)
       return fail(ErrorCode::io, "{}: the bus has not taken the decision for mission '{}' within {} s: {}", where.url,
-                  where.mission, options.wait_s, state.last_error);
+                  where.mission, options.wait_s, why_not(state));
     if (now_s > options.wait_s)
       return fail(ErrorCode::io,
                   "{}: the bus has the decision, but the server has not confirmed it within {} s; give it again if "
