@@ -9,6 +9,7 @@
 #include "tutti/base/config.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/base/result.hpp"
+#include "tutti/base/rows.hpp"
 #include "tutti/geometry/pose3.hpp"
 #include "tutti/model/point_cloud.hpp"
 #include "tutti/model/recording.hpp"
@@ -36,7 +37,7 @@ struct LidarConfig {
   double mount_height_m = 0.25;
   template <class V>
   void describe(V& v) {
-    v.field("pattern", pattern, one_of(scan_pattern_names()), scan_pattern_help());
+    v.field("pattern", pattern, one_of(names_of(scan_patterns())), help_of(scan_patterns()) + ".");
     v.field("beams", beams, between(1, 128), "Beams; of a spinning one evenly spaced from lowest_deg to highest_deg.");
     v.field("lowest_deg", lowest_deg, between(-90.0, 90.0), "Elevation of the lowest ray.");
     v.field("highest_deg", highest_deg, between(-90.0, 90.0), "Elevation of the highest ray.");

@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/simulation/scan_pattern.hpp"
 
-#include <fmt/format.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 
 #include "tutti/base/check.hpp"
+#include "tutti/base/rows.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/simulation/lidar.hpp"
 
@@ -62,31 +60,21 @@ Firing rosette(const LidarConfig& config, Timestamp end) {
   };
 }
 
-constexpr std::array<ScanPattern, 2> kPatterns{{
-    {"spinning", "turns once in a sweep, its beams at fixed elevations", spinning_firings, spinning},
-    {"rosette", "beams that swing while they turn, nowhere the same from sweep to sweep, as those of a Livox Mid-360",
-     rosette_firings, rosette},
-}};
-
 }  // namespace
 
+const std::vector<ScanPattern>& scan_patterns() {
+  static const std::vector<ScanPattern> rows{
+      {"spinning", "turns once in a sweep, its beams at fixed elevations", spinning_firings, spinning},
+      {"rosette", "beams that swing while they turn, nowhere the same from sweep to sweep, as those of a Livox Mid-360",
+       rosette_firings, rosette},
+  };
+  return rows;
+}
+
 const ScanPattern& scan_pattern(std::string_view name) {
-  const auto at = std::ranges::find(kPatterns, name, &ScanPattern::name);
-  TUTTI_CHECK(at != kPatterns.end(), "pattern '{}'", name);
-  return *at;
-}
-
-std::vector<std::string> scan_pattern_names() {
-  std::vector<std::string> out;
-  for (const ScanPattern& pattern : kPatterns) out.emplace_back(pattern.name);
-  return out;
-}
-
-std::string scan_pattern_help() {
-  std::string out;
-  for (const ScanPattern& pattern : kPatterns)
-    out += fmt::format("{}{}: {}", out.empty() ? "" : "; ", pattern.name, pattern.help);
-  return out + ".";
+  const ScanPattern* row = row_of(scan_patterns(), name);
+  TUTTI_CHECK(row != nullptr, "pattern '{}'", name);
+  return *row;
 }
 
 }  // namespace tutti::simulation

@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <functional>
-#include <string>
 #include <string_view>
 #include <vector>
 
@@ -27,8 +26,6 @@ struct ScanPattern {
 
 /// The pattern of LidarConfig::pattern.
 const ScanPattern& scan_pattern(std::string_view name);
-std::vector<std::string> scan_pattern_names();
-/// A line with all of them, for LidarConfig::pattern's help.
-std::string scan_pattern_help();
+const std::vector<ScanPattern>& scan_patterns();
 
 }  // namespace tutti::simulation
