@@ -115,7 +115,7 @@ void add_member(CLI::App& app, BusRole role, const char* help, int& exit_code) {
   if (role == BusRole::robot)
     command
         ->add_option("--number", options->number,
-                     "Of a robot of a mission file, its place in there from 0; default: that of a robot with --feed or "
+                     "The place of a robot in its mission file, from 0; default: that of a robot with --feed or "
                      "--ros, made from its name")
         ->type_name("N");
 }
@@ -131,7 +131,7 @@ void add_pki_command(CLI::App& app, int& exit_code) {
   command->footer(
       "Example: tutti pki init --mission cave; tutti pki add-robot alpha; tutti pki add-operator anna;\n"
       "         tutti server --pki pki --mission cave --listen 0.0.0.0:4222 --state /var/lib/tutti-server\n"
-      "         tutti robot --name alpha --credentials alpha.cred --bus nats://BASE:4222 --mission cave ..\n");
+      "         tutti robot --name alpha --credentials alpha.cred --bus tls://BASE:4222 --mission cave ..\n");
   const auto made = std::make_shared<PkiOptions>(), revoked = std::make_shared<PkiOptions>(),
              renewed = std::make_shared<PkiOptions>(), listed = std::make_shared<PkiOptions>();
   CLI::App* one = add_one(*command, "init", "Makes the folder, the authority and the server's own credential.", made,

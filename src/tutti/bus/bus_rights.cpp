@@ -18,6 +18,8 @@ constexpr BusRight listens(BusRole role, const char* subject, const char* purpos
 constexpr BusRole kRobotUser = BusRole::robot, kWorkerUser = BusRole::worker, kViewerUser = BusRole::views,
                   kOperatorUser = BusRole::operates, kServerUser = BusRole::server;
 
+constexpr const char* kAskLease = "$JS.API.DIRECT.GET.KV_TUTTI_SERVERS.$KV.TUTTI_SERVERS.{mission}";
+constexpr const char* kAskStatus = "$JS.API.DIRECT.GET.KV_GRAPH_{mission}.$KV.GRAPH_{mission}.viewer.0.mission_status";
 constexpr const char* kOwnInbox = "answers to what it asks";
 constexpr const char* kLease = "whether the mission has a server";
 constexpr const char* kStreams = "makes and watches the mission's streams";
@@ -29,7 +31,7 @@ constexpr std::array kRights{
     publishes(kRobotUser, "mission.{mission}.robot.{number}.status", "its own status"),
     publishes(kRobotUser, "$JS.API.DIRECT.GET.KV_GRAPH_{mission}.$KV.GRAPH_{mission}.robot.{number}.*",
               "asks for its last graph and receipt"),
-    publishes(kRobotUser, "$JS.API.DIRECT.GET.KV_TUTTI_SERVERS.$KV.TUTTI_SERVERS.{mission}", kLease),
+    publishes(kRobotUser, kAskLease, kLease),
     listens(kRobotUser, "$KV.GRAPH_{mission}.robot.{number}.*", "its own graphs and receipts"),
     listens(kRobotUser, "_INBOX.robot.{number}.>", kOwnInbox),
 
@@ -40,20 +42,18 @@ constexpr std::array kRights{
     publishes(kWorkerUser, "mission.{mission}.worker.{number}.refinement", "its refinements of the map"),
     publishes(kWorkerUser, "mission.{mission}.worker.{number}.submap_request",
               "asks for submaps, and gets those of jobs that are out"),
-    publishes(kWorkerUser, "$JS.API.DIRECT.GET.KV_TUTTI_SERVERS.$KV.TUTTI_SERVERS.{mission}", kLease),
+    publishes(kWorkerUser, kAskLease, kLease),
     listens(kWorkerUser, "mission.{mission}.worker.{number}.submap_copy", "the submaps that it asked for"),
     listens(kWorkerUser, "_INBOX.worker.{number}.>", kOwnInbox),
 
-    publishes(kViewerUser, "$JS.API.DIRECT.GET.KV_GRAPH_{mission}.$KV.GRAPH_{mission}.viewer.0.mission_status",
-              "asks for the mission's last status"),
-    publishes(kViewerUser, "$JS.API.DIRECT.GET.KV_TUTTI_SERVERS.$KV.TUTTI_SERVERS.{mission}", kLease),
+    publishes(kViewerUser, kAskStatus, "asks for the mission's last status"),
+    publishes(kViewerUser, kAskLease, kLease),
     listens(kViewerUser, "$KV.GRAPH_{mission}.viewer.0.*", "the mission's status"),
     listens(kViewerUser, "_INBOX.viewer.{number}.>", kOwnInbox),
 
     publishes(kOperatorUser, "mission.{mission}.operator.{name}.word", "decisions, under the name that the key proves"),
-    publishes(kOperatorUser, "$JS.API.DIRECT.GET.KV_GRAPH_{mission}.$KV.GRAPH_{mission}.viewer.0.mission_status",
-              "asks for the mission's last status"),
-    publishes(kOperatorUser, "$JS.API.DIRECT.GET.KV_TUTTI_SERVERS.$KV.TUTTI_SERVERS.{mission}", kLease),
+    publishes(kOperatorUser, kAskStatus, "asks for the mission's last status"),
+    publishes(kOperatorUser, kAskLease, kLease),
     listens(kOperatorUser, "$KV.GRAPH_{mission}.viewer.0.*", "the mission's status"),
     listens(kOperatorUser, "_INBOX.operator.{number}.>", kOwnInbox),
 
@@ -75,8 +75,7 @@ constexpr std::array kRights{
     publishes(kServerUser, "$JS.ACK.JOBS_{mission}.workers.>", "of its own worker's jobs"),
     publishes(kServerUser, "$KV.GRAPH_{mission}.>", "graphs, receipts and the mission's status"),
     publishes(kServerUser, "$KV.TUTTI_SERVERS.{mission}", "the lease of the mission"),
-    publishes(kServerUser, "$JS.API.DIRECT.GET.KV_TUTTI_SERVERS.$KV.TUTTI_SERVERS.{mission}",
-              "the lease of the mission"),
+    publishes(kServerUser, kAskLease, "the lease of the mission"),
     publishes(kServerUser, "mission.{mission}.jobs.loop", "jobs"),
     publishes(kServerUser, "mission.{mission}.worker.*.submap_copy", "the submaps that workers ask for"),
     publishes(kServerUser, "mission.{mission}.worker.0.*", "its own worker"),
