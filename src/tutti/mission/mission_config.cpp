@@ -8,6 +8,7 @@
 #include <functional>
 #include <set>
 
+#include "tutti/base/plain_name.hpp"
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::mission {
@@ -112,8 +113,7 @@ bool has_graphs(const MissionConfig& config) {
 }
 
 std::string problem_of_name(const std::string& name) {
-  constexpr const char* kLetters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-";
-  if (name.size() <= kLongestName && name.find_first_not_of(kLetters) == std::string::npos) return {};
+  if (name.empty() || is_plain_name(name, kLongestName)) return {};
   return fmt::format("is '{:.80}', expected at most {} letters, digits, '_' and '-'", name, kLongestName);
 }
 

@@ -16,6 +16,7 @@
 #include "tutti/base/content_hash.hpp"
 #include "tutti/base/file.hpp"
 #include "tutti/base/own_file.hpp"
+#include "tutti/base/plain_name.hpp"
 #include "tutti/bus/bus_rights.hpp"
 #include "tutti/bus/mission_lease.hpp"
 #include "tutti/pki/certificates.hpp"
@@ -35,7 +36,7 @@ constexpr const char* kCredentials = "credentials";
 constexpr std::string_view kFirstLine = "tutti-pki 1";
 constexpr unsigned kPrivate = 0600;
 
-Status make_folder(const fs::path& folder) {
+Status make_private_folder(const fs::path& folder) {
   if (mkdir(folder.c_str(), 0700) == 0 || errno == EEXIST) return {};
   return fail(ErrorCode::io, "{}: cannot be made: {}", folder.string(), std::strerror(errno));
 }
@@ -70,10 +71,7 @@ std::string line_of(const Member& member) {
 }
 
 Status check_name(const std::string& name) {
-  const auto is_allowed = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
-  };
-  if (!name.empty() && name.size() <= 64 && std::ranges::all_of(name, is_allowed)) return {};
+  if (is_plain_name(name, 64)) return {};
   return fail(ErrorCode::configuration, "name '{}': 1 to 64 letters, digits, '_' and '-' were expected", name);
 }
 
@@ -114,7 +112,7 @@ Result<Pki> Pki::make(const fs::path& folder, const std::string& mission, int da
     return fail(ErrorCode::configuration, "{}: there is an authority already: expected a new folder",
                 pki.folder_.string());
   for (const fs::path& made : {pki.folder_, pki.folder_ / kCredentials})
-    if (Status done = make_folder(made); !done) return tl::unexpected(done.error());
+    if (Status done = make_private_folder(made); !done) return tl::unexpected(done.error());
   const auto authority = make_authority("tutti authority of mission " + mission, kAuthorityDays);
   if (!authority) return tl::unexpected(authority.error());
   pki.mission_ = mission;

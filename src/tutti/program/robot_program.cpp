@@ -8,6 +8,7 @@
 #include <memory>
 #include <utility>
 
+#include "tutti/base/plain_name.hpp"
 #include "tutti/bus/mission_lease.hpp"
 #include "tutti/program/feed/live_feed.hpp"
 #include "tutti/program/field_json.hpp"
@@ -39,11 +40,8 @@ Json last_words(const Host::TrafficTable& table, const std::optional<NodeStatus>
 /// What a status may carry, and a unit of systemd, a folder and a subject of the bus can be called.
 Status check_robot_name(const std::string& name) {
   constexpr std::size_t kLongest = 64;
-  const auto is_allowed = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
-  };
-  const auto wrong = std::ranges::find_if_not(name, is_allowed);
-  if (!name.empty() && name.size() <= kLongest && wrong == name.end()) return {};
+  if (is_plain_name(name, kLongest)) return {};
+  const auto wrong = std::ranges::find_if_not(name, is_plain);
   const std::string what =
       wrong == name.end() ? fmt::format("{} letters", name.size()) : fmt::format("'{}' is none of these", *wrong);
   return fail(ErrorCode::configuration,

@@ -11,6 +11,7 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/base/content_hash.hpp"
+#include "tutti/base/plain_name.hpp"
 #include "tutti/bus/delivery.hpp"
 
 namespace tutti::bus {
@@ -67,12 +68,7 @@ std::vector<std::string_view> split(std::string_view text, char at) {
 
 }  // namespace
 
-bool is_mission_name(std::string_view mission) {
-  const auto allowed = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
-  };
-  return !mission.empty() && mission.size() <= 32 && std::ranges::all_of(mission, allowed);
-}
+bool is_mission_name(std::string_view mission) { return is_plain_name(mission, 32); }
 
 std::string word_of(MessageKind kind) {
   std::string word = wire::name(kind);
