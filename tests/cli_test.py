@@ -108,7 +108,7 @@ class CommandLine(unittest.TestCase):
     def test_status_without_a_bus(self):
         self.expect(tutti("status"), 2, "--bus")
         self.expect(tutti("status", "--bus", "nats://192.0.2.1:4222"), 2, "another machine", "TLS")
-        self.expect(tutti("status", "--bus", "nats://127.0.0.1:1", "--wait", "0.3"), 1, "no bus at nats://127.0.0.1:1")
+        self.expect(tutti("status", "--bus", "nats://127.0.0.1:1", "--wait", "0.3"), 1, "no link to a bus at nats://127.0.0.1:1")
         self.expect(tutti("status", "--bus", "nats://127.0.0.1.example.invalid:1"), 2, "another machine", "TLS")
         self.expect(tutti("status", "--bus", "nats://127.0.0.1:one"), 2, "expected nats://HOST:PORT")
         self.expect(tutti("status", "--bus", "nats://127.0.0.1:1", "--credentials", self.path / "none"), 2, "none")
@@ -144,7 +144,7 @@ class CommandLine(unittest.TestCase):
 
     def test_passwords_are_not_printed(self):
         done = tutti("status", "--bus", "nats://alpha:hidden@127.0.0.1:1", "--wait", "0.3")
-        self.expect(done, 1, "no bus at nats://127.0.0.1:1")
+        self.expect(done, 1, "no link to a bus at nats://127.0.0.1:1")
         self.assertNotIn("hidden", done.stdout + done.stderr)
 
     def test_a_word_says_what_it_waits_for(self):

@@ -106,7 +106,7 @@ int look_once(bus::Port& port, View& view, const StatusOptions& options) {
     return view.is_there() ? 0 : 1;
   }
   const std::string error = view.problem().empty() ? port.state().last_error : view.problem();
-  if (!connected) return complain("status", fmt::format("no bus at {} ({})", options.bus.url, error));
+  if (!connected) return complain("status", fmt::format("no link to a bus at {} ({})", options.bus.url, error));
   return complain("status",
                   fmt::format("there is a bus at {}, but no server{} has said anything on it{}", options.bus.url,
                               options.bus.mission.empty() ? "" : " of mission '" + options.bus.mission + "'",

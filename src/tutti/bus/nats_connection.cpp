@@ -55,7 +55,11 @@ Result<std::shared_ptr<NatsConnection>> NatsConnection::open(const BusOptions& o
   if (!settings)
     return fail(ErrorCode::configuration, "{}: not an address or a credential that NATS understands", made->url_);
   natsStatus status = natsConnection_Connect(&made->connection_, settings.get());
-  if (status != NATS_OK) return made->failure(status, "connecting");
+  if (status != NATS_OK) {
+    auto refused = made->failure(status, "connecting");
+    refused.value().message += why_not_let_in(status, *url, made->credentials_);
+    return refused;
+  }
   jsOptions streams;
   jsOptions_Init(&streams);
   streams.Wait = kNatsAnswer.count();

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/bus/nats_log.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
 #include "tutti/base/plain_text.hpp"
 
 namespace tutti::bus {
@@ -12,6 +17,33 @@ std::string_view text_between(std::string_view line, std::string_view begin, std
   if (first == std::string_view::npos) return {};
   line.remove_prefix(first + begin.size());
   return line.substr(0, line.find(end));
+}
+
+/// Why a TLS handshake ended, in Go's words and in ours.
+struct HandshakeEnd {
+  std::string_view go;
+  std::string_view plain;
+};
+constexpr std::array<HandshakeEnd, 8> kHandshakeEnds{{
+    // A client that does not trust the bus hangs up with an alert that Go cannot decrypt.
+    {"bad record MAC", "hung up at the bus's certificate, and showed no certificate of this mission"},
+    {"remote error", "hung up at the bus's certificate, and showed no certificate of this mission"},
+    {"didn't provide a certificate", "showed no certificate of this mission"},
+    {"unknown authority", "showed no certificate of this mission, but one of another authority"},
+    {"certificate has expired", "showed a certificate that has expired"},
+    {"does not look like a TLS handshake", "does not speak TLS"},
+    {"i/o timeout", "showed no certificate of this mission in time"},
+    {"EOF", "hung up, and showed no certificate of this mission"},
+}};
+
+std::string what_of(std::string_view complaint) {
+  constexpr std::size_t kLongest = 200;
+  const std::string said = plain_text(complaint, kLongest);
+  if (complaint.starts_with("authentication error")) return "has no key that may come in (" + said + ")";
+  if (!complaint.starts_with("TLS handshake error")) return said;
+  const auto* const known = std::ranges::find_if(
+      kHandshakeEnds, [&](const HandshakeEnd& end) { return complaint.find(end.go) != std::string_view::npos; });
+  return known == kHandshakeEnds.end() ? said : fmt::format("{} ({})", known->plain, said);
 }
 
 }  // namespace
@@ -31,7 +63,7 @@ std::optional<BusRefusal> refusal_of(std::string_view line) {
                           "authentication timeout", "maximum payload", "Maximum Payload", "arser error", "arser ERROR",
                           "maximum connections", "Maximum Control Line"})
     if (const std::size_t at = line.find(why); at != std::string_view::npos) {
-      out.what = plain_text(line.substr(at), kLongest);
+      out.what = what_of(line.substr(at));
       return out;
     }
   constexpr std::string_view kViolation = " Violation - Nkey \"";

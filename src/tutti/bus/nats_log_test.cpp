@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace tutti::bus {
 namespace nats_log_test {
@@ -19,7 +21,27 @@ TEST(NatsLogTest, SaysWhoWasRefusedWhat) {
   EXPECT_EQ(refusal(kBegin + "\"v1:C:a\" - Subscription Violation - Nkey \"" + kKey + "\", Subject \"c.>\", SID 1"),
             (BusRefusal{"10.0.0.7:35536", kKey, "subscribe c.>"}));
   EXPECT_EQ(refusal(kBegin + "TLS handshake error: tls: client didn't provide a certificate"),
-            (BusRefusal{"10.0.0.7:35536", "", "TLS handshake error: tls: client didn't provide a certificate"}));
+            (BusRefusal{"10.0.0.7:35536", "",
+                        "showed no certificate of this mission (TLS handshake error: tls: client didn't provide a "
+                        "certificate)"}));
+}
+
+/// What nats-server writes is Go's: whom it concerns does not know what a bad record MAC is.
+TEST(NatsLogTest, SaysInPlainWordsWhyNobodyWasLetIn) {
+  const std::vector<std::pair<std::string, std::string>> ends{
+      {"local error: tls: bad record MAC", "showed no certificate of this mission"},
+      {"tls: failed to verify certificate: x509: certificate signed by unknown authority", "another authority"},
+      {"tls: failed to verify certificate: x509: certificate has expired or is not yet valid: current time 2026-11-25",
+       "has expired"},
+      {"tls: first record does not look like a TLS handshake", "does not speak TLS"},
+      {"read tcp 127.0.0.1:4222->127.0.0.1:40000: i/o timeout", "in time"}};
+  for (const auto& [end, words] : ends) {
+    const std::string what = refusal(kBegin + "TLS handshake error: " + end).what;
+    EXPECT_NE(what.find(words), std::string::npos) << what;
+    EXPECT_NE(what.find(end), std::string::npos) << what;
+  }
+  const std::string unknown = "TLS handshake error: something of tomorrow";
+  EXPECT_EQ(refusal(kBegin + unknown).what, unknown);
 }
 
 /// Who has proved nothing chooses the key, and who has chooses the client's name: neither accuses another.

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // How a connection to a bus is to be made.
+#include <fmt/format.h>
+
 #include <string>
 #include <utility>
 
+#include "tutti/base/plain_text.hpp"
 #include "tutti/bus/bus_address.hpp"
 #include "tutti/bus/internal/nats_connection.hpp"
 #include "tutti/bus/internal/transports.hpp"
@@ -39,7 +42,43 @@ bool secure(natsOptions* made, const BusUrl& url, const BusCredentials& credenti
                              const_cast<char*>(credentials.key.seed.c_str())) == NATS_OK;
 }
 
+/// For a member who was not let in.
+std::string advice_to(const BusUser& member, natsStatus status, const std::string& detail) {
+  if (status == NATS_SECURE_CONNECTION_WANTED)
+    return "this bus does not speak TLS, and a credential of `tutti pki` is for one that does: another --bus, or a "
+           "server without --pki?";
+  if (status == NATS_CONNECTION_AUTH_FAILED)
+    return fmt::format("the bus does not know the key of {}: revoked, or of another folder of `tutti pki`",
+                       to_string(member));
+  if (status == NATS_SSL_ERROR && detail.find("certificate") != std::string::npos)
+    return "the bus's certificate is not of the credential's authority: another bus, or another folder of `tutti pki`";
+  if (status == NATS_SSL_ERROR || status == NATS_PROTOCOL_ERROR || status == NATS_IO_ERROR)
+    return fmt::format("the bus hung up: has the certificate of {} expired (tutti pki list, tutti pki renew)?",
+                       to_string(member));
+  return {};
+}
+
+std::string advice_to_stranger(natsStatus status, const BusUrl& url) {
+  if (status == NATS_SECURE_CONNECTION_WANTED)
+    return fmt::format("this bus does not speak TLS: expected nats://{}", to_string(url.at));
+  if (status == NATS_SSL_ERROR || status == NATS_PROTOCOL_ERROR)
+    return "this bus speaks TLS and lets nobody in without a credential of its mission: --credentials FILE, which "
+           "`tutti pki` makes (docs/security.md)";
+  if (status == NATS_CONNECTION_AUTH_FAILED)
+    return "this bus wants to know who comes, or knows other passwords: --credentials FILE";
+  return {};
+}
+
 }  // namespace
+
+/// libnats keeps the detail for the thread that has called it.
+std::string why_not_let_in(natsStatus status, const BusUrl& url, const BusCredentials& credentials) {
+  const char* const last = nats_GetLastError(nullptr);
+  const std::string detail = plain_text(last == nullptr ? "" : last);
+  const std::string advice =
+      credentials.known ? advice_to(*credentials.known, status, detail) : advice_to_stranger(status, url);
+  return advice.empty() ? "" : " (" + advice + ")";
+}
 
 NatsOwned<natsOptions> make_options(const BusUrl& url, const BusCredentials& credentials, const std::string& name) {
   natsOptions* made = nullptr;

@@ -11,6 +11,7 @@
 
 #include "support/pki/pki_bus.hpp"
 #include "tutti/base/file.hpp"
+#include "tutti/bus/internal/nats_connection.hpp"
 #include "tutti/bus/mission_lease.hpp"
 #include "tutti/bus/transport.hpp"
 
@@ -142,13 +143,33 @@ TEST_F(PkiTest, WhoHasNoCertificateOfOursIsNotLetIn) {
     EXPECT_FALSE((*port)->state().connected);
     return (*port)->state().last_error;
   };
-  for (const bus::BusCredentials& one : {stranger, expired, astray}) EXPECT_NE(why(one), "");
-  const auto plain = bus::open_port(Endpoint::of(RobotId{3}), options({})).value();
-  EXPECT_TRUE(within(10.0, [&] { return !plain->state().last_error.empty(); }));
-  EXPECT_FALSE(plain->state().connected);
+  for (const bus::BusCredentials& one : {stranger, expired})
+    EXPECT_NE(why(one).find("tutti pki renew"), std::string::npos) << why(one);
+  EXPECT_NE(why(astray).find("not of the credential's authority"), std::string::npos) << why(astray);
+  for (const char* scheme : {"tls", "nats"}) {
+    auto where = options({});
+    where.url = scheme + where.url.substr(where.url.find(':'));
+    const auto plain = bus::open_port(Endpoint::of(RobotId{3}), where).value();
+    EXPECT_TRUE(within(10.0, [&] { return !plain->state().last_error.empty(); }));
+    EXPECT_FALSE(plain->state().connected);
+    EXPECT_NE(plain->state().last_error.find("--credentials FILE"), std::string::npos) << plain->state().last_error;
+  }
   const auto refusals = child_->take_refusals();
   EXPECT_GE(refusals.all.size(), 3U);
   for (const bus::BusRefusal& refusal : refusals.all) EXPECT_EQ(refusal.key, "");
+}
+
+/// A bus without rights: who expects TLS is told so, not that something is not available.
+TEST_F(PkiTest, ABusWithoutTlsSaysSoToWhoExpectsIt) {
+  const auto open_bus = bus::NatsChild::start(folder_ / "open", {.max_store_bytes = 256U << 20U, .min_free_bytes = 0});
+  ASSERT_TRUE(open_bus.has_value()) << open_bus.error().message;
+  bus::BusOptions where{.url = (*open_bus)->url(), .mission = "cave"};
+  const auto why = [&] { return bus::NatsConnection::open(where, "test").error().message; };
+  const std::string address = where.url.substr(where.url.find(':'));
+  where.url = "tls" + address;
+  EXPECT_NE(why().find("expected nats" + address), std::string::npos) << why();
+  where.credentials = credentials("server");
+  EXPECT_NE(why().find("does not speak TLS, and a credential"), std::string::npos) << why();
 }
 
 TEST_F(PkiTest, ACredentialIsOfOneEndpointAndOneMission) {

@@ -40,6 +40,10 @@ inline constexpr std::uint64_t kMostUnacknowledged = 65'536;
 /// Null: libnats does not take them. `credentials` must outlive the connection.
 NatsOwned<natsOptions> make_options(const BusUrl& url, const BusCredentials& credentials, const std::string& name);
 
+/// " (what to change)" of one whom natsConnection_Connect() has just told, on this thread, that it does not come in;
+/// empty: the status says all that is known.
+std::string why_not_let_in(natsStatus status, const BusUrl& url, const BusCredentials& credentials);
+
 class NatsConnection {
  public:
   /// Once it is there it comes back by itself, however long it was gone. `name` in the bus's logs and of its inboxes.
