@@ -11,7 +11,7 @@ namespace tutti::bus {
 struct BusRefusal {
   std::string address;  ///< "10.0.0.7:40123"
   std::string key;      ///< NatsKey::open of the user; empty: nobody has proved to be one.
-  std::string what;     ///< "publish mission.tutti.robot.3.submap", or why nobody was let in, in plain words and in the bus's.
+  std::string what;     ///< "publish mission.tutti.robot.3.submap", or plain words for why nobody was let in.
   friend bool operator==(const BusRefusal&, const BusRefusal&) = default;
 };
 /// Nothing: the line is of something else.
