@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/** What follows from the store and is in no message: where robots may be, when backlogs are empty, what a correction moved. */
+import { REACH_M, SLOWEST_MPS, TIMES } from "./limits";
+import { distance } from "./pose";
+import { POSE_ROW } from "./schema";
+import type { Poses, RobotStatus, Submap, SubmapId } from "./schema";
+import type { Store } from "./store";
+
+export type Presence = "here" | "silent" | "lost" | "finished" | "unknown";
+
+export interface RobotView {
+  number: number;
+  /** Place among all robots; its colour. */
+  index: number;
+  name: string;
+  status: RobotStatus | null;
+  presence: Presence;
+  /** Since the robot was heard, at the moment that is shown; null: never. */
+  silent_s: number | null;
+  /** Its newest submap in the map. */
+  newest: Submap | null;
+  submaps: number;
+  /** Speed over its newest submaps, m/s. */
+  speed_mps: number;
+  /** How far it may be from where it was seen last; 0 while it is heard. */
+  reach_m: number;
+  drain: Drain;
+}
+
+export interface Drain {
+  state: "empty" | "drains" | "grows" | "waits";
+  seconds: number | null;
+}
+
+/** All robots that a message names, by number. */
+export function robots_at(store: Store, t: number, now: number): RobotView[] {
+  const track = store.track("status");
+  const index = track ? track.index(t) : -1;
+  const status = index < 0 ? null : track!.values[index];
+  const age = index < 0 ? 0 : Math.max(0, Math.min(t, now) - track!.times[index]);
+  const by_number = new Map<number, { status: RobotStatus | null; submaps: Submap[] }>();
+  for (const robot of status?.robots ?? []) by_number.set(robot.number, { status: robot, submaps: [] });
+  for (const [, submap] of store.all("submap", t)) {
+    let robot = by_number.get(submap.robot);
+    if (!robot) by_number.set(submap.robot, (robot = { status: null, submaps: [] }));
+    robot.submaps.push(submap);
+  }
+  const sorted = [...by_number].sort(([a], [b]) => a - b);
+  return sorted.map(([number, { status: own, submaps }], place) => view_of(store, t, age, number, place, own, submaps));
+}
+
+function view_of(store: Store, t: number, age_s: number, number: number, index: number, status: RobotStatus | null, submaps: Submap[]): RobotView {
+  submaps.sort((a, b) => a.until_s - b.until_s);
+  const newest = submaps.at(-1) ?? null;
+  const silent_s = status?.last_seen_s_ago == null ? null : status.last_seen_s_ago + age_s;
+  const presence = presence_of(status, silent_s);
+  const speed_mps = speed_of(submaps.slice(-3));
+  const away = presence === "silent" || presence === "lost";
+  const name = status?.name || newest?.name.split("/")[0] || `robot ${number}`;
+  const reach_m = away && silent_s !== null ? Math.min(REACH_M, Math.max(speed_mps, SLOWEST_MPS) * silent_s) : 0;
+  return { number, index, name, status, presence, silent_s, newest, submaps: submaps.length, speed_mps, reach_m, drain: drain_of(store, t, number) };
+}
+
+function presence_of(status: RobotStatus | null, silent_s: number | null): Presence {
+  if (!status || silent_s === null) return "unknown";
+  if (status.finished && status.backlog_submaps === 0) return "finished";
+  if (silent_s < TIMES.robot_silent_s) return "here";
+  return silent_s < TIMES.robot_lost_s ? "silent" : "lost";
+}
+
+function speed_of(submaps: Submap[]): number {
+  let way = 0;
+  let time = 0;
+  for (const { path, from_s, until_s } of submaps) {
+    for (let i = 1; i < path.length; ++i) way += distance(path[i - 1], path[i]);
+    time += until_s - from_s;
+  }
+  return time > 0 ? way / time : 0;
+}
+
+/** When a backlog will be empty if it goes on as over the last minute. */
+export function drain_of(store: Store, t: number, robot: number): Drain {
+  const track = store.track("status");
+  const last = track ? track.index(t) : -1;
+  const backlog = (i: number) => track!.values[i]?.robots.find((r) => r.number === robot)?.backlog_bytes ?? null;
+  const now = last < 0 ? null : backlog(last);
+  if (now === null || now === 0) return { state: "empty", seconds: null };
+  let first = last;
+  while (first > 0 && track!.times[last] - track!.times[first] < TIMES.drain_window_s && backlog(first - 1) !== null) --first;
+  const time = track!.times[last] - track!.times[first];
+  const drained = (backlog(first) ?? now) - now;
+  if (time <= 0 || drained === 0) return { state: "waits", seconds: null };
+  return drained > 0 ? { state: "drains", seconds: (now * time) / drained } : { state: "grows", seconds: null };
+}
+
+export interface Correction {
+  t: number;
+  before: Poses;
+  after: Poses;
+  /** How far each submap moved, by place; NaN: not comparable. */
+  moved_m: Float64Array;
+  largest_m: number;
+  largest: SubmapId;
+  /** Parts of the map that became one. */
+  joined: number;
+}
+
+/** What the newest poses at t changed; null when nothing did. */
+export function correction_at(store: Store, t: number): Correction | null {
+  const track = store.track("poses");
+  const i = track ? track.index(t) : -1;
+  if (i < 1 || !track!.values[i] || !track!.values[i - 1]) return null;
+  return correction_between(store, track!.times[i], track!.values[i - 1]!, track!.values[i]!);
+}
+
+/**
+ * Distances make sense inside one frame only: of the old parts that are now in one, the largest keeps its frame; the
+ * others were joined to it.
+ */
+export function correction_between(store: Store, t: number, before: Poses, after: Poses): Correction {
+  const n = Math.min(before.rows.length, after.rows.length) / POSE_ROW;
+  const sizes = new Map<number, Map<number, number>>();
+  for (let p = 0; p < n; ++p) {
+    const [was, is] = [before.rows[p * POSE_ROW], after.rows[p * POSE_ROW]];
+    if (!Number.isFinite(was) || !Number.isFinite(is)) continue;
+    const parts = sizes.get(is) ?? new Map<number, number>();
+    parts.set(was, (parts.get(was) ?? 0) + 1);
+    sizes.set(is, parts);
+  }
+  const keeper = new Map([...sizes].map(([is, parts]) => [is, [...parts].sort((a, b) => b[1] - a[1] || a[0] - b[0])[0][0]]));
+  const moved_m = new Float64Array(n).fill(Number.NaN);
+  let largest_m = 0;
+  let largest = "";
+  for (let p = 0; p < n; ++p) {
+    const at = p * POSE_ROW;
+    if (keeper.get(after.rows[at]) !== before.rows[at]) continue;
+    moved_m[p] = distance(before.rows.subarray(at + 1, at + 4) as unknown as number[], after.rows.subarray(at + 1, at + 4) as unknown as number[]);
+    if (moved_m[p] > largest_m) [largest_m, largest] = [moved_m[p], store.id_at(p)];
+  }
+  const joined = [...sizes.values()].reduce((sum, parts) => sum + parts.size - 1, 0);
+  return { t, before, after, moved_m, largest_m, largest, joined };
+}
+
+/** Ways between the mission's first and last message, for the time line. */
+export function time_range(store: Store, now: number): { first: number; last: number } {
+  const mission = store.get("mission");
+  const last = Math.max(now, store.newest, mission?.mode === "report" ? (mission.duration_s ?? 0) : 0);
+  return { first: mission?.mode === "report" ? 0 : Math.min(store.oldest, last), last };
+}
+
+

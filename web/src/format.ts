@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/** Numbers as people read them. "-" where there is none; nothing is estimated in its place. */
+type Figure = number | null | undefined;
+const known = (x: Figure): x is number => typeof x === "number" && Number.isFinite(x);
+
+export function metres(x: Figure): string {
+  if (!known(x)) return "-";
+  return Math.abs(x) >= 1000 ? `${(x / 1000).toFixed(2)} km` : `${x.toFixed(Math.abs(x) >= 100 ? 0 : Math.abs(x) >= 10 ? 1 : Math.abs(x) >= 1 ? 2 : 3)} m`;
+}
+
+export function bytes(x: Figure): string {
+  if (!known(x)) return "-";
+  if (x < 1000) return `${Math.round(x)} B`;
+  const k = x < 1e6 ? 1e3 : x < 1e9 ? 1e6 : 1e9;
+  const digits = x / k >= 100 ? 0 : x / k >= 10 ? 1 : 2;
+  return `${(x / k).toFixed(digits)} ${k === 1e3 ? "kB" : k === 1e6 ? "MB" : "GB"}`;
+}
+
+/** How long: "3 s", "4 min 10 s", "2 h 05 min". */
+export function span(s: Figure): string {
+  if (!known(s)) return "-";
+  if (s < 10) return `${Math.max(0, s).toFixed(s < 1 ? 1 : 0)} s`;
+  if (s < 120) return `${Math.round(s)} s`;
+  if (s < 3600) return `${Math.floor(s / 60)} min ${two(Math.floor(s % 60))} s`;
+  return `${Math.floor(s / 3600)} h ${two(Math.floor((s % 3600) / 60))} min`;
+}
+
+/** A moment of the mission: "0:04:10". */
+export function moment(s: Figure): string {
+  if (!known(s)) return "-";
+  const whole = Math.max(0, Math.floor(s));
+  return `${Math.floor(whole / 3600)}:${two(Math.floor(whole / 60) % 60)}:${two(whole % 60)}`;
+}
+
+export const milliseconds = (ms: Figure): string =>
+  !known(ms) ? "-" : ms < 1 ? `${(1000 * ms).toFixed(0)} µs` : ms < 1000 ? `${ms.toFixed(ms < 10 ? 2 : ms < 100 ? 1 : 0)} ms` : span(ms / 1000);
+
+export const share = (x: Figure, digits = 1): string => (known(x) ? `${(100 * x).toFixed(digits)} %` : "-");
+export const degrees = (x: Figure): string => (known(x) ? `${x.toFixed(2)}°` : "-");
+
+/** A measured value with its unit; three figures that count. */
+export function figure(x: Figure, unit = ""): string {
+  if (!known(x)) return "-";
+  const digits = x === 0 || Math.abs(x) >= 100 || Number.isInteger(x) ? 0 : Math.abs(x) >= 10 ? 1 : Math.abs(x) >= 1 ? 2 : 3;
+  return `${x.toFixed(digits)}${unit ? ` ${unit}` : ""}`;
+}
+
+export const many = (n: number, one: string, several = `${one}s`): string => `${n} ${n === 1 ? one : several}`;
+
+/** When, by the watch on the wall; from ns since 1970. */
+export const wall = (ns: number | null): string => (ns ? new Date(ns / 1e6).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" }) : "");
+
+const two = (n: number): string => String(n).padStart(2, "0");

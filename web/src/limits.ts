@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/** What the page keeps, and when it calls something old: all bounds in one place. */
+export const LIMITS = {
+  /** Messages kept per key in a running mission; older ones are thinned. A report keeps everything. */
+  history: {
+    mission: 1,
+    status: 240,
+    alerts: 120,
+    submap: 2,
+    poses: 240,
+    closure: 8,
+    refusals: 60,
+    disagreement: 12,
+    trajectory: 1,
+    errors: 1,
+    survey: 1,
+    report: 1,
+    mark: 8,
+  },
+  /** Most keys of one kind; beyond, the oldest goes. */
+  keys: 20_000,
+  /** Points held by the page in all clouds together; beyond, clouds are thinned to a prefix. */
+  points: 4_000_000,
+  /** Clouds fetched at once. */
+  fetches: 6,
+  /** Rows that a list shows before it asks for a filter. */
+  rows: 200,
+  /** Alerts that were acknowledged, remembered by this browser. */
+  acknowledged: 500,
+  /** Points drawn on the CPU while the picture moves, at most. */
+  moving_points: 1_200_000,
+} as const;
+
+export const TIMES = {
+  /** The server sends a sign of life every second. */
+  server_silent_s: 3,
+  reconnect_ms: 400,
+  /** Robots report every two seconds. */
+  robot_silent_s: 7,
+  robot_lost_s: 60,
+  /** Over which the drain of a backlog is measured. */
+  drain_window_s: 60,
+  /** How long a correction stays in sight. */
+  ghost_s: 20,
+  /** Corrections below this are not shown. */
+  ghost_m: 0.05,
+  animation_ms: 1200,
+  answer_ms: 20_000,
+} as const;
+
+/** A silent robot is somewhere in a circle: the speed it had, times its silence, at most this. */
+export const REACH_M = 150;
+/** A robot that never moved may start to. */
+export const SLOWEST_MPS = 0.2;

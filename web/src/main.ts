@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: BSD-3-Clause
+import { App } from "./app";
+import { View } from "./scene/view";
+import { InlinedSource } from "./sources/inlined";
+import { LiveSource } from "./sources/live";
+import "./styles.css";
+import { ThemeChoice } from "./theme";
+import { h } from "./ui/dom";
+import { robots_panel } from "./ui/robots";
+import { side_panel } from "./ui/side";
+import { Timeline } from "./ui/timeline";
+import { legend, tool_bar } from "./ui/tools";
+import { top_bar } from "./ui/top";
+
+const app = new App(InlinedSource.of_page(document) ?? new LiveSource());
+const theme = new ThemeChoice(app);
+
+const view = new View(app, new URLSearchParams(location.search).has("cpu"));
+const middle = h("main", { class: "middle" }, view.element, tool_bar(app, view), legend(app, view));
+document.body.append(h("div", { class: `room ${app.live ? "live" : "report"}` }, top_bar(app, theme), h("aside", { class: "left" }, robots_panel(app, view)), middle, side_panel(app, view), new Timeline(app).element), h("div", { id: "notices", "aria-live": "polite" }));
+app.on(() => (document.title = `${app.store.get("mission")?.name ?? ""} – Tutti`));
+app.start();
+
+// For tests and measurements.
+Object.assign(window, { tutti: { app, view } });

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/** Which points are drawn in which colours. */
+import type { Cloud, Clouds } from "../cloud";
+import { bad, css, even, height_ramp, mix, ramp_of, robot_rgb } from "../colours";
+import type { Rgb } from "../colours";
+import { metres, span } from "../format";
+import type { Options } from "../options";
+import { rows_of, transform } from "../pose";
+import type { Painted, Window3 } from "../raster";
+import type { Eye } from "./eye";
+import type { Placed, World } from "./world";
+
+export interface Dressing {
+  options: Options;
+  dark: boolean;
+  /** Place of a robot's number among all, for its colour. */
+  colour_index: (robot: number) => number;
+  robot_name: (robot: number) => string;
+  /** The moment that is shown, s. */
+  t: number;
+  /** Whether this submap is faint, because another thing is looked at. */
+  faint: (id: string) => boolean;
+}
+
+export interface Legend {
+  title: string;
+  entries: { colour: string; label: string }[];
+  /** Instead of entries: a scale from left to right. */
+  scale: { colours: string[]; low: string; high: string } | null;
+}
+
+const kHolding: { most: number; colour: Rgb; label: string }[] = [
+  { most: 0, colour: [150, 160, 175], label: "root of its part" },
+  { most: 1, colour: [255, 93, 117], label: "1: hangs on one" },
+  { most: 2, colour: [240, 180, 70], label: "2" },
+  { most: Infinity, colour: [70, 200, 150], label: "3 or more" },
+];
+
+/** Largest sigma of a submap and oldest age: the ends of scales. */
+interface Scales {
+  sigma_m: number;
+  age_s: number;
+}
+
+function scales_of(world: World, t: number): Scales {
+  let sigma_m = 0.01;
+  let age_s = 10;
+  for (const p of world.placed.values()) {
+    if (p.sigma_m > sigma_m) sigma_m = p.sigma_m;
+    age_s = Math.max(age_s, t - p.submap.until_s);
+  }
+  return { sigma_m, age_s };
+}
+
+function colour_of(p: Placed, d: Dressing, s: Scales): Rgb {
+  switch (d.options.colour) {
+    case "age":
+      return even(1 - (d.t - p.submap.until_s) / s.age_s);
+    case "sigma":
+      return Number.isFinite(p.sigma_m) ? bad(p.sigma_m / s.sigma_m) : [130, 138, 150];
+    case "held":
+      return Number.isFinite(p.holding) ? kHolding.find((h) => p.holding <= h.most)!.colour : [130, 138, 150];
+    case "part":
+      return robot_rgb(p.component, d.dark);
+    default:
+      return robot_rgb(d.colour_index(p.submap.robot), d.dark);
+  }
+}
+
+export class Dresser {
+  private ramps = new Map<string, Uint32Array>();
+  private height = height_ramp();
+
+  /** Of what the eye sees, with `most` points altogether. */
+  dress(world: World, clouds: Clouds, eye: Eye, d: Dressing, most: number): Map<string, Painted> {
+    const out = new Map<string, Painted>();
+    if (!d.options.layers.clouds) return out;
+    const scales = scales_of(world, d.t);
+    let points = 0;
+    for (const [id, placed] of world.placed) {
+      const cloud = clouds.get(id);
+      if (!cloud || cloud.n === 0) continue;
+      const centre = transform(placed.T, cloud.centre);
+      if (!eye.sees(centre, cloud.radius_m)) continue;
+      points += cloud.n;
+      const ramp = d.options.colour === "height" ? this.height : this.ramp(colour_of(placed, d, scales), d.faint(id), d.dark);
+      out.set(id, painted(cloud, placed.T, ramp, eye, centre));
+    }
+    if (points > most) for (const cloud of out.values()) cloud.count = Math.ceil((cloud.count * most) / points);
+    return out;
+  }
+
+  survey(cloud: Cloud, eye: Eye, d: Dressing, offset: readonly number[]): Painted {
+    const T = [offset[0], offset[1], offset[2], 0, 0, 0, 1];
+    return painted(cloud, T, this.ramp([140, 150, 165], false, d.dark), eye, transform(T, cloud.centre));
+  }
+
+  private ramp(colour: Rgb, faint: boolean, dark: boolean): Uint32Array {
+    const shown = faint ? mix(colour, dark ? [24, 30, 39] : [235, 235, 232], 0.8) : colour;
+    const key = shown.map((x) => Math.round(x / 4)).join();
+    let ramp = this.ramps.get(key);
+    if (!ramp) this.ramps.set(key, (ramp = ramp_of(shown, dark)));
+    if (this.ramps.size > 512) this.ramps.clear();
+    return ramp;
+  }
+}
+
+function painted(cloud: Cloud, T: readonly number[], ramp: Uint32Array, eye: Eye, centre: readonly number[]): Painted {
+  const away = Math.hypot(...centre.map((x, k) => x - eye.position[k]));
+  const size = Math.min(4, Math.max(1, Math.round(0.05 * eye.pixels_per_m(Math.max(away, cloud.radius_m * 0.4)))));
+  return { xyz: cloud.xyz, count: cloud.n, step_m: cloud.step_m, T_world: rows_of(T), ramp, size };
+}
+
+export function window_of(world: World, options: Options): Window3 {
+  const low = options.low_m ?? -Infinity;
+  const high = options.high_m ?? Infinity;
+  const normal: [number, number, number] = [-Math.sin(options.section_rad), Math.cos(options.section_rad), 0];
+  const offset_m = normal[0] * options.section_at[0] + normal[1] * options.section_at[1];
+  return {
+    low_m: low,
+    high_m: high,
+    section: options.section ? { normal, offset_m, half_m: options.section_half_m } : null,
+    ramp_low_m: Number.isFinite(low) ? low : world.low[2] + 3,
+    ramp_high_m: Number.isFinite(high) ? high : world.high[2] - 1,
+  };
+}
+
+export function legend_of(world: World, d: Dressing): Legend {
+  const s = scales_of(world, d.t);
+  const scale = (title: string, colour: (x: number) => Rgb, low: string, high: string): Legend => ({
+    title,
+    entries: [],
+    scale: { colours: [0, 0.25, 0.5, 0.75, 1].map((x) => css(colour(x))), low, high },
+  });
+  const w = window_of(world, d.options);
+  switch (d.options.colour) {
+    case "height":
+      return scale("height", even, metres(w.ramp_low_m), metres(w.ramp_high_m));
+    case "age":
+      return scale("seen last", (x) => even(1 - x), "now", `${span(s.age_s)} ago`);
+    case "sigma":
+      return scale("uncertainty of position, one sigma", bad, "0 m", metres(s.sigma_m));
+    case "held":
+      return { title: "closures that hold it", entries: kHolding.map((h) => ({ colour: css(h.colour), label: h.label })), scale: null };
+    case "part":
+      return { title: "part of the map", entries: [...world.parts.values()].map((p) => ({ colour: css(robot_rgb(p.component, d.dark)), label: `part ${p.component + 1}` })), scale: null };
+    default: {
+      const numbers = [...new Set([...world.placed.values()].map((p) => p.submap.robot))].sort((a, b) => a - b);
+      return { title: "robot", entries: numbers.map((n) => ({ colour: css(robot_rgb(d.colour_index(n), d.dark)), label: d.robot_name(n) })), scale: null };
+    }
+  }
+}

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/** The camera, and how one moves it: mouse, fingers, keys. */
+import { MOUSE, Matrix4, PerspectiveCamera, Vector3 } from "three";
+import { MapControls } from "three/examples/jsm/controls/MapControls.js";
+import type { Vec3 } from "../schema";
+
+const kField_deg = 45;
+
+export class Eye {
+  readonly camera = new PerspectiveCamera(kField_deg, 1, 0.05, 20_000);
+  private controls: MapControls;
+  /** Projection times view, column by column. */
+  readonly matrix = new Float64Array(16);
+  width = 1;
+  height = 1;
+  private product = new Matrix4();
+
+  constructor(element: HTMLElement, on_change: () => void) {
+    this.camera.up.set(0, 0, 1);
+    this.camera.position.set(0, -40, 40);
+    this.controls = new MapControls(this.camera, element);
+    this.controls.zoomToCursor = true;
+    this.controls.enableDamping = false;
+    this.controls.maxPolarAngle = Math.PI * 0.98;
+    this.controls.mouseButtons = { LEFT: MOUSE.PAN, MIDDLE: MOUSE.ROTATE, RIGHT: MOUSE.ROTATE };
+    this.controls.addEventListener("change", on_change);
+  }
+
+  resize(width: number, height: number): void {
+    this.width = width;
+    this.height = height;
+    this.camera.aspect = width / Math.max(height, 1);
+    this.camera.updateProjectionMatrix();
+  }
+
+  update(): void {
+    this.camera.updateMatrixWorld();
+    this.product.multiplyMatrices(this.camera.projectionMatrix, this.camera.matrixWorldInverse);
+    this.matrix.set(this.product.elements);
+  }
+
+  /** Pixels and depth of a point of the world; null behind the camera. */
+  project(p: readonly number[]): [number, number, number] | null {
+    const m = this.matrix;
+    const w = m[3] * p[0] + m[7] * p[1] + m[11] * p[2] + m[15];
+    if (w < 0.05) return null;
+    const x = (m[0] * p[0] + m[4] * p[1] + m[8] * p[2] + m[12]) / w;
+    const y = (m[1] * p[0] + m[5] * p[1] + m[9] * p[2] + m[13]) / w;
+    return [0.5 * this.width * (1 + x), 0.5 * this.height * (1 - y), w];
+  }
+
+  /** Pixels of a metre at a depth. */
+  pixels_per_m(depth: number): number {
+    return (0.5 * this.height) / (Math.tan((kField_deg * Math.PI) / 360) * Math.max(depth, 0.05));
+  }
+
+  /** Whether a ball may be in the picture. */
+  sees(centre: readonly number[], radius: number): boolean {
+    const m = this.matrix;
+    for (let plane = 0; plane < 6; ++plane) {
+      const row = plane >> 1;
+      const sign = plane & 1 ? -1 : 1;
+      const a = m[3] + sign * m[row];
+      const b = m[7] + sign * m[4 + row];
+      const c = m[11] + sign * m[8 + row];
+      const d = m[15] + sign * m[12 + row];
+      if (row < 2 && a * centre[0] + b * centre[1] + c * centre[2] + d < -radius * Math.hypot(a, b, c)) return false;
+    }
+    return true;
+  }
+
+  get target(): Vec3 {
+    return this.controls.target.toArray() as Vec3;
+  }
+  get distance(): number {
+    return this.camera.position.distanceTo(this.controls.target);
+  }
+  get position(): Vec3 {
+    return this.camera.position.toArray() as Vec3;
+  }
+  /** Angle from the world's x to what is right on the screen, seen from above. */
+  get heading(): number {
+    const m = this.camera.matrixWorld.elements;
+    return Math.atan2(m[1], m[0]);
+  }
+
+  /** Looks at a box from above, a little from the south. */
+  fit(low: Vec3, high: Vec3, from_above = false): void {
+    const size = Math.max(high[1] - low[1], (high[0] - low[0]) / this.camera.aspect, 4);
+    const away = (0.56 * size) / Math.tan((kField_deg * Math.PI) / 360) + (high[2] - low[2]) / 2;
+    this.controls.target.set((low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2);
+    const tilt = from_above ? 0.0001 : 0.62;
+    this.camera.position.copy(this.controls.target).add(new Vector3(0, -away * Math.sin(tilt), away * Math.cos(tilt)));
+    this.controls.update();
+  }
+
+  /** Looks straight down, and keeps what is in the middle. */
+  top(): void {
+    const away = this.distance;
+    this.camera.position.copy(this.controls.target).add(new Vector3(0, -0.0001 * away, away));
+    this.controls.update();
+  }
+
+  /** Keeps its direction and looks at p; from `away` if given. */
+  look_at(p: readonly number[], away?: number): void {
+    const back = this.camera.position.clone().sub(this.controls.target);
+    if (away !== undefined) back.setLength(away);
+    this.controls.target.set(p[0], p[1], p[2]);
+    this.camera.position.copy(this.controls.target).add(back);
+    this.controls.update();
+  }
+
+  /** Along the ground: right and forward in shares of the distance; turned by an angle; zoomed by a factor. */
+  move(right: number, forward: number, turn = 0, zoom = 1): void {
+    const back = this.camera.position.clone().sub(this.controls.target);
+    const a = this.heading;
+    const d = this.distance;
+    const step = new Vector3((Math.cos(a) * right - Math.sin(a) * forward) * d, (Math.sin(a) * right + Math.cos(a) * forward) * d, 0);
+    this.controls.target.add(step);
+    back.applyAxisAngle(this.camera.up, turn).multiplyScalar(zoom);
+    this.camera.position.copy(this.controls.target).add(back);
+    this.controls.update();
+  }
+}

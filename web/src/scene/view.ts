@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/** The 3-D picture: points, and ink over them. Draws only when something changed. */
+import type { App } from "../app";
+import { LIMITS } from "../limits";
+import type { SubmapId, Vec3 } from "../schema";
+import { Dresser, window_of } from "./dress";
+import type { Dressing } from "./dress";
+import { Eye } from "./eye";
+import { Ink } from "./ink";
+import type { Target } from "./ink";
+import { CpuPainter, GpuPainter, gpu_name } from "./painters";
+import type { Painter } from "./painters";
+import { draw_picture } from "./picture";
+import { nearest_point } from "./pick";
+
+/** A place that somebody pointed at. */
+export interface Spot {
+  submap: SubmapId;
+  /** In the submap's frame. */
+  at: Vec3;
+  world: Vec3;
+}
+
+export interface Tool {
+  readonly name: string;
+  /** Somebody pointed at a place. */
+  point(spot: Spot): void;
+  draw(ink: Ink): void;
+}
+
+const kBackground = { dark: [14, 18, 26] as [number, number, number], light: [244, 243, 239] as [number, number, number] };
+
+export class View {
+  readonly element = document.createElement("div");
+  readonly eye: Eye;
+  readonly ink: Ink;
+  readonly painter: Painter;
+  readonly gpu = gpu_name();
+  tool: Tool | null = null;
+  followed: number | null = null;
+  /** Milliseconds of the last picture, and points in it. */
+  last = { ms: 0, points: 0, pictures: 0 };
+  private dresser = new Dresser();
+  private dirty = true;
+  private fitted = false;
+  private moved_ms = -Infinity;
+  private still = 0;
+
+  constructor(private readonly app: App, force_cpu = false) {
+    this.element.className = "view";
+    this.painter = this.gpu && !force_cpu ? new GpuPainter() : new CpuPainter();
+    this.eye = new Eye(this.element, () => this.move());
+    this.ink = new Ink(this.eye);
+    this.element.append(this.painter.canvas, this.ink.canvas);
+    this.element.tabIndex = 0;
+    this.element.setAttribute("aria-label", "3-D map: arrows move, Q and E turn, plus and minus zoom, T looks from above, F shows all");
+    new ResizeObserver(() => this.resize()).observe(this.element);
+    this.listen();
+    app.on((topic) => this.hear(topic));
+    requestAnimationFrame(() => this.frame());
+  }
+
+  redraw(): void {
+    this.dirty = true;
+  }
+  fit(from_above = false): void {
+    this.followed = null;
+    this.eye.fit(this.app.world.low, this.app.world.high, from_above);
+    this.fitted = this.app.world.placed.size > 0;
+  }
+  use(tool: Tool | null): void {
+    this.tool = tool;
+    this.element.classList.toggle("pointing", tool !== null);
+    this.app.say("tool");
+  }
+  look_at(p: readonly number[], away = Math.min(this.eye.distance, 40)): void {
+    this.eye.look_at(p, away);
+  }
+
+  /** The place under a pixel of the picture. */
+  spot_at(x: number, y: number): Spot | null {
+    return nearest_point(this.app, this.eye, x, y);
+  }
+
+  dressing(): Dressing {
+    const { app } = this;
+    return {
+      options: app.options,
+      dark: app.dark,
+      colour_index: (n) => app.robot_index(n),
+      robot_name: (n) => app.robot_name(n),
+      t: app.shown(),
+      faint: (id) => app.selection?.kind === "robot" && app.world.placed.get(id)?.submap.robot !== app.selection.number,
+    };
+  }
+
+  private hear(topic: string): void {
+    if (topic === "link" || topic === "me") return;
+    if (!this.fitted && this.app.world.placed.size > 0 && this.app.ready) this.fit();
+    this.dirty = true;
+  }
+
+  private move(): void {
+    this.moved_ms = performance.now();
+    this.dirty = true;
+  }
+
+  private resize(): void {
+    const { clientWidth: width, clientHeight: height } = this.element;
+    const ratio = Math.min(devicePixelRatio || 1, 2);
+    this.eye.resize(width, height);
+    this.painter.resize(width, height, ratio);
+    this.ink.resize(width, height, ratio);
+    this.draw();
+  }
+
+  private frame(): void {
+    requestAnimationFrame(() => this.frame());
+    const now = performance.now();
+    const glides = this.app.world.step(now);
+    const moves = glides || now - this.moved_ms < 150;
+    if (this.followed !== null) this.follow();
+    if (!moves && this.still === 0) this.dirty = true; // once more, with all points and shaded edges
+    if (this.dirty || glides) this.draw(moves);
+    this.still = moves ? 0 : this.still + 1;
+    this.dirty = false;
+  }
+
+  private follow(): void {
+    const robot = this.app.robots.find((r) => r.number === this.followed);
+    const at = robot?.newest && this.app.world.end_of(robot.newest);
+    if (!at) return;
+    if (Math.hypot(...at.map((x, k) => x - this.eye.target[k])) > 0.01) this.eye.look_at(at);
+  }
+
+  private draw(moves = false): void {
+    if (!this.eye.width || !this.eye.height) return;
+    const start = performance.now();
+    const { app, eye } = this;
+    eye.update();
+    const dressing = this.dressing();
+    const clouds = this.dresser.dress(app.world, app.clouds, eye, dressing, moves ? LIMITS.moving_points : Infinity);
+    this.add_survey(clouds, dressing);
+    const fast = !moves || this.last.ms < 24;
+    this.painter.draw(clouds, eye.matrix, eye.camera, window_of(app.world, app.options), app.dark ? kBackground.dark : kBackground.light, app.options.edges && fast);
+    draw_picture(app, this.ink);
+    this.tool?.draw(this.ink);
+    let points = 0;
+    for (const cloud of clouds.values()) points += cloud.count;
+    this.last = { ms: performance.now() - start, points, pictures: this.last.pictures + 1 };
+  }
+
+  private add_survey(clouds: Map<string, import("../raster").Painted>, dressing: Dressing): void {
+    const survey = this.app.options.layers.survey ? this.app.store.get("survey") : null;
+    if (!survey) return;
+    this.app.clouds.want(survey.cloud);
+    const cloud = this.app.clouds.get(survey.cloud);
+    if (cloud) clouds.set(survey.cloud, this.dresser.survey(cloud, this.eye, dressing, this.app.world.offset_of(0)));
+  }
+
+  private listen(): void {
+    const { element } = this;
+    let down = { x: 0, y: 0 };
+    element.addEventListener("pointerdown", (e) => {
+      down = { x: e.clientX, y: e.clientY };
+      element.focus({ preventScroll: true });
+    });
+    element.addEventListener("pointerup", (e) => {
+      if (e.button === 0 && Math.hypot(e.clientX - down.x, e.clientY - down.y) < 5) this.click(e);
+    });
+    element.addEventListener("pointermove", (e) => {
+      if (e.buttons === 0) element.classList.toggle("over", !this.tool && this.target_of(e) !== null);
+    });
+    element.addEventListener("contextmenu", (e) => e.preventDefault());
+    element.addEventListener("keydown", (e) => this.key(e));
+  }
+
+  private pixel(e: PointerEvent): [number, number] {
+    const box = this.element.getBoundingClientRect();
+    return [e.clientX - box.left, e.clientY - box.top];
+  }
+  private target_of(e: PointerEvent): Target | null {
+    return this.ink.find(...this.pixel(e));
+  }
+
+  private click(e: PointerEvent): void {
+    if (this.tool) {
+      const spot = this.spot_at(...this.pixel(e));
+      if (spot) this.tool.point(spot);
+      this.dirty = true;
+      return;
+    }
+    const target = this.target_of(e);
+    this.app.select(target);
+  }
+
+  private key(e: KeyboardEvent): void {
+    if (e.ctrlKey || e.altKey || e.metaKey) return;
+    const moves: Record<string, () => void> = {
+      ArrowLeft: () => this.eye.move(-0.1, 0),
+      ArrowRight: () => this.eye.move(0.1, 0),
+      ArrowUp: () => this.eye.move(0, 0.1),
+      ArrowDown: () => this.eye.move(0, -0.1),
+      q: () => this.eye.move(0, 0, 0.15),
+      e: () => this.eye.move(0, 0, -0.15),
+      "+": () => this.eye.move(0, 0, 0, 0.8),
+      "=": () => this.eye.move(0, 0, 0, 0.8),
+      "-": () => this.eye.move(0, 0, 0, 1.25),
+      t: () => this.eye.top(),
+      f: () => this.fit(),
+      Escape: () => (this.tool ? this.use(null) : this.app.select(null)),
+    };
+    const move = moves[e.key];
+    if (!move) return;
+    e.preventDefault();
+    move();
+  }
+}

@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/** What the program tells the page: {key, t, value}. A key is KIND or KIND/NAME. */
+
+/** "ROBOT:SESSION/INDEX"; text, because a session may have 64 bits. */
+export type SubmapId = string;
+export type Vec3 = [number, number, number];
+/** x, y, z, qx, qy, qz, qw: T_a_b maps coordinates of b to coordinates of a. */
+export type Pose = [number, number, number, number, number, number, number];
+
+export interface Message {
+  key: string;
+  t: number;
+  value: unknown;
+}
+
+export interface Mission {
+  name: string;
+  description: string;
+  version: string;
+  mode: "live" | "report";
+  duration_s: number | null;
+  robots: string[];
+}
+
+/** Of a robot's status, what the page shows. */
+export interface RobotStatus {
+  number: number;
+  name: string;
+  session: string;
+  last_seen_s_ago: number | null;
+  last_update_s_ago: number | null;
+  submaps: number;
+  submaps_begun: number | null;
+  refused_submaps: number;
+  unread_submaps: number;
+  conflict: string;
+  version: string;
+  backlog_submaps: number;
+  backlog_bytes: number;
+  heard_revision: number;
+  update_age_s: number | null;
+  keyframes: number;
+  position: Vec3 | null;
+  alerts: number;
+  finished: boolean;
+  trouble: string;
+  battery_v: number | null;
+  battery_percent: number | null;
+}
+
+export interface WorkerStatus {
+  number: number;
+  name: string;
+  last_seen_s_ago: number | null;
+  jobs_done: number;
+  trouble: string;
+}
+
+export interface Status {
+  version: string;
+  revision: number;
+  submaps: number;
+  closures: number;
+  components: number;
+  pending_jobs: number;
+  has_news: boolean;
+  robots: RobotStatus[];
+  workers: WorkerStatus[];
+  refused: { from: string; kind: string; count: number; why: string }[];
+  trouble: string;
+  finder: string;
+  waiting: number;
+  why_waiting: string;
+}
+
+export type Severity = "info" | "warning" | "error";
+export interface Alert {
+  id: string;
+  severity: Severity;
+  what: string;
+  where: string;
+  since_s: number | null;
+  todo: string;
+  robot: number | null;
+  submap: SubmapId | null;
+  closure: string | null;
+}
+
+export interface Submap {
+  id: SubmapId;
+  name: string;
+  robot: number;
+  session: string;
+  index: number;
+  from_s: number;
+  until_s: number;
+  path: Vec3[];
+  points: number;
+  bytes: number;
+}
+
+/** Poses of all submaps at one revision; `rows` has POSE_ROW numbers for each place in the store's table of ids. */
+export interface Poses {
+  revision: number;
+  accepted: number;
+  components: number;
+  rows: Float64Array;
+}
+/** component, x, y, z, qx, qy, qz, qw, closures that hold it, sigma (both NaN: not computed). A component of NaN: not in the map. */
+export const POSE_ROW = 10;
+
+export type ClosureState = "accepted" | "rejected" | "candidate";
+export type Wish = "accept" | "reject" | "withdraw";
+export interface Gate {
+  reason: string;
+  value: number | null;
+  limit: number | null;
+  unit: string;
+  /** The limit is the least that is allowed; otherwise the most. */
+  at_least: boolean;
+  ok: boolean;
+}
+export interface Link {
+  at_from: Vec3;
+  at_to: Vec3;
+  T_from_to: Pose;
+  misfit_m: number | null;
+  misfit_deg: number | null;
+  chi2: number | null;
+  reason: string;
+}
+export interface Closure {
+  name: string;
+  from: SubmapId;
+  to: SubmapId;
+  state: ClosureState;
+  reason: string;
+  by_hand: boolean;
+  word: { wish: Wish; by: string; wall_ns: number | null } | null;
+  finder: string;
+  worker: string;
+  verified_ns: number | null;
+  links: Link[];
+  evidence: Gate[];
+}
+
+export interface Refused {
+  reason: string;
+  count: number;
+}
+
+export interface Disagreement {
+  scales: string[];
+  nodes: { submap: SubmapId; t: number; d: number[] }[];
+}
+
+export interface Trajectory {
+  component: number;
+  name: string;
+  /** t, x, y, z after each other. */
+  points: Float64Array;
+}
+
+export interface Errors {
+  names: string[];
+  /** One column of times, and one per name; NaN where not known. */
+  columns: Float64Array[];
+}
+
+export interface Survey {
+  points: number;
+  cloud: string;
+}
+
+export interface Mark {
+  id: string;
+  submap: SubmapId;
+  at: Vec3;
+  text: string;
+  by: string;
+  wall_ns: number | null;
+  photo: string | null;
+}
+
+/** The types of values by kind of key. */
+export interface Values {
+  mission: Mission;
+  status: Status;
+  alerts: Alert[];
+  submap: Submap;
+  poses: Poses;
+  closure: Closure;
+  refusals: Refused[];
+  disagreement: Disagreement;
+  trajectory: Trajectory;
+  errors: Errors;
+  survey: Survey;
+  report: Report;
+  mark: Mark;
+}
+export type Kind = keyof Values;
+
+/** report.json of docs/report.md; read where it is shown. */
+export type Report = Record<string, unknown>;
+
+export type Offer = "decide" | "register" | "closure" | "mark" | "why" | "disagreement";
+export interface Me {
+  login: boolean;
+  name: string;
+  role: "operator" | "viewer" | null;
+  mission: string;
+  may_decide: boolean;
+  nonce: string;
+  offers: Offer[];
+}
+
+export interface Registration {
+  found: boolean;
+  why: string;
+  T_from_to: Pose | null;
+  evidence: Gate[];
+  map_change_m: number | null;
+}
+
+export interface Why {
+  sentence: string;
+  candidates: {
+    pair: string;
+    from: SubmapId;
+    to: SubmapId;
+    reason: string;
+    value: number | null;
+    limit: number | null;
+    unit: string;
+    nearest: boolean;
+    hint: string;
+  }[];
+}

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/** Where messages come from: a running server, or the mission inside the page. */
+import type { Message, Submap } from "../schema";
+
+export interface Callbacks {
+  /** Every message, in order. */
+  message: (message: Message) => void;
+  /** All before is void. */
+  reset: () => void;
+  /** All that was known has been sent: these keys. */
+  ready: (keys: ReadonlySet<string>) => void;
+  link: (link: LinkState) => void;
+}
+
+export interface Source {
+  readonly mode: "live" | "report";
+  start(on: Callbacks): void;
+  /** `submap`: whose cloud it is; null for the survey. */
+  cloud(name: string, submap: Submap | null): Promise<ArrayBuffer>;
+}
+
+export interface LinkState {
+  /** connecting: never heard yet; here: signs of life come; silent: they stopped. */
+  state: "connecting" | "here" | "silent";
+  /** performance.now() of the last sign of life. */
+  heard_ms: number;
+  why: string;
+}

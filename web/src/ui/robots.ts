@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/** One card per robot: is it there, what can it do now, what does it still hold. */
+import type { App } from "../app";
+import { css, robot_rgb } from "../colours";
+import type { RobotView } from "../derive";
+import { bytes, many, metres, span } from "../format";
+import { LIMITS, TIMES } from "../limits";
+import type { View } from "../scene/view";
+import { button, h, icon, panel, swatch } from "./dom";
+import type { Child } from "./dom";
+
+export function robots_panel(app: App, view: View): HTMLElement {
+  return panel(app, ["data", "selection", "time", "tick", "options", "tool"], { class: "robots" }, () => [
+    h("h2", {}, "Robots", h("small", {}, summary(app.robots))),
+    app.robots.length === 0 ? h("p", { class: "empty" }, "No robot was heard yet.") : null,
+    ordered(app).slice(0, LIMITS.rows).map((robot) => card(app, view, robot)),
+    app.robots.length > LIMITS.rows ? h("p", { class: "empty" }, `and ${app.robots.length - LIMITS.rows} more`) : null,
+    workers(app),
+  ]);
+}
+
+/** In the phase of recovery, those that are missed stand first. */
+function ordered(app: App): RobotView[] {
+  if (app.phase !== "recover") return app.robots;
+  const rank = (r: RobotView) => (r.presence === "lost" || r.presence === "silent" ? -(r.silent_s ?? 0) : r.drain.state === "empty" ? 2 : 1);
+  return [...app.robots].sort((a, b) => rank(a) - rank(b));
+}
+
+function summary(robots: RobotView[]): string {
+  const n = (presence: RobotView["presence"][]) => robots.filter((r) => presence.includes(r.presence)).length;
+  return [[n(["here"]), "here"], [n(["silent", "lost"]), "silent"], [n(["finished"]), "finished"]]
+    .filter(([count]) => count !== 0).map(([count, word]) => `${count} ${word}`).join(", ");
+}
+
+function card(app: App, view: View, robot: RobotView): HTMLElement {
+  const chosen = app.selection?.kind === "robot" && app.selection.number === robot.number;
+  const away = robot.presence === "silent" || robot.presence === "lost";
+  const colour = css(robot_rgb(robot.index, app.dark));
+  const body = h("button", { type: "button", class: "who", key: `robot ${robot.number}`, "aria-pressed": String(chosen), on: { click: () => choose(app, view, robot, chosen) } },
+    h("span", { class: "line" }, swatch(away ? "var(--soft)" : colour), h("b", {}, robot.name), h("span", { class: "seen" }, seen(app, robot))),
+    h("span", { class: "icons" }, icons(app, robot), h("span", { class: "right" }, many(robot.submaps, "submap"))),
+    details(app, robot));
+  return h("article", { class: `robot ${robot.presence}${chosen ? " chosen" : ""}` }, body, chosen ? actions(app, view, robot) : null);
+}
+
+function choose(app: App, view: View, robot: RobotView, chosen: boolean): void {
+  app.select(chosen ? null : { kind: "robot", number: robot.number });
+  const at = robot.newest && app.world.end_of(robot.newest);
+  if (!chosen && at) view.look_at(at, Math.max(30, robot.reach_m * 2.5));
+}
+
+function actions(app: App, view: View, robot: RobotView): Child {
+  const follows = view.followed === robot.number;
+  return h("div", { class: "row" }, button(follows ? "Stop following" : "Follow", () => {
+    view.followed = follows ? null : robot.number;
+    app.say("tool");
+  }, { "aria-pressed": String(follows) }));
+}
+
+function seen(app: App, robot: RobotView): Child {
+  switch (robot.presence) {
+    case "here":
+      return span(robot.silent_s);
+    case "finished":
+      return "finished";
+    case "unknown":
+      return app.store.get("status", app.at()) ? "not heard" : "";
+    default:
+      return h("em", {}, `silent ${span(robot.silent_s)}`);
+  }
+}
+
+/** What a robot can do now. */
+function icons(app: App, robot: RobotView): Child[] {
+  const { status } = robot;
+  const away = robot.presence === "silent" || robot.presence === "lost";
+  const joined = robot.newest !== null && app.world.placed.has(robot.newest.id);
+  const largest = Math.max(0, ...[...app.world.parts.values()].map((p) => p.submaps));
+  const part = robot.newest ? app.world.parts.get(app.world.placed.get(robot.newest.id)?.component ?? -1) : undefined;
+  const main = joined && (part?.submaps ?? 0) === largest;
+  const out: Child[] = [
+    icon("link", away ? "Cannot be heard now" : status ? "Is heard" : "Never heard", away ? "bad" : status ? "on" : "off"),
+    icon("joined", main ? "Joined to the map" : joined ? "Its part is not joined to the largest part" : "Not in the map yet", main ? "on" : joined ? "warn" : "off"),
+    icon("corrects", corrects(status), status?.update_age_s == null ? "off" : "on"),
+  ];
+  if (!status) return out;
+  if (status.backlog_submaps > 0) out.push(icon("upload", `Holds ${many(status.backlog_submaps, "submap")} that the server has not stored`, robot.drain.state === "grows" || away ? "warn" : "on"));
+  if (status.battery_percent !== null) out.push(icon("battery", `Battery ${status.battery_percent.toFixed(0)} %`, status.battery_percent < 15 ? "bad" : status.battery_percent < 30 ? "warn" : "on"));
+  if (status.finished) out.push(icon("flag", "Its recording has ended"));
+  if (status.trouble || status.conflict || status.alerts > 0) out.push(icon("alert", status.trouble || status.conflict || many(status.alerts, "alert"), "bad"));
+  return out;
+}
+
+const corrects = (status: RobotView["status"]): string =>
+  status?.update_age_s == null ? "Has not used the map yet: drives by its own odometry" : `Corrects itself: used the map of revision ${status.heard_revision}, ${span(status.update_age_s)} ago`;
+
+function details(app: App, robot: RobotView): Child[] {
+  const { status, drain } = robot;
+  const out: Child[] = [];
+  const line = (text: Child, severity = "") => out.push(h("span", { class: `detail ${severity}` }, text));
+  const away = robot.presence === "silent" || robot.presence === "lost";
+  if (away) line(`May be within ${metres(robot.reach_m)} of where it was seen (drove ${robot.speed_mps.toFixed(1)} m/s)`, "warn");
+  if (status && status.backlog_submaps > 0) line(`Backlog ${many(status.backlog_submaps, "submap")}, ${bytes(status.backlog_bytes)} · ${drains(robot, drain)}`, drain.state === "grows" ? "warn" : "");
+  if (status?.conflict) line(status.conflict, "bad");
+  if (status?.trouble) line(status.trouble, "bad");
+  const loud = app.phase === "deploy" || (app.selection?.kind === "robot" && app.selection.number === robot.number);
+  if (loud && status) {
+    line([status.version ? `Version ${status.version}` : null, status.battery_percent === null ? null : `battery ${status.battery_percent.toFixed(0)} %`, status.battery_v === null ? null : `${status.battery_v.toFixed(1)} V`].filter((x) => x).join(" · ") || "No version reported");
+    line(corrects(status));
+    if (status.refused_submaps + status.unread_submaps > 0) line(`${many(status.refused_submaps + status.unread_submaps, "submap")} not taken by the map`, "warn");
+  }
+  return out;
+}
+
+function drains(robot: RobotView, drain: RobotView["drain"]): string {
+  if (robot.presence === "silent" || robot.presence === "lost") return "waits for the link";
+  return drain.state === "drains" ? `sent in ${span(drain.seconds)}` : drain.state === "grows" ? "grows" : "not moving";
+}
+
+function workers(app: App): Child {
+  const status = app.store.get("status", app.at());
+  if (!status || status.workers.length === 0) return null;
+  const late = status.workers.filter((w) => (w.last_seen_s_ago ?? 0) > TIMES.robot_silent_s).length;
+  return h("p", { class: "workers" }, `${many(status.workers.length, "worker")} look${status.workers.length === 1 ? "s" : ""} for closures`, late ? h("em", {}, ` · ${late} silent`) : null);
+}

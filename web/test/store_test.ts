@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: BSD-3-Clause
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { correction_at, drain_of, robots_at } from "../src/derive";
+import { LIMITS, REACH_M } from "../src/limits";
+import type { Message } from "../src/schema";
+import { Store } from "../src/store";
+import { FakeMission } from "./fake_mission.mjs";
+
+const filled = (mission = new FakeMission(), keep_all = false): Store => {
+  const store = new Store(keep_all);
+  for (const message of mission.everything() as Message[]) store.apply(message);
+  return store;
+};
+
+test("everything that a server says first is read", () => {
+  const store = filled();
+  assert.deepEqual(store.unread, { count: 0, last: "" });
+  assert.equal([...store.all("submap")].length, 72);
+  assert.equal(store.get("mission")?.name, "adit north");
+  assert.equal(store.get("poses")?.components, 2);
+});
+
+test("the same messages again change nothing", () => {
+  const mission = new FakeMission();
+  const store = filled(mission);
+  const before = store.size();
+  for (const message of mission.everything() as Message[]) store.apply(message);
+  assert.deepEqual(store.size(), before);
+});
+
+test("after a gap, what was not sent again is gone, and what was stays", () => {
+  const mission = new FakeMission();
+  const store = filled(mission);
+  store.apply({ key: "mark/m1", t: 241, value: { id: "m1", submap: "0:1/3", at: [0, 0, 0], text: "door", by: "eva", wall_ns: 1, photo: null } });
+  const keys = new Set((mission.everything() as Message[]).map((m) => m.key));
+  store.retain(keys);
+  assert.equal(store.get("mark", Infinity, "m1"), null);
+  assert.equal([...store.all("submap")].length, 72);
+});
+
+test("null removes a key from then on, and not before", () => {
+  const store = filled();
+  store.apply({ key: "mark/m1", t: 250, value: { id: "m1", submap: "0:1/3", at: [0, 0, 0], text: "door", by: "eva" } });
+  store.apply({ key: "mark/m1", t: 260, value: null });
+  assert.equal(store.get("mark", 255, "m1")?.text, "door");
+  assert.equal(store.get("mark", 265, "m1"), null);
+  assert.equal([...store.all("mark")].length, 0);
+});
+
+test("a message that does not fit is counted, with what it lacks, and changes nothing", () => {
+  const store = filled();
+  store.apply({ key: "submap/9:1/9", t: 250, value: { id: "9:1/9", name: 7, path: [] } });
+  store.apply({ key: "poses", t: 250, value: { submaps: { "0:1/1": [0, 1, 2, "x", 0, 0, 0, 1] } } });
+  store.apply({ key: "alerts", t: 250, value: [{ severity: "loud", what: "x" }] });
+  assert.equal(store.unread.count, 3);
+  assert.match(store.unread.last, /^alerts: severity: "loud", expected one of/);
+  assert.equal(store.get("submap", Infinity, "9:1/9"), null);
+  assert.equal(store.get("poses")?.revision, 0);
+});
+
+test("keys of newer programs are passed over", () => {
+  const store = filled();
+  store.apply({ key: "weather", t: 250, value: "rain" });
+  store.apply({ key: "__proto__/x", t: 250, value: 1 });
+  store.apply({ key: "constructor", t: 250, value: 1 });
+  assert.equal(store.unread.count, 0);
+});
+
+test("a photo is a picture inside the message, or none", () => {
+  const store = filled();
+  const mark = (photo: string) => {
+    store.apply({ key: "mark/p", t: store.newest + 1, value: { id: "p", submap: "0:1/3", at: [0, 0, 0], text: "", by: "", photo } });
+    return store.get("mark", Infinity, "p")?.photo;
+  };
+  assert.equal(mark("data:image/jpeg;base64,AAAA"), "data:image/jpeg;base64,AAAA");
+  for (const bad of ["https://example.org/x.jpg", "javascript:alert(1)", "data:image/svg+xml;base64,AAAA", "data:text/html,<b>"]) assert.equal(mark(bad), null);
+});
+
+test("a correction says how far the map moved, and which parts were joined", () => {
+  const mission = new FakeMission();
+  const store = filled(mission);
+  mission.time += 10;
+  store.apply(mission.correct(0.2) as Message);
+  const moved = correction_at(store, Infinity)!;
+  // bend is 0.8 i / 20 before, 0.2 i / 20 after: the last submap moved 0.6 * 23 / 20 times (sin(robot + 1), 0.6)
+  const expected = (0.6 * 23 * Math.hypot(Math.sin(2), 0.6)) / 20;
+  assert.ok(Math.abs(moved.largest_m - expected) < 1e-9, `${moved.largest_m} m, expected ${expected} m`);
+  assert.equal(moved.joined, 0);
+  mission.time += 10;
+  mission.apart.clear();
+  store.apply(mission.correct(0.2) as Message);
+  const joined = correction_at(store, Infinity)!;
+  assert.equal(joined.joined, 1);
+  assert.equal(joined.largest_m, 0);
+});
+
+test("a silent robot is somewhere in a circle that grows with its speed, to a bound", () => {
+  const mission = new FakeMission();
+  const store = filled(mission);
+  mission.silent.set(1, mission.time);
+  mission.time += 40;
+  store.apply(mission.message("status", mission.status()) as Message);
+  const [alpha, bravo] = robots_at(store, Infinity, mission.time);
+  assert.equal(alpha.presence, "here");
+  assert.equal(alpha.reach_m, 0);
+  assert.equal(bravo.presence, "silent");
+  assert.ok(Math.abs(bravo.reach_m - bravo.speed_mps * 40.4) < 1e-9 && bravo.speed_mps > 0.85 && bravo.speed_mps < 1.2);
+  const later = robots_at(store, Infinity, mission.time + 5000)[1]; // and the server is silent, too
+  assert.equal(later.presence, "lost");
+  assert.equal(later.reach_m, REACH_M);
+});
+
+test("a backlog that shrinks tells when it is empty", () => {
+  const mission = new FakeMission();
+  const store = filled(mission);
+  for (const backlog of [40, 38, 36, 34, 32, 30]) {
+    mission.backlog[0] = backlog;
+    mission.time += 2;
+    store.apply(mission.message("status", mission.status()) as Message);
+  }
+  // 10 submaps in 10 s (from the first status with a backlog): 30 more take 30 s
+  const drain = drain_of(store, Infinity, 0);
+  assert.equal(drain.state, "grows"); // it began empty, twelve seconds ago
+  for (let i = 0; i < 40; ++i) {
+    mission.backlog[0] = Math.max(0, 30 - i / 2);
+    mission.time += 2;
+    store.apply(mission.message("status", mission.status()) as Message);
+  }
+  const later = drain_of(store, Infinity, 0);
+  assert.equal(later.state, "drains");
+  assert.ok(Math.abs(later.seconds! - 10.5 / 0.25) < 1.5, `${later.seconds} s`);
+});
+
+/** Sizes in memory of a store that heard a day of messages. */
+test("a day of messages does not grow the page", () => {
+  const mission = new FakeMission({ submaps: 100, points: 0 });
+  const store = filled(mission);
+  const heap: number[] = [];
+  const collect = (globalThis as { gc?: () => void }).gc;
+  assert.ok(collect, "run by test/run.mjs, which exposes the collector");
+  for (let i = 0; i < 40_000; ++i) {
+    mission.time += 2.16; // a day
+    mission.backlog[0] = i % 50;
+    store.apply(JSON.parse(JSON.stringify(mission.message("status", mission.status()))) as Message);
+    if (i % 8 === 0) store.apply(JSON.parse(JSON.stringify(mission.correct(0.001 * (i % 900)))) as Message);
+    if (i === 10_000 || i === 39_999) {
+      collect();
+      heap.push(process.memoryUsage().heapUsed + process.memoryUsage().arrayBuffers);
+    }
+  }
+  assert.ok(store.track("status")!.times.length <= LIMITS.history.status);
+  assert.ok(store.track("poses")!.times.length <= LIMITS.history.poses);
+  const size = store.size();
+  assert.ok(size.pose_numbers <= LIMITS.history.poses * 300 * 10, `${size.pose_numbers} numbers in poses`);
+  assert.equal(store.track("status")!.times[0], 1000, "the first status is still there");
+  const grown = (heap[1] - heap[0]) / 1e6;
+  assert.ok(grown < 5, `the heap grew by ${grown.toFixed(1)} MB from a quarter of the day to its end`);
+  console.log(`a day: ${JSON.stringify(size)}, heap and arrays ${(heap[0] / 1e6).toFixed(1)} MB, then ${(heap[1] / 1e6).toFixed(1)} MB`);
+});
