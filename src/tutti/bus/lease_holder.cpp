@@ -8,17 +8,16 @@
 #include <cerrno>
 #include <charconv>
 #include <csignal>
-#include <ctime>
 #include <limits>
 #include <system_error>
 
 #include "tutti/base/file.hpp"
 #include "tutti/base/plain_text.hpp"
+#include "tutti/base/utc_text.hpp"
 
 namespace tutti::bus {
 namespace {
 
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
 constexpr std::size_t kLongestLease = 8192;  // bytes; the bus takes no larger value
 constexpr std::size_t kFieldsBefore = 5;     // of versions whose processes had no marks
 
@@ -57,11 +56,8 @@ std::string mark_before_random(std::uint64_t process) {
 }  // namespace
 
 std::string to_string(const LeaseHolder& holder) {
-  const std::time_t seconds = holder.since_ns / kSecond_ns;
-  std::tm utc{};
-  char text[32] = "?";
-  if (gmtime_r(&seconds, &utc) != nullptr) std::strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S UTC", &utc);
-  return fmt::format("process {} on {}, state {}, since {}", holder.process, holder.host, holder.state, text);
+  return fmt::format("process {} on {}, state {}, since {}", holder.process, holder.host, holder.state,
+                     utc_text(holder.since_ns));
 }
 
 std::string lease_text(const LeaseHolder& holder) {

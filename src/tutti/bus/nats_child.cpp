@@ -50,8 +50,7 @@ struct ToBeClosed {
 
 /// Messages of up to 8 MB pass, which copies of submaps need. The default write_deadline of 10 s cuts off a receiver of
 /// 2 MB over 1 Mbit/s.
-std::string configuration(const fs::path& folder, const NatsChildOptions& options, int port,
-                          const std::string& rights) {
+std::string configuration(const fs::path& folder, const NatsChildOptions& options, int port) {
   const std::string host = to_string(HostPort{parse_host_port(options.host).value_or(HostPort{options.host}).host});
   const std::string listen_at = fmt::format("{}:{}", host, port == 0 ? -1 : port);
   return fmt::format(R"(server_name: tutti
@@ -62,7 +61,7 @@ max_pending: 67108864
 write_deadline: "60s"
 jetstream {{ store_dir: "{}", max_mem: 64MB, max_file: {} }}
 {})",
-                     listen_at, folder.string(), (folder / "js").string(), options.max_store_bytes, rights);
+                     listen_at, folder.string(), (folder / "js").string(), options.max_store_bytes, options.rights);
 }
 
 /// The last lines that say that something is wrong, or the last ones.
@@ -242,9 +241,7 @@ Status NatsChild::wait_until_ready() {
 }
 
 Result<bool> NatsChild::configure(int port) {
-  const auto rights = options_.rights.empty() ? Result<std::string>("") : read_file(options_.rights.string());
-  if (!rights) return tl::unexpected(rights.error());
-  std::string text = configuration(folder_, options_, port, *rights);
+  std::string text = configuration(folder_, options_, port);
   if (text == configured_) return false;
   if (Status written = replace_file(folder_ / kConfiguration, text, false, 0600); !written)
     return tl::unexpected(written.error());
@@ -315,7 +312,6 @@ Status NatsChild::tend() {
     return room;
   }
   if (!running()) return launch(port_of(url_));
-  if (options_.rights.empty()) return {};
   const auto changed = configure(port_of(url_));
   if (!changed) return tl::unexpected(changed.error());
   if (*changed) kill(pid_, SIGHUP);

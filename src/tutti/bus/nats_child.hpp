@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tutti/base/config.hpp"
@@ -19,9 +20,9 @@ struct NatsChildOptions {
   std::string host = "127.0.0.1";
   int port = 0;
   bool allow_insecure = false;
-  /// A file of `tutti pki` with the blocks `tls` and `authorization` of nats-server's configuration, and the server's
-  /// own credential; empty: whoever reaches the bus may do all.
-  std::filesystem::path rights = {};
+  /// The blocks `tls` and `authorization` of nats-server's configuration (pki::Pki::bus_configuration()), and the
+  /// server's own credential; empty: whoever reaches the bus may do all.
+  std::string rights = {};
   BusCredentials credentials = {};
   std::uint64_t max_store_bytes = std::uint64_t{4} << 30U;
   std::uint64_t min_free_bytes = std::uint64_t{1} << 30U;
@@ -56,9 +57,11 @@ class NatsChild {
   [[nodiscard]] int pid() const { return pid_; }
   [[nodiscard]] bool running() const;
   /// To be called about once a second: starts a child that has ended again, at the same address, stops it for as
-  /// long as less than half of min_free_bytes are free, and lets it read its rights anew when they have changed, which
-  /// cuts off those who have none any more. An error says why it is not running now, or has not got its rights.
+  /// long as less than half of min_free_bytes are free, and gives it its rights when they have changed, which cuts off
+  /// those who have none any more. An error says why it is not running now, or has not got its rights.
   Status tend();
+  /// From the next tend() on.
+  void set_rights(std::string rights) { options_.rights = std::move(rights); }
   /// What it has refused since this was last called, at most kMostRefusals, and how many more.
   struct Refusals {
     std::vector<BusRefusal> all;

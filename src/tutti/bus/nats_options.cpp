@@ -48,7 +48,7 @@ std::string advice_to(const BusUser& member, natsStatus status, const std::strin
     return "this bus does not speak TLS, and a credential of `tutti pki` is for one that does: another --bus, or a "
            "server without --pki?";
   if (status == NATS_CONNECTION_AUTH_FAILED)
-    return fmt::format("the bus does not know the key of {}: revoked, or of another folder of `tutti pki`",
+    return fmt::format("the bus does not know the key of {}: revoked, expired, or of another folder of `tutti pki`",
                        to_string(member));
   if (status == NATS_SSL_ERROR && detail.find("certificate") != std::string::npos)
     return "the bus's certificate is not of the credential's authority: another bus, or another folder of `tutti pki`";

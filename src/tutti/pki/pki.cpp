@@ -150,23 +150,28 @@ Status Pki::read() {
   return {};
 }
 
-/// The line of the bus's certificate makes a renewed one another configuration, which is read anew.
+/// Its file has all who are not revoked: whoever includes it cannot tell the time.
 Status Pki::write() const {
   std::string text = fmt::format("{}\n{}\n", kFirstLine, mission_);
-  std::vector<bus::KeyedUser> users;
-  for (const Member& member : members_) {
-    text += line_of(member);
-    if (!member.is_revoked) users.push_back({member.user, member.key});
-  }
+  for (const Member& member : members_) text += line_of(member);
   if (Status done = write_private(folder_ / kUsers, text); !done) return done;
+  const auto configuration = bus_configuration("");
+  if (!configuration) return tl::unexpected(configuration.error());
+  return write_private(folder_ / kBusConfiguration, *configuration);
+}
+
+/// The line of the bus's certificate makes a renewed one another configuration, which is read anew.
+Result<std::string> Pki::bus_configuration(const std::string& now) const {
+  std::vector<bus::KeyedUser> users;
+  for (const Member& member : members_)
+    if (!member.is_revoked && !member.has_expired(now)) users.push_back({member.user, member.key});
   const auto own = read_file((folder_ / kBus).string());
   if (!own) return tl::unexpected(own.error());
   const auto quoted = [&](const char* file) { return '"' + (folder_ / file).string() + '"'; };
-  return write_private(folder_ / kBusConfiguration,
-                       fmt::format("# `tutti pki` writes this file; mission {}, certificate of the bus {:016x}\n"
-                                   "tls {{ cert_file: {}, key_file: {}, ca_file: {}, verify: true, timeout: 2 }}\n{}",
-                                   mission_, content_hash(*own), quoted(kBus), quoted(kBusKey), quoted(kAuthority),
-                                   bus::authorization(users)));
+  return fmt::format(
+      "# by `tutti pki`; mission {}, certificate of the bus {:016x}\n"
+      "tls {{ cert_file: {}, key_file: {}, ca_file: {}, verify: true, timeout: 2 }}\n{}",
+      mission_, content_hash(*own), quoted(kBus), quoted(kBusKey), quoted(kAuthority), bus::authorization(users));
 }
 
 Status Pki::make_bus_certificate(int days) const {

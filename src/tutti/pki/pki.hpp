@@ -18,6 +18,11 @@ struct Member {
   std::string key;  ///< bus::NatsKey::open
   bool is_revoked = false;
   std::string until;  ///< valid_until() of the certificate.
+  /// At this time (utc_text()) its certificate has expired. The server's own never does in this sense: cut off from
+  /// its own bus it would end the mission, and nobody else comes in with an expired one either.
+  [[nodiscard]] bool has_expired(const std::string& now) const {
+    return user.role != bus::BusRole::server && until < now;
+  }
 };
 
 /// How long certificates are valid.
@@ -26,8 +31,8 @@ inline constexpr int kDays = 397;
 
 /// A folder that says who may use the bus of one mission: an authority and the bus's certificate, a credential for each
 /// member, and the configuration of nats-server with everyone's rights (bus/bus_rights.hpp). All files are this user's
-/// alone. Whatever changes it writes the configuration anew; a server that runs with it follows within two seconds
-/// (bus::NatsChild::tend()). Processes change it one after the other.
+/// alone. Whatever changes it writes the configuration anew; a server that runs with the folder follows within two
+/// seconds (program::BusGuard). Processes change it one after the other.
 class Pki {
  public:
   /// Makes the folder, which must not be one already, and the server's own credential.
@@ -43,6 +48,9 @@ class Pki {
   /// A new certificate for a member, with the key that it has; with no name for the bus. Whoever is connected stays so.
   Status renew(const std::string& name, int days = kDays);
 
+  /// The blocks `tls` and `authorization` of nats-server's configuration, with the rights of all who are not revoked
+  /// and, at this time (utc_text()), have a certificate that has not expired.
+  [[nodiscard]] Result<std::string> bus_configuration(const std::string& now) const;
   [[nodiscard]] const std::string& mission() const { return mission_; }
   [[nodiscard]] const std::vector<Member>& members() const { return members_; }
   /// Until when the bus's certificate is valid.
@@ -65,7 +73,8 @@ class Pki {
   std::vector<Member> members_;
 };
 
-/// In the folder: the file for bus::NatsChildOptions::rights, and the name of the server's own credential.
+/// In the folder: the file to be included in a nats-server's configuration, and the name of the server's own
+/// credential.
 inline constexpr const char* kBusConfiguration = "bus.conf";
 inline constexpr const char* kServer = "server";
 

@@ -79,7 +79,7 @@ TEST_F(PkiTest, WhoIsRevokedIsCutOffAndOthersStay) {
   ASSERT_TRUE(pki_->revoke("alpha"));
   EXPECT_FALSE(fs::exists(pki_->credential("alpha")));
   const auto since = std::chrono::steady_clock::now();
-  ASSERT_TRUE(child_->tend());  // a server does so once a second
+  tend();
   EXPECT_TRUE(within(10.0, [&] { return !lost->state().connected; }));
   EXPECT_LT(std::chrono::steady_clock::now() - since, std::chrono::seconds(8)) << "under 1 s when nothing else runs";
   EXPECT_TRUE(within(10.0, [&] {
@@ -92,6 +92,27 @@ TEST_F(PkiTest, WhoIsRevokedIsCutOffAndOthersStay) {
   EXPECT_NE(refusals.all.front().what.find("authentication error"), std::string::npos) << refusals.all.front().what;
 }
 
+TEST_F(PkiTest, WhoseCertificateExpiresWhileConnectedIsCutOff) {
+  start_bus();
+  const auto alpha = add(BusRole::robot, "alpha", 3, 1), bravo = add(BusRole::robot, "bravo", 4, 2);
+  test::prepare(options(credentials("server")));
+  const auto late = open(Endpoint::of(RobotId{3}), alpha), other = open(Endpoint::of(RobotId{4}), bravo);
+  ASSERT_TRUE(within(10.0, [&] { return late->state().connected && other->state().connected; }));
+  const std::string end = pki_->members()[1].until;
+  tend(end);
+  EXPECT_TRUE(late->state().connected);
+  tend(end + "x");  // a moment later
+  EXPECT_TRUE(within(10.0, [&] { return !late->state().connected; }));
+  EXPECT_TRUE(within(10.0, [&] {
+    return late->state().last_error.find("does not know the key of robot alpha") != std::string::npos;
+  })) << late->state().last_error;
+  EXPECT_TRUE(other->state().connected);
+  EXPECT_EQ(other->state().reconnects, 0U);
+  ASSERT_TRUE(pki_->renew("alpha"));
+  tend(end + "x");
+  EXPECT_TRUE(within(10.0, [&] { return late->state().connected; })) << late->state().last_error;
+}
+
 /// The bus's certificate and a member's: nobody starts again, and nobody is cut off.
 TEST_F(PkiTest, WhatIsRenewedCutsNobodyOff) {
   start_bus();
@@ -101,7 +122,7 @@ TEST_F(PkiTest, WhatIsRenewedCutsNobodyOff) {
   ASSERT_TRUE(within(10.0, [&] { return robot->state().connected; }));
   ASSERT_TRUE(pki_->renew(""));
   ASSERT_TRUE(pki_->renew("alpha"));
-  ASSERT_TRUE(child_->tend());
+  tend();
   const auto renewed = credentials("alpha");
   EXPECT_EQ(renewed.key, alpha.key);
   EXPECT_NE(renewed.certificate, alpha.certificate);

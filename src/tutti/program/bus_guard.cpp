@@ -11,7 +11,8 @@
 
 namespace tutti::program {
 
-Result<BusGuard> BusGuard::open(const std::filesystem::path& folder, const std::string& mission) {
+Result<BusGuard> BusGuard::open(const std::filesystem::path& folder, const std::string& mission,
+                                const std::string& now) {
   const auto there = pki::Pki::open(folder);
   if (!there) return in_context("--pki", there.error());
   if (there->mission() != mission)
@@ -25,22 +26,43 @@ Result<BusGuard> BusGuard::open(const std::filesystem::path& folder, const std::
   BusGuard guard(folder);
   guard.credentials_ = std::move(*credentials);
   guard.credentials_.file = file;
-  guard.look();
+  auto rights = there->bus_configuration(now);
+  if (!rights) return tl::unexpected(rights.error());
+  guard.rights_ = std::move(*rights);
   return guard;
 }
 
-std::filesystem::path BusGuard::rights() const { return folder_ / pki::kBusConfiguration; }
-
 /// While it is being changed, what was there before holds.
-void BusGuard::look() {
+std::vector<std::string> BusGuard::look(const std::string& now) {
+  std::vector<std::string> lines;
   const auto there = pki::Pki::open(folder_);
-  if (!there) return;
+  auto rights = there ? there->bus_configuration(now) : tl::unexpected(there.error());
+  if (!rights) return lines;
+  rights_ = std::move(*rights);
   robots_.clear();
   for (const pki::Member& member : there->members()) {
-    users_[member.key] = member.user;
-    if (member.user.role == bus::BusRole::robot && !member.is_revoked)
-      robots_[RobotId{member.user.number}] = member.user.name;
+    users_.insert_or_assign(member.key, member);
+    if (member.is_revoked) continue;
+    if (member.user.role == bus::BusRole::robot) robots_[RobotId{member.user.number}] = member.user.name;
+    const std::string& name = member.user.name;
+    if (!member.has_expired(now))
+      expired_.erase(member.key);
+    else if (expired_.insert(member.key).second)
+      lines.push_back(fmt::format("the certificate of {} has expired ({}): it is cut off; `tutti pki renew {}`",
+                                  to_string(member.user), member.until, name));
   }
+  return lines;
+}
+
+/// Whose key somebody gave who was not let in and so has not proved to have it; empty: nobody's.
+std::string BusGuard::claimed_by(const std::string& what) const {
+  for (const auto& [key, member] : users_)
+    if (what.find(key) != std::string::npos)
+      return fmt::format(": the key is that of {}{}", to_string(member.user),
+                         member.is_revoked        ? ", revoked"
+                         : expired_.contains(key) ? ", expired"
+                                                  : "");
+  return {};
 }
 
 std::vector<std::string> BusGuard::lines(const bus::NatsChild::Refusals& refusals, double wall_s) {
@@ -48,11 +70,12 @@ std::vector<std::string> BusGuard::lines(const bus::NatsChild::Refusals& refusal
   for (const bus::BusRefusal& refusal : refusals.all) {
     ++refused_;
     const auto known = users_.find(refusal.key);
-    const std::string who = known == users_.end() ? "a stranger" : to_string(known->second);
+    const std::string who = known == users_.end() ? "a stranger" : to_string(known->second.user);
     const Throttle::Verdict verdict = throttle_.ask(who, wall_s);
     if (!verdict.passes) continue;
-    out.push_back(fmt::format("the bus refuses {} ({}): {}; {} refusals so far{}", who, refusal.address, refusal.what,
-                              refused_, verdict.left_out == 0 ? "" : fmt::format(", {} not told", verdict.left_out)));
+    out.push_back(fmt::format("the bus refuses {} ({}): {}{}; {} refusals so far{}", who, refusal.address, refusal.what,
+                              known == users_.end() ? claimed_by(refusal.what) : "", refused_,
+                              verdict.left_out == 0 ? "" : fmt::format(", {} not told", verdict.left_out)));
   }
   refused_ += refusals.more;
   return out;

@@ -4,11 +4,13 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "tutti/base/ids.hpp"
 #include "tutti/bus/nats_child.hpp"
+#include "tutti/pki/pki.hpp"
 #include "tutti/program/throttle.hpp"
 
 namespace tutti::program {
@@ -16,14 +18,16 @@ namespace tutti::program {
 /// The folder of `tutti pki` as a server uses it: what its bus needs, and who is who on it.
 class BusGuard {
  public:
-  /// Fails when the folder is that of another mission.
-  static Result<BusGuard> open(const std::filesystem::path& folder, const std::string& mission);
+  /// Fails when the folder is that of another mission. `now` as of utc_text(), here and below.
+  static Result<BusGuard> open(const std::filesystem::path& folder, const std::string& mission, const std::string& now);
 
-  [[nodiscard]] std::filesystem::path rights() const;
+  /// For bus::NatsChild: those of everybody whose certificate had not expired when the folder was last looked at.
+  [[nodiscard]] const std::string& rights() const { return rights_; }
   /// The server's own.
   [[nodiscard]] const bus::BusCredentials& credentials() const { return credentials_; }
-  /// Reads the folder again, in which members come and go. Called once a second.
-  void look();
+  /// Reads the folder again, in which members come and go. Called once a second. Returns, as lines for the log, whose
+  /// certificate has expired since it was last called.
+  std::vector<std::string> look(const std::string& now);
   /// What the bus has refused, as lines for the log: who, what, and how many so far; of each member, and of all
   /// strangers together, as Throttle lets through.
   [[nodiscard]] std::vector<std::string> lines(const bus::NatsChild::Refusals& refusals, double wall_s);
@@ -33,10 +37,13 @@ class BusGuard {
 
  private:
   explicit BusGuard(std::filesystem::path folder) : folder_(std::move(folder)) {}
+  [[nodiscard]] std::string claimed_by(const std::string& what) const;
 
   std::filesystem::path folder_;
   bus::BusCredentials credentials_;
-  std::map<std::string, bus::BusUser> users_;  // by key
+  std::string rights_;
+  std::map<std::string, pki::Member> users_;  // by key
+  std::set<std::string> expired_;             // keys
   std::map<RobotId, std::string> robots_;
   Throttle throttle_;
   std::uint64_t refused_ = 0;

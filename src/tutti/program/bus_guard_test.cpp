@@ -14,6 +14,8 @@ namespace bus_guard_test {
 
 namespace fs = std::filesystem;
 
+const std::string kNow = "2026-01-31 12:00:00 UTC", kMuchLater = "2126-01-31 12:00:00 UTC";
+
 class BusGuardTest : public ::testing::Test {
  protected:
   void SetUp() override { fs::remove_all(folder_); }
@@ -24,8 +26,9 @@ class BusGuardTest : public ::testing::Test {
 TEST_F(BusGuardTest, SaysWhoWasRefusedWhatAndNotTooOften) {
   auto pki = pki::Pki::make(folder_, "cave").value();
   ASSERT_TRUE(pki.add(bus::BusRole::robot, "alpha", 3));
-  auto guard = BusGuard::open(folder_, "cave").value();
+  auto guard = BusGuard::open(folder_, "cave", kNow).value();
   EXPECT_EQ(guard.credentials().known->role, bus::BusRole::server);
+  EXPECT_TRUE(guard.look(kNow).empty());
   const std::string key = pki.members().back().key;
   bus::NatsChild::Refusals many;
   for (int i = 0; i < 500; ++i) many.all.push_back({"10.0.0.7:1", key, "publish mission.cave.robot.4.submap"});
@@ -39,22 +42,57 @@ TEST_F(BusGuardTest, SaysWhoWasRefusedWhatAndNotTooOften) {
   const auto stranger = guard.lines({{{"10.0.0.9:1", "", "authentication error"}}, 0}, 0.0);
   ASSERT_EQ(stranger.size(), 1U);
   EXPECT_NE(stranger.front().find("a stranger"), std::string::npos) << stranger.front();
+  ASSERT_TRUE(pki.revoke("alpha"));
+  EXPECT_TRUE(guard.look(kNow).empty());
+  const auto lost = guard.lines({{{"10.0.0.9:2", "", "authentication error - Nkey \"" + key + "\""}}, 0}, 0.0);
+  ASSERT_EQ(lost.size(), 1U);
+  for (const char* part : {"a stranger", "robot alpha, revoked"})
+    EXPECT_NE(lost.front().find(part), std::string::npos) << lost.front();
+}
+
+TEST_F(BusGuardTest, WhoseCertificateHasExpiredHasNoRightsUntilItIsRenewed) {
+  auto pki = pki::Pki::make(folder_, "cave").value();
+  ASSERT_TRUE(pki.add(bus::BusRole::robot, "alpha", 3));
+  ASSERT_TRUE(pki.add(bus::BusRole::robot, "bravo", 4, -1));  // since yesterday
+  const auto key = [&](const std::string& name) {
+    for (const pki::Member& member : pki.members())
+      if (member.user.name == name) return member.key;
+    return std::string();
+  };
+  auto guard = BusGuard::open(folder_, "cave", kNow).value();
+  const auto has = [&](const std::string& name) { return guard.rights().find(key(name)) != std::string::npos; };
+  EXPECT_TRUE(has("bravo"));
+  const std::string until = pki.members().back().until;
+  EXPECT_TRUE(guard.look(until).empty());
+  EXPECT_TRUE(has("bravo"));
+  const auto said = guard.look(until + "x");  // a moment later
+  ASSERT_EQ(said.size(), 1U);
+  EXPECT_NE(said.front().find("robot bravo has expired (" + until), std::string::npos) << said.front();
+  EXPECT_FALSE(has("bravo"));
+  EXPECT_TRUE(has("alpha"));
+  EXPECT_TRUE(guard.look(until + "x").empty()) << "said once";
+  ASSERT_TRUE(pki.renew("bravo"));
+  EXPECT_TRUE(guard.look(until + "x").empty());
+  EXPECT_TRUE(has("bravo"));
+  EXPECT_EQ(guard.look(kMuchLater).size(), 2U);
+  EXPECT_FALSE(has("alpha"));
+  EXPECT_TRUE(has("server")) << "without its own bus there is no mission";
 }
 
 TEST_F(BusGuardTest, ARobotHasTheNameOfItsCredential) {
   auto pki = pki::Pki::make(folder_, "cave").value();
-  auto guard = BusGuard::open(folder_, "cave").value();
+  auto guard = BusGuard::open(folder_, "cave", kNow).value();
   EXPECT_EQ(guard.objection(RobotId{3}, "alpha"), "");
   ASSERT_TRUE(pki.add(bus::BusRole::robot, "alpha", 3));
-  guard.look();
+  EXPECT_TRUE(guard.look(kNow).empty());
   EXPECT_EQ(guard.objection(RobotId{3}, "alpha"), "");
   EXPECT_NE(guard.objection(RobotId{3}, "bravo"), "");
 }
 
 TEST_F(BusGuardTest, TheFolderOfAnotherMissionIsRefused) {
-  EXPECT_FALSE(BusGuard::open(folder_, "cave"));
+  EXPECT_FALSE(BusGuard::open(folder_, "cave", kNow));
   ASSERT_TRUE(pki::Pki::make(folder_, "cave"));
-  const auto other = BusGuard::open(folder_, "tunnel");
+  const auto other = BusGuard::open(folder_, "tunnel", kNow);
   ASSERT_FALSE(other);
   EXPECT_NE(other.error().message.find("'cave'"), std::string::npos) << other.error().message;
 }

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "tutti/base/file.hpp"
+#include "tutti/base/utc_text.hpp"
 #include "tutti/bus/mission_lease.hpp"
 #include "tutti/bus/nats_child.hpp"
 #include "tutti/node/map_meta.hpp"
@@ -289,12 +290,16 @@ void ServerProgram::tend() {
 /// The bus may have ended, or its disk may be full.
 void ServerProgram::tend_bus() {
   if (!child_) return;
+  if (guard_) {
+    for (const std::string& line : guard_->look(utc_text(static_cast<std::int64_t>(wall_clock_ns()))))
+      log_->say(Level::warning, line);
+    child_->set_rights(guard_->rights());
+  }
   const Status runs = child_->tend();
   if (!runs && trouble_.empty()) log_->say(Level::error, "the bus does not run: " + runs.error().message);
   if (runs && !trouble_.empty()) log_->say(Level::info, "the bus runs again");
   trouble_ = runs ? "" : "the bus does not run: " + runs.error().message;
   if (!guard_) return;
-  guard_->look();
   for (const std::string& line : guard_->lines(child_->take_refusals(), clock_->wall_s()))
     log_->say(Level::warning, line);
 }
@@ -310,7 +315,7 @@ Status ServerProgram::start() {
   if (!address) return tl::unexpected(address.error());
   if (Status ok = check_addresses(options_, *address); !ok) return ok;
   if (!options_.pki.empty()) {
-    auto guard = BusGuard::open(options_.pki, settings_.mission);
+    auto guard = BusGuard::open(options_.pki, settings_.mission, utc_text(static_cast<std::int64_t>(wall_clock_ns())));
     if (!guard) return tl::unexpected(guard.error());
     guard_.emplace(std::move(*guard));
   }

@@ -37,20 +37,23 @@ class PkiBus : public ::testing::Test {
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
   void start_bus() {
-    auto started = bus::NatsChild::start(folder_ / "bus", {.rights = folder_ / "pki" / pki::kBusConfiguration,
+    auto started = bus::NatsChild::start(folder_ / "bus", {.rights = pki_->bus_configuration("").value(),
                                                            .credentials = credentials("server"),
                                                            .max_store_bytes = 256U << 20U,
                                                            .min_free_bytes = 0});
     ASSERT_TRUE(started.has_value()) << started.error().message;
     child_ = std::move(*started);
   }
+  /// As a server does once a second.
+  void tend(const std::string& now = "") {
+    child_->set_rights(pki_->bus_configuration(now).value());
+    EXPECT_TRUE(child_->tend());
+  }
   bus::BusCredentials add(bus::BusRole role, const std::string& name, std::optional<std::uint32_t> number = {},
                           int days = pki::kDays) {
     const auto file = pki_->add(role, name, number, days);
     EXPECT_TRUE(file.has_value()) << file.error().message;
-    if (child_) {
-      EXPECT_TRUE(child_->tend());
-    }
+    if (child_) tend();
     return credentials(name);
   }
   [[nodiscard]] bus::BusCredentials credentials(const std::string& name) const {
