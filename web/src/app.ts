@@ -19,7 +19,7 @@ export type Selection =
   | { kind: "mark"; id: string }
   | null;
 
-export type Topic = "data" | "time" | "selection" | "options" | "me" | "link" | "tick" | "tool";
+export type Topic = "data" | "time" | "selection" | "options" | "me" | "link" | "tick" | "tool" | "cursor" | "cloud";
 
 const soon = (run: () => void): void => void setTimeout(run, 60);
 
@@ -35,6 +35,8 @@ export class App {
   selection: Selection = null;
   /** The moment that is looked at; null: the newest. */
   time: number | null = null;
+  /** A moment that somebody points at in a plot. */
+  cursor: number | null = null;
   robots: RobotView[] = [];
   correction: Correction | null = null;
   dark = true;
@@ -42,15 +44,16 @@ export class App {
   /** Who decides, where nobody logs in. */
   by: string = memory.read("by", "");
   private heard = { t: 0, ms: 0 };
+  private cloud_waits = false;
   private listeners: ((topic: Topic) => void)[] = [];
 
   constructor(readonly source: Source) {
     this.live = source.mode === "live";
     this.store = new Store(!this.live, soon);
-    this.clouds = new Clouds((name) => source.cloud(name, this.store.get("submap", Infinity, name)), () => this.say("data"));
+    this.clouds = new Clouds((name) => source.cloud(name, this.store.get("submap", Infinity, name)), () => this.cloud_came());
     this.phase = this.live ? memory.read<Phase>("phase", "explore") : "debrief";
     if (!(this.phase in PHASES)) this.phase = "explore";
-    this.options = { ...default_options(), colour: this.live ? "robot" : "robot" };
+    this.options = default_options();
     this.store.on_change(() => this.refresh("data"));
   }
 
@@ -106,6 +109,11 @@ export class App {
     this.time = time;
     this.refresh("time");
   }
+  set_cursor(cursor: number | null): void {
+    if (cursor === this.cursor) return;
+    this.cursor = cursor;
+    this.say("cursor");
+  }
   set_options(change: Partial<Options>): void {
     Object.assign(this.options, change);
     this.say("options");
@@ -158,7 +166,17 @@ export class App {
   shows_ghost(): boolean {
     const c = this.correction;
     if (!c || !this.options.layers.ghost || (c.largest_m < TIMES.ghost_m && c.joined === 0)) return false;
-    return this.time !== null || this.shown() - c.t < TIMES.ghost_s;
+    return this.time !== null || (this.live && this.shown() - c.t < TIMES.ghost_s);
+  }
+
+  /** Many come at once: the picture is drawn for several together. */
+  private cloud_came(): void {
+    if (this.cloud_waits) return;
+    this.cloud_waits = true;
+    setTimeout(() => {
+      this.cloud_waits = false;
+      this.say("cloud");
+    }, TIMES.clouds_ms);
   }
 
   private hear(t: number, apply: () => void): void {

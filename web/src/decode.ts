@@ -121,6 +121,7 @@ function submap(value: unknown): s.Submap {
     from_s: count(f.from_s, "from_s"),
     until_s: count(f.until_s, "until_s"),
     path: list(f.path, "path", vec3),
+    T_odom_submap: f.T_odom_submap ? pose(f.T_odom_submap, "T_odom_submap") : null,
     points: count(f.points, "points"),
     bytes: count(f.bytes, "bytes"),
   };
@@ -257,6 +258,9 @@ export const DECODERS: { [K in s.Kind]: (value: unknown, ids: IdTable) => s.Valu
   errors,
   survey,
   report: (value) => fields(value, "report"),
+  timing: (value) => fields(value, "timing"),
+  settings: (value) => ({ text: text(fields(value, "settings").text, "text") }),
+  odometry: (value) => new Map(Object.entries(fields(fields(value, "odometry").submaps, "submaps")).map(([id, T]) => [id, pose(T, id)])),
   mark,
 };
 

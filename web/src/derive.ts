@@ -149,3 +149,10 @@ export function time_range(store: Store, now: number): { first: number; last: nu
 }
 
 
+
+/** The worst disagreement of every submap with its robot's odometry, over all scales. */
+export function worst_disagreement(store: Store, t: number): Map<SubmapId, number> {
+  const out = new Map<SubmapId, number>();
+  for (const [, { nodes }] of store.all("disagreement", t)) for (const { submap, d } of nodes) out.set(submap, Math.max(out.get(submap) ?? 0, ...d));
+  return out;
+}

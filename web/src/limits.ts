@@ -15,6 +15,9 @@ export const LIMITS = {
     errors: 1,
     survey: 1,
     report: 1,
+    timing: 1,
+    settings: 1,
+    odometry: 1,
     mark: 8,
   },
   /** Most keys of one kind; beyond, the oldest goes. */
@@ -27,8 +30,8 @@ export const LIMITS = {
   rows: 200,
   /** Alerts that were acknowledged, remembered by this browser. */
   acknowledged: 500,
-  /** Points drawn on the CPU while the picture moves, at most. */
-  moving_points: 1_200_000,
+  /** A picture that moves has fewer points when it takes longer, but never fewer than these. */
+  moving_points: 100_000,
 } as const;
 
 export const TIMES = {
@@ -45,6 +48,10 @@ export const TIMES = {
   /** Corrections below this are not shown. */
   ghost_m: 0.05,
   animation_ms: 1200,
+  /** Between pictures while clouds arrive. */
+  clouds_ms: 250,
+  /** What a picture that moves may take. */
+  moving_ms: 24,
   answer_ms: 20_000,
 } as const;
 

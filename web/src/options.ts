@@ -7,6 +7,7 @@ export const COLOUR_MODES = {
   age: "age",
   sigma: "uncertainty",
   held: "closures that hold it",
+  disagreement: "disagreement with odometry",
   part: "part of the map",
   survey: "distance to the survey",
 } as const;

@@ -11,6 +11,8 @@ export interface Painted {
   ramp: Uint32Array;
   /** Side of a point, pixels. */
   size: number;
+  /** Instead of heights: the place of each point in its ramp. */
+  shades?: Uint8Array;
 }
 
 /** What part of the world is drawn: heights, and the distance to a plane. */
@@ -53,7 +55,7 @@ export class Raster {
     const half = window.section?.half_m ?? Infinity;
     const { low_m, high_m } = window;
     const per_m = 255 / Math.max(window.ramp_high_m - window.ramp_low_m, 1e-6);
-    const { xyz, ramp, size } = cloud;
+    const { xyz, ramp, size, shades } = cloud;
     const end = 3 * cloud.count;
     let drawn = 0;
     for (let i = 0; i < end; i += 3) {
@@ -72,7 +74,7 @@ export class Raster {
       const at = py * width + px;
       if (w >= depth[at]) continue;
       ++drawn;
-      let shade = ((h - window.ramp_low_m) * per_m) | 0;
+      let shade = shades ? shades[(i / 3) | 0] : ((h - window.ramp_low_m) * per_m) | 0;
       if (shade < 0) shade = 0;
       else if (shade > 255) shade = 255;
       const colour = ramp[shade];

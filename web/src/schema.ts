@@ -95,6 +95,8 @@ export interface Submap {
   from_s: number;
   until_s: number;
   path: Vec3[];
+  /** Where the robot's own odometry has this submap; null: not told. */
+  T_odom_submap: Pose | null;
   points: number;
   bytes: number;
 }
@@ -196,11 +198,19 @@ export interface Values {
   errors: Errors;
   survey: Survey;
   report: Report;
+  timing: Report;
+  settings: Settings;
+  odometry: Map<SubmapId, Pose>;
   mark: Mark;
 }
 export type Kind = keyof Values;
 
-/** report.json of docs/report.md; read where it is shown. */
+/** The effective settings of a mission, as a file. */
+export interface Settings {
+  text: string;
+}
+
+/** report.json and timing.json of docs/report.md; read where they are shown. */
 export type Report = Record<string, unknown>;
 
 export type Offer = "decide" | "register" | "closure" | "mark" | "why" | "disagreement";

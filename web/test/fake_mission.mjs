@@ -64,6 +64,7 @@ export class FakeMission {
     this.closures = new Map();
     this.marks = new Map();
     this.silent = new Map(); // robot -> since
+    this.clouds = new Map();
     this.backlog = robots.map(() => 0);
     this.revision = 0;
     this.wobble = 0.8;
@@ -177,6 +178,8 @@ export class FakeMission {
   }
 
   cloud(robot, index) {
-    return cloud_of(robot, index, this.points);
+    const name = `${robot}/${index}`;
+    if (!this.clouds.has(name)) this.clouds.set(name, cloud_of(robot, index, this.points));
+    return this.clouds.get(name);
   }
 }

@@ -98,7 +98,7 @@ export class FakeServer {
       const [a, b] = [submap(body.from), submap(body.to)];
       const T = relative(mission.truth(a.robot, a.index), mission.truth(b.robot, b.index));
       const found = Math.hypot(T[0], T[1]) < 15;
-      return ok({ found, why: found ? "Both clouds fit." : "no alignment comes near", T_from_to: T, evidence: [{ reason: "overlap", value: found ? 0.55 : 0.04, limit: 0.3, unit: "", ok: found }, { reason: "plane RMSE", value: 0.05, limit: 0.12, unit: "m", ok: true }], map_change_m: found ? 2.7 : null });
+      return ok({ found, why: found ? "Both clouds fit." : "no alignment comes near", T_from_to: T, evidence: [{ reason: "overlap", value: found ? 0.55 : 0.04, limit: 0.3, unit: "", at_least: true, ok: found }, { reason: "plane RMSE", value: 0.05, limit: 0.12, unit: "m", ok: true }], map_change_m: found ? 2.7 : null });
     }
     if (path === "/api/closure") {
       const [a, b] = [submap(body.from), submap(body.to)];

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /** Which points are drawn in which colours. */
 import type { Cloud, Clouds } from "../cloud";
-import { bad, css, even, height_ramp, mix, ramp_of, robot_rgb } from "../colours";
+import { abgr, bad, css, even, height_ramp, mix, ramp_of, robot_rgb } from "../colours";
 import type { Rgb } from "../colours";
 import { metres, span } from "../format";
 import type { Options } from "../options";
 import { rows_of, transform } from "../pose";
 import type { Painted, Window3 } from "../raster";
+import type { Pose } from "../schema";
+import { SurveyDistance } from "../survey";
 import type { Eye } from "./eye";
 import type { Placed, World } from "./world";
 
@@ -16,6 +18,10 @@ export interface Dressing {
   /** Place of a robot's number among all, for its colour. */
   colour_index: (robot: number) => number;
   robot_name: (robot: number) => string;
+  /** The worst disagreement of a submap, over its threshold; null: none is known. */
+  disagreement: (id: string) => number | null;
+  /** The distance of a cloud's points to the survey, as places in a ramp; null: there is none. */
+  distances: (id: string, cloud: Cloud, T: Pose) => Uint8Array | null;
   /** The moment that is shown, s. */
   t: number;
   /** Whether this submap is faint, because another thing is looked at. */
@@ -35,6 +41,9 @@ const kHolding: { most: number; colour: Rgb; label: string }[] = [
   { most: 2, colour: [240, 180, 70], label: "2" },
   { most: Infinity, colour: [70, 200, 150], label: "3 or more" },
 ];
+
+/** In units of the threshold: the end of its scale. */
+const kMostDisagreement = 2;
 
 /** Largest sigma of a submap and oldest age: the ends of scales. */
 interface Scales {
@@ -60,6 +69,10 @@ function colour_of(p: Placed, d: Dressing, s: Scales): Rgb {
       return Number.isFinite(p.sigma_m) ? bad(p.sigma_m / s.sigma_m) : [130, 138, 150];
     case "held":
       return Number.isFinite(p.holding) ? kHolding.find((h) => p.holding <= h.most)!.colour : [130, 138, 150];
+    case "disagreement": {
+      const x = d.disagreement(p.id);
+      return x === null ? [130, 138, 150] : bad(x / kMostDisagreement);
+    }
     case "part":
       return robot_rgb(p.component, d.dark);
     default:
@@ -70,9 +83,10 @@ function colour_of(p: Placed, d: Dressing, s: Scales): Rgb {
 export class Dresser {
   private ramps = new Map<string, Uint32Array>();
   private height = height_ramp();
+  private bad = Uint32Array.from({ length: 256 }, (_, i) => abgr(bad(i / 255)));
 
-  /** Of what the eye sees, with `most` points altogether. */
-  dress(world: World, clouds: Clouds, eye: Eye, d: Dressing, most: number): Map<string, Painted> {
+  /** Of what the eye sees, with `most` points altogether. `all`: also of what it does not see. */
+  dress(world: World, clouds: Clouds, eye: Eye, d: Dressing, most: number, all = false): Map<string, Painted> {
     const out = new Map<string, Painted>();
     if (!d.options.layers.clouds) return out;
     const scales = scales_of(world, d.t);
@@ -81,10 +95,11 @@ export class Dresser {
       const cloud = clouds.get(id);
       if (!cloud || cloud.n === 0) continue;
       const centre = transform(placed.T, cloud.centre);
-      if (!eye.sees(centre, cloud.radius_m)) continue;
+      if (!all && !eye.sees(centre, cloud.radius_m)) continue;
       points += cloud.n;
       const ramp = d.options.colour === "height" ? this.height : this.ramp(colour_of(placed, d, scales), d.faint(id), d.dark);
-      out.set(id, painted(cloud, placed.T, ramp, eye, centre));
+      const shades = d.options.colour === "survey" ? d.distances(id, cloud, placed.target) : null;
+      out.set(id, { ...painted(cloud, placed.T, shades ? this.bad : ramp, eye, centre), ...(shades ? { shades } : {}) });
     }
     if (points > most) for (const cloud of out.values()) cloud.count = Math.ceil((cloud.count * most) / points);
     return out;
@@ -140,6 +155,10 @@ export function legend_of(world: World, d: Dressing): Legend {
       return scale("seen last", (x) => even(1 - x), "now", `${span(s.age_s)} ago`);
     case "sigma":
       return scale("uncertainty of position, one sigma", bad, "0 m", metres(s.sigma_m));
+    case "survey":
+      return scale("distance to the survey's nearest point", bad, "0", `${100 * SurveyDistance.most_m} cm or more`);
+    case "disagreement":
+      return scale("disagreement, times the threshold", bad, "0", `${kMostDisagreement} or more`);
     case "held":
       return { title: "closures that hold it", entries: kHolding.map((h) => ({ colour: css(h.colour), label: h.label })), scale: null };
     case "part":

@@ -39,6 +39,16 @@ export class Eye {
     this.matrix.set(this.product.elements);
   }
 
+  /** The same view in a picture of another shape: as wide, and higher or lower. */
+  reshaped(aspect: number): Float64Array {
+    const other = this.camera.clone();
+    const half = (kField_deg * Math.PI) / 360;
+    other.fov = (360 / Math.PI) * Math.atan((Math.tan(half) * Math.min(this.camera.aspect, 2)) / aspect);
+    other.aspect = aspect;
+    other.updateProjectionMatrix();
+    return Float64Array.from(this.product.multiplyMatrices(other.projectionMatrix, this.camera.matrixWorldInverse).elements);
+  }
+
   /** Pixels and depth of a point of the world; null behind the camera. */
   project(p: readonly number[]): [number, number, number] | null {
     const m = this.matrix;

@@ -39,13 +39,14 @@ export class CpuPainter implements Painter {
 }
 
 const kVertex = `
-uniform vec4 section; uniform float section_half; uniform vec2 slab; uniform vec2 ramp_range; uniform float size;
+uniform vec4 section; uniform float section_half; uniform vec2 slab; uniform vec2 ramp_range; uniform float size; uniform float use_own;
+attribute float own;
 varying float shade; varying float hidden;
 void main() {
   vec4 world = modelMatrix * vec4(position, 1.0);
   float s = dot(section.xyz, world.xyz) - section.w;
   hidden = (world.z < slab.x || world.z > slab.y || abs(s) > section_half) ? 1.0 : 0.0;
-  shade = clamp((world.z - ramp_range.x) / max(ramp_range.y - ramp_range.x, 1e-6), 0.0, 1.0);
+  shade = use_own > 0.5 ? own : clamp((world.z - ramp_range.x) / max(ramp_range.y - ramp_range.x, 1e-6), 0.0, 1.0);
   gl_Position = projectionMatrix * viewMatrix * world;
   gl_PointSize = size;
 }`;
@@ -58,7 +59,7 @@ export class GpuPainter implements Painter {
   readonly name = "GPU";
   private renderer = new WebGLRenderer({ canvas: this.canvas, antialias: false, powerPreference: "high-performance" });
   private scene = new Scene();
-  private drawn = new Map<string, { xyz: Int16Array; points: Points<BufferGeometry, ShaderMaterial> }>();
+  private drawn = new Map<string, { xyz: Int16Array; shades?: Uint8Array; points: Points<BufferGeometry, ShaderMaterial> }>();
   private textures = new Map<Uint32Array, DataTexture>();
   private ratio = 1;
 
@@ -95,13 +96,15 @@ export class GpuPainter implements Painter {
     u.slab.value.set(Math.max(window.low_m, -1e30), Math.min(window.high_m, 1e30));
     u.ramp_range.value.set(window.ramp_low_m, window.ramp_high_m);
     u.size.value = cloud.size * this.ratio;
+    u.use_own.value = cloud.shades ? 1 : 0;
+    if (cloud.shades && held.shades !== cloud.shades) points.geometry.setAttribute("own", new BufferAttribute((held.shades = cloud.shades), 1, true));
     u.ramp.value = this.texture(cloud.ramp);
   }
 
   private make(xyz: Int16Array): Points<BufferGeometry, ShaderMaterial> {
     const geometry = new BufferGeometry();
     geometry.setAttribute("position", new BufferAttribute(xyz, 3));
-    const uniforms = { section: { value: new Vector4() }, section_half: { value: 0 }, slab: { value: new Vector2() }, ramp_range: { value: new Vector2() }, size: { value: 1 }, ramp: { value: null } };
+    const uniforms = { section: { value: new Vector4() }, section_half: { value: 0 }, slab: { value: new Vector2() }, ramp_range: { value: new Vector2() }, size: { value: 1 }, use_own: { value: 0 }, ramp: { value: null } };
     const points = new Points(geometry, new ShaderMaterial({ vertexShader: kVertex, fragmentShader: kFragment, uniforms }));
     points.matrixAutoUpdate = false;
     points.frustumCulled = false;

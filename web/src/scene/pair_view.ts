@@ -40,7 +40,7 @@ export class PairView {
       this.ink.resize(width, height, Math.min(devicePixelRatio || 1, 2));
       this.draw();
     }).observe(this.element);
-    app.on((topic) => (topic === "data" || topic === "options") && this.draw());
+    app.on((topic) => (topic === "data" || topic === "options" || topic === "cloud") && this.draw());
   }
 
   show(pair: Pair): void {
@@ -107,7 +107,7 @@ export class PairView {
       const T = poses[i];
       if (!T) return;
       const centre = transform(T, cloud?.centre ?? [0, 0, 0]);
-      const radius = (cloud?.radius_m ?? 5) * 0.7;
+      const radius = (cloud?.radius_m ?? 5) * 0.5;
       for (let k = 0; k < 3; ++k) {
         low[k] = Math.min(low[k], centre[k] - radius);
         high[k] = Math.max(high[k], centre[k] + radius);

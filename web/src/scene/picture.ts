@@ -2,12 +2,13 @@
 /** Everything over the points: tracks, closures, robots, circles, ghosts, marks, scales. */
 import type { App } from "../app";
 import { css, robot_rgb } from "../colours";
-import { metres, span } from "../format";
+import { metres, moment, span } from "../format";
 import { TIMES } from "../limits";
 import { transform } from "../pose";
 import { POSE_ROW } from "../schema";
 import type { Closure, ClosureState, Vec3 } from "../schema";
 import type { Ink } from "./ink";
+import { place_at, point_at, position_of } from "./where";
 
 export interface Palette {
   ink: string;
@@ -20,11 +21,12 @@ export interface Palette {
   rejected: string;
   ghost: string;
   mark: string;
+  onboard: string;
 }
 export const palette_of = (dark: boolean): Palette =>
   dark
-    ? { ink: "#e7e9ee", soft: "#9aa4b2", halo: "rgba(12,16,23,.85)", accent: "#4fb3ff", accepted: "#2fd3a0", within: "#5f8fd8", candidate: "#e6b422", rejected: "#ff5d75", ghost: "#f2e8c9", mark: "#ffd54a" }
-    : { ink: "#1d2430", soft: "#5d6675", halo: "rgba(255,255,255,.88)", accent: "#0072b2", accepted: "#00855f", within: "#3f6fb8", candidate: "#a67c00", rejected: "#c8203c", ghost: "#5a4a12", mark: "#b8860b" };
+    ? { ink: "#e7e9ee", soft: "#9aa4b2", halo: "rgba(12,16,23,.85)", accent: "#4fb3ff", accepted: "#2fd3a0", within: "#5f8fd8", candidate: "#e6b422", rejected: "#ff5d75", ghost: "#f2e8c9", mark: "#ffd54a", onboard: "#ff8a4c" }
+    : { ink: "#1d2430", soft: "#5d6675", halo: "rgba(255,255,255,.88)", accent: "#0072b2", accepted: "#00855f", within: "#3f6fb8", candidate: "#a67c00", rejected: "#c8203c", ghost: "#5a4a12", mark: "#b8860b", onboard: "#c24e00" };
 
 export const state_colour = (p: Palette, state: ClosureState, within = false): string =>
   state === "accepted" ? (within ? p.within : p.accepted) : state === "candidate" ? p.candidate : p.rejected;
@@ -40,6 +42,7 @@ export function draw_picture(app: App, ink: Ink): void {
   draw_selection(app, ink, palette);
   if (layers.robots || layers.reach) draw_robots(app, ink, palette);
   if (layers.marks) draw_marks(app, ink, palette);
+  if (app.cursor !== null) draw_cursor(app, ink, palette, app.cursor);
   draw_part_names(app, ink, palette);
   draw_scale(ink, palette);
 }
@@ -125,7 +128,7 @@ function draw_selection(app: App, ink: Ink, palette: Palette): void {
 
 function draw_robots(app: App, ink: Ink, palette: Palette): void {
   for (const robot of app.robots) {
-    const at = robot.newest && app.world.end_of(robot.newest);
+    const at = position_of(app, robot);
     if (!at) continue;
     const away = robot.presence === "silent" || robot.presence === "lost";
     const colour = away ? "#8a929e" : css(robot_rgb(robot.index, app.dark));
@@ -177,9 +180,32 @@ function draw_part_names(app: App, ink: Ink, palette: Palette): void {
   for (const part of parts.values()) {
     const at = [0, 1, 2].map((k) => (k === 1 ? part.low[1] : (part.low[k] + part.high[k]) / 2) + part.offset[k]);
     const text = part.submaps === largest ? `part ${part.component + 1}` : `part ${part.component + 1}: not joined, placed beside`;
-    ink.label(at, text, palette.soft, palette.halo);
+    const spot = ink.eye.project(at);
+    if (spot) ink.text(spot[0] - 20, spot[1] + 24, text, palette.soft, palette.halo);
   }
 }
+
+/** Where everybody was at the moment that somebody points at in a plot; in a report, by every estimate. */
+function draw_cursor(app: App, ink: Ink, palette: Palette, t: number): void {
+  for (const robot of app.robots) {
+    const at = place_at(app, robot.number, t);
+    if (!at) continue;
+    ink.dot(at, 7, css(robot_rgb(robot.index, app.dark)), palette.ink);
+    ink.label(at, `${robot.name} at ${moment(t)}`, palette.ink, palette.halo, undefined, true);
+    for (const [name, trajectory] of app.store.all("trajectory")) {
+      if (trajectory.name !== robot.name && name.split("/")[0] !== robot.name) continue;
+      const other = point_at(trajectory.points, t);
+      const kind = name.split("/")[1];
+      if (!other || kind === "server") continue;
+      const shown = other.map((x, k) => x + app.world.offset_of(trajectory.component)[k]);
+      ink.line([at, shown], { colour: palette.soft, width: 1 });
+      ink.dot(shown, 4, estimate_colour(palette, kind), palette.halo);
+      ink.label(shown, kind, palette.soft, palette.halo);
+    }
+  }
+}
+
+const estimate_colour = (palette: Palette, kind: string): string => (kind === "onboard" ? palette.onboard : kind === "corrected" ? palette.accent : palette.ink);
 
 function draw_scale(ink: Ink, palette: Palette): void {
   const { eye } = ink;

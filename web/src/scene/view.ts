@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /** The 3-D picture: points, and ink over them. Draws only when something changed. */
 import type { App } from "../app";
-import { LIMITS } from "../limits";
+import { worst_disagreement } from "../derive";
+import { LIMITS, TIMES } from "../limits";
+import type { Painted } from "../raster";
 import type { SubmapId, Vec3 } from "../schema";
+import { SurveyDistance } from "../survey";
 import { Dresser, window_of } from "./dress";
 import type { Dressing } from "./dress";
 import { Eye } from "./eye";
@@ -12,6 +15,7 @@ import { CpuPainter, GpuPainter, gpu_name } from "./painters";
 import type { Painter } from "./painters";
 import { draw_picture } from "./picture";
 import { nearest_point } from "./pick";
+import { position_of } from "./where";
 
 /** A place that somebody pointed at. */
 export interface Spot {
@@ -38,13 +42,16 @@ export class View {
   readonly gpu = gpu_name();
   tool: Tool | null = null;
   followed: number | null = null;
-  /** Milliseconds of the last picture, and points in it. */
-  last = { ms: 0, points: 0, pictures: 0 };
+  /** Milliseconds of the last picture, points in it, pictures so far, and when the first with points was there. */
+  last = { ms: 0, points: 0, pictures: 0, first_ms: 0 };
+  private ms_per_point = 0;
   private dresser = new Dresser();
   private dirty = true;
   private fitted = false;
   private moved_ms = -Infinity;
   private still = 0;
+  private draw_listeners: (() => void)[] = [];
+  private distance: SurveyDistance | null = null;
 
   constructor(private readonly app: App, force_cpu = false) {
     this.element.className = "view";
@@ -84,14 +91,32 @@ export class View {
 
   dressing(): Dressing {
     const { app } = this;
+    const worst = app.options.colour === "disagreement" ? worst_disagreement(app.store, app.at()) : null;
     return {
       options: app.options,
       dark: app.dark,
       colour_index: (n) => app.robot_index(n),
       robot_name: (n) => app.robot_name(n),
+      disagreement: (id) => worst?.get(id) ?? null,
+      distances: (id, cloud, T) => this.survey_distance()?.shades(id, cloud, T) ?? null,
       t: app.shown(),
       faint: (id) => app.selection?.kind === "robot" && app.world.placed.get(id)?.submap.robot !== app.selection.number,
     };
+  }
+
+  /** Calls back after every picture. */
+  on_draw(listener: () => void): void {
+    this.draw_listeners.push(listener);
+  }
+
+  /** Null without a survey, or while it is not there yet. */
+  survey_distance(): SurveyDistance | null {
+    const survey = this.app.store.get("survey");
+    if (!survey) return null;
+    this.app.clouds.want(survey.cloud);
+    const cloud = this.app.clouds.get(survey.cloud);
+    if (cloud && this.distance?.survey !== cloud) this.distance = new SurveyDistance(cloud);
+    return cloud ? this.distance : null;
   }
 
   private hear(topic: string): void {
@@ -128,7 +153,7 @@ export class View {
 
   private follow(): void {
     const robot = this.app.robots.find((r) => r.number === this.followed);
-    const at = robot?.newest && this.app.world.end_of(robot.newest);
+    const at = robot && position_of(this.app, robot);
     if (!at) return;
     if (Math.hypot(...at.map((x, k) => x - this.eye.target[k])) > 0.01) this.eye.look_at(at);
   }
@@ -139,18 +164,27 @@ export class View {
     const { app, eye } = this;
     eye.update();
     const dressing = this.dressing();
-    const clouds = this.dresser.dress(app.world, app.clouds, eye, dressing, moves ? LIMITS.moving_points : Infinity);
+    const clouds = this.dresser.dress(app.world, app.clouds, eye, dressing, moves ? this.affordable() : Infinity);
     this.add_survey(clouds, dressing);
-    const fast = !moves || this.last.ms < 24;
+    const fast = !moves || this.last.ms < TIMES.moving_ms;
     this.painter.draw(clouds, eye.matrix, eye.camera, window_of(app.world, app.options), app.dark ? kBackground.dark : kBackground.light, app.options.edges && fast);
     draw_picture(app, this.ink);
     this.tool?.draw(this.ink);
     let points = 0;
     for (const cloud of clouds.values()) points += cloud.count;
-    this.last = { ms: performance.now() - start, points, pictures: this.last.pictures + 1 };
+    const now = performance.now();
+    const first_ms = this.last.first_ms || (points > 0 ? now : 0);
+    this.last = { ms: now - start, points, pictures: this.last.pictures + 1, first_ms };
+    if (points > 0) this.ms_per_point += 0.3 * ((now - start) / points - this.ms_per_point);
+    for (const listener of this.draw_listeners) listener();
   }
 
-  private add_survey(clouds: Map<string, import("../raster").Painted>, dressing: Dressing): void {
+  /** Points of a picture that moves, so that it goes on smoothly. */
+  private affordable(): number {
+    return this.ms_per_point > 0 ? Math.max(LIMITS.moving_points, TIMES.moving_ms / this.ms_per_point) : Infinity;
+  }
+
+  private add_survey(clouds: Map<string, Painted>, dressing: Dressing): void {
     const survey = this.app.options.layers.survey ? this.app.store.get("survey") : null;
     if (!survey) return;
     this.app.clouds.want(survey.cloud);

@@ -69,11 +69,6 @@ export class World {
     return placed ? transform(placed.T, p) : null;
   }
 
-  /** Where a submap ends. */
-  end_of(submap: Submap): Vec3 | null {
-    return this.point(submap.id, submap.path.at(-1) ?? [0, 0, 0]);
-  }
-
   offset_of(component: number): Vec3 {
     return this.parts.get(component)?.offset ?? [0, 0, 0];
   }

@@ -6,6 +6,7 @@ import type { RobotView } from "../derive";
 import { bytes, many, metres, span } from "../format";
 import { LIMITS, TIMES } from "../limits";
 import type { View } from "../scene/view";
+import { position_of } from "../scene/where";
 import { button, h, icon, panel, swatch } from "./dom";
 import type { Child } from "./dom";
 
@@ -45,7 +46,7 @@ function card(app: App, view: View, robot: RobotView): HTMLElement {
 
 function choose(app: App, view: View, robot: RobotView, chosen: boolean): void {
   app.select(chosen ? null : { kind: "robot", number: robot.number });
-  const at = robot.newest && app.world.end_of(robot.newest);
+  const at = position_of(app, robot);
   if (!chosen && at) view.look_at(at, Math.max(30, robot.reach_m * 2.5));
 }
 

@@ -1,50 +1,87 @@
 // SPDX-License-Identifier: BSD-3-Clause
-/** The panel on the right: tabs, and what is inspected above them. */
+/** The panel on the right: what is inspected, and below it the tabs. */
 import type { App } from "../app";
-import { PHASES } from "../options";
+import { memory, PHASES } from "../options";
 import type { View } from "../scene/view";
 import { alerts_panel, open_alerts } from "./alerts";
+import { by_hand_panel } from "./by_hand";
 import { closures_panel } from "./closures";
+import { disagreement_panel } from "./disagreement";
 import { button, h, panel } from "./dom";
 import { inspector_panel } from "./inspector";
+import { marks_panel } from "./marks";
+import { report_panel } from "./report";
+import { robots_panel } from "./robots";
+import { why_panel } from "./why";
 
 interface Tab {
   name: string;
   title: (app: App) => string;
-  /** Whether there is anything to show. */
+  /** Whether there is anything to show, and this person may see it. */
   offered: (app: App) => boolean;
-  make: (app: App, view: View) => HTMLElement;
+  make: (app: App, view: View, open: (tab: string) => void) => HTMLElement;
 }
 
 /** To add a tab, add a row. */
 const TABS: Tab[] = [
+  { name: "report", title: () => "Report", offered: (app) => app.store.get("report") !== null, make: report_panel },
+  { name: "robots", title: () => "Robots", offered: (app) => !app.live, make: robots_panel },
   { name: "alerts", title: (app) => `Alerts${open_alerts(app).length ? ` ${open_alerts(app).length}` : ""}`, offered: () => true, make: alerts_panel },
   { name: "closures", title: () => "Closures", offered: () => true, make: closures_panel },
+  { name: "by hand", title: () => "By hand", offered: (app) => app.may("register"), make: by_hand_panel },
+  { name: "why", title: () => "Why not?", offered: (app) => app.may("why"), make: why_panel },
+  { name: "disagreement", title: () => "Odometry", offered: (app) => [...app.store.all("disagreement", app.at())].length > 0, make: disagreement_panel },
+  { name: "marks", title: () => "Marks", offered: (app) => app.may("mark") || [...app.store.all("mark", app.at())].length > 0, make: marks_panel },
 ];
 
 export function side_panel(app: App, view: View): HTMLElement {
-  let tab: string = PHASES[app.phase].tab;
+  let tab: string = app.live ? PHASES[app.phase].tab : "report";
   let phase = app.phase;
   const bodies = new Map<string, HTMLElement>();
-  const body = h("div", { class: "tab-body" });
+  const body = h("div", { class: "tab-body", role: "tabpanel" });
   const show = (name: string): void => {
     tab = name;
-    for (const [other, element] of bodies) element.hidden = other !== name;
     if (!bodies.has(name)) {
-      const made = TABS.find((t) => t.name === name)!.make(app, view);
+      const made = TABS.find((t) => t.name === name)!.make(app, view, show);
       bodies.set(name, made);
       body.append(made);
     }
+    for (const [other, element] of bodies) element.hidden = other !== name;
     app.say("options");
   };
   const bar = panel(app, ["data", "options", "me", "time"], { class: "tabs", role: "tablist" }, () => {
-    if (phase !== app.phase) {
+    const offered = TABS.filter((t) => t.offered(app));
+    if (phase !== app.phase || (app.ready && !offered.some((t) => t.name === tab))) {
+      const wanted = phase === app.phase ? "alerts" : PHASES[app.phase].tab;
       phase = app.phase;
-      queueMicrotask(() => show(PHASES[phase].tab));
+      queueMicrotask(() => show(wanted));
     }
-    return TABS.filter((t) => t.offered(app)).map((t) => button(t.title(app), () => show(t.name), { key: `tab ${t.name}`, role: "tab", "aria-selected": String(t.name === tab) }));
+    return offered.map((t) => button(t.title(app), () => show(t.name), { key: `tab ${t.name}`, role: "tab", "aria-selected": String(t.name === tab) }));
   });
-  const element = h("aside", { class: "side" }, inspector_panel(app), bar, body);
   queueMicrotask(() => show(tab));
+  return h("aside", { class: "side" }, inspector_panel(app), bar, body);
+}
+
+const kLeast_px = 280;
+
+/** Between the picture and the panel: dragged, or moved by arrow keys. */
+export function splitter(app: App): HTMLElement {
+  const name = app.live ? "side" : "side.report";
+  const set = (px: number): void => {
+    const width = Math.round(Math.min(Math.max(px, kLeast_px), innerWidth - kLeast_px - 80));
+    document.documentElement.style.setProperty("--side", `${width}px`);
+    memory.write(name, width);
+  };
+  const held = memory.read<number | null>(name, null);
+  if (held !== null) set(held);
+  else if (!app.live) document.documentElement.style.setProperty("--side", "48vw");
+  const element = h("div", { class: "splitter", role: "separator", tabindex: 0, "aria-orientation": "vertical", "aria-label": "Width of the panel" });
+  element.addEventListener("pointerdown", (e) => element.setPointerCapture(e.pointerId));
+  element.addEventListener("pointermove", (e) => element.hasPointerCapture(e.pointerId) && set(innerWidth - e.clientX));
+  element.addEventListener("keydown", (e) => {
+    const step = e.key === "ArrowLeft" ? 24 : e.key === "ArrowRight" ? -24 : 0;
+    const side = document.querySelector<HTMLElement>(".side");
+    if (step && side) set(side.clientWidth + step);
+  });
   return element;
 }

@@ -128,11 +128,11 @@ export class Timeline {
     for (const { t, moved_m, joined } of this.moves()) {
       const tall = joined > 0 ? 14 : moved_m < TIMES.ghost_m ? 2 : Math.min(14, 4 + 5 * Math.log10(1 + 10 * moved_m));
       c.fillStyle = joined > 0 ? palette.accepted : palette.accent;
-      c.fillRect(x(t) - 1, 18 - tall, 2, tall);
+      c.fillRect(x(t) - 1, 15 - tall, 2, tall);
     }
     const mission = this.app.store.get("mission")?.name ?? "";
     c.fillStyle = palette.mark;
-    for (const b of this.bookmarks) if (b.mission === mission) c.fillRect(x(b.t) - 1.5, 0, 3, 20);
+    for (const b of this.bookmarks) if (b.mission === mission) c.fillRect(x(b.t) - 1.5, 0, 3, 15);
     this.slider.title = this.moves().length ? `Strokes: corrections of the map, the largest ${metres(Math.max(...this.moves().map((m) => m.moved_m)))}; green where parts were joined` : "";
   }
 
@@ -145,7 +145,7 @@ export class Timeline {
     c.textAlign = "center";
     for (let t = Math.ceil(first / step) * step; t <= last; t += step) {
       if (x(t) > 20 && x(t) < width - 20) c.fillText(moment(t), x(t), height - 2);
-      c.fillRect(x(t), 18, 1, 4);
+      c.fillRect(x(t), 29, 1, 4);
     }
   }
 }

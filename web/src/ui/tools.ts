@@ -103,7 +103,7 @@ function section(app: App, view: View): Child {
 }
 
 export function legend(app: App, view: View): HTMLElement {
-  return panel(app, ["options", "data", "time"], { class: "legend-box" }, () => {
+  return panel(app, ["options", "data", "time", "cloud"], { class: "legend-box" }, () => {
     if (app.world.placed.size === 0) return [h("p", { class: "empty" }, app.ready ? "No submap is in the map yet." : "Waiting for the map …")];
     const { title, entries, scale } = legend_of(app.world, view.dressing());
     return [

@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Drives the built page in a headless Chromium, against the fake server and as a file. Ends with 1 if anything is not as it should be.
+import assert from "node:assert/strict";
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { Browser } from "./chromium.mjs";
+import { FakeMission } from "./fake_mission.mjs";
+import { fill, recorded_mission } from "./fake_report.mjs";
+import { FakeServer } from "./fake_server.mjs";
+
+const page_text = readFileSync(new URL("../dist/index.html", import.meta.url), "utf8");
+const work = mkdtempSync(join(tmpdir(), "tutti-web-"));
+const browser = await Browser.launch();
+const tests = [];
+const test = (name, run) => tests.push({ name, run });
+
+/** A fake server that lives as long as `run`. */
+async function served(mission, run, options) {
+  const server = await new FakeServer(mission, options).start();
+  const page = await browser.open(`http://127.0.0.1:${server.port}/`);
+  try {
+    await page.until("all submaps are placed", (n) => tutti.app.world.placed.size >= n, mission.submaps.length);
+    await run(page, server, mission);
+    assert.deepEqual(page.errors, [], "errors on the page");
+  } finally {
+    await page.close();
+    await server.stop();
+  }
+}
+
+test("three robots live: all in one frame, parts apart, clouds come", () =>
+  served(new FakeMission(), async (page) => {
+    await page.until("clouds are drawn", () => tutti.view.last.points >= 72 * 6000);
+    assert.deepEqual(await page.texts(".robot b"), ["alpha", "bravo", "charlie"]);
+    assert.match((await page.texts(".badge"))[0], /Live/);
+    assert.match((await page.texts(".facts"))[0], /3 robots · 72 submaps · \d+ closures · 2 parts/);
+    assert.ok(await page.pixels() > 3000, "the picture is not empty");
+  }));
+
+test("a robot goes silent: grey, a circle, an alert; comes back and drains", () =>
+  served(new FakeMission(), async (page, server, mission) => {
+    mission.silent.set(1, mission.time);
+    server.tick(30);
+    await page.until("bravo is silent", () => document.querySelectorAll(".robot.silent").length === 1);
+    assert.match((await page.texts(".robot.silent .detail"))[0], /May be within [23]\d\.\d\sm/);
+    assert.match((await page.texts(".alert b")).join(), /bravo is silent/);
+    const ring = await page.evaluate(() => tutti.app.robots[1].reach_m);
+    assert.ok(ring > 25 && ring < 40, `${ring} m`);
+    mission.silent.delete(1);
+    for (const backlog of [40, 36, 32]) {
+      mission.backlog[1] = backlog;
+      server.tick(2);
+      await page.pause(120);
+    }
+    mission.backlog[1] = 28;
+    server.tick(60);
+    await page.until("bravo is back", () => document.querySelectorAll(".robot.silent").length === 0);
+    await page.until("its backlog drains", () => [...document.querySelectorAll(".robot .detail")].some((d) => /Backlog 28 submaps.*sent in/.test(d.textContent)));
+  }));
+
+test("an alert is acknowledged once, and stays so over a reload", () =>
+  served(new FakeMission(), async (page) => {
+    await page.press("Acknowledge");
+    await page.until("the inbox is empty", () => /Everything is acknowledged/.test(document.querySelector(".alerts").textContent));
+    await page.reload();
+    await page.until("loaded", () => tutti.app.ready && document.querySelector(".alerts")?.textContent.includes("acknowledged"));
+    assert.equal((await page.texts(".alert.seen b"))[0], "charlie is not joined to the map");
+  }));
+
+test("a closure is inspected, rejected by name, taken back", () =>
+  served(new FakeMission(), async (page, server) => {
+    await page.press("Closures");
+    await page.press(/^In the map/);
+    await page.click(".closure");
+    await page.until("both clouds are laid over each other", () => document.querySelector(".inspector .pair canvas") !== null);
+    assert.match((await page.texts(".inspector .gates")).join(), /overlap0\.610 at least 0\.300/);
+    await page.press("Reject");
+    await page.fill("dialog input", "eva");
+    await page.press("Use it");
+    await page.until("it is refused", () => /refused/.test(document.querySelector(".inspector .state").textContent));
+    assert.deepEqual([server.asked[0].path, server.asked[0].body.wish, server.asked[0].body.by], ["/api/decide", "reject", "eva"]);
+    await page.until("the word is shown", () => /eva said reject/.test(document.querySelector(".inspector").textContent));
+    await page.press(/^Take back/);
+    await page.until("it is in the map again", () => /in the map/.test(document.querySelector(".inspector .state").textContent));
+    assert.equal(server.asked[1].body.wish, "withdraw");
+  }));
+
+test("a closure by hand joins two parts, the map follows, and it is undone", () =>
+  served(new FakeMission(), async (page, server) => {
+    await page.evaluate(() => localStorage.setItem("tutti.by", JSON.stringify("eva")));
+    await page.reload();
+    await page.until("loaded", () => tutti.app.world.placed.size === 72 && tutti.app.may("register"));
+    const pair = server.mission.closures.values().find?.((c) => c.from[0] === "0" && c.to[0] === "2") ?? [...server.mission.closures.values()].find((c) => c.from[0] === "0" && c.to[0] === "2");
+    const [from, to] = [pair.from, pair.to].map((id) => server.mission.submaps.find((s) => s.id === id).name);
+    await page.press("By hand");
+    await page.fill('[aria-label="First submap"]', from);
+    await page.fill('[aria-label="Second submap"]', to);
+    await page.press("Register");
+    await page.until("they fit", () => /They fit/.test(document.querySelector(".by-hand").textContent));
+    assert.match((await page.texts(".by-hand")).join(), /would change by up to 2\.70\sm/);
+    await page.press("Keep it in the map");
+    await page.until("one part", () => tutti.app.world.parts.size === 1);
+    assert.equal(server.asked.at(-1).body.by, "eva");
+    await page.until("everything glided to its place", () => [...tutti.app.world.placed.values()].every((p) => p.T === p.target));
+    await page.press("Undo");
+    await page.until("two parts again", () => tutti.app.world.parts.size === 2);
+  }));
+
+test("a correction is shown in metres, beside where the map was", () =>
+  served(new FakeMission(), async (page, server, mission) => {
+    mission.time += 10;
+    server.send(mission.correct(0.1));
+    await page.until("the correction is known", () => tutti.app.correction?.largest_m > 0.5 && tutti.app.shows_ghost());
+  }));
+
+test("a mark is placed where somebody points, shown, and removed", () =>
+  served(new FakeMission(), async (page, server) => {
+    await page.evaluate(() => localStorage.setItem("tutti.by", JSON.stringify("eva")));
+    await page.reload();
+    await page.until("loaded", () => tutti.app.may("mark") && tutti.view.last.points > 0);
+    await page.press("Marks");
+    await page.press("New mark");
+    const at = await page.evaluate(() => {
+      const placed = tutti.app.world.placed.get("0:1/5");
+      return tutti.view.eye.project(placed.target).slice(0, 2);
+    });
+    await page.click_in(".middle .view", at);
+    await page.fill(".marks textarea", "door, locked");
+    await page.press("Save");
+    await page.until("it is there", () => document.querySelector(".mark b")?.textContent === "door, locked");
+    assert.match(server.asked.at(-1).body.submap, /^[01]:1\/\d+$/);
+    await page.click(".mark .closure");
+    await page.press("Remove");
+    await page.until("it is gone", () => document.querySelector(".mark") === null);
+  }));
+
+test("why two robots are not joined: candidates with gate and limit, and on to joining by hand", () =>
+  served(new FakeMission(), async (page) => {
+    await page.press("Why not?");
+    await page.evaluate(() => {
+      const [, other] = document.querySelectorAll(".why select");
+      other.value = "charlie";
+      other.dispatchEvent(new Event("change"));
+    });
+    await page.press("Ask");
+    await page.until("an answer", () => document.querySelectorAll(".why .alert").length === 3);
+    assert.match((await page.texts(".why .alert p"))[0], /overlap: 0\.270, limit 0\.300/);
+    await page.press("Join by hand");
+    await page.until("the pair is filled in", () => document.querySelector('[aria-label="Second submap"]')?.value === "charlie/11");
+  }));
+
+test("the server is killed, and back within three seconds", () =>
+  served(new FakeMission(), async (page, server) => {
+    const { port } = server;
+    await server.stop();
+    await page.until("the page says so", () => /silent|No server/.test(document.querySelector(".badge").textContent), undefined, 6000);
+    server.mission.time += 60;
+    await server.start(port);
+    const start = Date.now();
+    await page.until("live again", () => document.querySelector(".badge").textContent === "Live", undefined, 8000);
+    const took = Date.now() - start;
+    console.log(`    live again ${took} ms after the server`);
+    assert.ok(took < 3000, `${took} ms`);
+    assert.equal(await page.evaluate(() => tutti.app.world.placed.size), 72);
+  }));
+
+test("a late joiner sees all of a long mission at once", () =>
+  served(new FakeMission({ robots: ["a", "b", "c", "d", "e", "f"], submaps: 60, points: 1500, apart: [] }), async (page) => {
+    await page.until("all clouds", () => tutti.app.clouds.points === 360 * 1500, undefined, 20_000);
+    assert.equal(await page.evaluate(() => tutti.app.store.unread.count), 0);
+  }));
+
+test("time is scrubbed: what was known then, and nothing can be decided there", () =>
+  served(new FakeMission(), async (page) => {
+    await page.evaluate(() => tutti.app.set_time(100));
+    await page.until("ten submaps each", () => tutti.app.world.placed.size === 30);
+    assert.match((await page.texts(".badge"))[0], /Past: 0:01:40/);
+    assert.equal((await page.texts(".tabs button")).includes("By hand"), false);
+    await page.press("Live");
+    await page.until("all again", () => tutti.app.world.placed.size === 72);
+  }));
+
+test("a viewer is offered no decisions, and what the program does not offer is not shown", () =>
+  served(new FakeMission(), async (page) => {
+    await page.until("me", () => tutti.app.me.role === "viewer");
+    const tabs = await page.texts(".tabs button");
+    assert.deepEqual(tabs.filter((t) => /hand|Why|Marks/.test(t)), ["Why not?"]);
+    await page.press("Closures");
+    await page.click(".closure");
+    await page.until("inspected", () => document.querySelector(".inspector h2") !== null);
+    assert.deepEqual(await page.texts(".decide button"), []);
+  }, { me: { login: true, role: "viewer", name: "vera", may_decide: false, offers: ["decide", "register", "closure", "mark", "why"] } }));
+
+const kHostile = '<img src=x onerror="window.hacked=1"><script>window.hacked=1</script>';
+test("scripts in names, words, reasons and photos do nothing", async () => {
+  const mission = new FakeMission({ robots: [kHostile, "bravo", "charlie"], name: kHostile });
+  for (const c of mission.closures.values()) Object.assign(c, { reason: kHostile, finder: kHostile, word: { wish: "reject", by: kHostile, wall_ns: 1 } });
+  mission.marks.set("m1", { id: "m1", submap: "0:1/2", at: [0, 0, 0], text: kHostile, by: kHostile, wall_ns: 1, photo: "data:text/html,<script>window.hacked=1</script>" });
+  mission.silent.set(0, mission.time - 20);
+  await served(mission, async (page) => {
+    for (const tab of ["Closures", "Marks", "Odometry", /^Alerts/]) {
+      await page.press(tab);
+      await page.pause(150);
+    }
+    await page.press("Closures");
+    await page.click(".closure");
+    await page.pause(300);
+    assert.equal(await page.evaluate(() => window.hacked), undefined);
+    assert.equal(await page.evaluate(() => document.querySelectorAll("img, .room script").length), 0);
+    assert.ok((await page.texts(".robot b"))[0].includes("<img"), "the name is shown as it is");
+  });
+});
+
+test("a report opens as a file without a network, and its time can be scrubbed", async () => {
+  const file = join(work, "report.html");
+  const recorded = recorded_mission({ name: "demo </script><b>" });
+  writeFileSync(file, fill(page_text, recorded));
+  const page = await browser.open(`file://${file}`);
+  await page.until("the map is placed", () => tutti.app.ready && tutti.app.world.placed.size === 72);
+  await page.until("clouds", () => tutti.view.last.points > 100_000);
+  assert.match((await page.texts(".report .cards.wide .value")).join(), /2\.32\sm → 0\.059\sm/);
+  assert.match((await page.texts(".report")).join(), /A note with <b>markup<\/b>/);
+  await page.until("four pictures", () => document.querySelectorAll(".report figure canvas").length === 4);
+  assert.ok((await page.texts(".report h2")).includes("Who drifted where and when"));
+  await page.evaluate(() => tutti.app.set_time(120));
+  await page.until("a third of the submaps", () => tutti.app.world.placed.size === 24);
+  assert.equal((await page.texts("button")).filter((t) => /Accept|Reject|By hand/.test(t)).length, 0);
+  assert.deepEqual(page.errors, []);
+  assert.deepEqual(page.requests.filter((url) => !/^(file|data|blob):/.test(url)), [], "nothing is fetched");
+  await page.close();
+});
+
+test("a hundred robots and a million points: the first picture, frames a second, memory", async () => {
+  const robots = Array.from({ length: 100 }, (_, i) => `r${String(i).padStart(2, "0")}`);
+  const mission = new FakeMission({ robots, submaps: 2, points: 5000, apart: [] });
+  mission.closures.clear();
+  for (const s of mission.submaps) mission.cloud(s.robot, s.index); // not the page's time
+  await served(mission, async (page) => {
+    await page.until("a million points are drawn", () => tutti.view.last.points >= 1_000_000, undefined, 20_000);
+    const all = await page.evaluate(() => performance.now());
+    const { first_ms } = await page.evaluate(() => tutti.view.last);
+    await page.pause(500);
+    const { last, frames } = await page.evaluate(async () => {
+      const start = performance.now();
+      let frames = 0;
+      const before = tutti.view.last.pictures;
+      while (performance.now() - start < 3000) {
+        tutti.view.eye.move(0.002, 0, 0.01);
+        await new Promise((resolve) => requestAnimationFrame(resolve));
+        ++frames;
+      }
+      return { last: tutti.view.last, frames: ((tutti.view.last.pictures - before) * 1000) / (performance.now() - start) };
+    });
+    const heap = await page.heap_mb();
+    console.log(`    ${await page.evaluate(() => tutti.view.painter.name)}: first picture ${(first_ms / 1000).toFixed(1)} s, all points ${(all / 1000).toFixed(1)} s after the page was asked for; ${frames.toFixed(0)} frames/s moving (the last ${last.points} points in ${last.ms.toFixed(0)} ms); JS heap ${heap.toFixed(0)} MB`);
+    assert.ok(heap < 500, `${heap} MB`);
+    assert.ok(frames > 5, `${frames} frames/s`); // on a free machine above 30
+  });
+});
+
+let failed = 0;
+const only = process.argv[2];
+for (const { name, run } of tests) {
+  if (only && !name.includes(only)) continue;
+  const start = Date.now();
+  try {
+    await run();
+    console.log(`ok   ${name} (${Date.now() - start} ms)`);
+  } catch (error) {
+    ++failed;
+    console.log(`FAIL ${name}: ${error.stack ?? error}`);
+  }
+}
+await browser.close();
+rmSync(work, { recursive: true });
+console.log(failed ? `${failed} of ${tests.length} failed` : "all is as it should be");
+process.exit(failed ? 1 : 0);
