@@ -265,9 +265,9 @@ Status show_on_ros(const RosArguments& arguments, program::ServerOptions& option
   ros::RosServerOptions ros = arguments.server;
   ros.name_space = arguments.name_space;
   ros.say = log_of("server ros", options.console);
-  options.view = [ros, participant = *participant](const storage::TableStore& map) {
-    return ros::view_on_ros(ros, participant, map);
-  };
+  options.views.emplace_back([ros, participant = *participant](const program::ViewedMission& mission) {
+    return ros::view_on_ros(ros, participant, mission.map);
+  });
   return {};
 }
 

@@ -87,6 +87,8 @@ class ServerNode {
   [[nodiscard]] std::uint64_t changes() const { return changes_; }
 
   [[nodiscard]] const server::MapServer& map_server() const { return server_; }
+  /// Those that robots have told.
+  [[nodiscard]] std::map<RobotId, std::string> robot_names() const;
   /// False after a start until the first update; mission_status() then has the figures of the last update before the
   /// start.
   [[nodiscard]] bool has_map() const { return has_map_; }

@@ -63,13 +63,17 @@ void ServerNode::recall_words() {
   for (const ClosureWord& word : given) note_word(wire::encode(word), {});
 }
 
-server::ClosureNames ServerNode::closure_names() const {
+std::map<RobotId, std::string> ServerNode::robot_names() const {
   std::map<RobotId, std::string> names;
   for (const auto& [robot, entry] : registry_.robots())
     if (entry.is_claimed) names[robot] = entry.status.name;
+  return names;
+}
+
+server::ClosureNames ServerNode::closure_names() const {
   std::set<ChainId> chains;
   for (const auto& [id, submap] : server_.state().submaps) chains.insert(chains.end(), id.chain);
-  return {names, chains};
+  return {robot_names(), chains};
 }
 
 }  // namespace tutti::node

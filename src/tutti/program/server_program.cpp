@@ -28,6 +28,7 @@
 #include "tutti/program/stop.hpp"
 #include "tutti/program/worker_program.hpp"
 #include "tutti/storage/sqlite_store.hpp"
+#include "tutti/wire/codec.hpp"
 
 namespace tutti::program {
 namespace {
@@ -35,8 +36,13 @@ namespace {
 class HostedServer final : public Hosted {
  public:
   HostedServer(std::unique_ptr<node::ServerNode> node, std::string version, std::function<std::string()> trouble,
-               const bool& is_over)
-      : node_(std::move(node)), version_(std::move(version)), trouble_(std::move(trouble)), is_over_(is_over) {}
+               const bool& is_over, const std::vector<std::unique_ptr<MapViewer>>& viewers, const Clock& clock)
+      : node_(std::move(node)),
+        version_(std::move(version)),
+        trouble_(std::move(trouble)),
+        is_over_(is_over),
+        viewers_(viewers),
+        clock_(clock) {}
   Answer start(Timestamp now) override { return {node_->resume(now), {}}; }
   Answer receive(const bus::Received& message, Timestamp now) override {
     return {node_->receive(message.envelope, now), {message.ticket}};
@@ -44,26 +50,23 @@ class HostedServer final : public Hosted {
   Answer put_aside(const bus::Received& message, const std::string& why, Timestamp now) override {
     return {node_->put_aside(message.envelope, why, now), {message.ticket}};
   }
-  [[nodiscard]] std::optional<Timestamp> next_work() const override { return node_->next_timer(); }
+  [[nodiscard]] std::optional<Timestamp> next_work() const override {
+    return asked_.empty() ? node_->next_timer() : kFirstTimestamp;
+  }
   Answer work(Timestamp now) override {
-    Answer answer{node_->on_timer(now), {}};
+    Answer answer;
+    for (AskedWord& word : std::exchange(asked_, {})) take(word, now, answer.step);
+    answer.step.add(node_->on_timer(now));
     if (node_->changes() != told_changes_) answer.step.messages.push_back(mission_status(now));
     return answer;
   }
   Answer report(Timestamp now) override { return {{.messages = {mission_status(now)}}, {}}; }
   [[nodiscard]] Json status(Timestamp now) const override;
   [[nodiscard]] bool finished() const override { return is_over_; }
-  /// A new map is shown, if the viewer has time for it.
-  void show(MapViewer& viewer) const {
-    const server::MapServer& map = node_->map_server();
-    const server::MapServerState& state = map.state();
-    if (!node_->has_map() || !viewer.wants(state.revision)) return;
-    auto shown = std::make_shared<ShownMap>();
-    shown->revision = state.revision;
-    shown->content.submaps = state.submaps;
-    shown->content.payload_sizes = state.payload_sizes;
-    shown->map = map.map();
-    viewer.show(std::move(shown));
+  /// Viewers that have time for a new map get it, and what operators decided there is work for the next turn.
+  void wait(double wall_s) override {
+    tend_viewers(clock_.now());
+    Hosted::wait(asked_.empty() ? wall_s : 0.0);
   }
 
  private:
@@ -73,15 +76,51 @@ class HostedServer final : public Hosted {
     status.version = version_;
     status.wall_ns = static_cast<std::int64_t>(wall_clock_ns());
     status.trouble = trouble_();
+    for (const auto& viewer : viewers_) viewer->tell(status);
     return node::to_viewers(std::move(status));
   }
+  void tend_viewers(Timestamp now);
+  /// As if it had come by the bus.
+  void take(AskedWord& asked, Timestamp now, node::Step& step);
 
   std::unique_ptr<node::ServerNode> node_;
   std::string version_;
   std::function<std::string()> trouble_;
   const bool& is_over_;
+  const std::vector<std::unique_ptr<MapViewer>>& viewers_;
+  const Clock& clock_;
+  std::vector<AskedWord> asked_;
+  /// Answers to words whose step is being carried out.
+  std::vector<std::pair<std::promise<std::string>, std::string>> answers_;
   std::uint64_t told_changes_ = 0;
+  std::uint64_t asked_words_ = 0;  // so many so far
 };
+
+void HostedServer::tend_viewers(Timestamp now) {
+  for (auto& [promise, why] : std::exchange(answers_, {})) promise.set_value(why);
+  std::shared_ptr<const mapfile::ShownMap> shown;
+  for (const auto& viewer : viewers_) {
+    for (AskedWord& word : viewer->take_words()) asked_.push_back(std::move(word));
+    if (!node_->has_map() || !viewer->wants(node_->map_server().state().revision)) continue;
+    if (!shown) shown = std::make_shared<const mapfile::ShownMap>(mapfile::shown_map(*node_, now));
+    viewer->show(shown);
+  }
+}
+
+void HostedServer::take(AskedWord& asked, Timestamp now, node::Step& step) {
+  const bus::Envelope envelope{bus::Endpoint::viewer(0),
+                               bus::Endpoint::server(),
+                               bus::MessageKind::word,
+                               fmt::format("page/{}/{}", asked.word.given_ns, ++asked_words_),
+                               std::make_shared<const std::string>(wire::encode(asked.word)),
+                               asked.proved_name};
+  node::Step taken = node_->receive(envelope, now);
+  std::string why;
+  for (const node::Event& event : taken.events)
+    if (const auto* refused = std::get_if<node::MessageRefused>(&event.what)) why = refused->why;
+  answers_.emplace_back(std::move(asked.answer), std::move(why));
+  step.add(std::move(taken));
+}
 
 Json HostedServer::status(Timestamp now) const {
   const MissionStatus status = node_->mission_status(now);
@@ -236,7 +275,7 @@ class ServerProgram {
   std::optional<Clock> clock_;
   std::optional<Host> host_;
   std::optional<OwnWorker> worker_;
-  std::unique_ptr<MapViewer> viewer_;
+  std::vector<std::unique_ptr<MapViewer>> viewers_;
   std::string trouble_;  // of the bus
 };
 
@@ -252,7 +291,7 @@ Result<std::unique_ptr<Hosted>> ServerProgram::open_node() {
   auto node = node::ServerNode::open(std::move(robots), finder_, config, folder_->made_ns(), *store_);
   if (!node) return in_context((folder_->path() / kMapFile).string(), node.error());
   return std::make_unique<HostedServer>(
-      std::move(*node), options_.version, [this] { return host_->all_trouble(); }, is_over_);
+      std::move(*node), options_.version, [this] { return host_->all_trouble(); }, is_over_, viewers_, *clock_);
 }
 
 Status ServerProgram::check_lease(const bus::MissionLease::State& seen) const {
@@ -283,8 +322,6 @@ void ServerProgram::tend() {
   tend_bus();
   is_over_ = !check_lease(lease_->state());
   if (const auto link = host_->link(); worker_) worker_->note_given_in_vain(link && link->given_in_vain > 0);
-  if (const auto* server = dynamic_cast<const HostedServer*>(host_->hosted()); server != nullptr && viewer_)
-    server->show(*viewer_);
 }
 
 /// The bus may have ended, or its disk may be full.
@@ -352,10 +389,16 @@ Status ServerProgram::start() {
                             .trouble = [this] { return trouble_; }},
                 *clock_, *log_);
   if (Status opened = host_->open(); !opened) return opened;
-  if (options_.view) {
-    auto viewer = options_.view(*store_);
+  const ViewedMission viewed{.name = settings_.mission,
+                             .version = options_.version,
+                             .map = *store_,
+                             .finder = finder_,
+                             .pki = options_.pki,
+                             .say = [this](Level level, const std::string& sentence) { log_->say(level, sentence); }};
+  for (const auto& view : options_.views) {
+    auto viewer = view(viewed);
     if (!viewer) return tl::unexpected(viewer.error());
-    viewer_ = std::move(*viewer);
+    viewers_.push_back(std::move(*viewer));
   }
   if (options_.threads == 0) return {};
   worker_.emplace(bus_, finder_, settings_.finders.refiner(), *store_, options_.version,

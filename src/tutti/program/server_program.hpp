@@ -11,9 +11,9 @@
 
 #include "tutti/base/result.hpp"
 #include "tutti/bus/transport.hpp"
-#include "tutti/mapfile/content.hpp"
 #include "tutti/program/event_log.hpp"
 #include "tutti/program/finder_settings.hpp"
+#include "tutti/program/map_viewer.hpp"
 #include "tutti/server/map_server.hpp"
 
 namespace tutti::program {
@@ -38,30 +38,6 @@ struct ServerSettings {
   }
 };
 
-/// A map as the server has it; its clouds are in the server's store.
-struct ShownMap {
-  std::uint64_t revision = 0;
-  mapfile::Content content;  ///< Submaps, with the sizes of their payloads only.
-  server::MapEstimate map;
-};
-
-/// Shows the map to others while the server makes it. It has a thread of its own; the server's thread calls these
-/// functions, which must not block.
-class MapViewer {
- public:
-  virtual ~MapViewer() = default;
-  /// True if it has time for this revision and does not show it yet.
-  [[nodiscard]] virtual bool wants(std::uint64_t revision) const = 0;
-  virtual void show(std::shared_ptr<const ShownMap> map) = 0;
-
- protected:
-  MapViewer() = default;
-  MapViewer(const MapViewer&) = default;
-  MapViewer(MapViewer&&) = default;
-  MapViewer& operator=(const MapViewer&) = default;
-  MapViewer& operator=(MapViewer&&) = default;
-};
-
 /// How a server program runs.
 struct ServerOptions {
   std::filesystem::path state;
@@ -73,8 +49,8 @@ struct ServerOptions {
   double rate = 1.0;  ///< Mission time per wall time.
   Level console = Level::warning;
   std::string version;
-  /// Makes the viewer of the map's store, which outlives it; empty: there is none.
-  std::function<Result<std::unique_ptr<MapViewer>>(const storage::TableStore& map)> view;
+  /// Each makes a viewer of the mission.
+  std::vector<std::function<Result<std::unique_ptr<MapViewer>>(const ViewedMission& mission)>> views;
   /// Called once with the command that starts a robot of this server.
   std::function<void(const std::string&)> announce;
 };

@@ -74,7 +74,7 @@ class Viewer final : public program::MapViewer {
   [[nodiscard]] bool wants(std::uint64_t revision) const override {
     return revision != shown_ && Clock::steady_s() >= not_before_s_;
   }
-  void show(std::shared_ptr<const program::ShownMap> map) override {
+  void show(std::shared_ptr<const mapfile::ShownMap> map) override {
     shown_ = map->revision;
     not_before_s_ = Clock::steady_s() + options_.period_s;
     {
@@ -95,7 +95,7 @@ class Viewer final : public program::MapViewer {
     }
   }
 
-  void publish(const program::ShownMap& map) {
+  void publish(const mapfile::ShownMap& map) {
     const double begin_s = Clock::steady_s();
     const bags::RosHeader header{{static_cast<std::int64_t>(program::wall_clock_ns())}, options_.frame};
     const auto grid = grids::grid_of_map(map_, map.content, map.map, options_.grid);
@@ -121,7 +121,7 @@ class Viewer final : public program::MapViewer {
   std::atomic<double> not_before_s_ = 0.0;
   std::mutex mutex_;  // of next_
   std::condition_variable_any changed_;
-  std::shared_ptr<const program::ShownMap> next_;
+  std::shared_ptr<const mapfile::ShownMap> next_;
   std::string said_;
   std::jthread thread_;
 };
