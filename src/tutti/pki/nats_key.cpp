@@ -3,7 +3,9 @@
 
 #include <openssl/evp.h>
 
+#include <algorithm>
 #include <memory>
+#include <string_view>
 #include <vector>
 
 #include "tutti/base/check.hpp"
@@ -24,9 +26,10 @@ std::uint16_t crc_of(const std::vector<std::uint8_t>& bytes) {
   return static_cast<std::uint16_t>(crc);
 }
 
-/// RFC 4648, without padding.
+constexpr std::string_view kLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZ234567";  // of base32 (RFC 4648)
+
+/// Without padding.
 std::string base32(const std::vector<std::uint8_t>& bytes) {
-  constexpr const char* kLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZ234567";
   std::string out;
   unsigned held = 0, bits = 0;
   for (const std::uint8_t byte : bytes) {
@@ -52,6 +55,23 @@ bus::NatsKey encode_nats_key(const Ed25519& open, const Ed25519& secret) {
   return {encoded({kUser}, open),
           encoded({static_cast<std::uint8_t>(kSeed | (kUser >> 5U)), static_cast<std::uint8_t>((kUser & 31U) << 3U)},
                   secret)};
+}
+
+std::optional<Ed25519> decode_open_key(const std::string& text) {
+  std::vector<std::uint8_t> bytes;
+  unsigned held = 0, bits = 0;
+  for (const char letter : text) {
+    const std::size_t value = kLetters.find(letter);
+    if (value == std::string_view::npos) return std::nullopt;
+    held = ((held << 5U) | static_cast<unsigned>(value)) & 0xFFFFU;
+    if (bits += 5; bits < 8) continue;
+    bits -= 8;
+    bytes.push_back(static_cast<std::uint8_t>((held >> bits) & 0xFFU));
+  }
+  Ed25519 open{};
+  if (bytes.size() != 1 + open.size() + 2 || bytes.front() != kUser) return std::nullopt;
+  std::copy_n(bytes.begin() + 1, open.size(), open.begin());
+  return encoded({kUser}, open) == text ? std::optional(open) : std::nullopt;  // or its checksum is wrong
 }
 
 bus::NatsKey make_nats_key() {

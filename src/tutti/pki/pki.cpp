@@ -29,8 +29,6 @@ namespace fs = std::filesystem;
 
 constexpr const char* kAuthority = "authority.pem";
 constexpr const char* kAuthorityKey = "authority.key";
-constexpr const char* kBus = "bus.pem";
-constexpr const char* kBusKey = "bus.key";
 constexpr const char* kUsers = "users";
 constexpr const char* kCredentials = "credentials";
 constexpr std::string_view kFirstLine = "tutti-pki 1";
@@ -165,13 +163,14 @@ Result<std::string> Pki::bus_configuration(const std::string& now) const {
   std::vector<bus::KeyedUser> users;
   for (const Member& member : members_)
     if (!member.is_revoked && !member.has_expired(now)) users.push_back({member.user, member.key});
-  const auto own = read_file((folder_ / kBus).string());
+  const auto own = read_file((folder_ / kBusCertificate).string());
   if (!own) return tl::unexpected(own.error());
   const auto quoted = [&](const char* file) { return '"' + (folder_ / file).string() + '"'; };
   return fmt::format(
       "# by `tutti pki`; mission {}, certificate of the bus {:016x}\n"
       "tls {{ cert_file: {}, key_file: {}, ca_file: {}, verify: true, timeout: 2 }}\n{}",
-      mission_, content_hash(*own), quoted(kBus), quoted(kBusKey), quoted(kAuthority), bus::authorization(users));
+      mission_, content_hash(*own), quoted(kBusCertificate), quoted(kBusKey), quoted(kAuthority),
+      bus::authorization(users));
 }
 
 Status Pki::make_bus_certificate(int days) const {
@@ -180,7 +179,7 @@ Status Pki::make_bus_certificate(int days) const {
   const auto made = make_certificate(*authority, bus::kBusName, true, days);
   if (!made) return tl::unexpected(made.error());
   if (Status done = write_private(folder_ / kBusKey, made->key); !done) return done;
-  return write_private(folder_ / kBus, made->text);
+  return write_private(folder_ / kBusCertificate, made->text);
 }
 
 Status Pki::write_credential(const bus::BusUser& user, const bus::NatsKey& key, int days, std::string& until) const {
@@ -266,7 +265,7 @@ Status Pki::renew(const std::string& name, int days) {
 }
 
 Result<std::string> Pki::bus_until() const {
-  const auto text = read_file((folder_ / kBus).string());
+  const auto text = read_file((folder_ / kBusCertificate).string());
   if (!text) return tl::unexpected(text.error());
   return valid_until(*text);
 }

@@ -73,9 +73,11 @@ class Pki {
   std::vector<Member> members_;
 };
 
-/// In the folder: the file to be included in a nats-server's configuration, and the name of the server's own
-/// credential.
+/// In the folder: the file to be included in a nats-server's configuration, the bus's certificate and its key, and the
+/// name of the server's own credential.
 inline constexpr const char* kBusConfiguration = "bus.conf";
+inline constexpr const char* kBusCertificate = "bus.pem";
+inline constexpr const char* kBusKey = "bus.key";
 inline constexpr const char* kServer = "server";
 
 }  // namespace tutti::pki

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace tutti::pki {
+
+/// Sixty-four hexadecimal digits of OpenSSL's random numbers, which nobody can guess.
+std::string random_token();
+
+/// True if the owner of a user's key (bus::NatsKey::open) has signed `message`: `signature` is the Ed25519 signature's
+/// 64 bytes. False also for a malformed key.
+bool is_signed(const std::string& key, std::string_view message, std::string_view signature);
+
+}  // namespace tutti::pki
