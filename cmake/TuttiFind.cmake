@@ -38,6 +38,7 @@ set(TUTTI_THIRD_PARTY
   "tutti::lz4|import lz4frame.h LIBS lz4"
   "tutti::bz2|import bzlib.h LIBS bz2"
   "tutti::crypto|import openssl/evp.h LIBS crypto"
+  "tutti::httplib|import httplib.h LIBS cpp-httplib"
   "tutti::cyclonedds|import dds/dds.h LIBS ddsc"
   "tutti::nanoflann|import nanoflann.hpp"
   "tutti::sqlite|import sqlite3.h LIBS sqlite3"

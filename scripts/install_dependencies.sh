@@ -8,7 +8,7 @@ source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 packages=(
   cmake ninja-build g++ ccache pkg-config
   libeigen3-dev libsuitesparse-dev libopenblas-dev liblapacke-dev libspectra-dev libnanoflann-dev libceres-dev
-  libprotobuf-dev protobuf-compiler libzstd-dev zlib1g-dev liblz4-dev libbz2-dev libssl-dev libpng-dev libturbojpeg0-dev libsqlite3-dev libnats-dev nats-server cyclonedds-dev
+  libprotobuf-dev protobuf-compiler libzstd-dev zlib1g-dev liblz4-dev libbz2-dev libssl-dev libpng-dev libturbojpeg0-dev libsqlite3-dev libnats-dev nats-server cyclonedds-dev libcpp-httplib-dev
   libexpected-dev libfmt-dev libspdlog-dev libsystemd-dev libcli11-dev libyaml-cpp-dev nlohmann-json3-dev
   libopencv-core-dev libopencv-imgproc-dev libopencv-features2d-dev libopencv-video-dev
 )

@@ -86,6 +86,8 @@ void add_mission_command(CLI::App& app, int& exit_code) {
       ->type_name("N")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
+  command->add_option("--view", options->view, "Serve the server's page (tutti server --view)")
+      ->type_name("[HOST:]PORT");
   add_program_options(*command, *common);
   options->version = TUTTI_VERSION;
   command->callback([options, common, &exit_code] {

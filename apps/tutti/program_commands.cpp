@@ -12,6 +12,7 @@
 #include "options.hpp"
 #include "program_options.hpp"
 #include "ros_commands.hpp"
+#include "tutti/program/page/page_server.hpp"
 #include "tutti/program/robot_program.hpp"
 #include "tutti/program/server_program.hpp"
 #include "tutti/program/stop.hpp"
@@ -24,6 +25,13 @@ constexpr const char* kFilesName = "as the mission file says (mission: NAME), el
 
 void add_state_option(CLI::App& command, std::filesystem::path& state, const std::string& what) {
   command.add_option("--state", state, what)->type_name("DIR")->required();
+}
+
+void show_on_page(page::PageOptions& page, program::ServerOptions& options) {
+  page.allow_insecure = options.bus.allow_insecure;
+  page.announce = [](const std::string& url) { fmt::print(stderr, "tutti server: the page is at {}\n", url); };
+  options.views.emplace_back(
+      [&page](const program::ViewedMission& mission) { return page::serve_page(page, mission); });
 }
 
 }  // namespace
@@ -63,13 +71,19 @@ void add_server_command(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   add_rate_option(*command, options->rate,
                   "How fast mission time passes, for robots that replay faster than real time");
+  const auto page = std::make_shared<page::PageOptions>();
+  command
+      ->add_option("--view", page->listen,
+                   "Serve the page of the mission (map, robots, closures, alerts, decisions) at this port of this "
+                   "machine; with a HOST to others, too, which needs --pki (docs/operating.md)")
+      ->type_name("[HOST:]PORT");
   const auto ros = add_ros_server_options(*command);
   add_program_options(*command, *common);
   options->announce = [](const std::string& line) {
     fmt::print("{}\n", line);
     std::fflush(stdout);
   };
-  command->callback([options, common, ros, &exit_code] {
+  command->callback([options, common, page, ros, &exit_code] {
     exit_code = run_program("server", *common, options->console, [&]() -> Status {
       auto settings = lab::server_settings(common->mission);
       if (!settings) return tl::unexpected(settings.error());
@@ -77,6 +91,7 @@ void add_server_command(CLI::App& app, int& exit_code) {
       if (wants_ros(*ros))
         if (Status shown = show_on_ros(*ros, *options); !shown) return shown;
       options->settings = std::move(*settings);
+      if (!page->listen.empty()) show_on_page(*page, *options);
       return program::run_server(*options, program::stop_asked());
     });
   });

@@ -103,6 +103,7 @@ Status MissionUp::start_server(const std::atomic<bool>& stop) {
   if (error) return fail(ErrorCode::io, "{}: cannot be made: {}", state_.string(), error.message());
   auto server = words("server", state_ / "server", true);
   server.insert(server.end(), {"--threads", std::to_string(options_.workers > 0 ? 0 : options_.threads)});
+  if (!options_.view.empty()) server.insert(server.end(), {"--view", options_.view});
   const fs::path output = state_ / "server.out";
   if (Status started = children_.start("server", server, output); !started) return started;
   const auto until = SteadyClock::now() + kServerStarts;

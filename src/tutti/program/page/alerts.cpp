@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What an operator should know without being asked: from statuses and maps to a list of problems.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "tutti/program/page/view.hpp"
+#include "tutti/server/map_components.hpp"
+
+namespace tutti::page {
+namespace {
+
+constexpr double kSilent_s = 10.0;          // five statuses that did not come
+constexpr double kNoUpdate_s = 300.0;       // a robot that is heard, and does not use the map
+constexpr std::uint64_t kLongBacklog = 30;  // submaps, five minutes of mapping
+constexpr double kLowBattery_percent = 20.0;
+constexpr std::uint64_t kManyWaitingJobs = 200;
+
+Alert robot_alert(const MissionStatus::Robot& robot, const char* kind, const char* severity, std::string what,
+                  std::string todo) {
+  return {.id = fmt::format("robot/{}/{}", robot.robot.value, kind),
+          .severity = severity,
+          .what = std::move(what),
+          .where = robot.status.name,
+          .todo = std::move(todo),
+          .robot = robot.robot};
+}
+
+/// When the robot was last heard is known, so that is when this began.
+void look_at_silence(const MissionStatus& status, const MissionStatus::Robot& robot, std::vector<Alert>& out) {
+  if (robot.status.finished) return;
+  if (!robot.last_seen) {
+    out.push_back(robot_alert(robot, "unseen", "info", "not heard since the server started",
+                              "Start its program, or check its network."));
+    return;
+  }
+  const double silent_s = status.time - *robot.last_seen;
+  if (silent_s < kSilent_s) return;
+  Alert alert = robot_alert(robot, "silent", "warning", "silent",
+                            "It maps on and keeps its submaps; it joins again when the radio reaches it.");
+  alert.since_s = *robot.last_seen - Timestamp{};
+  out.push_back(std::move(alert));
+}
+
+void look_at_robot(const MissionStatus& status, const MissionStatus::Robot& robot, std::vector<Alert>& out) {
+  look_at_silence(status, robot, out);
+  const NodeStatus& own = robot.status;
+  const bool is_heard = robot.last_seen && status.time - *robot.last_seen < kSilent_s;
+  if (!robot.conflict.empty())
+    out.push_back(robot_alert(robot, "conflict", "error", robot.conflict,
+                              "Two programs claim to be this robot: stop one, or give it another --name."));
+  if (!own.trouble.empty())
+    out.push_back(robot_alert(robot, "trouble", "warning", own.trouble, "See the robot's log.txt."));
+  if (own.alerts > 0)
+    out.push_back(robot_alert(robot, "drift", "warning",
+                              own.alerts == 1 ? "its odometry left the map at one place"
+                                              : fmt::format("its odometry left the map at {} places", own.alerts),
+                              "Look at disagreement: the robot is corrected, its sensors may not be well."));
+  if (own.backlog_submaps >= kLongBacklog)
+    out.push_back(robot_alert(robot, "backlog", "warning",
+                              fmt::format("{} submaps are not on the server yet", own.backlog_submaps),
+                              "Bring it nearer to the base, or wait: the newest come first."));
+  if (is_heard && !own.finished && robot.submaps > 0 && status.revision > 0 &&
+      (!robot.last_update || status.time - *robot.last_update > kNoUpdate_s))
+    out.push_back(robot_alert(robot, "uncorrected", "warning", "does not use the map",
+                              "The way down may be cut: it hears no proxy graph."));
+  if (own.health.battery_percent && *own.health.battery_percent < kLowBattery_percent)
+    out.push_back(robot_alert(robot, "battery", "error",
+                              fmt::format("battery at {:.0f} %", *own.health.battery_percent), "Bring it home."));
+  if (robot.refused > 0)
+    out.push_back(robot_alert(robot, "refused", "warning",
+                              fmt::format("{} submaps are no good and not in the map", robot.refused),
+                              "See the server's log.txt for why."));
+  if (robot.unread > 0)
+    out.push_back(robot_alert(robot, "unread", "warning",
+                              fmt::format("{} submaps are of a newer version than this server reads", robot.unread),
+                              "Upgrade the server; the robot keeps them until then."));
+}
+
+Alert server_alert(const char* kind, const char* severity, std::string what, std::string todo) {
+  return {.id = fmt::format("server/{}", kind),
+          .severity = severity,
+          .what = std::move(what),
+          .where = "server",
+          .todo = std::move(todo)};
+}
+
+int rank(const Alert& alert) { return alert.severity == "error" ? 0 : alert.severity == "warning" ? 1 : 2; }
+
+}  // namespace
+
+std::vector<Alert> Alerts::dated(std::vector<Alert> found, std::map<std::string, double>& since, double now_s) {
+  std::map<std::string, double> next;
+  for (Alert& alert : found) {
+    if (alert.since_s == 0.0) {
+      const auto known = since.find(alert.id);
+      alert.since_s = known == since.end() ? now_s : known->second;
+    }
+    next[alert.id] = alert.since_s;
+  }
+  since = std::move(next);
+  std::ranges::sort(found, {}, [](const Alert& alert) { return std::tuple(rank(alert), alert.since_s, alert.id); });
+  return found;
+}
+
+std::vector<Alert> Alerts::of_status(const MissionStatus& status) {
+  std::vector<Alert> out;
+  if (!status.trouble.empty())
+    out.push_back(server_alert("trouble", "error", status.trouble, "See the server's log.txt."));
+  if (status.waiting > 0)
+    out.push_back(server_alert(
+        "waiting", "warning",
+        fmt::format("{} pairs or refinements wait for a worker that can: {}", status.waiting, status.why_waiting),
+        "Start a worker of this server's version."));
+  if (status.pending_jobs > kManyWaitingJobs)
+    out.push_back(server_alert("jobs", "info", fmt::format("{} jobs wait for workers", status.pending_jobs),
+                               "Closures come late. Start more workers (tutti worker)."));
+  for (const MissionStatus::Robot& robot : status.robots) look_at_robot(status, robot, out);
+  return dated(std::move(out), status_since_, status.time - Timestamp{});
+}
+
+std::vector<Alert> Alerts::of_map(const mapfile::ShownMap& map) {
+  std::vector<Alert> out;
+  const server::ClosureNames names = map.content.closure_names();
+  const server::MapComponents components = server::choose_components(map.map);
+  for (const auto& [robot, component] : components.of_robot) {
+    if (component == components.largest) continue;
+    Alert alert{.id = fmt::format("map/{}/alone", robot.value),
+                .severity = "info",
+                .what = "its part of the map is joined to no other",
+                .where = names.of(ChainId(robot)),
+                .todo = "Let it see a place that another robot has seen; or ask why there is no closure.",
+                .robot = robot};
+    for (const auto& [chain, part] : components.of_chain)
+      if (chain.robot == robot) alert.where = names.of(chain);
+    out.push_back(std::move(alert));
+  }
+  for (const server::FailedOdometry& failed : map.map.failed_odometry)
+    out.push_back({.id = fmt::format("map/{}/odometry/{}", to_string(failed.chain), failed.from),
+                   .severity = "warning",
+                   .what = fmt::format("odometry failed by {:.2f} m between keyframes {} and {}", failed.jump_m,
+                                       failed.from, failed.to),
+                   .where = names.of(failed.chain),
+                   .todo = "The map does without it: closures agree with each other against it.",
+                   .robot = failed.chain.robot});
+  std::set<ChainId> hanging;
+  for (const auto& [submap, closures] : closures_holding(map.content.submaps, map.map))
+    if (closures == 1 && hanging.insert(submap.chain).second)
+      out.push_back({.id = fmt::format("map/{}/hangs", to_string(submap.chain)),
+                     .severity = "warning",
+                     .what = "its part hangs on one closure",
+                     .where = names.of(submap.chain),
+                     .todo = "Look at that closure; another meeting would settle it.",
+                     .robot = submap.chain.robot});
+  return dated(std::move(out), map_since_, map.time - Timestamp{});
+}
+
+}  // namespace tutti::page

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <future>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tutti/node/submap_frames.hpp"
+#include "tutti/program/incarnation.hpp"
+#include "tutti/program/map_viewer.hpp"
+#include "tutti/program/page/live_board.hpp"
+#include "tutti/program/page/metrics.hpp"
+#include "tutti/program/page/sign_in.hpp"
+
+namespace httplib {
+class Server;
+}
+
+namespace tutti::page {
+
+/// Decisions on their way from the page's threads to the server's.
+class WordInbox {
+ public:
+  /// The server's answer will be in the future: why the word is not stored, or empty. Nothing when too many wait.
+  std::optional<std::future<std::string>> ask(ClosureWord word, std::string proved_name) {
+    const std::scoped_lock lock(mutex_);
+    if (asked_.size() >= kMost) return std::nullopt;
+    asked_.push_back({std::move(word), std::move(proved_name), {}});
+    return asked_.back().answer.get_future();
+  }
+  std::vector<program::AskedWord> take() {
+    const std::scoped_lock lock(mutex_);
+    return std::exchange(asked_, {});
+  }
+
+ private:
+  static constexpr std::size_t kMost = 100;
+  std::mutex mutex_;
+  std::vector<program::AskedWord> asked_;
+};
+
+/// What the page's threads share.
+struct Site {
+  explicit Site(const program::ViewedMission& mission)
+      : mission_name(mission.name), sign_in(mission.pki), clouds(node::SubmapFrames::of(mission.map)) {}
+
+  bool is_secure = false;
+  const std::string mission_name;
+  const std::uint32_t incarnation = program::any_incarnation();
+  SignIn sign_in;
+  LiveBoard board;
+  WordInbox words;
+  Metrics metrics;
+  std::shared_ptr<const node::SubmapFrames> clouds;
+};
+
+/// Everything that the page asks for (docs/page.md). `site` outlives the server.
+void add_routes(httplib::Server& server, Site& site);
+
+}  // namespace tutti::page

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/page/metrics.hpp"
+
+#include <fmt/format.h>
+
+#include <map>
+#include <type_traits>
+#include <vector>
+
+namespace tutti::page {
+namespace {
+
+/// The samples of each gauge, which Prometheus wants side by side.
+using Gauges = std::map<std::string, std::vector<std::string>>;
+
+std::string label_value(const std::string& text) {
+  std::string out;
+  for (const char letter : text) {
+    if (letter == '\\' || letter == '"') out += '\\';
+    out += letter == '\n' ? ' ' : letter;
+  }
+  return out;
+}
+
+/// Adds every number among a value's fields.
+class GaugeWriter {
+ public:
+  GaugeWriter(std::string prefix, std::string labels, Timestamp now, Gauges& out)
+      : prefix_(std::move(prefix)), labels_(std::move(labels)), now_(now), out_(out) {}
+
+  template <class T>
+  void field(int /*number*/, const std::string& name, const T& value, const FieldRule& rule = {}, const char* = "") {
+    if constexpr (IsOptionalField<T>) {
+      if (value) field(0, name, *value, rule);
+    } else if constexpr (std::is_same_v<T, Timestamp>) {
+      add(name + "_s_ago", now_ - value);
+    } else if constexpr (std::is_arithmetic_v<T>) {
+      if (!rule.fixed) add(name, static_cast<double>(value));
+    } else if constexpr (HasFields<T>) {
+      visit_fields(value, *this);
+    }
+  }
+
+ private:
+  void add(const std::string& name, double value) {
+    const std::string gauge = prefix_ + name;
+    out_[gauge].push_back(fmt::format("{}{} {}\n", gauge, labels_, value));
+  }
+  std::string prefix_, labels_;
+  Timestamp now_;
+  Gauges& out_;
+};
+
+template <class Members>
+void add_members(const Members& members, const std::string& role, Timestamp now, Gauges& out) {
+  for (const auto& member : members) {
+    const std::string label = fmt::format("{{name=\"{}\"}}", label_value(member.status.name));
+    GaugeWriter writer("tutti_" + role + "_", label, now, out);
+    visit_fields(member, writer);
+  }
+}
+
+}  // namespace
+
+void Metrics::tell(const MissionStatus& status) {
+  const std::scoped_lock lock(mutex_);
+  last_ = status;
+}
+
+std::optional<std::string> Metrics::trouble() const {
+  const std::scoped_lock lock(mutex_);
+  return last_ ? std::optional(last_->trouble) : std::nullopt;
+}
+
+std::string Metrics::text() const {
+  const std::scoped_lock lock(mutex_);
+  if (!last_) return {};
+  Gauges gauges;
+  GaugeWriter writer("tutti_mission_", "", last_->time, gauges);
+  visit_fields(*last_, writer);
+  add_members(last_->robots, "robot", last_->time, gauges);
+  add_members(last_->workers, "worker", last_->time, gauges);
+  for (const MissionStatus::Refusals& refusals : last_->refusals)
+    gauges["tutti_refused_messages"].push_back(fmt::format("tutti_refused_messages{{from=\"{}\",kind=\"{}\"}} {}\n",
+                                                           label_value(refusals.from), label_value(refusals.kind),
+                                                           refusals.count));
+  std::string out;
+  for (const auto& [name, samples] : gauges) {
+    out += fmt::format("# TYPE {} gauge\n", name);
+    for (const std::string& sample : samples) out += sample;
+  }
+  return out;
+}
+
+}  // namespace tutti::page

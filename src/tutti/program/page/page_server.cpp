@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/page/page_server.hpp"
+
+#include <fmt/format.h>
+#include <httplib.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdlib>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "tutti/bus/bus_address.hpp"
+#include "tutti/pki/pki.hpp"
+#include "tutti/program/clock.hpp"
+#include "tutti/program/incarnation.hpp"
+#include "tutti/program/page/internal/routes.hpp"
+#include "tutti/program/page/view.hpp"
+
+namespace tutti::page {
+namespace {
+
+using program::Clock, program::Level, mapfile::ShownMap;
+
+constexpr std::size_t kConnections = 64;  // served at a time; watchers are among them
+constexpr time_t kRead_s = 3, kWrite_s = 5, kKeepAlive_s = 3;
+constexpr std::size_t kMostBody = 8U << 20U;
+constexpr double kPeriod_s = 1.0;  // at least between two maps that are shown
+constexpr double kRestPerWork = 4.0;
+
+/// As many threads as connections are served at a time. Who comes then waits in the kernel's queue, and takes no file
+/// of the program's.
+class BoundedPool final : public httplib::TaskQueue {
+ public:
+  explicit BoundedPool(std::size_t threads) : pool_(threads), free_(threads) {}
+  void enqueue(std::function<void()> task) override {
+    {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, [this] { return free_ > 0; });
+      --free_;
+    }
+    pool_.enqueue([this, task = std::move(task)] {
+      task();
+      {
+        const std::scoped_lock lock(mutex_);
+        ++free_;
+      }
+      changed_.notify_one();
+    });
+  }
+  void shutdown() override { pool_.shutdown(); }
+
+ private:
+  httplib::ThreadPool pool_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::size_t free_;
+};
+
+class PageViewer final : public program::MapViewer {
+ public:
+  PageViewer(const PageOptions& options, const program::ViewedMission& mission)
+      : site_(mission), say_(mission.say), announce_(options.announce) {
+    site_.board.put([&](Board& board) {
+      board.put(
+          mission_message({.name = mission.name, .description = options.description, .version = mission.version}));
+    });
+  }
+  ~PageViewer() override {
+    site_.board.close();
+    if (server_) server_->stop();
+    if (listens_.joinable()) listens_.join();
+    makes_.request_stop();
+    if (makes_.joinable()) makes_.join();
+  }
+  PageViewer(const PageViewer&) = delete;
+  PageViewer& operator=(const PageViewer&) = delete;
+
+  Status open(const bus::HostPort& address, const std::filesystem::path& pki) {
+    if (pki.empty())
+      server_ = std::make_unique<httplib::Server>();
+    else
+      server_ =
+          std::make_unique<httplib::SSLServer>((pki / pki::kBusCertificate).c_str(), (pki / pki::kBusKey).c_str());
+    if (!server_->is_valid()) return fail(ErrorCode::io, "--view: the certificate of {} cannot be used", pki.string());
+    server_->new_task_queue = [] { return new BoundedPool(kConnections); };
+    server_->set_read_timeout(kRead_s);
+    server_->set_write_timeout(kWrite_s);
+    server_->set_keep_alive_timeout(kKeepAlive_s);
+    server_->set_payload_max_length(kMostBody);
+    add_routes(*server_, site_);
+    const int port = address.port == 0 ? server_->bind_to_any_port(address.host) : address.port;
+    if (port < 0 || (address.port != 0 && !server_->bind_to_port(address.host, port)))
+      return fail(ErrorCode::io, "--view {}: this address cannot be listened at; is another program there?",
+                  to_string(address));
+    site_.is_secure = !pki.empty();
+    listens_ = std::thread([this] { server_->listen_after_bind(); });
+    makes_ = std::jthread([this](const std::stop_token& stop) { make_all(stop); });
+    const std::string url =
+        fmt::format("{}://{}/", pki.empty() ? "http" : "https", to_string(bus::HostPort{address.host, port}));
+    say_(Level::info, "the page is at " + url);
+    if (announce_) announce_(url);
+    return {};
+  }
+
+  [[nodiscard]] bool wants(std::uint64_t revision) const override {
+    return revision != shown_ && Clock::steady_s() >= not_before_s_;
+  }
+  void show(std::shared_ptr<const ShownMap> map) override {
+    shown_ = map->revision;
+    not_before_s_ = Clock::steady_s() + kPeriod_s;
+    {
+      const std::scoped_lock lock(mutex_);
+      next_ = std::move(map);
+    }
+    changed_.notify_one();
+  }
+  void tell(const MissionStatus& status) override {
+    const double time_s = status.time - Timestamp{};
+    status_alerts_ = alerts_.of_status(status);
+    site_.metrics.tell(status);
+    site_.board.put([&](Board& board) {
+      board.put(status_message(status));
+      board.put(alerts_message(joined(status_alerts_, map_alerts()), time_s));
+    });
+  }
+  std::vector<program::AskedWord> take_words() override { return site_.words.take(); }
+
+ private:
+  static std::vector<Alert> joined(std::vector<Alert> alerts, const std::vector<Alert>& more) {
+    alerts.insert(alerts.end(), more.begin(), more.end());
+    std::ranges::stable_sort(alerts, {}, [](const Alert& alert) {
+      return std::pair(alert.severity == "error" ? 0 : alert.severity == "warning" ? 1 : 2, alert.since_s);
+    });
+    return alerts;
+  }
+  std::vector<Alert> map_alerts() {
+    const std::scoped_lock lock(mutex_);
+    return map_alerts_;
+  }
+  void make_all(const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, stop, [this] { return next_ != nullptr; });
+      const auto map = std::exchange(next_, nullptr);
+      lock.unlock();
+      if (map) make(*map);
+    }
+  }
+  void make(const ShownMap& map) {
+    const double begin_s = Clock::steady_s(), time_s = map.time - Timestamp{};
+    MapMessages messages = map_messages(map);
+    auto alerts = maps_alerts_.of_map(map);
+    {
+      const std::scoped_lock lock(mutex_);
+      map_alerts_ = std::move(alerts);
+    }
+    site_.board.put([&](Board& board) {
+      board.put_all("submap/", std::move(messages.submaps), time_s);
+      board.put(std::move(messages.poses));
+      board.put_all("closure/", std::move(messages.closures), time_s);
+    });
+    const double now_s = Clock::steady_s();
+    not_before_s_ = std::max(begin_s + kPeriod_s, now_s + kRestPerWork * (now_s - begin_s));
+  }
+
+  Site site_;
+  std::function<void(Level, const std::string&)> say_;
+  std::function<void(const std::string&)> announce_;
+  std::unique_ptr<httplib::Server> server_;
+  Alerts alerts_;                     // the server's thread's
+  std::vector<Alert> status_alerts_;  // likewise
+  Alerts maps_alerts_;                // of the thread that makes messages
+  std::atomic<std::uint64_t> shown_ = 0;
+  std::atomic<double> not_before_s_ = 0.0;
+  std::mutex mutex_;  // of next_ and map_alerts_
+  std::condition_variable_any changed_;
+  std::shared_ptr<const ShownMap> next_;
+  std::vector<Alert> map_alerts_;
+  std::thread listens_;
+  std::jthread makes_;
+};
+
+Result<bus::HostPort> address_of(const std::string& listen) {
+  const bool is_port = !listen.empty() && listen.find_first_not_of("0123456789") == std::string::npos;
+  const bool is_any = is_port && std::stoul("0" + listen.substr(0, 9)) == 0;
+  auto address = bus::parse_host_port(is_any ? "127.0.0.1" : is_port ? "127.0.0.1:" + listen : listen);
+  if (!address) return in_context("--view", address.error());
+  return address;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<program::MapViewer>> serve_page(const PageOptions& options,
+                                                       const program::ViewedMission& mission) {
+  const auto address = address_of(options.listen);
+  if (!address) return tl::unexpected(address.error());
+  if (mission.pki.empty() && !options.allow_insecure && !bus::is_loopback(address->host))
+    return fail(ErrorCode::configuration,
+                "--view {}: anybody who reaches this address could decide: needs --pki DIR (tutti pki init); "
+                "--insecure forces it",
+                options.listen);
+  auto viewer = std::make_unique<PageViewer>(options, mission);
+  if (Status ok = viewer->open(*address, mission.pki); !ok) return tl::unexpected(ok.error());
+  return viewer;
+}
+
+}  // namespace tutti::page

@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/page/page_server.hpp"
+
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <httplib.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "support/mapfile/small_map.hpp"
+#include "support/pki/sign.hpp"
+#include "tutti/base/file.hpp"
+#include "tutti/pki/pki.hpp"
+#include "tutti/program/page/cloud_bytes.hpp"
+
+namespace tutti::page {
+namespace page_server_test {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+/// A page over a small map, and the server's thread, which takes its decisions.
+class PageServer : public ::testing::Test {
+ protected:
+  PageServer() {
+    mapfile::test::Mapper mapper({RobotId{0}, RobotId{1}}, store_);
+    mapper.walk({RobotId{0}, 5});
+    mapper.walk({RobotId{1}, 5});
+    auto shown = std::make_shared<mapfile::ShownMap>();
+    shown->content = mapfile::read(store_).value();
+    shown->content.names = {{RobotId{0}, "alpha"}, {RobotId{1}, "bravo"}};
+    shown->map = mapfile::estimate(shown->content);
+    shown->revision = 3;
+    map_ = std::move(shown);
+  }
+  ~PageServer() override {
+    stop_ = true;
+    if (takes_.joinable()) takes_.join();
+    viewer_.reset();
+    fs::remove_all(folder_);
+  }
+  void start(const fs::path& pki = {}) {
+    PageOptions options{.listen = "0", .announce = [this](const std::string& url) { url_ = url; }};
+    auto made = serve_page(options, {.name = "cave",
+                                     .version = "1",
+                                     .map = store_,
+                                     .finder = nullptr,
+                                     .pki = pki,
+                                     .say = [](program::Level, const std::string&) {}});
+    ASSERT_TRUE(made.has_value()) << made.error().message;
+    viewer_ = std::move(*made);
+    viewer_->show(map_);
+    viewer_->tell({.time = Timestamp{} + 5.0, .revision = 3});
+    takes_ = std::thread([this] {
+      while (!stop_) {
+        for (program::AskedWord& asked : viewer_->take_words()) {
+          const bool is_known = asked.word.closure != "alpha/0-bravo/999";
+          asked.answer.set_value(is_known ? "" : "no such closure");
+          const std::scoped_lock lock(mutex_);
+          if (is_known) words_.emplace_back(asked.word, asked.proved_name);
+        }
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      }
+    });
+  }
+  [[nodiscard]] httplib::Client client() const {
+    httplib::Client out(url_.substr(0, url_.size() - 1));
+    out.enable_server_certificate_verification(false);
+    return out;
+  }
+  static httplib::Headers ours(const std::string& cookie = "") {
+    httplib::Headers out{{"X-Tutti", "1"}};
+    if (!cookie.empty()) out.emplace("Cookie", cookie);
+    return out;
+  }
+  /// Everything until "ready", by key.
+  std::map<std::string, json> events(const httplib::Headers& headers = {}) {
+    std::string text;
+    auto http = client();
+    http.Get("/api/events", headers, [&](const char* data, std::size_t size) {
+      text.append(data, size);
+      return text.find("event: ready") == std::string::npos;
+    });
+    std::map<std::string, json> out;
+    std::istringstream lines(text);
+    std::string line;
+    while (std::getline(lines, line))
+      if (line.starts_with("data: {\"key\"")) {
+        const json message = json::parse(line.substr(6));
+        out[message.at("key")] = message.at("value");
+      }
+    return out;
+  }
+  /// Maps are made into messages by a thread of the page's own.
+  std::map<std::string, json> events_with_map(const httplib::Headers& headers = {}) {
+    for (int i = 0; i < 1000; ++i) {
+      auto all = events(headers);
+      if (all.contains("poses")) return all;
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    ADD_FAILURE() << "no map";
+    return {};
+  }
+  std::string decide(const std::string& closure, const std::string& wish, const httplib::Headers& headers) {
+    auto http = client();
+    const auto answer =
+        http.Post("/api/decide", headers, json{{"closure", closure}, {"wish", wish}, {"by", "mallory"}}.dump(),
+                  "application/json");
+    return answer ? std::to_string(answer->status) : httplib::to_string(answer.error());
+  }
+
+  fs::path folder_ = fs::path(::testing::TempDir()) / ("page_" + std::to_string(getpid()));
+  storage::MemoryStore store_{storage::map_schema()};
+  std::shared_ptr<const mapfile::ShownMap> map_;
+  std::unique_ptr<program::MapViewer> viewer_;
+  std::string url_;
+  std::atomic<bool> stop_ = false;
+  std::mutex mutex_;
+  std::vector<std::pair<ClosureWord, std::string>> words_;
+  std::thread takes_;
+};
+
+TEST_F(PageServer, ShowsTheMissionToWhoComesLate) {
+  start();
+  const auto all = events_with_map();
+  EXPECT_EQ(all.at("mission").at("name"), "cave");
+  EXPECT_EQ(all.at("status").at("revision"), 3);
+  EXPECT_EQ(all.at("poses").at("submaps").size(), map_->content.submaps.size());
+  for (const auto& [id, submap] : map_->content.submaps) {
+    const json message = all.at("submap/" + to_string(id));
+    auto http = client();
+    const auto cloud = http.Get(fmt::format("/api/cloud/{}/{}/{}", id.chain.robot.value, id.chain.session, id.index));
+    ASSERT_TRUE(cloud);
+    EXPECT_EQ(cloud->body.size(), 8U + 6U * message.at("points").get<std::size_t>());
+  }
+  auto http = client();
+  EXPECT_EQ(http.Get("/api/cloud/9/9/9")->status, 404);
+  EXPECT_EQ(http.Get("/api/cloud/0/99999999999999999999/0")->status, 404) << "no number";
+  EXPECT_EQ(http.Get("/../../etc/passwd")->status, 404);
+  EXPECT_NE(http.Get("/metrics")->body.find("tutti_mission_revision 3"), std::string::npos);
+  EXPECT_EQ(http.Get("/healthz")->status, 200);
+  const auto page = http.Get("/");
+  EXPECT_NE(page->body.find("tutti-mission"), std::string::npos);
+  EXPECT_NE(page->get_header_value("Content-Security-Policy").find("default-src 'none'"), std::string::npos);
+}
+
+TEST_F(PageServer, ADecisionIsTheServersToTakeOrNot) {
+  start();
+  EXPECT_EQ(decide("alpha/0-bravo/1", "reject", ours()), "200");
+  EXPECT_EQ(decide("alpha/0-bravo/999", "reject", ours()), "409");
+  EXPECT_EQ(decide("alpha/0-bravo/1", "destroy", ours()), "400");
+  EXPECT_EQ(decide("", "reject", ours()), "400");
+  EXPECT_EQ(decide(std::string(1000, 'a'), "reject", ours()), "400");
+  auto http = client();
+  EXPECT_EQ(http.Post("/api/decide", ours(), "[", "application/json")->status, 400);
+  EXPECT_EQ(http.Post("/api/decide", ours(), R"({"wish":7})", "application/json")->status, 400);
+  EXPECT_EQ(http.Post("/api/decide", ours(), std::string(9U << 20U, ' '), "application/json")->status, 413);
+  const std::scoped_lock lock(mutex_);
+  ASSERT_EQ(words_.size(), 1U);
+  EXPECT_EQ(words_.front().first.closure, "alpha/0-bravo/1");
+  EXPECT_EQ(words_.front().first.wish, Wish::reject);
+  EXPECT_EQ(words_.front().first.by, "mallory") << "nobody has proved anything";
+  EXPECT_EQ(words_.front().second, "");
+}
+
+TEST_F(PageServer, OtherSitesReachNothing) {
+  start();
+  EXPECT_EQ(decide("alpha/0-bravo/1", "reject", {}), "403") << "a form of another site's cannot set the header";
+  auto http = client();
+  for (const char* path : {"/", "/api/me", "/api/events", "/metrics"})
+    EXPECT_EQ(http.Get(path, httplib::Headers{{"Host", "evil.example"}})->status, 421) << path;
+  const std::scoped_lock lock(mutex_);
+  EXPECT_TRUE(words_.empty());
+}
+
+TEST_F(PageServer, WithCredentialsShowsNothingToStrangersAndLetsOperatorsDecide) {
+  fs::create_directories(folder_);
+  auto pki = pki::Pki::make(folder_ / "pki", "cave").value();
+  ASSERT_TRUE(pki.add(bus::BusRole::operates, "anna", {}) && pki.add(bus::BusRole::views, "vera", {}));
+  start(folder_ / "pki");
+  ASSERT_TRUE(url_.starts_with("https://")) << url_;
+  auto http = client();
+  for (const char* path : {"/api/events", "/api/cloud/0/5/0", "/metrics"})
+    EXPECT_EQ(http.Get(path)->status, 401) << path;
+  EXPECT_EQ(decide("alpha/0-bravo/1", "reject", ours()), "401");
+  const auto sign_in = [&](const std::string& name) {
+    const auto key = bus::parse_credentials(read_file(pki.credential(name).string()).value())->key;
+    const json me = json::parse(http.Get("/api/me")->body);
+    EXPECT_TRUE(me.at("login"));
+    const std::string nonce = me.at("nonce");
+    const auto answer =
+        http.Post("/api/login", ours(),
+                  json{{"key", key.open}, {"nonce", nonce}, {"signature", base64(test::sign(key.seed, nonce))}}.dump(),
+                  "application/json");
+    EXPECT_EQ(answer->status, 200) << answer->body;
+    const std::string cookie = answer->get_header_value("Set-Cookie");
+    for (const char* part : {"HttpOnly", "SameSite=Strict", "Secure"})
+      EXPECT_NE(cookie.find(part), std::string::npos) << cookie;
+    return cookie.substr(0, cookie.find(';'));
+  };
+  const std::string vera = sign_in("vera"), anna = sign_in("anna");
+  EXPECT_TRUE(events_with_map({{"Cookie", vera}}).contains("poses"));
+  EXPECT_EQ(decide("alpha/0-bravo/1", "reject", ours(vera)), "403");
+  EXPECT_EQ(decide("alpha/0-bravo/1", "reject", ours(anna)), "200");
+  {
+    const std::scoped_lock lock(mutex_);
+    ASSERT_EQ(words_.size(), 1U);
+    EXPECT_EQ(words_.front().second, "anna") << "whatever the page says";
+  }
+  EXPECT_EQ(http.Post("/api/logout", ours(anna), "{}", "application/json")->status, 200);
+  EXPECT_EQ(decide("alpha/0-bravo/1", "accept", ours(anna)), "401");
+}
+
+TEST_F(PageServer, ConnectionsThatSayNothingTakeNothingFromTheMission) {
+  start();
+  std::vector<int> sockets;
+  sockaddr_in at{};
+  at.sin_family = AF_INET;
+  at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  at.sin_port = htons(static_cast<std::uint16_t>(std::stoi(url_.substr(url_.rfind(':') + 1))));
+  const auto open_files = [] {
+    return std::distance(fs::directory_iterator("/proc/self/fd"), fs::directory_iterator());
+  };
+  const auto before = open_files();
+  for (int i = 0; i < 400; ++i) {
+    const int one = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK, 0);
+    connect(one, reinterpret_cast<const sockaddr*>(&at), sizeof at);
+    static_cast<void>(!write(one, "G", 1));
+    sockets.push_back(one);
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  EXPECT_LE(open_files() - before, 400 + 70) << "the page itself holds as many as it serves";
+  viewer_->tell({.time = Timestamp{} + 6.0, .revision = 4});
+  EXPECT_TRUE(viewer_->take_words().empty());
+  for (const int one : sockets) close(one);
+  EXPECT_EQ(events_with_map().at("status").at("revision"), 4) << "and it is there again when they have gone";
+}
+
+TEST(PageOptions, ALoopbackAddressOrCredentialsAreNeeded) {
+  storage::MemoryStore store{storage::map_schema()};
+  const program::ViewedMission mission{.name = "cave",
+                                       .version = "1",
+                                       .map = store,
+                                       .finder = nullptr,
+                                       .pki = {},
+                                       .say = [](program::Level, const std::string&) {}};
+  const auto open = serve_page({.listen = "0.0.0.0"}, mission);
+  ASSERT_FALSE(open.has_value());
+  EXPECT_NE(open.error().message.find("--pki"), std::string::npos) << open.error().message;
+  EXPECT_FALSE(serve_page({.listen = "nonsense:abc"}, mission).has_value());
+  EXPECT_FALSE(serve_page({.listen = ""}, mission).has_value());
+}
+
+}  // namespace page_server_test
+}  // namespace tutti::page

@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/page/internal/routes.hpp"
+
+#include <fmt/format.h>
+#include <httplib.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <charconv>
+#include <nlohmann/json.hpp>
+
+#include "tutti/bus/bus_address.hpp"
+#include "tutti/program/clock.hpp"
+#include "tutti/program/page/cloud_bytes.hpp"
+#include "tutti/program/page/internal/page_data.hpp"
+
+namespace tutti::page {
+namespace {
+
+using httplib::Request, httplib::Response;
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kJson = "application/json";
+constexpr const char* kCookie = "tutti_session";
+constexpr int kMostWatchers = 32;
+constexpr std::size_t kMostPoints = 20'000;  // of one submap's cloud
+constexpr auto kSignOfLife = std::chrono::milliseconds(1000);
+constexpr auto kAnswer = std::chrono::seconds(10);  // the server's thread may be at a map
+constexpr const char* kPolicy =
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'; img-src data: "
+    "blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+void say(Response& response, int status, const std::string& error) {
+  response.status = status;
+  response.set_content(Json{{"error", error}}.dump(-1, ' ', false, Json::error_handler_t::replace), kJson);
+}
+void say(Response& response, const Json& json) {
+  response.set_content(json.dump(-1, ' ', false, Json::error_handler_t::replace), kJson);
+}
+
+std::string token_of(const Request& request) {
+  const std::string cookies = request.get_header_value("Cookie"), name = std::string(kCookie) + "=";
+  const std::size_t begin = cookies.find(name);
+  if (begin == std::string::npos) return {};
+  return cookies.substr(begin + name.size(), cookies.find(';', begin) - begin - name.size());
+}
+
+/// A page of somebody else's, under a name of his own that leads here, is not to read or decide.
+bool is_our_host(const std::string& header) {
+  const auto at = bus::parse_host_port(header);
+  if (!at) return false;
+  std::array<char, 256> own{};
+  static_cast<void>(gethostname(own.data(), own.size() - 1));
+  const std::string& host = at->host;
+  const bool is_address =
+      host.find_first_not_of("0123456789.") == std::string::npos || host.find(':') != std::string::npos;
+  return is_address || host == "localhost" || host == own.data() || host == std::string(own.data()) + ".local";
+}
+
+std::string cookie(const std::string& token, bool is_secure) {
+  return fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict; Max-Age={:.0f}{}", kCookie, token,
+                     token.empty() ? 0.0 : SignIn::kSession_s, is_secure ? "; Secure" : "");
+}
+
+class Routes {
+ public:
+  explicit Routes(Site& site) : site_(site) {}
+
+  void me(const Request& request, Response& response) {
+    const Visitor visitor = who(request);
+    Json out{{"login", !site_.sign_in.is_open()},
+             {"name", visitor.name},
+             {"role", visitor.may_decide ? Json("operator")
+                      : visitor.may_see  ? Json("viewer")
+                                         : Json(nullptr)},
+             {"mission", site_.mission_name},
+             {"may_decide", visitor.may_decide},
+             {"offers", {"decide"}}};
+    if (!site_.sign_in.is_open()) out["nonce"] = site_.sign_in.nonce(program::Clock::steady_s());
+    say(response, out);
+  }
+
+  void login(const Json& body, Response& response) {
+    std::string signature;
+    const std::string text = body.value("signature", "");
+    if (!decode(text, signature)) return say(response, 400, "the signature is no base64");
+    const auto token =
+        site_.sign_in.open(body.value("key", ""), body.value("nonce", ""), signature, program::Clock::steady_s());
+    if (!token) return say(response, 403, token.error().message);
+    response.set_header("Set-Cookie", cookie(*token, site_.is_secure));
+    say(response, Json::object());
+  }
+
+  void logout(const Request& request, Response& response) {
+    site_.sign_in.close(token_of(request));
+    response.set_header("Set-Cookie", cookie("", site_.is_secure));
+    say(response, Json::object());
+  }
+
+  /// Everything that is known, then what is new, until the watcher goes or may no longer watch.
+  void events(const Request& request, Response& response) {
+    if (watchers_ >= kMostWatchers) return say(response, 503, fmt::format("{} others watch already", kMostWatchers));
+    ++watchers_;
+    response.set_header("Cache-Control", "no-store");
+    response.set_chunked_content_provider(
+        "text/event-stream",
+        [this, token = token_of(request), sequence = std::uint64_t{0}, is_first = true](
+            std::size_t, httplib::DataSink& sink) mutable {
+          std::string text;
+          if (is_first) text = fmt::format("event: begin\ndata: {{\"incarnation\":{}}}\n\n", site_.incarnation);
+          for (const auto& message : site_.board.wait_after(sequence, kSignOfLife))
+            text += fmt::format("id: {}\ndata: {}\n\n", sequence, to_json(*message));
+          if (std::exchange(is_first, false)) text += "event: ready\ndata: {}\n\n";
+          if (text.empty()) text = ": here\n\n";
+          const bool goes_on = !site_.board.is_closed() &&
+                               site_.sign_in.visitor(token, program::Clock::steady_s()).may_see &&
+                               sink.write(text.data(), text.size());
+          if (!goes_on) sink.done();
+          return goes_on;
+        },
+        [this](bool) { --watchers_; });
+  }
+
+  void cloud(const Request& request, Response& response) {
+    SubmapId id;
+    const auto number = [&](std::size_t match, auto& out) {
+      const std::string text = request.matches[match];
+      return std::from_chars(text.data(), text.data() + text.size(), out).ec == std::errc();
+    };
+    if (!number(1, id.chain.robot.value) || !number(2, id.chain.session) || !number(3, id.index))
+      return say(response, 404, "no such submap");
+    const auto cloud = site_.clouds->cloud(id);
+    if (!cloud) return say(response, 404, cloud.error().message);
+    response.set_header("Cache-Control", "private, max-age=31536000, immutable");
+    response.set_content(cloud_bytes(*cloud == nullptr ? PointCloud() : **cloud, kMostPoints),
+                         "application/octet-stream");
+  }
+
+  void decide(const Visitor& visitor, const Json& body, Response& response) {
+    constexpr std::array kWishes{Wish::accept, Wish::reject, Wish::withdraw};
+    const std::string wish = body.value("wish", "");
+    const auto* const found = std::ranges::find(kWishes, wish, [](Wish one) { return std::string(to_string(one)); });
+    if (found == kWishes.end())
+      return say(response, 400, fmt::format("wish '{}': expected accept, reject or withdraw", plain_text(wish)));
+    ClosureWord word{.closure = body.value("closure", ""),
+                     .wish = *found,
+                     .by = plain_text(body.value("by", "")),
+                     .given_ns = static_cast<std::int64_t>(program::wall_clock_ns())};
+    if (word.closure.empty() || word.closure.size() > 200) return say(response, 400, "closure: expected a name");
+    auto answer = site_.words.ask(std::move(word), visitor.name);
+    if (!answer) return say(response, 503, "too many decisions wait for the server");
+    if (answer->wait_for(kAnswer) != std::future_status::ready)
+      return say(response, 504, "the server has not answered yet; the decision may still be taken");
+    try {
+      const std::string why = answer->get();
+      if (!why.empty()) return say(response, 409, why);
+      say(response, Json::object());
+    } catch (const std::future_error&) {
+      say(response, 503, "the server could not store it: try again");
+    }
+  }
+
+  void health(Response& response) {
+    const auto trouble = site_.metrics.trouble();
+    if (!trouble || !trouble->empty()) return say(response, 503, trouble ? *trouble : "it has only just started");
+    say(response, Json{{"ok", true}});
+  }
+  void metrics(Response& response) { response.set_content(site_.metrics.text(), "text/plain; version=0.0.4"); }
+
+  [[nodiscard]] Visitor who(const Request& request) {
+    return site_.sign_in.visitor(token_of(request), program::Clock::steady_s());
+  }
+
+  /// A handler for those who may see.
+  template <class Call>
+  httplib::Server::Handler seen(Call call) {
+    return [this, call](const Request& request, Response& response) {
+      if (!who(request).may_see) return say(response, 401, "sign in with an operator's or viewer's credential");
+      call(request, response);
+    };
+  }
+  /// A handler of a request with JSON; only pages of ours can set its header.
+  template <class Call>
+  static httplib::Server::Handler posted(Call call) {
+    return [call](const Request& request, Response& response) {
+      if (request.get_header_value("X-Tutti") != "1") return say(response, 403, "the header X-Tutti: 1 is missing");
+      try {
+        const Json body = Json::parse(request.body.empty() ? "{}" : request.body);
+        if (!body.is_object()) return say(response, 400, "expected a JSON object");
+        call(request, body, response);
+      } catch (const Json::exception& error) {
+        say(response, 400, error.what());
+      }
+    };
+  }
+  template <class Call>
+  httplib::Server::Handler decided(Call call) {
+    return posted([this, call](const Request& request, const Json& body, Response& response) {
+      const Visitor visitor = who(request);
+      if (!visitor.may_decide)
+        return say(response, visitor.may_see ? 403 : 401,
+                   visitor.may_see ? "viewers do not decide" : "sign in with an operator's credential");
+      call(visitor, body, response);
+    });
+  }
+
+ private:
+  static bool decode(const std::string& text, std::string& out) {
+    unsigned held = 0, bits = 0;
+    for (const char letter : text) {
+      constexpr std::string_view kLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+      if (letter == '=') break;
+      const std::size_t value = kLetters.find(letter);
+      if (value == std::string_view::npos) return false;
+      held = ((held << 6U) | static_cast<unsigned>(value)) & 0xFFFFU;
+      if (bits += 6; bits < 8) continue;
+      bits -= 8;
+      out += static_cast<char>((held >> bits) & 0xFFU);
+    }
+    return true;
+  }
+
+  Site& site_;
+  std::atomic<int> watchers_ = 0;
+};
+
+}  // namespace
+
+void add_routes(httplib::Server& server, Site& site) {
+  const auto routes = std::make_shared<Routes>(site);
+  server.set_default_headers({{"Content-Security-Policy", kPolicy},
+                              {"X-Content-Type-Options", "nosniff"},
+                              {"Referrer-Policy", "no-referrer"},
+                              {"Cross-Origin-Resource-Policy", "same-origin"}});
+  server.set_pre_routing_handler([](const Request& request, Response& response) {
+    if (is_our_host(request.get_header_value("Host"))) return httplib::Server::HandlerResponse::Unhandled;
+    say(response, 421, "this page is served under addresses and this machine's name only");
+    return httplib::Server::HandlerResponse::Handled;
+  });
+  server.set_error_handler([](const Request& request, Response& response) {
+    if (response.body.empty()) say(response, response.status, fmt::format("{}: nothing there", request.path));
+  });
+  server.set_exception_handler(
+      [](const Request&, Response& response, std::exception_ptr) { say(response, 500, "a defect of the program"); });
+  server.Get("/", [](const Request&, Response& response) {
+    const std::string_view page = live_page();
+    response.set_content(page.data(), page.size(), "text/html; charset=utf-8");
+  });
+  server.Get("/api/me", [routes](const Request& q, Response& r) { routes->me(q, r); });
+  server.Post("/api/login",
+              Routes::posted([routes](const Request&, const Json& body, Response& r) { routes->login(body, r); }));
+  server.Post("/api/logout",
+              Routes::posted([routes](const Request& q, const Json&, Response& r) { routes->logout(q, r); }));
+  server.Get("/api/events", routes->seen([routes](const Request& q, Response& r) { routes->events(q, r); }));
+  server.Get(R"(/api/cloud/(\d{1,10})/(\d{1,20})/(\d{1,10}))",
+             routes->seen([routes](const Request& q, Response& r) { routes->cloud(q, r); }));
+  server.Post("/api/decide", routes->decided([routes](const Visitor& visitor, const Json& body, Response& r) {
+    routes->decide(visitor, body, r);
+  }));
+  server.Get("/metrics", routes->seen([routes](const Request&, Response& r) { routes->metrics(r); }));
+  server.Get("/healthz", [routes](const Request&, Response& r) { routes->health(r); });
+}
+
+}  // namespace tutti::page

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/page/sign_in.hpp"
+
+#include <algorithm>
+
+#include "tutti/base/utc_text.hpp"
+#include "tutti/pki/pki.hpp"
+#include "tutti/pki/proof.hpp"
+#include "tutti/program/clock.hpp"
+
+namespace tutti::page {
+namespace {
+
+/// Those whose time is over go, and of too many the one whose time is over first.
+template <class Map, class Until>
+void make_room(Map& map, double now_s, std::size_t at_most, Until until) {
+  std::erase_if(map, [&](const auto& entry) { return until(entry.second) < now_s; });
+  while (map.size() >= at_most)
+    map.erase(std::ranges::min_element(map, {}, [&](const auto& entry) { return until(entry.second); }));
+}
+
+}  // namespace
+
+std::string SignIn::nonce(double now_s) {
+  const std::scoped_lock lock(mutex_);
+  make_room(nonces_, now_s, kMost, [](double until_s) { return until_s; });
+  std::string out = pki::random_token();
+  nonces_[out] = now_s + kNonce_s;
+  return out;
+}
+
+const bus::BusUser* SignIn::member(const std::string& key, double now_s) {
+  if (!looked_s_ || now_s - *looked_s_ >= kLookAgain_s) {
+    if (const auto there = pki::Pki::open(pki_)) {  // while it is being changed, what was there before holds
+      const std::string now = utc_text(static_cast<std::int64_t>(program::wall_clock_ns()));
+      members_.clear();
+      for (const pki::Member& one : there->members())
+        if (!one.is_revoked && !one.has_expired(now)) members_[one.key] = one.user;
+    }
+    looked_s_ = now_s;
+  }
+  const auto found = members_.find(key);
+  return found == members_.end() ? nullptr : &found->second;
+}
+
+Result<std::string> SignIn::open(const std::string& key, const std::string& nonce, const std::string& signature,
+                                 double now_s) {
+  const std::scoped_lock lock(mutex_);
+  const auto known = nonces_.extract(nonce);  // good once
+  if (known.empty() || known.mapped() < now_s)
+    return fail(ErrorCode::invalid, "the page was open for too long before signing in: try again");
+  const bus::BusUser* const user = member(key, now_s);
+  if (user == nullptr || !pki::is_signed(key, nonce, signature))
+    return fail(ErrorCode::invalid, "this credential is not one of this mission's, or is revoked");
+  if (user->role != bus::BusRole::operates && user->role != bus::BusRole::views)
+    return fail(ErrorCode::invalid, "{}: the page is for operators and viewers (tutti pki add-operator, add-viewer)",
+                to_string(*user));
+  make_room(sessions_, now_s, kMost, [](const Session& session) { return session.until_s; });
+  std::string token = pki::random_token();
+  sessions_[token] = {key, now_s + kSession_s};
+  return token;
+}
+
+void SignIn::close(const std::string& token) {
+  const std::scoped_lock lock(mutex_);
+  sessions_.erase(token);
+}
+
+Visitor SignIn::visitor(const std::string& token, double now_s) {
+  if (is_open()) return {.may_see = true, .may_decide = true};
+  const std::scoped_lock lock(mutex_);
+  const auto session = sessions_.find(token);
+  if (session == sessions_.end() || session->second.until_s < now_s) return {};
+  const bus::BusUser* const user = member(session->second.key, now_s);
+  if (user == nullptr) return {};
+  return {user->name, true, user->role == bus::BusRole::operates};
+}
+
+}  // namespace tutti::page

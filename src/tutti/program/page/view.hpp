@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tutti/mapfile/shown_map.hpp"
+#include "tutti/model/status.hpp"
+#include "tutti/program/page/board.hpp"
+
+/// What the page shows, as messages (docs/page.md): pure functions of a map and a status.
+namespace tutti::page {
+
+/// What the page is told first.
+struct Mission {
+  std::string name;
+  std::string description;
+  std::string mode = "live";  ///< Or "report".
+  std::string version;
+  std::optional<double> duration_s;
+  template <class V>
+  void describe(V& v) {
+    v.field(1, "name", name);
+    v.field(2, "description", description);
+    v.field(3, "mode", mode);
+    v.field(4, "version", version);
+    v.field(5, "duration_s", duration_s);
+  }
+};
+Message mission_message(const Mission& mission);
+
+/// A problem, for people: what, where, since when, and what to do about it.
+struct Alert {
+  std::string id;        ///< The same as long as it is the same problem.
+  std::string severity;  ///< "error", "warning", "info".
+  std::string what;
+  std::string where;
+  double since_s = 0.0;  ///< Mission time.
+  std::string todo;
+  std::optional<RobotId> robot;
+  std::optional<std::string> closure;
+  template <class V>
+  void describe(V& v) {
+    v.field(1, "id", id);
+    v.field(2, "severity", severity);
+    v.field(3, "what", what);
+    v.field(4, "where", where);
+    v.field(5, "since_s", since_s);
+    v.field(6, "todo", todo);
+    v.field(7, "robot", robot);
+    v.field(8, "closure", closure);
+  }
+  friend bool operator==(const Alert&, const Alert&) = default;
+};
+
+/// Follows the problems that statuses and maps show, so that each has a time since when it is there.
+class Alerts {
+ public:
+  /// Errors first, the oldest of each first.
+  std::vector<Alert> of_status(const MissionStatus& status);
+  std::vector<Alert> of_map(const mapfile::ShownMap& map);
+
+ private:
+  std::vector<Alert> dated(std::vector<Alert> found, std::map<std::string, double>& since, double now_s);
+
+  std::map<std::string, double> status_since_, map_since_;
+};
+Message alerts_message(const std::vector<Alert>& alerts, double time_s);
+
+/// `status`, with times as seconds before it.
+Message status_message(const MissionStatus& status);
+
+/// What one map shows, to be put on a board with the prefixes below.
+struct MapMessages {
+  std::vector<Message> submaps;   ///< "submap/".
+  std::vector<Message> closures;  ///< "closure/".
+  Message poses;                  ///< Where all submaps are.
+};
+MapMessages map_messages(const mapfile::ShownMap& map);
+
+/// The least number of accepted closures (pairs of submaps) without which a submap would no longer be joined to the
+/// part of its component with the most submaps; nothing for that part itself. Odometry of one session without a gap
+/// holds without closures. 1: it hangs on one closure.
+std::map<SubmapId, std::size_t> closures_holding(const server::SubmapSet& submaps, const server::MapEstimate& map);
+
+}  // namespace tutti::page

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Submaps, where they are, and the closures between them, as messages.
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <set>
+#include <utility>
+
+#include "tutti/mapfile/closures.hpp"
+#include "tutti/program/field_json.hpp"
+#include "tutti/program/page/view.hpp"
+
+namespace tutti::page {
+namespace {
+
+using mapfile::ShownMap;
+
+constexpr double kDegrees = 180.0 / std::numbers::pi;
+
+/// To 0.1 mm (or the same of other units): what people and pictures need, in few characters.
+double rounded(double value) { return std::round(1e4 * value) / 1e4; }
+Eigen::Vector3d rounded(const Eigen::Vector3d& value) {
+  return value.unaryExpr([](double x) { return rounded(x); });
+}
+
+FieldJson pose_json(const Pose3& pose) {
+  FieldJson out = FieldJson::array();
+  for (int i = 0; i < 3; ++i) out.push_back(rounded(pose.translation(i)));
+  for (int i = 0; i < 4; ++i) out.push_back(std::round(1e6 * pose.rotation.coeffs()(i)) / 1e6);
+  return out;
+}
+
+std::string text_of(const FieldJson& json) { return json.dump(-1, ' ', false, FieldJson::error_handler_t::replace); }
+
+/// A submap as it will always be; where it is changes with the map.
+struct SubmapEntry {
+  SubmapId id;
+  std::string name;
+  const Submap* submap;
+  std::size_t points;
+};
+
+std::string submap_json(const SubmapEntry& entry) {
+  const std::vector<Keyframe>& keyframes = entry.submap->keyframes;
+  const Pose3 T_submap_odom = keyframes.front().T_odom_body.inverse();
+  FieldJson path = FieldJson::array();
+  for (const Keyframe& keyframe : keyframes) {
+    if (!keyframe.representative && &keyframe != &keyframes.front() && &keyframe != &keyframes.back()) continue;
+    const Eigen::Vector3d at = rounded(Eigen::Vector3d(T_submap_odom * keyframe.T_odom_body.translation));
+    path.push_back({at.x(), at.y(), at.z()});
+  }
+  return text_of({{"id", to_string(entry.id)},
+                  {"name", entry.name},
+                  {"robot", entry.id.chain.robot.value},
+                  {"session", std::to_string(entry.id.chain.session)},
+                  {"index", entry.id.index},
+                  {"from_s", keyframes.front().stamp - Timestamp{}},
+                  {"until_s", keyframes.back().stamp - Timestamp{}},
+                  {"path", std::move(path)},
+                  {"points", entry.points}});
+}
+
+const MapNode* first_node(const server::MapEstimate& map, const Submap& submap) {
+  return find_node(map, {submap.id.chain, submap.keyframes.front().index});
+}
+
+FieldJson evidence_json(const Refusal& refusal) {
+  const RefusalKind& kind = kind_of(refusal.reason);
+  return {{"reason", kind.words},
+          {"value", is_measured(refusal) ? FieldJson(rounded(refusal.value)) : FieldJson(nullptr)},
+          {"limit", is_measured(refusal) ? FieldJson(rounded(refusal.limit)) : FieldJson(nullptr)},
+          {"unit", kind.unit},
+          {"at_least", kind.bound == RefusalKind::Bound::at_least},
+          {"ok", !misses(refusal)}};
+}
+
+/// Where in its submap's frame a keyframe is.
+Pose3 in_submap(const ShownMap& map, const SubmapId& submap, const KeyframeId& keyframe) {
+  const auto found = map.content.submaps.find(submap);
+  if (found == map.content.submaps.end()) return {};
+  const std::vector<Keyframe>& keyframes = found->second->keyframes;
+  const auto at = std::ranges::find(keyframes, keyframe.index, &Keyframe::index);
+  return at == keyframes.end() ? Pose3() : keyframes.front().T_odom_body.inverse() * at->T_odom_body;
+}
+
+FieldJson link_json(const ShownMap& map, const mapfile::ClosureInfo& info, const mapfile::ClosureFit& fit) {
+  const Pose3 T_first_from = in_submap(map, info.pair.first, fit.closure.from);
+  const Pose3 T_second_to = in_submap(map, info.pair.second, fit.closure.to);
+  const Eigen::Vector3d from = rounded(T_first_from.translation), to = rounded(T_second_to.translation);
+  FieldJson out{{"at_from", {from.x(), from.y(), from.z()}},
+                {"at_to", {to.x(), to.y(), to.z()}},
+                {"T_from_to", pose_json(T_first_from * fit.closure.measurement.T_a_b * T_second_to.inverse())},
+                {"state", to_string(fit.state)},
+                {"reason", fit.reason}};
+  const auto& misfit = fit.misfit;
+  out["misfit_m"] = misfit ? FieldJson(rounded(misfit->position_m)) : FieldJson(nullptr);
+  out["misfit_deg"] = misfit ? FieldJson(rounded(misfit->rotation_rad * kDegrees)) : FieldJson(nullptr);
+  out["chi2"] = misfit ? FieldJson(rounded(misfit->chi2)) : FieldJson(nullptr);
+  return out;
+}
+
+std::string closure_json(const ShownMap& map, const mapfile::ClosureInfo& info) {
+  FieldJson out{{"name", info.name},
+                {"from", to_string(info.pair.first)},
+                {"to", to_string(info.pair.second)},
+                {"state", to_string(info.state)},
+                {"reason", info.reason}};
+  out["word"] =
+      info.word
+          ? FieldJson{{"wish", to_string(info.word->wish)}, {"by", info.word->by}, {"wall_ns", info.word->given_ns}}
+          : FieldJson(nullptr);
+  out["links"] = FieldJson::array();
+  for (const mapfile::ClosureFit& fit : info.closures) out["links"].push_back(link_json(map, info, fit));
+  out["evidence"] = FieldJson::array();
+  if (info.verdict) {
+    out["finder"] = to_string(info.verdict->finder);
+    out["worker"] = info.verdict->worker;
+    out["verified_ns"] = info.verdict->verified_ns;
+    for (const Refusal& refusal : info.verdict->evidence) out["evidence"].push_back(evidence_json(refusal));
+  }
+  return text_of(out);
+}
+
+std::string poses_json(const ShownMap& map) {
+  const auto holding = closures_holding(map.content.submaps, map.map);
+  const auto accepted = std::ranges::count_if(map.map.closures, &server::JudgedClosure::accepted);
+  FieldJson submaps = FieldJson::object();
+  for (const auto& [id, submap] : map.content.submaps) {
+    const MapNode* const node = first_node(map.map, *submap);
+    if (node == nullptr) continue;
+    FieldJson& entry = submaps[to_string(id)] = FieldJson::array({node->component});
+    for (const FieldJson& number : pose_json(node->T_world_body)) entry.push_back(number);
+    const auto held = holding.find(id);
+    entry.push_back(held == holding.end() ? 0 : held->second);
+  }
+  return text_of({{"revision", map.revision},
+                  {"accepted", accepted},
+                  {"components", map.map.components},
+                  {"submaps", std::move(submaps)}});
+}
+
+}  // namespace
+
+MapMessages map_messages(const ShownMap& map) {
+  const double time_s = map.time - Timestamp{};
+  const server::ClosureNames names = map.content.closure_names();
+  MapMessages out;
+  for (const auto& [id, submap] : map.content.submaps) {
+    const auto size = map.content.payload_sizes.find(id);
+    const std::size_t points = size == map.content.payload_sizes.end() ? 0 : size->second.points;
+    out.submaps.push_back({"submap/" + to_string(id), time_s, submap_json({id, names.of(id), submap.get(), points})});
+  }
+  for (const mapfile::ClosureInfo& info : mapfile::closures(map.content, map.map))
+    out.closures.push_back({"closure/" + info.name, time_s, closure_json(map, info)});
+  out.poses = {"poses", time_s, poses_json(map)};
+  return out;
+}
+
+Message mission_message(const Mission& mission) { return {"mission", 0.0, text_of(json_of_fields(mission))}; }
+
+Message status_message(const MissionStatus& status) {
+  return {"status", status.time - Timestamp{}, text_of(json_of_fields(status, status.time))};
+}
+
+Message alerts_message(const std::vector<Alert>& alerts, double time_s) {
+  FieldJson out = FieldJson::array();
+  for (const Alert& alert : alerts) out.push_back(json_of_fields(alert));
+  return {"alerts", time_s, text_of(out)};
+}
+
+}  // namespace tutti::page
