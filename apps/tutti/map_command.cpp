@@ -22,6 +22,7 @@
 #include "tutti/mapfile/closures.hpp"
 #include "tutti/mapfile/merge.hpp"
 #include "tutti/mapfile/salvage.hpp"
+#include "tutti/mapfile/why.hpp"
 #include "tutti/server/map_components.hpp"
 
 namespace tutti::app {
@@ -224,6 +225,29 @@ int salvage_map(const fs::path& in, const fs::path& out) {
   return 0;
 }
 
+struct WhyOptions {
+  std::string map;
+  std::vector<std::string> robots;
+};
+
+int tell_why(const WhyOptions& options) {
+  constexpr const char* kWhy = "map why";
+  const auto map = mapfile::open_copy(options.map);
+  if (!map) return complain(kWhy, map.error().message);
+  const auto content = mapfile::read(**map);
+  if (!content) return complain(kWhy, content.error().message);
+  const auto why = mapfile::why_not_joined(**map, *content, mapfile::estimate(*content), options.robots.front(),
+                                           options.robots.back());
+  if (!why) return complain(kWhy, why.error().message, 2);
+  fmt::print("{}.\n", why->sentence);
+  if (!why->stopped_by.empty()) fmt::print("\n{:>8}  stopped by\n", "pairs");
+  for (const auto& [reason, count] : why->stopped_by) fmt::print("{:>8}  {}\n", count, reason);
+  if (!why->nearest.empty()) fmt::print("\n{:<24} {:<44} {}\n", "nearest", "stopped by", "what would help");
+  for (const mapfile::NearMiss& miss : why->nearest)
+    fmt::print("{:<24} {:<44} {}\n", miss.name, miss.reason, miss.hint);
+  return 0;
+}
+
 }  // namespace
 
 void add_map_command(CLI::App& app, int& exit_code) {
@@ -245,6 +269,15 @@ void add_map_command(CLI::App& app, int& exit_code) {
   info->callback([file, &exit_code] { exit_code = show_map(*file); });
 
   add_export_command(*map, exit_code);
+
+  const auto asked = std::make_shared<WhyOptions>();
+  CLI::App* why = map->add_subcommand(
+      "why",
+      "Why two robots' maps are not joined: which of their submaps came nearest to a closure, and what stopped it.");
+  why->footer("Also of a map that a server has open. Example: tutti map why state/map.tutti alpha bravo\n");
+  why->add_option("map", asked->map, "The map's file.")->type_name("MAP")->required();
+  why->add_option("robots", asked->robots, "The two robots.")->type_name("ROBOT")->required()->expected(2);
+  why->callback([asked, &exit_code] { exit_code = tell_why(*asked); });
 
   const auto merging = std::make_shared<MergeOptions>();
   CLI::App* merge = map->add_subcommand("merge", "Join two maps into a third; the two stay as they are.");

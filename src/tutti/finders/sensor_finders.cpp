@@ -38,6 +38,29 @@ Result<ClosureVerdict> LidarClosureFinder::verify(const Submap& first, const Sub
   return verdict;
 }
 
+Result<LidarClosureFinder::Look> LidarClosureFinder::look(const Submap& first, const Submap& second,
+                                                          const server::PayloadStore& payloads,
+                                                          const std::optional<Pose3>& T_first_second) const {
+  const auto a = features_of(first, payloads);
+  if (!a) return tl::unexpected(a.error());
+  const auto b = features_of(second, payloads);
+  if (!b) return tl::unexpected(b.error());
+  lidar::PairVerification seen;
+  if (!T_first_second) seen = lidar::verify_pair(**a, **b, config_);
+  const bool is_aligned = T_first_second || seen.overlap > 0.0;
+  if (is_aligned && !seen.accepted) {
+    std::optional<Refusal> refusal = seen.refusal;  // also a rival, which the second look does not look for
+    seen = lidar::verify_near(**a, **b, T_first_second.value_or(seen.T_a_b), config_);
+    if (!T_first_second && refusal) seen.refusal = refusal;
+  }
+  Look out{.best = {}, .refusal = seen.refusal, .evidence = seen.evidence};
+  if (seen.evidence.empty()) return out;
+  seen.accepted = true;
+  seen.refusal.reset();
+  out.best = lidar::to_verdict(first, second, seen).closures.front();
+  return out;
+}
+
 Result<std::shared_ptr<const lidar::SubmapFeatures>> LidarClosureFinder::features_of(
     const Submap& submap, const server::PayloadStore& payloads) const {
   return cache_.get(submap.id, [&]() -> Result<FeatureCache<lidar::SubmapFeatures>::Features> {
@@ -103,6 +126,18 @@ Result<ClosureVerdict> JointClosureFinder::verify(const Submap& first, const Sub
     if (!out.refusal || out.refusal->reason == RefusalReason::too_small) out.refusal = verdict->refusal;
   }
   if (!out.closures.empty()) out.refusal.reset();
+  return out;
+}
+
+Result<JointClosureFinder::Look> JointClosureFinder::look(const Submap& first, const Submap& second,
+                                                          const server::PayloadStore& payloads,
+                                                          const std::optional<Pose3>& T_first_second) const {
+  Look out{.best = {}, .refusal = Refusal{RefusalReason::other}, .evidence = {}};
+  for (const auto& finder : finders_) {
+    auto look = finder->look(first, second, payloads, T_first_second);
+    if (!look || look->best) return look;
+    if (look->refusal && look->refusal->reason != RefusalReason::too_small) out = std::move(*look);
+  }
   return out;
 }
 

@@ -31,6 +31,8 @@ class LidarClosureFinder final : public server::ClosureFinder {
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override;
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const server::PayloadStore& payloads) const override;
+  [[nodiscard]] Result<Look> look(const Submap& first, const Submap& second, const server::PayloadStore& payloads,
+                                  const std::optional<Pose3>& T_first_second) const override;
   [[nodiscard]] const FeatureCache<lidar::SubmapFeatures>& cache() const { return cache_; }
 
  private:
@@ -76,6 +78,8 @@ class JointClosureFinder final : public server::ClosureFinder {
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override;
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const server::PayloadStore& payloads) const override;
+  [[nodiscard]] Result<Look> look(const Submap& first, const Submap& second, const server::PayloadStore& payloads,
+                                  const std::optional<Pose3>& T_first_second) const override;
 
  private:
   std::vector<std::shared_ptr<const server::ClosureFinder>> finders_;
@@ -103,6 +107,10 @@ class NamedFinder final : public server::ClosureFinder {
     auto verdict = finder_->verify(first, second, payloads);
     if (verdict) verdict->finder = id_;
     return verdict;
+  }
+  [[nodiscard]] Result<Look> look(const Submap& first, const Submap& second, const server::PayloadStore& payloads,
+                                  const std::optional<Pose3>& T_first_second) const override {
+    return finder_->look(first, second, payloads, T_first_second);
   }
 
  private:

@@ -12,7 +12,7 @@ namespace {
 
 using Ends = std::pair<KeyframeId, KeyframeId>;
 
-std::optional<ClosureFit::Misfit> misfit(const server::MapEstimate& map, const LoopClosure& closure) {
+std::optional<ClosureFit::Misfit> misfit_of(const server::MapEstimate& map, const LoopClosure& closure) {
   const MapNode *from = find_node(map, closure.from), *to = find_node(map, closure.to);
   if (from == nullptr || to == nullptr || from->component != to->component) return std::nullopt;
   const Vector6d error = local(closure.measurement.T_a_b, from->T_world_body.inverse() * to->T_world_body);
@@ -46,8 +46,11 @@ std::vector<ClosureInfo> closures(const Content& content, const server::MapEstim
   for (auto& [pair, info] : infos) {
     info.pair = pair;
     info.name = names.of(pair);
-    for (const LoopClosure& closure : info.verdict ? info.verdict->closures : std::vector<LoopClosure>{}) {
-      ClosureFit& fit = info.closures.emplace_back(ClosureFit{.closure = closure, .misfit = misfit(map, closure)});
+    std::vector<LoopClosure> all = info.verdict ? info.verdict->closures : std::vector<LoopClosure>{};
+    if (info.word && info.word->wish == Wish::accept)
+      all.insert(all.end(), info.word->by_hand.begin(), info.word->by_hand.end());
+    for (const LoopClosure& closure : all) {
+      ClosureFit& fit = info.closures.emplace_back(ClosureFit{.closure = closure, .misfit = misfit_of(map, closure)});
       const auto [first, last] = judged.equal_range({closure.from, closure.to});
       const auto found = std::find_if(first, last, [&](const auto& entry) {  // neighbours share a keyframe
         return entry.second->closure.measurement.T_a_b == closure.measurement.T_a_b;

@@ -154,7 +154,7 @@ Status put_word(storage::TableStore& map, const ClosureWord& word) {
       return fail(ErrorCode::invalid, "{}: submap {} is not in the map", word.closure, content->closure_names().of(id));
   const auto verdict = content->verdicts.find(*pair);
   const bool has_closures = verdict != content->verdicts.end() && !verdict->second.closures.empty();
-  if (word.wish == Wish::accept && !has_closures)
+  if (word.wish == Wish::accept && !has_closures && word.by_hand.empty())
     return fail(ErrorCode::invalid, "{}: no closure was found there that could be accepted", word.closure);
   const auto known = content->words.find(*pair);
   if (known != content->words.end() && !holds_over(word, known->second))

@@ -6,7 +6,7 @@ namespace tutti::mapfile {
 ShownMap shown_map(const node::ServerNode& server, Timestamp now) {
   const server::MapServer& map = server.map_server();
   const server::MapServerState& state = map.state();
-  ShownMap shown{.revision = state.revision, .time = now, .map = map.map()};
+  ShownMap shown{.revision = state.revision, .time = now, .map = map.map(), .broadcast = server.broadcast()};
   shown.content.submaps = state.submaps;
   shown.content.payload_sizes = state.payload_sizes;
   shown.content.verdicts = state.verdicts;

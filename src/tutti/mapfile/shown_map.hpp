@@ -15,6 +15,7 @@ struct ShownMap {
   Timestamp time;   ///< Mission time.
   Content content;  ///< Submaps with the sizes of their payloads only, names, verdicts with closures, words.
   server::MapEstimate map;
+  ProxyGraph broadcast;  ///< The last proxy graph; empty: there was none yet.
 };
 
 /// A copy of the server's map: none of its parts is the server's any more, but for the submaps, which never change.

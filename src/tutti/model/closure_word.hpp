@@ -5,6 +5,8 @@
 #include <map>
 #include <string>
 #include <tuple>
+#include <utility>
+#include <vector>
 
 #include "tutti/base/fields.hpp"
 #include "tutti/model/loop_closure.hpp"
@@ -29,6 +31,8 @@ struct ClosureWord {
   Wish wish = Wish::withdraw;
   std::string by;             ///< Who said it, for people; may be empty.
   std::int64_t given_ns = 0;  ///< When, since the Unix epoch.
+  /// With `accept`: a closure that the operator has added, beside those that were found; at most one.
+  std::vector<LoopClosure> by_hand = {};
   template <class V>
   void describe(V& v) {
     constexpr std::size_t kMostBytes = 200;
@@ -36,9 +40,19 @@ struct ClosureWord {
     v.field(2, "wish", wish, {.low = 1, .high = 3});
     v.field(3, "by", by, {.text = FieldRule::Text::any, .at_most = kMostBytes});
     v.field(4, "given_ns", given_ns);
+    v.field(5, "by_hand", by_hand, {.at_most = 1});
   }
   friend bool operator==(const ClosureWord&, const ClosureWord&) = default;
 };
+
+/// Its closure's sessions, which are not sent, are those of the pair.
+inline ClosureWord with_sessions(ClosureWord word, const SubmapPair& pair) {
+  for (LoopClosure& closure : word.by_hand) {
+    closure.from.chain = pair.first.chain;
+    closure.to.chain = pair.second.chain;
+  }
+  return word;
+}
 
 /// True if word `a` counts and not `b`, both being on one pair: the later one counts. Words given at the same time are
 /// ordered by their other fields, so that the outcome does not depend on the order of arrival.

@@ -32,7 +32,7 @@ Result<WordSet> read_words(const storage::TableStore& map, const std::function<v
     else if (!word)
       ok = in_context("the map's table 'words'", word.error());
     else
-      words.insert_or_assign(*pair, std::move(*word));
+      words.insert_or_assign(*pair, with_sessions(std::move(*word), *pair));
     return ok.has_value();
   });
   if (!scanned) return tl::unexpected(scanned.error());

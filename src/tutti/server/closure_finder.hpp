@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,22 @@ class ClosureFinder {
   /// error means that one could not be read: there is no verdict, and the pair may be verified another time.
   [[nodiscard]] virtual Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                                       const PayloadStore& payloads) const = 0;
+  /// What there is to say of a pair that somebody looks at.
+  struct Look {
+    std::optional<LoopClosure> best;  ///< The best alignment that can be measured, also where verify() refuses it.
+    std::optional<Refusal> refusal;   ///< Why verify() would refuse it, or why there is none.
+    std::vector<Refusal> evidence;    ///< Every gate's value and limit, as far as they were measured.
+  };
+  /// The same question from somebody who may know better: with `T_first_second` (of the two submap frames) the
+  /// alignment nearest to it. Expensive, and no verdict: its closure is an operator's to keep (ClosureWord::by_hand).
+  [[nodiscard]] virtual Result<Look> look(const Submap& first, const Submap& second, const PayloadStore& payloads,
+                                          const std::optional<Pose3>& /*T_first_second*/) const {
+    auto verdict = verify(first, second, payloads);
+    if (!verdict) return tl::unexpected(verdict.error());
+    Look out{.best = {}, .refusal = verdict->refusal, .evidence = verdict->evidence};
+    if (!verdict->closures.empty()) out.best = verdict->closures.front();
+    return out;
+  }
   /// For closures that others find while robots drive: when each closure of verify()'s verdict becomes known, by the
   /// robots' clock, in their order and not decreasing. A worker answers with each when it is known. Empty: verify()
   /// found them.

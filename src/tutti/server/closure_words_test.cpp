@@ -126,6 +126,25 @@ TEST(ClosureWords, OneAcceptedClosureJoinsTwoRobots) {
   EXPECT_EQ(estimate_map(in.submaps, one, {}, {{inter->first, word(Wish::accept)}}).components, 1U);
 }
 
+TEST(ClosureWords, AClosureAddedByHandJoinsTwoRobotsAndIsGoneWhenItIsWithdrawn) {
+  const Inputs in = make_inputs(TestFinder(3), 3);
+  const auto inter = std::ranges::find_if(
+      in.verdicts, [](const auto& entry) { return entry.first.first.chain != entry.first.second.chain; });
+  ClosureWord added = word(Wish::accept);
+  added.by_hand = inter->second.closures;
+  const MapEstimate joined = estimate_map(in.submaps, {}, {}, {{inter->first, added}});
+  EXPECT_EQ(joined.components, 1U);
+  ASSERT_EQ(joined.closures.size(), 1U);
+  EXPECT_TRUE(joined.closures.front().accepted && joined.closures.front().by_operator);
+  EXPECT_EQ(joined.graph.poses,
+            estimate_map(in.submaps, VerdictSet{*inter}, {}, {{inter->first, word(Wish::accept)}}).graph.poses)
+      << "as one that was found";
+  for (const Wish wish : {Wish::reject, Wish::withdraw}) {
+    added.wish = wish;
+    EXPECT_EQ(estimate_map(in.submaps, {}, {}, {{inter->first, added}}).components, 2U);
+  }
+}
+
 /// A server that knows all submaps, and the finder's verdicts on all pairs it asks for.
 class WordsToAServer : public testing::Test {
  protected:
@@ -227,6 +246,26 @@ TEST_F(WordsToAServer, WhatCannotBeMeantIsRefused) {
   EXPECT_FALSE(server_.has_news());
   EXPECT_TRUE(server_.receive(apart, word(Wish::reject)).has_value());  // should one ever be found
   EXPECT_FALSE(server_.has_news());
+}
+
+TEST_F(WordsToAServer, AClosureAddedByHandNeedsNoOtherAndIsBetweenKeyframesOfItsSubmaps) {
+  const SubmapSet submaps = server_.state().submaps;
+  const SubmapPair between{submaps.begin()->first, std::prev(submaps.end())->first};
+  const std::uint32_t last = std::prev(submaps.end())->second->keyframes.back().index;
+  ClosureWord added = word(Wish::accept, 10);
+  added.by_hand.push_back({});
+  added.by_hand.front().from.index = submaps.begin()->second->keyframes.front().index;
+  added.by_hand.front().to.index = last;
+  added.by_hand.front().measurement.covariance = Matrix6d::Identity();
+  ASSERT_TRUE(server_.receive(between, added).has_value());
+  EXPECT_TRUE(server_.has_news());
+  EXPECT_EQ(server_.state().words.at(between).by_hand.front().to.chain, between.second.chain)
+      << "sessions are those of the pair";
+  added.given_ns = 11;
+  added.by_hand.front().to.index = last + 1;
+  const auto beyond = server_.receive(between, added);
+  ASSERT_FALSE(beyond.has_value());
+  EXPECT_NE(beyond.error().message.find("keyframes"), std::string::npos) << beyond.error().message;
 }
 
 }  // namespace closure_words_test

@@ -89,6 +89,15 @@ judge::Closures collect_closures(const VerdictSet& verdicts, const WordSet& word
         all.pop_back();
       }
   }
+  for (const auto& [pair, word] : words) {
+    if (word.wish != Wish::accept || !has_both(submaps, pair)) continue;
+    for (const LoopClosure& closure : word.by_hand)
+      if (index.contains(closure.from) && index.contains(closure.to)) {
+        all.emplace_back(closure, word.wish);
+        LoopClosure& added = all.back().first;
+        added.measurement.covariance = bounded_covariance(closure.measurement.covariance);
+      }
+  }
   std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) {
     return std::tie(a.first.from, a.first.to) < std::tie(b.first.from, b.first.to);
   });

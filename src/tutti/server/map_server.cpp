@@ -15,6 +15,10 @@
 namespace tutti::server {
 namespace {
 
+bool has_keyframe(const Submap& submap, const KeyframeId& keyframe) {
+  return submap.keyframes.front().index <= keyframe.index && keyframe.index <= submap.keyframes.back().index;
+}
+
 /// Between neighbouring keyframes. Odometry that diverged beyond this would leave the joint map without a solution.
 constexpr double kLongestStep_m = 1e4;
 /// By which odometry may differ from the poses it made: what rounding leaves, however far away they are.
@@ -279,7 +283,8 @@ void MapServer::take(const ClosureVerdict& verdict) {
   }
 }
 
-Status MapServer::receive(const SubmapPair& pair, const ClosureWord& word) {
+Status MapServer::receive(const SubmapPair& pair, const ClosureWord& given) {
+  const ClosureWord word = with_sessions(given, pair);
   const auto where = [&] {
     return fmt::format("decision on submaps {} and {}", to_string(pair.first), to_string(pair.second));
   };
@@ -291,13 +296,19 @@ Status MapServer::receive(const SubmapPair& pair, const ClosureWord& word) {
   if (known != state_.words.end() && !holds_over(word, known->second)) return {};
   const auto verdict = state_.verdicts.find(pair);
   const bool has_closures = verdict != state_.verdicts.end() && !verdict->second.closures.empty();
-  if (word.wish == Wish::accept && !has_closures)
+  if (word.wish == Wish::accept && !has_closures && word.by_hand.empty())
     return fail(ErrorCode::invalid, "{}: no closure was found there that could be accepted", where());
+  for (const LoopClosure& closure : word.by_hand)
+    if (!has_keyframe(*state_.submaps.at(pair.first), closure.from) ||
+        !has_keyframe(*state_.submaps.at(pair.second), closure.to))
+      return fail(ErrorCode::invalid, "{}: its closure is between keyframes {} and {}, which these do not have",
+                  where(), closure.from.index, closure.to.index);
   const bool was_accepted = known != state_.words.end() && known->second.wish == Wish::accept;
   const bool changes = known == state_.words.end() ? word.wish != Wish::withdraw : known->second.wish != word.wish;
+  const bool adds = !word.by_hand.empty() || (known != state_.words.end() && !known->second.by_hand.empty());
   state_.words.insert_or_assign(pair, word);
   if (was_accepted && word.wish != Wish::accept) plan_verification(pair);  // other finders were not asked
-  if (changes && has_closures) note_news();
+  if ((changes && has_closures) || adds) note_news();
   return {};
 }
 

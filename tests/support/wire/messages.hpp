@@ -180,12 +180,12 @@ class AnyFields {
   explicit AnyFields(Rng& rng) : rng_(rng) {}
   template <class T>
   void field(int /*number*/, const char* name, T& value, const FieldRule& rule = {}, const char* /*help*/ = "") {
-    const bool is_needed = rule.text == FieldRule::Text::name || rule.at_least > 0 || rule.low > 0.0;
+    const bool is_needed = rule.text == FieldRule::Text::name || rule.at_least > 0 || rule.low > 0.0 || rule.always;
     if (!HasFields<T> && !is_needed && rng_.bernoulli(0.3)) return;
     if constexpr (IsOptionalField<T>) {
       fill(value.emplace(), name, rule);
     } else if constexpr (IsListField<T>) {
-      value.resize(rng_.index(4));
+      value.resize(rng_.index(std::min<std::size_t>(4, rule.at_most + 1)));
       for (auto& element : value) fill(element, name, rule);
     } else {
       fill(value, name, rule);
@@ -205,6 +205,8 @@ class AnyFields {
         for (int i = 0; i < 20; ++i) value[any_session(rng_)].insert(rng_.index(40));
     } else if constexpr (std::is_same_v<T, Pose3>) {
       value = any_pose(rng_, 100.0);
+    } else if constexpr (std::is_same_v<T, Matrix6d>) {
+      value = any_covariance(rng_);
     } else if constexpr (std::is_same_v<T, Timestamp>) {
       value.ns = static_cast<std::int64_t>(rng_.index(std::uint64_t{1} << 62U));
     } else if constexpr (std::is_same_v<T, RobotId>) {

@@ -174,6 +174,13 @@ std::optional<Refusal> why_refused(const PairVerification& v, const LidarClosure
   return std::nullopt;
 }
 
+void add_bend_and_evidence(const SubmapFeatures& a, const SubmapFeatures& b, const LidarClosureConfig& config,
+                           PairVerification& out) {
+  const auto contacts = find_contacts(a.cloud, b.cloud, out.T_a_b, kBendPoints, config.registration);
+  out.covariance += bend_covariance(*a.bend, *b.bend, out.T_a_b, contacts);
+  out.evidence = gates(out, config);
+}
+
 }  // namespace
 
 PairVerification inverse(PairVerification v) {
@@ -211,10 +218,32 @@ PairVerification verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, c
     out.refusal = why_refused(out, config);
   }
   out.accepted = !out.refusal;
-  if (!out.accepted) return out;
-  const auto contacts = find_contacts(a.cloud, b.cloud, out.T_a_b, kBendPoints, config.registration);
-  out.covariance += bend_covariance(*a.bend, *b.bend, out.T_a_b, contacts);
-  out.evidence = gates(out, config);
+  if (out.accepted) add_bend_and_evidence(a, b, config, out);
+  return out;
+}
+
+PairVerification verify_near(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_a_b,
+                             const LidarClosureConfig& config) {
+  TUTTI_CHECK(!config.registration.levels.empty(), "a registration needs at least one level");
+  PairVerification out;
+  if (!a.usable || !b.usable) {
+    out.refusal = (a.usable ? b : a).refusal;
+    return out;
+  }
+  if (b.id < a.id) return inverse(verify_near(b, a, T_a_b.inverse(), config));
+  const RegistrationResult coarse = register_clouds(a.cloud, b.cloud, T_a_b, coarse_levels(config.registration));
+  out.refusal = Refusal{RefusalReason::no_alignment};
+  if (!coarse.converged) return out;
+  Eigen::Vector3d weakest_b;
+  refine(a, b, coarse.T_target_source, config, out, weakest_b);
+  if (out.overlap <= 0.0) return out;
+  out.viewpoint_distance_m = viewpoint_distance(a, b, out.T_a_b);
+  out.contradiction = contradiction(a, b, out.T_a_b);
+  const double quality = out.overlap * (1.0 - out.contradiction) / std::max(1.0, out.misfit);
+  if (quality > 0.0) out.slid_ratio = best_slid_quality(a, b, out.T_a_b, weakest_b, config) / quality;
+  out.refusal = why_refused(out, config);
+  out.accepted = !out.refusal;
+  add_bend_and_evidence(a, b, config, out);
   return out;
 }
 

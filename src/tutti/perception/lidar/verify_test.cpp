@@ -181,6 +181,33 @@ TEST(VerifyPair, covarianceIsHonestHoweverManyNeighboursErrAlike) {
   }
 }
 
+TEST(VerifyNear, findsThePoseFromAnywhereNearIt) {
+  const Side a = see({RobotId{0}, 0}, furnished_room(), kWalkA, 1),
+             b = see({RobotId{1}, 0}, furnished_room(), kWalkB, 2);
+  const Pose3 truth = true_relative(kWalkA, kWalkB);
+  const Pose3 guess = truth * Pose3{so3_exp({0.0, 0.0, 0.08}), {0.5, -0.4, 0.1}};
+  const auto v = verify_near(a.features, b.features, guess, kConfig);
+  ASSERT_TRUE(v.accepted) << to_string(*v.refusal);
+  EXPECT_LT(local(truth, v.T_a_b).head<3>().norm(), 0.02);
+  EXPECT_EQ(v.evidence.size(), 10U);
+  const auto turned = verify_near(b.features, a.features, guess.inverse(), kConfig);
+  EXPECT_LT(local(v.T_a_b, turned.T_a_b.inverse()).norm(), 1e-12);
+}
+
+TEST(VerifyNear, measuresWhatItRefuses) {
+  const Side a = see({RobotId{0}, 0}, furnished_room(), kWalkA, 1), b = see({RobotId{1}, 0}, other_room(), kWalkB, 2);
+  const auto v = verify_near(a.features, b.features, true_relative(kWalkA, kWalkB), kConfig);
+  EXPECT_FALSE(v.accepted);
+  ASSERT_TRUE(v.refusal.has_value());
+  if (v.refusal->reason != RefusalReason::no_alignment) {
+    EXPECT_EQ(v.evidence.size(), 10U);
+  }
+  const Pose3 far{Eigen::Quaterniond::Identity(), {500.0, 0.0, 0.0}};
+  const auto none = verify_near(a.features, b.features, far, kConfig);
+  EXPECT_EQ(none.refusal->reason, RefusalReason::no_alignment);
+  EXPECT_TRUE(none.evidence.empty());
+}
+
 TEST(ToVerdict, closureJoinsTheMiddleKeyframesWhicheverWayThePairIsGiven) {
   const Side a = see({RobotId{0}, 2}, furnished_room(), kWalkA, 1),
              b = see({RobotId{1}, 1}, furnished_room(), kWalkB, 2);

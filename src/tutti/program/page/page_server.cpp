@@ -111,6 +111,7 @@ class PageViewer final : public program::MapViewer {
   }
   void show(std::shared_ptr<const ShownMap> map) override {
     shown_ = map->revision;
+    site_.last_map.set(map);
     not_before_s_ = Clock::steady_s() + kPeriod_s;
     {
       const std::scoped_lock lock(mutex_);
@@ -162,6 +163,7 @@ class PageViewer final : public program::MapViewer {
       board.put_all("submap/", std::move(messages.submaps), time_s);
       board.put(std::move(messages.poses));
       board.put_all("closure/", std::move(messages.closures), time_s);
+      board.put_all("disagreement/", std::move(messages.disagreements), time_s);
     });
     const double now_s = Clock::steady_s();
     not_before_s_ = std::max(begin_s + kPeriod_s, now_s + kRestPerWork * (now_s - begin_s));

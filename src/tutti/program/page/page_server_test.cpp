@@ -17,6 +17,7 @@
 #include "tutti/base/file.hpp"
 #include "tutti/pki/pki.hpp"
 #include "tutti/program/page/cloud_bytes.hpp"
+#include "tutti/program/page/view.hpp"
 
 namespace tutti::page {
 namespace page_server_test {
@@ -49,7 +50,7 @@ class PageServer : public ::testing::Test {
     auto made = serve_page(options, {.name = "cave",
                                      .version = "1",
                                      .map = store_,
-                                     .finder = nullptr,
+                                     .finder = std::make_shared<mapfile::test::ExplainingFinder>(),
                                      .pki = pki,
                                      .say = [](program::Level, const std::string&) {}});
     ASSERT_TRUE(made.has_value()) << made.error().message;
@@ -166,6 +167,65 @@ TEST_F(PageServer, ADecisionIsTheServersToTakeOrNot) {
   EXPECT_EQ(words_.front().first.wish, Wish::reject);
   EXPECT_EQ(words_.front().first.by, "mallory") << "nobody has proved anything";
   EXPECT_EQ(words_.front().second, "");
+}
+
+/// What the server answers to a request of ours.
+std::pair<int, json> ask(httplib::Client http, const char* path, const json& body) {
+  const auto answer = http.Post(path, {{"X-Tutti", "1"}}, body.dump(), "application/json");
+  return {answer->status, json::parse(answer->body)};
+}
+
+TEST_F(PageServer, TwoSubmapsAreLookedAtAndAClosureIsAddedByHand) {
+  start();
+  json closure;
+  for (const auto& [key, value] : events_with_map())
+    if (key.starts_with("closure/alpha") && key.find("bravo") != std::string::npos && value.at("state") == "accepted")
+      closure = value;
+  ASSERT_FALSE(closure.is_null());
+  // Asked for the other way round.
+  const auto [status, seen] = ask(client(), "/api/register", {{"from", closure.at("to")}, {"to", closure.at("from")}});
+  ASSERT_EQ(status, 200) << seen;
+  EXPECT_TRUE(seen.at("found"));
+  EXPECT_EQ(seen.at("name"), closure.at("name"));
+  const Pose3 T_to_from = pose_of_text(seen.at("T_from_to").dump()).value();
+  const Pose3 T_from_to = pose_of_text(closure.at("links").at(0).at("T_from_to").dump()).value();
+  EXPECT_LT((T_from_to * T_to_from).translation.norm(), 1e-3);
+  EXPECT_EQ(seen.at("evidence").at(0).at("value"), 0.75);
+  const auto [kept, name] =
+      ask(client(), "/api/closure", {{"from", closure.at("from")}, {"to", closure.at("to")}, {"by", "anna"}});
+  EXPECT_EQ(kept, 200) << name;
+  const std::scoped_lock lock(mutex_);
+  ASSERT_EQ(words_.size(), 1U);
+  EXPECT_EQ(words_.front().first.closure, closure.at("name"));
+  EXPECT_EQ(words_.front().first.wish, Wish::accept);
+  EXPECT_EQ(words_.front().first.by, "anna");
+  ASSERT_EQ(words_.front().first.by_hand.size(), 1U);
+}
+
+TEST_F(PageServer, WhatCannotBeLookedAtIsSaid) {
+  start();
+  events_with_map();
+  const std::string first = to_string(map_->content.submaps.begin()->first);
+  const std::string last = to_string(std::prev(map_->content.submaps.end())->first);
+  EXPECT_EQ(ask(client(), "/api/register", {{"from", first}, {"to", first}}).first, 404);
+  EXPECT_EQ(ask(client(), "/api/register", {{"from", "9/9"}, {"to", first}}).first, 404);
+  for (const char* bad : {R"("near")", "[1,2,3]", "[0,0,0,0,0,0,0]", "[1e300,0,0,0,0,0,1]", R"([0,0,0,0,0,0,"1"])"})
+    EXPECT_EQ(ask(client(), "/api/closure", {{"from", first}, {"to", last}, {"T_from_to", json::parse(bad)}}).first,
+              400)
+        << bad;
+  const std::scoped_lock lock(mutex_);
+  EXPECT_TRUE(words_.empty());
+}
+
+TEST_F(PageServer, SaysWhyTwoRobotsAreJoinedOrNot) {
+  start();
+  events_with_map();
+  auto http = client();
+  const json why = json::parse(http.Get("/api/why?from=alpha&to=bravo")->body);
+  EXPECT_TRUE(why.at("joined"));
+  EXPECT_FALSE(why.at("candidates").empty()) << "every fourth closure is wrong";
+  EXPECT_EQ(http.Get("/api/why?from=alpha&to=%3Cb%3E")->status, 404);
+  EXPECT_EQ(http.Get("/api/why")->status, 404);
 }
 
 TEST_F(PageServer, OtherSitesReachNothing) {

@@ -11,9 +11,11 @@
 #include <nlohmann/json.hpp>
 
 #include "tutti/bus/bus_address.hpp"
+#include "tutti/mapfile/why.hpp"
 #include "tutti/program/clock.hpp"
 #include "tutti/program/page/cloud_bytes.hpp"
 #include "tutti/program/page/internal/page_data.hpp"
+#include "tutti/program/page/view.hpp"
 
 namespace tutti::page {
 namespace {
@@ -76,7 +78,7 @@ class Routes {
                                          : Json(nullptr)},
              {"mission", site_.mission_name},
              {"may_decide", visitor.may_decide},
-             {"offers", {"decide"}}};
+             {"offers", {"decide", "register", "closure", "why", "disagreement"}}};
     if (!site_.sign_in.is_open()) out["nonce"] = site_.sign_in.nonce(program::Clock::steady_s());
     say(response, out);
   }
@@ -143,21 +145,72 @@ class Routes {
     const auto* const found = std::ranges::find(kWishes, wish, [](Wish one) { return std::string(to_string(one)); });
     if (found == kWishes.end())
       return say(response, 400, fmt::format("wish '{}': expected accept, reject or withdraw", plain_text(wish)));
-    ClosureWord word{.closure = body.value("closure", ""),
-                     .wish = *found,
-                     .by = plain_text(body.value("by", "")),
-                     .given_ns = static_cast<std::int64_t>(program::wall_clock_ns())};
+    ClosureWord word{.closure = body.value("closure", ""), .wish = *found};
     if (word.closure.empty() || word.closure.size() > 200) return say(response, 400, "closure: expected a name");
+    if (give(visitor, body, std::move(word), response)) say(response, Json::object());
+  }
+
+  /// Looks at two submaps; nothing is stored.
+  void look(const Json& body, Response& response) {
+    const auto seen = look_at(body, response);
+    if (!seen) return;
+    Json out{{"found", seen->look.best.has_value()},
+             {"why", seen->look.refusal ? to_string(*seen->look.refusal) : "every gate is passed"},
+             {"hint", seen->look.refusal ? mapfile::hint_for(seen->look.refusal->reason) : ""},
+             {"name", seen->name},
+             {"evidence", Json::parse(evidence_text(seen->look.evidence))}};
+    out["T_from_to"] = seen->look.best ? Json::parse(pose_text(asked_order(*seen))) : Json(nullptr);
+    say(response, out);
+  }
+
+  /// Keeps what look() shows as the operator's own closure.
+  void keep(const Visitor& visitor, const Json& body, Response& response) {
+    const auto seen = look_at(body, response);
+    if (!seen) return;
+    if (!seen->look.best)
+      return say(response, 409,
+                 "there is no alignment to keep: " +
+                     (seen->look.refusal ? to_string(*seen->look.refusal) : std::string("none")));
+    ClosureWord word{.closure = seen->name, .wish = Wish::accept, .by_hand = {*seen->look.best}};
+    if (give(visitor, body, std::move(word), response)) say(response, Json{{"name", seen->name}});
+  }
+
+  void why(const Request& request, Response& response) {
+    const auto map = site_.last_map.get();
+    if (map == nullptr) return say(response, 409, "there is no map yet");
+    const auto why = mapfile::why_not_joined(site_.store, map->content, map->map, request.get_param_value("from"),
+                                             request.get_param_value("to"));
+    if (!why) return say(response, 404, why.error().message);
+    Json out{{"sentence", why->sentence}, {"joined", why->is_joined}, {"compared", why->compared}};
+    out["stopped_by"] = Json::object();
+    for (const auto& [reason, count] : why->stopped_by) out["stopped_by"][reason] = count;
+    out["candidates"] = Json::array();
+    for (const mapfile::NearMiss& miss : why->nearest)
+      out["candidates"].push_back({{"pair", miss.name},
+                                   {"from", to_string(miss.pair.first)},
+                                   {"to", to_string(miss.pair.second)},
+                                   {"reason", miss.reason},
+                                   {"hint", miss.hint}});
+    say(response, out);
+  }
+
+  /// Hands the operator's word to the server; false: the answer says why it is not stored.
+  bool give(const Visitor& visitor, const Json& body, ClosureWord word, Response& response) {
+    word.by = plain_text(body.value("by", ""));
+    word.given_ns = static_cast<std::int64_t>(program::wall_clock_ns());
     auto answer = site_.words.ask(std::move(word), visitor.name);
-    if (!answer) return say(response, 503, "too many decisions wait for the server");
+    const auto refuse = [&](int status, const std::string& why) {
+      say(response, status, why);
+      return false;
+    };
+    if (!answer) return refuse(503, "too many decisions wait for the server");
     if (answer->wait_for(kAnswer) != std::future_status::ready)
-      return say(response, 504, "the server has not answered yet; the decision may still be taken");
+      return refuse(504, "the server has not answered yet; the decision may still be taken");
     try {
       const std::string why = answer->get();
-      if (!why.empty()) return say(response, 409, why);
-      say(response, Json::object());
+      return why.empty() || refuse(409, why);
     } catch (const std::future_error&) {
-      say(response, 503, "the server could not store it: try again");
+      return refuse(503, "the server could not store it: try again");
     }
   }
 
@@ -206,6 +259,55 @@ class Routes {
   }
 
  private:
+  /// What a finder sees in two submaps of the last map, in the order of their ids.
+  struct Seen {
+    std::shared_ptr<const mapfile::ShownMap> map;
+    SubmapPair pair;
+    bool is_turned = false;  ///< The page has asked for them the other way round.
+    std::string name;
+    server::ClosureFinder::Look look;
+  };
+  static Pose3 asked_order(const Seen& seen) {
+    const Pose3 T_first_second = between_submaps(*seen.map, seen.pair, *seen.look.best);
+    return seen.is_turned ? T_first_second.inverse() : T_first_second;
+  }
+
+  /// Nothing: the answer says why.
+  std::optional<Seen> look_at(const Json& body, Response& response) {
+    const auto refuse = [&](int status, const std::string& why) {
+      say(response, status, why);
+      return std::nullopt;
+    };
+    Seen out{.map = site_.last_map.get()};
+    if (out.map == nullptr || site_.finder == nullptr) return refuse(409, "there is no map yet");
+    const auto& submaps = out.map->content.submaps;
+    const auto called = [&](const char* key) {
+      const std::string id = body.value(key, "");
+      return std::ranges::find_if(submaps, [&](const auto& entry) { return to_string(entry.first) == id; });
+    };
+    auto first = called("from"), second = called("to");
+    if (first == submaps.end() || second == submaps.end() || first == second)
+      return refuse(404, "from, to: expected two submaps of the map");
+    std::optional<Pose3> T_first_second;
+    if (body.contains("T_from_to") && !body.at("T_from_to").is_null()) {
+      const auto pose = pose_of_text(body.at("T_from_to").dump());
+      if (!pose) return refuse(400, pose.error().message);
+      T_first_second = *pose;
+    }
+    out.is_turned = second->first < first->first;
+    if (out.is_turned) {
+      std::swap(first, second);
+      if (T_first_second) T_first_second = T_first_second->inverse();
+    }
+    out.pair = {first->first, second->first};
+    out.name = out.map->content.closure_names().of(out.pair);
+    const std::scoped_lock one_at_a_time(looks_);  // they take seconds of a core
+    auto look = site_.finder->look(*first->second, *second->second, *site_.clouds, T_first_second);
+    if (!look) return refuse(500, look.error().message);
+    out.look = std::move(*look);
+    return out;
+  }
+
   static bool decode(const std::string& text, std::string& out) {
     unsigned held = 0, bits = 0;
     for (const char letter : text) {
@@ -222,6 +324,7 @@ class Routes {
   }
 
   Site& site_;
+  std::mutex looks_;
   std::atomic<int> watchers_ = 0;
 };
 
@@ -258,6 +361,12 @@ void add_routes(httplib::Server& server, Site& site) {
   server.Post("/api/decide", routes->decided([routes](const Visitor& visitor, const Json& body, Response& r) {
     routes->decide(visitor, body, r);
   }));
+  server.Post("/api/register",
+              routes->decided([routes](const Visitor&, const Json& body, Response& r) { routes->look(body, r); }));
+  server.Post("/api/closure", routes->decided([routes](const Visitor& visitor, const Json& body, Response& r) {
+    routes->keep(visitor, body, r);
+  }));
+  server.Get("/api/why", routes->seen([routes](const Request& q, Response& r) { routes->why(q, r); }));
   server.Get("/metrics", routes->seen([routes](const Request&, Response& r) { routes->metrics(r); }));
   server.Get("/healthz", [routes](const Request&, Response& r) { routes->health(r); });
 }

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "tutti/consistency/explanation.hpp"
 #include "tutti/mapfile/shown_map.hpp"
 #include "tutti/model/status.hpp"
 #include "tutti/program/page/board.hpp"
@@ -75,11 +77,40 @@ Message status_message(const MissionStatus& status);
 
 /// What one map shows, to be put on a board with the prefixes below.
 struct MapMessages {
-  std::vector<Message> submaps;   ///< "submap/".
-  std::vector<Message> closures;  ///< "closure/".
-  Message poses;                  ///< Where all submaps are.
+  std::vector<Message> submaps;        ///< "submap/".
+  std::vector<Message> closures;       ///< "closure/".
+  std::vector<Message> disagreements;  ///< "disagreement/".
+  Message poses;                       ///< Where all submaps are.
 };
 MapMessages map_messages(const mapfile::ShownMap& map);
+
+/// Whose raw odometry is compared with the map, and when.
+struct DisagreementOf {
+  std::string name;
+  RobotId robot;
+  std::uint32_t component = 0;
+  double time_s = 0.0;                    ///< Mission time of the message.
+  std::vector<std::string> submaps = {};  ///< That each compared node is in, by id; may be empty.
+};
+/// "disagreement/NAME": by node and scale, and where it began; `time_of` makes seconds of the robot's stamps.
+Message disagreement_message(const DisagreementOf& of, const consistency::Explanation& found,
+                             const std::function<double(Timestamp)>& time_of);
+
+/// Every session's raw odometry against the last broadcast, and how sure the server is of where each submap is: the
+/// largest standard deviation of its nodes, relative to the rest of its chain.
+struct Comparisons {
+  std::vector<Message> messages;
+  std::map<SubmapId, double> sigma_m;
+};
+Comparisons compare_all(const mapfile::ShownMap& map);
+
+/// A closure's relative pose of the two submap frames.
+Pose3 between_submaps(const mapfile::ShownMap& map, const SubmapPair& pair, const LoopClosure& closure);
+/// [x, y, z, qx, qy, qz, qw], to 0.1 mm and 1e-6; and back. Errors: not seven finite numbers, or no rotation.
+std::string pose_text(const Pose3& pose);
+Result<Pose3> pose_of_text(const std::string& json);
+/// Gates with their values and limits, as closures have them.
+std::string evidence_text(const std::vector<Refusal>& evidence);
 
 /// The least number of accepted closures (pairs of submaps) without which a submap would no longer be joined to the
 /// part of its component with the most submaps; nothing for that part itself. Odometry of one session without a gap

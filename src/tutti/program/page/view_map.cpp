@@ -58,6 +58,7 @@ std::string submap_json(const SubmapEntry& entry) {
                   {"from_s", keyframes.front().stamp - Timestamp{}},
                   {"until_s", keyframes.back().stamp - Timestamp{}},
                   {"path", std::move(path)},
+                  {"T_odom_submap", pose_json(keyframes.front().T_odom_body)},
                   {"points", entry.points}});
 }
 
@@ -90,7 +91,7 @@ FieldJson link_json(const ShownMap& map, const mapfile::ClosureInfo& info, const
   const Eigen::Vector3d from = rounded(T_first_from.translation), to = rounded(T_second_to.translation);
   FieldJson out{{"at_from", {from.x(), from.y(), from.z()}},
                 {"at_to", {to.x(), to.y(), to.z()}},
-                {"T_from_to", pose_json(T_first_from * fit.closure.measurement.T_a_b * T_second_to.inverse())},
+                {"T_from_to", pose_json(between_submaps(map, info.pair, fit.closure))},
                 {"state", to_string(fit.state)},
                 {"reason", fit.reason}};
   const auto& misfit = fit.misfit;
@@ -112,6 +113,7 @@ std::string closure_json(const ShownMap& map, const mapfile::ClosureInfo& info) 
           : FieldJson(nullptr);
   out["links"] = FieldJson::array();
   for (const mapfile::ClosureFit& fit : info.closures) out["links"].push_back(link_json(map, info, fit));
+  out["by_hand"] = info.word && !info.word->by_hand.empty();
   out["evidence"] = FieldJson::array();
   if (info.verdict) {
     out["finder"] = to_string(info.verdict->finder);
@@ -122,7 +124,7 @@ std::string closure_json(const ShownMap& map, const mapfile::ClosureInfo& info) 
   return text_of(out);
 }
 
-std::string poses_json(const ShownMap& map) {
+std::string poses_json(const ShownMap& map, const std::map<SubmapId, double>& sigma_m) {
   const auto holding = closures_holding(map.content.submaps, map.map);
   const auto accepted = std::ranges::count_if(map.map.closures, &server::JudgedClosure::accepted);
   FieldJson submaps = FieldJson::object();
@@ -133,6 +135,7 @@ std::string poses_json(const ShownMap& map) {
     for (const FieldJson& number : pose_json(node->T_world_body)) entry.push_back(number);
     const auto held = holding.find(id);
     entry.push_back(held == holding.end() ? 0 : held->second);
+    if (const auto sigma = sigma_m.find(id); sigma != sigma_m.end()) entry.push_back(rounded(sigma->second));
   }
   return text_of({{"revision", map.revision},
                   {"accepted", accepted},
@@ -141,6 +144,34 @@ std::string poses_json(const ShownMap& map) {
 }
 
 }  // namespace
+
+Pose3 between_submaps(const ShownMap& map, const SubmapPair& pair, const LoopClosure& closure) {
+  return in_submap(map, pair.first, closure.from) * closure.measurement.T_a_b *
+         in_submap(map, pair.second, closure.to).inverse();
+}
+
+std::string pose_text(const Pose3& pose) { return text_of(pose_json(pose)); }
+
+Result<Pose3> pose_of_text(const std::string& json) {
+  const FieldJson numbers = FieldJson::parse(json, nullptr, false);
+  if (!numbers.is_array() || numbers.size() != 7 ||
+      !std::ranges::all_of(numbers, [](const FieldJson& one) { return one.is_number(); }))
+    return fail(ErrorCode::parse, "a pose: expected [x, y, z, qx, qy, qz, qw]");
+  Pose3 out;
+  for (int i = 0; i < 3; ++i) out.translation(i) = numbers[static_cast<std::size_t>(i)];
+  for (int i = 0; i < 4; ++i) out.rotation.coeffs()(i) = numbers[static_cast<std::size_t>(3 + i)];
+  const double norm = out.rotation.norm();
+  if (!out.translation.allFinite() || out.translation.norm() > 1e7 || !(std::abs(norm - 1.0) < 1e-3))
+    return fail(ErrorCode::parse, "a pose: expected metres and a unit quaternion");
+  out.rotation.normalize();
+  return out;
+}
+
+std::string evidence_text(const std::vector<Refusal>& evidence) {
+  FieldJson out = FieldJson::array();
+  for (const Refusal& refusal : evidence) out.push_back(evidence_json(refusal));
+  return text_of(out);
+}
 
 MapMessages map_messages(const ShownMap& map) {
   const double time_s = map.time - Timestamp{};
@@ -153,7 +184,9 @@ MapMessages map_messages(const ShownMap& map) {
   }
   for (const mapfile::ClosureInfo& info : mapfile::closures(map.content, map.map))
     out.closures.push_back({"closure/" + info.name, time_s, closure_json(map, info)});
-  out.poses = {"poses", time_s, poses_json(map)};
+  Comparisons comparisons = compare_all(map);
+  out.disagreements = std::move(comparisons.messages);
+  out.poses = {"poses", time_s, poses_json(map, comparisons.sigma_m)};
   return out;
 }
 

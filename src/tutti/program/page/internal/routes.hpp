@@ -42,19 +42,44 @@ class WordInbox {
   std::vector<program::AskedWord> asked_;
 };
 
+/// The last map that the server has shown.
+class LastMap {
+ public:
+  void set(std::shared_ptr<const mapfile::ShownMap> map) {
+    const std::scoped_lock lock(mutex_);
+    map_ = std::move(map);
+  }
+  /// Null: there was none yet.
+  [[nodiscard]] std::shared_ptr<const mapfile::ShownMap> get() const {
+    const std::scoped_lock lock(mutex_);
+    return map_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::shared_ptr<const mapfile::ShownMap> map_;
+};
+
 /// What the page's threads share.
 struct Site {
   explicit Site(const program::ViewedMission& mission)
-      : mission_name(mission.name), sign_in(mission.pki), clouds(node::SubmapFrames::of(mission.map)) {}
+      : mission_name(mission.name),
+        store(mission.map),
+        finder(mission.finder),
+        sign_in(mission.pki),
+        clouds(node::SubmapFrames::of(mission.map)) {}
 
   bool is_secure = false;
   const std::string mission_name;
+  const storage::TableStore& store;  ///< The map's.
+  const std::shared_ptr<const server::ClosureFinder> finder;
   const std::uint32_t incarnation = program::any_incarnation();
   SignIn sign_in;
   LiveBoard board;
   WordInbox words;
   Metrics metrics;
   std::shared_ptr<const node::SubmapFrames> clouds;
+  LastMap last_map;
 };
 
 /// Everything that the page asks for (docs/page.md). `site` outlives the server.
