@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
-import { Browser } from "./chromium.mjs";
+import { Browser, WEBGL } from "./chromium.mjs";
 import { FakeMission } from "./fake_mission.mjs";
 import { fill, recorded_mission } from "./fake_report.mjs";
 import { FakeServer } from "./fake_server.mjs";
@@ -230,6 +230,45 @@ test("a report opens as a file without a network, and its time can be scrubbed",
   assert.deepEqual(page.requests.filter((url) => !/^(file|data|blob):/.test(url)), [], "nothing is fetched");
   await page.close();
 });
+
+test("WebGL draws the same picture as the CPU, in all colours, heights and sections", async () => {
+  const mission = new FakeMission({ submaps: 8 });
+  const server = await new FakeServer(mission).start();
+  const with_webgl = await Browser.launch(WEBGL);
+  const pages = [await browser.open(`http://127.0.0.1:${server.port}/?draw=cpu`), await with_webgl.open(`http://127.0.0.1:${server.port}/?draw=gpu`)];
+  const shares = [];
+  for (const page of pages) {
+    await page.until("clouds are drawn", () => tutti.view.last.points >= 24 * 6000, undefined, 30_000);
+    const counts = [];
+    for (const options of [{ edges: false }, { low_m: 0.5 }, { low_m: null, section: true, section_at: [10, 0], section_rad: 1.5708, section_half_m: 4 }, { section: false, colour: "height" }]) {
+      await page.evaluate((o) => (tutti.app.set_options(o), tutti.view.eye.look_at([20, 0, 0], 60)), options);
+      await page.pause(400);
+      counts.push(await page.pixels());
+    }
+    shares.push(counts);
+    assert.deepEqual(page.errors, []);
+  }
+  console.log(`    pixels that are not background: CPU ${shares[0]}, WebGL ${shares[1]}`);
+  shares[0].forEach((n, i) => assert.ok(n > 500 && Math.abs(shares[1][i] - n) < 0.15 * n, `picture ${i}: ${n} and ${shares[1][i]} pixels`));
+  await with_webgl.close();
+  await server.stop();
+});
+
+test("a distance is measured between two places", () =>
+  served(new FakeMission(), async (page) => {
+    await page.until("clouds", () => tutti.view.last.points > 0);
+    await page.press("Measure");
+    await page.evaluate(() => tutti.view.eye.top());
+    await page.pause(300);
+    for (const id of ["0:1/1", "0:1/4"]) {
+      await page.click_in(".middle .view", await page.evaluate((name) => tutti.view.eye.project(tutti.app.world.placed.get(name).target).slice(0, 2), id));
+      await page.pause(200);
+    }
+    const measured = await page.evaluate(() => tutti.view.tool.spots.map((s) => s.world));
+    const way = Math.hypot(measured[0][0] - measured[1][0], measured[0][1] - measured[1][1]);
+    assert.ok(Math.abs(way - 27) < 1.5, `${way} m; three submaps of 9 m`);
+    await page.press("Stop");
+  }));
 
 test("a hundred robots and a million points: the first picture, frames a second, memory", async () => {
   const robots = Array.from({ length: 100 }, (_, i) => `r${String(i).padStart(2, "0")}`);

@@ -2,12 +2,15 @@
 // A headless Chromium without a GPU and without a network beyond loopback, and what tests do on a page.
 import puppeteer from "puppeteer-core";
 
-const kFlags = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync", "--js-flags=--expose-gc"];
+const kNoGpu = ["--disable-gpu"];
+/** WebGL in software: slow, but the same pictures as a GPU makes. */
+export const WEBGL = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
+const kFlags = ["--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync", "--js-flags=--expose-gc"];
 
 export class Browser {
-  static async launch() {
+  static async launch(graphics = kNoGpu) {
     const out = new Browser();
-    out.browser = await puppeteer.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: kFlags });
+    out.browser = await puppeteer.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: [...kFlags, ...graphics] });
     return out;
   }
   async open(url, { width = 1280, height = 800, light = false } = {}) {
@@ -71,6 +74,7 @@ export class Page {
   /** Pixels of the points' picture that are not background. */
   pixels() {
     return this.page.evaluate(() => {
+      tutti.view.draw(); // WebGL forgets its picture once it is shown
       const { canvas } = tutti.view.painter;
       const copy = document.createElement("canvas");
       Object.assign(copy, { width: canvas.width, height: canvas.height });

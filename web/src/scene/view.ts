@@ -53,9 +53,10 @@ export class View {
   private draw_listeners: (() => void)[] = [];
   private distance: SurveyDistance | null = null;
 
-  constructor(private readonly app: App, force_cpu = false) {
+  /** `wanted`: "cpu" or "gpu" instead of what the machine has. */
+  constructor(private readonly app: App, wanted: string | null = null) {
     this.element.className = "view";
-    this.painter = this.gpu && !force_cpu ? new GpuPainter() : new CpuPainter();
+    this.painter = (wanted ?? (this.gpu ? "gpu" : "cpu")) === "gpu" ? new GpuPainter() : new CpuPainter();
     this.eye = new Eye(this.element, () => this.move());
     this.ink = new Ink(this.eye);
     this.element.append(this.painter.canvas, this.ink.canvas);
