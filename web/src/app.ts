@@ -54,6 +54,9 @@ export class App {
     this.phase = this.live ? memory.read<Phase>("phase", "explore") : "debrief";
     if (!(this.phase in PHASES)) this.phase = "explore";
     this.options = default_options();
+    this.store.on_change((changed) => {
+      if (changed.has("mission") && this.store.get("mission")?.mode === "compare") this.options.layers.estimates = true;
+    });
     this.store.on_change(() => this.refresh("data"));
   }
 

@@ -22,7 +22,7 @@ function mission(value: unknown): s.Mission {
     name: text(f.name, "name"),
     description: words(f.description, "description"),
     version: words(f.version, "version"),
-    mode: f.mode === "report" ? "report" : "live",
+    mode: f.mode === "report" || f.mode === "compare" ? f.mode : "live",
     duration_s: maybe(f.duration_s, "duration_s"),
     robots: maybe_list(f.robots, "robots", text),
   };
@@ -199,10 +199,17 @@ function refused(value: unknown, what: string): s.Refused {
 function disagreement(value: unknown): s.Disagreement {
   const f = fields(value, "disagreement");
   return {
-    scales: list(f.scales, "scales", words),
+    robot: maybe(f.robot, "robot"),
+    scale_length_m: list(f.scale_length_m, "scale_length_m", number),
     nodes: list(f.nodes, "nodes", (n, what) => {
       const e = fields(n, what);
-      return { submap: text(e.submap, "submap"), t: number(e.t, "t"), d: list(e.d, "d", number) };
+      const significance = list(e.significance, "significance", number);
+      return { submap: e.submap ? text(e.submap, "submap") : null, t: number(e.t, "t"), distance_m: count(e.distance_m, "distance_m"), d_m: maybe_list(e.d, "d", number), significance };
+    }),
+    origins: maybe_list(f.origins, "origins", (o, what) => {
+      const e = fields(o, what);
+      const n = (key: string) => count(e[key], key);
+      return { from_s: n("from_s"), until_s: n("until_s"), translation_m: n("translation_m"), rotation_rad: n("rotation_rad"), significance: n("significance"), alert: e.alert === true };
     }),
   };
 }
@@ -212,7 +219,7 @@ function trajectory(value: unknown): s.Trajectory {
   const rows = list(f.points, "points", (p, what) => numbers<[number, number, number, number]>(p, what, 4));
   const points = new Float64Array(rows.length * 4);
   rows.forEach((row, i) => points.set(row, 4 * i));
-  return { component: count(f.component, "component"), name: words(f.name, "name"), points };
+  return { robot: maybe(f.robot, "robot"), component: count(f.component, "component"), name: words(f.name, "name"), points };
 }
 
 function errors(value: unknown): s.Errors {
@@ -220,12 +227,12 @@ function errors(value: unknown): s.Errors {
   const names = list(f.names, "names", text);
   const rows = list(f.points, "points", (p, what) => list(p, what, maybe));
   const columns = [0, ...names].map((_, c) => Float64Array.from(rows, (row) => row[c] ?? Number.NaN));
-  return { names, columns };
+  return { robot: maybe(f.robot, "robot"), against: words(f.against, "against"), names, columns };
 }
 
 function survey(value: unknown): s.Survey {
   const f = fields(value, "survey");
-  return { points: count(f.points, "points"), cloud: text(f.cloud, "cloud") };
+  return { component: count(f.component, "component"), cloud: text(f.cloud, "cloud") };
 }
 
 /** Photos are pictures inside the message; anything else could be fetched from elsewhere. */
@@ -259,7 +266,8 @@ export const DECODERS: { [K in s.Kind]: (value: unknown, ids: IdTable) => s.Valu
   survey,
   report: (value) => fields(value, "report"),
   timing: (value) => fields(value, "timing"),
-  settings: (value) => ({ text: text(fields(value, "settings").text, "text") }),
+  settings: (value) => text(value, "settings"),
+  compare: (value) => fields(value, "compare"),
   odometry: (value) => new Map(Object.entries(fields(fields(value, "odometry").submaps, "submaps")).map(([id, T]) => [id, pose(T, id)])),
   mark,
 };

@@ -45,18 +45,24 @@ export function robots_at(store: Store, t: number, now: number): RobotView[] {
     if (!robot) by_number.set(submap.robot, (robot = { status: null, submaps: [] }));
     robot.submaps.push(submap);
   }
+  const names = new Map<number, string>();
+  if (by_number.size === 0)
+    for (const [, { robot, name }] of store.all("trajectory", t)) {
+      by_number.set(robot ?? 0, { status: null, submaps: [] });
+      names.set(robot ?? 0, name);
+    }
   const sorted = [...by_number].sort(([a], [b]) => a - b);
-  return sorted.map(([number, { status: own, submaps }], place) => view_of(store, t, age, number, place, own, submaps));
+  return sorted.map(([number, { status: own, submaps }], place) => view_of(store, t, age, number, place, own, submaps, names.get(number)));
 }
 
-function view_of(store: Store, t: number, age_s: number, number: number, index: number, status: RobotStatus | null, submaps: Submap[]): RobotView {
+function view_of(store: Store, t: number, age_s: number, number: number, index: number, status: RobotStatus | null, submaps: Submap[], otherwise?: string): RobotView {
   submaps.sort((a, b) => a.until_s - b.until_s);
   const newest = submaps.at(-1) ?? null;
   const silent_s = status?.last_seen_s_ago == null ? null : status.last_seen_s_ago + age_s;
   const presence = presence_of(status, silent_s);
   const speed_mps = speed_of(submaps.slice(-3));
   const away = presence === "silent" || presence === "lost";
-  const name = status?.name || newest?.name.split("/")[0] || `robot ${number}`;
+  const name = status?.name || newest?.name.split("/")[0] || otherwise || `robot ${number}`;
   const reach_m = away && silent_s !== null ? Math.min(REACH_M, Math.max(speed_mps, SLOWEST_MPS) * silent_s) : 0;
   return { number, index, name, status, presence, silent_s, newest, submaps: submaps.length, speed_mps, reach_m, drain: drain_of(store, t, number) };
 }
@@ -144,8 +150,8 @@ export function correction_between(store: Store, t: number, before: Poses, after
 /** Ways between the mission's first and last message, for the time line. */
 export function time_range(store: Store, now: number): { first: number; last: number } {
   const mission = store.get("mission");
-  const last = Math.max(now, store.newest, mission?.mode === "report" ? (mission.duration_s ?? 0) : 0);
-  return { first: mission?.mode === "report" ? 0 : Math.min(store.oldest, last), last };
+  const last = Math.max(now, store.newest, mission && mission.mode !== "live" ? (mission.duration_s ?? 0) : 0);
+  return { first: mission && mission.mode !== "live" ? 0 : Math.min(store.oldest, last), last };
 }
 
 
@@ -153,6 +159,17 @@ export function time_range(store: Store, now: number): { first: number; last: nu
 /** The worst disagreement of every submap with its robot's odometry, over all scales. */
 export function worst_disagreement(store: Store, t: number): Map<SubmapId, number> {
   const out = new Map<SubmapId, number>();
-  for (const [, { nodes }] of store.all("disagreement", t)) for (const { submap, d } of nodes) out.set(submap, Math.max(out.get(submap) ?? 0, ...d));
+  const submaps = [...store.all("submap", t)].map(([, submap]) => submap);
+  for (const [, { robot, nodes }] of store.all("disagreement", t))
+    for (const node of nodes) {
+      const id = node.submap ?? submap_at(submaps, robot, node.t)?.id;
+      if (id) out.set(id, Math.max(out.get(id) ?? 0, ...node.significance));
+    }
   return out;
 }
+
+/** The submap that a robot drew at time t. */
+export const submap_at = (submaps: Iterable<Submap>, robot: number | null, t: number): Submap | null => {
+  for (const submap of submaps) if (submap.robot === robot && t >= submap.from_s && t <= submap.until_s) return submap;
+  return null;
+};

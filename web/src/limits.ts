@@ -17,6 +17,7 @@ export const LIMITS = {
     report: 1,
     timing: 1,
     settings: 1,
+    compare: 1,
     odometry: 1,
     mark: 8,
   },

@@ -17,7 +17,7 @@ export interface Mission {
   name: string;
   description: string;
   version: string;
-  mode: "live" | "report";
+  mode: "live" | "report" | "compare";
   duration_s: number | null;
   robots: string[];
 }
@@ -152,11 +152,16 @@ export interface Refused {
 }
 
 export interface Disagreement {
-  scales: string[];
-  nodes: { submap: SubmapId; t: number; d: number[] }[];
+  robot: number | null;
+  scale_length_m: number[];
+  /** By scale: the difference, and over what chance explains (above 1 it is none). `submap` only in a running mission. */
+  nodes: { submap: SubmapId | null; t: number; distance_m: number; d_m: number[]; significance: number[] }[];
+  /** Where odometry left the map. */
+  origins: { from_s: number; until_s: number; translation_m: number; rotation_rad: number; significance: number; alert: boolean }[];
 }
 
 export interface Trajectory {
+  robot: number | null;
   component: number;
   name: string;
   /** t, x, y, z after each other. */
@@ -164,13 +169,15 @@ export interface Trajectory {
 }
 
 export interface Errors {
+  robot: number | null;
+  against: string;
   names: string[];
   /** One column of times, and one per name; NaN where not known. */
   columns: Float64Array[];
 }
 
 export interface Survey {
-  points: number;
+  component: number;
   cloud: string;
 }
 
@@ -199,16 +206,14 @@ export interface Values {
   survey: Survey;
   report: Report;
   timing: Report;
-  settings: Settings;
+  /** The effective settings of a mission, YAML. */
+  settings: string;
+  /** compare.json of docs/compare.md. */
+  compare: Report;
   odometry: Map<SubmapId, Pose>;
   mark: Mark;
 }
 export type Kind = keyof Values;
-
-/** The effective settings of a mission, as a file. */
-export interface Settings {
-  text: string;
-}
 
 /** report.json and timing.json of docs/report.md; read where they are shown. */
 export type Report = Record<string, unknown>;

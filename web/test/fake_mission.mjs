@@ -157,8 +157,9 @@ export class FakeMission {
   }
 
   disagreement(robot) {
-    const nodes = this.submaps.filter((s) => s.robot === robot).map((s) => ({ submap: s.id, t: s.from_s, d: [0.3 + 0.02 * s.index, 0.4 + (s.index > 12 && s.index < 16 ? 2.1 : 0.2), 0.2, 0.1].map((x) => x * (1 + 0.2 * robot)) }));
-    return { scales: ["120 m", "40 m", "13 m", "4 m"], nodes };
+    const nodes = this.submaps.filter((s) => s.robot === robot).map((s) => ({ submap: s.id, t: s.from_s, distance_m: 9 * s.index, d: [1, 0.3, 0.1, 0.1], significance: [0.3 + 0.02 * s.index, 0.4 + (s.index > 12 && s.index < 16 ? 2.1 : 0.2), 0.2, 0.1].map((x) => x * (1 + 0.2 * robot)) }));
+    const origins = robot === 0 ? [] : [{ from_s: 120, until_s: 150, scale: 1, place: [0, 0, 0], translation_m: 0.42, rotation_rad: 0.03, significance: 2.6, alert: robot === 2 }];
+    return { robot, component: 0, scale_length_m: [120, 40, 13, 4], nodes, origins };
   }
 
   message(key, value) {

@@ -39,7 +39,7 @@ export function recorded_mission({ robots = ["alpha", "bravo"], submaps = 36, po
   say("refusals", [{ reason: "overlap", count: 812 }, { reason: "no alignment comes near", count: 640 }]);
   say("report", JSON.parse(read("./data/report.json")));
   say("timing", JSON.parse(read("./data/timing.json")));
-  say("settings", { text: "mission: demo\nseed: 1\nrobots:\n  - name: alpha\n" });
+  say("settings", "mission: demo\nseed: 1\nrobots:\n  - name: alpha\n");
   add_survey(mission, say, clouds);
   return { messages, clouds };
 }
@@ -59,11 +59,11 @@ function add_estimates(mission, say, robot, r) {
       points.server.push([t, ...p]);
       points.corrected.push([t, p[0] + 0.03, p[1], p[2]]);
       points.onboard.push([t, p[0] + drift, p[1] - drift, p[2]]);
-      errors.push([t, 0.02 + Math.SQRT2 * drift, 0.05 + 0.02 * Math.sin(t / 9), t < 20 ? null : 0.04 + 0.015 * Math.sin(t / 7)]);
+      errors.push([t, 0.02 + Math.SQRT2 * drift, 0.05 + 0.02 * Math.sin(t / 9), t < 20 ? null : 0.04 + 0.015 * Math.sin(t / 7), t < 20 ? null : 0.2 + 0.1 * Math.sin(t / 11), t]);
     }
   }
-  for (const [kind, list] of Object.entries(points)) say(`trajectory/${robot}/${kind}`, { component: 0, name: robot, points: list });
-  say(`errors/${robot}`, { names: ["onboard", "corrected", "server"], points: errors });
+  for (const [kind, list] of Object.entries(points)) say(`trajectory/${robot}/${kind}`, { robot: r, component: 0, name: robot, points: list });
+  say(`errors/${robot}`, { robot: r, names: ["onboard", "corrected", "server", "born", "distance"], against: "reference", points: errors });
   say(`disagreement/${robot}`, mission.disagreement(r));
 }
 
@@ -83,7 +83,7 @@ function add_survey(mission, say, clouds) {
     [T[0] + Math.cos(yaw) * x - Math.sin(yaw) * y, T[1] + Math.sin(yaw) * x + Math.cos(yaw) * y, T[2] + z].forEach((v, o) => bytes.writeInt16LE(Math.round(v / 0.005), 8 + 6 * i + 2 * o));
   }
   clouds.survey = bytes.toString("base64");
-  say("survey", { points: n, cloud: "survey" });
+  say("survey", { cloud: "survey", component: 0 });
   const odometry = {};
   for (const s of submaps) {
     const T = mission.truth(s.robot, s.index);

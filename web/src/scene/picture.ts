@@ -8,7 +8,7 @@ import { transform } from "../pose";
 import { POSE_ROW } from "../schema";
 import type { Closure, ClosureState, Vec3 } from "../schema";
 import type { Ink } from "./ink";
-import { place_at, point_at, position_of } from "./where";
+import { estimate_at, place_at, point_at, position_of } from "./where";
 
 export interface Palette {
   ink: string;
@@ -62,15 +62,16 @@ const kEstimates: Record<string, { dash: number[]; width: number }> = {
   onboard: { dash: [6, 4], width: 1.4 },
   corrected: { dash: [], width: 1.4 },
   reference: { dash: [1, 5], width: 1.6 },
+  server: { dash: [], width: 2.4 },
 };
 
 /** A report's other estimates, as far as the time that is shown. */
 function draw_estimates(app: App, ink: Ink, palette: Palette): void {
   for (const [name, trajectory] of app.store.all("trajectory")) {
     const [robot, kind] = name.split("/");
-    const style = kEstimates[kind];
-    if (!style) continue;
-    const index = app.robots.find((r) => r.name === trajectory.name || r.name === robot || String(r.number) === robot)?.index ?? 0;
+    const style = kEstimates[kind] ?? kEstimates.corrected;
+    if (kind === "server" && app.world.placed.size > 0) continue; // the tracks
+    const index = app.robots.find((r) => r.number === trajectory.robot || r.name === robot)?.index ?? 0;
     const offset = app.world.offset_of(trajectory.component);
     const points: number[][] = [];
     for (let i = 0; i < trajectory.points.length; i += 4) {
@@ -188,12 +189,12 @@ function draw_part_names(app: App, ink: Ink, palette: Palette): void {
 /** Where everybody was at the moment that somebody points at in a plot; in a report, by every estimate. */
 function draw_cursor(app: App, ink: Ink, palette: Palette, t: number): void {
   for (const robot of app.robots) {
-    const at = place_at(app, robot.number, t);
+    const at = place_at(app, robot.number, t) ?? estimate_at(app, robot.number, t);
     if (!at) continue;
     ink.dot(at, 7, css(robot_rgb(robot.index, app.dark)), palette.ink);
     ink.label(at, `${robot.name} at ${moment(t)}`, palette.ink, palette.halo, undefined, true);
     for (const [name, trajectory] of app.store.all("trajectory")) {
-      if (trajectory.name !== robot.name && name.split("/")[0] !== robot.name) continue;
+      if (trajectory.robot !== robot.number && name.split("/")[0] !== robot.name) continue;
       const other = point_at(trajectory.points, t);
       const kind = name.split("/")[1];
       if (!other || kind === "server") continue;

@@ -74,7 +74,7 @@ export class View {
   fit(from_above = false): void {
     this.followed = null;
     this.eye.fit(this.app.world.low, this.app.world.high, from_above);
-    this.fitted = this.app.world.placed.size > 0;
+    this.fitted = true;
   }
   use(tool: Tool | null): void {
     this.tool = tool;
@@ -122,7 +122,7 @@ export class View {
 
   private hear(topic: string): void {
     if (topic === "link" || topic === "me") return;
-    if (!this.fitted && this.app.world.placed.size > 0 && this.app.ready) this.fit();
+    if (!this.fitted && this.app.ready && this.app.robots.some((r) => r.newest || !this.app.live)) this.fit();
     this.dirty = true;
   }
 
@@ -190,7 +190,7 @@ export class View {
     if (!survey) return;
     this.app.clouds.want(survey.cloud);
     const cloud = this.app.clouds.get(survey.cloud);
-    if (cloud) clouds.set(survey.cloud, this.dresser.survey(cloud, this.eye, dressing, this.app.world.offset_of(0)));
+    if (cloud) clouds.set(survey.cloud, this.dresser.survey(cloud, this.eye, dressing, this.app.world.offset_of(survey.component)));
   }
 
   private listen(): void {

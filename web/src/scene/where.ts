@@ -28,6 +28,16 @@ export function place_at(app: App, robot: number, t: number): Vec3 | null {
   return null;
 }
 
+/** The same by a report's estimates, the best one that knows. */
+export function estimate_at(app: App, robot: number, t: number): Vec3 | null {
+  for (const kind of ["server", "reference", "corrected", "onboard"])
+    for (const [name, trajectory] of app.store.all("trajectory")) {
+      const at = name.endsWith(`/${kind}`) && trajectory.robot === robot ? point_at(trajectory.points, t) : null;
+      if (at) return at.map((x, k) => x + app.world.offset_of(trajectory.component)[k]) as Vec3;
+    }
+  return null;
+}
+
 /** A point of a trajectory (t, x, y, z after each other) at time t; null outside of it. */
 export function point_at(points: Float64Array, t: number): Vec3 | null {
   let low = 0;

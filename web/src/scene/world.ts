@@ -33,7 +33,7 @@ export class World {
     this.poses = store.get_or_first("poses", t);
     const before = this.placed;
     this.placed = new Map();
-    if (!this.poses) return;
+    if (!this.poses) return this.measure_trajectories(store);
     const rows = this.poses.rows;
     this.parts = place_parts(this.poses, store.all("submap", t), (id) => this.row(store, id));
     let moved = false;
@@ -76,6 +76,19 @@ export class World {
   private row(store: Store, id: string): number {
     const place = store.place_of(id);
     return place >= 0 && this.poses && place * POSE_ROW < this.poses.rows.length ? place : -1;
+  }
+
+  /** A comparison of trajectories has no submaps. */
+  private measure_trajectories(store: Store): void {
+    this.low = [Infinity, Infinity, Infinity];
+    this.high = [-Infinity, -Infinity, -Infinity];
+    for (const [, { points }] of store.all("trajectory"))
+      for (let i = 0; i < points.length; i += 4)
+        for (let k = 0; k < 3; ++k) {
+          this.low[k] = Math.min(this.low[k], points[i + 1 + k]);
+          this.high[k] = Math.max(this.high[k], points[i + 1 + k]);
+        }
+    if (!Number.isFinite(this.low[0])) [this.low, this.high] = [[-10, -10, -2], [10, 10, 2]];
   }
 
   private measure(): void {

@@ -10,6 +10,8 @@ export interface Curve {
   colour: string;
   width?: number;
   dash?: number[];
+  /** Filled down to zero. */
+  fill?: boolean;
   values: (number | null)[];
 }
 
@@ -74,7 +76,7 @@ export class Plot {
         { ...axis, space: 70, size: 30, values: (_u, ticks) => ticks.map((t) => moment(t)) },
         { ...axis, size: 58, values: (_u, ticks) => ticks.map((v) => (v === null ? "" : `${Number(v.toPrecision(6))} ${spec.unit}`)) },
       ],
-      series: [{}, ...spec.curves.map((c) => ({ label: c.label, stroke: c.colour, width: c.width ?? 1.4, dash: c.dash, points: { show: false }, spanGaps: false }))],
+      series: [{}, ...spec.curves.map((c) => ({ label: c.label, stroke: c.colour, width: c.width ?? 1.4, dash: c.dash, fill: c.fill ? `color-mix(in srgb, ${c.colour} 35%, transparent)` : undefined, points: { show: false }, spanGaps: false }))],
       hooks: {
         drawClear: [(u) => this.background(u)],
         setCursor: [(u) => {

@@ -116,6 +116,6 @@ function notes(report: Node): HTMLElement | null {
 }
 
 function settings(app: App): HTMLElement | null {
-  const text = app.store.get("settings")?.text;
+  const text = app.store.get("settings");
   return text ? h("details", {}, h("summary", {}, "Effective settings"), h("pre", {}, text)) : null;
 }

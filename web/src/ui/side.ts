@@ -6,6 +6,7 @@ import type { View } from "../scene/view";
 import { alerts_panel, open_alerts } from "./alerts";
 import { by_hand_panel } from "./by_hand";
 import { closures_panel } from "./closures";
+import { compare_panel } from "./compare";
 import { disagreement_panel } from "./disagreement";
 import { button, h, panel } from "./dom";
 import { inspector_panel } from "./inspector";
@@ -25,9 +26,10 @@ interface Tab {
 /** To add a tab, add a row. */
 const TABS: Tab[] = [
   { name: "report", title: () => "Report", offered: (app) => app.store.get("report") !== null, make: report_panel },
-  { name: "robots", title: () => "Robots", offered: (app) => !app.live, make: robots_panel },
-  { name: "alerts", title: (app) => `Alerts${open_alerts(app).length ? ` ${open_alerts(app).length}` : ""}`, offered: () => true, make: alerts_panel },
-  { name: "closures", title: () => "Closures", offered: () => true, make: closures_panel },
+  { name: "compare", title: () => "Comparison", offered: (app) => app.store.get("compare") !== null, make: compare_panel },
+  { name: "robots", title: () => "Robots", offered: (app) => !app.live && app.world.placed.size > 0, make: robots_panel },
+  { name: "alerts", title: (app) => `Alerts${open_alerts(app).length ? ` ${open_alerts(app).length}` : ""}`, offered: (app) => app.live || app.store.track("alerts") !== null, make: alerts_panel },
+  { name: "closures", title: () => "Closures", offered: (app) => app.live || !app.store.all("closure").next().done, make: closures_panel },
   { name: "by hand", title: () => "By hand", offered: (app) => app.may("register"), make: by_hand_panel },
   { name: "why", title: () => "Why not?", offered: (app) => app.may("why"), make: why_panel },
   { name: "disagreement", title: () => "Odometry", offered: (app) => [...app.store.all("disagreement", app.at())].length > 0, make: disagreement_panel },
@@ -52,7 +54,7 @@ export function side_panel(app: App, view: View): HTMLElement {
   const bar = panel(app, ["data", "options", "me", "time"], { class: "tabs", role: "tablist" }, () => {
     const offered = TABS.filter((t) => t.offered(app));
     if (phase !== app.phase || (app.ready && !offered.some((t) => t.name === tab))) {
-      const wanted = phase === app.phase ? "alerts" : PHASES[app.phase].tab;
+      const wanted = [phase === app.phase ? "" : PHASES[app.phase].tab, ...offered.map((t) => t.name)].find((name) => offered.some((t) => t.name === name))!;
       phase = app.phase;
       queueMicrotask(() => show(wanted));
     }
