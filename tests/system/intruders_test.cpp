@@ -109,13 +109,14 @@ class IntrudersSystem : public ::testing::Test {
   std::vector<std::unique_ptr<Running>> robots_;
 };
 
-/// What a robot that was lost, a worker and a viewer send, again and again while the mission runs.
+/// What a robot that was lost, a worker, a viewer and a second program with alpha's credential send, again and again
+/// while the mission runs.
 void intrude(const bus::NatsConnection& connection) {
   NodeStatus bravo{.name = "bravo", .version = "0"};
   bravo.session = test::kSession + 1;
   for (const auto& [subject, bytes] : std::vector<std::pair<std::string, std::string>>{
            {"mission.small.robot.1.status", wire::encode(bravo)},
-           {"mission.small.robot.9.status", wire::encode(bravo)},  // its own subject, another's name
+           {"mission.small.robot.0.status", wire::encode(bravo)},  // with alpha's credential: another's name
            {"mission.small.robot.1.submap", "forged"},
            {"$KV.GRAPH_small.robot.1.receipt", "forged"},
            {"$KV.GRAPH_small.robot.1.proxy_graph", "forged"},
@@ -138,7 +139,7 @@ TEST_F(IntrudersSystem, AMissionWithRightsGivesTheSameMapWhateverIntrudersTry) {
   ASSERT_FALSE(HasFatalFailure());
   start_worker();
   std::vector<std::shared_ptr<bus::NatsConnection>> intruders;
-  for (const char* name : {"lost", "w", "vera"}) intruders.push_back(connect(name));
+  for (const char* name : {"lost", "w", "vera", "alpha"}) intruders.push_back(connect(name));
   ASSERT_TRUE(std::ranges::all_of(intruders, [](const auto& one) { return one != nullptr; }));
   for (const std::string& name : kNames) start_robot(name);
   const auto robots_end = [&] { return std::ranges::all_of(robots_, [](const auto& robot) { return robot->over(); }); };
@@ -152,8 +153,9 @@ TEST_F(IntrudersSystem, AMissionWithRightsGivesTheSameMapWhateverIntrudersTry) {
   ASSERT_TRUE(pki_->revoke("lost"));
   EXPECT_TRUE(within(10.0, [&] { return !intruders.front()->connected(); })) << "the server looks every second";
   EXPECT_TRUE(test::server_ends(folder_ / "server"));
-  for (const char* told : {"the bus refuses robot lost", "the bus refuses worker w", "the bus refuses viewer vera",
-                           "publish mission.small.robot.1."})
+  for (const char* told :
+       {"the bus refuses robot lost", "the bus refuses worker w", "the bus refuses viewer vera",
+        "publish mission.small.robot.1.", "number 0 is robot 'alpha' by its credential, not 'bravo'"})
     EXPECT_TRUE(within(10.0, [&] { return log().find(told) != std::string::npos; })) << told;
   intruders.clear();
   robots_.clear();

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <set>
 
 namespace tutti::bus {
 namespace {
@@ -91,6 +92,40 @@ std::string quoted(const std::vector<std::string>& subjects) {
   return out;
 }
 
+std::string subject_of(const BusRight& right, const std::string& mission, const std::string& number,
+                       const std::string& name) {
+  return fmt::format(fmt::runtime(right.subject), fmt::arg("mission", mission), fmt::arg("number", number),
+                     fmt::arg("name", name));
+}
+
+std::string user_block(const KeyedUser& one) {
+  return fmt::format(
+      "      # {}\n      {{ nkey: {}, permissions: {{\n        publish: {{ allow: [{}] }}\n        subscribe: {{ "
+      "allow: "
+      "[{}] }} }} }}\n",
+      to_string(one.user), one.key, quoted(subjects_of(one.user, BusRight::To::publish)),
+      quoted(subjects_of(one.user, BusRight::To::subscribe)));
+}
+
+/// What passes between the accounts: all that members publish and subscribe to, but their inboxes.
+struct Passages {
+  std::string exports, imports;
+};
+Passages passages_of(const std::string& mission) {
+  Passages out;
+  std::set<std::string> seen;
+  for (const BusRight& right : kRights) {
+    const std::string subject = subject_of(right, mission, "*", "*");
+    if (right.role == BusRole::server || subject.starts_with("_INBOX.") || !seen.insert(subject).second) continue;
+    const char* const kind = right.to == BusRight::To::publish ? "service" : "stream";
+    const bool is_answered_often = subject.starts_with("$JS.API.CONSUMER.MSG.NEXT.");
+    out.exports += fmt::format("      {{ {}: \"{}\", accounts: [MEMBERS]{} }}\n", kind, subject,
+                               is_answered_often ? ", response_type: stream" : "");
+    out.imports += fmt::format("      {{ {}: {{ account: SERVER, subject: \"{}\" }} }}\n", kind, subject);
+  }
+  return out;
+}
+
 }  // namespace
 
 std::span<const BusRight> bus_rights() { return kRights; }
@@ -99,20 +134,19 @@ std::vector<std::string> subjects_of(const BusUser& user, BusRight::To to) {
   std::vector<std::string> out;
   for (const BusRight& right : kRights)
     if (right.role == user.role && right.to == to)
-      out.push_back(fmt::format(fmt::runtime(right.subject), fmt::arg("mission", user.mission),
-                                fmt::arg("number", user.number), fmt::arg("name", user.name)));
+      out.push_back(subject_of(right, user.mission, std::to_string(user.number), user.name));
   return out;
 }
 
-std::string authorization(const std::vector<KeyedUser>& users) {
-  std::string out = "authorization {\n  timeout: 2\n  users: [\n";
-  for (const KeyedUser& one : users)
-    out += fmt::format(
-        "    # {}\n    {{ nkey: {}, permissions: {{\n      publish: {{ allow: [{}] }}\n      subscribe: {{ allow: [{}] "
-        "}} }} }}\n",
-        to_string(one.user), one.key, quoted(subjects_of(one.user, BusRight::To::publish)),
-        quoted(subjects_of(one.user, BusRight::To::subscribe)));
-  return out + "  ]\n}\n";
+std::string authorization(const std::string& mission, const std::vector<KeyedUser>& users) {
+  std::string servers, members;
+  for (const KeyedUser& one : users) (one.user.role == BusRole::server ? servers : members) += user_block(one);
+  const Passages between = passages_of(mission);
+  return fmt::format(
+      "authorization {{ timeout: 2 }}\naccounts {{\n"
+      "  SERVER {{\n    jetstream: enabled\n    users: [\n{}    ]\n    exports: [\n{}    ]\n  }}\n"
+      "  MEMBERS {{\n    users: [\n{}    ]\n    imports: [\n{}    ]\n  }}\n}}\n",
+      servers, between.exports, members, between.imports);
 }
 
 }  // namespace tutti::bus

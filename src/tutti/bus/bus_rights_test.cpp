@@ -61,7 +61,7 @@ TEST(BusRightsTest, OnlyTheServerChangesStreams) {
 }
 
 TEST(BusRightsTest, TheConfigurationNamesEveryUserAndSubject) {
-  const std::string text = authorization({{kAlpha, "UALPHA"}, {kAnna, "UANNA"}});
+  const std::string text = authorization("cave", {{kAlpha, "UALPHA"}, {kAnna, "UANNA"}});
   for (const char* part : {"nkey: UALPHA", "nkey: UANNA", "\"mission.cave.robot.7.submap\"", "\"_INBOX.operator.1.>\"",
                            "\"mission.cave.operator.anna.word\"", "# robot alpha"})
     EXPECT_NE(text.find(part), std::string::npos) << part << " in: " << text;

@@ -20,8 +20,8 @@ struct NatsChildOptions {
   std::string host = "127.0.0.1";
   int port = 0;
   bool allow_insecure = false;
-  /// The blocks `tls` and `authorization` of nats-server's configuration (pki::Pki::bus_configuration()), and the
-  /// server's own credential; empty: whoever reaches the bus may do all.
+  /// The blocks `tls`, `authorization` and `accounts` of nats-server's configuration (pki::Pki::bus_configuration()),
+  /// and the server's own credential; empty: whoever reaches the bus may do all.
   std::string rights = {};
   BusCredentials credentials = {};
   std::uint64_t max_store_bytes = std::uint64_t{4} << 30U;

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cstdlib>
 #include <utility>
 
 #include "tutti/base/plain_text.hpp"
@@ -30,6 +31,15 @@ constexpr std::int64_t kDeliveries = 5;                   // of a job: what ends
 std::string_view bytes_of(const natsMsg* message) {
   const char* data = natsMsg_GetData(message);
   return {data == nullptr ? "" : data, static_cast<std::size_t>(natsMsg_GetDataLength(message))};
+}
+
+bool is_of_another_subject(natsMsg* message, const std::string& subject) {
+  const char** subjects = nullptr;
+  int count = 0;
+  if (natsMsgHeader_Values(message, "Nats-Subject", &subjects, &count) != NATS_OK) return false;
+  const bool is_other = std::any_of(subjects, subjects + count, [&](const char* asked) { return subject != asked; });
+  std::free(subjects);  // NOLINT: libnats has allocated the array, and keeps the strings
+  return is_other;
 }
 
 std::string submap_stream(const std::string& mission) { return "SUBMAPS_" + mission; }
@@ -204,6 +214,7 @@ Result<std::optional<std::string>> NatsConnection::retained(const std::string& b
   const NatsOwned<natsMsg> message(found);
   if (status == NATS_NOT_FOUND) return std::nullopt;
   if (status != NATS_OK) return failure(status, "asking for " + subject);
+  if (is_of_another_subject(found, subject)) return std::nullopt;
   return std::string(bytes_of(found));
 }
 

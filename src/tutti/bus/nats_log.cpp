@@ -49,9 +49,10 @@ std::string what_of(std::string_view complaint) {
 }  // namespace
 
 /// `[17] 2026/01/31 12:00:00.000000 [ERR] 10.0.0.7:40123 - cid:4 - "v3:C:robot_3" - Publish Violation - Nkey "U..",
-/// Subject "a.b"`; `.. - authentication error - Nkey "U.."`; `.. - TLS handshake error: why`. A client that has proved
-/// nothing chooses the text of the second kind, so that kind is looked for first and no key is believed in it; in the
-/// first kind the client chooses its name, and nothing with blanks behind that.
+/// Subject "a.b"`, or `.., Reply "a.b"`, where an answer was to go; `.. - authentication error - Nkey "U.."`; `.. - TLS
+/// handshake error: why`. A client that has proved nothing chooses the text of the second kind, so that kind is looked
+/// for first and no key is believed in it; in the first kind the client chooses its name, and nothing with blanks
+/// behind that.
 std::optional<BusRefusal> refusal_of(std::string_view line) {
   constexpr std::size_t kLongest = 200;
   const std::size_t level = line.find("[ERR] ");
@@ -72,7 +73,12 @@ std::optional<BusRefusal> refusal_of(std::string_view line) {
   const bool publishes = line.substr(0, at).ends_with("Publish");
   line.remove_prefix(at + kViolation.size());
   out.key = plain_text(line.substr(0, line.find('"')), kLongest);
-  out.what = (publishes ? "publish " : "subscribe ") + plain_text(text_between(line, ", Subject \"", "\""), kLongest);
+  const std::string_view answered = text_between(line, ", Reply \"", "\"");
+  const std::string_view subject = answered.empty() ? text_between(line, ", Subject \"", "\"") : answered;
+  out.what = std::string(!publishes         ? "subscribe "
+                         : answered.empty() ? "publish "
+                                            : "be answered at ") +
+             plain_text(subject, kLongest);
   return out;
 }
 

@@ -20,6 +20,8 @@ TEST(NatsLogTest, SaysWhoWasRefusedWhat) {
             (BusRefusal{"10.0.0.7:35536", kKey, "publish b.x"}));
   EXPECT_EQ(refusal(kBegin + "\"v1:C:a\" - Subscription Violation - Nkey \"" + kKey + "\", Subject \"c.>\", SID 1"),
             (BusRefusal{"10.0.0.7:35536", kKey, "subscribe c.>"}));
+  EXPECT_EQ(refusal(kBegin + "\"v1:C:a\" - Publish Violation - Nkey \"" + kKey + "\", Reply \"$JS.ACK.x\"").what,
+            "be answered at $JS.ACK.x");
   EXPECT_EQ(refusal(kBegin + "TLS handshake error: tls: client didn't provide a certificate"),
             (BusRefusal{"10.0.0.7:35536", "",
                         "showed no certificate of this mission (TLS handshake error: tls: client didn't provide a "

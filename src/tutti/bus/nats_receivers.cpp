@@ -283,8 +283,15 @@ void JetStreamPort::hear_retained() {
          const natsStatus status = natsSubscription_NextMsg(&heard, subscription, kListen_ms);
          const NatsOwned<natsMsg> message(heard);
          if (status != NATS_OK) return status == NATS_TIMEOUT;
-         if (const auto address = address_of(natsMsg_GetSubject(heard)))
+         const std::string at = natsMsg_GetSubject(heard);
+         if (is_of_another_subject(heard, at)) {
+           const std::scoped_lock guard(mutex_);
+           ++refused_;
+           last_error_ =
+               fmt::format("{}: not the server's, but the bus's answer to somebody about another subject", at);
+         } else if (const auto address = address_of(at)) {
            put_retained(address->kind, std::string(bytes_of(heard)));
+         }
          return true;
        });
 }

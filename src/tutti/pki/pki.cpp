@@ -170,7 +170,7 @@ Result<std::string> Pki::bus_configuration(const std::string& now) const {
       "# by `tutti pki`; mission {}, certificate of the bus {:016x}\n"
       "tls {{ cert_file: {}, key_file: {}, ca_file: {}, verify: true, timeout: 2 }}\n{}",
       mission_, content_hash(*own), quoted(kBusCertificate), quoted(kBusKey), quoted(kAuthority),
-      bus::authorization(users));
+      bus::authorization(mission_, users));
 }
 
 Status Pki::make_bus_certificate(int days) const {

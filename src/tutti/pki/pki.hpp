@@ -48,8 +48,8 @@ class Pki {
   /// A new certificate for a member, with the key that it has; with no name for the bus. Whoever is connected stays so.
   Status renew(const std::string& name, int days = kDays);
 
-  /// The blocks `tls` and `authorization` of nats-server's configuration, with the rights of all who are not revoked
-  /// and, at this time (utc_text()), have a certificate that has not expired.
+  /// The blocks `tls`, `authorization` and `accounts` of nats-server's configuration, with the rights of all who are
+  /// not revoked and, at this time (utc_text()), have a certificate that has not expired.
   [[nodiscard]] Result<std::string> bus_configuration(const std::string& now) const;
   [[nodiscard]] const std::string& mission() const { return mission_; }
   [[nodiscard]] const std::vector<Member>& members() const { return members_; }

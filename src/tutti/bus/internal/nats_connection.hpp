@@ -104,7 +104,7 @@ class NatsConnection {
   /// A bucket of values that are gone so many seconds after they were put, made if it is missing; without a number:
   /// null then.
   [[nodiscard]] Result<NatsOwned<kvStore>> bucket(const std::string& name, std::optional<double> lasts_s) const;
-  /// The value retained at this subject; nothing if there is none.
+  /// The value retained at this subject; nothing if there is none, or one that is_of_another_subject().
   [[nodiscard]] Result<std::optional<std::string>> retained(const std::string& bucket,
                                                             const std::string& subject) const;
   /// The message is acknowledged, and the bus has said so.
@@ -129,6 +129,9 @@ class NatsConnection {
 };
 
 std::string_view bytes_of(const natsMsg* message);
+/// The bus has answered a question about a value of another subject, and whoever asked had it answer at this one: the
+/// bus checks where members publish, but not where they are answered.
+bool is_of_another_subject(natsMsg* message, const std::string& subject);
 
 std::string submap_stream(const std::string& mission);
 std::string verdict_stream(const std::string& mission);
