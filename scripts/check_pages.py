@@ -11,8 +11,8 @@ import pathlib
 import re
 import sys
 
-SOURCES = {"src", "apps", "proto", "python", "ros2", "cmake", "tests", "scripts", "bench"}
-SUFFIXES = {".cpp", ".hpp", ".py", ".proto", ".txt", ".cmake", ".sh", ".yaml"}
+SOURCES = {"src", "apps", "proto", "python", "ros2", "cmake", "tests", "scripts", "bench", "web/src", "web/test"}
+SUFFIXES = {".cpp", ".hpp", ".py", ".proto", ".txt", ".cmake", ".sh", ".yaml", ".ts", ".mjs"}
 EXTENDING = "docs/extending.md"
 CODE = re.compile(r"`([^`]+)`")
 COMMAND = re.compile(r"(?:^|[\s;])tutti (?:[a-z]+ ?)+.*")

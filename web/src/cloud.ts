@@ -9,6 +9,8 @@ export interface Cloud {
   /** x, y, z after each other, times step_m; in the submap's frame. */
   xyz: Int16Array;
   centre: Vec3;
+  /** From its centre to its sides, along x, y and z. */
+  half_m: Vec3;
   radius_m: number;
 }
 
@@ -26,7 +28,7 @@ export function decode_cloud(bytes: ArrayBuffer): Cloud {
   return { step_m, n, xyz, ...bounds(xyz, step_m) };
 }
 
-function bounds(xyz: Int16Array, step_m: number): { centre: Vec3; radius_m: number } {
+function bounds(xyz: Int16Array, step_m: number): { centre: Vec3; half_m: Vec3; radius_m: number } {
   const low = [Infinity, Infinity, Infinity];
   const high = [-Infinity, -Infinity, -Infinity];
   for (let i = 0; i < xyz.length; ++i) {
@@ -34,9 +36,10 @@ function bounds(xyz: Int16Array, step_m: number): { centre: Vec3; radius_m: numb
     if (xyz[i] < low[k]) low[k] = xyz[i];
     if (xyz[i] > high[k]) high[k] = xyz[i];
   }
-  if (xyz.length === 0) return { centre: [0, 0, 0], radius_m: 0 };
+  if (xyz.length === 0) return { centre: [0, 0, 0], half_m: [0, 0, 0], radius_m: 0 };
   const centre = low.map((l, k) => (step_m * (l + high[k])) / 2) as Vec3;
-  return { centre, radius_m: (step_m * Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2])) / 2 };
+  const half_m = low.map((l, k) => (step_m * (high[k] - l)) / 2) as Vec3;
+  return { centre, half_m, radius_m: Math.hypot(...half_m) };
 }
 
 export function bytes_of_base64(text: string): ArrayBuffer {

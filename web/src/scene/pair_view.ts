@@ -107,12 +107,14 @@ export class PairView {
       const T = poses[i];
       if (!T) return;
       const centre = transform(T, cloud?.centre ?? [0, 0, 0]);
-      const radius = (cloud?.radius_m ?? 5) * 0.5;
+      const m = rows_of(T);
+      const half = cloud?.half_m ?? [5, 5, 1];
       for (let k = 0; k < 3; ++k) {
-        low[k] = Math.min(low[k], centre[k] - radius);
-        high[k] = Math.max(high[k], centre[k] + radius);
+        const reach = Math.abs(m[4 * k] * half[0]) + Math.abs(m[4 * k + 1] * half[1]) + Math.abs(m[4 * k + 2] * half[2]);
+        low[k] = Math.min(low[k], centre[k] - reach);
+        high[k] = Math.max(high[k], centre[k] + reach);
       }
     });
-    if (Number.isFinite(low[0])) this.eye.fit(low, high);
+    if (Number.isFinite(low[0])) this.eye.fit(low, high, true);
   }
 }

@@ -4,7 +4,7 @@ import type { App } from "../app";
 import { css, robot_rgb } from "../colours";
 import { metres, moment, span } from "../format";
 import { TIMES } from "../limits";
-import { transform } from "../pose";
+import { distance, transform } from "../pose";
 import { POSE_ROW } from "../schema";
 import type { Closure, ClosureState, Vec3 } from "../schema";
 import type { Ink } from "./ink";
@@ -201,10 +201,14 @@ function draw_cursor(app: App, ink: Ink, palette: Palette, t: number): void {
       const shown = other.map((x, k) => x + app.world.offset_of(trajectory.component)[k]);
       ink.line([at, shown], { colour: palette.soft, width: 1 });
       ink.dot(shown, 4, estimate_colour(palette, kind), palette.halo);
-      ink.label(shown, kind, palette.soft, palette.halo);
+      const off_m = distance(at, shown);
+      if (off_m > kLabelled_m) ink.label(shown, `${kind}, ${metres(off_m)} off`, palette.soft, palette.halo);
     }
   }
 }
+
+/** Estimates nearer than this to the map have a dot and no words. */
+const kLabelled_m = 0.3;
 
 const estimate_colour = (palette: Palette, kind: string): string => (kind === "onboard" ? palette.onboard : kind === "corrected" ? palette.accent : palette.ink);
 

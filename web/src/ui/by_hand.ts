@@ -107,7 +107,7 @@ function start_of(app: App): Pose {
 function ask_row(app: App): Child {
   if (draft.kept) return null;
   const label = draft.busy ? "Registering …" : draft.guess ? "Register from here" : "Register";
-  return h("div", { class: "row" }, button(label, () => void register(app), { key: "register", class: draft.answer?.found ? "" : "primary", disabled: draft.busy || !app.may("register") }),
+  return h("div", { class: "row" }, button(label, () => void register(app), { key: "register", class: draft.answer ? "" : "primary", disabled: draft.busy || !app.may("register") }),
     draft.guess ? button("Let Tutti search", () => (Object.assign(draft, { guess: null, answer: null }), app.say("tool")), { class: "plain" }) : null);
 }
 
@@ -124,12 +124,13 @@ async function register(app: App): Promise<void> {
 }
 
 function answer(app: App, found: Registration): Child {
+  const fits = found.found && found.evidence.every((gate) => gate.ok);
   const may_keep = found.T_from_to && app.may("closure") && !draft.kept;
   return [
-    h("p", { class: `state ${found.found ? "" : "warn"}` }, h("b", {}, found.found ? "They fit." : "They do not fit."), ` ${found.why}`),
+    h("p", { class: `state ${fits ? "" : "warn"}` }, h("b", {}, fits ? "They fit." : found.found ? "Tutti would refuse this:" : "They do not fit."), ` ${found.why}`),
     found.map_change_m === null ? null : h("p", {}, "The map would change by up to ", h("b", {}, metres(found.map_change_m)), "."),
     gates(found.evidence),
-    may_keep ? h("div", { class: "row decide" }, button(found.found ? "Keep it in the map" : "Keep it all the same", () => void keep(app), { key: "keep", class: found.found ? "primary" : "danger" })) : null,
+    may_keep ? h("div", { class: "row decide" }, button(fits ? "Keep it in the map" : "Keep it all the same", () => void keep(app), { key: "keep", class: fits ? "primary" : "danger" })) : null,
   ];
 }
 
@@ -139,7 +140,6 @@ async function keep(app: App): Promise<void> {
   const { from, to, answer: found } = draft;
   await attempt(async () => {
     draft.kept = await api.keep_closure(from!, to!, found!.T_from_to!, by);
-    app.select({ kind: "closure", name: draft.kept });
     notice("Kept. The map follows with the next update.");
   });
   app.say("tool");

@@ -11,8 +11,7 @@ import type { Child } from "./dom";
 export function person(app: App): Child {
   const { me } = app;
   if (me.login && !me.role) return h("label", { class: "button primary", title: "Choose the credential file that `tutti pki` has made for you" }, "Log in", credential_input(app));
-  if (me.role)
-    return h("span", { class: "person" }, h("b", {}, me.name), ` ${me.role}`, me.login ? button("Log out", () => void attempt(() => log_out(app)), { class: "plain" }) : null);
+  if (me.login) return h("span", { class: "person" }, h("b", {}, me.name), ` ${me.role}`, button("Log out", () => void attempt(() => log_out(app)), { class: "plain" }));
   if (!me.may_decide) return null;
   return button(app.by ? `You: ${app.by}` : "Your name?", () => void name_of(app), { class: "plain", title: "Decisions carry this name" });
 }
@@ -60,4 +59,4 @@ export function name_of(app: App): Promise<string> {
 }
 
 /** The name that a decision carries; asks for it when there is none. "" : nobody wants to give one. */
-export const who = async (app: App): Promise<string> => (app.me.role ? app.me.name : app.by || name_of(app));
+export const who = async (app: App): Promise<string> => (app.me.login ? app.me.name : app.by || name_of(app));

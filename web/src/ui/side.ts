@@ -36,6 +36,9 @@ const TABS: Tab[] = [
   { name: "marks", title: () => "Marks", offered: (app) => app.may("mark") || [...app.store.all("mark", app.at())].length > 0, make: marks_panel },
 ];
 
+/** Tabs that leave room for an inspected closure. */
+const kBesideClosures = ["closures", "alerts", "robots", "report"];
+
 export function side_panel(app: App, view: View): HTMLElement {
   let tab: string = app.live ? PHASES[app.phase].tab : "report";
   let phase = app.phase;
@@ -43,6 +46,7 @@ export function side_panel(app: App, view: View): HTMLElement {
   const body = h("div", { class: "tab-body", role: "tabpanel" });
   const show = (name: string): void => {
     tab = name;
+    if (!kBesideClosures.includes(name) && app.selection?.kind === "closure") app.select(null);
     if (!bodies.has(name)) {
       const made = TABS.find((t) => t.name === name)!.make(app, view, show);
       bodies.set(name, made);
