@@ -134,7 +134,7 @@ prints; docs/compare.md defines every figure.)")
       .def_property_readonly(
           "after", [](const CompareReport& r) { return only(r).after; }, "AteResult of corrected against a.")
       .def("json", &mission::compare_json, "All figures as `tutti compare --json` prints them: a string of JSON.")
-      .def("html", &mission::compare_html, "Pictures: one page, without scripts.")
+      .def("html", &mission::compare_html, "One page with everything, which opens without a network.")
       .def("write", &write, "folder"_a,
            "Writes compare.html and compare.json there; the folder is made. OSError: it cannot be.")
       .def("__str__", &mission::compare_text)

@@ -418,8 +418,10 @@ class CommandLine(unittest.TestCase):
         self.assertEqual(origin["from_stamp_ns"], round((10.0 + origin["from_s"]) * 1e9))
         self.assertLess(robot["fixed"]["rmse_m"], 0.1 * robot["aligned"]["rmse_m"])
         page = (out / "compare.html").read_text()
-        self.assertIn("<svg", page)
-        self.assertNotIn("http", page)
+        mission = json.loads(page.split('id="tutti-mission">', 1)[1].split("</script>", 1)[0])
+        keys = {message["key"] for message in mission["messages"]}
+        self.assertLessEqual({"mission", "compare", "trajectory/B/server", "trajectory/B/onboard", "disagreement/B"}, keys)
+        self.assertNotIn("src=\"http", page)
 
     def test_compare_says_when_two_trajectories_agree(self):
         truth = self.write_way("truth.tum")

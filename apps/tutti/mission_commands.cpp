@@ -8,10 +8,12 @@
 #include <iostream>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "commands.hpp"
+#include "live_mission.hpp"
 #include "options.hpp"
 #include "tutti/base/folder.hpp"
 #include "tutti/formats/ply.hpp"
@@ -20,6 +22,8 @@
 #include "tutti/mission/bag_mission.hpp"
 #include "tutti/mission/graph_recording.hpp"
 #include "tutti/mission/report/report.hpp"
+#include "tutti/program/clock.hpp"
+#include "tutti/program/stop.hpp"
 #include "tutti/simulation/surface.hpp"
 
 namespace tutti::app {
@@ -129,6 +133,26 @@ int run_and_report(const Result<lab::MissionConfig>& config, MissionArguments& a
   return 0;
 }
 
+constexpr int kPagePort = 8080;
+constexpr double kLiveRate = 4.0;
+
+int show_live(const MissionArguments& arguments, const std::string& sensors, int port) {
+  constexpr const char* kLive = "demo --live";
+  if (sensors != "lidar" || !arguments.map.empty())
+    return complain(kLive, "shows the robots with LiDAR, and keeps its map in OUT/state: without --sensors and --map",
+                    2);
+  lab::MissionUpOptions options{
+      .mission = {.file = "demo", .data = {}, .assignments = arguments.assignments, .seed = arguments.run.seed},
+      .out = arguments.out,
+      .rate = arguments.run.rate.value_or(kLiveRate),
+      .view = std::to_string(port)};
+  if (options.out.empty()) options.out = fs::path("out") / fmt::format("demo_live_{}", program::wall_clock_ns());
+  fmt::print(stderr, "tutti demo: look at http://127.0.0.1:{}/ for the next minutes\n", port);
+  program::stop_on_signals();
+  const Status shown = run_as_programs(options, program::Level::warning);
+  return shown ? 0 : complain(kLive, shown.error().message);
+}
+
 struct WorldOptions {
   std::string mission;
   std::string output;
@@ -177,8 +201,22 @@ void add_demo_command(CLI::App& app, int& exit_code) {
       ->check(CLI::IsMember(std::vector<std::string>{"lidar", "visual", "both"}))
       ->type_name("S")
       ->capture_default_str();
+  const auto live = std::make_shared<std::optional<int>>();
+  command
+      ->add_option_function<std::string>(
+          "--live", [live](const std::string& port) { live->emplace(port.empty() ? kPagePort : std::stoi(port)); },
+          fmt::format("Watch it: the same robots as programs of their own, four times as fast as they walk, and their "
+                      "map on a\npage at this port of this machine, {} unless said otherwise",
+                      kPagePort))
+      ->expected(0, 1)
+      ->check(CLI::Range(1, 65535) | CLI::IsMember(std::vector<std::string>{""}))
+      ->type_name("[PORT]");
   add_mission_options(*command, *arguments);
   command->callback([=, &exit_code] {
+    if (live->has_value()) {
+      exit_code = show_live(*arguments, *sensors, **live);
+      return;
+    }
     const auto config = lab::demo_mission(arguments->assignments, names.at(*sensors));
     if (arguments->out.empty() && config) arguments->out = fs::path("out") / config->mission;
     exit_code = run_and_report(config, *arguments);

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "commands.hpp"
+#include "live_mission.hpp"
 #include "options.hpp"
 #include "program_options.hpp"
 #include "tutti/lab/feed_player.hpp"
@@ -14,11 +15,13 @@
 #include "tutti/mission/report/report.hpp"
 
 namespace tutti::app {
-namespace {
 
 namespace fs = std::filesystem;
 
-Status run_and_report(lab::MissionUpOptions& options, program::Level console) {
+Status run_as_programs(lab::MissionUpOptions& options, program::Level console) {
+  std::error_code error;
+  options.program = fs::read_symlink("/proc/self/exe", error);
+  options.version = TUTTI_VERSION;
   if (options.out.empty()) options.out = fs::path("out") / fs::path(options.mission.file).stem();
   const auto log = program::EventLog::on_console("mission", console);
   options.progress = [&](const std::string& line) { log->show(line); };
@@ -29,6 +32,8 @@ Status run_and_report(lab::MissionUpOptions& options, program::Level console) {
   fmt::print("{}", mission::report_text(*record, (options.out / "report.html").string()));
   return {};
 }
+
+namespace {
 
 /// `mission up` runs it, and whoever wants a robot's program fed as its driver would.
 void add_play_command(CLI::App& group, int& exit_code) {
@@ -89,13 +94,10 @@ void add_mission_command(CLI::App& app, int& exit_code) {
   command->add_option("--view", options->view, "Serve the server's page (tutti server --view)")
       ->type_name("[HOST:]PORT");
   add_program_options(*command, *common);
-  options->version = TUTTI_VERSION;
   command->callback([options, common, &exit_code] {
     options->mission = common->mission;
-    std::error_code error;
-    options->program = fs::read_symlink("/proc/self/exe", error);
     program::Level console{};
-    exit_code = run_program("mission up", *common, console, [&] { return run_and_report(*options, console); });
+    exit_code = run_program("mission up", *common, console, [&] { return run_as_programs(*options, console); });
   });
 }
 

@@ -14,6 +14,8 @@
 #include "tutti/mission/make_record.hpp"
 #include "tutti/mission/robot_actor.hpp"
 #include "tutti/mission/runner.hpp"
+#include "tutti/mission/view_recorder.hpp"
+#include "tutti/node/submap_frames.hpp"
 #include "tutti/program/event_log.hpp"
 #include "tutti/program/field_json.hpp"
 #include "tutti/program/robot_program.hpp"
@@ -247,6 +249,9 @@ Result<mission::MissionRecord> collect_mission(const MissionConfig& config, cons
   mission::MissionRecord record = mission::make_record(finished);
   if (gone > 0) record.notes.push_back(cut_short("the server", gone));
   for (Robot& robot : robots) record.timing.policies.push_back(std::move(robot.timing));
+  const Timestamp end = mission::kMissionStart + record.duration_s;
+  record.view = std::make_shared<const mission::ViewRecord>(
+      mission::ViewRecorder(1).finish(mapfile::shown_map(**server, end), *node::SubmapFrames::of(**store)));
   return record;
 }
 

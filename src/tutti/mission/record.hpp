@@ -32,6 +32,8 @@
 /// not be measured is std::nullopt (or an empty vector). docs/report.md defines every figure.
 namespace tutti::mission {
 
+struct ViewRecord;  // view_recorder.hpp
+
 /// A figure that was scored on a smaller share of the way is partial: it is shown, marked, and never a headline.
 inline constexpr double kPartialBelow = 0.95;
 
@@ -372,6 +374,7 @@ struct MissionRecord {
   std::shared_ptr<const PointCloud> survey;  ///< Points of the real surface, in the reference frame; null when unknown.
   std::vector<TransformRecord> transforms;
   TimingRecord timing;
+  std::shared_ptr<const ViewRecord> view;  ///< The course of the mission for the report's page; null: none was kept.
 };
 
 /// consistency::follow_alerts() of these updates.

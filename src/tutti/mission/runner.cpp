@@ -19,9 +19,11 @@
 #include "tutti/mission/recordings.hpp"
 #include "tutti/mission/robot_actor.hpp"
 #include "tutti/mission/server_meter.hpp"
+#include "tutti/mission/view_recorder.hpp"
 #include "tutti/node/map_meta.hpp"
 #include "tutti/node/robot_registry.hpp"
 #include "tutti/node/server_node.hpp"
+#include "tutti/node/submap_frames.hpp"
 #include "tutti/node/worker_node.hpp"
 #include "tutti/storage/memory_store.hpp"
 #include "tutti/wire/limits.hpp"
@@ -78,7 +80,8 @@ class MissionRun {
                 [this](std::size_t count, const auto& call) { finders::for_each_parallel(count, threads_, call); }),
         server_port_(network_.connect(bus::Endpoint::server())),
         worker_port_(network_.connect(kWorker)),
-        pace_(options.rate) {
+        pace_(options.rate),
+        view_(static_cast<std::size_t>(duration_of(config, recordings_) / config.server.update_period_s)) {
     worker_.refine_with(meter_.refiner());
     for (const MissionRecording& recording : recordings_) {
       robots_.push_back(
@@ -135,7 +138,8 @@ class MissionRun {
     TUTTI_CHECK(store_.commit(rows).has_value(), "a store in memory");
     return store_;
   }
-  MissionRecord record() const;
+  /// Ends it: called once.
+  MissionRecord record();
 
  private:
   struct Robot {
@@ -239,7 +243,16 @@ class MissionRun {
     if (const auto check =
             check_closures(server_->map_server().map(), recordings, config_.association, config_.closure_check))
       events_.set_wrong(check->wrong);
+    if (server_->has_map() && view_.wants_next()) view_.take(shown_map());
     server_latency_ms_ = std::max(server_latency_ms_, pace_.late_ms(time_s_));
+  }
+
+  /// With the names that robots tell in statuses, which a mission in virtual time does not send.
+  [[nodiscard]] mapfile::ShownMap shown_map() const {
+    mapfile::ShownMap shown = mapfile::shown_map(*server_, now());
+    for (const MissionRecording& recording : recordings_)
+      shown.content.names[recording.recording.robot] = recording.recording.name;
+    return shown;
   }
 
   void tell_progress() const {
@@ -264,6 +277,7 @@ class MissionRun {
   node::WorkerNode worker_;
   std::unique_ptr<bus::Port> server_port_, worker_port_;
   Pace pace_;
+  ViewRecorder view_;
   std::vector<Robot> robots_;  // by RobotId
   MissionEvents events_;
   double time_s_ = 0.0;
@@ -309,7 +323,7 @@ void MissionRun::record_timing(MissionRecord& record) const {
   record.timing.load.push_back({"server", meter_.cpu_s() / record.timing.wall_s, server_latency_ms_});
 }
 
-MissionRecord MissionRun::record() const {
+MissionRecord MissionRun::record() {
   FinishedMission mission{.config = config_,
                           .seed = options_.seed,
                           .version = options_.version,
@@ -332,6 +346,8 @@ MissionRecord MissionRun::record() const {
   }
   MissionRecord record = make_record(mission);
   record_timing(record);
+  record.view =
+      std::make_shared<const ViewRecord>(std::move(view_).finish(shown_map(), *node::SubmapFrames::of(store_)));
   return record;
 }
 

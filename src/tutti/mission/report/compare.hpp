@@ -22,7 +22,7 @@ struct CompareReport {
 std::string compare_text(const CompareReport& report);
 /// A function of its input, byte for byte.
 std::string compare_json(const CompareReport& report);
-/// One page without scripts, fonts or anything to fetch.
+/// One page, which opens without a network. A function of its input, too.
 std::string compare_html(const CompareReport& report);
 
 /// One scale of the disagreement map in figures.

@@ -11,7 +11,6 @@
 #include "tutti/formats/trajectory_file.hpp"
 #include "tutti/mission/report/colours.hpp"
 #include "tutti/mission/report/file_names.hpp"
-#include "tutti/mission/report/map_pictures.hpp"
 #include "tutti/mission/report/report.hpp"
 
 namespace tutti::mission {
@@ -75,16 +74,6 @@ Status write_map(const MissionRecord& record, const fs::path& out_dir) {
   return record.survey ? formats::write_ply((out_dir / "survey.ply").string(), record.survey->points) : Status();
 }
 
-Status write_pictures(const MissionRecord& record, const fs::path& out_dir) {
-  for (const auto& [name, picture, columns] :
-       {std::tuple<const char*, MapPicture, std::size_t>{"map_top.png", map_from_above(record), 2},
-        {"map_section.png", map_section(record), 1}})
-    if (!picture.panels.empty())
-      if (auto status = write_file((out_dir / name).string(), encode_png(compose(picture, columns))); !status)
-        return status;
-  return {};
-}
-
 std::string config_text(const MissionRecord& record) {
   return fmt::format("# Tutti {}; mission {}; seed {}.\n# Every setting this run used, defaults included.\n{}",
                      record.version, record.mission, record.seed, record.effective_config_yaml);
@@ -104,8 +93,7 @@ Status write_report(const MissionRecord& record, const fs::path& out_dir) {
     if (auto status = write_file((out_dir / name).string(), text); !status) return status;
   if (auto status = write_trajectories(record, out_dir); !status) return status;
   if (auto status = write_graph(record.server, out_dir); !status) return status;
-  if (auto status = write_map(record, out_dir); !status) return status;
-  return write_pictures(record, out_dir);
+  return write_map(record, out_dir);
 }
 
 }  // namespace tutti::mission

@@ -34,16 +34,6 @@ std::string format_scored(std::optional<double> scored_share) {
   return fmt::format("{:.0f} %", is_partial(scored_share) ? std::floor(percent) : percent);
 }
 
-std::string format_rmse(const Accuracy& accuracy) {
-  const std::string rmse = format_metres(accuracy.rmse_m);
-  if (!is_partial(accuracy.scored_share)) return rmse;
-  return fmt::format("({}, partial: on {})", rmse, format_scored(accuracy.scored_share));
-}
-
-std::optional<double> for_headline(std::optional<double> value_m, std::optional<double> scored_share) {
-  return is_partial(scored_share) ? std::nullopt : value_m;
-}
-
 std::optional<double> server_share(const RobotRecord& robot) {
   if (robot.server.scored_share || robot.server_estimate.empty()) return robot.server.scored_share;
   return robot.mapped_share;
@@ -82,14 +72,6 @@ std::string format_bytes(double bytes) {
   std::size_t unit = 0;
   for (bytes /= 1000.0; bytes >= 999.5 && unit + 1 < kUnits.size(); ++unit) bytes /= 1000.0;
   return three_digits(bytes) + " " + kUnits[unit];
-}
-
-std::string format_rate(std::uint64_t bytes, double seconds) {
-  return seconds > 0.0 ? format_bytes(static_cast<double>(bytes) / seconds) + "/s" : "-";
-}
-
-std::string format_share(std::size_t part, std::size_t whole) {
-  return whole == 0 ? "-" : fmt::format("{:.1f} %", 100.0 * static_cast<double>(part) / static_cast<double>(whole));
 }
 
 std::optional<Spread> spread(std::span<const double> samples) {

@@ -18,10 +18,6 @@ std::string format_metres(std::optional<double> value_m);
 std::string format_error(std::optional<double> value_m, std::optional<double> scored_share);
 /// Such as "100 %"; a partial share is rounded down, and "-" means that nothing was scored.
 std::string format_scored(std::optional<double> scored_share);
-/// An RMSE for a sentence: "0.013 m"; partial: "(0.013 m, partial: on 62 %)".
-std::string format_rmse(const Accuracy& accuracy);
-/// The value for a headline: nothing when it is partial.
-std::optional<double> for_headline(std::optional<double> value_m, std::optional<double> scored_share);
 /// The share on which the server's figures of a robot were scored; without a reference, the share for the distance
 /// between the robot and the server.
 std::optional<double> server_share(const RobotRecord& robot);
@@ -35,10 +31,6 @@ std::string format_duration_ms(double value_ms);
 std::string format_mission_time(double value_s);
 /// Powers of 1000: "812 B", "3.42 kB", "1.20 MB".
 std::string format_bytes(double bytes);
-/// "3.42 kB/s"
-std::string format_rate(std::uint64_t bytes, double seconds);
-/// "2.6 %"; "-" when the whole is 0.
-std::string format_share(std::size_t part, std::size_t whole);
 
 /// The median and largest of some samples, for an even number the mean of the two middle ones.
 struct Spread {

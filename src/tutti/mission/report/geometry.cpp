@@ -70,8 +70,7 @@ RobotGeometry robot_geometry(const MissionRecord& record, const RobotRecord& rob
   out.onboard = onboard.positions;
   out.corrected = corrected.positions;
   out.server = server.positions;
-  for (const auto& other : robot.whereabouts)
-    out.whereabouts.push_back(corrected.T_base_estimate * other.T_map_body.translation);
+  out.T_base_odom = onboard.T_base_estimate;
   if (out.has_reference)
     for (const auto& p : robot.reference) out.reference.push_back(p.pose.translation);
 
@@ -92,79 +91,9 @@ PictureClock mission_clock(const RobotRecord& robot) {
   return {robot.odometry.empty() ? Timestamp{} : robot.odometry.front().stamp, robot.start_s};
 }
 
-std::pair<std::size_t, std::size_t> stretch(const Trajectory& trajectory, Timestamp from, Timestamp until) {
-  const auto first = std::lower_bound(trajectory.begin(), trajectory.end(), from,
-                                      [](const StampedPose& p, Timestamp t) { return p.stamp < t; });
-  const auto last = std::upper_bound(trajectory.begin(), trajectory.end(), until,
-                                     [](Timestamp t, const StampedPose& p) { return t < p.stamp; });
-  const auto begin = static_cast<std::size_t>(first - trajectory.begin());
-  const auto end = static_cast<std::size_t>(last - trajectory.begin());
-  return {begin - std::min<std::size_t>(begin, 1), std::min(std::max(end, begin) + 1, trajectory.size())};
-}
-
-Points2d GroundPlane::operator()(const Points3d& points) const {
-  Points2d out;
-  out.reserve(points.size());
-  for (const auto& p : points) out.push_back((*this)(p));
-  return out;
-}
-
-GroundPlane ground_plane(const std::vector<Points3d>& layers) {
-  constexpr double kMuchMore = 3.0;
-  constexpr double kFlat_m = 0.1;  // of the smaller extent: a straight line on the ground stays seen from above
-  Eigen::Array3d low = Eigen::Array3d::Constant(std::numeric_limits<double>::infinity());
-  Eigen::Array3d high = -low;
-  for (const auto& layer : layers)
-    for (const auto& p : layer)
-      if (p.allFinite()) {
-        low = low.min(p.array());
-        high = high.max(p.array());
-      }
-  if (!(low <= high).all()) return {};
-  const Eigen::Array3d extent = high - low;
-  if (extent.z() > kMuchMore * std::max(extent.y(), kFlat_m)) return {0, 2};
-  if (extent.z() > kMuchMore * std::max(extent.x(), kFlat_m)) return {1, 2};
-  return {};
-}
-
-const Eigen::Vector3d* find_position(const Trajectory& trajectory, Timestamp stamp) {
-  const auto found = std::lower_bound(trajectory.begin(), trajectory.end(), stamp,
-                                      [](const StampedPose& p, Timestamp t) { return p.stamp < t; });
-  return found == trajectory.end() || found->stamp != stamp ? nullptr : &found->pose.translation;
-}
-
 Pose3 display_from_world(const MissionRecord& record, std::uint32_t component) {
   if (component != record.server.largest_component) return {};
   return record.server.T_reference_world.value_or(Pose3{});
-}
-
-std::vector<Points3d> displayed_routes(const MissionRecord& record, std::uint32_t component) {
-  const Pose3 T_display_world = display_from_world(record, component);
-  std::vector<Points3d> out;
-  for (const RobotRecord& robot : record.robots) {
-    if (robot.component != component) continue;
-    Points3d& route = out.emplace_back();
-    for (const StampedPose& p : robot.server_estimate) route.push_back(T_display_world * p.pose.translation);
-  }
-  return out;
-}
-
-ClosureStrokes closure_strokes(const MissionRecord& record, std::uint32_t component, const MapView& map) {
-  std::map<KeyframeId, Eigen::Vector3d> positions;
-  for (const RobotRecord& robot : record.robots)
-    for (const NodeRecord& node : record.server.nodes)
-      if (robot.component == component && node.id.chain.robot == robot.id)
-        if (const Eigen::Vector3d* position = find_position(robot.server_estimate, node.stamp))
-          positions[node.id] = *position;
-  ClosureStrokes out;
-  for (const ClosureRecord& closure : record.server.closures) {
-    const auto from = positions.find(closure.from);
-    const auto to = positions.find(closure.to);
-    if (from == positions.end() || to == positions.end()) continue;
-    (closure.from.chain.robot == closure.to.chain.robot ? out.intra : out.inter)
-        .emplace_back(map(from->second), map(to->second));
-  }
-  return out;
 }
 
 }  // namespace tutti::mission

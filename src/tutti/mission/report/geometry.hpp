@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "tutti/mission/record.hpp"
-#include "tutti/mission/report/plot.hpp"
 
 /// Places estimates in pictures: they are in unrelated frames, so each is moved by one rigid transform for display.
 namespace tutti::mission {
@@ -30,22 +29,11 @@ struct RobotGeometry {
   /// After alignment, the distances to the reference (without one, to the server's estimate); one per odometry
   /// keyframe.
   std::vector<KeyframeError> errors;
-  /// Positions where this robot assumes the others to be: RobotRecord::whereabouts, moved with `corrected`.
-  Points3d whereabouts;
+  Pose3 T_base_odom;  ///< Moves the raw odometry there.
   bool has_reference = false;
 };
 /// The geometry of one robot of the record.
 RobotGeometry robot_geometry(const MissionRecord& record, const RobotRecord& robot);
-
-/// Chooses the two coordinates of the view from above: x and y, unless the mission extends much more along z than along
-/// one of them (camera frames, y down).
-struct GroundPlane {
-  Eigen::Index right = 0;
-  Eigen::Index up = 1;
-  [[nodiscard]] Eigen::Vector2d operator()(const Eigen::Vector3d& p) const { return {p[right], p[up]}; }
-  [[nodiscard]] Points2d operator()(const Points3d& points) const;
-};
-GroundPlane ground_plane(const std::vector<Points3d>& layers);
 
 /// The time axis of a picture: it shows `at_start_s` at the stamp `start`.
 struct PictureClock {
@@ -57,31 +45,6 @@ struct PictureClock {
 /// Turns stamps of the robot's own clock into mission time.
 PictureClock mission_clock(const RobotRecord& robot);
 
-/// Indices [first, last) of the poses from `from` until `until`, with one more on either side, so that there is a line
-/// to draw.
-std::pair<std::size_t, std::size_t> stretch(const Trajectory& trajectory, Timestamp from, Timestamp until);
-
-/// Position of a robot's estimate at the stamp of a keyframe; null when it has none there.
-const Eigen::Vector3d* find_position(const Trajectory& trajectory, Timestamp stamp);
-
-/// One component of the joint map seen from above: maps points of `world` to pixels.
-struct MapView {
-  Pose3 T_display_world;
-  GroundPlane ground;
-  PlanView view;
-  [[nodiscard]] Eigen::Vector2d operator()(const Eigen::Vector3d& p_world) const {
-    return view(ground(T_display_world * p_world));
-  }
-};
 /// T_display_world of a component: the largest is shown in the reference's frame, where there is one.
 Pose3 display_from_world(const MissionRecord& record, std::uint32_t component);
-/// The server's estimates of all robots of a component, in the display frame.
-std::vector<Points3d> displayed_routes(const MissionRecord& record, std::uint32_t component);
-
-/// The loop closures of a component in pixels, by the server's final estimate: within one robot, and between two.
-struct ClosureStrokes {
-  Strokes intra, inter;
-};
-ClosureStrokes closure_strokes(const MissionRecord& record, std::uint32_t component, const MapView& map);
-
 }  // namespace tutti::mission

@@ -60,51 +60,5 @@ TEST(RobotGeometry, NewDriftIsWhereTheOdometryWentWrong) {
   }
 }
 
-TEST(ClosureStrokes, LeaveOutWhatLiesInAnotherComponent) {
-  MissionRecord record = test::example_record({.robots = 1, .keyframes = 30});
-  const auto node = [&](std::size_t i) { return record.server.nodes[i].id; };
-  record.server.closures = {{node(0), node(19)}, {node(0), node(20)}};
-  const auto drawn = [&](std::uint32_t component) {
-    return closure_strokes(record, component, {{}, {}, PlanView({}, 100.0, 100.0)}).intra.size();
-  };
-  EXPECT_EQ(drawn(record.robots[0].component), 2U);
-  EXPECT_EQ(drawn(record.robots[0].component + 1), 0U);
-  record.robots[0].server_estimate.resize(20);  // the last ten are not joined to the first
-  EXPECT_EQ(drawn(record.robots[0].component), 1U);
-}
-
-TEST(Stretch, HasOnePoseMoreOnEitherSide) {
-  Trajectory trajectory;
-  for (std::int64_t t = 0; t < 100; t += 10) trajectory.push_back({Timestamp{t}, {}});
-  using P = std::pair<std::size_t, std::size_t>;
-  EXPECT_EQ(stretch(trajectory, Timestamp{30}, Timestamp{50}), P(2, 7));
-  EXPECT_EQ(stretch(trajectory, Timestamp{31}, Timestamp{32}), P(3, 5));
-  EXPECT_EQ(stretch(trajectory, Timestamp{-5}, Timestamp{500}), P(0, 10));
-  EXPECT_EQ(stretch(trajectory, Timestamp{-9}, Timestamp{-5}), P(0, 1));
-  EXPECT_EQ(stretch(trajectory, Timestamp{200}, Timestamp{300}), P(9, 10));
-  EXPECT_EQ(stretch({}, Timestamp{0}, Timestamp{1}), P(0, 0));
-}
-
-TEST(GroundPlane, LooksFromAbove) {
-  const auto axes = [](double x, double y, double z) {
-    const GroundPlane ground = ground_plane({{{0.0, 0.0, 0.0}, {x, y, z}}});
-    return std::pair(ground.right, ground.up);
-  };
-  using P = std::pair<Eigen::Index, Eigen::Index>;
-  EXPECT_EQ(axes(20.0, 15.0, 2.0), P(0, 1));
-  EXPECT_EQ(axes(15.0, 12.0, 9.0), P(0, 1));     // a drone that climbs
-  EXPECT_EQ(axes(500.0, 20.0, 400.0), P(0, 2));  // a camera frame: y is down
-  EXPECT_EQ(axes(100.0, 0.01, 0.2), P(0, 1));    // a straight line on the ground
-  EXPECT_EQ(ground_plane({}).up, 1);
-}
-
-TEST(FindPosition, OnlyExactStamps) {
-  const Trajectory trajectory{{Timestamp{10}, {}}, {Timestamp{20}, {Eigen::Quaterniond::Identity(), {1.0, 2.0, 3.0}}}};
-  ASSERT_NE(find_position(trajectory, Timestamp{20}), nullptr);
-  EXPECT_EQ(find_position(trajectory, Timestamp{20})->z(), 3.0);
-  EXPECT_EQ(find_position(trajectory, Timestamp{19}), nullptr);
-  EXPECT_EQ(find_position({}, Timestamp{19}), nullptr);
-}
-
 }  // namespace geometry_test
 }  // namespace tutti::mission

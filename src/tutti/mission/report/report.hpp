@@ -12,7 +12,7 @@ namespace tutti::mission {
 
 /// Writes all files into `out_dir`: report.json, timing.json, report.html, config.yaml, per robot
 /// <name>_{onboard,corrected,server,reference}.tum where there are such poses, graph.g2o with graph_stamps.csv,
-/// map.ply, map_top.png and map_section.png when there is a cloud, and survey.ply when there is a survey. Characters of
+/// map.ply when there is a cloud, and survey.ply when there is a survey. Characters of
 /// a robot's name other than letters, digits, '-' and '_' become '_'. The folder is made when missing; files of the
 /// same names are replaced, and files that an earlier report.json there lists as its own are removed. Fails when a file
 /// cannot be written.
@@ -24,8 +24,8 @@ std::string report_json(const MissionRecord& record);
 /// timing.json: everything that depends on this machine's clock.
 std::string timing_json(const MissionRecord& record);
 
-/// The report as one page without scripts, fonts or anything to fetch; plots are inline SVG, and the page follows the
-/// reader's light or dark setting. It has wall-clock figures, so unlike report.json it differs from run to run.
+/// The report as one page (page/page_file.hpp), which opens without a network. It has wall-clock figures, so unlike
+/// report.json it differs from run to run.
 std::string report_html(const MissionRecord& record);
 
 /// The last output of `tutti run` and `tutti demo`: plain ASCII, at most 100 columns (for robot and policy names of up

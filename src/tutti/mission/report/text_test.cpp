@@ -175,8 +175,6 @@ TEST(Format, Words) {
   EXPECT_EQ(format_bytes(812.0), "812 B");
   EXPECT_EQ(format_bytes(3424.0), "3.42 kB");
   EXPECT_EQ(format_bytes(999'600.0), "1.00 MB");
-  EXPECT_EQ(format_share(26, 1000), "2.6 %");
-  EXPECT_EQ(format_share(1, 0), "-");
 }
 
 TEST(Format, SpreadIsMedianAndLargest) {

@@ -153,7 +153,8 @@ class PageViewer final : public program::MapViewer {
   }
   void make(const ShownMap& map) {
     const double begin_s = Clock::steady_s(), time_s = map.time - Timestamp{};
-    MapMessages messages = map_messages(map);
+    Comparisons comparisons = compare_all(map);
+    MapMessages messages = map_messages(map, comparisons.sigma_m);
     auto alerts = maps_alerts_.of_map(map);
     {
       const std::scoped_lock lock(mutex_);
@@ -163,7 +164,7 @@ class PageViewer final : public program::MapViewer {
       board.put_all("submap/", std::move(messages.submaps), time_s);
       board.put(std::move(messages.poses));
       board.put_all("closure/", std::move(messages.closures), time_s);
-      board.put_all("disagreement/", std::move(messages.disagreements), time_s);
+      board.put_all("disagreement/", std::move(comparisons.messages), time_s);
     });
     const double now_s = Clock::steady_s();
     not_before_s_ = std::max(begin_s + kPeriod_s, now_s + kRestPerWork * (now_s - begin_s));

@@ -61,9 +61,11 @@ class PageServer : public ::testing::Test {
       while (!stop_) {
         for (program::AskedWord& asked : viewer_->take_words()) {
           const bool is_known = asked.word.closure != "alpha/0-bravo/999";
+          if (is_known) {
+            const std::scoped_lock lock(mutex_);
+            words_.emplace_back(asked.word, asked.proved_name);
+          }
           asked.answer.set_value(is_known ? "" : "no such closure");
-          const std::scoped_lock lock(mutex_);
-          if (is_known) words_.emplace_back(asked.word, asked.proved_name);
         }
         std::this_thread::sleep_for(std::chrono::milliseconds(5));
       }

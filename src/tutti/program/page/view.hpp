@@ -77,12 +77,12 @@ Message status_message(const MissionStatus& status);
 
 /// What one map shows, to be put on a board with the prefixes below.
 struct MapMessages {
-  std::vector<Message> submaps;        ///< "submap/".
-  std::vector<Message> closures;       ///< "closure/".
-  std::vector<Message> disagreements;  ///< "disagreement/".
-  Message poses;                       ///< Where all submaps are.
+  std::vector<Message> submaps;   ///< "submap/".
+  std::vector<Message> closures;  ///< "closure/".
+  Message poses;                  ///< Where all submaps are.
 };
-MapMessages map_messages(const mapfile::ShownMap& map);
+/// `sigma_m`: how sure the server is of each submap (Comparisons); empty: that is not shown.
+MapMessages map_messages(const mapfile::ShownMap& map, const std::map<SubmapId, double>& sigma_m = {});
 
 /// Whose raw odometry is compared with the map, and when.
 struct DisagreementOf {
@@ -97,7 +97,7 @@ Message disagreement_message(const DisagreementOf& of, const consistency::Explan
                              const std::function<double(Timestamp)>& time_of);
 
 /// Every session's raw odometry against the last broadcast, and how sure the server is of where each submap is: the
-/// largest standard deviation of its nodes, relative to the rest of its chain.
+/// largest standard deviation of its nodes, relative to the rest of its chain. Costs what a robot's comparison does.
 struct Comparisons {
   std::vector<Message> messages;
   std::map<SubmapId, double> sigma_m;

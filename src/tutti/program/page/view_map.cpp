@@ -173,7 +173,7 @@ std::string evidence_text(const std::vector<Refusal>& evidence) {
   return text_of(out);
 }
 
-MapMessages map_messages(const ShownMap& map) {
+MapMessages map_messages(const ShownMap& map, const std::map<SubmapId, double>& sigma_m) {
   const double time_s = map.time - Timestamp{};
   const server::ClosureNames names = map.content.closure_names();
   MapMessages out;
@@ -184,9 +184,7 @@ MapMessages map_messages(const ShownMap& map) {
   }
   for (const mapfile::ClosureInfo& info : mapfile::closures(map.content, map.map))
     out.closures.push_back({"closure/" + info.name, time_s, closure_json(map, info)});
-  Comparisons comparisons = compare_all(map);
-  out.disagreements = std::move(comparisons.messages);
-  out.poses = {"poses", time_s, poses_json(map, comparisons.sigma_m)};
+  out.poses = {"poses", time_s, poses_json(map, sigma_m)};
   return out;
 }
 

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "tutti/mapfile/shown_map.hpp"
+#include "tutti/program/page/board.hpp"
+#include "tutti/server/payload_store.hpp"
+
+namespace tutti::mission {
+
+/// What somebody at the page of a mission would have seen (docs/page.md), for the report's page.
+struct ViewRecord {
+  std::vector<page::Message> messages;        ///< In the order of time.
+  std::map<std::string, std::string> clouds;  ///< page::cloud_bytes(), by the submap's id.
+  std::map<SubmapId, Pose3> T_odom_submap;    ///< By raw odometry.
+};
+
+/// Collects it while a mission runs, with at most about kMostMaps maps, evenly over the mission.
+class ViewRecorder {
+ public:
+  static constexpr std::size_t kMostMaps = 60;
+  static constexpr std::size_t kMostPoints = 300'000;  ///< In all clouds together.
+
+  explicit ViewRecorder(std::size_t expected_updates)
+      : every_(std::max<std::size_t>(1, (expected_updates + kMostMaps - 1) / kMostMaps)) {}
+  /// True if this update's map is one to keep.
+  [[nodiscard]] bool wants_next() { return updates_++ % every_ == 0; }
+  void take(const mapfile::ShownMap& map, const std::map<SubmapId, double>& sigma_m = {});
+  /// The last map, and the clouds of its submaps; what cannot be read is left out.
+  ViewRecord finish(const mapfile::ShownMap& last, const server::PayloadStore& payloads) &&;
+
+ private:
+  std::size_t every_;
+  std::size_t updates_ = 0;
+  page::Board board_;
+  std::vector<page::Message> messages_;
+};
+
+}  // namespace tutti::mission
