@@ -198,9 +198,8 @@ TEST_F(Intruders, WhatIsReplayedArrivesOnce) {
   expect_all_is_well();
 }
 
-/// Whoever asks the bus says where it answers, and it does not check that subject against their rights. Of all that a
-/// member may ask, no answer reaches the server's streams, and none is taken for a word of the server or another
-/// member.
+/// Whoever asks the bus says where it answers, and it does not check that subject against their rights. No answer to a
+/// member reaches the server's streams, and none is taken for a word of the server or another member.
 TEST_F(Intruders, WhatTheBusAnswersIsNobodysWord) {
   const auto tell = [&](RobotId robot, MessageKind kind, const std::string& text) {
     ASSERT_TRUE(hub_->send({Endpoint::server(), Endpoint::of(robot), kind, "", bytes(text)}));
