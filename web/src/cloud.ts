@@ -49,6 +49,18 @@ export function bytes_of_base64(text: string): ArrayBuffer {
   return bytes.buffer;
 }
 
+/** The same bytes again, of the points that are held. */
+export function base64_of_cloud(cloud: Cloud): string {
+  const bytes = new Uint8Array(kHeader + 6 * cloud.n);
+  const head = new DataView(bytes.buffer);
+  head.setFloat32(0, cloud.step_m, true);
+  head.setUint32(4, cloud.n, true);
+  bytes.set(new Uint8Array(cloud.xyz.buffer, cloud.xyz.byteOffset, 6 * cloud.n), kHeader);
+  let raw = "";
+  for (let i = 0; i < bytes.length; i += 0x8000) raw += String.fromCharCode(...bytes.subarray(i, i + 0x8000));
+  return btoa(raw);
+}
+
 /** Fetches what is asked for, and holds at most LIMITS.points points. */
 export class Clouds {
   private held = new Map<string, Cloud>();

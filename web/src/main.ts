@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 import { App } from "./app";
+import { saved_page } from "./handover";
 import { View } from "./scene/view";
 import { InlinedSource } from "./sources/inlined";
 import { LiveSource } from "./sources/live";
@@ -26,4 +27,4 @@ app.on(() => {
 app.start();
 
 // For tests and measurements.
-Object.assign(window, { tutti: { app, view } });
+Object.assign(window, { tutti: { app, view, saved_page } });

@@ -89,6 +89,14 @@ export class Store {
     }
   }
 
+  /** All values over time, by the time since which they hold. */
+  everything(): { key: string; kind: Kind; t: number; value: unknown }[] {
+    const out: { key: string; kind: Kind; t: number; value: unknown }[] = [];
+    for (const [kind, named] of this.tracks)
+      for (const [name, track] of named) track.times.forEach((t, i) => out.push({ key: name === "" ? kind : `${kind}/${name}`, kind, t, value: track.values[i] }));
+    return out.sort((a, b) => a.t - b.t);
+  }
+
   /** Place of a submap in the rows of poses; -1 when it is in none. */
   place_of(id: string): number {
     return this.places.get(id) ?? -1;

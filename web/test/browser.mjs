@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Drives the built page in a headless Chromium, against the fake server and as a file. Ends with 1 if anything is not as it should be.
 import assert from "node:assert/strict";
+import { generateKeyPairSync, verify } from "node:crypto";
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -192,6 +193,38 @@ test("a viewer is offered no decisions, and what the program does not offer is n
     assert.deepEqual(await page.texts(".decide button"), []);
   }, { me: { login: true, role: "viewer", name: "vera", may_decide: false, offers: ["decide", "register", "closure", "mark", "why"] } }));
 
+test("who has a credential logs in with it, and its seed stays in the page", () =>
+  served(new FakeMission(), async (page, server) => {
+    await page.until("a login is asked for", () => document.querySelector('[aria-label="Credential file"]') !== null);
+    assert.equal((await page.texts(".tabs button")).includes("By hand"), false);
+    const { text, seed_text, open } = credential();
+    const file = join(work, "eva.credential");
+    writeFileSync(file, text);
+    await (await page.page.$('[aria-label="Credential file"]')).uploadFile(file);
+    await page.until("eva is there", () => document.querySelector(".person b")?.textContent === "eva");
+    await page.until("she may decide", () => [...document.querySelectorAll(".tabs button")].some((b) => b.textContent === "By hand"));
+    const [login] = server.asked;
+    assert.deepEqual([login.path, login.body.nonce, login.body.key], ["/api/login", "nonce 7", "UEVA"]);
+    assert.ok(verify(null, Buffer.from("nonce 7"), open, Buffer.from(login.body.signature, "base64")), "the signature is hers");
+    assert.equal(JSON.stringify(server.asked).includes(seed_text.slice(4, 40)), false);
+  }, { me: { login: true, role: null, may_decide: false, nonce: "nonce 7", offers: [] } }));
+
+/** As `tutti pki` writes it, with a key made here. */
+function credential() {
+  const { publicKey, privateKey } = generateKeyPairSync("ed25519");
+  const seed = privateKey.export({ format: "der", type: "pkcs8" }).subarray(-32);
+  const bytes = [(18 << 3) | (20 >> 2), (20 << 6) & 255, ...seed];
+  let crc = 0;
+  for (const byte of bytes) {
+    crc ^= byte << 8;
+    for (let i = 0; i < 8; ++i) crc = crc & 0x8000 ? ((crc << 1) ^ 0x1021) & 0xffff : (crc << 1) & 0xffff;
+  }
+  const bits = [...bytes, crc & 255, crc >> 8].map((b) => b.toString(2).padStart(8, "0")).join("");
+  const seed_text = bits.match(/.{1,5}/g).map((b) => "ABCDEFGHIJKLMNOPQRSTUVWXYZ234567"[parseInt(b.padEnd(5, "0"), 2)]).join("");
+  const text = `tutti-credential 1\nmission: adit north\nrole: operator\nname: eva\nnumber: 1\nnkey: UEVA\n-----BEGIN USER NKEY SEED-----\n${seed_text}\n-----END USER NKEY SEED-----\n`;
+  return { text, seed_text, open: publicKey };
+}
+
 const kHostile = '<img src=x onerror="window.hacked=1"><script>window.hacked=1</script>';
 test("scripts in names, words, reasons and photos do nothing", async () => {
   const mission = new FakeMission({ robots: [kHostile, "bravo", "charlie"], name: kHostile });
@@ -211,6 +244,23 @@ test("scripts in names, words, reasons and photos do nothing", async () => {
     assert.ok((await page.texts(".robot b"))[0].includes("<img"), "the name is shown as it is");
   });
 });
+
+test("the mission so far is saved as one file, which opens offline as it was", () =>
+  served(new FakeMission(), async (page, server, mission) => {
+    await page.until("all clouds", () => tutti.app.clouds.points === 72 * 6000);
+    mission.time += 10;
+    server.send(mission.correct(0.3));
+    await page.until("two revisions", () => tutti.app.store.track("poses").times.length === 2);
+    const text = await page.evaluate(() => tutti.saved_page(tutti.app));
+    const file = join(work, "saved.html");
+    writeFileSync(file, text);
+    const saved = await browser.open(`file://${file}`);
+    await saved.until("the map and its clouds", () => tutti.app.world.placed.size === 72 && tutti.view.last.points >= 72 * 6000);
+    const state = () => [tutti.app.store.size(), tutti.app.store.unread.count, [...tutti.app.store.all("closure")].length, tutti.app.robots.map((r) => [r.name, r.speed_mps]), [...tutti.app.world.placed.values()].map((p) => p.target), tutti.app.correction.largest_m];
+    assert.deepEqual(await saved.evaluate(state), await page.evaluate(state));
+    assert.deepEqual(saved.errors, []);
+    await saved.close();
+  }));
 
 test("a report opens as a file without a network, and its time can be scrubbed", async () => {
   const file = join(work, "report.html");

@@ -38,7 +38,7 @@ export class Page {
   evaluate(run, ...args) {
     return this.page.evaluate(run, ...args);
   }
-  async until(what, condition, argument, timeout = 10_000) {
+  async until(what, condition, argument, timeout = 30_000) {
     await this.page.waitForFunction(condition, { timeout, polling: 50 }, argument).catch(async () => {
       throw new Error(`not seen within ${timeout} ms: ${what}. The page: ${(await this.page.evaluate(() => document.body.innerText)).slice(0, 600)} ${this.errors.join("; ")}`);
     });

@@ -85,6 +85,7 @@ const credential = (role: string, seed = kSeedText) =>
   `tutti-credential 1\nmission: m\nrole: ${role}\nname: eva\nnumber: 3\nnkey: UABC\n-----BEGIN USER NKEY SEED-----\n${seed}\n-----END USER NKEY SEED-----\n`;
 
 test("a credential is read, and its seed signs", async () => {
+  globalThis.crypto ??= (await import("node:crypto")).webcrypto as Crypto; // Node 18
   assert.match(kSeedText, /^SU/);
   const read = read_credential(credential("operator"));
   assert.deepEqual([read.name, read.role, read.key], ["eva", "operator", "UABC"]);

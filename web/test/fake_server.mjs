@@ -84,6 +84,10 @@ export class FakeServer {
     const { mission } = this;
     const submap = (id) => mission.submaps.find((s) => s.id === id);
     const ok = (value = {}) => this.say(response, 200, value);
+    if (path === "/api/login") {
+      Object.assign(this.me, { role: "operator", name: "eva", may_decide: true, offers: ["decide", "register", "closure"] });
+      return ok();
+    }
     if (path === "/api/decide") {
       const closure = mission.closures.get(body.closure);
       if (!closure) return this.say(response, 404, { error: `There is no closure ${body.closure}.` });

@@ -7,7 +7,8 @@ import { PHASES } from "../options";
 import type { Phase } from "../options";
 import { THEMES } from "../theme";
 import type { ThemeChoice } from "../theme";
-import { button, h, icon, panel } from "./dom";
+import { save_file } from "../handover";
+import { attempt, button, h, icon, panel } from "./dom";
 import type { Child } from "./dom";
 import { person } from "./login";
 
@@ -21,6 +22,7 @@ export function top_bar(app: App, theme: ThemeChoice): HTMLElement {
       button(PHASES[phase].name, () => app.set_phase(phase), { title: PHASES[phase].help, "aria-pressed": String(app.phase === phase) }),
     )),
     button(icon(theme.theme === "light" ? "sun" : theme.theme === "dark" ? "moon" : "system", `Colours: ${THEMES[theme.theme]}`), () => theme.next(), { class: "plain square", key: "theme", "aria-label": `Colours: ${THEMES[theme.theme]}` }),
+    app.live ? button(icon("save", "Save the mission so far as one file that opens offline"), () => void attempt(() => save_file(app)), { class: "plain square", key: "save", "aria-label": "Save as a file" }) : null,
     app.live ? person(app) : null,
   ]);
 }

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/** The mission so far as one file, to hand over: this page, with everything that it knows in it. */
+import type { App } from "./app";
+import { base64_of_cloud } from "./cloud";
+import type { Disagreement, Kind, Mission, Poses, Status } from "./schema";
+import { POSE_ROW } from "./schema";
+import { MISSION_ELEMENT } from "./sources/inlined";
+import type { Store } from "./store";
+
+/** The value as a program says it, so that the same page reads it again. Most are kept as they came. */
+const ENCODERS: { [K in Kind]?: (value: never, store: Store) => unknown } = {
+  mission: (m: Mission) => ({ ...m, mode: "report" }),
+  poses: (p: Poses, store: Store) => ({ ...p, rows: undefined, submaps: Object.fromEntries(rows_of_submaps(p, store)) }),
+  status: (s: Status) => ({ ...s, robots: s.robots.map((r) => ({ ...r, T_odom_body: r.position && { translation_m: r.position } })), refusals: s.refused.map((r) => ({ ...r, last_why: r.why })) }),
+  disagreement: (d: Disagreement) => ({ ...d, nodes: d.nodes.map((n) => ({ ...n, d: n.d_m })) }),
+};
+
+function rows_of_submaps(poses: Poses, store: Store): [string, (number | null)[]][] {
+  const out: [string, (number | null)[]][] = [];
+  for (let place = 0; place * POSE_ROW < poses.rows.length; ++place) {
+    const row = Array.from(poses.rows.subarray(place * POSE_ROW, (place + 1) * POSE_ROW));
+    if (Number.isFinite(row[0])) out.push([store.id_at(place), row.map((x) => (Number.isFinite(x) ? x : null))]);
+  }
+  return out;
+}
+
+/** Throws an Error when the server does not give its page. */
+export async function saved_page(app: App): Promise<string> {
+  const answer = await fetch("/", { cache: "no-store" });
+  if (!answer.ok) throw new Error(`The server answers ${answer.status}.`);
+  const [before, after] = (await answer.text()).split(slot(""));
+  if (after === undefined) throw new Error("The server's page has no place for a mission.");
+  const messages: unknown[] = [];
+  for (const { key, kind, t, value } of app.store.everything()) messages.push({ key, t, value: value === null ? null : (ENCODERS[kind]?.(value as never, app.store) ?? value) });
+  const clouds = Object.fromEntries([...app.clouds].map(([name, cloud]) => [name, base64_of_cloud(cloud)]));
+  return before + slot(JSON.stringify({ messages, clouds }).replaceAll("<", "\\u003c")) + after;
+}
+
+/** Made of pieces: the page itself has this text exactly once. */
+const slot = (text: string): string => `<script type="application/json" id="${MISSION_ELEMENT}">${text}</` + "script>";
+
+export async function save_file(app: App): Promise<void> {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([await saved_page(app)], { type: "text/html" }));
+  link.download = `${(app.store.get("mission")?.name ?? "mission").replace(/[^A-Za-z0-9_-]+/g, "_")}_${Math.round(app.now())}s.html`;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}
