@@ -74,10 +74,6 @@ stage "packages"
 "$root/scripts/install_dependencies.sh" --tests
 trap finish EXIT
 build_and_test "$preset" Release "${tests[@]}"
-if [ "${#tests[@]}" -eq 0 ]; then
-  stage "page"
-  "$root/scripts/test_web.sh"
-fi
 if [ "$sanitize" = yes ]; then
   export ASAN_OPTIONS=detect_stack_use_after_return=1:strict_string_checks=1
   export UBSAN_OPTIONS=print_stacktrace=1
