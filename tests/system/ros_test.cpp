@@ -27,13 +27,13 @@
 #include "tutti/bags/point_cloud.hpp"
 #include "tutti/bags/ros_messages.hpp"
 #include "tutti/base/file.hpp"
+#include "tutti/intake/ros_intake.hpp"
 #include "tutti/lab/children.hpp"
 #include "tutti/lab/mission_source.hpp"
 #include "tutti/lab/run_mission.hpp"
 #include "tutti/lab/write_bags.hpp"
 #include "tutti/mapfile/content.hpp"
 #include "tutti/mission/runner.hpp"
-#include "tutti/program/ros/ros_intake.hpp"
 #include "tutti/program/server_program.hpp"
 
 namespace tutti {

@@ -27,8 +27,8 @@ constexpr int kWait_ms = 100;
 constexpr double kConnects_s = 120.0;
 constexpr std::size_t kMostInputs = 2'000, kMostBytes = 24U << 20U;  // of FeedFront::Limits less than half
 
-program::FeedSensors sensors_of(const Recording& recording) {
-  program::FeedSensors out{.scans = recording.scans != nullptr, .cameras = {}, .depth = {}, .imu = {}};
+intake::FeedSensors sensors_of(const Recording& recording) {
+  intake::FeedSensors out{.scans = recording.scans != nullptr, .cameras = {}, .depth = {}, .imu = {}};
   if (!recording.images) return out;
   out.cameras = recording.images->cameras;
   if (recording.images->load_depth) out.depth = recording.images->depth;
@@ -55,7 +55,7 @@ class Player {
   void note_said(Timestamp stamp, std::size_t bytes);
   void note_stored(const std::optional<Timestamp>& stored);
   Status wait_for_robot(const std::atomic<bool>& stop);
-  [[nodiscard]] std::optional<program::FedImages> images(std::size_t moment, Timestamp stamp) const;
+  [[nodiscard]] std::optional<intake::FedImages> images(std::size_t moment, Timestamp stamp) const;
   void score(const program::FeedWay& way);
 
   const FeedPlayerOptions& options_;
@@ -196,15 +196,15 @@ Status Player::say_images(Timestamp now) {
     const auto seen = images(images_, is_of_sample ? now : stamp);
     if (!seen) continue;
     if (Status ok = client_->say(*seen); !ok) return ok;
-    note_said(now, program::bytes_of(*seen));
+    note_said(now, intake::bytes_of(*seen));
   }
   return {};
 }
 
 /// Without those that cannot be read: the robot finds out that there are none.
-std::optional<program::FedImages> Player::images(std::size_t moment, Timestamp stamp) const {
+std::optional<intake::FedImages> Player::images(std::size_t moment, Timestamp stamp) const {
   const ImageStream& stream = *robot_.recording.images;
-  program::FedImages out{stamp, {}, {}};
+  intake::FedImages out{stamp, {}, {}};
   for (std::uint32_t camera = 0; camera < stream.cameras.size(); ++camera) {
     const auto image = stream.load(moment, camera);
     if (!image || image->empty()) continue;
@@ -215,7 +215,7 @@ std::optional<program::FedImages> Player::images(std::size_t moment, Timestamp s
   if (out.images.empty() || out.images.front().camera != 0) return std::nullopt;
   if (stream.load_depth)
     if (const auto depth = stream.load_depth(moment); depth && !depth->empty())
-      out.depth = program::EncodedImage{0, false, formats::encode_depth(*depth)};
+      out.depth = intake::EncodedImage{0, false, formats::encode_depth(*depth)};
   return out;
 }
 

@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "tutti/intake/feed_sensors.hpp"
 #include "tutti/perception/visual/frontend/image_tracker.hpp"
-#include "tutti/program/feed/feed_sensors.hpp"
 
 namespace tutti::program {
 
@@ -15,16 +15,16 @@ class FedCamera {
  public:
   explicit FedCamera(const visual::TrackerConfig& config) : config_(config) {}
 
-  /// Tracks points in the next images, of which raw ones must have their camera's size (check_images()); at a keyframe
-  /// descriptors are computed. Empty when there is nothing to track; take_errors() says why.
-  TrackedImages see(const FedImages& images, bool keyframe);
+  /// Tracks points in the next images, of which raw ones must have their camera's size (intake::check_images()); at a
+  /// keyframe descriptors are computed. Empty when there is nothing to track; take_errors() says why.
+  TrackedImages see(const intake::FedImages& images, bool keyframe);
   /// The errors since the last call.
   std::vector<Error> take_errors() { return std::exchange(errors_, {}); }
 
  private:
   visual::TrackerConfig config_;
-  std::shared_ptr<const FeedSensors> sensors_;     // for which the tracker was made
-  std::unique_ptr<visual::ImageTracker> tracker_;  // null: these sensors allow none
+  std::shared_ptr<const intake::FeedSensors> sensors_;  // for which the tracker was made
+  std::unique_ptr<visual::ImageTracker> tracker_;       // null: these sensors allow none
   std::vector<Error> errors_;
 };
 

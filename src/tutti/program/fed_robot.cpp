@@ -57,7 +57,7 @@ void FedRobot::hear(const Scan& scan, Timestamp now) {
 }
 
 /// Every image is tracked, those of keyframes are kept.
-void FedRobot::hear(const std::shared_ptr<const FedImages>& images, Timestamp now) {
+void FedRobot::hear(const std::shared_ptr<const intake::FedImages>& images, Timestamp now) {
   const robot::RobotAgent& agent = robot_.node().agent();
   const Timestamp stamp = images->stamp;
   const bool is_keyframe = agent.wants_images(stamp);

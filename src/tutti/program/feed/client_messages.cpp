@@ -66,8 +66,8 @@ Camera read(const v1::Feed::Camera& in) {
 
 double or_default(double said, double otherwise) { return said == 0.0 ? otherwise : said; }
 
-Result<FeedSensors> read(const v1::Feed::Sensors& in) {
-  FeedSensors out{.scans = in.scans(), .cameras = {}, .depth = {}, .imu = {}};
+Result<intake::FeedSensors> read(const v1::Feed::Sensors& in) {
+  intake::FeedSensors out{.scans = in.scans(), .cameras = {}, .depth = {}, .imu = {}};
   for (const v1::Feed::Camera& camera : in.camera()) {
     if (!v1::Feed::Camera::Kind_IsValid(camera.kind()))
       return fail(ErrorCode::unsupported, "a camera of a kind ({}) that this program does not know",
@@ -88,7 +88,7 @@ Result<FeedSensors> read(const v1::Feed::Sensors& in) {
                        or_default(in.imu().accelerometer_noise_density(), usual.accelerometer_noise_density),
                        or_default(in.imu().accelerometer_random_walk(), usual.accelerometer_random_walk)};
   }
-  if (auto ok = check_sensors(out); !ok) return tl::unexpected(ok.error());
+  if (auto ok = intake::check_sensors(out); !ok) return tl::unexpected(ok.error());
   return out;
 }
 
@@ -103,12 +103,12 @@ FromClient read(v1::Feed::Hello& in) {
   return out;
 }
 
-EncodedImage read(v1::Feed::Image& in) {
+intake::EncodedImage read(v1::Feed::Image& in) {
   return {in.camera(), in.encoding() == v1::Feed::Image::RAW, std::move(*in.mutable_data())};
 }
 
 FromClient read(v1::Feed::Images& in) {
-  FedImages out{.stamp = {in.stamp_ns()}, .images = {}, .depth = {}};
+  intake::FedImages out{.stamp = {in.stamp_ns()}, .images = {}, .depth = {}};
   const auto is_known = [](const v1::Feed::Image& image) {
     return v1::Feed::Image::Encoding_IsValid(image.encoding());
   };
@@ -154,11 +154,11 @@ FromClient read(const v1::Feed::Health& in) {
 FromClient read(const v1::Feed::Imu& in) {
   const int samples = in.stamp_ns_size();
   const Timestamp first{samples > 0 ? in.stamp_ns(0) : 0};
-  if (samples == 0 || static_cast<std::size_t>(samples) > kMaxImuSamples || in.gyro_size() != 3 * samples ||
+  if (samples == 0 || static_cast<std::size_t>(samples) > intake::kMaxImuSamples || in.gyro_size() != 3 * samples ||
       in.accelerometer_size() != 3 * samples)
     return BadSample{first, fmt::format("{} IMU samples with {} numbers of the gyro and {} of the accelerometer, "
                                         "expected 1 to {} samples and three numbers of both for each",
-                                        samples, in.gyro_size(), in.accelerometer_size(), kMaxImuSamples)};
+                                        samples, in.gyro_size(), in.accelerometer_size(), intake::kMaxImuSamples)};
   FeedImu out;
   out.samples.reserve(static_cast<std::size_t>(samples));
   for (int i = 0; i < samples; ++i) {

@@ -95,7 +95,7 @@ FromRobot read(const v1::Feed& message) {
 }  // namespace
 
 Result<std::unique_ptr<FeedClient>> FeedClient::connect(const std::string& socket, const std::string& name,
-                                                        const FeedSensors& sensors, bool wants_way) {
+                                                        const intake::FeedSensors& sensors, bool wants_way) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   if (socket.empty() || socket.size() >= sizeof address.sun_path)
@@ -135,7 +135,7 @@ Status FeedClient::say(const node::OdometrySample& sample) { return send(interna
 
 Status FeedClient::say(const Scan& scan) { return send(internal::message_of(scan)); }
 
-Status FeedClient::say(const FedImages& images) { return send(internal::message_of(images)); }
+Status FeedClient::say(const intake::FedImages& images) { return send(internal::message_of(images)); }
 
 Status FeedClient::say(const std::vector<ImuSample>& samples) { return send(internal::message_of(samples)); }
 

@@ -63,14 +63,14 @@ class FeedClient {
   /// Connects and sends Hello; the robot's FeedWelcome is what hear() returns first. Fails when nobody listens on
   /// `socket`.
   static Result<std::unique_ptr<FeedClient>> connect(const std::string& socket, const std::string& name,
-                                                     const FeedSensors& sensors, bool wants_way);
+                                                     const intake::FeedSensors& sensors, bool wants_way);
   ~FeedClient();
   FeedClient(const FeedClient&) = delete;
   FeedClient& operator=(const FeedClient&) = delete;
 
   Status say(const node::OdometrySample& sample);
   Status say(const Scan& scan);
-  Status say(const FedImages& images);
+  Status say(const intake::FedImages& images);
   Status say(const std::vector<ImuSample>& samples);
   Status say(const PositionFix& fix);
   Status say(const Health& health);

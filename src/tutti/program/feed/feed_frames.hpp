@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "tutti/base/result.hpp"
+#include "tutti/intake/feed_sensors.hpp"
 #include "tutti/node/journal.hpp"
-#include "tutti/program/feed/feed_sensors.hpp"
 #include "tutti/program/feed/feed_target.hpp"
 #include "tutti/program/feed/smooth_map.hpp"
 
@@ -24,7 +24,6 @@ inline constexpr std::uint32_t kFeedVersion = 1;
 inline constexpr std::size_t kMaxFeedBytes = 16U << 20U;
 /// Size limit of a client's message while it does not feed: then only Hello is expected.
 inline constexpr std::size_t kMaxHelloBytes = 64U << 10U;
-inline constexpr std::size_t kMaxImuSamples = 10'000;  ///< Limit per message: ten seconds at 1 kHz.
 /// Names of the messages a client may send; the index is the message's number in the protocol minus one.
 inline constexpr const char* kFromClient[] = {"hello", "odometry", "scan",  "end_of_recording", "images", "imu",
                                               "time",  "fix",      "health"};
@@ -47,7 +46,7 @@ struct FeedHello {
   std::uint32_t version = 0;
   std::string client;
   bool listens_only = false;
-  Result<FeedSensors> sensors = FeedSensors{};  ///< An error says why such sensors cannot be.
+  Result<intake::FeedSensors> sensors = intake::FeedSensors{};  ///< An error says why such sensors cannot be.
   /// Nanoseconds, to be added to the client's stamps; or the client's time now.
   std::optional<std::int64_t> clock_offset_ns = {}, clock_now_ns = {};
   bool wants_way = false;  ///< Asks for a FeedWay after every update of the map.
@@ -69,7 +68,7 @@ struct BadSample {
   std::string why;
 };
 /// What a client may say.
-using FromClient = std::variant<FeedHello, node::OdometrySample, Scan, FeedEnd, FedImages, FeedImu, FeedTime,
+using FromClient = std::variant<FeedHello, node::OdometrySample, Scan, FeedEnd, intake::FedImages, FeedImu, FeedTime,
                                 PositionFix, Health, FeedUnknown, BadSample>;
 /// Decodes untrusted bytes; an error when they are no message of the protocol.
 Result<FromClient> decode_from_client(std::string_view payload);

@@ -22,8 +22,8 @@ std::size_t scan_bytes_of(const FeedInput& input) {
 }
 
 std::size_t image_bytes_of(const FeedInput& input) {
-  const auto* images = std::get_if<std::shared_ptr<const FedImages>>(&input);
-  return images == nullptr ? 0 : bytes_of(**images);
+  const auto* images = std::get_if<std::shared_ptr<const intake::FedImages>>(&input);
+  return images == nullptr ? 0 : intake::bytes_of(**images);
 }
 
 bool is_odometry(const FeedInput& input) { return std::holds_alternative<node::OdometrySample>(input); }
@@ -42,10 +42,10 @@ Timestamp stamp_of(const FeedInput& input) {
   struct Stamp {
     Timestamp operator()(const node::OdometrySample& sample) const { return sample.stamp; }
     Timestamp operator()(const Scan& scan) const { return scan.stamp; }
-    Timestamp operator()(const std::shared_ptr<const FedImages>& images) const { return images->stamp; }
+    Timestamp operator()(const std::shared_ptr<const intake::FedImages>& images) const { return images->stamp; }
     Timestamp operator()(const PositionFix& fix) const { return fix.stamp; }
     Timestamp operator()(const FeedEnded&) const { return {}; }
-    Timestamp operator()(const std::shared_ptr<const FeedSensors>&) const { return {}; }
+    Timestamp operator()(const std::shared_ptr<const intake::FeedSensors>&) const { return {}; }
     Timestamp operator()(const FeedAnew&) const { return {}; }
   };
   return std::visit(Stamp{}, input);  // does not compile with a kind of input that is not named above
@@ -248,7 +248,7 @@ void FeedFront::note_heard() {
   in_hand_ = false;
 }
 
-std::shared_ptr<const FeedSensors> FeedFront::sensors() const {
+std::shared_ptr<const intake::FeedSensors> FeedFront::sensors() const {
   const std::scoped_lock lock(mutex_);
   return sensors_;
 }
@@ -267,7 +267,7 @@ void FeedFront::note_stored() {
   std::vector<FeedInput> stored;  // which are freed while nobody waits
   const std::scoped_lock lock(mutex_);
   for (; taken_ > 0; --taken_) {
-    if (!std::holds_alternative<std::shared_ptr<const FeedSensors>>(inputs_.front()))
+    if (!std::holds_alternative<std::shared_ptr<const intake::FeedSensors>>(inputs_.front()))
       ended_ = std::holds_alternative<FeedEnded>(inputs_.front());
     if (const auto* sample = std::get_if<node::OdometrySample>(&inputs_.front())) stored_ = sample->stamp;
     if (std::holds_alternative<FeedAnew>(inputs_.front())) {

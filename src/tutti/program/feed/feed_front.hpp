@@ -26,8 +26,8 @@ struct FeedAnew {
   std::string why;
 };
 /// An input for the robot, cheap to copy. Sensors mean that later inputs are of these sensors.
-using FeedInput = std::variant<node::OdometrySample, Scan, FeedEnded, std::shared_ptr<const FedImages>,
-                               std::shared_ptr<const FeedSensors>, PositionFix, FeedAnew>;
+using FeedInput = std::variant<node::OdometrySample, Scan, FeedEnded, std::shared_ptr<const intake::FedImages>,
+                               std::shared_ptr<const intake::FeedSensors>, PositionFix, FeedAnew>;
 
 /// The input's stamp; zero for kinds that have none.
 Timestamp stamp_of(const FeedInput& input);
@@ -58,8 +58,8 @@ class FeedFront final : public FeedTarget {
   // For the feed.
   Status add_odometry(const node::OdometrySample& sample) override;
   Status add_scan(const Scan& scan) override;
-  void set_sensors(const FeedSensors& sensors) override;
-  Status add_images(FedImages images) override;
+  void set_sensors(const intake::FeedSensors& sensors) override;
+  Status add_images(intake::FedImages images) override;
   Status add_imu(const std::vector<ImuSample>& samples) override;
   Status add_fix(const PositionFix& fix) override;
   void set_health(const Health& health) override;
@@ -75,7 +75,7 @@ class FeedFront final : public FeedTarget {
   std::optional<FeedInput> take(double wall_s);
   void note_heard();
   /// What inputs from now on come from; never null.
-  [[nodiscard]] std::shared_ptr<const FeedSensors> sensors() const;
+  [[nodiscard]] std::shared_ptr<const intake::FeedSensors> sensors() const;
   /// imu_over() the IMU samples that are kept.
   [[nodiscard]] std::vector<ImuSample> imu(Timestamp from, Timestamp until) const;
   /// The robot has taken every input.
@@ -130,7 +130,7 @@ class FeedFront final : public FeedTarget {
   void push(FeedInput input);
   void note_behind(Timestamp stamp);
   [[nodiscard]] bool is_ahead(Timestamp stamp) const;
-  Status may_wait(const FedImages& images) const;
+  Status may_wait(const intake::FedImages& images) const;
   Status may_wait(const PositionFix& fix) const;
   void release_images(bool all = false);
   void thin();
@@ -153,9 +153,9 @@ class FeedFront final : public FeedTarget {
   std::size_t taken_ = 0;       // of them, from the front
   std::size_t anew_ = 0;        // of them, how many FeedAnew
   std::size_t scan_bytes_ = 0;  // in them
-  std::shared_ptr<const FeedSensors> sensors_ = std::make_shared<const FeedSensors>();
-  std::deque<std::shared_ptr<const FedImages>> images_;  // that wait for odometry or the IMU
-  std::size_t image_bytes_ = 0;                          // in them and in inputs_
+  std::shared_ptr<const intake::FeedSensors> sensors_ = std::make_shared<const intake::FeedSensors>();
+  std::deque<std::shared_ptr<const intake::FedImages>> images_;  // that wait for odometry or the IMU
+  std::size_t image_bytes_ = 0;                                  // in them and in inputs_
   std::optional<Timestamp> newest_images_, newest_fix_;
   std::deque<ImuSample> imu_;
   std::uint64_t images_taken_ = 0, images_refused_ = 0, imu_taken_ = 0, imu_refused_ = 0, fixes_taken_ = 0,

@@ -11,7 +11,7 @@
 namespace tutti::program {
 namespace feed_front_images_test {
 
-using Moment = std::shared_ptr<const FedImages>;
+using Moment = std::shared_ptr<const intake::FedImages>;
 const Trajectory kOdometry = robot::test::drifting_odometry(20);
 
 node::OdometrySample sample(std::size_t i) {
@@ -19,14 +19,14 @@ node::OdometrySample sample(std::size_t i) {
 }
 
 /// One camera of 8 x 4 pixels, with an IMU.
-FeedSensors eyes() {
-  FeedSensors out;
+intake::FeedSensors eyes() {
+  intake::FeedSensors out;
   out.cameras.resize(1);
   out.cameras[0].model = {.width_px = 8, .height_px = 4, .fx = 5.0, .fy = 5.0, .cx = 3.5, .cy = 1.5};
   out.imu = ImuNoise{};
   return out;
 }
-FedImages images(Timestamp stamp) { return {stamp, {{0, true, std::string(32, 'x')}}, {}}; }
+intake::FedImages images(Timestamp stamp) { return {stamp, {{0, true, std::string(32, 'x')}}, {}}; }
 std::vector<ImuSample> imu(Timestamp stamp) { return {{.stamp = stamp}}; }
 
 /// What the robot is given next: o, i, s (what is fed), or nothing.
@@ -46,7 +46,7 @@ TEST(FeedFrontImages, AreNotCopied) {
   EXPECT_EQ(next(front), 's');
   EXPECT_TRUE(front.add_odometry(sample(0)));
   EXPECT_EQ(next(front), 'o');
-  FedImages fed = images(kOdometry[0].stamp);
+  intake::FedImages fed = images(kOdometry[0].stamp);
   const char* const bytes = fed.images[0].bytes.data();
   EXPECT_TRUE(front.add_images(std::move(fed)));
   EXPECT_TRUE(front.add_imu(imu(kOdometry[0].stamp)));
@@ -111,7 +111,7 @@ TEST(FeedFrontImages, StampsThatJumpBackOrFarAheadAreRefusedAndDoNoHarm) {
 
 TEST(FeedFrontImages, WhatWaitsInImagesIsBoundedAndCounted) {
   FeedFront front(test::NodeTarget().state(), {.image_bytes = 1000, .imu = 50});
-  FeedSensors sensors = eyes();
+  intake::FeedSensors sensors = eyes();
   sensors.imu.reset();
   front.set_sensors(sensors);
   EXPECT_TRUE(front.add_odometry(sample(0)));

@@ -9,11 +9,11 @@
 
 namespace tutti::program {
 
-void FeedFront::set_sensors(const FeedSensors& sensors) {
+void FeedFront::set_sensors(const intake::FeedSensors& sensors) {
   const std::scoped_lock lock(mutex_);
   if (sensors == *sensors_) return;
   release_images(true);
-  sensors_ = std::make_shared<const FeedSensors>(sensors);
+  sensors_ = std::make_shared<const intake::FeedSensors>(sensors);
   push(sensors_);
   fed_.notify_one();
 }
@@ -22,14 +22,14 @@ bool FeedFront::is_ahead(Timestamp stamp) const {
   return !localiser_.newest() || stamp - localiser_.newest()->stamp > kAhead_s;
 }
 
-Status FeedFront::may_wait(const FedImages& images) const {
-  if (auto ok = check_images(images, *sensors_); !ok) return ok;
+Status FeedFront::may_wait(const intake::FedImages& images) const {
+  if (auto ok = intake::check_images(images, *sensors_); !ok) return ok;
   if (newest_images_ && images.stamp <= *newest_images_)
     return fail(ErrorCode::invalid, "images at {} ns: there were some at {} ns, stamps must increase", images.stamp.ns,
                 newest_images_->ns);
   if (is_ahead(images.stamp))
     return fail(ErrorCode::invalid, "images at {} ns: no odometry within {} s before", images.stamp.ns, kAhead_s);
-  if (image_bytes_ + bytes_of(images) > limits_.image_bytes || waiting() + images_.size() >= limits_.inputs / 2)
+  if (image_bytes_ + intake::bytes_of(images) > limits_.image_bytes || waiting() + images_.size() >= limits_.inputs / 2)
     return fail(ErrorCode::io,
                 "the map is behind: {} inputs and {} bytes of images wait, at most {} with {}; the images at {} ns are "
                 "left out",
@@ -37,8 +37,8 @@ Status FeedFront::may_wait(const FedImages& images) const {
   return {};
 }
 
-Status FeedFront::add_images(FedImages fed) {
-  const auto images = std::make_shared<FedImages>(std::move(fed));
+Status FeedFront::add_images(intake::FedImages fed) {
+  const auto images = std::make_shared<intake::FedImages>(std::move(fed));
   const std::scoped_lock lock(mutex_);
   if (closed_) return fail(ErrorCode::io, "the robot's program ends");
   if (Status ok = may_wait(*images); !ok) {
@@ -51,7 +51,7 @@ Status FeedFront::add_images(FedImages fed) {
   }
   ++images_taken_;
   newest_images_ = images->stamp;
-  image_bytes_ += bytes_of(*images);
+  image_bytes_ += intake::bytes_of(*images);
   images->sensors = sensors_;
   images_.push_back(images);
   release_images();

@@ -25,7 +25,7 @@ struct ToRobot {
   }
   Wrong operator()(node::OdometrySample& sample) const { return shift(sample.stamp); }
   Wrong operator()(Scan& scan) const { return shift(scan.stamp); }
-  Wrong operator()(FedImages& images) const { return shift(images.stamp); }
+  Wrong operator()(intake::FedImages& images) const { return shift(images.stamp); }
   Wrong operator()(PositionFix& fix) const { return shift(fix.stamp); }
   Wrong operator()(FeedImu& imu) const {
     for (ImuSample& sample : imu.samples)
@@ -110,7 +110,7 @@ void FeedSession::take_fed(Client client, FromClient message) {
   };
   if (const auto* imu = std::get_if<FeedImu>(&message))
     return take(imu->samples.front().stamp, [&] { return target_.add_imu(imu->samples); });
-  if (auto* images = std::get_if<FedImages>(&message))
+  if (auto* images = std::get_if<intake::FedImages>(&message))
     return take(images->stamp, [&] { return target_.add_images(std::move(*images)); });
   if (const auto* fix = std::get_if<PositionFix>(&message))
     return take(fix->stamp, [&] { return target_.add_fix(*fix); });

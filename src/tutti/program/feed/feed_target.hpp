@@ -10,11 +10,11 @@
 
 #include "tutti/base/ids.hpp"
 #include "tutti/base/result.hpp"
+#include "tutti/intake/feed_sensors.hpp"
 #include "tutti/model/position_fix.hpp"
 #include "tutti/model/status.hpp"
 #include "tutti/model/trajectory.hpp"
 #include "tutti/node/journal.hpp"
-#include "tutti/program/feed/feed_sensors.hpp"
 #include "tutti/robot/next_keyframe.hpp"
 #include "tutti/robot/odometry_watch.hpp"
 
@@ -83,8 +83,8 @@ class FeedTarget {
   virtual Status add_odometry(const node::OdometrySample& sample) = 0;
   virtual Status add_scan(const Scan& scan) = 0;
   /// Sets what the client's later inputs come from.
-  virtual void set_sensors(const FeedSensors& /*sensors*/) {}
-  virtual Status add_images(FedImages images) {
+  virtual void set_sensors(const intake::FeedSensors& /*sensors*/) {}
+  virtual Status add_images(intake::FedImages images) {
     return fail(ErrorCode::unsupported, "images at {} ns: this robot takes none", images.stamp.ns);
   }
   /// An error when any of the samples was left out.

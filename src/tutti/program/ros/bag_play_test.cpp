@@ -9,15 +9,15 @@
 #include <thread>
 
 #include "support/bus/nats_network.hpp"
+#include "support/intake/messages.hpp"
 #include "support/program/ros/loopback.hpp"
-#include "support/program/ros/messages.hpp"
 #include "tutti/bags/bag_writer.hpp"
 
 namespace tutti::ros {
 namespace bag_play_test {
 
 namespace fs = std::filesystem;
-using test::kPeriod, test::kStart, test::odometry, test::taken;
+using intake::test::kPeriod, intake::test::kStart, intake::test::odometry, test::taken;
 
 constexpr double kPatience_s = 20.0;
 constexpr const char *kOdometry = "nav_msgs/msg/Odometry", *kTf = "tf2_msgs/msg/TFMessage";
@@ -36,7 +36,7 @@ class BagPlay : public ::testing::Test {
         const std::int64_t stamp = kStart + i * kPeriod;
         EXPECT_TRUE(bag.write("/odom", kOdometry, {stamp}, odometry(stamp, i)));
       }
-      EXPECT_TRUE(bag.write("/tf", kTf, {kStart}, test::transform(kStart, "odom", "base_link", {})));
+      EXPECT_TRUE(bag.write("/tf", kTf, {kStart}, intake::test::transform(kStart, "odom", "base_link", {})));
       EXPECT_TRUE(bag.close());
       out.push_back(folder.string());
     }

@@ -6,49 +6,21 @@
 #include <vector>
 
 #include "tutti/base/result.hpp"
-#include "tutti/model/image_stream.hpp"
+#include "tutti/intake/camera_topics.hpp"
 #include "tutti/program/ros/dds.hpp"
 
 namespace tutti::ros {
 
-inline constexpr const char *kImageType = "sensor_msgs/msg/Image", *kCompressedType = "sensor_msgs/msg/CompressedImage",
-                            *kCameraInfoType = "sensor_msgs/msg/CameraInfo", *kImuType = "sensor_msgs/msg/Imu";
-
-/// Which cameras and which IMU a robot on ROS's topics has.
-struct ImagesConfig {
-  std::vector<std::string> images;        ///< Topics; empty: found by type, within the namespace.
-  std::string depth;                      ///< A topic; empty: found by what messages show, within the namespace.
-  bool with_depth = true;                 ///< False: depth is not used.
-  std::string imu;                        ///< A topic; empty: found by type, within the namespace.
-  std::string within = "/";               ///< How the namespace's topics begin, "/alpha/"; set by resolve().
-  int most_cameras = 2;                   ///< RobotConfig::images.most_cameras
-  double time_offset_s = 0.0;             ///< Added to the images' stamps gives the odometry's time.
-  double most_difference_s = 0.005;       ///< Between the stamps of two cameras' images of one moment.
-  DepthSensor depth_sensor = {};          ///< Its unit is not read: ROS's depth is in millimetres or metres.
-  double most_depth_difference_s = 0.02;  ///< Between the stamps of an image and of its depth.
-};
-
 /// Sets `within`, and makes all topics' names full ones. Fails when one is no valid name in ROS.
-Status resolve(ImagesConfig& config, const std::string& name_space);
-
-/// What a topic of images was said to be.
-enum class Wish { nothing, camera, depth };
-
-/// A topic of images, and that of its CameraInfo.
-struct CameraTopics {
-  std::string images, info;
-  bool is_compressed = false;
-  bool has_info = true;  ///< The CameraInfo is published.
-  Wish wish = Wish::nothing;
-  friend bool operator==(const CameraTopics&, const CameraTopics&) = default;
-};
+Status resolve(intake::ImagesConfig& config, const std::string& name_space);
 
 /// Published topics that may be the robot's cameras and their depth, in the order of their names: those that `config`
 /// names, or all that have a CameraInfo beside them (of which a compressed topic counts only where there is no
 /// other). Which is which tell their messages. Where one camera is named, the others may be its depth. None while those
 /// that are named are not all published; an error when two cameras that are named are one.
-Result<std::vector<CameraTopics>> find_images(std::span<const Publication> published, const ImagesConfig& config);
+Result<std::vector<intake::CameraTopics>> find_images(std::span<const Publication> published,
+                                                      const intake::ImagesConfig& config);
 /// The topic of the IMU, by the same rules; empty while there is none.
-Result<std::string> choose_imu(std::span<const Publication> published, const ImagesConfig& config);
+Result<std::string> choose_imu(std::span<const Publication> published, const intake::ImagesConfig& config);
 
 }  // namespace tutti::ros

@@ -3,45 +3,45 @@
 
 #include <gtest/gtest.h>
 
-#include "support/program/ros/camera_robot.hpp"
+#include "support/intake/camera_robot.hpp"
 
 namespace tutti::ros {
 namespace image_topics_test {
 
-using namespace test;
+using namespace intake::test;
 
 std::vector<Publication> publications(const std::vector<std::pair<const char*, const char*>>& all) {
   std::vector<Publication> out;
   for (const auto& [topic, type] : all) out.push_back({.topic = topic, .type = type, .user_data = {}});
   return out;
 }
-std::vector<std::string> names(const Result<std::vector<CameraTopics>>& topics) {
+std::vector<std::string> names(const Result<std::vector<intake::CameraTopics>>& topics) {
   std::vector<std::string> out;
-  for (const CameraTopics& topic : topics.value()) out.push_back(topic.images);
+  for (const intake::CameraTopics& topic : topics.value()) out.push_back(topic.images);
   return out;
 }
 
 TEST(ImageTopics, TopicsAreFoundByType) {
-  ImagesConfig config;
+  intake::ImagesConfig config;
   ASSERT_TRUE(resolve(config, "r"));
-  auto published = publications({{"/r/right/image_raw", kImageType},
-                                 {"/r/right/camera_info", kCameraInfoType},
-                                 {"/r/left/image_raw", kImageType},
-                                 {"/r/left/image_raw/compressed", kCompressedType},
-                                 {"/r/left/image_raw/compressedDepth", kCompressedType},
-                                 {"/r/left/camera_info", kCameraInfoType},
-                                 {"/r/rviz", kImageType},
-                                 {"/s/image_raw", kImageType},
-                                 {"/s/camera_info", kCameraInfoType},
-                                 {"/s/imu", kImuType},
-                                 {"/r/imu", kImuType}});
+  auto published = publications({{"/r/right/image_raw", intake::kImageType},
+                                 {"/r/right/camera_info", intake::kCameraInfoType},
+                                 {"/r/left/image_raw", intake::kImageType},
+                                 {"/r/left/image_raw/compressed", intake::kCompressedType},
+                                 {"/r/left/image_raw/compressedDepth", intake::kCompressedType},
+                                 {"/r/left/camera_info", intake::kCameraInfoType},
+                                 {"/r/rviz", intake::kImageType},
+                                 {"/s/image_raw", intake::kImageType},
+                                 {"/s/camera_info", intake::kCameraInfoType},
+                                 {"/s/imu", intake::kImuType},
+                                 {"/r/imu", intake::kImuType}});
   EXPECT_EQ(find_images(published, config).value(), (std::vector{kLeft, kRight}));
   EXPECT_EQ(choose_imu(published, config).value(), "/r/imu");
   EXPECT_TRUE(find_images(publications({}), config)->empty());
-  published.push_back({.topic = "/r/imu2", .type = kImuType, .user_data = {}});
+  published.push_back({.topic = "/r/imu2", .type = intake::kImuType, .user_data = {}});
   expect(choose_imu(published, config).error().message, "2 topics have one; say which: --imu /r/imu ");
 
-  ImagesConfig named{.images = {"left/image_raw/compressed"}, .with_depth = false, .imu = "imu2"};
+  intake::ImagesConfig named{.images = {"left/image_raw/compressed"}, .with_depth = false, .imu = "imu2"};
   ASSERT_TRUE(resolve(named, "r"));
   EXPECT_EQ(names(find_images(published, named)), std::vector<std::string>{"/r/left/image_raw/compressed"});
   EXPECT_EQ(choose_imu(published, named).value(), "/r/imu2");
@@ -54,20 +54,20 @@ TEST(ImageTopics, TopicsAreFoundByType) {
 
 /// One camera that is named may have depth that is not; what both are named nothing else is looked at.
 TEST(ImageTopics, DepthIsFoundAmongTheOthersOrNamed) {
-  const auto published = publications({{"/r/color/image_raw", kImageType},
-                                       {"/r/color/camera_info", kCameraInfoType},
-                                       {"/r/depth/image_raw", kImageType},
-                                       {"/r/depth/camera_info", kCameraInfoType},
-                                       {"/r/registered", kImageType}});
+  const auto published = publications({{"/r/color/image_raw", intake::kImageType},
+                                       {"/r/color/camera_info", intake::kCameraInfoType},
+                                       {"/r/depth/image_raw", intake::kImageType},
+                                       {"/r/depth/camera_info", intake::kCameraInfoType},
+                                       {"/r/registered", intake::kImageType}});
   const std::vector<std::string> both{"/r/color/image_raw", "/r/depth/image_raw"};
-  ImagesConfig config{.images = {"color/image_raw"}};
+  intake::ImagesConfig config{.images = {"color/image_raw"}};
   ASSERT_TRUE(resolve(config, "r"));
   EXPECT_EQ(names(find_images(published, config)), both);
-  EXPECT_EQ(find_images(published, config)->front().wish, Wish::camera);
+  EXPECT_EQ(find_images(published, config)->front().wish, intake::Wish::camera);
   config.depth = "/r/registered";
   const auto named = find_images(published, config).value();
   EXPECT_EQ(names(named), (std::vector<std::string>{"/r/color/image_raw", "/r/registered"}));
-  EXPECT_EQ(named.back().wish, Wish::depth);
+  EXPECT_EQ(named.back().wish, intake::Wish::depth);
   EXPECT_FALSE(named.back().has_info);
   config.depth = "/r/none";
   EXPECT_TRUE(find_images(published, config)->empty());

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "tutti/bags/ros_encode.hpp"
+#include "tutti/intake/ros_intake.hpp"
 #include "tutti/model/trajectory.hpp"
 #include "tutti/program/feed/feed_client.hpp"
-#include "tutti/program/ros/ros_intake.hpp"
 
 namespace tutti::ros {
 
@@ -62,7 +62,7 @@ std::array<double, 36> ros_covariance(const Matrix6d& of_T_map_odom, const Pose3
 struct RosSituation {
   std::string name;
   bool is_connected = false;  ///< To the robot's live feed.
-  RosIntake::Counts counts;
+  intake::RosIntake::Counts counts;
   bool in_map = false;
   std::vector<std::pair<std::string, std::string>> status;  ///< What the robot reports of itself.
   std::vector<std::string> alerts, troubles;  ///< The robot's alerts, and problems with its messages, the newest last.

@@ -19,14 +19,14 @@ constexpr double kLongest_s = 5.0;
 std::string images_of(const std::vector<Publication>& published) {
   std::vector<std::string> names;
   for (const Publication& topic : published)
-    if (topic.type == kImageType || topic.type == kCompressedType) names.push_back(topic.topic);
+    if (topic.type == intake::kImageType || topic.type == intake::kCompressedType) names.push_back(topic.topic);
   return fmt::format("topics of sensor_msgs/Image and CompressedImage here are: {}",
                      names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", ")));
 }
 
 }  // namespace
 
-RosImages::RosImages(Options options, std::shared_ptr<Participant> participant, const RosIntake& odometry,
+RosImages::RosImages(Options options, std::shared_ptr<Participant> participant, const intake::RosIntake& odometry,
                      Complaints& complaints)
     : options_(std::move(options)),
       participant_(std::move(participant)),
@@ -60,23 +60,23 @@ void RosImages::look(double now_s) {
   }
 }
 
-Status RosImages::subscribe(const std::vector<CameraTopics>& topics, const std::string& imu) {
+Status RosImages::subscribe(const std::vector<intake::CameraTopics>& topics, const std::string& imu) {
   const auto make = [&](const std::string& topic, const char* type, int depth) {
     const Qos qos{.reliable = options_.lossless, .latched = false, .depth = options_.lossless ? 0 : depth};
     return participant_->reader(topic, type, qos, bags::ros_type_hash(type));
   };
   constexpr int kImagesDepth = 10, kImuDepth = 2000;  // how long this thread may be held up
   std::vector<std::unique_ptr<Reader>> images, infos;
-  for (const CameraTopics& topic : topics) {
-    auto info = make(topic.info, kCameraInfoType, kImagesDepth);
+  for (const intake::CameraTopics& topic : topics) {
+    auto info = make(topic.info, intake::kCameraInfoType, kImagesDepth);
     if (!info) return tl::unexpected(info.error());
-    auto image = make(topic.images, topic.is_compressed ? kCompressedType : kImageType, kImagesDepth);
+    auto image = make(topic.images, topic.is_compressed ? intake::kCompressedType : intake::kImageType, kImagesDepth);
     if (!image) return tl::unexpected(image.error());
     infos.push_back(std::move(*info));
     images.push_back(std::move(*image));
   }
   if (!imu.empty()) {
-    auto samples = make(imu, kImuType, kImuDepth);
+    auto samples = make(imu, intake::kImuType, kImuDepth);
     if (!samples) return tl::unexpected(samples.error());
     imu_ = std::move(*samples);
   }
@@ -128,19 +128,19 @@ void RosImages::take() {
     options_.say(program::Level::warning, said_ = std::move(missing));
 }
 
-void RosImages::describe(program::FeedSensors& sensors) const {
+void RosImages::describe(intake::FeedSensors& sensors) const {
   if (intake_) intake_->describe(sensors);
 }
 
 bool RosImages::holds_odometry() const {
   const auto waiting = odometry_.waiting();
   if (!waiting || waiting->second - waiting->first > kLongest_s) return false;
-  program::FeedSensors sensors;
+  intake::FeedSensors sensors;
   describe(sensors);
   return sensors.cameras.empty() || !intake_->reaches(waiting->first);
 }
 
-bool RosImages::feed(program::FeedClient& client, const program::FeedSensors& sensors, Timestamp stamp,
+bool RosImages::feed(program::FeedClient& client, const intake::FeedSensors& sensors, Timestamp stamp,
                      Unstored& unstored) {
   if (!intake_ || sensors.cameras.empty()) return true;
   const auto is_said = [&](const Status& status) {
@@ -159,7 +159,7 @@ bool RosImages::feed(program::FeedClient& client, const program::FeedSensors& se
       continue;
     }
     if (!*images) return true;
-    unstored.add((*images)->stamp, program::bytes_of(**images));
+    unstored.add((*images)->stamp, intake::bytes_of(**images));
     if (!is_said(client.say(**images))) return false;
   }
 }

@@ -66,7 +66,7 @@ class Robot final : public RosRobot {
   Status say_battery(std::string_view cdr);
   void say_scans();
   void say_images();
-  [[nodiscard]] program::FeedSensors sensors() const;
+  [[nodiscard]] intake::FeedSensors sensors() const;
   void hear(int timeout_ms, const std::function<bool(const program::FromRobot&)>& until);
   void note(const program::FromRobot& said);
   void publish_situation();
@@ -78,7 +78,7 @@ class Robot final : public RosRobot {
 
   RosRobotOptions options_;
   std::shared_ptr<Participant> participant_;
-  RosIntake intake_;
+  intake::RosIntake intake_;
   std::unique_ptr<Writer> tf_out_, own_tf_out_, pose_, path_, mates_, diagnostics_;
   std::map<std::string, std::unique_ptr<Writer>> mate_poses_;
   std::unique_ptr<Reader> odometry_, points_, fixes_, battery_, tf_, tf_static_, own_tf_, own_tf_static_;
@@ -92,7 +92,7 @@ class Robot final : public RosRobot {
   bool said_no_odometry_ = false;
   Complaints complaints_;
   std::unique_ptr<RosImages> images_;  // null: none are wanted
-  program::FeedSensors sensors_;       // that the robot was told of
+  intake::FeedSensors sensors_;        // that the robot was told of
   std::optional<Timestamp> fed_;       // the newest odometry
   std::jthread thread_;
 };
@@ -204,8 +204,8 @@ void Robot::turn() {
   each_second();
 }
 
-program::FeedSensors Robot::sensors() const {
-  program::FeedSensors out{.scans = !options_.points.empty(), .cameras = {}, .depth = {}, .imu = {}};
+intake::FeedSensors Robot::sensors() const {
+  intake::FeedSensors out{.scans = !options_.points.empty(), .cameras = {}, .depth = {}, .imu = {}};
   if (images_) images_->describe(out);
   return out;
 }
@@ -240,10 +240,10 @@ void Robot::take_messages() {
   };
   take(tf_static_, [&](std::string_view cdr) { return intake_.add_tf(cdr, true); });
   take(tf_, [&](std::string_view cdr) { return intake_.add_tf(cdr, false); });
-  take(own_tf_static_, [&](std::string_view cdr) { return intake_.add_tf(cdr, true, RosIntake::TfOf::robot); });
+  take(own_tf_static_, [&](std::string_view cdr) { return intake_.add_tf(cdr, true, intake::RosIntake::TfOf::robot); });
   take(own_tf_, [&](std::string_view cdr) {
     if (!own_tf_out_) open_own_tf();
-    return intake_.add_tf(cdr, false, RosIntake::TfOf::robot);
+    return intake_.add_tf(cdr, false, intake::RosIntake::TfOf::robot);
   });
   take(odometry_, [&](std::string_view cdr) { return intake_.add_odometry(cdr); });
   take(points_, [&](std::string_view cdr) { return intake_.add_points(cdr, points_->type()); });

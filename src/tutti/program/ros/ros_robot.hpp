@@ -6,10 +6,10 @@
 #include <optional>
 #include <string>
 
+#include "tutti/intake/images_intake.hpp"
+#include "tutti/intake/ros_intake.hpp"
 #include "tutti/program/event_log.hpp"
 #include "tutti/program/ros/dds.hpp"
-#include "tutti/program/ros/images_intake.hpp"
-#include "tutti/program/ros/ros_intake.hpp"
 
 namespace tutti::ros {
 
@@ -17,18 +17,18 @@ namespace tutti::ros {
 struct RosRobotOptions {
   std::string socket;  ///< Path of the robot's live feed.
   std::string name_space;
-  std::string odometry = "odom";          ///< Topic of Odometry messages, or two frames of /tf: "odom->base_link".
-  std::string points = "points";          ///< Topic of scans (bags::kScanTypes); empty: none.
-  std::string fixes = "fix";              ///< Topic of NavSatFix messages; empty: no position fixes.
-  std::string battery = "battery_state";  ///< Topic of BatteryState messages; empty: none.
-  std::optional<ImagesConfig> images;     ///< Nothing: no images and no IMU.
-  std::string map_frame;                  ///< Empty: derived from odometry's frame, as RosAnswers does.
+  std::string odometry = "odom";               ///< Topic of Odometry messages, or two frames of /tf: "odom->base_link".
+  std::string points = "points";               ///< Topic of scans (bags::kScanTypes); empty: none.
+  std::string fixes = "fix";                   ///< Topic of NavSatFix messages; empty: no position fixes.
+  std::string battery = "battery_state";       ///< Topic of BatteryState messages; empty: none.
+  std::optional<intake::ImagesConfig> images;  ///< Nothing: no images and no IMU.
+  std::string map_frame;                       ///< Empty: derived from odometry's frame, as RosAnswers does.
   double tolerance_s = 0.1;
   /// For recordings of which nothing may be lost, however fast they are played: requests reliable publishers, waits for
   /// the robot when it is behind, and holds odometry back until the scans before it have arrived.
   bool lossless = false;
   double end_after_s = 0.0;  ///< The recording has ended after so long without odometry; 0: never.
-  IntakeConfig intake;
+  intake::IntakeConfig intake;
   double patience_s = 5.0;  ///< After so long without odometry, `say` is told so.
   std::string who;          ///< Name and version of this program, for /diagnostics.
   std::function<void(program::Level, const std::string&)> say;

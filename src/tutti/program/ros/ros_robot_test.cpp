@@ -12,15 +12,16 @@
 
 #include "support/bags/bag_writer.hpp"
 #include "support/bus/nats_network.hpp"
+#include "support/intake/messages.hpp"
 #include "support/program/ros/loopback.hpp"
-#include "support/program/ros/messages.hpp"
 #include "tutti/bags/ros_messages.hpp"
 #include "tutti/program/feed/live_feed.hpp"
 
 namespace tutti::ros {
 namespace ros_robot_test {
 
-using test::fix, test::kAtOnce, test::kPeriod, test::kStart, test::odometry, test::points, test::taken;
+using intake::test::fix, intake::test::kAtOnce, intake::test::kPeriod, intake::test::kStart, intake::test::odometry,
+    intake::test::points, test::taken;
 
 constexpr double kPatience_s = 20.0;
 constexpr const char *kOdometry = "nav_msgs/msg/Odometry", *kPoints = "sensor_msgs/msg/PointCloud2",
@@ -81,8 +82,8 @@ TEST_F(RosRobots, IsFedByTopicsAndAnswersOnTopics) {
   const auto cloud = publisher("/alpha/points", kPoints);
   const auto receiver = publisher("/alpha/fix", kFix);
   ASSERT_TRUE(is_heard(*odom) && is_heard(*cloud) && is_heard(*receiver));
-  const auto camera = publisher("/alpha/image_raw", kImageType),
-             info = publisher("/alpha/camera_info", kCameraInfoType);
+  const auto camera = publisher("/alpha/image_raw", intake::kImageType),
+             info = publisher("/alpha/camera_info", intake::kCameraInfoType);
   std::size_t scans = 0, samples = 0, fixes = 0, transforms = 0, poses = 0;
   const auto look = [&] {
     while (const auto input = feed_->front().take(0.0)) {
@@ -140,7 +141,8 @@ TEST_F(RosRobots, ScansOfALivoxAreFed) {
         kPatience_s,
         [&] {
           stamp_ += kPeriod;
-          EXPECT_TRUE(lidar->write(std::string(type) == kPoints ? points(stamp_, kAtOnce) : test::livox(stamp_)));
+          EXPECT_TRUE(
+              lidar->write(std::string(type) == kPoints ? points(stamp_, kAtOnce) : intake::test::livox(stamp_)));
           EXPECT_TRUE(odom->write(odometry(stamp_)));
           while (const auto input = feed_->front().take(0.0)) {
             const auto* scan = std::get_if<Scan>(&*input);
@@ -166,17 +168,19 @@ TEST_F(RosRobots, TheBatteryIsReported) {
 
 /// Cameras are found by type; until their place is known, odometry is answered without them.
 TEST_F(RosRobots, ImagesAndImuAreFedOnceTheirPlaceIsKnown) {
-  start({.images = ImagesConfig{}, .intake = {}});
-  const auto odom = publisher("/alpha/odom", kOdometry), camera = publisher("/alpha/front/image_raw", kImageType),
-             info = publisher("/alpha/front/camera_info", kCameraInfoType), imu = publisher("/alpha/imu", kImuType);
+  start({.images = intake::ImagesConfig{}, .intake = {}});
+  const auto odom = publisher("/alpha/odom", kOdometry),
+             camera = publisher("/alpha/front/image_raw", intake::kImageType),
+             info = publisher("/alpha/front/camera_info", intake::kCameraInfoType),
+             imu = publisher("/alpha/imu", intake::kImuType);
   const auto still = publisher("/tf_static", kTf, kStaticTfQos);
   ASSERT_TRUE(is_heard(*odom) && is_heard(*camera) && is_heard(*info) && is_heard(*imu)) << said();
   std::size_t samples = 0, images = 0, sensors = 0;
   const auto look = [&] {
     while (const auto input = feed_->front().take(0.0)) {
       samples += std::holds_alternative<node::OdometrySample>(*input) ? 1 : 0;
-      if (const auto* taken = std::get_if<std::shared_ptr<const program::FedImages>>(&*input)) {
-        const program::FedImages& seen = **taken;
+      if (const auto* taken = std::get_if<std::shared_ptr<const intake::FedImages>>(&*input)) {
+        const intake::FedImages& seen = **taken;
         ++images;
         EXPECT_EQ(seen.images.at(0).bytes, "abcdefghijkl");
         EXPECT_EQ(seen.sensors->cameras.size(), 1U);
@@ -189,8 +193,9 @@ TEST_F(RosRobots, ImagesAndImuAreFedOnceTheirPlaceIsKnown) {
   const auto go = [&](const std::function<bool()>& done) {
     return ::tutti::test::within(kPatience_s, [&] {
       stamp += kPeriod;
-      EXPECT_TRUE(imu->write(test::imu(stamp)) && camera->write(bags::encode(test::grey_image(stamp))) &&
-                  info->write(bags::encode(test::calibration())) && odom->write(odometry(stamp)));
+      EXPECT_TRUE(imu->write(intake::test::imu(stamp)) &&
+                  camera->write(bags::encode(intake::test::grey_image(stamp))) &&
+                  info->write(bags::encode(intake::test::calibration())) && odom->write(odometry(stamp)));
       look();
       return done();
     });
@@ -198,7 +203,8 @@ TEST_F(RosRobots, ImagesAndImuAreFedOnceTheirPlaceIsKnown) {
   EXPECT_TRUE(go([&] { return is_said_already("no transform from 'camera' to 'base_link' on /tf_static"); })) << said();
   EXPECT_GT(samples, 0U);
   EXPECT_EQ(images, 0U);
-  for (const char* frame : {"camera", "imu"}) ASSERT_TRUE(still->write(test::transform(0, "base_link", frame, {})));
+  for (const char* frame : {"camera", "imu"})
+    ASSERT_TRUE(still->write(intake::test::transform(0, "base_link", frame, {})));
   EXPECT_TRUE(go([&] { return sensors > 5; })) << images << " " << said();
   EXPECT_GT(feed_->front().imu({kStart}, {stamp}).size(), 5U);
 }
@@ -211,13 +217,14 @@ TEST_F(RosRobots, TransformsInTheNamespaceAreHeardAndAnsweredThere) {
   const auto tf = publisher("/alpha/tf", kTf, kTfQos), still = publisher("/alpha/tf_static", kTf, kStaticTfQos);
   const auto cloud = publisher("/alpha/points", kPoints);
   ASSERT_TRUE(is_heard(*tf) && is_heard(*still) && is_heard(*cloud));
-  ASSERT_TRUE(still->write(test::transform(0, "base_link", "lidar", {Eigen::Quaterniond::Identity(), {0, 0, 2}})));
+  ASSERT_TRUE(
+      still->write(intake::test::transform(0, "base_link", "lidar", {Eigen::Quaterniond::Identity(), {0, 0, 2}})));
   std::size_t scans = 0, answers = 0;
   EXPECT_TRUE(::tutti::test::within(kPatience_s,
                                     [&] {
                                       stamp_ += kPeriod;
                                       EXPECT_TRUE(cloud->write(points(stamp_, kAtOnce, "lidar")));
-                                      EXPECT_TRUE(tf->write(test::transform(stamp_, "odom", "base_link", {})));
+                                      EXPECT_TRUE(tf->write(intake::test::transform(stamp_, "odom", "base_link", {})));
                                       while (const auto input = feed_->front().take(0.0)) {
                                         if (const auto* scan = std::get_if<Scan>(&*input); scan != nullptr) {
                                           EXPECT_EQ(scan->cloud->points.at(0), Eigen::Vector3f(5, 0, 2));

@@ -26,7 +26,7 @@ inline std::string hello(bool listens_only = false, std::uint32_t version = kFee
   message.mutable_hello()->set_listens_only(listens_only);
   return framed(message);
 }
-inline v1::Feed::Sensors sensors(const FeedSensors& of) {
+inline v1::Feed::Sensors sensors(const intake::FeedSensors& of) {
   v1::Feed::Sensors out;
   write(of, out);
   return out;
@@ -37,7 +37,7 @@ inline std::string hello(const v1::Feed::Sensors& sensors) {
   *message.mutable_hello()->mutable_sensors() = sensors;
   return framed(message);
 }
-inline std::string images(const FedImages& of) { return framed(internal::message_of(of)); }
+inline std::string images(const intake::FedImages& of) { return framed(internal::message_of(of)); }
 inline std::string imu(const std::vector<ImuSample>& samples) { return framed(internal::message_of(samples)); }
 inline std::string fix(const PositionFix& of) { return framed(internal::message_of(of)); }
 

@@ -30,9 +30,9 @@ class ScriptedTarget final : public FeedTarget {
     known.ended = ends_at_once;
     return {};
   }
-  void set_sensors(const FeedSensors& of) override { sensors = of; }
-  Status add_images(FedImages images) override {
-    if (auto ok = check_images(images, sensors); !ok) return ok;
+  void set_sensors(const intake::FeedSensors& of) override { sensors = of; }
+  Status add_images(intake::FedImages images) override {
+    if (auto ok = intake::check_images(images, sensors); !ok) return ok;
     seen.push_back(images.stamp);
     return {};
   }
@@ -51,7 +51,7 @@ class ScriptedTarget final : public FeedTarget {
   FeedState known{.chain = {RobotId{4}, 77}, .name = "alpha", .newest = {}};
   std::vector<Timestamp> scans, seen, felt;
   std::vector<PositionFix> fixes;
-  FeedSensors sensors;
+  intake::FeedSensors sensors;
   Health health;
   int finished = 0;
   bool ends_at_once = true;

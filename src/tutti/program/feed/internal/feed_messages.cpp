@@ -7,7 +7,7 @@
 namespace tutti::program::internal {
 namespace {
 
-void write(const EncodedImage& image, v1::Feed::Image& out) {
+void write(const intake::EncodedImage& image, v1::Feed::Image& out) {
   out.set_camera(image.camera);
   out.set_encoding(image.is_raw ? v1::Feed::Image::RAW : v1::Feed::Image::FILE);
   out.set_data(image.bytes);
@@ -25,7 +25,7 @@ void write(const Pose3& T, v1::Feed::Pose& out) {
   out.set_qw(T.rotation.w());
 }
 
-void write(const FeedSensors& sensors, v1::Feed::Sensors& out) {
+void write(const intake::FeedSensors& sensors, v1::Feed::Sensors& out) {
   out.set_scans(sensors.scans);
   for (const Camera& camera : sensors.cameras) {
     auto& to = *out.add_camera();
@@ -71,10 +71,10 @@ v1::Feed message_of(const Scan& scan) {
   return message;
 }
 
-v1::Feed message_of(const FedImages& images) {
+v1::Feed message_of(const intake::FedImages& images) {
   v1::Feed message;
   message.mutable_images()->set_stamp_ns(images.stamp.ns);
-  for (const EncodedImage& image : images.images) write(image, *message.mutable_images()->add_image());
+  for (const intake::EncodedImage& image : images.images) write(image, *message.mutable_images()->add_image());
   if (images.depth) write(*images.depth, *message.mutable_images()->mutable_depth());
   return message;
 }

@@ -11,12 +11,12 @@
 namespace tutti::program::internal {
 
 void write(const Pose3& T, v1::Feed::Pose& out);
-void write(const FeedSensors& sensors, v1::Feed::Sensors& out);
+void write(const intake::FeedSensors& sensors, v1::Feed::Sensors& out);
 
 /// What a client says.
 v1::Feed message_of(const node::OdometrySample& sample);
 v1::Feed message_of(const Scan& scan);
-v1::Feed message_of(const FedImages& images);
+v1::Feed message_of(const intake::FedImages& images);
 v1::Feed message_of(const std::vector<ImuSample>& samples);
 v1::Feed message_of(const PositionFix& fix);
 v1::Feed message_of(const Health& health);

@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
-#include "support/program/ros/messages.hpp"
-#include "tutti/program/ros/images_intake.hpp"
+#include "support/intake/messages.hpp"
+#include "tutti/intake/images_intake.hpp"
 
-namespace tutti::ros::test {
+namespace tutti::intake::test {
 
 inline std::string why(const Status& status) { return status ? "" : status.error().message; }
 inline void expect(const std::string& said, const std::string& part) {
@@ -42,10 +42,10 @@ struct CameraRobot {
     }
     return {kStart + i * kPeriod};
   }
-  program::FeedSensors sensors(bool is_late = false) {
+  FeedSensors sensors(bool is_late = false) {
     const auto chosen = images.choose(is_late);
     EXPECT_TRUE(chosen) << chosen.error().message;
-    program::FeedSensors out;
+    FeedSensors out;
     images.describe(out);
     return out;
   }
@@ -56,4 +56,4 @@ struct CameraRobot {
   int next_ = 0;
 };
 
-}  // namespace tutti::ros::test
+}  // namespace tutti::intake::test

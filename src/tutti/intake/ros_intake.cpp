@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/program/ros/ros_intake.hpp"
+#include "tutti/intake/ros_intake.hpp"
 
 #include <fmt/format.h>
 
@@ -10,7 +10,7 @@
 #include "tutti/base/plain_text.hpp"
 #include "tutti/perception/lidar/deskewed_scan.hpp"
 
-namespace tutti::ros {
+namespace tutti::intake {
 namespace {
 
 constexpr double kUnseen_m2 = 1.0, kUnseen_rad2 = 0.03;  // as ros2/tutti_ros states it
@@ -305,4 +305,4 @@ std::optional<PositionFix> RosIntake::next_fix() {
   return std::nullopt;
 }
 
-}  // namespace tutti::ros
+}  // namespace tutti::intake

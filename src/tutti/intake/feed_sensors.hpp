@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -11,7 +12,11 @@
 #include "tutti/model/image_stream.hpp"
 #include "tutti/model/visual.hpp"
 
-namespace tutti::program {
+namespace tutti::intake {
+
+/// Limit on the pixels of an image: a raw one must fit a message of the live feed.
+inline constexpr std::size_t kMaxPixels = 16U << 20U;
+inline constexpr std::size_t kMaxImuSamples = 10'000;  ///< Limit per message: ten seconds at 1 kHz.
 
 /// The sensors that a client of a live feed has beside odometry.
 struct FeedSensors {
@@ -48,4 +53,4 @@ Status check_images(const FedImages& images, const FeedSensors& sensors);
 
 std::size_t bytes_of(const FedImages& images);
 
-}  // namespace tutti::program
+}  // namespace tutti::intake

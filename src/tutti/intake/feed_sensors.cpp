@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/program/feed/feed_sensors.hpp"
+#include "tutti/intake/feed_sensors.hpp"
+
+#include <fmt/format.h>
 
 #include <cmath>
 #include <set>
 
-#include "tutti/program/feed/feed_frames.hpp"
-
-namespace tutti::program {
+namespace tutti::intake {
 namespace {
 
 std::size_t pixels_of(const Camera& camera) {
@@ -34,10 +34,9 @@ Status check_sensors(const FeedSensors& sensors) {
   for (std::size_t i = 0; i < sensors.cameras.size(); ++i) {
     const Camera& camera = sensors.cameras[i];
     if (auto ok = check_camera(camera.model); !ok) return in_context(fmt::format("camera {}", i), ok.error());
-    if (static_cast<std::size_t>(camera.model.width_px) >
-        kMaxFeedBytes / static_cast<std::size_t>(camera.model.height_px))
+    if (static_cast<std::size_t>(camera.model.width_px) > kMaxPixels / static_cast<std::size_t>(camera.model.height_px))
       return fail(ErrorCode::unsupported, "camera {}: {} x {} pixels, expected at most {}", i, camera.model.width_px,
-                  camera.model.height_px, kMaxFeedBytes);
+                  camera.model.height_px, kMaxPixels);
     const Pose3& pose = camera.T_body_camera;
     if (!pose.translation.allFinite() || !(std::abs(pose.rotation.norm() - 1.0) < 1e-6))
       return fail(ErrorCode::invalid, "camera {}: T_body_camera is no pose: its quaternion has norm {}", i,
@@ -90,4 +89,4 @@ std::size_t bytes_of(const FedImages& images) {
   return out;
 }
 
-}  // namespace tutti::program
+}  // namespace tutti::intake

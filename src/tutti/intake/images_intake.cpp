@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/program/ros/images_intake.hpp"
+#include "tutti/intake/images_intake.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -11,9 +11,8 @@
 #include "tutti/bags/camera.hpp"
 #include "tutti/bags/transform_tree.hpp"
 #include "tutti/model/nearest_stamp.hpp"
-#include "tutti/program/feed/feed_frames.hpp"
 
-namespace tutti::ros {
+namespace tutti::intake {
 namespace {
 
 /// As the feed has raw depth: two bytes a pixel, little endian.
@@ -260,7 +259,7 @@ Result<bool> ImagesIntake::choose(bool is_late) {
   return true;
 }
 
-void ImagesIntake::describe(program::FeedSensors& sensors) const {
+void ImagesIntake::describe(FeedSensors& sensors) const {
   std::vector<Camera> cameras;
   for (const std::size_t i : cameras_) {
     auto placed = place(topics_[i]);
@@ -304,7 +303,7 @@ bool ImagesIntake::reaches(Timestamp stamp) const {
 }
 
 /// The nearest of the second camera's images that have arrived.
-std::optional<program::EncodedImage> ImagesIntake::second_of(Timestamp moment) {
+std::optional<EncodedImage> ImagesIntake::second_of(Timestamp moment) {
   if (cameras_.size() < 2) return std::nullopt;
   OneTopic& of = topics_[cameras_.back()];
   of.drop_before(moment - config_.most_difference_s);
@@ -315,8 +314,8 @@ std::optional<program::EncodedImage> ImagesIntake::second_of(Timestamp moment) {
 }
 
 /// The nearest of the depth images that have arrived; it may be the next image's, too.
-Result<std::optional<program::EncodedImage>> ImagesIntake::depth_of(Timestamp moment) {
-  std::optional<program::EncodedImage> none;
+Result<std::optional<EncodedImage>> ImagesIntake::depth_of(Timestamp moment) {
+  std::optional<EncodedImage> none;
   if (!depth_) return none;
   OneTopic& of = topics_[*depth_];
   of.drop_before(moment - config_.most_depth_difference_s);
@@ -324,21 +323,21 @@ Result<std::optional<program::EncodedImage>> ImagesIntake::depth_of(Timestamp mo
   if (at == of.waiting.end()) return none;
   if (at->image.is_raw) return std::optional(at->image);
   if (of.first->encoding != "32FC1")
-    return std::optional(program::EncodedImage{0, false, std::string(bags::png_of(at->image.bytes))});
+    return std::optional(EncodedImage{0, false, std::string(bags::png_of(at->image.bytes))});
   const CameraModel& camera = *topics_[cameras_.front()].model;
   bags::RosCompressedImage image;  // a temporary is uninitialised for GCC 12
   image.format = of.first->encoding + ";";
   image.data = at->image.bytes;
   const auto depth = bags::to_depth(image, {camera.width_px, camera.height_px});
-  if (depth) return std::optional(program::EncodedImage{0, true, to_bytes(*depth)});
+  if (depth) return std::optional(EncodedImage{0, true, to_bytes(*depth)});
   const Timestamp wrong = at->stamp;
   of.bytes -= at->image.bytes.size();
   of.waiting.erase(at);
   return in_context(fmt::format("{}: depth at {} ns", of.topics.images, wrong.ns), depth.error());
 }
 
-Result<std::optional<program::FedImages>> ImagesIntake::next_images(Timestamp stamp) {
-  const std::optional<program::FedImages> none;
+Result<std::optional<FedImages>> ImagesIntake::next_images(Timestamp stamp) {
+  const std::optional<FedImages> none;
   if (!is_chosen()) return none;
   OneTopic& camera = topics_[cameras_.front()];
   while (!camera.waiting.empty() && odometry_.is_before_all(camera.waiting.front().stamp)) camera.pop();
@@ -353,10 +352,10 @@ Result<std::optional<program::FedImages>> ImagesIntake::next_images(Timestamp st
   const auto may_come = [&](const OneTopic& topic) { return is_patient && !(topic.newest && *topic.newest >= moment); };
   if ((cameras_.size() > 1 && may_come(topics_[cameras_.back()])) || (depth_ && may_come(topics_[*depth_])))
     return none;
-  std::optional<program::EncodedImage> other = second_of(moment);
+  std::optional<EncodedImage> other = second_of(moment);
   auto depth = depth_of(moment);
   if (!depth) return tl::unexpected(depth.error());
-  program::FedImages out{.stamp = moment, .images = {}, .depth = std::move(*depth)};
+  FedImages out{.stamp = moment, .images = {}, .depth = std::move(*depth)};
   out.images.push_back(camera.pop().image);
   if (!other) return std::optional(std::move(out));
   other->camera = 1;
@@ -368,11 +367,11 @@ std::vector<ImuSample> ImagesIntake::next_imu(Timestamp stamp) {
   std::vector<ImuSample> out;
   const auto T_body_imu = imu_place();
   if (!T_body_imu) return out;
-  while (!samples_.empty() && samples_.front().stamp - stamp <= kAhead_s && out.size() < program::kMaxImuSamples) {
+  while (!samples_.empty() && samples_.front().stamp - stamp <= kAhead_s && out.size() < kMaxImuSamples) {
     out.push_back(bags::in_body(samples_.front(), *T_body_imu));
     samples_.pop_front();
   }
   return out;
 }
 
-}  // namespace tutti::ros
+}  // namespace tutti::intake

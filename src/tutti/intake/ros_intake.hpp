@@ -25,7 +25,7 @@
 #include "tutti/robot/odometry_covariance.hpp"
 #include "tutti/robot/stamp_watch.hpp"
 
-namespace tutti::ros {
+namespace tutti::intake {
 
 struct IntakeConfig {
   std::string odometry_frames;  ///< Two frames of /tf, "odom->base_link"; empty: odometry is from Odometry messages.
@@ -155,4 +155,4 @@ class RosIntake {
   Counts counts_;
 };
 
-}  // namespace tutti::ros
+}  // namespace tutti::intake

@@ -14,12 +14,12 @@
 #include "tutti/bags/rgbd.hpp"
 #include "tutti/bags/ros_messages.hpp"
 #include "tutti/base/result.hpp"
+#include "tutti/intake/camera_topics.hpp"
+#include "tutti/intake/feed_sensors.hpp"
+#include "tutti/intake/ros_intake.hpp"
 #include "tutti/model/visual.hpp"
-#include "tutti/program/feed/feed_sensors.hpp"
-#include "tutti/program/ros/image_topics.hpp"
-#include "tutti/program/ros/ros_intake.hpp"
 
-namespace tutti::ros {
+namespace tutti::intake {
 
 /// Turns images and IMU samples of ROS 2 into inputs of a robot's live feed, as mission/bag_cameras.cpp does of a bag.
 /// Which topics are cameras and which is their depth is chosen once each has said what it shows. Raw images become grey
@@ -58,7 +58,7 @@ class ImagesIntake {
   [[nodiscard]] const std::string& note() const { return note_; }
 
   /// Fills in the cameras and their depth, once they are chosen, and the IMU once its place is known.
-  void describe(program::FeedSensors& sensors) const;
+  void describe(FeedSensors& sensors) const;
   /// What is being waited for: "/a/camera_info: no sensor_msgs/CameraInfo"; empty when there is everything.
   [[nodiscard]] std::string missing() const;
   /// The calibration of this topic's camera is known.
@@ -68,7 +68,7 @@ class ImagesIntake {
 
   /// The next images that odometry up to `stamp` covers, of both cameras if the second's come in time; nothing when
   /// there are none; an error for images that come too late. After describe() has filled in cameras.
-  Result<std::optional<program::FedImages>> next_images(Timestamp stamp);
+  Result<std::optional<FedImages>> next_images(Timestamp stamp);
   /// The IMU samples that the robot takes when odometry is at `stamp`, in the body frame, at most as many as fit a
   /// message. After describe() has filled in the IMU.
   std::vector<ImuSample> next_imu(Timestamp stamp);
@@ -76,7 +76,7 @@ class ImagesIntake {
  private:
   struct Waiting {
     Timestamp stamp;
-    program::EncodedImage image;
+    EncodedImage image;
     std::uint32_t width = 0, height = 0;  ///< 0: of a file.
   };
   struct OneTopic {
@@ -102,8 +102,8 @@ class ImagesIntake {
   [[nodiscard]] static bags::ImageTopic to_topic(const OneTopic& topic);
   [[nodiscard]] Result<Camera> place(const OneTopic& camera) const;
   [[nodiscard]] Result<Pose3> imu_place() const;
-  std::optional<program::EncodedImage> second_of(Timestamp moment);
-  Result<std::optional<program::EncodedImage>> depth_of(Timestamp moment);
+  std::optional<EncodedImage> second_of(Timestamp moment);
+  Result<std::optional<EncodedImage>> depth_of(Timestamp moment);
 
   ImagesConfig config_;
   std::vector<OneTopic> topics_;
@@ -117,4 +117,4 @@ class ImagesIntake {
   std::deque<ImuSample> samples_;
 };
 
-}  // namespace tutti::ros
+}  // namespace tutti::intake

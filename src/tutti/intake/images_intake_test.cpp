@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/program/ros/images_intake.hpp"
+#include "tutti/intake/images_intake.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,9 +7,9 @@
 #include <limits>
 #include <random>
 
-#include "support/program/ros/camera_robot.hpp"
+#include "support/intake/camera_robot.hpp"
 
-namespace tutti::ros {
+namespace tutti::intake {
 namespace images_intake_test {
 
 using namespace test;
@@ -29,12 +29,12 @@ TEST(ImagesIntake, CamerasAndImuAreKnownOnceCalibrationAndPlaceAre) {
   EXPECT_FALSE(robot.sensors().imu);
   robot.place();
   EXPECT_EQ(robot.images.missing(), "");
-  const program::FeedSensors sensors = robot.sensors();
+  const FeedSensors sensors = robot.sensors();
   ASSERT_EQ(sensors.cameras.size(), 1U);
   EXPECT_EQ(sensors.cameras[0].T_body_camera, kBodyCamera);
   EXPECT_EQ(sensors.cameras[0].model.fx, 3.0);
   EXPECT_EQ(sensors.imu, ImuNoise{});
-  EXPECT_TRUE(program::check_sensors(sensors));
+  EXPECT_TRUE(check_sensors(sensors));
 }
 
 TEST(ImagesIntake, ImagesAndSamplesAreFedWhenOdometryCoversThem) {
@@ -60,7 +60,7 @@ TEST(ImagesIntake, ImagesAndSamplesAreFedWhenOdometryCoversThem) {
   ASSERT_EQ(images->images.size(), 1U);
   EXPECT_TRUE(images->images[0].is_raw);
   EXPECT_EQ(images->images[0].bytes, "abcdefghijkl");
-  EXPECT_TRUE(program::check_images(*images, robot.sensors()));
+  EXPECT_TRUE(check_images(*images, robot.sensors()));
   EXPECT_FALSE(robot.images.next_images(robot.go(2)).value());
 }
 
@@ -206,4 +206,4 @@ TEST(ImagesIntake, BytesOfStrangersDoNoHarm) {
 }
 
 }  // namespace images_intake_test
-}  // namespace tutti::ros
+}  // namespace tutti::intake

@@ -4,10 +4,10 @@
 
 #include <cmath>
 
-#include "support/program/ros/camera_robot.hpp"
+#include "support/intake/camera_robot.hpp"
 #include "tutti/formats/image_file.hpp"
 
-namespace tutti::ros {
+namespace tutti::intake {
 namespace depth_intake_test {
 
 using namespace test;
@@ -30,16 +30,16 @@ TEST(DepthIntake, DepthIsNeverACameraAndIsFedBesideIt) {
   EXPECT_EQ(robot.add(0, depth_image(kStart)), "");
   EXPECT_TRUE(robot.sensors().cameras.empty());  // the other has said nothing
   EXPECT_EQ(robot.add(1, grey_image(kStart)), "");
-  const program::FeedSensors sensors = robot.sensors();
+  const FeedSensors sensors = robot.sensors();
   ASSERT_EQ(sensors.cameras.size(), 1U);
   ASSERT_TRUE(sensors.depth);
   EXPECT_EQ(sensors.depth->unit_m, 0.001);
-  EXPECT_TRUE(program::check_sensors(sensors));
+  EXPECT_TRUE(check_sensors(sensors));
   EXPECT_EQ(robot.images.in_words(), "/r/left/image_raw with depth of /r/depth/image_raw");
   const auto images = robot.images.next_images({kStart}).value();
   ASSERT_TRUE(images && images->depth);
   EXPECT_EQ(images->depth->bytes, depth_image(kStart).data);
-  EXPECT_TRUE(program::check_images(*images, sensors));
+  EXPECT_TRUE(check_images(*images, sensors));
 }
 
 TEST(DepthIntake, DepthInMetresAndCompressedDepthAreTheSame) {
@@ -205,4 +205,4 @@ TEST(DepthIntake, WrongDepthIsSaidAndLeftOut) {
 }
 
 }  // namespace depth_intake_test
-}  // namespace tutti::ros
+}  // namespace tutti::intake

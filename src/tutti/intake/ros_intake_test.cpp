@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/program/ros/ros_intake.hpp"
+#include "tutti/intake/ros_intake.hpp"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "support/program/ros/messages.hpp"
+#include "support/intake/messages.hpp"
 #include "tutti/node/odometry_gate.hpp"
 
-namespace tutti::ros {
+namespace tutti::intake {
 namespace ros_intake_test {
 
 using test::fix, test::kAtOnce, test::kPeriod, test::kStart, test::kSweepAfter, test::kSweepBefore, test::odometry,
@@ -404,4 +404,4 @@ TEST(RosIntake, BytesOfStrangersDoNoHarm) {
 }
 
 }  // namespace ros_intake_test
-}  // namespace tutti::ros
+}  // namespace tutti::intake

@@ -10,7 +10,7 @@
 #include "tutti/geometry/pose3.hpp"
 
 /// Messages of a robot's, as bytes.
-namespace tutti::ros::test {
+namespace tutti::intake::test {
 
 inline constexpr std::int64_t kSecond = 1'000'000'000;
 inline constexpr std::int64_t kStart = 1'700'000'000 * kSecond;
@@ -89,4 +89,4 @@ inline std::string imu(std::int64_t ns, const Eigen::Vector3d& gyro = {1, 2, 3},
 inline const std::vector<float> kAtOnce{0.0F};
 inline const std::vector<float> kSweepBefore{-0.1F, -0.05F, 0.0F}, kSweepAfter{0.0F, 0.05F, 0.09F};
 
-}  // namespace tutti::ros::test
+}  // namespace tutti::intake::test
