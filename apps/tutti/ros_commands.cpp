@@ -221,8 +221,7 @@ std::function<void(program::Level, const std::string&)> log_of(const std::string
 }  // namespace
 
 Result<std::shared_ptr<void>> start_ros(const RosArguments& arguments, const program::RobotOptions& options) {
-  const program::DriverSettings& driver = options.settings.driver;
-  const bool takes_images = arguments.has_images ? !arguments.images.empty() : driver.with_images;
+  const bool takes_images = arguments.has_images ? !arguments.images.empty() : options.settings.with_images;
   for (const auto& [option, topic] : {std::pair("--imu", arguments.imu), std::pair("--depth", arguments.depth)})
     if (!takes_images && !topic.empty())
       return fail(
@@ -235,22 +234,14 @@ Result<std::shared_ptr<void>> start_ros(const RosArguments& arguments, const pro
   ros::RosRobotOptions ros = arguments.robot;
   ros.socket = options.feed;
   ros.name_space = arguments.has_name_space ? arguments.name_space : options.name;
-  ros.intake = {.odometry_frames = {},
-                .covariance = driver.covariance,
-                .scan_times = driver.scan_times,
-                .scan_offset_s = driver.scan_offset_s,
-                .T_body_lidar = driver.T_body_lidar,
-                .p_body_antenna = driver.p_body_antenna};
-  if (takes_images)
-    ros.images = {.images = arguments.images,
-                  .depth = arguments.depth,
-                  .with_depth = !arguments.has_depth || !arguments.depth.empty(),
-                  .imu = arguments.imu,
-                  .most_cameras = driver.most_cameras,
-                  .time_offset_s = driver.images_offset_s,
-                  .most_difference_s = options.settings.tracking.max_stamp_difference_s,
-                  .depth_sensor = driver.depth,
-                  .most_depth_difference_s = driver.depth_difference_s};
+  ros.intake = options.settings.sensors.odometry;
+  if (takes_images) {
+    ros.images = options.settings.sensors.images;
+    ros.images->images = arguments.images;
+    ros.images->depth = arguments.depth;
+    ros.images->with_depth = !arguments.has_depth || !arguments.depth.empty();
+    ros.images->imu = arguments.imu;
+  }
   (arguments.odometry.find("->") == std::string::npos ? ros.odometry : ros.intake.odometry_frames) = arguments.odometry;
   ros.who = "tutti robot --ros " + options.version;
   ros.say = log_of(options.name + " ros", options.console);

@@ -58,9 +58,9 @@ Status ImagesIntake::check_size(const OneTopic& topic, const Waiting& waiting) {
               waiting.height, width, height, topic.topics.info);
 }
 
-Status ImagesIntake::add_info(std::size_t topic, std::string_view cdr) {
+Status ImagesIntake::add_info(std::size_t topic, std::string_view bytes, Encoding encoding) {
   OneTopic& of = topics_[topic];
-  auto message = bags::decode_camera_info(cdr);
+  auto message = bags::decode_camera_info(bytes, encoding);
   if (!message) return tl::unexpected(message.error());
   if (of.model) return {};
   const auto model = bags::to_camera(*message);
@@ -78,10 +78,10 @@ Status ImagesIntake::add_info(std::size_t topic, std::string_view cdr) {
   return first;
 }
 
-Status ImagesIntake::add_image(std::size_t topic, std::string_view cdr) {
+Status ImagesIntake::add_image(std::size_t topic, std::string_view bytes, Encoding encoding) {
   OneTopic& of = topics_[topic];
   if (of.topics.is_compressed) {
-    const auto message = bags::decode_compressed_image(cdr);
+    const auto message = bags::decode_compressed_image(bytes, encoding);
     if (!message) return tl::unexpected(message.error());
     if (message->data.empty()) return fail(ErrorCode::invalid, "an image of no bytes, expected a PNG or JPEG file");
     const bags::ImageLook look = bags::look_of(*message);
@@ -89,7 +89,7 @@ Status ImagesIntake::add_image(std::size_t topic, std::string_view cdr) {
     if (!of.first) of.first = look;
     return push(of, message->header, {{}, {0, false, std::string(message->data)}});
   }
-  const auto message = bags::decode_image(cdr);
+  const auto message = bags::decode_image(bytes, encoding);
   if (!message) return tl::unexpected(message.error());
   const bags::ImageLook look = bags::look_of(*message);
   if (bags::is_depth(of.topics.images, of.first.value_or(look).encoding)) return add_depth(of, look, *message);
@@ -140,8 +140,8 @@ Status ImagesIntake::push(OneTopic& topic, const bags::RosHeader& header, Waitin
   return {};
 }
 
-Status ImagesIntake::add_imu(std::string_view cdr) {
-  const auto message = bags::decode_imu(cdr);
+Status ImagesIntake::add_imu(std::string_view bytes, Encoding encoding) {
+  const auto message = bags::decode_imu(bytes, encoding);
   if (!message) return tl::unexpected(message.error());
   const auto sample = bags::to_imu_sample(*message);
   if (!sample) return tl::unexpected(sample.error());
@@ -296,6 +296,10 @@ std::string ImagesIntake::missing() const {
   return out;
 }
 
+void ImagesIntake::drop_late(Timestamp stamp) {
+  for (OneTopic& topic : topics_) topic.drop_before(stamp - kLatest_s);
+}
+
 bool ImagesIntake::reaches(Timestamp stamp) const {
   const auto has = [&](std::size_t i) { return topics_[i].newest && *topics_[i].newest >= stamp; };
   return std::ranges::all_of(cameras_, has) && (!depth_ || has(*depth_)) &&
@@ -336,7 +340,7 @@ Result<std::optional<EncodedImage>> ImagesIntake::depth_of(Timestamp moment) {
   return in_context(fmt::format("{}: depth at {} ns", of.topics.images, wrong.ns), depth.error());
 }
 
-Result<std::optional<FedImages>> ImagesIntake::next_images(Timestamp stamp) {
+Result<std::optional<FedImages>> ImagesIntake::next_images(Timestamp stamp, bool is_last) {
   const std::optional<FedImages> none;
   if (!is_chosen()) return none;
   OneTopic& camera = topics_[cameras_.front()];
@@ -348,7 +352,7 @@ Result<std::optional<FedImages>> ImagesIntake::next_images(Timestamp stamp) {
     return fail(ErrorCode::invalid, "image at {} ns comes {:.1f} s after odometry of its time, expected at most {} s",
                 moment.ns, stamp - moment, kLatest_s);
   }
-  const bool is_patient = stamp - moment < kPatience_s;
+  const bool is_patient = !is_last && stamp - moment < kPatience_s;
   const auto may_come = [&](const OneTopic& topic) { return is_patient && !(topic.newest && *topic.newest >= moment); };
   if ((cameras_.size() > 1 && may_come(topics_[cameras_.back()])) || (depth_ && may_come(topics_[*depth_])))
     return none;

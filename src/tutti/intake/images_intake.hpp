@@ -27,6 +27,7 @@ namespace tutti::intake {
 /// an error says what is wrong with a message, which then has no effect.
 class ImagesIntake {
  public:
+  using Encoding = bags::RosEncoding;
   static constexpr double kLatest_s = 0.5;               ///< Behind odometry; the robot takes none later.
   static constexpr double kPatience_s = 0.3;             ///< By odometry, for the second camera's image of a moment.
   static constexpr double kAhead_s = 0.5;                ///< IMU samples may be that far ahead of odometry.
@@ -39,9 +40,9 @@ class ImagesIntake {
   ImagesIntake(ImagesConfig config, std::vector<CameraTopics> topics, std::string imu, const RosIntake& odometry);
 
   /// The first valid calibration of a camera counts; images of another size that wait are dropped.
-  Status add_info(std::size_t topic, std::string_view cdr);
-  Status add_image(std::size_t topic, std::string_view cdr);
-  Status add_imu(std::string_view cdr);
+  Status add_info(std::size_t topic, std::string_view bytes, Encoding encoding = Encoding::cdr);
+  Status add_image(std::size_t topic, std::string_view bytes, Encoding encoding = Encoding::cdr);
+  Status add_imu(std::string_view bytes, Encoding encoding = Encoding::cdr);
 
   /// Chooses cameras and depth by bags::choose_cameras(), once every topic has said what it shows, and calibration and
   /// place of the cameras are known; `is_late`: topics that nobody named and that have said nothing are left out. False
@@ -67,8 +68,11 @@ class ImagesIntake {
   [[nodiscard]] bool reaches(Timestamp stamp) const;
 
   /// The next images that odometry up to `stamp` covers, of both cameras if the second's come in time; nothing when
-  /// there are none; an error for images that come too late. After describe() has filled in cameras.
-  Result<std::optional<FedImages>> next_images(Timestamp stamp);
+  /// there are none; an error for images that come too late. With `is_last` nothing more comes. After describe() has
+  /// filled in cameras.
+  Result<std::optional<FedImages>> next_images(Timestamp stamp, bool is_last = false);
+  /// Drops images that are too late when odometry is at `stamp`.
+  void drop_late(Timestamp stamp);
   /// The IMU samples that the robot takes when odometry is at `stamp`, in the body frame, at most as many as fit a
   /// message. After describe() has filled in the IMU.
   std::vector<ImuSample> next_imu(Timestamp stamp);

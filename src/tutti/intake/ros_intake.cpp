@@ -46,16 +46,21 @@ Status RosIntake::counted(Status taken) {
   return taken;
 }
 
-Status RosIntake::add_odometry(std::string_view cdr) { return counted(take_odometry(cdr)); }
-Status RosIntake::add_points(std::string_view cdr, std::string_view type) { return counted(take_points(cdr, type)); }
-Status RosIntake::add_fix(std::string_view cdr) { return counted(take_fix(cdr)); }
+Status RosIntake::add_odometry(std::string_view bytes, Encoding encoding) {
+  return counted(take_odometry(bytes, encoding));
+}
+Status RosIntake::add_points(std::string_view bytes, std::string_view type, Encoding encoding) {
+  return counted(take_points(bytes, type, encoding));
+}
+Status RosIntake::add_fix(std::string_view bytes, Encoding encoding) { return counted(take_fix(bytes, encoding)); }
 
-Status RosIntake::take_odometry(std::string_view cdr) {
-  const auto message = bags::decode_odometry(cdr);
+Status RosIntake::take_odometry(std::string_view bytes, Encoding encoding) {
+  const auto message = bags::decode_odometry(bytes, encoding);
   if (!message) return tl::unexpected(message.error());
   const auto pose = bags::to_pose(message->pose.position, message->pose.orientation);
   if (!pose) return tl::unexpected(pose.error());
-  return add_sample(message->header.stamp, *pose, message->header.frame_id, message->child_frame_id);
+  return add_sample(message->header.stamp, *pose, message->header.frame_id,
+                    config_.body_frame.empty() ? message->child_frame_id : config_.body_frame);
 }
 
 Status RosIntake::add_sample(Timestamp stamp, const Pose3& T_odom_body, const std::string& odom,
@@ -70,6 +75,7 @@ Status RosIntake::add_sample(Timestamp stamp, const Pose3& T_odom_body, const st
   const bool is_said_again = !config_.odometry_frames.empty() && newest && stamp == *newest;  // as many do on /tf
   if (is_said_again) return {};
   const StampedPose sample{stamp, T_odom_body};
+  if (is_history(sample)) return {};
   switch (stamps_.take(stamp)) {
     case Verdict::waits:
     case Verdict::is_before:
@@ -94,6 +100,20 @@ Status RosIntake::add_sample(Timestamp stamp, const Pose3& T_odom_body, const st
   return {};
 }
 
+/// What the robot has and who feeds says again, before anything new: the way to the next sample is known then.
+bool RosIntake::is_history(const StampedPose& sample) {
+  const bool is_again = known_ && counts_.odometry == 0 && sample.stamp <= *known_ &&
+                        *known_ - sample.stamp <= kHistory_s &&
+                        (history_.empty() || history_.back().stamp < sample.stamp);
+  if (!is_again) return false;
+  has_whole_history_ = false;
+  history_.push_back(sample);
+  if (sample.stamp != *known_) return true;
+  last_ = sample;
+  unseen_ = false;
+  return true;
+}
+
 void RosIntake::queue(const StampedPose& sample) {
   samples_.push_back(sample);
   ++counts_.odometry;
@@ -109,8 +129,8 @@ void RosIntake::begin_anew() {
   fixes_.clear();
 }
 
-Status RosIntake::add_tf(std::string_view cdr, bool is_static, TfOf of) {
-  const auto transforms = bags::decode_tf(cdr);
+Status RosIntake::add_tf(std::string_view bytes, bool is_static, TfOf of, Encoding encoding) {
+  const auto transforms = bags::decode_tf(bytes, encoding);
   if (!transforms) return counted(tl::unexpected(transforms.error()));
   Status first;
   for (const bags::RosTransform& transform : *transforms)
@@ -156,8 +176,8 @@ Status RosIntake::check_follows(Timestamp stamp, const std::optional<Timestamp>&
   return was_wrong ? Status() : check_increases(stamp, before);
 }
 
-Status RosIntake::take_fix(std::string_view cdr) {
-  const auto message = bags::decode_nav_sat_fix(cdr);
+Status RosIntake::take_fix(std::string_view bytes, Encoding encoding) {
+  const auto message = bags::decode_nav_sat_fix(bytes, encoding);
   if (!message) return tl::unexpected(message.error());
   const Timestamp stamp = message->header.stamp;
   if (known_ && stamp <= *known_) return {};
@@ -173,8 +193,8 @@ Status RosIntake::take_fix(std::string_view cdr) {
   return {};
 }
 
-Status RosIntake::take_points(std::string_view cdr, std::string_view type) {
-  const auto message = bags::decode_scan(type, cdr);
+Status RosIntake::take_points(std::string_view bytes, std::string_view type, Encoding encoding) {
+  const auto message = bags::decode_scan(type, bytes, encoding);
   if (!message) return tl::unexpected(message.error());
   const Timestamp sensor_stamp = message->header.stamp, stamp = sensor_stamp + config_.scan_offset_s;
   if (known_ && stamp <= *known_) return {};
@@ -227,6 +247,8 @@ Result<Pose3> RosIntake::pose_on_body(const std::string& frame) const {
   const std::string from = bags::frame_name(frame), &body = frames_->body;
   if (from == body) return Pose3{};
   if (const auto found = own_tree_.find(body, from)) return *found;
+  if (own_frames_.empty())
+    if (const auto found = tree_.find(body, from)) return *found;
   const bags::TransformTree all = tree();
   if (const auto found = all.find(body, from)) return *found;
   const std::string frames = all.frames();

@@ -32,6 +32,7 @@ struct IntakeConfig {
   robot::OdometryCovarianceConfig covariance;
   lidar::ScanTimesConfig scan_times;
   double scan_offset_s = 0.0;         ///< Added to scans' stamps gives the odometry's time.
+  std::string body_frame;             ///< Empty: the child frame of odometry.
   std::optional<Pose3> T_body_lidar;  ///< Nothing: taken from /tf_static, and from frames of /tf that never move.
   std::optional<Eigen::Vector3d> p_body_antenna;  ///< In the body frame, m. Nothing: taken from /tf_static like
                                                   ///< T_body_lidar, or else the body's origin.
@@ -53,6 +54,7 @@ struct OdometryFrames {
 /// untrusted: an error says what is wrong with a message, which then has no effect.
 class RosIntake {
  public:
+  using Encoding = bags::RosEncoding;
   static constexpr double kHistory_s = 2.0;          ///< How long fed odometry is kept, to undistort sweeps.
   static constexpr std::size_t kMostScans = 40;      ///< Scans that wait for odometry; beyond it the oldest is dropped.
   static constexpr std::size_t kMostFixes = 200;     ///< Fixes that wait for odometry; beyond it the oldest is dropped.
@@ -61,20 +63,22 @@ class RosIntake {
   explicit RosIntake(IntakeConfig config) : config_(std::move(config)) {}
 
   /// The robot already has everything up to `newest` (FeedWelcome::newest): samples that wait and are older are
-  /// dropped, and the first step after it gets a large covariance when nobody has observed the way there.
+  /// dropped, and the first step after it gets a large covariance when nobody has observed the way there. A new intake
+  /// may be told odometry up to `newest` again, of at most kHistory_s: how the body moved.
   void begin_behind(const std::optional<Timestamp>& newest);
 
   /// Stamps are judged as by the robot (StampWatch): what it would refuse is refused here. Where the clock began anew,
   /// what was refused of the new time is fed after all, so that the robot sees it, too.
-  Status add_odometry(std::string_view cdr);
+  Status add_odometry(std::string_view bytes, Encoding encoding = Encoding::cdr);
   /// `type`: one of bags::kScanTypes.
-  Status add_points(std::string_view cdr, std::string_view type = bags::kScanTypes.front().name);
+  Status add_points(std::string_view bytes, std::string_view type = bags::kScanTypes.front().name,
+                    Encoding encoding = Encoding::cdr);
   /// Adds a fix; ignores messages in which the receiver reports that it has none.
-  Status add_fix(std::string_view cdr);
+  Status add_fix(std::string_view bytes, Encoding encoding = Encoding::cdr);
   /// Whose transforms a topic has: everybody's (/tf), or those of this robot alone (/alpha/tf), which count first.
   enum class TfOf { all, robot };
   /// Adds the transforms of one message, and returns the first of their errors.
-  Status add_tf(std::string_view cdr, bool is_static, TfOf of = TfOf::all);
+  Status add_tf(std::string_view bytes, bool is_static, TfOf of = TfOf::all, Encoding encoding = Encoding::cdr);
 
   /// The next odometry sample to feed, in order of arrival. With `wait_for_scans` it is held back until a scan with its
   /// stamp or a later one has arrived.
@@ -115,11 +119,12 @@ class RosIntake {
 
  private:
   Status add_sample(Timestamp stamp, const Pose3& T_odom_body, const std::string& odom, const std::string& body);
+  bool is_history(const StampedPose& sample);
   void queue(const StampedPose& sample);
   void begin_anew();
-  Status take_odometry(std::string_view cdr);
-  Status take_points(std::string_view cdr, std::string_view type);
-  Status take_fix(std::string_view cdr);
+  Status take_odometry(std::string_view bytes, Encoding encoding);
+  Status take_points(std::string_view bytes, std::string_view type, Encoding encoding);
+  Status take_fix(std::string_view bytes, Encoding encoding);
   [[nodiscard]] std::optional<Eigen::Vector3d> antenna_of(const std::string& frame) const;
   Status take_transform(const bags::RosTransform& transform, bool is_static, TfOf of);
   [[nodiscard]] bags::TransformTree tree() const;

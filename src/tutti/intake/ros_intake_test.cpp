@@ -220,7 +220,7 @@ TEST(RosIntake, WhereNothingMayBeLostOdometryWaitsForScans) {
 
 TEST(RosIntake, WhatTheRobotHasIsPassedOverAndTheWaySinceIsUnseen) {
   RosIntake intake({});
-  intake.begin_behind(Timestamp{kStart + kPeriod});
+  intake.begin_behind(Timestamp{kStart + kPeriod + 1});
   for (int i = 0; i < 4; ++i) ASSERT_TRUE(intake.add_odometry(odometry(kStart + i * kPeriod)));
   const Fed fed = feed(intake);
   ASSERT_EQ(fed.samples.size(), 2U);

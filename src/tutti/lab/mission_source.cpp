@@ -106,23 +106,24 @@ Result<program::WorkerSettings> worker_settings(const MissionSource& source) {
 namespace {
 
 /// What the file says of the robot's messages, if it is a robot with a recording.
-Status tell_driver(const MissionConfig& config, program::RobotOptions& options) {
+Status tell_sensors(const MissionConfig& config, program::RobotOptions& options) {
   const auto robot = std::ranges::find(config.robots, options.name, &mission::RobotConfig::name);
   if (config.source != "recordings" || robot == config.robots.end()) return {};
-  program::DriverSettings& driver = options.settings.driver;
-  driver.covariance = robot->covariance;
-  driver.scan_times = robot->scan_times_config();
-  driver.scan_offset_s = robot->scan_time_offset_s;
-  driver.with_images = config.closures.kind().uses_images;
-  driver.most_cameras = robot->images.most_cameras;
-  driver.images_offset_s = robot->images.time_offset_s;
-  driver.depth = robot->images.depth.sensor;
-  driver.depth_difference_s = robot->images.depth.max_difference_s;
-  if (!robot->antenna_m.empty()) driver.p_body_antenna = Eigen::Vector3d(robot->antenna_m.data());
+  options.settings.with_images = config.closures.kind().uses_images;
+  auto& [odometry, images] = options.settings.sensors;
+  images.most_difference_s = config.tracking.max_stamp_difference_s;
+  images.most_cameras = robot->images.most_cameras;
+  images.time_offset_s = robot->images.time_offset_s;
+  images.depth_sensor = robot->images.depth.sensor;
+  images.most_depth_difference_s = robot->images.depth.max_difference_s;
+  odometry.covariance = robot->covariance;
+  odometry.scan_times = robot->scan_times_config();
+  odometry.scan_offset_s = robot->scan_time_offset_s;
+  if (!robot->antenna_m.empty()) odometry.p_body_antenna = Eigen::Vector3d(robot->antenna_m.data());
   if (!mission::is_given(robot->T_body_lidar)) return {};
   const auto T_body_lidar = mission::to_pose(robot->T_body_lidar);
   if (!T_body_lidar) return in_context("robot " + robot->name, T_body_lidar.error());
-  driver.T_body_lidar = *T_body_lidar;
+  odometry.T_body_lidar = *T_body_lidar;
   return {};
 }
 
@@ -133,7 +134,7 @@ Result<program::RobotSettings> settings_of_robot(const MissionSource& source, co
                                 .robots = robot_names(config),
                                 .agent = config.agent,
                                 .tracking = config.tracking,
-                                .driver = {}};
+                                .sensors = {}};
 }
 
 }  // namespace
@@ -150,7 +151,7 @@ Status tell_robot(const MissionSource& source, program::RobotOptions& options) {
   auto settings = settings_of_robot(source, *config);
   if (!settings) return tl::unexpected(settings.error());
   options.settings = std::move(*settings);
-  if (!options.feed.empty()) return tell_driver(*config, options);
+  if (!options.feed.empty()) return tell_sensors(*config, options);
   const auto number = program::number_of(options.name, options.settings.robots, false);
   if (!number) return tl::unexpected(number.error());
   auto input = load_input(*config, source.data, source.seed);

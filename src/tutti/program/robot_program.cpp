@@ -131,7 +131,7 @@ RobotView RobotProgram::view() const {
 
 Status RobotProgram::open_feed(const node::RobotNode& node) {
   if (options_.feed.empty()) return {};
-  auto feed = LiveFeed::open(options_.feed, options_.feed_access, view().state(node));
+  auto feed = LiveFeed::open(options_.feed, options_.feed_access, view().state(node), options_.settings.sensors);
   if (!feed) return tl::unexpected(feed.error());
   feed_ = std::move(*feed);
   return {};

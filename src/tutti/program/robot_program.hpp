@@ -11,34 +11,17 @@
 #include "tutti/base/random.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/bus/transport.hpp"
-#include "tutti/model/image_stream.hpp"
-#include "tutti/perception/lidar/scan_times.hpp"
+#include "tutti/intake/sensor_intake.hpp"
 #include "tutti/perception/visual/frontend/tracking_source.hpp"
 #include "tutti/program/event_log.hpp"
 #include "tutti/program/feed/feed_server.hpp"
 #include "tutti/program/robot_driver.hpp"
 #include "tutti/program/robot_store.hpp"
 #include "tutti/robot/agent.hpp"
-#include "tutti/robot/odometry_covariance.hpp"
 
 namespace tutti::program {
 
 inline constexpr const char* kEnded = "ended";  ///< The program's last event, which has its traffic and status.
-
-/// How a client that feeds a robot's raw messages is to interpret them.
-struct DriverSettings {
-  robot::OdometryCovarianceConfig covariance;
-  lidar::ScanTimesConfig scan_times;
-  double scan_offset_s = 0.0;         ///< Added to scans' stamps gives the odometry's time.
-  std::optional<Pose3> T_body_lidar;  ///< Nothing: the messages tell it.
-  /// The receiver's antenna in the body frame, m; nothing: the messages tell it.
-  std::optional<Eigen::Vector3d> p_body_antenna;
-  bool with_images = false;  ///< Closures are found from images, so images and IMU samples are wanted.
-  int most_cameras = 2;
-  double images_offset_s = 0.0;  ///< Added to the images' stamps gives the odometry's time.
-  DepthSensor depth;
-  double depth_difference_s = 0.02;  ///< Between the stamps of an image and its depth, at most.
-};
 
 /// What a robot is told about its mission.
 struct RobotSettings {
@@ -46,7 +29,8 @@ struct RobotSettings {
   std::vector<std::string> robots;  ///< By number; empty: unknown.
   robot::AgentConfig agent;
   visual::TrackingConfig tracking;
-  DriverSettings driver;
+  intake::SensorConfig sensors;  ///< How raw messages that are fed are read.
+  bool with_images = false;      ///< Closures are found from images, so images and IMU samples are wanted.
   /// Describes the settings that a mission file may have.
   template <class V>
   void describe(V& v) {

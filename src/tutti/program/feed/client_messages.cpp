@@ -2,6 +2,7 @@
 #include <google/protobuf/io/coded_stream.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -92,12 +93,54 @@ Result<intake::FeedSensors> read(const v1::Feed::Sensors& in) {
   return out;
 }
 
+Result<std::optional<FeedRos>> read(const v1::Feed::Ros& in) {
+  constexpr double kMost_s = 1e6, kMostNoise = 1e3;
+  FeedRos out{.images = {in.images().begin(), in.images().end()},
+              .depth = in.depth(),
+              .imu = in.imu(),
+              .scans_deskewed = in.scans_deskewed(),
+              .body_frame = in.body_frame(),
+              .odom_frame = plain_text(in.odom_frame()),
+              .map_frame = plain_text(in.map_frame()),
+              .tolerance_s = in.tolerance_s()};
+  if (in.has_images_offset_s()) out.images_offset_s = in.images_offset_s();
+  if (!(std::abs(out.tolerance_s) < kMost_s) || !(std::abs(out.images_offset_s.value_or(0.0)) < kMost_s))
+    return fail(ErrorCode::invalid, "tolerance_s {}, images_offset_s {}: expected less than {} s", out.tolerance_s,
+                out.images_offset_s.value_or(0.0), kMost_s);
+  if (in.has_t_body_lidar()) {
+    out.T_body_lidar = read(in.t_body_lidar());
+    const double norm = out.T_body_lidar->rotation.norm();
+    if (!out.T_body_lidar->translation.allFinite() || !(std::abs(norm - 1.0) < 0.01))
+      return fail(ErrorCode::invalid, "T_body_lidar is no pose: its quaternion has norm {}", norm);
+    out.T_body_lidar->rotation.normalize();
+  }
+  const auto& antenna = in.p_body_antenna();
+  const auto& noise = in.noise();
+  if (antenna.size() == 3)
+    out.p_body_antenna = Eigen::Vector3d(antenna.Get(0), antenna.Get(1), antenna.Get(2));
+  else if (!antenna.empty())
+    return fail(ErrorCode::invalid, "p_body_antenna of {} numbers, expected 3 or none", antenna.size());
+  if (noise.size() == 6)
+    out.covariance.emplace(robot::OdometryCovarianceConfig{noise.Get(0), noise.Get(1), noise.Get(2), noise.Get(3),
+                                                           noise.Get(4), noise.Get(5)});
+  else if (!noise.empty())
+    return fail(ErrorCode::invalid, "noise of {} numbers, expected 6 or none", noise.size());
+  for (int i = 0; i < noise.size(); ++i) {
+    const bool is_per_second = i % 3 == 2;  // without which standing still would be certain
+    if (!(noise.Get(i) >= 0.0 && noise.Get(i) < kMostNoise) || (is_per_second && noise.Get(i) == 0.0))
+      return fail(ErrorCode::invalid, "noise {}: expected {} and less than {}", noise.Get(i),
+                  is_per_second ? "more than 0" : "at least 0", kMostNoise);
+  }
+  return std::optional(std::move(out));
+}
+
 FromClient read(v1::Feed::Hello& in) {
   FeedHello out{.version = in.protocol_version(),
                 .client = plain_text(in.client_name()),
                 .listens_only = in.listens_only(),
                 .wants_way = in.wants_way()};
   if (in.has_sensors()) out.sensors = read(in.sensors());
+  if (in.has_ros()) out.ros = read(in.ros());
   if (in.has_clock_offset_ns()) out.clock_offset_ns = in.clock_offset_ns();
   if (in.has_clock_now_ns()) out.clock_now_ns = in.clock_now_ns();
   return out;
@@ -151,6 +194,11 @@ FromClient read(const v1::Feed::Health& in) {
   return *health;
 }
 
+FromClient read(v1::Feed::Raw& in) {
+  return FeedRaw{std::move(*in.mutable_topic()), std::move(*in.mutable_type()), std::move(*in.mutable_encoding()),
+                 std::move(*in.mutable_data())};
+}
+
 FromClient read(const v1::Feed::Imu& in) {
   const int samples = in.stamp_ns_size();
   const Timestamp first{samples > 0 ? in.stamp_ns(0) : 0};
@@ -159,14 +207,14 @@ FromClient read(const v1::Feed::Imu& in) {
     return BadSample{first, fmt::format("{} IMU samples with {} numbers of the gyro and {} of the accelerometer, "
                                         "expected 1 to {} samples and three numbers of both for each",
                                         samples, in.gyro_size(), in.accelerometer_size(), intake::kMaxImuSamples)};
-  FeedImu out;
-  out.samples.reserve(static_cast<std::size_t>(samples));
+  std::vector<ImuSample> out;
+  out.reserve(static_cast<std::size_t>(samples));
   for (int i = 0; i < samples; ++i) {
     const auto vector = [&](const auto& of) {
       return Eigen::Vector3d(of.Get(3 * i), of.Get(3 * i + 1), of.Get(3 * i + 2));
     };
-    out.samples.push_back({{in.stamp_ns(i)}, vector(in.gyro()), vector(in.accelerometer())});
-    const ImuSample& sample = out.samples.back();
+    out.push_back({{in.stamp_ns(i)}, vector(in.gyro()), vector(in.accelerometer())});
+    const ImuSample& sample = out.back();
     if (!sample.gyro.allFinite() || !sample.accelerometer.allFinite())
       return BadSample{sample.stamp, "an IMU sample that is not finite"};
   }
@@ -182,7 +230,7 @@ Result<std::uint32_t> number_of_client(const char* bytes, int size) {
   if (static_cast<std::size_t>(size) > kMaxFeedBytes || (tag & 7U) != kLengthDelimited || !in.ReadVarint32(&length) ||
       length != static_cast<std::uint32_t>(size - in.CurrentPosition()))
     return fail(ErrorCode::parse, "a frame that holds no Feed message");
-  if (number >= v1::Feed::kWelcomeFieldNumber && number <= v1::Feed::kWayFieldNumber)
+  if (number >= v1::Feed::kWelcomeFieldNumber && number <= v1::Feed::kNoteFieldNumber)
     return fail(ErrorCode::parse, "a message that clients do not send (number {})", number);
   return number;
 }
@@ -214,6 +262,8 @@ Result<FromClient> decode_from_client(std::string_view payload) {
       return read(message.fix());
     case v1::Feed::kHealth:
       return read(message.health());
+    case v1::Feed::kRaw:
+      return read(*message.mutable_raw());
     case v1::Feed::kTime:
       return FeedTime{message.time().clock_now_ns()};
     default:

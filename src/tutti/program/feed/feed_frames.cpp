@@ -15,14 +15,13 @@ using internal::framed;
 using internal::kHeaderBytes;
 using internal::write;
 
-/// A stamp by the clock of the client that is told it.
+}  // namespace
+
 std::int64_t told(Timestamp stamp, std::int64_t offset_ns) {
   std::int64_t out = 0;
   if (!__builtin_sub_overflow(stamp.ns, offset_ns, &out)) return out;
   return offset_ns > 0 ? kFirstTimestamp.ns : kLastTimestamp.ns;
 }
-
-}  // namespace
 
 Result<std::optional<std::string>> FrameReader::take(std::string_view& bytes, std::size_t most) {
   const auto fill = [&](std::string& part, std::size_t size) {
@@ -153,6 +152,22 @@ std::optional<std::string> way_frame(const FeedWay& way, std::int64_t offset_ns)
   };
   add(way.corrected, *out.mutable_stamp_ns(), *out.mutable_t_map_body());
   add(way.map, *out.mutable_map_stamp_ns(), *out.mutable_t_world_body());
+  return framed(message);
+}
+
+std::string raw_frame(const FeedRaw& raw) {
+  v1::Feed message;
+  auto& out = *message.mutable_raw();
+  out.set_topic(raw.topic);
+  out.set_type(raw.type);
+  out.set_encoding(raw.encoding);
+  out.set_data(raw.bytes);
+  return framed(message);
+}
+
+std::string note_frame(const std::string& text) {
+  v1::Feed message;
+  message.mutable_note()->set_text(plain_text(text));
   return framed(message);
 }
 

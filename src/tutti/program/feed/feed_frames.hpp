@@ -14,6 +14,7 @@
 #include "tutti/node/journal.hpp"
 #include "tutti/program/feed/feed_target.hpp"
 #include "tutti/program/feed/smooth_map.hpp"
+#include "tutti/robot/odometry_covariance.hpp"
 
 /// Encodes and decodes the frames of a live feed (proto/tutti/v1/feed.proto): a length of 4 bytes, little endian, then
 /// one protobuf message.
@@ -25,8 +26,8 @@ inline constexpr std::size_t kMaxFeedBytes = 16U << 20U;
 /// Size limit of a client's message while it does not feed: then only Hello is expected.
 inline constexpr std::size_t kMaxHelloBytes = 64U << 10U;
 /// Names of the messages a client may send; the index is the message's number in the protocol minus one.
-inline constexpr const char* kFromClient[] = {"hello", "odometry", "scan",  "end_of_recording", "images", "imu",
-                                              "time",  "fix",      "health"};
+inline constexpr const char* kFromClient[] = {"hello", "odometry", "scan", "end_of_recording", "images",
+                                              "imu",   "time",     "fix",  "health",           "raw"};
 
 /// Assembles frames from bytes as they arrive. Holds at most one incomplete frame.
 class FrameReader {
@@ -42,6 +43,26 @@ class FrameReader {
   std::string header_, payload_;
 };
 
+/// How a client's raw messages of ROS are read and answered; what it does not say is as the robot's mission file has
+/// it.
+struct FeedRos {
+  std::vector<std::string> images;  ///< Topics of one camera or two.
+  std::string depth, imu;           ///< Topics.
+  std::optional<double> images_offset_s;
+  std::optional<Pose3> T_body_lidar;
+  std::optional<Eigen::Vector3d> p_body_antenna;
+  bool scans_deskewed = false;
+  std::string body_frame, odom_frame, map_frame;
+  std::optional<robot::OdometryCovarianceConfig> covariance;
+  double tolerance_s = 0.0;  ///< By which map -> odom is dated ahead.
+  bool operator==(const FeedRos& other) const {
+    return images == other.images && depth == other.depth && imu == other.imu;
+  }
+};
+/// A message of ROS as it came, or for the client to publish.
+struct FeedRaw {
+  std::string topic, type, encoding, bytes;
+};
 struct FeedHello {
   std::uint32_t version = 0;
   std::string client;
@@ -49,12 +70,10 @@ struct FeedHello {
   Result<intake::FeedSensors> sensors = intake::FeedSensors{};  ///< An error says why such sensors cannot be.
   /// Nanoseconds, to be added to the client's stamps; or the client's time now.
   std::optional<std::int64_t> clock_offset_ns = {}, clock_now_ns = {};
-  bool wants_way = false;  ///< Asks for a FeedWay after every update of the map.
+  Result<std::optional<FeedRos>> ros = std::nullopt;  ///< An error says why these cannot be.
+  bool wants_way = false;                             ///< Asks for a FeedWay after every update of the map.
 };
 struct FeedEnd {};
-struct FeedImu {
-  std::vector<ImuSample> samples;  ///< At least one.
-};
 struct FeedTime {
   std::int64_t clock_now_ns = 0;
 };
@@ -68,10 +87,13 @@ struct BadSample {
   std::string why;
 };
 /// What a client may say.
-using FromClient = std::variant<FeedHello, node::OdometrySample, Scan, FeedEnd, intake::FedImages, FeedImu, FeedTime,
-                                PositionFix, Health, FeedUnknown, BadSample>;
+using FromClient = std::variant<FeedHello, node::OdometrySample, Scan, FeedEnd, intake::FedImages,
+                                std::vector<ImuSample>, FeedTime, PositionFix, Health, FeedRaw, FeedUnknown, BadSample>;
 /// Decodes untrusted bytes; an error when they are no message of the protocol.
 Result<FromClient> decode_from_client(std::string_view payload);
+
+/// A stamp by the clock of a client whose stamps `offset_ns` is added to.
+std::int64_t told(Timestamp stamp, std::int64_t offset_ns);
 
 /// The robot's messages, each as a whole frame. `offset_ns` is FeedClock::offset_ns(): stamps are sent by the client's
 /// clock.
@@ -87,6 +109,8 @@ std::string time_answer_frame(std::int64_t client_now_ns, Timestamp robot_now, s
                               std::int64_t measured_ns, const std::optional<Timestamp>& stored);
 /// Nothing when the way is too long for one message.
 std::optional<std::string> way_frame(const FeedWay& way, std::int64_t offset_ns);
+std::string raw_frame(const FeedRaw& raw);
+std::string note_frame(const std::string& text);
 std::string ended_frame();
 std::string closed_frame(const std::string& why);
 

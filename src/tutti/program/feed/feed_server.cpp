@@ -15,6 +15,7 @@
 #include <chrono>
 #include <cstring>
 #include <optional>
+#include <utility>
 #include <vector>
 
 namespace tutti::program {
@@ -56,7 +57,8 @@ std::optional<gid_t> group_of(const std::string& name) {
 }  // namespace
 
 Result<std::unique_ptr<FeedServer>> FeedServer::listen(const std::string& path, FeedTarget& target,
-                                                       const FeedSettings& settings, const FeedAccess& access) {
+                                                       const FeedSettings& settings, const FeedAccess& access,
+                                                       intake::SensorConfig sensors) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   if (path.empty() || path.size() >= sizeof address.sun_path)
@@ -81,11 +83,15 @@ Result<std::unique_ptr<FeedServer>> FeedServer::listen(const std::string& path, 
   }
   if (chmod(path.c_str(), access.mode) != 0) return failed("set the mode of the socket");
   if (::listen(listener, settings.max_clients) != 0) return failed("listen");
-  return std::unique_ptr<FeedServer>(new FeedServer(path, listener, target, settings));
+  return std::unique_ptr<FeedServer>(new FeedServer(path, listener, target, settings, std::move(sensors)));
 }
 
-FeedServer::FeedServer(std::string path, int listener, FeedTarget& target, const FeedSettings& settings)
-    : path_(std::move(path)), listener_(listener), settings_(settings), session_(target, settings, wall_clock) {}
+FeedServer::FeedServer(std::string path, int listener, FeedTarget& target, const FeedSettings& settings,
+                       intake::SensorConfig sensors)
+    : path_(std::move(path)),
+      listener_(listener),
+      settings_(settings),
+      session_(target, settings, wall_clock, std::move(sensors)) {}
 
 FeedServer::~FeedServer() {
   for (const auto& [client, file] : files_) close(file);

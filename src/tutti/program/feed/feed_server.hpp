@@ -21,9 +21,11 @@ struct FeedAccess {
 class FeedServer {
  public:
   /// Listens at `path` with `access`. A socket left there by a killed program is replaced; fails when another program
-  /// listens on it, or when the path is another kind of file. `target` must outlive the server.
+  /// listens on it, or when the path is another kind of file. `target` must outlive the server; `sensors` is
+  /// FeedSession's.
   static Result<std::unique_ptr<FeedServer>> listen(const std::string& path, FeedTarget& target,
-                                                    const FeedSettings& settings, const FeedAccess& access = {});
+                                                    const FeedSettings& settings, const FeedAccess& access = {},
+                                                    intake::SensorConfig sensors = {});
   ~FeedServer();
   FeedServer(const FeedServer&) = delete;
   FeedServer& operator=(const FeedServer&) = delete;
@@ -34,7 +36,8 @@ class FeedServer {
   [[nodiscard]] std::size_t clients() const { return files_.size(); }
 
  private:
-  FeedServer(std::string path, int listener, FeedTarget& target, const FeedSettings& settings);
+  FeedServer(std::string path, int listener, FeedTarget& target, const FeedSettings& settings,
+             intake::SensorConfig sensors);
   void accept_one();
   /// Drops the oldest connection that has not sent Hello; false when there is none.
   bool drop_silent();

@@ -27,8 +27,8 @@ struct ToRobot {
   Wrong operator()(Scan& scan) const { return shift(scan.stamp); }
   Wrong operator()(intake::FedImages& images) const { return shift(images.stamp); }
   Wrong operator()(PositionFix& fix) const { return shift(fix.stamp); }
-  Wrong operator()(FeedImu& imu) const {
-    for (ImuSample& sample : imu.samples)
+  Wrong operator()(std::vector<ImuSample>& samples) const {
+    for (ImuSample& sample : samples)
       if (const Wrong wrong = shift(sample.stamp)) return wrong;
     return std::nullopt;
   }
@@ -37,6 +37,7 @@ struct ToRobot {
   Wrong operator()(const FeedEnd&) const { return std::nullopt; }
   Wrong operator()(const FeedTime&) const { return std::nullopt; }
   Wrong operator()(const Health&) const { return std::nullopt; }
+  Wrong operator()(const FeedRaw&) const { return std::nullopt; }
   Wrong operator()(const FeedUnknown&) const { return std::nullopt; }
   Wrong operator()(const BadSample&) const { return std::nullopt; }
 };
@@ -49,17 +50,20 @@ std::string without_status(FeedState state) {
 
 }  // namespace
 
-FeedSession::FeedSession(FeedTarget& target, const FeedSettings& settings, Now now)
+FeedSession::FeedSession(FeedTarget& target, const FeedSettings& settings, Now now, intake::SensorConfig sensors)
     : target_(target),
       settings_(settings),
       map_(settings, target.state().T_map_odom),
       T_odom_fed_(target.state().T_odom_fed),
       situation_(without_status(target.state())),
-      now_(std::move(now)) {}
+      now_(std::move(now)),
+      of_mission_(std::move(sensors)) {}
 
 void FeedSession::disconnect(Client client) {
   clients_.erase(client);
-  if (feeder_ == client) feeder_.reset();
+  if (feeder_ != client) return;
+  feeder_.reset();
+  ros_.reset();
 }
 
 void FeedSession::receive(Client client, std::string_view bytes) {
@@ -90,7 +94,9 @@ void FeedSession::take(Client client, FromClient message) {
   if (const auto* bad = std::get_if<BadSample>(&message))
     return put(connection, refused_frame(bad->stamp, bad->why, 0));  // by its own clock
   if (const auto* time = std::get_if<FeedTime>(&message)) return take_time(client, *time);
+  if (const auto* raw = std::get_if<FeedRaw>(&message)) return take_raw(client, *raw);
   if (!std::holds_alternative<FeedEnd>(message)) return take_fed(client, std::move(message));
+  if (ros_) ros_->end(), take_due(client);
   if (const Status ok = target_.finish(); !ok) return put(connection, refused_frame({}, ok.error().message, 0));
   connection.ended = connection.waits_for_end = true;
   answer_end();
@@ -108,8 +114,8 @@ void FeedSession::take_fed(Client client, FromClient message) {
     if (connection.ended) return refuse(client, stamp, "the recording has ended");
     if (const Status taken = add(); !taken) refuse(client, stamp, taken.error().message);
   };
-  if (const auto* imu = std::get_if<FeedImu>(&message))
-    return take(imu->samples.front().stamp, [&] { return target_.add_imu(imu->samples); });
+  if (const auto* imu = std::get_if<std::vector<ImuSample>>(&message))
+    return take(imu->front().stamp, [&] { return target_.add_imu(*imu); });
   if (auto* images = std::get_if<intake::FedImages>(&message))
     return take(images->stamp, [&] { return target_.add_images(std::move(*images)); });
   if (const auto* fix = std::get_if<PositionFix>(&message))
@@ -144,9 +150,10 @@ void FeedSession::greet(Client client, const FeedHello& hello) {
     if (!hello.sensors) return close(client, "sensors: " + hello.sensors.error().message);
     if (!last_.clock.begin(hello.clock_offset_ns, hello.clock_now_ns, now_()))
       return close(client, "a clock that is farther from the robot's than 64 bits hold");
+    if (const Status ok = begin_ros(hello); !ok) return close(client, "ros: " + ok.error().message);
     last_.name = hello.client;
     feeder_ = client;
-    target_.set_sensors(*hello.sensors);
+    target_.set_sensors(sensors_);
   }
   const auto listeners = std::ranges::count_if(clients_, [](const auto& other) { return other.second.listens_only; });
   if (hello.listens_only && listeners + 1 >= settings_.max_clients)
@@ -154,8 +161,8 @@ void FeedSession::greet(Client client, const FeedHello& hello) {
   connection.listens_only = hello.listens_only;
   connection.greeted = true;
   connection.wants_way = hello.wants_way;
-  if (hello.wants_way) target_.want_ways();
-  const FeedState state = target_.state();
+  if (hello.wants_way || (feeder_ == client && ros_)) target_.want_ways();
+  const FeedState state = this->state();
   put(connection, welcome_frame(state, map_.T_map_odom(), offset_ns(client)));
   put(connection, situation_frame(state, offset_ns(client)));
 }
@@ -179,6 +186,7 @@ void FeedSession::take_odometry(Client client, const node::OdometrySample& sampl
   if (answer.jump) broadcast([&](std::int64_t offset_ns) { return jump_frame(state, *answer.jump, offset_ns); });
   for (auto& [number, listener] : clients_)
     if (listener.greeted) put(listener, correction_frame(state, answer, listener.dropped, offset_ns(number)), true);
+  if (ros_) tell_ros(client, state, answer);
   refresh();
 }
 
@@ -192,11 +200,15 @@ void FeedSession::refresh() {
   for (const FeedRefusal& refusal : target_.take_refusals())
     if (feeder_) refuse(*feeder_, refusal.stamp, refusal.why);
   answer_end();
-  for (const FeedWay& way : target_.take_ways())
+  for (const FeedWay& way : target_.take_ways()) {
+    if (ros_) tell_ros(way);
     for (auto& [number, listener] : clients_)
       if (listener.wants_way)
         if (auto frame = way_frame(way, offset_ns(number))) put(listener, std::move(*frame), true);
-  const FeedState state = target_.state();
+  }
+  const FeedState state = this->state();
+  if (ros_)
+    for (const FeedRaw& raw : ros_->hear(state.team_mates)) put(clients_.at(*feeder_), raw_frame(raw));
   std::string now = without_status(state);
   if (now == situation_ && state.status == status_) return;
   situation_ = std::move(now);
@@ -250,7 +262,8 @@ void FeedSession::make_room(Connection& connection) {
     connection.queue.erase(connection.queue.begin() + static_cast<std::ptrdiff_t>(at));
     ++connection.dropped;
   }
-  if (connection.queued <= most) return;
+  const Frame& newest = connection.queue.back();
+  if (connection.queued - (newest.is_correction ? newest.bytes.size() : 0) <= most) return;
   drop_queue(connection);
   connection.over = true;
   connection.reader = {};

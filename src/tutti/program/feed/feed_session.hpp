@@ -5,6 +5,7 @@
 #include <deque>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -13,6 +14,7 @@
 #include "tutti/program/feed/feed_frames.hpp"
 #include "tutti/program/feed/feed_settings.hpp"
 #include "tutti/program/feed/feed_target.hpp"
+#include "tutti/program/feed/ros_client.hpp"
 #include "tutti/program/feed/smooth_map.hpp"
 
 namespace tutti::program {
@@ -28,8 +30,10 @@ class FeedSession {
   /// Returns the robot's time, since the Unix epoch.
   using Now = std::function<Timestamp()>;
   /// `target` must outlive the session. Corrections start from the target's T_map_odom at this time.
+  /// Raw messages are read as `sensors` says, unless their client says otherwise.
   FeedSession(
-      FeedTarget& target, const FeedSettings& settings, Now now = [] { return Timestamp{}; });
+      FeedTarget& target, const FeedSettings& settings, Now now = [] { return Timestamp{}; },
+      intake::SensorConfig sensors = {});
 
   void connect(Client client) { clients_[client]; }
   /// A client that feeds may come again, or another one may take over; the robot goes on where it stood.
@@ -97,6 +101,15 @@ class FeedSession {
   void greet(Client client, const FeedHello& hello);
   void answer_end();
   void take_odometry(Client client, const node::OdometrySample& sample);
+  // For a client that feeds raw messages: feed_session_ros.cpp.
+  Status begin_ros(const FeedHello& hello);
+  void take_raw(Client client, const FeedRaw& raw);
+  void take_due(Client client);
+  void tell_ros(Client client, const FeedState& state, const SmoothMap::Answer& answer);
+  void tell_ros(FeedWay way);
+  [[nodiscard]] Timestamp by_client(Timestamp stamp) const;
+  /// The target's, with what this session knows itself.
+  [[nodiscard]] FeedState state() const;
 
   FeedTarget& target_;
   FeedSettings settings_;
@@ -108,6 +121,10 @@ class FeedSession {
   std::optional<Client> feeder_;
   Feeder last_;
   Now now_;
+  const intake::SensorConfig of_mission_;
+  std::unique_ptr<RosClient> ros_;     ///< Belongs to the client that feeds, if raw messages.
+  intake::FeedSensors sensors_;        ///< As the target was told them last,
+  std::optional<FeedRos> sensors_of_;  ///< by a client that said this.
 };
 
 }  // namespace tutti::program

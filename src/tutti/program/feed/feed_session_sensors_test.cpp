@@ -155,10 +155,10 @@ TEST_F(FeedSessionSensors, FixesComeAsTheyWereSaid) {
 
 TEST_F(FeedSessionSensors, AMessageOfANewerProtocolIsRefusedByItsNumber) {
   join(1);
-  const std::string newer("\x0a\x00\x00\x00\x52\x08\x12\x06 later", 14);  // field 10
+  const std::string newer("\x0a\x00\x00\x00\x5a\x08\x12\x06 later", 14);  // field 11
   const auto answer = say(1, newer);
   ASSERT_EQ(answer.size(), 1U);
-  EXPECT_NE(answer[0].refused().why().find("number 10"), std::string::npos) << answer[0].refused().why();
+  EXPECT_NE(answer[0].refused().why().find("number 11"), std::string::npos) << answer[0].refused().why();
   EXPECT_NE(answer[0].refused().why().find("images"), std::string::npos);
   EXPECT_EQ(say(1, sample(20)).size(), 1U);
 }

@@ -13,8 +13,9 @@ constexpr std::chrono::milliseconds kListensAgain{500};
 
 }  // namespace
 
-Result<std::unique_ptr<LiveFeed>> LiveFeed::open(const std::string& socket, const FeedAccess& access, FeedState robot) {
-  std::unique_ptr<LiveFeed> feed(new LiveFeed(socket, access, std::move(robot)));
+Result<std::unique_ptr<LiveFeed>> LiveFeed::open(const std::string& socket, const FeedAccess& access, FeedState robot,
+                                                 intake::SensorConfig sensors) {
+  std::unique_ptr<LiveFeed> feed(new LiveFeed(socket, access, std::move(robot), std::move(sensors)));
   if (Status ok = feed->listen(); !ok) return tl::unexpected(ok.error());
   feed->thread_ = std::jthread([raw = feed.get()](const std::stop_token& stop) { raw->run(stop); });
   return feed;
@@ -26,7 +27,7 @@ LiveFeed::~LiveFeed() {
 }
 
 Status LiveFeed::listen() {
-  auto server = FeedServer::listen(socket_, front_, {}, access_);
+  auto server = FeedServer::listen(socket_, front_, {}, access_, sensors_);
   if (!server) return tl::unexpected(server.error());
   server_ = std::move(*server);
   return {};

@@ -18,8 +18,9 @@ namespace tutti::program {
 class LiveFeed {
  public:
   /// Listens as FeedServer::listen() does, with the same errors. `robot` is the robot's state now, all of which is
-  /// stored.
-  static Result<std::unique_ptr<LiveFeed>> open(const std::string& socket, const FeedAccess& access, FeedState robot);
+  /// stored; `sensors` is FeedSession's.
+  static Result<std::unique_ptr<LiveFeed>> open(const std::string& socket, const FeedAccess& access, FeedState robot,
+                                                intake::SensorConfig sensors = {});
   ~LiveFeed();
   LiveFeed(const LiveFeed&) = delete;
   LiveFeed& operator=(const LiveFeed&) = delete;
@@ -34,14 +35,18 @@ class LiveFeed {
   std::string take_thrown();
 
  private:
-  LiveFeed(std::string socket, FeedAccess access, FeedState robot)
-      : socket_(std::move(socket)), access_(std::move(access)), front_(std::move(robot), {}) {}
+  LiveFeed(std::string socket, FeedAccess access, FeedState robot, intake::SensorConfig sensors)
+      : socket_(std::move(socket)),
+        access_(std::move(access)),
+        sensors_(std::move(sensors)),
+        front_(std::move(robot), {}) {}
   Status listen();
   void run(const std::stop_token& stop);
   void serve(int wait_ms);
 
   const std::string socket_;
   const FeedAccess access_;
+  const intake::SensorConfig sensors_;
   FeedFront front_;
   std::unique_ptr<FeedServer> server_;
   std::atomic<bool> is_fed_ = false;

@@ -13,8 +13,9 @@
 
 #include "tutti/bags/ros_definitions.hpp"
 #include "tutti/program/clock.hpp"
+#include "tutti/program/feed/ros_answers.hpp"
 #include "tutti/program/ros/complaints.hpp"
-#include "tutti/program/ros/ros_answers.hpp"
+#include "tutti/program/ros/ros_diagnosis.hpp"
 #include "tutti/program/ros/ros_images.hpp"
 #include "tutti/program/ros/unstored.hpp"
 
@@ -83,7 +84,7 @@ class Robot final : public RosRobot {
   std::map<std::string, std::unique_ptr<Writer>> mate_poses_;
   std::unique_ptr<Reader> odometry_, points_, fixes_, battery_, tf_, tf_static_, own_tf_, own_tf_static_;
   std::unique_ptr<FeedClient> client_;
-  std::optional<RosAnswers> answers_;
+  std::optional<program::RosAnswers> answers_;
   std::optional<program::FeedWay> way_;  // heard before there was any odometry
   program::FeedSituation situation_;
   Unstored unstored_;
@@ -277,7 +278,7 @@ void Robot::say_sample(const node::OdometrySample& sample) {
   if (!answers_) {
     answers_.emplace(intake_.frames()->odom, options_.map_frame, options_.tolerance_s);
     if (way_) answers_->hear(*way_);
-    answers_->hear(situation_);
+    answers_->hear(situation_.team_mates);
     options_.say(Level::info, fmt::format("odometry comes: {} -> {}; publishes {} -> {}", intake_.frames()->odom,
                                           intake_.frames()->body, answers_->map_frame(), intake_.frames()->odom));
   }
@@ -369,7 +370,7 @@ void Robot::note(const program::FromRobot& said) {
   }
   if (const auto* situation = std::get_if<program::FeedSituation>(&said)) {
     situation_ = *situation;
-    if (answers_) answers_->hear(*situation);
+    if (answers_) answers_->hear(situation->team_mates);
     publish_situation();
   }
   if (const auto* over = std::get_if<program::FeedOver>(&said))

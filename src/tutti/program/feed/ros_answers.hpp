@@ -8,11 +8,10 @@
 #include <vector>
 
 #include "tutti/bags/ros_encode.hpp"
-#include "tutti/intake/ros_intake.hpp"
 #include "tutti/model/trajectory.hpp"
 #include "tutti/program/feed/feed_client.hpp"
 
-namespace tutti::ros {
+namespace tutti::program {
 
 /// Turns a robot's answers into messages of ROS 2 (CDR), for the topics and frames of ros2/tutti_ros (docs/ros.md).
 class RosAnswers {
@@ -24,9 +23,9 @@ class RosAnswers {
   /// The stamp of map -> odom is set ahead by `tolerance_s`.
   RosAnswers(const std::string& odom, const std::string& map, double tolerance_s);
 
-  void hear(const program::FeedAnswer& answer, const Pose3& T_odom_body);
-  void hear(const program::FeedWay& way);
-  void hear(program::FeedSituation situation) { situation_ = std::move(situation); }
+  void hear(const FeedAnswer& answer, const Pose3& T_odom_body);
+  void hear(const FeedWay& way);
+  void hear(std::vector<TeamMate> team_mates) { team_mates_ = std::move(team_mates); }
 
   /// TFMessage with map -> odom as of the last answer; nothing when that stamp was published already, because tf2 warns
   /// of repeated ones.
@@ -41,36 +40,23 @@ class RosAnswers {
   [[nodiscard]] std::vector<std::pair<std::string, std::string>> team_mate_poses() const;
 
   [[nodiscard]] const std::string& map_frame() const { return map_; }
-  [[nodiscard]] const std::optional<program::FeedAnswer>& last() const { return last_; }
-  [[nodiscard]] const program::FeedSituation& situation() const { return situation_; }
+  [[nodiscard]] const std::optional<FeedAnswer>& last() const { return last_; }
 
  private:
   std::string odom_, map_;
   double tolerance_s_;
-  std::optional<program::FeedAnswer> last_;
+  std::optional<FeedAnswer> last_;
   std::optional<Timestamp> said_;
   Trajectory way_;                ///< T_map_body
   std::deque<StampedPose> tail_;  ///< T_odom_body since the end of way_.
-  program::FeedSituation situation_;
+  std::vector<TeamMate> team_mates_;
 };
 
 /// The covariance of T_map_body as ROS states it (6x6 by rows; position, then rotation; about the axes of the map),
 /// from that of T_map_odom in the right tangent: docs/protocol.md, "The covariance".
 std::array<double, 36> ros_covariance(const Matrix6d& of_T_map_odom, const Pose3& T_map_odom, const Pose3& T_map_body);
 
-/// The state of a robot on ROS's topics.
-struct RosSituation {
-  std::string name;
-  bool is_connected = false;  ///< To the robot's live feed.
-  intake::RosIntake::Counts counts;
-  bool in_map = false;
-  std::vector<std::pair<std::string, std::string>> status;  ///< What the robot reports of itself.
-  std::vector<std::string> alerts, troubles;  ///< The robot's alerts, and problems with its messages, the newest last.
-};
-/// The message for /diagnostics.
-bags::RosDiagnostic diagnosis(const RosSituation& situation);
-
 /// A robot's name, changed to what may be a part of a topic's name.
 std::string topic_part(const std::string& name);
 
-}  // namespace tutti::ros
+}  // namespace tutti::program

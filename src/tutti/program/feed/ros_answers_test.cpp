@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/program/ros/ros_answers.hpp"
+#include "tutti/program/feed/ros_answers.hpp"
 
 #include <gtest/gtest.h>
 
 #include "tutti/bags/ros_messages.hpp"
 
-namespace tutti::ros {
+namespace tutti::program {
 namespace ros_answers_test {
 
 const Pose3 kMapOdom{Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitZ())), {1, 2, 3}};
 
-program::FeedAnswer answer(std::int64_t ns, const Pose3& T_odom_body, const Pose3& T_map_odom = kMapOdom) {
-  program::FeedAnswer out{.stamp = {ns}, .T_map_body = T_map_odom * T_odom_body, .T_map_odom = T_map_odom};
+FeedAnswer answer(std::int64_t ns, const Pose3& T_odom_body, const Pose3& T_map_odom = kMapOdom) {
+  FeedAnswer out{.stamp = {ns}, .T_map_body = T_map_odom * T_odom_body, .T_map_odom = T_map_odom};
   return out;
 }
 
@@ -61,8 +61,7 @@ TEST(RosAnswers, ThePathIsTheCorrectedWayAndOdometrySince) {
   RosAnswers answers("odom", "", 0.0);
   const auto at = [](double x) { return Pose3{Eigen::Quaterniond::Identity(), {x, 0, 0}}; };
   for (int i = 0; i < 10; ++i) answers.hear(answer(i, at(i)), at(i));
-  answers.hear(
-      program::FeedWay{.map_age = {1, 1}, .constraints = 1, .corrected = {{{0}, at(50)}, {{4}, at(54)}}, .map = {}});
+  answers.hear(FeedWay{.map_age = {1, 1}, .constraints = 1, .corrected = {{{0}, at(50)}, {{4}, at(54)}}, .map = {}});
   const std::string path = answers.path();
   // header (8, "map"), count, then of each a header, seven numbers: 2 of the way, 5 to 9 of odometry
   constexpr std::size_t kHead = 4 + 8 + 4 + 4 + 4, kPose = 8 + 4 + 4 + 56;
@@ -71,10 +70,7 @@ TEST(RosAnswers, ThePathIsTheCorrectedWayAndOdometrySince) {
 
 TEST(RosAnswers, TeamMatesWhosePlaceIsKnownAreShown) {
   RosAnswers answers("r1/odom", "", 0.0);
-  answers.hear(
-      program::FeedSituation{.in_map = true,
-                             .team_mates = {{RobotId{2}, "bravo-2", {7}, kMapOdom}, {RobotId{3}, "far", {8}, {}}},
-                             .alerts = {}});
+  answers.hear(std::vector<TeamMate>{{RobotId{2}, "bravo-2", {7}, kMapOdom}, {RobotId{3}, "far", {8}, {}}});
   const auto mates = answers.team_mate_poses();
   ASSERT_EQ(mates.size(), 1U);
   EXPECT_EQ(mates[0].first, "bravo_2");
@@ -87,22 +83,6 @@ TEST(RosAnswers, TeamMatesWhosePlaceIsKnownAreShown) {
   EXPECT_EQ(markers.find("far"), std::string::npos);
 }
 
-TEST(RosAnswers, DiagnosticsSayTheWorst) {
-  RosSituation situation{.name = "alpha: live feed", .is_connected = true, .counts = {.odometry = 7}, .in_map = true};
-  const auto expect = [&](int level, const std::string& message) {
-    EXPECT_EQ(diagnosis(situation).level, level);
-    EXPECT_EQ(diagnosis(situation).message, message);
-  };
-  expect(0, "fed, and on the map");
-  situation.troubles = {"/alpha/points: holds no points"};
-  expect(1, situation.troubles[0]);
-  situation.alerts = {"odometry slipped"};
-  expect(1, "odometry slipped");
-  situation.is_connected = false;
-  expect(2, "no robot program");
-  EXPECT_EQ(diagnosis(situation).values.back(), std::pair(std::string("trouble 0"), situation.troubles[0]));
-}
-
 TEST(RosAnswers, NamesBecomePartsOfTopics) {
   EXPECT_EQ(topic_part("alpha"), "alpha");
   EXPECT_EQ(topic_part("a--b"), "a_b");
@@ -111,4 +91,4 @@ TEST(RosAnswers, NamesBecomePartsOfTopics) {
 }
 
 }  // namespace ros_answers_test
-}  // namespace tutti::ros
+}  // namespace tutti::program

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/program/ros/ros_answers.hpp"
-
-#include <fmt/format.h>
+#include "tutti/program/feed/ros_answers.hpp"
 
 #include "tutti/geometry/so3.hpp"
 
-namespace tutti::ros {
+namespace tutti::program {
 namespace {
 
 constexpr std::array<float, 4> kOrange{1.0F, 0.6F, 0.1F, 1.0F};
@@ -35,37 +33,10 @@ std::string topic_part(const std::string& name) {
   return begins_with_letter ? out : "robot_" + out;
 }
 
-bags::RosDiagnostic diagnosis(const RosSituation& situation) {
-  constexpr std::uint8_t kFine = 0, kWarning = 1, kError = 2;
-  bags::RosDiagnostic out{.level = kFine, .name = situation.name, .message = {}, .hardware_id = {}, .values = {}};
-  const auto add = [&](const std::string& key, const auto& value) {
-    out.values.emplace_back(key, fmt::format("{}", value));
-  };
-  add("connection", situation.is_connected ? "feeding" : "away");
-  add("odometry", situation.counts.odometry);
-  add("scans", situation.counts.scans);
-  add("fixes", situation.counts.fixes);
-  add("refused", situation.counts.refused);
-  add("in_map", situation.in_map);
-  for (const auto& [name, text] : situation.status) add(name, text);
-  for (std::size_t i = 0; i < situation.alerts.size(); ++i) add(fmt::format("alert {}", i), situation.alerts[i]);
-  for (std::size_t i = 0; i < situation.troubles.size(); ++i) add(fmt::format("trouble {}", i), situation.troubles[i]);
-  const auto say = [&](std::uint8_t level, const std::string& message) {
-    out.level = level;
-    out.message = message;
-  };
-  say(kFine, situation.in_map ? "fed, and on the map" : "fed, not in a map yet");
-  if (situation.counts.odometry == 0) say(kWarning, "no odometry yet");
-  if (!situation.troubles.empty()) say(kWarning, situation.troubles.back());
-  if (!situation.alerts.empty()) say(kWarning, situation.alerts.back());
-  if (!situation.is_connected) say(kError, "no robot program");
-  return out;
-}
-
 RosAnswers::RosAnswers(const std::string& odom, const std::string& map, double tolerance_s)
     : odom_(odom), map_(map.empty() ? map_of(odom) : map), tolerance_s_(tolerance_s) {}
 
-void RosAnswers::hear(const program::FeedAnswer& answer, const Pose3& T_odom_body) {
+void RosAnswers::hear(const FeedAnswer& answer, const Pose3& T_odom_body) {
   last_ = answer;
   if (!tail_.empty()) {
     const Pose3 step = tail_.back().pose.inverse() * T_odom_body;
@@ -75,7 +46,7 @@ void RosAnswers::hear(const program::FeedAnswer& answer, const Pose3& T_odom_bod
   if (tail_.size() > kLongestTail) tail_.pop_front();
 }
 
-void RosAnswers::hear(const program::FeedWay& way) {
+void RosAnswers::hear(const FeedWay& way) {
   way_ = way.corrected;
   if (way_.empty()) return;
   while (!tail_.empty() && tail_.front().stamp <= way_.back().stamp) tail_.pop_front();
@@ -111,7 +82,7 @@ std::string RosAnswers::path() const {
 
 std::string RosAnswers::team_mates() const {
   std::vector<bags::RosBall> balls;
-  for (const program::TeamMate& mate : situation_.team_mates)
+  for (const TeamMate& mate : team_mates_)
     if (mate.T_map_body)
       balls.push_back({.header = {{}, map_},  // stamp 0: the newest transform
                        .name_space = "team_mates",
@@ -124,7 +95,7 @@ std::string RosAnswers::team_mates() const {
 
 std::vector<std::pair<std::string, std::string>> RosAnswers::team_mate_poses() const {
   std::vector<std::pair<std::string, std::string>> out;
-  for (const program::TeamMate& mate : situation_.team_mates)
+  for (const TeamMate& mate : team_mates_)
     if (mate.T_map_body)
       out.emplace_back(
           topic_part(mate.name),
@@ -132,4 +103,4 @@ std::vector<std::pair<std::string, std::string>> RosAnswers::team_mate_poses() c
   return out;
 }
 
-}  // namespace tutti::ros
+}  // namespace tutti::program

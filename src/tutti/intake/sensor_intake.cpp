@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/intake/sensor_intake.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <functional>
+#include <set>
+
+#include "tutti/bags/camera.hpp"
+#include "tutti/bags/robot_namespace.hpp"
+#include "tutti/base/plain_text.hpp"
+
+namespace tutti::intake {
+namespace {
+
+constexpr double kLook_s = 0.5;  // between two looks for what is missing, by odometry's time
+
+bool is_compressed(const std::string& topic) {
+  return topic.ends_with("/compressed") || topic.ends_with("/compressedDepth");  // as image_transport names them
+}
+
+CameraTopics topics_of(const std::string& images, Wish wish) {
+  const bool needs_info = wish == Wish::camera;  // depth may go without
+  return {images, bags::camera_info_topic(images, is_compressed(images)), is_compressed(images), needs_info, wish};
+}
+
+}  // namespace
+
+Result<std::vector<CameraTopics>> named_topics(const ImagesConfig& config) {
+  std::vector<CameraTopics> out;
+  std::set<std::string> infos;
+  for (const std::string& images : config.images) {
+    out.push_back(topics_of(images, Wish::camera));
+    infos.insert(out.back().info);
+  }
+  if (out.size() > 2 || infos.size() < out.size())
+    return fail(ErrorCode::invalid,
+                "images are of '{}', expected the topics of one camera or two, each with a camera_info of its own "
+                "beside it",
+                fmt::join(config.images, ","));
+  if (!config.depth.empty() && out.size() != 1)
+    return fail(ErrorCode::invalid, "depth is of '{}' beside {} topics of images, expected those of one camera",
+                config.depth, out.size());
+  if (!config.imu.empty() && out.empty())
+    return fail(ErrorCode::invalid, "the IMU is of '{}' without images, with which it would go", config.imu);
+  if (!config.depth.empty()) out.push_back(topics_of(config.depth, Wish::depth));
+  return out;
+}
+
+/// What a type of message is for.
+struct SensorIntake::Row {
+  std::string_view type;
+  std::function<Status(SensorIntake&, const RawMessage&, bags::RosEncoding)> take;
+  bool is_of_sensors = false;  ///< After it more may be known of cameras and IMU.
+};
+
+const std::vector<SensorIntake::Row>& SensorIntake::rows() {
+  using Self = SensorIntake;
+  using bags::RosEncoding;
+  static const std::vector<Row> kRows = [] {
+    const auto image = [](Self& to, const RawMessage& in, RosEncoding encoding) {
+      return to.take_camera(in.topic, in.bytes, encoding, false);
+    };
+    std::vector<Row> out{
+        {"nav_msgs/msg/Odometry",
+         [](Self& to, const RawMessage& in, RosEncoding encoding) { return to.ros_.add_odometry(in.bytes, encoding); }},
+        {"tf2_msgs/msg/TFMessage",
+         [](Self& to, const RawMessage& in, RosEncoding encoding) {
+           const bool is_of_all = in.topic == "/tf" || in.topic == "/tf_static";
+           return to.ros_.add_tf(in.bytes, bags::is_static_tf(in.topic),
+                                 is_of_all ? RosIntake::TfOf::all : RosIntake::TfOf::robot, encoding);
+         },
+         true},
+        {"sensor_msgs/msg/NavSatFix",
+         [](Self& to, const RawMessage& in, RosEncoding encoding) { return to.ros_.add_fix(in.bytes, encoding); }},
+        {"sensor_msgs/msg/BatteryState",
+         [](Self& to, const RawMessage& in, RosEncoding encoding) { return to.take_battery(in.bytes, encoding); }},
+        {kImuType,
+         [](Self& to, const RawMessage& in, RosEncoding encoding) {
+           return to.images_ && in.topic == to.imu_ ? to.images_->add_imu(in.bytes, encoding) : Status();
+         },
+         true},
+        {kCameraInfoType,
+         [](Self& to, const RawMessage& in, RosEncoding encoding) {
+           return to.take_camera(in.topic, in.bytes, encoding, true);
+         },
+         true},
+        {kImageType, image, true},
+        {kCompressedType, image, true}};
+    for (const bags::ScanType& scan : bags::kScanTypes)
+      out.push_back({scan.name, [](Self& to, const RawMessage& in, RosEncoding encoding) {
+                       to.points_ = in.topic;
+                       return to.ros_.add_points(in.bytes, in.type, encoding);
+                     }});
+    return out;
+  }();
+  return kRows;
+}
+
+void SensorIntake::take_images(ImagesConfig config, std::vector<CameraTopics> topics, std::string imu) {
+  topics_ = topics;
+  imu_ = imu;
+  images_.reset();
+  sensors_ = {};
+  if (!topics.empty()) images_.emplace(std::move(config), std::move(topics), std::move(imu), ros_);
+}
+
+Status SensorIntake::add(const RawMessage& message) {
+  const std::string topic = plain_text(message.topic, 80);
+  const auto encoding = bags::to_encoding(message.encoding);
+  if (!encoding) return in_context(topic, encoding.error());
+  const auto row = std::ranges::find(rows(), message.type, &Row::type);
+  if (row == rows().end())
+    return fail(ErrorCode::unsupported, "{}: messages of type '{}', expected one of {}", topic,
+                plain_text(message.type, 80), [] {
+                  std::vector<std::string_view> types;
+                  for (const Row& one : rows()) types.push_back(one.type);
+                  return fmt::format("{}", fmt::join(types, ", "));
+                }());
+  const Status taken = row->take(*this, message, *encoding);
+  look(row->is_of_sensors);
+  return taken ? taken : in_context(topic, taken.error());
+}
+
+Status SensorIntake::take_camera(std::string_view topic, std::string_view bytes, bags::RosEncoding encoding,
+                                 bool is_info) {
+  Status first;
+  for (std::size_t i = 0; images_ && i < topics_.size(); ++i) {
+    if (topic != (is_info ? topics_[i].info : topics_[i].images) || !images_->uses(i)) continue;
+    Status ok = is_info ? images_->add_info(i, bytes, encoding) : images_->add_image(i, bytes, encoding);
+    if (first) first = std::move(ok);
+  }
+  return first;
+}
+
+/// What is no number, or no share of 1, the robot's driver does not know.
+Status SensorIntake::take_battery(std::string_view bytes, bags::RosEncoding encoding) {
+  const auto message = bags::decode_battery_state(bytes, encoding);
+  if (!message) return tl::unexpected(message.error());
+  health_.emplace();
+  if (message->voltage_v >= 0.0F) health_->battery_v = static_cast<double>(message->voltage_v);
+  if (message->percentage >= 0.0F && message->percentage <= 1.0F)
+    health_->battery_percent = 100.0 * static_cast<double>(message->percentage);
+  return {};
+}
+
+/// What can be known of cameras and IMU now; while nothing new is to be expected, not at every message.
+void SensorIntake::look(bool is_new) {
+  if (!images_) return;
+  if (!images_->is_chosen()) choose();
+  if (!images_) return;
+  const bool is_early = looked_ && fed_ && *fed_ >= *looked_ && *fed_ - *looked_ < kLook_s;
+  const bool is_complete = missing_.empty() && !sensors_.cameras.empty();
+  if (is_early && (is_complete || !is_new)) return;
+  looked_ = fed_;
+  images_->describe(sensors_);
+  missing_ = images_->missing();
+}
+
+void SensorIntake::choose() {
+  if (!first_image_ && images_->has_any_image()) first_image_ = fed_;
+  const bool is_late = first_image_ && fed_ && *fed_ - *first_image_ > kPatience_s;
+  const auto chosen = images_->choose(is_late);
+  if (!chosen) {
+    missing_ = "no images are used: " + chosen.error().message;
+    images_.reset();
+    return;
+  }
+  if (!*chosen) return;
+  note(fmt::format("takes images of {}, {}", images_->in_words(), imu_.empty() ? "no IMU" : imu_));
+  note(images_->note());
+  if (fed_) images_->drop_late(*fed_);
+}
+
+Result<std::optional<Input>> SensorIntake::next(bool wants_scan) {
+  auto out = next_beside(wants_scan);
+  for (std::string text = ros_.take_note(); !text.empty(); text.clear()) note(text);
+  if (!out || *out) return out;
+  const auto sample = ros_.next_odometry(false);
+  if (!sample) return out;
+  fed_ = sample->stamp;
+  return std::optional<Input>(*sample);
+}
+
+/// What odometry has reached.
+Result<std::optional<Input>> SensorIntake::next_beside(bool wants_scan) {
+  if (health_) return std::optional<Input>(*std::exchange(health_, std::nullopt));
+  if (const auto fix = ros_.next_fix()) return std::optional<Input>(*fix);
+  if (images_ && fed_ && !sensors_.cameras.empty()) {
+    if (sensors_.imu)
+      if (auto samples = images_->next_imu(*fed_); !samples.empty()) return std::optional<Input>(std::move(samples));
+    auto images = images_->next_images(*fed_, is_last_);
+    if (!images) return in_context(images_->in_words(), images.error());
+    if (*images) return std::optional<Input>(std::move(**images));
+  }
+  auto scan = ros_.next_scan(wants_scan);
+  if (!scan) return in_context(points_, scan.error());
+  if (*scan) return std::optional<Input>(std::move(**scan));
+  return std::optional<Input>();
+}
+
+}  // namespace tutti::intake

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "tutti/base/result.hpp"
+#include "tutti/intake/camera_topics.hpp"
+#include "tutti/intake/feed_sensors.hpp"
+#include "tutti/intake/images_intake.hpp"
+#include "tutti/intake/ros_intake.hpp"
+#include "tutti/model/status.hpp"
+
+namespace tutti::intake {
+
+/// A message of ROS as it came.
+struct RawMessage {
+  std::string_view topic;     ///< As whoever subscribes it calls it; transforms are on "/tf" and "/tf_static".
+  std::string_view type;      ///< "nav_msgs/msg/Odometry"
+  std::string_view encoding;  ///< As bags have it: "cdr", "ros1".
+  std::string_view bytes;
+};
+
+/// An input of a robot.
+using Input = std::variant<node::OdometrySample, Scan, FedImages, std::vector<ImuSample>, PositionFix, Health>;
+
+/// How a robot's messages are read.
+struct SensorConfig {
+  IntakeConfig odometry;
+  ImagesConfig images;
+};
+
+/// The topics of images and depth that `config` names. Fails unless these are none, one camera, perhaps with depth, or
+/// two cameras, and an IMU only beside these.
+Result<std::vector<CameraTopics>> named_topics(const ImagesConfig& config);
+
+/// Turns a robot's messages of ROS into its inputs: (topic, type, encoding, bytes) -> Input, by one table of types and
+/// one set of rules for clocks, transforms, cameras and depth (RosIntake, ImagesIntake). It waits for what belongs
+/// together, needs no clock, and says what it makes of the messages. Bytes are untrusted: an error says what is wrong
+/// with a message, which then has no effect.
+class SensorIntake {
+ public:
+  static constexpr double kPatience_s = 5.0;  ///< Topics that show nothing so long after another are left out.
+
+  explicit SensorIntake(IntakeConfig config) : ros_(std::move(config)) {}
+  /// From now on images of `topics`, and with them samples of `imu` (may be empty), are taken.
+  void take_images(ImagesConfig config, std::vector<CameraTopics> topics, std::string imu);
+
+  Status add(const RawMessage& message);
+  /// The next input that is due, in the order in which a robot wants them; nothing when more must come first. An error
+  /// when one is left out. Scans that are not wanted are skipped.
+  Result<std::optional<Input>> next(bool wants_scan);
+  /// Nothing more comes that would be worth waiting for.
+  void end() { is_last_ = true; }
+
+  /// Cameras, depth and IMU, as far as they are known.
+  [[nodiscard]] const FeedSensors& sensors() const { return sensors_; }
+  /// Why no images, depth or IMU are used; empty while nothing is missing.
+  [[nodiscard]] const std::string& missing() const { return missing_; }
+  /// How messages are read, said once after each change: points' times, places of antennas, cameras.
+  std::vector<std::string> take_notes() { return std::exchange(notes_, {}); }
+  [[nodiscard]] RosIntake& odometry() { return ros_; }
+  [[nodiscard]] const RosIntake& odometry() const { return ros_; }
+
+ private:
+  struct Row;
+  static const std::vector<Row>& rows();
+  Status take_camera(std::string_view topic, std::string_view bytes, bags::RosEncoding encoding, bool is_info);
+  Status take_battery(std::string_view bytes, bags::RosEncoding encoding);
+  void look(bool is_new);
+  void choose();
+  Result<std::optional<Input>> next_beside(bool wants_scan);
+  void note(std::string text) {
+    if (!text.empty()) notes_.push_back(std::move(text));
+  }
+
+  RosIntake ros_;
+  std::optional<ImagesIntake> images_;
+  std::vector<CameraTopics> topics_;
+  std::string imu_, points_;  ///< Topics.
+  std::optional<Health> health_;
+  std::optional<Timestamp> fed_;                   ///< Odometry's newest that next() returned.
+  std::optional<Timestamp> first_image_, looked_;  ///< By odometry's time.
+  bool is_last_ = false;
+  FeedSensors sensors_;
+  std::string missing_;
+  std::vector<std::string> notes_;
+};
+
+}  // namespace tutti::intake

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/feed/ros_client.hpp"
+
+#include <utility>
+
+namespace tutti::program {
+
+namespace {
+
+constexpr const char* kCdr = "cdr";
+
+}  // namespace
+
+Result<std::unique_ptr<RosClient>> RosClient::make(intake::SensorConfig of_mission, FeedRos ros,
+                                                   const std::optional<Timestamp>& newest) {
+  auto& [odometry, images] = of_mission;
+  odometry.body_frame = ros.body_frame;
+  if (ros.covariance) odometry.covariance = *ros.covariance;
+  if (ros.T_body_lidar) odometry.T_body_lidar = ros.T_body_lidar;
+  if (ros.p_body_antenna) odometry.p_body_antenna = ros.p_body_antenna;
+  if (ros.scans_deskewed) odometry.scan_times.deskewed = "yes";
+  images.images = ros.images;
+  images.depth = ros.depth;
+  images.imu = ros.imu;
+  if (ros.images_offset_s) images.time_offset_s = *ros.images_offset_s;
+  auto topics = intake::named_topics(images);
+  if (!topics) return tl::unexpected(topics.error());
+  std::unique_ptr<RosClient> out(new RosClient(std::move(odometry), std::move(ros)));
+  out->intake_.odometry().begin_behind(newest);
+  std::string imu = images.imu;
+  out->intake_.take_images(std::move(images), std::move(*topics), std::move(imu));
+  return out;
+}
+
+bool RosClient::has_sensors_of(const FeedRos& before) const {
+  return said_.images == before.images && said_.depth == before.depth && said_.imu == before.imu;
+}
+
+std::vector<FeedRaw> RosClient::hear(const FeedAnswer& answer, const Pose3& T_odom_body) {
+  wants_scan_ = answer.wants_scan;
+  if (!answers_) {
+    const auto& frames = intake_.odometry().frames();
+    const std::string odom = said_.odom_frame.empty() && frames ? frames->odom : said_.odom_frame;
+    answers_.emplace(odom, said_.map_frame, said_.tolerance_s);
+    if (way_) answers_->hear(*way_);
+    answers_->hear(team_mates_);
+  }
+  answers_->hear(answer, T_odom_body);
+  std::vector<FeedRaw> out;
+  if (auto transform = answers_->transform())
+    out.push_back({"/tf", "tf2_msgs/msg/TFMessage", kCdr, std::move(*transform)});
+  out.push_back({"corrected_pose", "geometry_msgs/msg/PoseWithCovarianceStamped", kCdr, answers_->pose()});
+  return out;
+}
+
+void RosClient::hear(const FeedWay& way) {
+  way_ = way;
+  if (answers_) answers_->hear(way);
+}
+
+std::vector<FeedRaw> RosClient::hear(const std::vector<TeamMate>& team_mates) {
+  std::vector<FeedRaw> out;
+  if (team_mates == team_mates_) return out;
+  team_mates_ = team_mates;
+  if (!answers_) return out;
+  answers_->hear(team_mates);
+  out.push_back({"team_mates", "visualization_msgs/msg/MarkerArray", kCdr, answers_->team_mates()});
+  for (auto& [name, pose] : answers_->team_mate_poses())
+    out.push_back({"team_mates/" + name + "/pose", "geometry_msgs/msg/PoseStamped", kCdr, std::move(pose)});
+  return out;
+}
+
+std::optional<FeedRaw> RosClient::path() const {
+  constexpr std::size_t kSlack = 1'000;
+  if (!answers_) return std::nullopt;
+  FeedRaw out{"corrected_path", kPathType, kCdr, answers_->path()};
+  return out.bytes.size() + kSlack > kMaxFeedBytes ? std::nullopt : std::optional(std::move(out));
+}
+
+}  // namespace tutti::program

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tutti/intake/sensor_intake.hpp"
+#include "tutti/program/feed/feed_frames.hpp"
+#include "tutti/program/feed/ros_answers.hpp"
+
+namespace tutti::program {
+
+/// The robot's end for a client that feeds raw messages of ROS (Hello.ros): reads them, and puts what the robot answers
+/// into messages that the client publishes as they are. Stamps are the client's own.
+class RosClient {
+ public:
+  /// The type of message by which a client asks for path().
+  static constexpr const char* kPathType = "nav_msgs/msg/Path";
+
+  /// What `ros` does not say is as `of_mission` says. `newest` is the newest sample that the robot has. Fails when the
+  /// topics that it names cannot be those of a robot's cameras.
+  static Result<std::unique_ptr<RosClient>> make(intake::SensorConfig of_mission, FeedRos ros,
+                                                 const std::optional<Timestamp>& newest);
+
+  /// Fails when the message is not taken; next() has what is due then.
+  Status add(const FeedRaw& raw) { return intake_.add({raw.topic, raw.type, raw.encoding, raw.bytes}); }
+  /// SensorIntake::next(). Scans are left out while the last answer wanted none.
+  Result<std::optional<intake::Input>> next() { return intake_.next(wants_scan_); }
+  void end() { intake_.end(); }
+  [[nodiscard]] const intake::FeedSensors& sensors() const { return intake_.sensors(); }
+  [[nodiscard]] const std::string& missing() const { return intake_.missing(); }
+  std::vector<std::string> take_notes() { return intake_.take_notes(); }
+  /// Tells whether this client, which comes after `before`, has the same cameras and IMU.
+  [[nodiscard]] bool has_sensors_of(const FeedRos& before) const;
+  [[nodiscard]] const FeedRos& said() const { return said_; }
+
+  /// What the client is to publish: where the robot is, as transform and pose.
+  std::vector<FeedRaw> hear(const FeedAnswer& answer, const Pose3& T_odom_body);
+  void hear(const FeedWay& way);
+  /// The team-mates, if they are others than before.
+  std::vector<FeedRaw> hear(const std::vector<TeamMate>& team_mates);
+  /// The whole trajectory; nothing before there is any, and when it is too long for a message.
+  [[nodiscard]] std::optional<FeedRaw> path() const;
+
+ private:
+  RosClient(intake::IntakeConfig config, FeedRos ros) : said_(std::move(ros)), intake_(std::move(config)) {}
+
+  FeedRos said_;
+  intake::SensorIntake intake_;
+  std::optional<RosAnswers> answers_;
+  std::optional<FeedWay> way_;  ///< Heard before there was any odometry.
+  std::vector<TeamMate> team_mates_;
+  bool wants_scan_ = false;
+};
+
+}  // namespace tutti::program
