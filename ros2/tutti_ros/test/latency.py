@@ -18,6 +18,7 @@ import ros_stub
 
 ros_stub.install()
 from made_messages import camera_info, cloud, image, imu, odometry, pose_at
+from tutti_ros.link import stamp_ns
 from tutti_ros.node import TuttiNode
 
 POINTS, SAMPLES, WITH_IMAGES = 60_000, 4000, "--images" in sys.argv
@@ -27,9 +28,7 @@ with tempfile.TemporaryDirectory() as folder:
     ros_stub.Node.given = {"socket": f"{folder}/feed", "T_body_lidar": "0 0 0.5 0 0 0 1", "transform_tolerance_s": 0.0,
                            "images": "image" if WITH_IMAGES else "", "imu": "imu" if WITH_IMAGES else ""}
     node, answered = TuttiNode(), {}
-    publish = node.tf_broadcaster.sendTransform
-    node.tf_broadcaster.sendTransform = lambda t: answered.setdefault(t.header.stamp.sec * 10**9 + t.header.stamp.nanosec,
-                                                                      time.perf_counter())
+    node.outputs["/tf"].publish = lambda cdr: answered.setdefault(stamp_ns(cdr, 8), time.perf_counter())
     scan = cloud([(n, 7, [random.uniform(-20.0, 20.0) for _ in range(POINTS)]) for n in "xyz"]
                  + [("t", 6, [i * 1000 for i in range(POINTS)])])
     messages = [odometry(10**9 + i * 5 * 10**6, pose_at(0.005 * i)) for i in range(SAMPLES)]
@@ -44,7 +43,7 @@ with tempfile.TemporaryDirectory() as folder:
         time.sleep(max(0.0, begin + 0.005 * i - time.perf_counter()))
         said[10**9 + i * 5 * 10**6] = time.perf_counter()
         node.callbacks["odom"](message)
-        scan.header.stamp = seen.header.stamp = felt.header.stamp = message.header.stamp
+        scan, seen, felt = (one[:4] + message[4:12] + one[12:] for one in (scan, seen, felt))
         if WITH_IMAGES:
             node.callbacks["imu"](felt)
         if WITH_IMAGES and i % 7 == 0:

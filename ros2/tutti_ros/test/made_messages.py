@@ -1,90 +1,85 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Messages of our own making, through CDR bytes and back."""
+"""CDR bytes of messages of our own making."""
 import struct
 
 import ros_stub
-from tutti_ros import from_ros
 
 
-def odometry(stamp_ns, pose, frames=("r1/odom", "r1/base_link")):
-    out = ros_stub.TYPES["nav_msgs/Odometry"]()
+def made(kind, stamp_ns, frame_id, **fields):
+    out = ros_stub.TYPES[kind]()
     out.header.stamp.sec, out.header.stamp.nanosec = divmod(stamp_ns, 10**9)
-    out.header.frame_id, out.child_frame_id = frames
-    p, q = out.pose.pose.position, out.pose.pose.orientation
-    p.x, p.y, p.z, q.x, q.y, q.z, q.w = pose
-    return ros_stub.decode("nav_msgs/Odometry", ros_stub.encode("nav_msgs/Odometry", out))
+    out.header.frame_id = frame_id
+    for name, value in fields.items():
+        setattr(out, name, value)
+    return out
 
 
-def cloud(columns, rows=1, order="<", padding=0, stamp_ns=10**9, frame_id="r1/lidar"):
-    """`columns`: [(name, datatype, numbers)], points row by row."""
-    out = ros_stub.TYPES["sensor_msgs/PointCloud2"]()
-    out.header.stamp.sec, out.header.stamp.nanosec = divmod(stamp_ns, 10**9)
-    out.header.frame_id, out.is_bigendian = frame_id, order == ">"
-    offset = 4  # something in front
-    for name, datatype, _ in columns:
-        field = ros_stub.TYPES["sensor_msgs/PointField"]()
-        field.name, field.offset, field.datatype, field.count = name, offset, datatype, 1
-        out.fields.append(field)
-        offset += int(from_ros.TYPES[datatype][1])
-    codes = {5: "i", 6: "I", 7: "f", 8: "d"}
-    points = [b"\xff" * 4 + b"".join(struct.pack(order + codes[datatype], numbers[i]) for _, datatype, numbers in columns)
-              for i in range(len(columns[0][2]))]
-    width = len(points) // rows
-    out.height, out.width, out.point_step, out.row_step = rows, width, offset, width * offset + padding
-    out.data = b"".join(b"".join(points[r * width:(r + 1) * width]) + b"\xee" * padding for r in range(rows))
-    return ros_stub.decode("sensor_msgs/PointCloud2", ros_stub.encode("sensor_msgs/PointCloud2", out))
+def encoded(kind, *what, **fields):
+    return ros_stub.encode(kind, made(kind, *what, **fields))
 
 
-def livox(points, times_ns, stamp_ns=10**9, frame_id="r1/lidar", order="<"):
-    """CDR of a Livox's CustomMsg."""
-    name = frame_id.encode() + b"\0"
-    out = struct.pack(order + "iII", *divmod(stamp_ns, 10**9), len(name)) + name
-    out += bytes(-len(out) % 8) + struct.pack(order + "QIB3xI", stamp_ns, len(points), 192, len(points))
-    each = [struct.pack(order + "IfffBBB", t, *xyz, 100, 0, 3) for t, xyz in zip(times_ns, points)]
-    return (b"\0\1\0\0" if order == "<" else b"\0\0\0\0") + out + b"\0".join(each)
-
-
-def fix(stamp_ns, latitude=46.5, variances=(1.0, 1.0, 4.0), frame_id="r1/gnss", status=0):
-    out = ros_stub.TYPES["sensor_msgs/NavSatFix"]()
-    out.header.stamp.sec, out.header.stamp.nanosec = divmod(stamp_ns, 10**9)
-    out.header.frame_id, out.status.status = frame_id, status
-    out.latitude, out.longitude, out.altitude = latitude, 7.9, 600.0
-    east, north, up = variances
-    out.position_covariance = [east, 0.0, 0.0, 0.0, north, 0.0, 0.0, 0.0, up]
-    out.position_covariance_type = 2
-    return ros_stub.decode("sensor_msgs/NavSatFix", ros_stub.encode("sensor_msgs/NavSatFix", out))
+def set_pose(position, orientation, pose):
+    position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w = pose
 
 
 def pose_at(x):
     return (float(x), 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
+def odometry(stamp_ns, pose, frames=("r1/odom", "r1/base_link")):
+    out = made("nav_msgs/Odometry", stamp_ns, frames[0], child_frame_id=frames[1])
+    set_pose(out.pose.pose.position, out.pose.pose.orientation, pose)
+    return ros_stub.encode("nav_msgs/Odometry", out)
+
+
+def transforms(*frames, z=0.5, parent="r1/base_link"):
+    out = ros_stub.TYPES["tf2_msgs/TFMessage"]()
+    for frame in frames:
+        one = made("geometry_msgs/TransformStamped", 0, parent, child_frame_id=frame)
+        set_pose(one.transform.translation, one.transform.rotation, (0.0, 0.0, z, 0.0, 0.0, 0.0, 1.0))
+        out.transforms.append(one)
+    return ros_stub.encode("tf2_msgs/TFMessage", out)
+
+
+def cloud(columns, stamp_ns=10**9, frame_id="r1/lidar"):
+    """`columns`: [(name, datatype, numbers)] of four bytes each."""
+    codes, fields = {6: "I", 7: "f"}, []
+    for i, (name, datatype, _) in enumerate(columns):
+        fields.append(ros_stub.TYPES["sensor_msgs/PointField"]())
+        fields[-1].name, fields[-1].offset, fields[-1].datatype, fields[-1].count = name, 4 * i, datatype, 1
+    count, step = len(columns[0][2]), 4 * len(columns)
+    layout = struct.Struct("<" + "".join(codes[datatype] for _, datatype, _ in columns))
+    data = b"".join(layout.pack(*point) for point in zip(*(numbers for _, _, numbers in columns)))
+    return encoded("sensor_msgs/PointCloud2", stamp_ns, frame_id, fields=fields, height=1, width=count, point_step=step,
+                   row_step=count * step, data=data)
+
+
+def livox(points, times_ns, stamp_ns=10**9, frame_id="r1/lidar"):
+    """A Livox's CustomMsg."""
+    name = frame_id.encode() + b"\0"
+    out = struct.pack("<iII", *divmod(stamp_ns, 10**9), len(name)) + name
+    out += bytes(-len(out) % 8) + struct.pack("<QIB3xI", stamp_ns, len(points), 192, len(points))
+    each = [struct.pack("<IfffBBB", t, *xyz, 100, 0, 3) for t, xyz in zip(times_ns, points)]
+    return b"\0\1\0\0" + out + b"\0".join(each)
+
+
+def fix(stamp_ns, latitude=46.5, frame_id="r1/gnss"):
+    return encoded("sensor_msgs/NavSatFix", stamp_ns, frame_id, latitude=latitude, longitude=7.9, altitude=600.0,
+                   position_covariance=[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 4.0], position_covariance_type=2)
+
+
 def camera_info(model="plumb_bob", d=(-0.3, 0.1, 0.0, 0.0, 0.0), width=4, height=3):
-    out = ros_stub.TYPES["sensor_msgs/CameraInfo"]()
-    out.width, out.height, out.distortion_model, out.d = width, height, model, list(d)
-    out.k = [460.0, 0.0, 370.0, 0.0, 458.0, 250.0, 0.0, 0.0, 1.0]
-    return ros_stub.decode("sensor_msgs/CameraInfo", ros_stub.encode("sensor_msgs/CameraInfo", out))
+    return encoded("sensor_msgs/CameraInfo", 0, "r1/camera", width=width, height=height, distortion_model=model, d=list(d),
+                   k=[460.0, 0.0, 370.0, 0.0, 458.0, 250.0, 0.0, 0.0, 1.0])
 
 
-def image(encoding, width, height, step, data, stamp_ns=10**9, frame_id="r1/camera", big=0):
-    out = ros_stub.TYPES["sensor_msgs/Image"]()
-    out.header.stamp.sec, out.header.stamp.nanosec = divmod(stamp_ns, 10**9)
-    out.header.frame_id, out.encoding, out.is_bigendian = frame_id, encoding, big
-    out.width, out.height, out.step, out.data = width, height, step, bytes(data)
-    return ros_stub.decode("sensor_msgs/Image", ros_stub.encode("sensor_msgs/Image", out))
-
-
-def file_image(data, stamp_ns=10**9, frame_id="r1/camera"):
-    out = ros_stub.TYPES["sensor_msgs/CompressedImage"]()
-    out.header.stamp.sec, out.header.stamp.nanosec = divmod(stamp_ns, 10**9)
-    out.header.frame_id, out.format, out.data = frame_id, "jpeg", data
-    return ros_stub.decode("sensor_msgs/CompressedImage", ros_stub.encode("sensor_msgs/CompressedImage", out))
+def image(encoding, width, height, step, data, stamp_ns=10**9, frame_id="r1/camera"):
+    return encoded("sensor_msgs/Image", stamp_ns, frame_id, encoding=encoding, width=width, height=height, step=step,
+                   data=bytes(data))
 
 
 def imu(stamp_ns, gyro=(1.0, 2.0, 3.0), accelerometer=(4.0, 5.0, 6.0), frame_id="r1/imu"):
-    out = ros_stub.TYPES["sensor_msgs/Imu"]()
-    out.header.stamp.sec, out.header.stamp.nanosec = divmod(stamp_ns, 10**9)
-    out.header.frame_id = frame_id
+    out = made("sensor_msgs/Imu", stamp_ns, frame_id)
     w, a = out.angular_velocity, out.linear_acceleration
     (w.x, w.y, w.z), (a.x, a.y, a.z) = gyro, accelerometer
-    return ros_stub.decode("sensor_msgs/Imu", ros_stub.encode("sensor_msgs/Imu", out))
+    return ros_stub.encode("sensor_msgs/Imu", out)

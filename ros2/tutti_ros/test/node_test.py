@@ -6,18 +6,46 @@ import time
 import unittest
 
 import ros_stub
-from made_messages import cloud, fix, livox, odometry, pose_at
+from made_messages import cloud, fix, livox, odometry, pose_at, transforms
 from paths import SOURCE
 from programs import HAS_NATS, PATIENCE_S, WithPrograms
-from tutti_ros import from_ros
+from tutti_ros.node import CLOUD, camera_info_topic
 
 
 class Programs(WithPrograms):
+    @staticmethod
+    def stamp_ns(message):
+        return message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+
+    def test_what_the_robot_says_of_messages_is_in_diagnostics(self):
+        self.start_robot("r1", "nats://127.0.0.1:1")
+        node = self.node("r1", odom_frame="r1/o", map_frame="world", base_frame="r1/body")
+        self.wait_for(lambda: node.link.state == "feeding", "the robot")
+        for i in range(3):
+            node.callbacks["odom"](odometry((1 + i) * 10**8, pose_at(0.1 * i)))
+        node.callbacks["points"](cloud([(n, 7, [1.0, 2.0]) for n in "xyz"], stamp_ns=2 * 10**8))
+        self.wait_for(lambda: "no transform from 'r1/lidar' to 'r1/body'" in self.diagnosis(node)[1], "why no scan is taken")
+        self.wait_for(lambda: node.made["/tf"].said, "map -> odom")
+        said = node.made["/tf"].said[0].transforms[0]
+        self.assertEqual((said.header.frame_id, said.child_frame_id), ("world", "r1/o"))
+
+    def test_parameters_that_cannot_be(self):
+        for bad in ({"socket": ""}, {"T_body_lidar": "1 2 3"}, {"antenna_m": "1"}):
+            with self.assertRaisesRegex(ValueError, "parameter"):
+                self.node("r1", **bad)
+        self.start_robot("r1", "nats://127.0.0.1:1")
+        node = self.node("r1", images="a/image_raw,b/image_raw,c/image_raw")
+        self.wait_for(lambda: node.link.state == "refused", "the robot's refusal")
+        self.assertIn("images are of 'a/image_raw,b/image_raw,c/image_raw', expected", node.link.why)
+
+    def test_the_camera_info_is_beside_the_images(self):
+        for images, expected in (("image", "camera_info"), ("left/image_raw", "left/camera_info"), ("/l/i", "/l/camera_info"),
+                                 ("l/i/compressed", "l/camera_info"), ("l/i/compressedDepth", "l/camera_info")):
+            self.assertEqual(camera_info_topic(images), expected)
+
     def test_a_robot_alone_that_is_killed_once(self):
         bus = "nats://127.0.0.1:1"  # nobody is there: a robot needs no link
         node = self.node("r1")
-        lidar = ros_stub.TYPES["geometry_msgs/TransformStamped"]()
-        lidar.transform.translation.z, lidar.transform.rotation.w = 0.5, 1.0
         draw = random.Random(1)
         columns = [(n, 7, [draw.uniform(-10.0, 10.0) for _ in range(2000)]) for n in "xyz"]
 
@@ -29,73 +57,72 @@ class Programs(WithPrograms):
                     node.callbacks["fix"](fix((1 + i) * 10**8))
                 time.sleep(0.002)
 
-        drive(0, 50)  # nobody is there yet, and tf2 knows nothing
-        self.assertEqual(ros_stub.Tf.sent, [])
-        node.callbacks["publish_diagnostics"]()
-        status = node.made["/diagnostics"].said[-1].status[0]
-        self.assertEqual(status.level, b"\2")
-        said = "".join(pair.value for pair in status.values)
-        self.assertIn("points: no transform from 'r1/lidar'", said)
-        self.assertIn("fixes are taken as of an antenna at the body's origin: no transform from 'r1/gnss'", said)
-        for frame in ("r1/lidar", "r1/gnss"):
-            ros_stub.Tf.known["r1/base_link", frame] = lidar
+        drive(0, 50)  # nobody is there yet
+        sent = node.made["/tf"].said
+        self.assertEqual(sent, [])
+        level, said = self.diagnosis(node)
+        self.assertEqual(level, b"\2")
+        self.assertIn("away", said)
+        node.callbacks["points"](b"\0\1\0\0")
+        self.assertIn("points: a message of 4 bytes", self.diagnosis(node)[1])
+        node.callbacks["/tf_static"](transforms("r1/lidar", "r1/gnss"))
         robot = self.start_robot("r1", bus)
         self.wait_for(lambda: node.link.counts["corrections"] == 50, "the first samples, said again")
         drive(50, 150)
         self.wait_for(lambda: node.link.counts["corrections"] == 150, "an answer for each sample")
-        self.wait_for(lambda: len(ros_stub.Tf.sent) == 150, "map -> odom at odometry's rate")
-        sent = ros_stub.Tf.sent[-1]
-        self.assertEqual((sent.header.frame_id, sent.child_frame_id), ("r1/map", "r1/odom"))
-        self.assertEqual(from_ros.nanoseconds(sent.header.stamp), 151 * 10**8 - 10**8 + 10**8)
+        self.wait_for(lambda: len(sent) == 150, "map -> odom at odometry's rate")
+        last = sent[-1].transforms[0]
+        self.assertEqual((last.header.frame_id, last.child_frame_id), ("r1/map", "r1/odom"))
+        self.assertEqual(self.stamp_ns(last), 151 * 10**8)
         self.assertGreater(node.link.counts["scans"], 15)
         self.assertEqual(node.link.counts["fixes"], 30)
         self.wait_for(lambda: self.fed("r1").get("fixes") == 30, "fixes, counted by the robot")
         self.assertEqual(self.fed("r1")["fixes_left_out"], 0)
-        self.assertEqual(node.antenna("r1/gnss"), (0.0, 0.0, 0.5))
         self.assertEqual(node.link.counts["refused"], 0, node.link.why)
 
         robot.kill()
         self.wait_for(lambda: node.link.state == "away", "the end")
         drive(150, 200)
-        self.assertEqual(len(ros_stub.Tf.sent), 200)  # the last correction goes on
+        self.assertEqual(len(sent), 200)  # the last correction goes on
         robot = self.start_robot("r1", bus)
         self.wait_for(lambda: node.link.state == "feeding" and not node.link.waiting, "the robot again")
-        self.wait_for(lambda: node.on_map.correction.stamp_ns == 200 * 10**8, "all that was said again")
+        self.wait_for(lambda: node.correction.stamp_ns == 200 * 10**8, "all that was said again")
         drive(200, 250)
         poses = node.made["corrected_pose"].said
-        self.wait_for(lambda: from_ros.nanoseconds(poses[-1].header.stamp) == 250 * 10**8, "the last sample")
-        stamps = [from_ros.nanoseconds(sent.header.stamp) for sent in ros_stub.Tf.sent]
+        self.wait_for(lambda: self.stamp_ns(poses[-1]) == 250 * 10**8, "the last sample")
+        stamps = [self.stamp_ns(one.transforms[0]) for one in sent]
         self.assertEqual(stamps, [(2 + i) * 10**8 for i in range(250)])  # none twice: tf2 warns of each
-        node.callbacks["publish_path"]()
+        node.callbacks["ask_for_path"]()
+        self.wait_for(lambda: node.made["corrected_path"].said, "the path")
         path = node.made["corrected_path"].said[-1]
         self.assertEqual(path.header.frame_id, "r1/map")
         self.assertGreater(len(path.poses), 50)
         at = poses[-1]
         self.assertAlmostEqual(at.pose.pose.position.x, 0.05 * 249, places=6)
         self.assertGreater(at.pose.covariance[0], 0.0)
-        node.callbacks["publish_diagnostics"]()
+        self.assertEqual(self.diagnosis(node)[0], b"\0")
         answer = ros_stub.types.SimpleNamespace()
         node.callbacks["~/end_recording"](None, answer)
         self.assertTrue(answer.success)
         robot.send_signal(signal.SIGTERM)
         self.assertEqual(robot.wait(PATIENCE_S), 0)
         self.assertEqual(node.qos["odom"], "sensor data")
+        self.assertTrue(all(node.raw.values()))
+        self.assertEqual(node.qos["/tf_static"]["durability"], "transient local")
         self.assertEqual(node.qos["corrected_path"]["durability"], "transient local")
 
     def test_scans_of_a_livox(self):
         self.start_robot("r1", "nats://127.0.0.1:1")
         node = self.node("r1", T_body_lidar="0 0 0 0 0 0 1")
-        look = lambda: (node.callbacks["look_for_scans"](), node.raw["points"])[1]
-        self.assertFalse(look())  # nobody publishes yet
+        look = lambda: (node.callbacks["look_for_scans"](), node.scans[0])[1]
+        self.assertEqual(look(), CLOUD)  # nobody publishes yet
         node.published["points"] = ["livox_ros_driver/msg/CustomMsg"]
-        self.assertFalse(look())  # there is no such package
-        node.callbacks["publish_diagnostics"]()
-        said = node.made["/diagnostics"].said[-1].status[0]
-        self.assertIn("whose package is not sourced here", "".join(pair.value for pair in said.values))
+        self.assertEqual(look(), CLOUD)  # there is no such package
+        self.assertIn("whose package is not sourced here", self.diagnosis(node)[1])
         node.published["points"] = ["livox_ros_driver2/msg/CustomMsg"]
-        self.assertTrue(look())
+        self.assertEqual(look(), "livox_ros_driver2/msg/CustomMsg")
         self.assertEqual(len(node.destroyed), 1)
-        self.assertTrue(look())
+        look()
         self.assertEqual(len(node.destroyed), 1)
         draw = random.Random(1)
         points = [tuple(draw.uniform(-10.0, 10.0) for _ in range(3)) for _ in range(500)]
@@ -106,7 +133,7 @@ class Programs(WithPrograms):
         self.wait_for(lambda: node.link.counts["corrections"] == 20, "an answer for each sample")
         self.assertEqual(node.link.counts["refused"], 0, node.link.why)
         node.published["points"] = ["sensor_msgs/msg/PointCloud2"]
-        self.assertFalse(look())
+        self.assertEqual(look(), CLOUD)
 
     @unittest.skipUnless(HAS_NATS, "nats-server is not installed")
     def test_two_robots_find_each_other(self):
@@ -133,7 +160,8 @@ class Programs(WithPrograms):
             made = nodes[name].made
             said = made["team_mates"].said
             self.wait_for(lambda: said and len(said[-1].markers) == 3, f"{name} hears of {other}")
-            self.wait_for(lambda: len(made["corrected_path"].said) > 0 and nodes[name].on_map.way, "its way")
+            nodes[name].callbacks["ask_for_path"]()
+            self.wait_for(lambda: made["corrected_path"].said, "its trajectory")
             mate = made[f"team_mates/{other}/pose"].said[-1]
             self.assertEqual(mate.header.frame_id, f"{name}/map")
             self.assertEqual(nodes[name].link.counts["refused"], 0, nodes[name].link.why)

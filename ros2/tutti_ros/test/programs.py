@@ -25,8 +25,6 @@ class WithPrograms(unittest.TestCase):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         self.path = pathlib.Path(folder.name)
-        ros_stub.Tf.sent.clear()
-        ros_stub.Tf.known.clear()
 
     def start(self, *arguments):
         program = subprocess.Popen([TUTTI, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
@@ -56,12 +54,23 @@ class WithPrograms(unittest.TestCase):
         return node
 
     def recorded(self, name, topics):
-        """(callback, message) of a bag that `tutti simulate` wrote, in its order. `topics`: {topic below the robot's name:
-        type}."""
-        kinds = {f"/{name}/{topic}": (topic, kind) for topic, kind in topics.items()}
+        """(topic, CDR) of a bag that `tutti simulate` wrote, in its order. `topics` are below the robot's name."""
+        of = {f"/{name}/{topic}": topic for topic in topics}
         for topic, cdr in mcap_reader.messages((self.path / name / f"{name}_0.mcap").read_bytes()):
-            if topic in kinds:
-                yield kinds[topic][0], ros_stub.decode(kinds[topic][1], cdr)
+            if topic in of:
+                yield of[topic], cdr
+
+    def place_sensors(self, name, node):
+        """As that bag says where they are."""
+        for topic, cdr in mcap_reader.messages((self.path / name / f"{name}_0.mcap").read_bytes()):
+            if topic == "/tf_static":
+                node.callbacks[topic](cdr)
+
+    def diagnosis(self, node):
+        """The level of /diagnostics, and its values in lines."""
+        node.callbacks["publish_diagnostics"]()
+        status = node.made["/diagnostics"].said[-1].status[0]
+        return status.level, "\n".join(pair.value for pair in status.values)
 
     def status(self, name):
         try:

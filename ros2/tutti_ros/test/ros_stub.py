@@ -53,7 +53,11 @@ DEFINITIONS = {
                                         "diagnostic_msgs/KeyValue[] values",
     "diagnostic_msgs/DiagnosticArray": "std_msgs/Header header, diagnostic_msgs/DiagnosticStatus[] status",
     "visualization_msgs/Marker": "std_msgs/Header header, string ns, int32 id, int32 type, int32 action, "
-                                 "geometry_msgs/Pose pose, geometry_msgs/Vector3 scale, std_msgs/ColorRGBA color, string text",
+                                 "geometry_msgs/Pose pose, geometry_msgs/Vector3 scale, std_msgs/ColorRGBA color, "
+                                 "builtin_interfaces/Time lifetime, bool frame_locked, geometry_msgs/Point[] points, "
+                                 "std_msgs/ColorRGBA[] colors, string texture_resource, sensor_msgs/CompressedImage texture, "
+                                 "geometry_msgs/Point[] uv_coordinates, string text, string mesh_resource, string mesh_filename, "
+                                 "uint8[] mesh_data, bool mesh_use_embedded_materials",
     "visualization_msgs/MarkerArray": "visualization_msgs/Marker[] markers",
 }
 NUMBERS = {"int8": "b", "uint16": "H", "int32": "i", "uint32": "I", "uint8": "B", "float32": "f", "float64": "d", "bool": "?"}
@@ -95,7 +99,7 @@ def make_type(name, definition):
         object.__setattr__(self, field, value)
 
     kinds = {field: kind for kind, field in fields}
-    return type(name.split("/")[1], (), {"__init__": init, "__setattr__": set_checked, "fields_": fields,
+    return type(name.split("/")[1], (), {"__init__": init, "__setattr__": set_checked, "fields_": fields, "name_": name,
                                          **CONSTANTS.get(name, {})})
 
 
@@ -174,11 +178,13 @@ def encode(kind, message):
 
 
 class Publisher:
-    def __init__(self):
-        self.said = []
+    """As rclpy's it takes messages, or their bytes."""
+
+    def __init__(self, kind):
+        self.kind, self.said = kind, []
 
     def publish(self, message):
-        self.said.append(message)
+        self.said.append(decode(self.kind.name_, message) if isinstance(message, bytes) else message)
 
     def get_subscription_count(self):
         return 1
@@ -210,7 +216,7 @@ class Node:
         return types.SimpleNamespace(value=self.given.get(name, value))
 
     def create_publisher(self, kind, topic, qos):
-        self.made[topic], self.qos[topic] = Publisher(), qos
+        self.made[topic], self.qos[topic] = Publisher(kind), qos
         return self.made[topic]
 
     def create_subscription(self, kind, topic, callback, qos, raw=False):
@@ -243,31 +249,6 @@ class Node:
         pass
 
 
-class Tf:
-    """tf2_ros: what is sent, and transforms to be found."""
-    sent, known = [], {}
-
-    class TransformException(Exception):
-        pass
-
-    class TransformBroadcaster:
-        def __init__(self, node):
-            pass
-
-        def sendTransform(self, transform):
-            Tf.sent.append(transform)
-
-    class Buffer:
-        def lookup_transform(self, parent, child, _):
-            if (parent, child) not in Tf.known:
-                raise Tf.TransformException(f"no transform from '{child}' to '{parent}'")
-            return Tf.known[parent, child]
-
-    class TransformListener:
-        def __init__(self, buffer, node):
-            pass
-
-
 def install():
     """Puts the modules that the node imports where it finds them."""
     def module(name, **has):
@@ -275,15 +256,12 @@ def install():
         sys.modules[name].__dict__.update(has)
         return sys.modules[name]
 
-    time = module("rclpy.time", Time=object)
     executors = module("rclpy.executors", ExternalShutdownException=type("ExternalShutdownException", (Exception,), {}))
     module("rclpy.node", Node=Node)
     module("rclpy.qos", DurabilityPolicy=types.SimpleNamespace(TRANSIENT_LOCAL="transient local"),
            ReliabilityPolicy=types.SimpleNamespace(RELIABLE="reliable", BEST_EFFORT="best effort"),
            QoSProfile=lambda **what: what, qos_profile_sensor_data="sensor data")
-    module("rclpy", ok=lambda: True, time=time, executors=executors)
-    module("tf2_ros", **{name: getattr(Tf, name) for name in
-                         ("TransformException", "TransformBroadcaster", "Buffer", "TransformListener")})
+    module("rclpy", ok=lambda: True, executors=executors)
     module("std_srvs.srv", Trigger=object)
     module("livox_ros_driver2.msg", CustomMsg=type("CustomMsg", (), {}))  # whose messages are taken as bytes
     for name, made in TYPES.items():

@@ -16,7 +16,7 @@ from programs import HAS_NATS, PATIENCE_S, WithPrograms
 from tutti_ros import server_map
 from tutti_ros.map_node import MapNode
 from tutti_ros.server_map import ServerMap, grid_of
-from tutti_ros.situation import ERROR, OK, WARN
+from tutti_ros.diagnosis import ERROR, OK, WARN
 
 YAML = """# up is z
 image: grid.pgm
@@ -190,7 +190,7 @@ class OfAServer(WithPrograms):
                            self.path / "alpha.feed", "--rate", "20")
         node = self.node("alpha", T_body_lidar="0 0 0.5 0 0 0 1", use_fixes=False)
         self.wait_for(lambda: node.link.state == "feeding", "the robot")
-        for topic, message in self.recorded("alpha", {"odom": "nav_msgs/Odometry", "points": "sensor_msgs/PointCloud2"}):
+        for topic, message in self.recorded("alpha", ("odom", "points")):
             node.callbacks[topic](message)
             time.sleep(0.001)
             looked()

@@ -16,7 +16,7 @@ class Connection(threading.Thread):
         self.lock = threading.Lock()
         self.wakes, self.waker = socket.socketpair()
         self.waker.setblocking(False)
-        self.ending, self.leaving = threading.Event(), threading.Event()
+        self.ending = threading.Event()
 
     def wake(self):
         """There is something to say."""
@@ -24,11 +24,6 @@ class Connection(threading.Thread):
             self.waker.send(b".")
         except BlockingIOError:  # it is awake
             pass
-
-    def again(self):
-        """Greets the robot anew: what the Link says of its sensors is said when a connection begins."""
-        self.leaving.set()
-        self.wake()
 
     def stop(self):
         self.ending.set()
@@ -46,7 +41,6 @@ class Connection(threading.Thread):
                     robot.connect(str(self.path))
                     robot.settimeout(None)
                     self._talk(robot)
-                    why = "greets the robot anew" if self.leaving.is_set() else why
             except (OSError, ValueError, DecodeError) as error:
                 why = f"{self.path}: {error}"
             with self.lock:
@@ -54,11 +48,10 @@ class Connection(threading.Thread):
             self.ending.wait(wait_s)
 
     def _talk(self, robot):
-        self.leaving.clear()
         with self.lock:
             out = memoryview(self.link.connected())  # whose rest is no copy
         robot.setblocking(False)
-        while not self.ending.is_set() and not self.leaving.is_set():
+        while not self.ending.is_set():
             readable, writable, _ = select.select([robot, self.wakes], [robot] if out else [], [])
             if self.wakes in readable:
                 self.wakes.recv(4096)

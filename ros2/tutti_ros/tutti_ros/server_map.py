@@ -10,7 +10,7 @@ import tempfile
 
 import numpy as np
 
-from tutti_ros.situation import ERROR, OK, WARN
+from tutti_ros.diagnosis import ERROR, OK, WARN
 
 REST_PER_WORK = 9.0      # as of `tutti server --ros`: a tenth of a core at most
 LONGEST_WAIT_S = 60.0    # after what failed
