@@ -12,7 +12,7 @@ import { FakeServer } from "./fake_server.mjs";
 
 const page_text = readFileSync(new URL("../dist/index.html", import.meta.url), "utf8");
 const work = mkdtempSync(join(tmpdir(), "tutti-web-"));
-const browser = await Browser.launch();
+let browser = await Browser.launch();
 const tests = [];
 const test = (name, run) => tests.push({ name, run });
 
@@ -281,6 +281,28 @@ test("a report opens as a file without a network, and its time can be scrubbed",
   await page.close();
 });
 
+test("a comparison has trajectories, figures and curves, and no submaps", async () => {
+  const t = 60;
+  const points = Array.from({ length: 60 }, (_, i) => [i, i, 0.1 * i, 0]);
+  const scales = [{ length_m: 60, significance: 3.2, worst_s: 41, position_m: 0.23, rotation_rad: 0.02, since_s: 0 }];
+  const compare = { format: 2, a: "truth.tum", b: "odometry.tum", disagree: true, tolerance_m: 0.02, tolerance_deg: 0.23, notes: [], robots: [{ name: "", poses: 60, paired: 60, nodes: 30, way_m: 60, duration_s: 60, aligned: { rmse_m: 0.134, max_m: 0.3, rmse_deg: 1.4 }, scales, origins: [], constraints: [] }] };
+  const messages = [
+    { key: "mission", t: 0, value: { name: "odometry.tum against truth.tum", mode: "compare", version: "0.3.0", duration_s: 60 } },
+    ...["onboard", "reference"].map((kind) => ({ key: `trajectory/robot/${kind}`, t, value: { name: "robot", robot: 0, component: 0, points } })),
+    { key: "errors/robot", t, value: { robot: 0, against: "reference", names: ["onboard"], points: points.map(([s]) => [s, 0.01 * s]) } },
+    { key: "compare", t, value: compare },
+  ];
+  const file = join(work, "compare.html");
+  writeFileSync(file, fill(page_text, { messages, clouds: {} }));
+  const page = await browser.open(`file://${file}`);
+  await page.until("the verdict", () => /They disagree/.test(document.querySelector(".report")?.textContent));
+  assert.match((await page.texts(".report"))[0], /0\.134\sm RMSE/);
+  assert.deepEqual(await page.texts(".tabs button"), ["Comparison"]);
+  assert.equal(await page.evaluate(() => tutti.app.store.unread.count), 0);
+  assert.deepEqual(page.errors, []);
+  await page.close();
+});
+
 test("WebGL draws the same picture as the CPU, in all colours, heights and sections", async () => {
   const mission = new FakeMission({ submaps: 8 });
   const server = await new FakeServer(mission).start();
@@ -354,7 +376,12 @@ for (const { name, run } of tests) {
   if (only && !name.includes(only)) continue;
   const start = Date.now();
   try {
-    await run();
+    await run().catch(async (error) => {
+      if (browser.lives) throw error;
+      console.log(`     Chromium itself ended in: ${name}; once more with another one`);
+      browser = await Browser.launch();
+      await run();
+    });
     console.log(`ok   ${name} (${Date.now() - start} ms)`);
   } catch (error) {
     ++failed;

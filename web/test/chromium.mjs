@@ -5,7 +5,7 @@ import puppeteer from "puppeteer-core";
 const kNoGpu = ["--disable-gpu"];
 /** WebGL in software: slow, but the same pictures as a GPU makes. */
 export const WEBGL = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
-const kFlags = ["--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync", "--js-flags=--expose-gc"];
+const kFlags = ["--no-sandbox", "--disable-dev-shm-usage", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync", "--js-flags=--expose-gc"];
 
 export class Browser {
   static async launch(graphics = kNoGpu) {
@@ -21,6 +21,10 @@ export class Browser {
     const out = new Page(page, context);
     await page.goto(url, { waitUntil: "domcontentloaded" });
     return out;
+  }
+  /** False when Chromium itself has ended. */
+  get lives() {
+    return this.browser.connected;
   }
   close() {
     return this.browser.close();

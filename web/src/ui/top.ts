@@ -18,7 +18,7 @@ export function top_bar(app: App, theme: ThemeChoice): HTMLElement {
     h("h1", { title: app.store.get("mission")?.description ?? "" }, app.store.get("mission")?.name ?? ""),
     badge(app),
     facts(app),
-    h("nav", { class: "phases", "aria-label": "Phase of the mission" }, (Object.keys(PHASES) as Phase[]).map((phase) =>
+    app.store.get("mission")?.mode === "compare" ? null : h("nav", { class: "phases", "aria-label": "Phase of the mission" }, (Object.keys(PHASES) as Phase[]).map((phase) =>
       button(PHASES[phase].name, () => app.set_phase(phase), { title: PHASES[phase].help, "aria-pressed": String(app.phase === phase) }),
     )),
     button(icon(theme.theme === "light" ? "sun" : theme.theme === "dark" ? "moon" : "system", `Colours: ${THEMES[theme.theme]}`), () => theme.next(), { class: "plain square", key: "theme", "aria-label": `Colours: ${THEMES[theme.theme]}` }),
@@ -50,7 +50,7 @@ function facts(app: App): Child {
   const parts = app.world.parts.size;
   const words = [
     many(app.robots.length, "robot"),
-    many(app.world.placed.size, "submap"),
+    app.world.placed.size > 0 || app.live ? many(app.world.placed.size, "submap") : null,
     poses ? many(poses.accepted, "closure") : null,
     parts > 1 ? `${parts} parts` : parts === 1 ? "1 map" : null,
     poses ? `revision ${poses.revision}` : null,
