@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What a robot's node makes of what the server sends: graphs, and receipts of which submaps it has.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <set>
 #include <utility>
@@ -57,6 +59,13 @@ void RobotNode::receive_graph(const bus::Envelope& envelope, Timestamp now, Step
     if (heard.age() < agent_.map_age()) agent_.forget_map_age();
     mapped_age_ = {};
   }
+  if (goes_on_behind(heard)) {
+    step.tell(now, MessageRefused{envelope.from, envelope.kind,
+                                  fmt::format("the map of revision {}, heard before: the server goes on from {}",
+                                              agent_.map_age().second, heard.revision)});
+    agent_.forget_map_age();
+    mapped_age_ = {};
+  }
   if (heard.age() >= mapped_age_) {
     mapped_age_ = heard.age();
     const auto own = nodes_of(heard, agent_.chain());
@@ -68,6 +77,21 @@ void RobotNode::receive_graph(const bus::Envelope& envelope, Timestamp now, Step
   step.tell(now, RobotUpdated{agent_.robot(), agent_.receive(**graph, observer_)});
   note(std::get<RobotUpdated>(step.events.back().what).summary);
   updated_ = now;
+}
+
+/// One graph in the server's name, with a revision that it will never have, would be the last that this robot believes.
+/// What is only late comes once, and the newest of a kind last.
+bool RobotNode::goes_on_behind(const ProxyGraph& heard) {
+  constexpr unsigned kGoesOn = 3;
+  if (heard.age() >= agent_.map_age()) {
+    older_ = 0;
+    return false;
+  }
+  if (older_ > 0 && heard.age() <= older_age_) return false;
+  older_age_ = heard.age();
+  if (++older_ < kGoesOn) return false;
+  older_ = 0;
+  return true;
 }
 
 bool RobotNode::is_whole_in_map() const {

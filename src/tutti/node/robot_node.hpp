@@ -140,6 +140,8 @@ class RobotNode {
   void note(const robot::UpdateSummary& summary);
   void receive_receipt(const bus::Envelope& envelope, Timestamp now, Step& step);
   /// Sends submaps again that a server which has started anew does not name.
+  /// Whether graphs go on and on behind a newer one of the same incarnation, which cannot be: it was nobody's.
+  bool goes_on_behind(const ProxyGraph& heard);
   void note_start(const Receipt& receipt, Timestamp now, Step& step);
   void archive(SubmapId id, Step& step);
   void remember_incarnations(Step& step) const;
@@ -181,6 +183,8 @@ class RobotNode {
   bool finished_ = false;
   std::optional<Timestamp> updated_;
   std::pair<std::uint64_t, std::uint64_t> mapped_age_;  // ProxyGraph::age() of the newest graph since the start,
+  std::pair<std::uint64_t, std::uint64_t> older_age_;   // of the newest of those that came behind a newer one,
+  unsigned older_ = 0;                                  // and how many these are, each newer than the one before
   Timestamp mapped_until_ = kFirstTimestamp;            // and the stamp of the last own node in it
   std::uint64_t alerts_ = 0;                            // of the last update
   std::optional<std::string> conflict_;

@@ -398,6 +398,27 @@ TEST_F(RobotNodeTest, AnotherRobotsStoreOrADamagedOneIsRefused) {
   EXPECT_FALSE(RobotNode::open(kRobot, 1, config_, damaged).has_value());
 }
 
+/// On a bus without rights anybody may send a graph in the server's name.
+TEST_F(RobotNodeTest, AForgedRevisionIsNotTheLastThatIsBelieved) {
+  walk(0, 130);
+  hear(5);
+  hear(20'931);
+  EXPECT_EQ(node_->agent().state().revision, 20'931U);
+  for (const std::uint64_t late : {5U, 5U, 4U}) {  // what comes again, or late, proves nothing
+    EXPECT_TRUE(hear(late).events.empty());
+  }
+  EXPECT_TRUE(hear(6).events.empty());
+  const Step step = hear(7);
+  ASSERT_EQ(step.events.size(), 2U);
+  const auto* told = std::get_if<MessageRefused>(&step.events[0].what);
+  ASSERT_NE(told, nullptr);
+  EXPECT_NE(told->why.find("20931"), std::string::npos) << told->why;
+  EXPECT_EQ(node_->agent().state().revision, 7U);
+  EXPECT_EQ(hear(8).events.size(), 1U);
+  restart();
+  EXPECT_EQ(node_->agent().state().revision, 8U);
+}
+
 TEST_F(RobotNodeTest, ADeltaIsHeardAsSoonAsItsBaseIsThere) {
   walk(0, 130);
   const std::string first = wire::encode(graph(1));
