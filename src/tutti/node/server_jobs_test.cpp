@@ -10,6 +10,7 @@
 
 #include "support/node/stored_server.hpp"
 #include "tutti/node/server_node.hpp"
+#include "tutti/node/status_envelope.hpp"
 #include "tutti/node/worker_node.hpp"
 #include "tutti/storage/memory_store.hpp"
 
@@ -179,6 +180,32 @@ TEST_F(StrangeAnswers, ToAJobThatIsAnsweredAreDropped) {
   EXPECT_TRUE(say(refusal_of(job.id)).writes.empty());
   EXPECT_TRUE(has_closure());
   EXPECT_EQ(store_->tables(), before);
+}
+
+/// What members have said, said again 10,000 times by somebody who has their credential and their disk.
+TEST_F(StrangeAnswers, ReplaysChangeNothing) {
+  const Job job = ask();
+  WorkerNode worker(Endpoint::worker(0), finder_, SubmapFrames::of(*store_));
+  const bus::Envelope asked{Endpoint::server(), Endpoint::any_worker(), MessageKind::job, job.id,
+                            std::make_shared<const std::string>(wire::encode(job))};
+  const auto verdicts = worker.receive(asked, now_).messages;
+  ASSERT_EQ(verdicts.size(), 1U);
+  NodeStatus alpha{.name = "alpha", .version = "0"};
+  alpha.session = 7;
+  const std::vector<bus::Envelope> all{verdicts[0], test::envelope(test::submap(kAlpha, 0)),
+                                       to_server(Endpoint::of(RobotId{0}), alpha)};
+  for (const bus::Envelope& message : all) receive(message);
+  const auto before = store_->tables();
+  const auto state = node_->map_server().state().verdicts;
+  const std::uint64_t jobs = node_->mission_status(now_).pending_jobs;
+  ASSERT_TRUE(has_closure());
+  for (int i = 0; i < 10'000; ++i)
+    for (const bus::Envelope& message : all) receive(message);
+  EXPECT_EQ(store_->tables(), before);
+  EXPECT_EQ(node_->map_server().state().verdicts, state);
+  EXPECT_EQ(node_->mission_status(now_).pending_jobs, jobs);
+  receive(test::submap(kAlpha, 1));
+  EXPECT_EQ(store_->tables().at("submaps").size(), 3U) << "it goes on";
 }
 
 TEST_F(StrangeAnswers, ToAJobOfAnotherStartOrOfNoneAreDropped) {

@@ -13,6 +13,7 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -191,7 +192,7 @@ TEST_F(Intruders, AViewerDoesNotDecideAndAnOperatorOnlyUnderOneName) {
 TEST_F(Intruders, WhatIsReplayedArrivesOnce) {
   const auto connection = connect(alpha_);
   const bus::Envelope submap{Endpoint::of(RobotId{3}), Endpoint::server(), MessageKind::submap, "3/1/1", bytes("own")};
-  for (int i = 0; i < 200; ++i)
+  for (int i = 0; i < 10'000; ++i)
     ASSERT_TRUE(connection->publish(bus::subject_of("cave", submap), "", to_string(bus::whole_part(submap)), "own"));
   connection->flush();
   EXPECT_EQ(heard(*hub_, 1).size(), 1U);
@@ -241,6 +242,24 @@ TEST_F(Intruders, WhatTheBusAnswersIsNobodysWord) {
   const auto base = connect(credentials("server"));
   for (const char* stream : {"SUBMAPS_cave", "VERDICTS_cave", "JOBS_cave", "KV_GRAPH_cave"})
     EXPECT_TRUE(base->has_stream(stream).value()) << stream;
+}
+
+/// Fifty who begin TLS, a byte now and then: the bus gives all of a handshake two seconds.
+TEST_F(Intruders, WhoSpeaksSlowlyHoldsUpNobody) {
+  std::string hello("\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03", 11);
+  hello.resize(512, 'x');
+  std::vector<std::unique_ptr<Stranger>> slow;
+  for (int i = 0; i < 50; ++i) slow.push_back(std::make_unique<Stranger>(port()));
+  std::size_t at = 0;
+  EXPECT_TRUE(within(30.0, [&] {
+    std::erase_if(slow, [&](const auto& one) { return !one->say(hello.substr(at, 1)) || one->is_closed(); });
+    at = std::min(at + 1, hello.size() - 2);
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    return slow.empty();
+  })) << slow.size();
+  EXPECT_LT(at, hello.size() - 2) << "nobody had come to the end of the greeting";
+  expect_all_is_well();
+  EXPECT_EQ(robot_->state().reconnects, 0U);
 }
 
 /// 10 MB of garbage, and 500 who say nothing, before and after the bus's first line: it closes them all in time.
