@@ -140,6 +140,27 @@ TEST_F(FeedServerTest, SilentConnectionsDoNotKeepTheFeederOut) {
   for (const int file : {one, two, three, again}) close(file);
 }
 
+/// Slow ones that never get to the end of their Hello, and more of them all the time.
+TEST_F(FeedServerTest, WhoSpeaksAByteAtATimeKeepsNobodyOut) {
+  const std::string hello = test::hello();
+  std::vector<int> slow;
+  for (int i = 0; i < 3; ++i) {
+    slow.push_back(connect());
+    server_->serve(0);
+  }
+  const int feeder = connect();
+  EXPECT_EQ(say(feeder, hello + sample(0)).size(), 3U);
+  for (int i = 1; i < 60; ++i) {
+    const char& next = hello[static_cast<std::size_t>(i) % (hello.size() - 1)];
+    for (const int file : slow) static_cast<void>(send(file, &next, 1, MSG_NOSIGNAL));
+    slow.push_back(connect());
+    EXPECT_EQ(say(feeder, sample(i)).size(), 1U) << i;
+    EXPECT_LE(server_->clients(), 3U);
+  }
+  for (const int file : slow) close(file);
+  close(feeder);
+}
+
 TEST_F(FeedServerTest, TheSocketMayBeAGroups) {
   server_.reset();
   const std::string group = ::getgrgid(::getegid())->gr_name;
