@@ -143,7 +143,7 @@ class Images(WithPrograms):
 
     def test_what_is_not_wanted_is_not_subscribed_and_what_is_missing_is_said(self):
         topics = {"odom", "points", "fix"}
-        self.assertTrue({"camera0/image_raw", "imu"}.isdisjoint(self.node("r1").callbacks))
+        self.assertTrue({"camera0/image_raw", "imu"}.isdisjoint(self.node("r2").callbacks))
         self.start_robot("r1", "nats://127.0.0.1:1")
         node = self.node("r1", images="camera0/image_raw,right/image_raw/compressed", imu="imu")
         self.assertLessEqual(topics | {"camera0/camera_info", "right/camera_info", "imu"}, set(node.callbacks))
