@@ -160,7 +160,7 @@ TEST_F(Ros, NonsenseFromAnotherProcessDoesNoHarm) {
                        return heard.size() == sent.size();
                      }))
       << heard.size() << output_of("play");
-  ros::RosIntake intake({});
+  intake::RosIntake intake({});
   for (std::size_t i = 0; i < sent.size(); ++i) {
     EXPECT_EQ(heard[i].substr(0, sent[i].size()), sent[i]);  // filled up to a multiple of four
     EXPECT_LT(heard[i].size(), sent[i].size() + 4);

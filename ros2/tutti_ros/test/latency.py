@@ -28,6 +28,7 @@ with tempfile.TemporaryDirectory() as folder:
     ros_stub.Node.given = {"socket": f"{folder}/feed", "T_body_lidar": "0 0 0.5 0 0 0 1", "transform_tolerance_s": 0.0,
                            "images": "image" if WITH_IMAGES else "", "imu": "imu" if WITH_IMAGES else ""}
     node, answered = TuttiNode(), {}
+    node.outputs["corrected_pose"].publish = lambda cdr: None  # the stub's would decode it
     node.outputs["/tf"].publish = lambda cdr: answered.setdefault(stamp_ns(cdr, 8), time.perf_counter())
     scan = cloud([(n, 7, [random.uniform(-20.0, 20.0) for _ in range(POINTS)]) for n in "xyz"]
                  + [("t", 6, [i * 1000 for i in range(POINTS)])])
