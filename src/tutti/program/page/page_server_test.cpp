@@ -74,6 +74,9 @@ class PageServer : public ::testing::Test {
   [[nodiscard]] httplib::Client client() const {
     httplib::Client out(url_.substr(0, url_.size() - 1));
     out.enable_server_certificate_verification(false);
+    out.set_read_timeout(120);  // a sanitizer's build on a busy machine
+    out.set_connection_timeout(120);
+    out.set_write_timeout(120);
     return out;
   }
   static httplib::Headers ours(const std::string& cookie = "") {
