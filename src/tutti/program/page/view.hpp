@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "tutti/consistency/explanation.hpp"
+#include "tutti/consistency/robot_node.hpp"
 #include "tutti/mapfile/shown_map.hpp"
 #include "tutti/model/status.hpp"
 #include "tutti/program/page/board.hpp"
@@ -95,6 +96,10 @@ struct DisagreementOf {
 /// "disagreement/NAME": by node and scale, and where it began; `time_of` makes seconds of the robot's stamps.
 Message disagreement_message(const DisagreementOf& of, const consistency::Explanation& found,
                              const std::function<double(Timestamp)>& time_of);
+
+/// A session's representative keyframes as its robot has them (RobotAgent::nodes()), by raw odometry, up to the first
+/// submap that is missing.
+std::vector<consistency::RobotNode> robot_nodes(const server::SubmapSet& submaps, const ChainId& chain);
 
 /// Every session's raw odometry against the last broadcast, and how sure the server is of where each submap is: the
 /// largest standard deviation of its nodes, relative to the rest of its chain. Costs what a robot's comparison does.

@@ -21,10 +21,30 @@ FieldJson number(double value, double digits) {
   return std::isfinite(value) ? FieldJson(std::round(digits * value) / digits) : FieldJson(nullptr);
 }
 
-/// The chain's representative keyframes as its robot has them, up to the first submap that is missing.
-std::vector<consistency::RobotNode> nodes_of(const server::SubmapSet& submaps, const ChainId& chain) {
+/// What one chain's comparison needs, which holds pointers into it.
+struct Comparison {
+  ProxyGraph graph;
+  std::vector<consistency::RobotNode> nodes;
+  std::vector<consistency::NodePair> pairs;
+  std::optional<consistency::DisagreementTest> test;
+
+  Comparison(const mapfile::ShownMap& map, const ChainId& chain)
+      : graph(consistency::without_doubted(consistency::own_part(map.broadcast, chain.robot), chain)),
+        nodes(robot_nodes(map.content.submaps, chain)),
+        pairs(consistency::synchronise(graph, chain, nodes).pairs) {
+    if (pairs.size() >= 2) test.emplace(graph, chain, pairs, std::max<std::uint64_t>(1, map.revision), kConfig);
+  }
+  Comparison(const Comparison&) = delete;
+  Comparison& operator=(const Comparison&) = delete;
+  static inline const consistency::DisagreementConfig kConfig{};
+};
+
+}  // namespace
+
+std::vector<consistency::RobotNode> robot_nodes(const server::SubmapSet& submaps, const ChainId& chain) {
   std::vector<consistency::RobotNode> out;
-  RelativePose since;  // the last representative, by odometry
+  const RelativePose nothing{.T_a_b = {}, .covariance = Matrix6d::Zero()};
+  RelativePose since = nothing;  // the last representative, by odometry
   std::optional<std::uint32_t> last;
   for (auto entry = submaps.lower_bound({chain, 0}); entry != submaps.end() && entry->first.chain == chain; ++entry) {
     const Submap& submap = *entry->second;
@@ -36,33 +56,13 @@ std::vector<consistency::RobotNode> nodes_of(const server::SubmapSet& submaps, c
       out.push_back({.stamp = keyframe.stamp,
                      .T_map_body = keyframe.T_odom_body,
                      .chain_index = keyframe.index,
-                     .odometry = std::exchange(since, {}),
+                     .odometry = std::exchange(since, nothing),
                      .submap = entry->first.index});
     }
     last = submap.keyframes.back().index;
   }
   return out;
 }
-
-/// What one chain's comparison needs, which holds pointers into it.
-struct Comparison {
-  ProxyGraph graph;
-  std::vector<consistency::RobotNode> nodes;
-  std::vector<consistency::NodePair> pairs;
-  std::optional<consistency::DisagreementTest> test;
-
-  Comparison(const mapfile::ShownMap& map, const ChainId& chain)
-      : graph(consistency::without_doubted(consistency::own_part(map.broadcast, chain.robot), chain)),
-        nodes(nodes_of(map.content.submaps, chain)),
-        pairs(consistency::synchronise(graph, chain, nodes).pairs) {
-    if (pairs.size() >= 2) test.emplace(graph, chain, pairs, std::max<std::uint64_t>(1, map.revision), kConfig);
-  }
-  Comparison(const Comparison&) = delete;
-  Comparison& operator=(const Comparison&) = delete;
-  static inline const consistency::DisagreementConfig kConfig{};
-};
-
-}  // namespace
 
 Message disagreement_message(const DisagreementOf& of, const consistency::Explanation& found,
                              const std::function<double(Timestamp)>& time_of) {
