@@ -3,13 +3,9 @@
 # All tracked C++ files are formatted as .clang-format says (clang-format 14, Debian 12's; others format differently), and no
 # comment or item of a page begins with "Of": subject first.
 set -euo pipefail
-cd "$(dirname "${BASH_SOURCE[0]}")/.."
+source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
+cd "$root"
 
-skip() {
-  echo "$1: formatting not checked"
-  echo TUTTI_ALL_SKIPPED # ctest's word for it
-  exit 0
-}
 formatter="$(command -v clang-format-14 || command -v clang-format)" || skip "no clang-format"
 [[ "$("$formatter" --version)" =~ version\ 14\. ]] || skip "$("$formatter" --version) is not version 14"
 git rev-parse --is-inside-work-tree >/dev/null 2>&1 || skip "not a git checkout"

@@ -6,12 +6,6 @@
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
-skip() {
-  echo "web: skipped: $*"
-  echo TUTTI_ALL_SKIPPED # ctest's word for it
-  exit 0
-}
-
 missing=()
 [ "${1-}" = --quick ] || command -v chromium >/dev/null || missing+=(chromium)
 command -v npm >/dev/null || missing+=(nodejs npm)

@@ -12,7 +12,7 @@ namespace tutti::mission {
 void ViewRecorder::take(const mapfile::ShownMap& map, const std::map<SubmapId, double>& sigma_m) {
   const double time_s = map.time - Timestamp{};
   const std::uint64_t before = board_.sequence();
-  page::MapMessages messages = page::map_messages(map, sigma_m);
+  page::MapMessages messages = page::map_messages(map, page::closures_holding(map.content.submaps, map.map), sigma_m);
   board_.put_all("submap/", std::move(messages.submaps), time_s);
   board_.put(std::move(messages.poses));
   board_.put_all("closure/", std::move(messages.closures), time_s);

@@ -341,7 +341,7 @@ void EventLog::write(const node::Event& event) {
 
 void EventLog::write(const Json& line) {
   const std::scoped_lock guard(mutex_);
-  append(line.dump(-1, ' ', false, Json::error_handler_t::replace));
+  append(text_of(line));
 }
 
 void EventLog::say(Level level, const std::string& sentence) {

@@ -17,6 +17,11 @@ namespace tutti {
 
 using FieldJson = nlohmann::ordered_json;
 
+/// In one line; bytes that are no UTF-8 are replaced.
+inline std::string text_of(const FieldJson& json) {
+  return json.dump(-1, ' ', false, FieldJson::error_handler_t::replace);
+}
+
 class FieldJsonWriter {
  public:
   FieldJsonWriter(FieldJson& out, std::optional<Timestamp> now) : out_(out), now_(now) {}

@@ -9,6 +9,7 @@
 #include "tutti/mission/report/geometry.hpp"
 #include "tutti/mission/report/report.hpp"
 #include "tutti/mission/view_recorder.hpp"
+#include "tutti/program/field_json.hpp"
 #include "tutti/program/page/cloud_bytes.hpp"
 #include "tutti/program/page/page_file.hpp"
 #include "tutti/program/page/view.hpp"
@@ -20,7 +21,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kMostSurveyPoints = 200'000;
 
-std::string text_of(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 Json rounded(double value, double digits = 1e4) {
   return std::isfinite(value) ? Json(std::round(digits * value) / digits) : Json(nullptr);
 }

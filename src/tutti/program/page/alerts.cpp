@@ -88,9 +88,20 @@ Alert server_alert(const char* kind, const char* severity, std::string what, std
           .todo = std::move(todo)};
 }
 
-int rank(const Alert& alert) { return alert.severity == "error" ? 0 : alert.severity == "warning" ? 1 : 2; }
+void sort(std::vector<Alert>& alerts) {
+  std::ranges::sort(alerts, {}, [](const Alert& alert) {
+    const int rank = alert.severity == "error" ? 0 : alert.severity == "warning" ? 1 : 2;
+    return std::tuple(rank, alert.since_s, alert.id);
+  });
+}
 
 }  // namespace
+
+std::vector<Alert> joined(std::vector<Alert> alerts, const std::vector<Alert>& more) {
+  alerts.insert(alerts.end(), more.begin(), more.end());
+  sort(alerts);
+  return alerts;
+}
 
 std::vector<Alert> Alerts::dated(std::vector<Alert> found, std::map<std::string, double>& since, double now_s) {
   std::map<std::string, double> next;
@@ -102,7 +113,7 @@ std::vector<Alert> Alerts::dated(std::vector<Alert> found, std::map<std::string,
     next[alert.id] = alert.since_s;
   }
   since = std::move(next);
-  std::ranges::sort(found, {}, [](const Alert& alert) { return std::tuple(rank(alert), alert.since_s, alert.id); });
+  sort(found);
   return found;
 }
 
@@ -122,7 +133,7 @@ std::vector<Alert> Alerts::of_status(const MissionStatus& status) {
   return dated(std::move(out), status_since_, status.time - Timestamp{});
 }
 
-std::vector<Alert> Alerts::of_map(const mapfile::ShownMap& map) {
+std::vector<Alert> Alerts::of_map(const mapfile::ShownMap& map, const std::map<SubmapId, std::size_t>& holding) {
   std::vector<Alert> out;
   const server::ClosureNames names = map.content.closure_names();
   const server::MapComponents components = server::choose_components(map.map);
@@ -147,7 +158,7 @@ std::vector<Alert> Alerts::of_map(const mapfile::ShownMap& map) {
                    .todo = "The map does without it: closures agree with each other against it.",
                    .robot = failed.chain.robot});
   std::set<ChainId> hanging;
-  for (const auto& [submap, closures] : closures_holding(map.content.submaps, map.map))
+  for (const auto& [submap, closures] : holding)
     if (closures == 1 && hanging.insert(submap.chain).second)
       out.push_back({.id = fmt::format("map/{}/hangs", to_string(submap.chain)),
                      .severity = "warning",

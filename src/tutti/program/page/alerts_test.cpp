@@ -84,13 +84,13 @@ TEST(Alerts, AMapTellsWhoIsAlone) {
   shown.map = mapfile::estimate(shown.content);
   shown.time = Timestamp{} + 10.0;
   Alerts alerts;
-  EXPECT_EQ(find(alerts.of_map(shown), "map/0/alone"), nullptr);
+  EXPECT_EQ(find(alerts.of_map(shown, closures_holding(shown.content.submaps, shown.map)), "map/0/alone"), nullptr);
   mapper.walk({RobotId{1}, 5});
   shown.content = mapfile::read(store).value();
   shown.content.verdicts.clear();  // nothing joins them
   shown.content.names = {{RobotId{1}, "bravo"}, {RobotId{0}, "alpha"}};
   shown.map = mapfile::estimate(shown.content);
-  const auto apart = alerts.of_map(shown);
+  const auto apart = alerts.of_map(shown, closures_holding(shown.content.submaps, shown.map));
   const Alert* alone = find(apart, "map/1/alone");
   if (alone == nullptr) alone = find(apart, "map/0/alone");
   ASSERT_NE(alone, nullptr);

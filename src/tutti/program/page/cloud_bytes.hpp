@@ -12,7 +12,4 @@ namespace tutti::page {
 /// finite are left out, and when there are more than `at_most` the rest of that order.
 std::string cloud_bytes(const PointCloud& cloud, std::size_t at_most);
 
-/// So many bytes as text for a page (RFC 4648).
-std::string base64(const std::string& bytes);
-
 }  // namespace tutti::page

@@ -66,14 +66,5 @@ TEST(CloudBytes, LeavesOutWhatIsNoPoint) {
   EXPECT_EQ(read(cloud_bytes({}, 100)).count, 0U);
 }
 
-TEST(Base64, IsThatOfTheStandard) {
-  EXPECT_EQ(base64(""), "");
-  EXPECT_EQ(base64("f"), "Zg==");
-  EXPECT_EQ(base64("fo"), "Zm8=");
-  EXPECT_EQ(base64("foo"), "Zm9v");
-  EXPECT_EQ(base64("foobar"), "Zm9vYmFy");
-  EXPECT_EQ(base64("\xff\xff\xff"), "////");
-}
-
 }  // namespace cloud_bytes_test
 }  // namespace tutti::page

@@ -2,7 +2,7 @@
 #include "tutti/program/page/page_file.hpp"
 
 #include "tutti/base/check.hpp"
-#include "tutti/program/page/cloud_bytes.hpp"
+#include "tutti/program/page/base64.hpp"
 #include "tutti/program/page/internal/page_data.hpp"
 
 namespace tutti::page {

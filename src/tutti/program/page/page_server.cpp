@@ -121,23 +121,16 @@ class PageViewer final : public program::MapViewer {
   }
   void tell(const MissionStatus& status) override {
     const double time_s = status.time - Timestamp{};
-    status_alerts_ = alerts_.of_status(status);
+    const auto alerts = joined(alerts_.of_status(status), map_alerts());
     site_.metrics.tell(status);
     site_.board.put([&](Board& board) {
       board.put(status_message(status));
-      board.put(alerts_message(joined(status_alerts_, map_alerts()), time_s));
+      board.put(alerts_message(alerts, time_s));
     });
   }
   std::vector<program::AskedWord> take_words() override { return site_.words.take(); }
 
  private:
-  static std::vector<Alert> joined(std::vector<Alert> alerts, const std::vector<Alert>& more) {
-    alerts.insert(alerts.end(), more.begin(), more.end());
-    std::ranges::stable_sort(alerts, {}, [](const Alert& alert) {
-      return std::pair(alert.severity == "error" ? 0 : alert.severity == "warning" ? 1 : 2, alert.since_s);
-    });
-    return alerts;
-  }
   std::vector<Alert> map_alerts() {
     const std::scoped_lock lock(mutex_);
     return map_alerts_;
@@ -154,8 +147,9 @@ class PageViewer final : public program::MapViewer {
   void make(const ShownMap& map) {
     const double begin_s = Clock::steady_s(), time_s = map.time - Timestamp{};
     Comparisons comparisons = compare_all(map);
-    MapMessages messages = map_messages(map, comparisons.sigma_m);
-    auto alerts = maps_alerts_.of_map(map);
+    const auto holding = closures_holding(map.content.submaps, map.map);
+    MapMessages messages = map_messages(map, holding, comparisons.sigma_m);
+    auto alerts = maps_alerts_.of_map(map, holding);
     {
       const std::scoped_lock lock(mutex_);
       map_alerts_ = std::move(alerts);
@@ -174,9 +168,8 @@ class PageViewer final : public program::MapViewer {
   std::function<void(Level, const std::string&)> say_;
   std::function<void(const std::string&)> announce_;
   std::unique_ptr<httplib::Server> server_;
-  Alerts alerts_;                     // the server's thread's
-  std::vector<Alert> status_alerts_;  // likewise
-  Alerts maps_alerts_;                // of the thread that makes messages
+  Alerts alerts_;       // the server's thread's
+  Alerts maps_alerts_;  // of the thread that makes messages
   std::atomic<std::uint64_t> shown_ = 0;
   std::atomic<double> not_before_s_ = 0.0;
   std::mutex mutex_;  // of next_ and map_alerts_

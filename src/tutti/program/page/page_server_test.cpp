@@ -16,7 +16,7 @@
 #include "support/pki/sign.hpp"
 #include "tutti/base/file.hpp"
 #include "tutti/pki/pki.hpp"
-#include "tutti/program/page/cloud_bytes.hpp"
+#include "tutti/program/page/base64.hpp"
 #include "tutti/program/page/view.hpp"
 
 namespace tutti::page {

@@ -13,6 +13,8 @@
 #include "tutti/bus/bus_address.hpp"
 #include "tutti/mapfile/why.hpp"
 #include "tutti/program/clock.hpp"
+#include "tutti/program/field_json.hpp"
+#include "tutti/program/page/base64.hpp"
 #include "tutti/program/page/cloud_bytes.hpp"
 #include "tutti/program/page/internal/page_data.hpp"
 #include "tutti/program/page/view.hpp"
@@ -35,11 +37,9 @@ constexpr const char* kPolicy =
 
 void say(Response& response, int status, const std::string& error) {
   response.status = status;
-  response.set_content(Json{{"error", error}}.dump(-1, ' ', false, Json::error_handler_t::replace), kJson);
+  response.set_content(text_of(Json{{"error", error}}), kJson);
 }
-void say(Response& response, const Json& json) {
-  response.set_content(json.dump(-1, ' ', false, Json::error_handler_t::replace), kJson);
-}
+void say(Response& response, const Json& json) { response.set_content(text_of(json), kJson); }
 
 std::string token_of(const Request& request) {
   const std::string cookies = request.get_header_value("Cookie"), name = std::string(kCookie) + "=";
@@ -84,11 +84,10 @@ class Routes {
   }
 
   void login(const Json& body, Response& response) {
-    std::string signature;
-    const std::string text = body.value("signature", "");
-    if (!decode(text, signature)) return say(response, 400, "the signature is no base64");
+    const auto signature = bytes_of_base64(body.value("signature", ""));
+    if (!signature) return say(response, 400, "the signature is no base64");
     const auto token =
-        site_.sign_in.open(body.value("key", ""), body.value("nonce", ""), signature, program::Clock::steady_s());
+        site_.sign_in.open(body.value("key", ""), body.value("nonce", ""), *signature, program::Clock::steady_s());
     if (!token) return say(response, 403, token.error().message);
     response.set_header("Set-Cookie", cookie(*token, site_.is_secure));
     say(response, Json::object());
@@ -306,21 +305,6 @@ class Routes {
     if (!look) return refuse(500, look.error().message);
     out.look = std::move(*look);
     return out;
-  }
-
-  static bool decode(const std::string& text, std::string& out) {
-    unsigned held = 0, bits = 0;
-    for (const char letter : text) {
-      constexpr std::string_view kLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-      if (letter == '=') break;
-      const std::size_t value = kLetters.find(letter);
-      if (value == std::string_view::npos) return false;
-      held = ((held << 6U) | static_cast<unsigned>(value)) & 0xFFFFU;
-      if (bits += 6; bits < 8) continue;
-      bits -= 8;
-      out += static_cast<char>((held >> bits) & 0xFFU);
-    }
-    return true;
   }
 
   Site& site_;

@@ -64,13 +64,15 @@ class Alerts {
  public:
   /// Errors first, the oldest of each first.
   std::vector<Alert> of_status(const MissionStatus& status);
-  std::vector<Alert> of_map(const mapfile::ShownMap& map);
+  std::vector<Alert> of_map(const mapfile::ShownMap& map, const std::map<SubmapId, std::size_t>& holding);
 
  private:
   std::vector<Alert> dated(std::vector<Alert> found, std::map<std::string, double>& since, double now_s);
 
   std::map<std::string, double> status_since_, map_since_;
 };
+/// Both, errors first, the oldest of each first.
+std::vector<Alert> joined(std::vector<Alert> alerts, const std::vector<Alert>& more);
 Message alerts_message(const std::vector<Alert>& alerts, double time_s);
 
 /// `status`, with times as seconds before it.
@@ -82,8 +84,10 @@ struct MapMessages {
   std::vector<Message> closures;  ///< "closure/".
   Message poses;                  ///< Where all submaps are.
 };
-/// `sigma_m`: how sure the server is of each submap (Comparisons); empty: that is not shown.
-MapMessages map_messages(const mapfile::ShownMap& map, const std::map<SubmapId, double>& sigma_m = {});
+/// `holding` is of closures_holding(). `sigma_m`: how sure the server is of each submap (Comparisons); empty: that is
+/// not shown.
+MapMessages map_messages(const mapfile::ShownMap& map, const std::map<SubmapId, std::size_t>& holding,
+                         const std::map<SubmapId, double>& sigma_m = {});
 
 /// Whose raw odometry is compared with the map, and when.
 struct DisagreementOf {

@@ -94,7 +94,7 @@ Message disagreement_message(const DisagreementOf& of, const consistency::Explan
   const FieldJson out{{"robot", of.robot.value},        {"component", of.component},
                       {"disagrees", found.disagrees()}, {"scale_length_m", std::move(lengths)},
                       {"nodes", std::move(nodes)},      {"origins", std::move(origins)}};
-  return {"disagreement/" + of.name, of.time_s, out.dump(-1, ' ', false, FieldJson::error_handler_t::replace)};
+  return {"disagreement/" + of.name, of.time_s, text_of(out)};
 }
 
 Comparisons compare_all(const mapfile::ShownMap& map) {

@@ -31,8 +31,6 @@ FieldJson pose_json(const Pose3& pose) {
   return out;
 }
 
-std::string text_of(const FieldJson& json) { return json.dump(-1, ' ', false, FieldJson::error_handler_t::replace); }
-
 /// A submap as it will always be; where it is changes with the map.
 struct SubmapEntry {
   SubmapId id;
@@ -124,8 +122,8 @@ std::string closure_json(const ShownMap& map, const mapfile::ClosureInfo& info) 
   return text_of(out);
 }
 
-std::string poses_json(const ShownMap& map, const std::map<SubmapId, double>& sigma_m) {
-  const auto holding = closures_holding(map.content.submaps, map.map);
+std::string poses_json(const ShownMap& map, const std::map<SubmapId, std::size_t>& holding,
+                       const std::map<SubmapId, double>& sigma_m) {
   const auto accepted = std::ranges::count_if(map.map.closures, &server::JudgedClosure::accepted);
   FieldJson submaps = FieldJson::object();
   for (const auto& [id, submap] : map.content.submaps) {
@@ -173,7 +171,8 @@ std::string evidence_text(const std::vector<Refusal>& evidence) {
   return text_of(out);
 }
 
-MapMessages map_messages(const ShownMap& map, const std::map<SubmapId, double>& sigma_m) {
+MapMessages map_messages(const ShownMap& map, const std::map<SubmapId, std::size_t>& holding,
+                         const std::map<SubmapId, double>& sigma_m) {
   const double time_s = map.time - Timestamp{};
   const server::ClosureNames names = map.content.closure_names();
   MapMessages out;
@@ -184,7 +183,7 @@ MapMessages map_messages(const ShownMap& map, const std::map<SubmapId, double>& 
   }
   for (const mapfile::ClosureInfo& info : mapfile::closures(map.content, map.map))
     out.closures.push_back({"closure/" + info.name, time_s, closure_json(map, info)});
-  out.poses = {"poses", time_s, poses_json(map, sigma_m)};
+  out.poses = {"poses", time_s, poses_json(map, holding, sigma_m)};
   return out;
 }
 

@@ -35,7 +35,7 @@ class ViewOfAMap : public testing::Test {
     shown_.map = mapfile::estimate(shown_.content);
     shown_.revision = 7;
     shown_.time = Timestamp{} + 42.0;
-    messages_ = map_messages(shown_);
+    messages_ = map_messages(shown_, closures_holding(shown_.content.submaps, shown_.map));
   }
   storage::MemoryStore store_{storage::map_schema()};
   ShownMap shown_;
@@ -96,14 +96,14 @@ TEST_F(ViewOfAMap, HasEveryClosureWithWhyItIsInTheMapOrNot) {
 }
 
 TEST_F(ViewOfAMap, TheSameMapGivesTheSameBytes) {
-  const MapMessages again = map_messages(shown_);
+  const MapMessages again = map_messages(shown_, closures_holding(shown_.content.submaps, shown_.map));
   EXPECT_EQ(again.submaps, messages_.submaps);
   EXPECT_EQ(again.closures, messages_.closures);
   EXPECT_EQ(again.poses, messages_.poses);
 }
 
 TEST(ViewOfNothing, IsNothing) {
-  const MapMessages messages = map_messages({});
+  const MapMessages messages = map_messages({}, {});
   EXPECT_TRUE(messages.submaps.empty());
   EXPECT_TRUE(messages.closures.empty());
   EXPECT_TRUE(json::parse(messages.poses.value).at("submaps").empty());
