@@ -121,7 +121,9 @@ void RobotNode::receive_receipt(const bus::Envelope& envelope, Timestamp now, St
   unread_.erase(envelope.kind);
   if (receipt->robot != agent_.robot())
     return step.tell(now, MessageRefused{envelope.from, envelope.kind, "a receipt for another robot"});
-  if (receipt->incarnation != receipt_incarnation_) note_start(*receipt, now, step);
+  const bool has_started = receipt->incarnation != receipt_incarnation_;
+  if (has_started) note_start(receipt->incarnation, step);
+  take_back(*receipt, has_started, now, step);
   std::vector<SubmapId> known;
   std::set<std::uint64_t> foreign;  // sessions
   for (const auto& [id, bytes] : uplink_.submaps()) {
@@ -139,42 +141,52 @@ void RobotNode::receive_receipt(const bus::Envelope& envelope, Timestamp now, St
     else if (receipt->leaves_unread(id))
       uplink_.park(id);
   }
-  for (const SubmapId id : known) archive(id, step);
+  for (const SubmapId id : known) archive(id, !receipt->contains(id), step);
   note_foreign(foreign, now, step);
   note_conflict(*receipt, now, step);
   send_submaps(now, {}, step);
 }
 
-void RobotNode::note_start(const Receipt& receipt, Timestamp now, Step& step) {
-  receipt_incarnation_ = receipt.incarnation;
+void RobotNode::note_start(std::uint32_t incarnation, Step& step) {
+  receipt_incarnation_ = incarnation;
   remember_incarnations(step);
   uplink_.release();
   hold_foreign();
+}
+
+/// A server that runs on forgets nothing: what it named as stored and names no more, somebody else named in its name.
+/// What it refused it may forget, for its list is bounded, unless it has started again.
+void RobotNode::take_back(const Receipt& receipt, bool has_started, Timestamp now, Step& step) {
   std::vector<SubmapId> forgotten;
-  for (const auto& [id, bytes] : archive_)
-    if (!receipt.contains(id) && !is_refused_as_it_is(id, receipt)) forgotten.push_back(id);
+  for (const auto& [id, bytes] : archive_) {
+    if (receipt.contains(id)) continue;
+    if (has_started ? !is_refused_as_it_is(id, receipt) : !refused_.contains(id)) forgotten.push_back(id);
+  }
   if (forgotten.empty()) return;
   for (const SubmapId id : forgotten) {
     const auto found = archive_.find(id);
     archive_bytes_ -= found->second;
     uplink_.add(id, found->second);
     archive_.erase(found);
+    refused_.erase(id);
     step.writes.push_back({kArchive, key_of(id), std::nullopt});
   }
   step.tell(now, SubmapsForgotten{agent_.robot(), forgotten.size()});
 }
 
 /// The oldest make room for it.
-void RobotNode::archive(SubmapId id, Step& step) {
+void RobotNode::archive(SubmapId id, bool is_refused, Step& step) {
   const std::size_t bytes = uplink_.submaps().at(id);
   uplink_.remove(id);
   archive_.emplace(id, bytes);
   archive_bytes_ += bytes;
-  step.writes.push_back({kArchive, key_of(id), ""});
+  if (is_refused) refused_.insert(id);
+  step.writes.push_back({kArchive, key_of(id), is_refused ? kRefused : ""});
   while (archive_bytes_ > config_.max_archive_bytes) {
     const auto oldest = archive_.begin();
     for (const char* table : {kOutbox, kArchive}) step.writes.push_back({table, key_of(oldest->first), std::nullopt});
     archive_bytes_ -= oldest->second;
+    refused_.erase(oldest->first);
     archive_.erase(oldest);
   }
 }

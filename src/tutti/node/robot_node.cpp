@@ -76,9 +76,10 @@ Status RobotNode::read_outbox() {
   const auto keep = [&](std::string_view key, std::size_t size) {
     if (const auto id = id_of(key)) kept.emplace(*id, size);
   };
-  const auto mark = [&](std::string_view key, std::size_t) {
+  const auto mark = [&](std::string_view key, std::size_t size) {
     const auto id = id_of(key);
     if (auto known = id ? kept.extract(*id) : decltype(kept)::node_type()) {
+      if (size > 0) refused_.insert(*id);
       archive_bytes_ += known.mapped();
       archive_.insert(std::move(known));
     }

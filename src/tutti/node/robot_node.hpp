@@ -139,11 +139,13 @@ class RobotNode {
   [[nodiscard]] std::uint64_t start() const { return std::uint64_t{config_.incarnation} << 32U | starts_; }
   void note(const robot::UpdateSummary& summary);
   void receive_receipt(const bus::Envelope& envelope, Timestamp now, Step& step);
-  /// Sends submaps again that a server which has started anew does not name.
   /// Whether graphs go on and on behind a newer one of the same incarnation, which cannot be: it was nobody's.
   bool goes_on_behind(const ProxyGraph& heard);
-  void note_start(const Receipt& receipt, Timestamp now, Step& step);
-  void archive(SubmapId id, Step& step);
+  /// The server has started again.
+  void note_start(std::uint32_t incarnation, Step& step);
+  /// Submaps of the archive that the server does not have after all are to be sent again.
+  void take_back(const Receipt& receipt, bool has_started, Timestamp now, Step& step);
+  void archive(SubmapId id, bool is_refused, Step& step);
   void remember_incarnations(Step& step) const;
   /// Tells a refused message, and keeps it for status() if this program cannot read its version.
   void refuse(const bus::Envelope& envelope, const Error& error, Timestamp now, Step& step);
@@ -156,6 +158,7 @@ class RobotNode {
   robot::StageObserver observer_;
   Uplink uplink_{config_.uplink};            // of the submaps in the outbox
   std::map<SubmapId, std::size_t> archive_;  // with their sizes
+  std::set<SubmapId> refused_;               // among these
   std::uint64_t archive_bytes_ = 0;
   std::uint32_t graph_incarnation_ = 0;    // in the last graph
   std::uint32_t receipt_incarnation_ = 0;  // in the last receipt

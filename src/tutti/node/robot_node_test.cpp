@@ -168,6 +168,39 @@ TEST_F(RobotNodeTest, WhatAServerHasForgottenGoesAgainAlsoWhenItRefusesGarbageUn
   EXPECT_TRUE(node_->backlog().contains(id));
 }
 
+TEST_F(RobotNodeTest, AForgedReceiptDeletesNothingAndTheNextOfTheServerUndoesIt) {
+  walk(0, 100);
+  std::vector<SubmapId> all;
+  for (const auto& [id, size] : node_->backlog()) all.push_back(id);
+  const std::vector<bus::Envelope> before = std::exchange(sent_, {});
+  confirm(all);  // which the server does not have
+  EXPECT_TRUE(node_->backlog().empty());
+  EXPECT_EQ(rows("outbox"), all.size());
+  restart();
+  EXPECT_TRUE(sent_.empty());
+  confirm({all[0], all[2]});
+  EXPECT_EQ(node_->backlog().size(), all.size() - 2);
+  EXPECT_EQ(rows("archive"), 2U);
+  ASSERT_EQ(sent_.size(), all.size() - 2);
+  EXPECT_EQ(*sent_.back().bytes, *before[1].bytes);
+}
+
+TEST_F(RobotNodeTest, WhatAServerRefusedLongAgoIsNotSentAgainAndAgain) {
+  walk(0, 100);
+  const SubmapId bad = node_->backlog().begin()->first;
+  Receipt receipt{.robot = kRobot, .incarnation = 1, .why_refused = "no good"};
+  receipt.refused[bad.chain.session].insert(bad.index);
+  done(node_->receive(from_server(MessageKind::receipt, wire::encode(receipt)), now_));
+  ASSERT_TRUE(node_->archive().contains(bad));
+  restart();
+  receipt.refused.clear();  // its list is bounded
+  done(node_->receive(from_server(MessageKind::receipt, wire::encode(receipt)), now_));
+  EXPECT_TRUE(node_->archive().contains(bad));
+  receipt.incarnation = 2;  // another server may take it
+  done(node_->receive(from_server(MessageKind::receipt, wire::encode(receipt)), now_));
+  EXPECT_TRUE(node_->backlog().contains(bad));
+}
+
 TEST_F(RobotNodeTest, SaysHowItIs) {
   config_.name = "alpha";
   restart();

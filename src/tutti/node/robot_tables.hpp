@@ -12,7 +12,9 @@ inline constexpr const char* kWhole = "agent";  // the single row that checkpoin
 inline constexpr const char* kAside = "aside/";
 inline constexpr const char* kJournal = "journal";
 inline constexpr const char* kOutbox = "outbox";    // submaps, with their bytes
-inline constexpr const char* kArchive = "archive";  // without bytes: which submaps of the outbox the server has named
+// Which submaps of the outbox the server has named: without bytes those that it has stored
+inline constexpr const char* kArchive = "archive";
+inline constexpr const char* kRefused = "refused";  // in a row of the archive
 inline constexpr const char* kMeta = "meta";
 inline constexpr const char* kRobot = "robot";      // which robot the store belongs to
 inline constexpr const char* kStarts = "starts";    // number of starts on this store
