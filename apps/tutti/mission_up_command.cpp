@@ -91,6 +91,8 @@ void add_mission_command(CLI::App& app, int& exit_code) {
       ->type_name("N")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
+  command->add_flag("--pki", options->has_rights,
+                    "With TLS, and a credential of `tutti pki` for each program (docs/security.md), in OUT/state/pki");
   command->add_option("--view", options->view, "Serve the server's page (tutti server --view)")
       ->type_name("[HOST:]PORT");
   add_program_options(*command, *common);

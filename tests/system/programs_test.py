@@ -202,12 +202,12 @@ class Programs(ProgramsTest):
         self.assertEqual(again.returncode, 1)
         self.assertIn("earlier mission", again.stderr)
 
-    def test_fixes_are_fed_like_the_rest(self):
+    def test_fixes_are_fed_like_the_rest_also_with_rights(self):
         mission = [SOURCE / "missions/apart_fixes.yaml", "--set", "simulation.robots.0.walk.duration_s=240",
                    "--set", "simulation.robots.1.walk.duration_s=240"]
         expected, out = self.path / "run", self.path / "up"
         for words in (("run", *mission, "--out", expected, "--map", self.path / "run.tutti"),
-                      ("mission", "up", *mission, "--out", out, "--rate", "60")):
+                      ("mission", "up", *mission, "--out", out, "--rate", "60", "--pki")):
             done = run(*words)
             self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         self.expect_same_map(out, expected)

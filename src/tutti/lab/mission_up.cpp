@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "tutti/lab/children.hpp"
 #include "tutti/lab/collect_mission.hpp"
 #include "tutti/mission/load_meter.hpp"
+#include "tutti/pki/pki.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::lab {
@@ -25,6 +27,9 @@ using SteadyClock = std::chrono::steady_clock;
 
 constexpr auto kLookAgain = std::chrono::milliseconds(200);
 constexpr auto kServerStarts = std::chrono::seconds(120);
+constexpr const char* kWatcher = "watcher";  // this program, on a bus with rights
+
+std::string worker_name(int number) { return fmt::format("worker{}", number + 1); }
 
 /// The server knows all that is to be known of the robots' submaps, and every robot has heard it: a robot says that it
 /// has finished and that everything is stored only after it was.
@@ -62,7 +67,10 @@ class MissionUp {
   Result<mission::MissionRecord> collect() const;
 
  private:
-  [[nodiscard]] std::vector<std::string> words(const std::string& command, const fs::path& folder, bool replays) const;
+  /// `member`: whose credential it gets, if the bus has rights; empty: nobody's.
+  [[nodiscard]] std::vector<std::string> words(const std::string& command, const std::string& member,
+                                               const fs::path& folder, bool replays) const;
+  Status make_credentials();
   Status start_server(const std::atomic<bool>& stop);
   void tell(const MissionStatus& status) const;
 
@@ -74,12 +82,14 @@ class MissionUp {
   SocketFolder sockets_;
   Children children_;
   std::string bus_;
+  std::optional<pki::Pki> pki_;  // of a bus with rights
   SteadyClock::time_point begin_ = SteadyClock::now();
   double wall_s_ = 0.0;
 };
 
 /// What all programs are told.
-std::vector<std::string> MissionUp::words(const std::string& command, const fs::path& folder, bool replays) const {
+std::vector<std::string> MissionUp::words(const std::string& command, const std::string& member, const fs::path& folder,
+                                          bool replays) const {
   const MissionSource& mission = options_.mission;
   std::vector<std::string> out{options_.program.string(), command, mission.file, "--seed",
                                std::to_string(mission.seed)};
@@ -90,8 +100,25 @@ std::vector<std::string> MissionUp::words(const std::string& command, const fs::
   if (replays) add({"--rate", fmt::format("{}", options_.rate)});
   if (!bus_.empty() && command != "mission") add({"--bus", bus_});
   if (command != "mission") add({"--mission", name_});
+  if (pki_ && !member.empty()) add({"--credentials", pki_->credential(member).string()});
   add({"--end-with-parent", std::to_string(getpid())});
   return out;
+}
+
+Status MissionUp::make_credentials() {
+  if (!options_.has_rights) return {};
+  auto made = pki::Pki::make(state_ / "pki", name_);
+  if (!made) return tl::unexpected(made.error());
+  pki_ = std::move(*made);
+  const auto add = [&](bus::BusRole role, const std::string& name, std::optional<std::uint32_t> number) -> Status {
+    if (const auto added = pki_->add(role, name, number); !added) return tl::unexpected(added.error());
+    return {};
+  };
+  for (std::uint32_t i = 0; i < names_.size(); ++i)
+    if (Status added = add(bus::BusRole::robot, names_[i], i); !added) return added;
+  for (int i = 0; i < options_.workers; ++i)
+    if (Status added = add(bus::BusRole::worker, worker_name(i), {}); !added) return added;
+  return add(bus::BusRole::views, kWatcher, {});
 }
 
 Status MissionUp::start_server(const std::atomic<bool>& stop) {
@@ -101,7 +128,9 @@ Status MissionUp::start_server(const std::atomic<bool>& stop) {
                 state_.string());
   fs::create_directories(state_, error);
   if (error) return fail(ErrorCode::io, "{}: cannot be made: {}", state_.string(), error.message());
-  auto server = words("server", state_ / "server", true);
+  if (Status made = make_credentials(); !made) return made;
+  auto server = words("server", "", state_ / "server", true);
+  if (pki_) server.insert(server.end(), {"--pki", (state_ / "pki").string()});
   server.insert(server.end(), {"--threads", std::to_string(options_.workers > 0 ? 0 : options_.threads)});
   if (!options_.view.empty()) server.insert(server.end(), {"--view", options_.view});
   const fs::path output = state_ / "server.out";
@@ -127,17 +156,17 @@ Status MissionUp::start(const std::atomic<bool>& stop) {
   if (sockets_.path.empty()) return fail(ErrorCode::io, "no folder for sockets can be made");
   if (Status started = start_server(stop); !started) return started;
   for (int i = 0; i < options_.workers; ++i) {
-    auto worker = words("worker", {}, false);
+    const std::string name = worker_name(i);
+    auto worker = words("worker", name, {}, false);
     worker.insert(worker.end(), {"--threads", std::to_string(options_.threads)});
-    const std::string name = fmt::format("worker{}", i + 1);
     if (Status started = children_.start(name, worker, state_ / (name + ".out")); !started) return started;
   }
   for (const std::string& name : names_) {
     const std::string feed = (sockets_.path / name).string();
-    auto robot = words("robot", state_ / "robots" / name, true);
+    auto robot = words("robot", name, state_ / "robots" / name, true);
     robot.insert(robot.end(), {"--name", name, "--stay", "--session", "0", "--feed", feed});
     if (Status started = children_.start("robot " + name, robot, state_ / (name + ".out")); !started) return started;
-    auto player = words("mission", {}, true);
+    auto player = words("mission", "", {}, true);
     player.insert(player.begin() + 2, "play");
     player.insert(player.end(), {"--name", name, "--feed", feed, "--scores", (state_ / "players" / name).string()});
     const fs::path output = state_ / (name + "_player.out");
@@ -147,8 +176,16 @@ Status MissionUp::start(const std::atomic<bool>& stop) {
 }
 
 Status MissionUp::watch(const std::atomic<bool>& stop) {
-  const auto port =
-      bus::open_port(bus::Endpoint::viewer(static_cast<std::uint32_t>(getpid())), {.url = bus_, .mission = name_});
+  bus::BusOptions on_bus{.url = bus_, .mission = name_};
+  const auto watcher = bus::Endpoint::viewer(static_cast<std::uint32_t>(getpid()));
+  if (pki_) {
+    const auto text = read_file(pki_->credential(kWatcher).string());
+    if (!text) return tl::unexpected(text.error());
+    auto credentials = bus::parse_credentials(*text);
+    if (!credentials) return tl::unexpected(credentials.error());
+    on_bus.credentials = std::move(*credentials);
+  }
+  const auto port = bus::open_port(watcher, on_bus);
   if (!port) return tl::unexpected(port.error());
   while (true) {
     for (const bus::Received& message : (*port)->receive()) {
@@ -183,7 +220,7 @@ void MissionUp::end() {
   for (const std::string& name : names_) players.push_back("player " + name);
   children_.stop(players);
   for (const std::string& name : names_) others.push_back("robot " + name);
-  for (int i = 0; i < options_.workers; ++i) others.push_back(fmt::format("worker{}", i + 1));
+  for (int i = 0; i < options_.workers; ++i) others.push_back(worker_name(i));
   children_.stop(others);
   children_.stop_all();
 }
@@ -192,8 +229,9 @@ Result<mission::MissionRecord> MissionUp::collect() const {
   auto record = collect_mission(config_, options_.mission, state_, options_.version);
   if (!record) return record;
   record->notes.push_back(
-      fmt::format("Run as {} programs on one machine, which talked over NATS, at {:g} times real time.",
-                  1 + names_.size() + static_cast<std::size_t>(options_.workers), options_.rate));
+      fmt::format("Run as {} programs on one machine, which talked over NATS{}, at {:g} times real time.",
+                  1 + names_.size() + static_cast<std::size_t>(options_.workers),
+                  options_.has_rights ? " with TLS and rights" : "", options_.rate));
   record->timing.machine = mission::machine_description();
   record->timing.wall_s = wall_s_;
   record->timing.rate = options_.rate;

@@ -18,9 +18,10 @@ struct MissionUpOptions {
   MissionSource mission;
   std::filesystem::path out;  ///< State and output of the programs go to OUT/state, which must not exist yet.
   double rate = 1.0;
-  int workers = 0;   ///< 0: the server verifies closures itself.
-  int threads = 1;   ///< The server's, without workers, and each worker's.
-  std::string view;  ///< Where the server serves its page ("[HOST:]PORT"); empty: nowhere.
+  int workers = 0;          ///< 0: the server verifies closures itself.
+  int threads = 1;          ///< The server's, without workers, and each worker's.
+  std::string view;         ///< Where the server serves its page ("[HOST:]PORT"); empty: nowhere.
+  bool has_rights = false;  ///< With TLS and a credential for each program, made by `tutti pki` in OUT/state/pki.
   std::string version;
   std::function<void(const std::string&)> progress;  ///< Called with one line, about twice a second.
 };
