@@ -17,9 +17,6 @@ namespace {
 
 using spectral::SparseMatrix;
 
-/// Relative. Both banks share the value, so its error cancels but for a shift of the bands by as much.
-constexpr double kLambdaTolerance = 1e-8;
-
 SparseMatrix proximity_laplacian(const std::vector<Eigen::Vector3d>& positions, const ProxyGraph& rule) {
   const SparseMatrix A = spectral::proximity_adjacency(positions, rule.radius_m, rule.sigma_m);  // eq. (1)
   return spectral::laplacian(A);                                                                 // eq. (2)
@@ -53,28 +50,27 @@ SparseMatrix reduced_laplacian(const ProxyGraph& graph, std::span<const RobotNod
 }
 
 /// W(n, s * d + c) = psi_{s,n}^T f_c, eq. (7) and below.
-Eigen::MatrixXd transform(const SparseMatrix& L, const spectral::MeyerFilterBank& bank, const Eigen::MatrixXd& f,
-                          const CompareConfig& config, int& order) {
-  if (config.exact) return spectral::exact_transform(spectral::dense_spectrum(L), bank, f);
+Eigen::MatrixXd transform(const GraphSignal& of, const spectral::MeyerFilterBank& bank, const CompareConfig& config,
+                          int& order) {
+  if (config.exact) return spectral::exact_transform(spectral::dense_spectrum(of.laplacian), bank, of.signal);
   // Half of the tolerance for either side, spread over the columns that eq. (8) sums in squares.
-  const double tolerance = config.tolerance_m / (2.0 * std::sqrt(static_cast<double>(f.cols())));
-  auto result = spectral::chebyshev_transform(L, bank, f, {.tolerance = tolerance});
+  const double tolerance = config.tolerance_m / (2.0 * std::sqrt(static_cast<double>(of.signal.cols())));
+  auto result = spectral::chebyshev_transform(of.laplacian, bank, of.signal,
+                                              {.tolerance = tolerance, .largest_eigenvalue = of.largest_eigenvalue});
   order = std::max(order, result.order);
   return std::move(result.coefficients);
 }
 
 }  // namespace
 
-Eigen::MatrixXd disagreement(const SparseMatrix& L_server, const Eigen::MatrixXd& f_server, const SparseMatrix& L_robot,
-                             const Eigen::MatrixXd& f_robot, double lambda_max, const CompareConfig& config,
+Eigen::MatrixXd disagreement(const GraphSignal& server, const GraphSignal& robot, const CompareConfig& config,
                              int& order) {
-  const spectral::MeyerFilterBank bank(config.scales, lambda_max);
+  const spectral::MeyerFilterBank bank(config.scales, std::max(server.largest_eigenvalue, robot.largest_eigenvalue));
   order = 0;
-  const Eigen::MatrixXd difference =
-      transform(L_server, bank, f_server, config, order) - transform(L_robot, bank, f_robot, config, order);
+  const Eigen::MatrixXd difference = transform(server, bank, config, order) - transform(robot, bank, config, order);
   Eigen::MatrixXd d(difference.rows(), config.scales);
   for (int s = 0; s < config.scales; ++s)
-    d.col(s) = difference.middleCols(s * f_server.cols(), f_server.cols()).rowwise().norm();  // eq. (8)
+    d.col(s) = difference.middleCols(s * server.signal.cols(), server.signal.cols()).rowwise().norm();  // eq. (8)
   return d;
 }
 
@@ -103,10 +99,14 @@ Comparison compare(const ProxyGraph& graph, const ChainId& chain, std::span<cons
     L_server = proximity_laplacian(positions_server, graph);
     L_robot = proximity_laplacian(positions_robot, graph);
   }
-  out.lambda_max = std::max(spectral::largest_eigenvalue(L_server, kLambdaTolerance),
-                            spectral::largest_eigenvalue(L_robot, kLambdaTolerance));
-  out.disagreement = disagreement(L_server, evaluate_signal(config.signal, poses_server), L_robot,
-                                  evaluate_signal(config.signal, poses_robot), out.lambda_max, config, out.order);
+  const auto largest = [](const SparseMatrix& L) {
+    return spectral::largest_eigenvalue(L, spectral::kLargestEigenvalueTolerance);
+  };
+  const Eigen::MatrixXd f_server = evaluate_signal(config.signal, poses_server),
+                        f_robot = evaluate_signal(config.signal, poses_robot);
+  const GraphSignal server{L_server, f_server, largest(L_server)}, robot{L_robot, f_robot, largest(L_robot)};
+  out.lambda_max = std::max(server.largest_eigenvalue, robot.largest_eigenvalue);
+  out.disagreement = disagreement(server, robot, config, out.order);
   return out;
 }
 

@@ -59,11 +59,15 @@ struct Comparison {
 Comparison compare(const ProxyGraph& graph, const ChainId& chain, std::span<const RobotNode> nodes,
                    const CompareConfig& config);
 
-/// The core of compare(): two graphs over the same n nodes (Laplacians, n x n), each with a signal (n x d) -> d^s, n x
-/// scales. `lambda_max` must be at least the largest eigenvalue of either graph, and 0 when neither has an edge.
-/// `order` is set to the polynomial order.
-Eigen::MatrixXd disagreement(const Eigen::SparseMatrix<double>& L_server, const Eigen::MatrixXd& f_server,
-                             const Eigen::SparseMatrix<double>& L_robot, const Eigen::MatrixXd& f_robot,
-                             double lambda_max, const CompareConfig& config, int& order);
+/// A graph over n nodes with a signal.
+struct GraphSignal {
+  const Eigen::SparseMatrix<double>& laplacian;  ///< n x n
+  const Eigen::MatrixXd& signal;                 ///< n x d
+  double largest_eigenvalue = 0.0;               ///< As spectral::ChebyshevConfig has it; 0 when the graph has no edge.
+};
+
+/// The core of compare(): two graphs over the same n nodes -> d^s, n x scales. `order` is set to the polynomial order.
+Eigen::MatrixXd disagreement(const GraphSignal& server, const GraphSignal& robot, const CompareConfig& config,
+                             int& order);
 
 }  // namespace tutti::consistency

@@ -166,15 +166,15 @@ TEST(Disagreement, SortsDifferencesByScale) {
   for (const Pose3& pose : test::corridor(200)) positions.push_back(pose.translation);
   const auto L = spectral::laplacian(spectral::proximity_adjacency(positions, 7.0, 1.0));
   const double lambda_max = spectral::largest_eigenvalue(L);
-  const Eigen::VectorXd f = Eigen::VectorXd::LinSpaced(200, 0.0, 199.0);
-  Eigen::VectorXd kink = f, drift = f;
-  kink[90] += 0.3;
-  for (Eigen::Index n = 0; n < 200; ++n) drift[n] += 0.3 * std::sin(static_cast<double>(n) / 40.0);
+  const Eigen::MatrixXd f = Eigen::VectorXd::LinSpaced(200, 0.0, 199.0);
+  Eigen::MatrixXd kink = f, drift = f;
+  kink(90, 0) += 0.3;
+  for (Eigen::Index n = 0; n < 200; ++n) drift(n, 0) += 0.3 * std::sin(static_cast<double>(n) / 40.0);
   Comparison comparison;
-  comparison.disagreement = disagreement(L, f, L, kink, lambda_max, {}, comparison.order);
+  comparison.disagreement = disagreement({L, f, lambda_max}, {L, kink, lambda_max}, {}, comparison.order);
   EXPECT_GT(groups(comparison, 90)(2), 5.0 * groups(comparison, 90)(0));
   EXPECT_GT(groups(comparison, 90)(2), 10.0 * groups(comparison, 80)(2));
-  comparison.disagreement = disagreement(L, f, L, drift, lambda_max, {}, comparison.order);
+  comparison.disagreement = disagreement({L, f, lambda_max}, {L, drift, lambda_max}, {}, comparison.order);
   for (const Eigen::Index n : {50, 60, 70}) {
     EXPECT_GT(groups(comparison, n)(0), 5.0 * groups(comparison, n)(1));
     EXPECT_GT(groups(comparison, n)(0), 20.0 * groups(comparison, n)(2));
@@ -186,7 +186,7 @@ TEST(Disagreement, OfTwoNodesByHand) {
   const std::vector<spectral::WeightedEdge> edges{{0, 1, 0.7}};
   const auto L = spectral::laplacian(spectral::adjacency_from_edges(2, edges));
   int order = -1;
-  const auto d = disagreement(L, Eigen::Vector2d(0, 3), L, Eigen::Vector2d(0, 1), 1.4, {.exact = true}, order);
+  const auto d = disagreement({L, Eigen::Vector2d(0, 3), 1.4}, {L, Eigen::Vector2d(0, 1), 1.4}, {.exact = true}, order);
   Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(2, 7);
   expected.col(0).setOnes();
   expected.col(6).setOnes();
@@ -199,7 +199,7 @@ TEST(Disagreement, SumsTheColumnsOfASignalInSquares) {
   const auto L = spectral::laplacian(spectral::adjacency_from_edges(2, edges));
   const Eigen::MatrixXd f = (Eigen::MatrixXd(2, 2) << 3, 4, 3, 4).finished();
   int order = 0;
-  const auto d = disagreement(L, f, L, Eigen::MatrixXd::Zero(2, 2), 2.0, {.scales = 3}, order);
+  const auto d = disagreement({L, f, 2.0}, {L, Eigen::MatrixXd::Zero(2, 2), 2.0}, {.scales = 3}, order);
   EXPECT_LT((d.col(0) - Eigen::Vector2d(5, 5)).norm(), 1e-9);
 }
 
@@ -217,12 +217,13 @@ TEST(Golden, DisagreementOnOneGraphIsPyGsps) {
     const auto L = spectral::laplacian(spectral::adjacency_from_edges(static_cast<int>(n), edges));
     const auto f = golden["signal_f"].get<std::vector<double>>();
     const auto g = golden["signal_f_perturbed"].get<std::vector<double>>();
-    const Eigen::Map<const Eigen::VectorXd> f_server(f.data(), n), f_robot(g.data(), n);
+    const Eigen::MatrixXd f_server = Eigen::Map<const Eigen::VectorXd>(f.data(), n),
+                          f_robot = Eigen::Map<const Eigen::VectorXd>(g.data(), n);
     for (const int scales : {6, 7}) {
       const auto& expected = golden["meyer"][std::to_string(scales)]["abs_diff"];
       for (const bool exact : {true, false}) {
         int order = 0;
-        const auto d = disagreement(L, f_server, L, f_robot, golden["lmax"].get<double>(),
+        const auto d = disagreement({L, f_server, golden["lmax"]}, {L, f_robot, golden["lmax"]},
                                     {.scales = scales, .tolerance_m = 1e-6, .exact = exact}, order);
         double worst = 0.0;
         for (Eigen::Index i = 0; i < n; ++i)

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <stdexcept>
 
 #include "tutti/base/check.hpp"
 #include "tutti/base/single_thread.hpp"
@@ -89,9 +90,14 @@ ExtremalPair largest_eigenpair(const SparseMatrix& laplacian, double tolerance) 
   const internal::RowBlocks blocks(laplacian);
   Operator product(blocks);
   Spectra::SymEigsSolver<Operator> solver(product, 1, kKrylov);
-  solver.init(start_vector(blocks).data());
-  solver.compute(Spectra::SortRule::LargestAlge, kMaxRestarts, tolerance);
-  ExtremalPair out{.vector = Eigen::VectorXd::Zero(n), .iterations = static_cast<int>(solver.num_operations())};
+  ExtremalPair out{.vector = Eigen::VectorXd::Zero(n)};
+  try {
+    solver.init(start_vector(blocks).data());
+    solver.compute(Spectra::SortRule::LargestAlge, kMaxRestarts, tolerance);
+  } catch (const std::runtime_error&) {  // its own decomposition fails where it breaks down, see below
+    return dense_largest_eigenpair(laplacian);
+  }
+  out.iterations = static_cast<int>(solver.num_operations());
   if (solver.info() == Spectra::CompInfo::Successful) {
     out.value = solver.eigenvalues()[0];
     blocks.from_blocks(solver.eigenvectors(1).col(0), out.vector);

@@ -97,10 +97,11 @@ std::vector<Index> degrees_for(const Expansion& expansion, double norm, double t
 struct Layout {
   internal::RowBlocks blocks;
   double domain;
-  Layout(const SparseMatrix& laplacian, double accuracy)
+  Layout(const SparseMatrix& laplacian, double accuracy, double largest = 0.0)
       : blocks(laplacian),
-        domain(std::min(largest_eigenvalue_bound(laplacian),
-                        (1.0 + 10.0 * accuracy) * largest_eigenvalue(laplacian, accuracy))) {}
+        domain(
+            std::min(largest_eigenvalue_bound(laplacian),
+                     (1.0 + 10.0 * accuracy) * (largest > 0.0 ? largest : largest_eigenvalue(laplacian, accuracy)))) {}
 };
 
 /// g_s(0) f of all signals.
@@ -118,14 +119,14 @@ void add_filtered(const Layout& layout, const Expansion& expansion, std::span<co
   Eigen::VectorXd current = layout.blocks.to_blocks(smoothed.col(c));
   Eigen::VectorXd previous = Eigen::VectorXd::Zero(current.size());
   Eigen::MatrixXd sums = current * expansion.coefficient.row(0);
+  std::vector<internal::RowBlocks::Step> steps;
   auto active = degrees.size();
   for (Index k = 1; k <= degrees.front(); ++k) {
     while (degrees[active - 1] < k) --active;
     const double half = k == 1 ? 0.5 : 1.0;  // T_1 = X T_0, then T_{k+1} = 2 X T_k - T_{k-1}
-    const std::span weights(&expansion.coefficient(k, 0), active);
-    layout.blocks.step(half * 4.0 / layout.domain, half * -2.0, current, previous, weights, sums);
-    std::swap(current, previous);
+    steps.push_back({half * 4.0 / layout.domain, half * -2.0, {&expansion.coefficient(k, 0), active}});
   }
+  layout.blocks.run(steps, current, previous, sums);
   Eigen::VectorXd column(smoothed.rows());
   for (Index s = 0; s < sums.cols(); ++s) {
     layout.blocks.from_blocks(sums.col(s), column);
@@ -157,7 +158,7 @@ ChebyshevResult chebyshev_transform(const SparseMatrix& laplacian, const MeyerFi
   const double norm = smoothed.size() == 0 ? 0.0 : smoothed.colwise().norm().maxCoeff();
   if (norm == 0.0) return result;  // constant on every component
 
-  const Layout layout(laplacian, 1e-9);
+  const Layout layout(laplacian, kLargestEigenvalueTolerance, config.largest_eigenvalue);
   const Index max_degree = config.max_order - 1;  // one product made L f
   Index size = 2048;
   Expansion expansion = expand(bank, layout.domain, size);

@@ -20,9 +20,15 @@ namespace tutti::spectral {
 [[nodiscard]] Eigen::MatrixXd exact_transform(const Spectrum& spectrum, const MeyerFilterBank& bank,
                                               const Eigen::MatrixXd& signals);
 
+/// How well a transform needs to know the largest eigenvalue, relative. Two banks that share the value share its error,
+/// which is but a shift of the bands by as much.
+inline constexpr double kLargestEigenvalueTolerance = 1e-8;
+
 struct ChebyshevConfig {
   double tolerance = 1e-3;  ///< Largest error allowed in any coefficient, in the signal's unit.
   int max_order = 4000;     ///< Limit on the products with the Laplacian per signal.
+  /// The Laplacian's, from largest_eigenvalue() with kLargestEigenvalueTolerance; 0: it is computed.
+  double largest_eigenvalue = 0.0;
 };
 
 struct ChebyshevResult {

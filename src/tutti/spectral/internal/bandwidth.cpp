@@ -2,6 +2,7 @@
 #include "tutti/spectral/internal/bandwidth.hpp"
 
 #include <algorithm>
+#include <optional>
 
 namespace tutti::spectral::internal {
 
@@ -37,6 +38,62 @@ std::vector<int> bandwidth_reducing_order(const SparseMatrix& matrix) {
   }
   std::reverse(order.begin(), order.end());
   return order;
+}
+
+namespace {
+
+/// A group that grows.
+class Group {
+ public:
+  Group(const SparseMatrix& matrix, std::vector<int>& taken)
+      : matrix_(matrix), taken_(taken), is_taken_(static_cast<std::size_t>(matrix.cols())), pull_(is_taken_.size()) {}
+  [[nodiscard]] bool is_taken(int node) const { return is_taken_[static_cast<std::size_t>(node)]; }
+  void take(int node) {
+    is_taken_[static_cast<std::size_t>(node)] = true;
+    taken_.push_back(node);
+    for (SparseMatrix::InnerIterator it(matrix_, node); it; ++it) {
+      const int other = static_cast<int>(it.row());
+      if (other == node || is_taken(other)) continue;
+      double& pull = pull_[static_cast<std::size_t>(other)];
+      if (pull == 0.0) beside_.push_back(other);
+      pull -= it.value();
+    }
+  }
+  /// The node beside the group that is drawn to it most; none when there is none.
+  [[nodiscard]] std::optional<int> next() const {
+    std::optional<int> best;
+    for (const int node : beside_)
+      if (!is_taken(node) && (!best || pull_[static_cast<std::size_t>(node)] > pull_[static_cast<std::size_t>(*best)]))
+        best = node;
+    return best;
+  }
+  void end() {
+    for (const int node : beside_) pull_[static_cast<std::size_t>(node)] = 0.0;
+    beside_.clear();
+  }
+
+ private:
+  const SparseMatrix& matrix_;
+  std::vector<int>& taken_;
+  std::vector<bool> is_taken_;
+  std::vector<double> pull_;  // by node: the weights of its edges into the group
+  std::vector<int> beside_;
+};
+
+}  // namespace
+
+std::vector<int> gather_neighbours(const SparseMatrix& matrix, const std::vector<int>& order, int count) {
+  std::vector<int> out;
+  out.reserve(order.size());
+  Group group(matrix, out);
+  auto left = order.begin();
+  while (out.size() < order.size()) {
+    if (out.size() % static_cast<std::size_t>(count) == 0) group.end();
+    const auto next = group.next();
+    if (!next) left = std::find_if(left, order.end(), [&](int node) { return !group.is_taken(node); });
+    group.take(next ? *next : *left);
+  }
+  return out;
 }
 
 }  // namespace tutti::spectral::internal

@@ -2,6 +2,8 @@
 #include "tutti/spectral/internal/row_blocks.hpp"
 
 #include <algorithm>
+#include <cstdlib>
+#include <utility>
 
 #include "tutti/spectral/internal/bandwidth.hpp"
 
@@ -25,7 +27,8 @@ inline Rows multiply_rows(const int* column, int columns, const double* m, const
 
 }  // namespace
 
-RowBlocks::RowBlocks(const SparseMatrix& matrix) : node_(bandwidth_reducing_order(matrix)) {
+RowBlocks::RowBlocks(const SparseMatrix& matrix)
+    : node_(gather_neighbours(matrix, bandwidth_reducing_order(matrix), kRows)) {
   const int nodes = static_cast<int>(matrix.cols());
   std::vector<int> place(node_.size());
   for (int n = 0; n < nodes; ++n) place[static_cast<std::size_t>(node_[static_cast<std::size_t>(n)])] = n;
@@ -48,6 +51,8 @@ RowBlocks::RowBlocks(const SparseMatrix& matrix) : node_(bandwidth_reducing_orde
         slot.push_back(known);
       }
     }
+    for (int at = start_.back(); at < static_cast<int>(column_.size()); ++at)
+      reach_ = std::max<std::ptrdiff_t>(reach_, std::abs(column_[static_cast<std::size_t>(at)] / kRows - block));
     start_.push_back(static_cast<int>(column_.size()));
   }
   coefficient_.setZero(static_cast<Eigen::Index>(column_.size()) * kRows);
@@ -68,24 +73,62 @@ void RowBlocks::from_blocks(const Eigen::Ref<const Eigen::VectorXd>& blocks, Eig
   for (std::size_t n = 0; n < node_.size(); ++n) nodes[node_[n]] = blocks[static_cast<Eigen::Index>(n)];
 }
 
-void RowBlocks::step(double scale, double shift, const Eigen::VectorXd& x, Eigen::VectorXd& y,
-                     std::span<const double> weights, Eigen::MatrixXd& sums) const {
+void RowBlocks::step_rows(const Step& step, std::ptrdiff_t begin, std::ptrdiff_t end, const double* x, double* y,
+                          Eigen::MatrixXd& sums) const {
   const int* start = start_.data();
-  for (std::size_t block = 0; block + 1 < start_.size(); ++block) {
-    const std::size_t row = block * kRows;
-    auto y_rows = Rows::Map(y.data() + row);
+  for (std::ptrdiff_t block = begin; block < end; ++block) {
+    const std::ptrdiff_t row = block * kRows;
+    auto y_rows = Rows::Map(y + row);
     const Rows product = multiply_rows(column_.data() + start[block], start[block + 1] - start[block],
-                                       coefficient_.data() + std::ptrdiff_t{start[block]} * kRows, x.data());
-    const Rows next = scale * product + (shift * Rows::Map(x.data() + row) - y_rows);
+                                       coefficient_.data() + std::ptrdiff_t{start[block]} * kRows, x);
+    const Rows next = step.scale * product + (step.shift * Rows::Map(x + row) - y_rows);
     y_rows = next;
-    for (std::size_t s = 0; s < weights.size(); ++s)
-      Rows::Map(sums.data() + s * static_cast<std::size_t>(sums.rows()) + row) += weights[s] * next;
+    for (std::size_t s = 0; s < step.weights.size(); ++s)
+      Rows::Map(sums.data() + static_cast<std::ptrdiff_t>(s) * sums.rows() + row) += step.weights[s] * next;
+  }
+}
+
+RowBlocks::Wave RowBlocks::wave(std::size_t cache_bytes) const {
+  const std::size_t blocks = start_.size() - 1;
+  constexpr std::size_t kVectors = 8;  // two, and some sums
+  const std::size_t bytes =
+      column_.size() * (sizeof(int) + kRows * sizeof(double)) + blocks * kVectors * kRows * sizeof(double);
+  Wave out{.rows = static_cast<std::ptrdiff_t>(blocks), .reach = reach_};
+  if (bytes <= cache_bytes) return out;
+  // Half of the cache for the rows, half for those that the steps lie behind each other.
+  const auto held = static_cast<std::ptrdiff_t>(static_cast<double>(cache_bytes) / static_cast<double>(bytes) *
+                                                static_cast<double>(blocks));
+  const std::ptrdiff_t steps = held / 2 / std::max<std::ptrdiff_t>(reach_, 1);
+  if (steps < 2) return out;
+  out.steps = static_cast<std::size_t>(steps);
+  out.rows = held / 2;
+  return out;
+}
+
+void RowBlocks::run(std::span<const Step> steps, Eigen::VectorXd& x, Eigen::VectorXd& y, Eigen::MatrixXd& sums,
+                    std::size_t cache_bytes) const {
+  const auto blocks = static_cast<std::ptrdiff_t>(start_.size()) - 1;
+  const Wave how = wave(cache_bytes);
+  while (!steps.empty()) {
+    const auto now = steps.first(std::min(how.steps, steps.size()));
+    const auto last_behind = static_cast<std::ptrdiff_t>(now.size() - 1) * how.reach;
+    for (std::ptrdiff_t begin = 0; begin < blocks + last_behind; begin += how.rows) {
+      // Step t reads what step t - 1 left up to `reach` blocks further on, and writes where no step needs t - 2.
+      double *from = x.data(), *to = y.data();
+      for (std::size_t t = 0; t < now.size(); ++t, std::swap(from, to)) {
+        const std::ptrdiff_t behind = static_cast<std::ptrdiff_t>(t) * how.reach;
+        step_rows(now[t], std::clamp<std::ptrdiff_t>(begin - behind, 0, blocks),
+                  std::clamp<std::ptrdiff_t>(begin + how.rows - behind, 0, blocks), from, to, sums);
+      }
+    }
+    if (now.size() % 2 == 1) x.swap(y);
+    steps = steps.subspan(now.size());
   }
 }
 
 void RowBlocks::step(double scale, double shift, const Eigen::VectorXd& x, Eigen::VectorXd& y) const {
   Eigen::MatrixXd none;
-  step(scale, shift, x, y, {}, none);
+  step_rows({scale, shift, {}}, 0, static_cast<std::ptrdiff_t>(start_.size()) - 1, x.data(), y.data(), none);
 }
 
 }  // namespace tutti::spectral::internal
