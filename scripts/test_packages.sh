@@ -100,6 +100,29 @@ inside full '
     tutti map export mine.tutti --grid map.yaml
     ls -s mine/report.html mine.mcap map.yaml map.pgm"'
 
+# What docs/security.md tells people to type, in its order, all on one machine.
+say "a base station, two robots and an operator with rights (docs/security.md)"
+typed="$(sed -n '/^## A base station/,/^## The model/p' "$root/docs/security.md" | sed -n '/^```/,/^```/{/^```/d;p}' |
+  sed -e 's/BASE/127.0.0.1/; s/0\.0\.0\.0/127.0.0.1/; s# \([a-z]*\.cred\)# pki/credentials/\1#; s#/var/lib/tutti-##')"
+robot="$(grep '^tutti robot' <<<"$typed")"
+{
+  echo 'set -eu; cd; mkdir rights; cd rights'
+  grep '^tutti pki' <<<"$typed"
+  grep '^tutti server' <<<"$typed" | sed 's/$/ >server.out 2>\&1 \&/'
+  echo 'until grep -q tls:// server.out; do sleep 0.2; done'
+  for name in alpha bravo; do
+    sed "s/alpha/$name/g; s#state robot#state $name#; s/\$/ >$name.out 2>\&1 \&/" <<<"$robot"
+  done
+  status="$(grep '^tutti status' <<<"$typed")"
+  echo "for i in \$(seq 60); do $status >status.out 2>&1 || true; grep -q alpha status.out && grep -q bravo status.out && break; sleep 1; done"
+  echo 'cat status.out; grep -q alpha status.out; grep -q bravo status.out'
+  grep '^tutti map closure' <<<"$typed" | sed 's/$/ >decision.out 2>\&1 || true; cat decision.out/'
+  echo '! tutti status --bus tls://127.0.0.1:4222 --insecure >stranger.out 2>&1; cat stranger.out'
+  echo 'tutti pki revoke bravo; sleep 3; grep "revoked\|bravo" server/log.txt | tail -n 3; kill $(jobs -p); wait || true'
+} >"$work/full/rights.sh"
+cat "$work/full/rights.sh"
+inside full 'su tutti -s /bin/bash /rights.sh'
+
 if [ "$development" = yes ]; then
   say "libtutti-dev"
   began=$SECONDS
