@@ -109,6 +109,26 @@ void BM_compare_two_graphs(benchmark::State& state) {
   state.counters["order"] = comparison.order;
 }
 
+/// One side of a comparison of a large graph, from positions to coefficients. Argument 1: 0 a tunnel, 1 an area that is
+/// crossed in lanes.
+void BM_large_graph(benchmark::State& state) {
+  const int nodes = static_cast<int>(state.range(0));
+  const bool is_area = state.range(1) != 0;
+  const Positions positions = is_area ? testing::area(nodes, Rng(3)) : testing::tunnel(nodes, 0.0, Rng(1));
+  const Eigen::VectorXd signal = testing::distance_signal(positions);
+  ChebyshevResult result;
+  double neighbours = 0.0;
+  for (auto _ : state) {
+    const SparseMatrix L = laplacian(proximity_adjacency(positions, is_area ? 4.0 : kRadius_m, kSigma_m));
+    const double largest = largest_eigenvalue(L, kLargestEigenvalueTolerance);
+    result = chebyshev_transform(L, MeyerFilterBank(kScales, largest), signal,
+                                 {.tolerance = 5e-4, .largest_eigenvalue = largest});
+    neighbours = static_cast<double>(L.nonZeros() - L.rows()) / static_cast<double>(L.rows());
+  }
+  state.counters["neighbours"] = neighbours;
+  state.counters["order"] = result.order;
+}
+
 void BM_select_budget(benchmark::State& state) {
   const Positions positions = server_run(state);
   const SparseMatrix L = graph_of(positions);
@@ -137,6 +157,11 @@ BENCHMARK(BM_chebyshev_transform)
     ->Args({3200, 3})
     ->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_compare_two_graphs)->Arg(1600)->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_large_graph)
+    ->ArgsProduct({{10'000, 100'000}, {0, 1}})
+    ->Args({1'000'000, 0})
+    ->Iterations(1)
+    ->Unit(benchmark::kSecond);
 BENCHMARK(BM_select_budget)->Arg(1600)->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_kron_reduce)->Arg(1600)->Unit(benchmark::kMillisecond);
 
