@@ -11,7 +11,7 @@ inline constexpr const char* kWhole = "agent";  // the single row that checkpoin
 /// Begins the keys of what this or another program could not read: then the session, '/', the table, '/' and the key.
 inline constexpr const char* kAside = "aside/";
 inline constexpr const char* kJournal = "journal";
-inline constexpr const char* kOutbox = "outbox";    // submaps, with their bytes
+inline constexpr const char* kOutbox = "outbox";  // submaps, with their bytes
 // Which submaps of the outbox the server has named: without bytes those that it has stored
 inline constexpr const char* kArchive = "archive";
 inline constexpr const char* kRefused = "refused";  // in a row of the archive
