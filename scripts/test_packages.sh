@@ -118,7 +118,7 @@ robot="$(grep '^tutti robot' <<<"$typed")"
   echo 'cat status.out; grep -q alpha status.out; grep -q bravo status.out'
   grep '^tutti map closure' <<<"$typed" | sed 's/$/ >decision.out 2>\&1 || true; cat decision.out/'
   echo '! tutti status --bus tls://127.0.0.1:4222 --insecure >stranger.out 2>&1; cat stranger.out'
-  echo 'tutti pki revoke bravo; sleep 3; grep "revoked\|bravo" server/log.txt | tail -n 3; kill $(jobs -p); wait || true'
+  echo 'tutti pki revoke bravo; for i in $(seq 60); do grep -q revoked server/log.txt && break; sleep 1; done; grep revoked server/log.txt | tail -n 1; kill $(jobs -p); wait || true'
 } >"$work/full/rights.sh"
 cat "$work/full/rights.sh"
 inside full 'su tutti -s /bin/bash /rights.sh'
