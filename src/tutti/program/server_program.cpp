@@ -19,125 +19,18 @@
 #include "tutti/bus/nats_child.hpp"
 #include "tutti/node/map_meta.hpp"
 #include "tutti/node/server_node.hpp"
-#include "tutti/node/status_envelope.hpp"
 #include "tutti/program/bus_guard.hpp"
 #include "tutti/program/host.hpp"
+#include "tutti/program/hosted_server.hpp"
 #include "tutti/program/incarnation.hpp"
 #include "tutti/program/link_watch.hpp"
 #include "tutti/program/state_folder.hpp"
 #include "tutti/program/stop.hpp"
 #include "tutti/program/worker_program.hpp"
 #include "tutti/storage/sqlite_store.hpp"
-#include "tutti/wire/codec.hpp"
 
 namespace tutti::program {
 namespace {
-
-class HostedServer final : public Hosted {
- public:
-  HostedServer(std::unique_ptr<node::ServerNode> node, std::string version, std::function<std::string()> trouble,
-               const bool& is_over, const std::vector<std::unique_ptr<MapViewer>>& viewers, const Clock& clock)
-      : node_(std::move(node)),
-        version_(std::move(version)),
-        trouble_(std::move(trouble)),
-        is_over_(is_over),
-        viewers_(viewers),
-        clock_(clock) {}
-  Answer start(Timestamp now) override { return {node_->resume(now), {}}; }
-  Answer receive(const bus::Received& message, Timestamp now) override {
-    return {node_->receive(message.envelope, now), {message.ticket}};
-  }
-  Answer put_aside(const bus::Received& message, const std::string& why, Timestamp now) override {
-    return {node_->put_aside(message.envelope, why, now), {message.ticket}};
-  }
-  [[nodiscard]] std::optional<Timestamp> next_work() const override {
-    return asked_.empty() ? node_->next_timer() : kFirstTimestamp;
-  }
-  Answer work(Timestamp now) override {
-    Answer answer;
-    for (AskedWord& word : std::exchange(asked_, {})) take(word, now, answer.step);
-    answer.step.add(node_->on_timer(now));
-    if (node_->changes() != told_changes_) answer.step.messages.push_back(mission_status(now));
-    return answer;
-  }
-  Answer report(Timestamp now) override { return {{.messages = {mission_status(now)}}, {}}; }
-  [[nodiscard]] Json status(Timestamp now) const override;
-  [[nodiscard]] bool finished() const override { return is_over_; }
-  /// Viewers that have time for a new map get it, and what operators decided there is work for the next turn.
-  void wait(double wall_s) override {
-    tend_viewers(clock_.now());
-    Hosted::wait(asked_.empty() ? wall_s : 0.0);
-  }
-
- private:
-  bus::Envelope mission_status(Timestamp now) {
-    told_changes_ = node_->changes();
-    MissionStatus status = node_->mission_status(now);
-    status.version = version_;
-    status.wall_ns = static_cast<std::int64_t>(wall_clock_ns());
-    status.trouble = trouble_();
-    for (const auto& viewer : viewers_) viewer->tell(status);
-    return node::to_viewers(std::move(status));
-  }
-  void tend_viewers(Timestamp now);
-  /// As if it had come by the bus.
-  void take(AskedWord& asked, Timestamp now, node::Step& step);
-
-  std::unique_ptr<node::ServerNode> node_;
-  std::string version_;
-  std::function<std::string()> trouble_;
-  const bool& is_over_;
-  const std::vector<std::unique_ptr<MapViewer>>& viewers_;
-  const Clock& clock_;
-  std::vector<AskedWord> asked_;
-  /// Answers to words whose step is being carried out.
-  std::vector<std::pair<std::promise<std::string>, std::string>> answers_;
-  std::uint64_t told_changes_ = 0;
-  std::uint64_t asked_words_ = 0;  // so many so far
-};
-
-void HostedServer::tend_viewers(Timestamp now) {
-  for (auto& [promise, why] : std::exchange(answers_, {})) promise.set_value(why);
-  std::shared_ptr<const mapfile::ShownMap> shown;
-  for (const auto& viewer : viewers_) {
-    for (AskedWord& word : viewer->take_words()) asked_.push_back(std::move(word));
-    if (!node_->has_map() || !viewer->wants(node_->map_server().state().revision)) continue;
-    if (!shown) shown = std::make_shared<const mapfile::ShownMap>(mapfile::shown_map(*node_, now));
-    viewer->show(shown);
-  }
-}
-
-void HostedServer::take(AskedWord& asked, Timestamp now, node::Step& step) {
-  const bus::Envelope envelope{bus::Endpoint::viewer(0),
-                               bus::Endpoint::server(),
-                               bus::MessageKind::word,
-                               fmt::format("page/{}/{}", asked.word.given_ns, ++asked_words_),
-                               std::make_shared<const std::string>(wire::encode(asked.word)),
-                               asked.proved_name};
-  node::Step taken = node_->receive(envelope, now);
-  std::string why;
-  for (const node::Event& event : taken.events)
-    if (const auto* refused = std::get_if<node::MessageRefused>(&event.what)) why = refused->why;
-  answers_.emplace_back(std::move(asked.answer), std::move(why));
-  step.add(std::move(taken));
-}
-
-Json HostedServer::status(Timestamp now) const {
-  const MissionStatus status = node_->mission_status(now);
-  return {{"program", "server"},
-          {"time_s", now - Timestamp{}},
-          {"revision", status.revision},
-          {"submaps", status.submaps},
-          {"closures", status.closures},
-          {"pending_jobs", status.pending_jobs},
-          {"has_news", status.has_news},
-          {"has_map", node_->has_map()},
-          {"line", fmt::format("map revision {}: {} submaps of {} robots, {} closures, {} maps{}", status.revision,
-                               status.submaps, status.robots.size(), status.closures, status.components,
-                               status.has_news                            ? ", news"
-                               : node_->has_map() || status.revision == 0 ? ""
-                                                                          : ", being computed")}};
-}
 
 /// The server's own worker: on a thread of its own, over a port of its own, with the map's file at hand.
 class OwnWorker {
