@@ -98,6 +98,39 @@ TEST(LevelFrame, HasTheMeanOfTheBodiesZAxesUp) {
   EXPECT_EQ(in_words(level_frame(map, 0)), "T_level_world 0 0 0 0 0 0 1 (x y z, quaternion x y z w)");
 }
 
+/// A body that looks along z, with y down, and turns.
+server::MapEstimate camera_map(const Eigen::Quaterniond& tilt) {
+  server::MapEstimate map;
+  for (std::uint32_t i = 0; i < 4; ++i)
+    map.nodes.push_back(
+        {.id = {{RobotId{0}, 5}, i},
+         .T_world_body = {tilt * Eigen::AngleAxisd(1.5 * i, Eigen::Vector3d::UnitY()), {1.0 * i, 0, 0}}});
+  return map;
+}
+
+TEST(LevelFrame, CamerasHaveTheirYAxesDown) {
+  const Eigen::Quaterniond tilt(Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitX()));
+  const server::MapEstimate map = camera_map(tilt);
+  EXPECT_LT((level_frame(map, 0).rotation * tilt * -Eigen::Vector3d::UnitY() - Eigen::Vector3d::UnitZ()).norm(), 1e-9);
+  const Pose3 upright = upright_frame(map, 0);
+  EXPECT_LT((upright.rotation * Eigen::Vector3d(1.0, 2.0, 3.0) - Eigen::Vector3d(1.0, 3.0, -2.0)).norm(), 1e-9);
+  EXPECT_EQ(upright_frame(camera_map(Eigen::Quaterniond::Identity()), 0).rotation.coeffs(), upright.rotation.coeffs())
+      << "a small change of the map does not turn it";
+}
+
+TEST(LevelFrame, AMapThatStandsIsShownAsItIs) {
+  server::MapEstimate map;
+  for (std::uint32_t i = 0; i < 4; ++i)
+    map.nodes.push_back(
+        {.id = {{RobotId{0}, 5}, i},
+         .T_world_body = {Eigen::Quaterniond(Eigen::AngleAxisd(0.01 * i, Eigen::Vector3d::UnitY())), {}}});
+  EXPECT_EQ(upright_frame(map, 0), Pose3()) << "where nothing turns much, z is believed";
+  for (MapNode& node : map.nodes) node.T_world_body.rotation = Eigen::Quaterniond(0.0, 1.0, 0.0, 0.0);
+  EXPECT_LT((upright_frame(map, 0).rotation * Eigen::Vector3d(1.0, 2.0, 3.0) - Eigen::Vector3d(1.0, -2.0, -3.0)).norm(),
+            1e-9)
+      << "upside down";
+}
+
 /// A small part has a camera on foot and a large one has none: there is something to see.
 TEST_F(Export, WhereTheLargestPartHasNoCloudsTheCloudIsOfAnother) {
   Content content;

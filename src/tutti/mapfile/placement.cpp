@@ -4,11 +4,32 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "tutti/server/map_components.hpp"
 
 namespace tutti::mapfile {
+namespace {
+
+/// The mean of the bodies' axis that is up, shorter than 1 where they tilt. A body's axis that stays where it is while
+/// the body turns is the one that it turns about. That is z, or, where bodies are cameras, y, which points down; where
+/// nothing turns much, z is believed.
+Eigen::Vector3d mean_up(const server::MapEstimate& map, std::uint32_t component) {
+  constexpr double kSteady = 0.8, kClearly = 0.2;
+  Eigen::Vector3d y = Eigen::Vector3d::Zero(), z = Eigen::Vector3d::Zero();
+  double count = 0.0;
+  for (const MapNode& node : map.nodes) {
+    if (node.component != component) continue;
+    y += node.T_world_body.rotation * Eigen::Vector3d::UnitY();
+    z += node.T_world_body.rotation * Eigen::Vector3d::UnitZ();
+    count += 1.0;
+  }
+  const bool is_camera = y.norm() > kSteady * count && y.norm() > z.norm() + kClearly * count;
+  return (is_camera ? Eigen::Vector3d(-y) : z) / std::max(count, 1.0);
+}
+
+}  // namespace
 
 std::optional<Place> place(const Submap& submap, const server::MapEstimate& map) {
   const Keyframe& first = submap.keyframes.front();
@@ -29,10 +50,21 @@ std::uint32_t component_to_show(const Content& content, const server::MapEstimat
 }
 
 Pose3 level_frame(const server::MapEstimate& map, std::uint32_t component) {
-  Eigen::Vector3d up = Eigen::Vector3d::Zero();
-  for (const MapNode& node : map.nodes)
-    if (node.component == component) up += node.T_world_body.rotation * Eigen::Vector3d::UnitZ();
-  return {Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()), Eigen::Vector3d::Zero()};
+  return {Eigen::Quaterniond::FromTwoVectors(mean_up(map, component), Eigen::Vector3d::UnitZ()),
+          Eigen::Vector3d::Zero()};
+}
+
+Pose3 upright_frame(const server::MapEstimate& map, std::uint32_t component) {
+  constexpr double kKnown = 0.8;  // bodies that tilt in all directions do not say what is up
+  const Eigen::Vector3d up = mean_up(map, component);
+  if (up.norm() < kKnown) return {};
+  Eigen::Index axis = 2;
+  up.cwiseAbs().maxCoeff(&axis);
+  const Eigen::Vector3d nearest = std::copysign(1.0, up(axis)) * Eigen::Vector3d::Unit(axis);
+  if (axis == 2)
+    return {nearest.z() > 0.0 ? Eigen::Quaterniond::Identity() : Eigen::Quaterniond(0.0, 1.0, 0.0, 0.0),
+            Eigen::Vector3d::Zero()};
+  return {Eigen::Quaterniond::FromTwoVectors(nearest, Eigen::Vector3d::UnitZ()), Eigen::Vector3d::Zero()};
 }
 
 std::string in_words(const Pose3& T_level_world) {

@@ -22,8 +22,12 @@ std::optional<Place> place(const Submap& submap, const server::MapEstimate& map)
 std::uint32_t component_to_show(const Content& content, const server::MapEstimate& map);
 
 /// T_level_world of a component, whose world has the tilt of the odometry that began it: a rotation about its origin,
-/// after which the mean z axis of its robots' bodies is up. Grids of the map are level, its clouds are in its world.
+/// after which up is z. Up is the mean z axis of its robots' bodies; where these turn about their y axis far more than
+/// about z, they are cameras, and up is against that. Grids of the map are level, its clouds are in its world.
 Pose3 level_frame(const server::MapEstimate& map, std::uint32_t component);
+/// T_upright_world: the rotation by quarter turns that comes nearest to level_frame(), which small changes of the map
+/// do not change; the identity, unless its robots' frames are a camera's or it stands on its side.
+Pose3 upright_frame(const server::MapEstimate& map, std::uint32_t component);
 /// How files in either frame say it, in one line.
 std::string in_words(const Pose3& T_level_world);
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "tutti/mapfile/placement.hpp"
 #include "tutti/program/page/cloud_bytes.hpp"
 #include "tutti/program/page/view.hpp"
 
@@ -21,7 +22,9 @@ void ViewRecorder::take(const mapfile::ShownMap& map, const std::map<SubmapId, d
 
 ViewRecord ViewRecorder::finish(const mapfile::ShownMap& last, const server::PayloadStore& payloads) && {
   take(last, page::compare_all(last).sigma_m);
-  ViewRecord out{.messages = std::move(messages_), .clouds = {}, .T_odom_submap = {}};
+  ViewRecord out{.messages = std::move(messages_), .clouds = {}, .T_odom_submap = {}, .T_upright_world = {}};
+  for (std::uint32_t component = 0; component < last.map.components; ++component)
+    out.T_upright_world[component] = mapfile::upright_frame(last.map, component);
   for (const auto& [id, submap] : last.content.submaps) out.T_odom_submap[id] = submap->keyframes.front().T_odom_body;
   std::size_t with_cloud = 0;
   for (const auto& [id, size] : last.content.payload_sizes) with_cloud += size.points > 0 ? 1 : 0;

@@ -18,6 +18,8 @@ struct ViewRecord {
   std::vector<page::Message> messages;        ///< In the order of time.
   std::map<std::string, std::string> clouds;  ///< page::cloud_bytes(), by the submap's id.
   std::map<SubmapId, Pose3> T_odom_submap;    ///< By raw odometry.
+  /// By component: what the page's poses are in (mapfile::upright_frame()).
+  std::map<std::uint32_t, Pose3> T_upright_world;
 };
 
 /// Collects it while a mission runs, with at most about kMostMaps maps, evenly over the mission.

@@ -25,11 +25,18 @@ Json rounded(double value, double digits = 1e4) {
   return std::isfinite(value) ? Json(std::round(digits * value) / digits) : Json(nullptr);
 }
 
+/// What the page's poses of a component's world are in.
+Pose3 page_from_world(const MissionRecord& record, std::uint32_t component) {
+  if (record.view == nullptr) return {};
+  const auto found = record.view->T_upright_world.find(component);
+  return found == record.view->T_upright_world.end() ? Pose3() : found->second;
+}
+
 /// Where its raw odometry alone puts the robot's submaps: moved as one rigid piece onto the map's frame.
-void add_odometry(const RobotRecord& robot, const Pose3& T_world_odom, const ViewRecord& view, Json& submaps) {
+void add_odometry(const RobotRecord& robot, const Pose3& T_page_odom, const ViewRecord& view, Json& submaps) {
   for (const auto& [id, T_odom_submap] : view.T_odom_submap) {
     if (id.chain.robot != robot.id) continue;
-    submaps[to_string(id)] = Json::parse(page::pose_text(T_world_odom * T_odom_submap));
+    submaps[to_string(id)] = Json::parse(page::pose_text(T_page_odom * T_odom_submap));
   }
 }
 
@@ -60,14 +67,15 @@ void add_trajectory(const Whose& whose, const char* kind, const Points3d& points
 void add_trajectories(const MissionRecord& record, const RobotRecord& robot, Json& odometry,
                       std::vector<page::Message>& out) {
   const RobotGeometry geometry = robot_geometry(record, robot);
-  const Pose3 T_world_display =
-      geometry.has_reference ? display_from_world(record, robot.component).inverse() : Pose3();
+  const Pose3 T_page_world = page_from_world(record, robot.component);
+  const Pose3 T_page_display =
+      geometry.has_reference ? T_page_world * display_from_world(record, robot.component).inverse() : T_page_world;
   const PictureClock clock = mission_clock(robot);
   const auto add = [&](const char* kind, Points3d points, const Trajectory& stamps) {
-    for (Eigen::Vector3d& point : points) point = T_world_display * point;
+    for (Eigen::Vector3d& point : points) point = T_page_display * point;
     add_trajectory({robot.name, robot.id, robot.component, clock, record.duration_s}, kind, points, stamps, out);
   };
-  if (record.view != nullptr) add_odometry(robot, T_world_display * geometry.T_base_odom, *record.view, odometry);
+  if (record.view != nullptr) add_odometry(robot, T_page_display * geometry.T_base_odom, *record.view, odometry);
   const PolicyRecord* const policy = find_policy(robot, record.default_policy);
   add("onboard", geometry.onboard, robot.odometry);
   if (policy != nullptr) add("corrected", geometry.corrected, policy->corrected);
@@ -88,9 +96,10 @@ void add_trajectories(const MissionRecord& record, const RobotRecord& robot, Jso
 void add_survey(const MissionRecord& record, std::vector<page::Message>& out,
                 std::map<std::string, std::string>& clouds) {
   if (record.survey == nullptr || record.survey->points.empty() || !record.server.T_reference_world) return;
-  const Pose3 T_world_reference = record.server.T_reference_world->inverse();
-  const Eigen::Matrix3f R = T_world_reference.rotation.toRotationMatrix().cast<float>();
-  const Eigen::Vector3f t = T_world_reference.translation.cast<float>();
+  const Pose3 T_page_reference =
+      page_from_world(record, record.server.largest_component) * record.server.T_reference_world->inverse();
+  const Eigen::Matrix3f R = T_page_reference.rotation.toRotationMatrix().cast<float>();
+  const Eigen::Vector3f t = T_page_reference.translation.cast<float>();
   PointCloud moved;
   moved.points.reserve(record.survey->points.size());
   for (const Eigen::Vector3f& point : record.survey->points) moved.points.emplace_back(R * point + t);

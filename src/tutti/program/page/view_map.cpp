@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "tutti/mapfile/closures.hpp"
+#include "tutti/mapfile/placement.hpp"
 #include "tutti/program/field_json.hpp"
 #include "tutti/program/page/view.hpp"
 
@@ -125,12 +126,15 @@ std::string closure_json(const ShownMap& map, const mapfile::ClosureInfo& info) 
 std::string poses_json(const ShownMap& map, const std::map<SubmapId, std::size_t>& holding,
                        const std::map<SubmapId, double>& sigma_m) {
   const auto accepted = std::ranges::count_if(map.map.closures, &server::JudgedClosure::accepted);
+  std::map<std::uint32_t, Pose3> upright;
   FieldJson submaps = FieldJson::object();
   for (const auto& [id, submap] : map.content.submaps) {
     const MapNode* const node = first_node(map.map, *submap);
     if (node == nullptr) continue;
     FieldJson& entry = submaps[to_string(id)] = FieldJson::array({node->component});
-    for (const FieldJson& number : pose_json(node->T_world_body)) entry.push_back(number);
+    const auto [T_upright_world, is_new] = upright.try_emplace(node->component);
+    if (is_new) T_upright_world->second = mapfile::upright_frame(map.map, node->component);
+    for (const FieldJson& number : pose_json(T_upright_world->second * node->T_world_body)) entry.push_back(number);
     const auto held = holding.find(id);
     entry.push_back(held == holding.end() ? 0 : held->second);
     if (const auto sigma = sigma_m.find(id); sigma != sigma_m.end()) entry.push_back(rounded(sigma->second));
