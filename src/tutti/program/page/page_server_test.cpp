@@ -12,8 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "support/mapfile/small_map.hpp"
-#include "support/pki/sign.hpp"
+#include "support/program/page/served_page.hpp"
 #include "tutti/base/file.hpp"
 #include "tutti/pki/pki.hpp"
 #include "tutti/program/page/base64.hpp"
@@ -22,114 +21,9 @@
 namespace tutti::page {
 namespace page_server_test {
 
+using served::ask, served::json;
 namespace fs = std::filesystem;
-using nlohmann::json;
-
-/// A page over a small map, and the server's thread, which takes its decisions.
-class PageServer : public ::testing::Test {
- protected:
-  PageServer() {
-    mapfile::test::Mapper mapper({RobotId{0}, RobotId{1}}, store_);
-    mapper.walk({RobotId{0}, 5});
-    mapper.walk({RobotId{1}, 5});
-    auto shown = std::make_shared<mapfile::ShownMap>();
-    shown->content = mapfile::read(store_).value();
-    shown->content.names = {{RobotId{0}, "alpha"}, {RobotId{1}, "bravo"}};
-    shown->map = mapfile::estimate(shown->content);
-    shown->revision = 3;
-    map_ = std::move(shown);
-  }
-  ~PageServer() override {
-    stop_ = true;
-    if (takes_.joinable()) takes_.join();
-    viewer_.reset();
-    fs::remove_all(folder_);
-  }
-  void start(const fs::path& pki = {}) {
-    PageOptions options{.listen = "0", .announce = [this](const std::string& url) { url_ = url; }};
-    auto made = serve_page(options, {.name = "cave",
-                                     .version = "1",
-                                     .map = store_,
-                                     .finder = std::make_shared<mapfile::test::ExplainingFinder>(),
-                                     .pki = pki,
-                                     .say = [](program::Level, const std::string&) {}});
-    ASSERT_TRUE(made.has_value()) << made.error().message;
-    viewer_ = std::move(*made);
-    viewer_->show(map_);
-    viewer_->tell({.time = Timestamp{} + 5.0, .revision = 3});
-    takes_ = std::thread([this] {
-      while (!stop_) {
-        for (program::AskedWord& asked : viewer_->take_words()) {
-          const bool is_known = asked.word.closure != "alpha/0-bravo/999";
-          if (is_known) {
-            const std::scoped_lock lock(mutex_);
-            words_.emplace_back(asked.word, asked.proved_name);
-          }
-          asked.answer.set_value(is_known ? "" : "no such closure");
-        }
-        std::this_thread::sleep_for(std::chrono::milliseconds(5));
-      }
-    });
-  }
-  [[nodiscard]] httplib::Client client() const {
-    httplib::Client out(url_.substr(0, url_.size() - 1));
-    out.enable_server_certificate_verification(false);
-    out.set_read_timeout(120);  // a sanitizer's build on a busy machine
-    out.set_connection_timeout(120);
-    out.set_write_timeout(120);
-    return out;
-  }
-  static httplib::Headers ours(const std::string& cookie = "") {
-    httplib::Headers out{{"X-Tutti", "1"}};
-    if (!cookie.empty()) out.emplace("Cookie", cookie);
-    return out;
-  }
-  /// Everything until "ready", by key.
-  std::map<std::string, json> events(const httplib::Headers& headers = {}) {
-    std::string text;
-    auto http = client();
-    http.Get("/api/events", headers, [&](const char* data, std::size_t size) {
-      text.append(data, size);
-      return text.find("event: ready") == std::string::npos;
-    });
-    std::map<std::string, json> out;
-    std::istringstream lines(text);
-    std::string line;
-    while (std::getline(lines, line))
-      if (line.starts_with("data: {\"key\"")) {
-        const json message = json::parse(line.substr(6));
-        out[message.at("key")] = message.at("value");
-      }
-    return out;
-  }
-  /// Maps are made into messages by a thread of the page's own.
-  std::map<std::string, json> events_with_map(const httplib::Headers& headers = {}) {
-    for (int i = 0; i < 1000; ++i) {
-      auto all = events(headers);
-      if (all.contains("poses")) return all;
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    }
-    ADD_FAILURE() << "no map";
-    return {};
-  }
-  std::string decide(const std::string& closure, const std::string& wish, const httplib::Headers& headers) {
-    auto http = client();
-    const auto answer =
-        http.Post("/api/decide", headers, json{{"closure", closure}, {"wish", wish}, {"by", "mallory"}}.dump(),
-                  "application/json");
-    return answer ? std::to_string(answer->status) : httplib::to_string(answer.error());
-  }
-
-  fs::path folder_ = fs::path(::testing::TempDir()) / ("page_" + std::to_string(getpid()));
-  storage::MemoryStore store_{storage::map_schema()};
-  std::shared_ptr<const mapfile::ShownMap> map_;
-  std::unique_ptr<program::MapViewer> viewer_;
-  std::string url_;
-  std::atomic<bool> stop_ = false;
-  std::mutex mutex_;
-  std::vector<std::pair<ClosureWord, std::string>> words_;
-  std::thread takes_;
-};
+using PageServer = served::ServedPage;
 
 TEST_F(PageServer, ShowsTheMissionToWhoComesLate) {
   start();
@@ -174,12 +68,6 @@ TEST_F(PageServer, ADecisionIsTheServersToTakeOrNot) {
   EXPECT_EQ(words_.front().second, "");
 }
 
-/// What the server answers to a request of ours.
-std::pair<int, json> ask(httplib::Client http, const char* path, const json& body) {
-  const auto answer = http.Post(path, {{"X-Tutti", "1"}}, body.dump(), "application/json");
-  return {answer->status, json::parse(answer->body)};
-}
-
 TEST_F(PageServer, TwoSubmapsAreLookedAtAndAClosureIsAddedByHand) {
   start();
   json closure;
@@ -205,6 +93,42 @@ TEST_F(PageServer, TwoSubmapsAreLookedAtAndAClosureIsAddedByHand) {
   EXPECT_EQ(words_.front().first.wish, Wish::accept);
   EXPECT_EQ(words_.front().first.by, "anna");
   ASSERT_EQ(words_.front().first.by_hand.size(), 1U);
+}
+
+TEST_F(PageServer, TheMapWithAClosureIsShownAndNothingIsStored) {
+  start();
+  json rejected;
+  for (const auto& [key, value] : events_with_map())
+    if (key.starts_with("closure/alpha") && key.find("bravo") != std::string::npos && value.at("state") == "rejected")
+      rejected = value;
+  ASSERT_FALSE(rejected.is_null()) << "every fourth closure is wrong";
+  const auto before = store_.tables();
+  const auto [status, seen] =
+      ask(client(), "/api/register", {{"from", rejected.at("from")}, {"to", rejected.at("to")}});
+  ASSERT_EQ(status, 200) << seen;
+  ASSERT_TRUE(seen.at("look").is_number()) << seen;
+  const auto [changed, answer] = ask(client(), "/api/change", {{"look", seen.at("look")}});
+  ASSERT_EQ(changed, 200) << answer;
+  EXPECT_EQ(answer.at("poses").at("submaps").size(), map_->content.submaps.size());
+  const json now = events().at("poses");
+  EXPECT_NE(answer.at("poses").at("submaps"), now.at("submaps")) << "a wrong closure bends the map";
+  // The server makes the same map when an operator keeps it.
+  mapfile::Content kept = map_->content;
+  ASSERT_TRUE(ask(client(), "/api/closure", {{"from", rejected.at("from")}, {"to", rejected.at("to")}}).first == 200);
+  {
+    const std::scoped_lock lock(mutex_);
+    ASSERT_EQ(words_.size(), 1U);
+    const SubmapPair pair = kept.closure_names().find(words_.front().first.closure).value();
+    kept.words[pair] = with_sessions(words_.front().first, pair);
+  }
+  mapfile::ShownMap with{
+      .revision = map_->revision, .time = {}, .content = kept, .map = mapfile::estimate(kept), .broadcast = {}};
+  EXPECT_EQ(answer.at("poses").at("submaps"), json::parse(poses_text(with)).at("submaps"));
+  EXPECT_EQ(store_.tables(), before);
+  for (const json& bad : {json(0), json(99)}) EXPECT_EQ(ask(client(), "/api/change", {{"look", bad}}).first, 404);
+  EXPECT_EQ(ask(client(), "/api/change", {{"look", "x"}}).first, 400);
+}
+
 }
 
 TEST_F(PageServer, WhatCannotBeLookedAtIsSaid) {
@@ -253,22 +177,7 @@ TEST_F(PageServer, WithCredentialsShowsNothingToStrangersAndLetsOperatorsDecide)
   for (const char* path : {"/api/events", "/api/cloud/0/5/0", "/metrics"})
     EXPECT_EQ(http.Get(path)->status, 401) << path;
   EXPECT_EQ(decide("alpha/0-bravo/1", "reject", ours()), "401");
-  const auto sign_in = [&](const std::string& name) {
-    const auto key = bus::parse_credentials(read_file(pki.credential(name).string()).value())->key;
-    const json me = json::parse(http.Get("/api/me")->body);
-    EXPECT_TRUE(me.at("login"));
-    const std::string nonce = me.at("nonce");
-    const auto answer =
-        http.Post("/api/login", ours(),
-                  json{{"key", key.open}, {"nonce", nonce}, {"signature", base64(test::sign(key.seed, nonce))}}.dump(),
-                  "application/json");
-    EXPECT_EQ(answer->status, 200) << answer->body;
-    const std::string cookie = answer->get_header_value("Set-Cookie");
-    for (const char* part : {"HttpOnly", "SameSite=Strict", "Secure"})
-      EXPECT_NE(cookie.find(part), std::string::npos) << cookie;
-    return cookie.substr(0, cookie.find(';'));
-  };
-  const std::string vera = sign_in("vera"), anna = sign_in("anna");
+  const std::string vera = sign_in(pki, "vera"), anna = sign_in(pki, "anna");
   EXPECT_TRUE(events_with_map({{"Cookie", vera}}).contains("poses"));
   EXPECT_EQ(decide("alpha/0-bravo/1", "reject", ours(vera)), "403");
   EXPECT_EQ(decide("alpha/0-bravo/1", "reject", ours(anna)), "200");

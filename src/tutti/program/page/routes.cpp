@@ -8,24 +8,23 @@
 #include <array>
 #include <atomic>
 #include <charconv>
-#include <nlohmann/json.hpp>
 
+#include "tutti/base/plain_text.hpp"
 #include "tutti/bus/bus_address.hpp"
 #include "tutti/mapfile/why.hpp"
 #include "tutti/program/clock.hpp"
-#include "tutti/program/field_json.hpp"
 #include "tutti/program/page/base64.hpp"
 #include "tutti/program/page/cloud_bytes.hpp"
+#include "tutti/program/page/internal/answers.hpp"
+#include "tutti/program/page/internal/by_hand.hpp"
 #include "tutti/program/page/internal/page_data.hpp"
 #include "tutti/program/page/view.hpp"
 
 namespace tutti::page {
 namespace {
 
-using httplib::Request, httplib::Response;
-using Json = nlohmann::ordered_json;
-
 constexpr const char* kJson = "application/json";
+constexpr std::size_t kLongestName = 64;  // of `tutti pki`
 constexpr const char* kCookie = "tutti_session";
 constexpr int kMostWatchers = 32;
 constexpr std::size_t kMostPoints = 20'000;  // of one submap's cloud
@@ -34,12 +33,6 @@ constexpr auto kAnswer = std::chrono::seconds(10);  // the server's thread may b
 constexpr const char* kPolicy =
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'; img-src data: "
     "blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
-
-void say(Response& response, int status, const std::string& error) {
-  response.status = status;
-  response.set_content(text_of(Json{{"error", error}}), kJson);
-}
-void say(Response& response, const Json& json) { response.set_content(text_of(json), kJson); }
 
 std::string token_of(const Request& request) {
   const std::string cookies = request.get_header_value("Cookie"), name = std::string(kCookie) + "=";
@@ -67,7 +60,8 @@ std::string cookie(const std::string& token, bool is_secure) {
 
 class Routes {
  public:
-  explicit Routes(Site& site) : site_(site) {}
+  explicit Routes(Site& site) : by_hand(site), site_(site) {}
+  ByHand by_hand;
 
   void me(const Request& request, Response& response) {
     const Visitor visitor = who(request);
@@ -149,22 +143,9 @@ class Routes {
     if (give(visitor, body, std::move(word), response)) say(response, Json::object());
   }
 
-  /// Looks at two submaps; nothing is stored.
-  void look(const Json& body, Response& response) {
-    const auto seen = look_at(body, response);
-    if (!seen) return;
-    Json out{{"found", seen->look.best.has_value()},
-             {"why", seen->look.refusal ? to_string(*seen->look.refusal) : "every gate is passed"},
-             {"hint", seen->look.refusal ? mapfile::hint_for(seen->look.refusal->reason) : ""},
-             {"name", seen->name},
-             {"evidence", Json::parse(evidence_text(seen->look.evidence))}};
-    out["T_from_to"] = seen->look.best ? Json::parse(pose_text(asked_order(*seen))) : Json(nullptr);
-    say(response, out);
-  }
-
-  /// Keeps what look() shows as the operator's own closure.
+  /// Keeps what ByHand::look() shows as the operator's own closure.
   void keep(const Visitor& visitor, const Json& body, Response& response) {
-    const auto seen = look_at(body, response);
+    const auto seen = by_hand.look_at(body, response);
     if (!seen) return;
     if (!seen->look.best)
       return say(response, 409,
@@ -258,61 +239,22 @@ class Routes {
   }
 
  private:
-  /// What a finder sees in two submaps of the last map, in the order of their ids.
-  struct Seen {
-    std::shared_ptr<const mapfile::ShownMap> map;
-    SubmapPair pair;
-    bool is_turned = false;  ///< The page has asked for them the other way round.
-    std::string name;
-    server::ClosureFinder::Look look;
-  };
-  static Pose3 asked_order(const Seen& seen) {
-    const Pose3 T_first_second = between_submaps(*seen.map, seen.pair, *seen.look.best);
-    return seen.is_turned ? T_first_second.inverse() : T_first_second;
-  }
-
-  /// Nothing: the answer says why.
-  std::optional<Seen> look_at(const Json& body, Response& response) {
-    const auto refuse = [&](int status, const std::string& why) {
-      say(response, status, why);
-      return std::nullopt;
-    };
-    Seen out{.map = site_.last_map.get()};
-    if (out.map == nullptr || site_.finder == nullptr) return refuse(409, "there is no map yet");
-    const auto& submaps = out.map->content.submaps;
-    const auto called = [&](const char* key) {
-      const std::string id = body.value(key, "");
-      return std::ranges::find_if(submaps, [&](const auto& entry) { return to_string(entry.first) == id; });
-    };
-    auto first = called("from"), second = called("to");
-    if (first == submaps.end() || second == submaps.end() || first == second)
-      return refuse(404, "from, to: expected two submaps of the map");
-    std::optional<Pose3> T_first_second;
-    if (body.contains("T_from_to") && !body.at("T_from_to").is_null()) {
-      const auto pose = pose_of_text(body.at("T_from_to").dump());
-      if (!pose) return refuse(400, pose.error().message);
-      T_first_second = *pose;
-    }
-    out.is_turned = second->first < first->first;
-    if (out.is_turned) {
-      std::swap(first, second);
-      if (T_first_second) T_first_second = T_first_second->inverse();
-    }
-    out.pair = {first->first, second->first};
-    out.name = out.map->content.closure_names().of(out.pair);
-    const std::scoped_lock one_at_a_time(looks_);  // they take seconds of a core
-    auto look = site_.finder->look(*first->second, *second->second, *site_.clouds, T_first_second);
-    if (!look) return refuse(500, look.error().message);
-    out.look = std::move(*look);
-    return out;
-  }
-
   Site& site_;
-  std::mutex looks_;
   std::atomic<int> watchers_ = 0;
 };
 
 }  // namespace
+
+void say(Response& response, int status, const std::string& error) {
+  response.status = status;
+  response.set_content(text_of(Json{{"error", error}}), kJson);
+}
+
+void say(Response& response, const Json& json) { response.set_content(text_of(json), kJson); }
+
+std::string name_of(const Visitor& visitor, const Json& body) {
+  return plain_text(visitor.name.empty() ? body.value("by", "") : visitor.name, kLongestName);
+}
 
 void add_routes(httplib::Server& server, Site& site) {
   const auto routes = std::make_shared<Routes>(site);
@@ -345,8 +287,12 @@ void add_routes(httplib::Server& server, Site& site) {
   server.Post("/api/decide", routes->decided([routes](const Visitor& visitor, const Json& body, Response& r) {
     routes->decide(visitor, body, r);
   }));
-  server.Post("/api/register",
-              routes->decided([routes](const Visitor&, const Json& body, Response& r) { routes->look(body, r); }));
+  server.Post("/api/register", routes->decided([routes](const Visitor&, const Json& body, Response& r) {
+    routes->by_hand.look(body, r);
+  }));
+  server.Post("/api/change", routes->decided([routes](const Visitor&, const Json& body, Response& r) {
+    routes->by_hand.change(body, r);
+  }));
   server.Post("/api/closure", routes->decided([routes](const Visitor& visitor, const Json& body, Response& r) {
     routes->keep(visitor, body, r);
   }));

@@ -84,6 +84,9 @@ struct MapMessages {
   std::vector<Message> closures;  ///< "closure/".
   Message poses;                  ///< Where all submaps are.
 };
+/// The value of "poses" alone.
+std::string poses_text(const mapfile::ShownMap& map, const std::map<SubmapId, std::size_t>& holding = {},
+                       const std::map<SubmapId, double>& sigma_m = {});
 /// `holding` is of closures_holding(). `sigma_m`: how sure the server is of each submap (Comparisons); empty: that is
 /// not shown.
 MapMessages map_messages(const mapfile::ShownMap& map, const std::map<SubmapId, std::size_t>& holding,

@@ -123,7 +123,9 @@ std::string closure_json(const ShownMap& map, const mapfile::ClosureInfo& info) 
   return text_of(out);
 }
 
-std::string poses_json(const ShownMap& map, const std::map<SubmapId, std::size_t>& holding,
+}  // namespace
+
+std::string poses_text(const ShownMap& map, const std::map<SubmapId, std::size_t>& holding,
                        const std::map<SubmapId, double>& sigma_m) {
   const auto accepted = std::ranges::count_if(map.map.closures, &server::JudgedClosure::accepted);
   std::map<std::uint32_t, Pose3> upright;
@@ -144,8 +146,6 @@ std::string poses_json(const ShownMap& map, const std::map<SubmapId, std::size_t
                   {"components", map.map.components},
                   {"submaps", std::move(submaps)}});
 }
-
-}  // namespace
 
 Pose3 between_submaps(const ShownMap& map, const SubmapPair& pair, const LoopClosure& closure) {
   return in_submap(map, pair.first, closure.from) * closure.measurement.T_a_b *
@@ -187,7 +187,7 @@ MapMessages map_messages(const ShownMap& map, const std::map<SubmapId, std::size
   }
   for (const mapfile::ClosureInfo& info : mapfile::closures(map.content, map.map))
     out.closures.push_back({"closure/" + info.name, time_s, closure_json(map, info)});
-  out.poses = {"poses", time_s, poses_json(map, holding, sigma_m)};
+  out.poses = {"poses", time_s, poses_text(map, holding, sigma_m)};
   return out;
 }
 

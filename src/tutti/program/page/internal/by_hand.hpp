@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "tutti/program/page/internal/answers.hpp"
+#include "tutti/program/page/internal/routes.hpp"
+
+namespace tutti::page {
+
+/// What the page asks of two submaps that an operator would join (docs/page.md). Nothing is stored here. May be called
+/// from several threads; one at a time is looked at, and one map is made, because either takes seconds of a core.
+class ByHand {
+ public:
+  explicit ByHand(Site& site) : site_(site) {}
+
+  /// What a finder sees in two submaps of the last map, in the order of their ids.
+  struct Seen {
+    std::shared_ptr<const mapfile::ShownMap> map;
+    SubmapPair pair;
+    bool is_turned = false;  ///< The page has asked for them the other way round.
+    std::string name;
+    server::ClosureFinder::Look look;
+  };
+  /// Nothing: the answer says why.
+  std::optional<Seen> look_at(const Json& body, Response& response);
+
+  /// Looks at two submaps.
+  void look(const Json& body, Response& response);
+  /// The map as it would be with a closure that was looked at.
+  void change(const Json& body, Response& response);
+
+ private:
+  struct Found {
+    SubmapPair pair;
+    LoopClosure closure;
+  };
+  Site& site_;
+  std::mutex looks_, changes_;
+  std::mutex mutex_;  // of found_
+  std::uint64_t found_so_far_ = 0;
+  std::map<std::uint64_t, Found> found_;  // the last ones
+};
+
+}  // namespace tutti::page
