@@ -12,6 +12,7 @@
 #include "tutti/exports/run_scene.hpp"
 #include "tutti/formats/graph_stamps.hpp"
 #include "tutti/mapfile/export.hpp"
+#include "tutti/mapfile/marks.hpp"
 
 namespace tutti::exports {
 
@@ -94,6 +95,15 @@ Result<std::string> ply_of_run(const fs::path& folder, const fs::path& out) {
   return copy_of(folder / "map.ply", out).map([&] { return out.string() + ": the server's map"; });
 }
 
+Result<std::string> marks_of_map(const MapSource& map, const FormatSettings&, const fs::path& out) {
+  return mapfile::export_marks(*map.store, map.content, map.estimate, out)
+      .map([&](const mapfile::ExportedMarks& written) {
+        return fmt::format(
+            "{}: {} marks, {} photos{}", out.string(), written.marks, written.photos,
+            written.left_out > 0 ? fmt::format("; {} are in no submap of the map", written.left_out) : "");
+      });
+}
+
 constexpr std::array kFormats{
     Format{"mcap", ".mcap",
            "For Foxglove, Rerun and PlotJuggler: trajectories (nav_msgs/Path, and poses over time), /tf, the cloud,\n"
@@ -108,6 +118,9 @@ constexpr std::array kFormats{
            "A map to drive on, as nav2's map server reads it, with the image beside it: where something stands\n"
            "between --low and --high above the ground, where nothing does, and what nobody knows.",
            write_grid, nullptr},
+    Format{"marks", ".csv",
+           "What operators marked on the page: where, with covariance, who, when, and words; photos beside it.",
+           marks_of_map, nullptr},
 };
 
 }  // namespace

@@ -18,6 +18,7 @@
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/program/event_log.hpp"
 #include "tutti/program/field_json.hpp"
+#include "tutti/program/page/view.hpp"
 #include "tutti/program/robot_program.hpp"
 #include "tutti/program/server_program.hpp"
 #include "tutti/storage/sqlite_store.hpp"
@@ -250,8 +251,11 @@ Result<mission::MissionRecord> collect_mission(const MissionConfig& config, cons
   if (gone > 0) record.notes.push_back(cut_short("the server", gone));
   for (Robot& robot : robots) record.timing.policies.push_back(std::move(robot.timing));
   const Timestamp end = mission::kMissionStart + record.duration_s;
-  record.view = std::make_shared<const mission::ViewRecord>(
-      mission::ViewRecorder(1).finish(mapfile::shown_map(**server, end), *node::SubmapFrames::of(**store)));
+  auto view = mission::ViewRecorder(1).finish(mapfile::shown_map(**server, end), *node::SubmapFrames::of(**store));
+  const auto marks = page::marks_with_photos(**store, 0.0);
+  if (!marks) return in_context(map.string(), marks.error());
+  view.messages.insert(view.messages.begin(), marks->begin(), marks->end());
+  record.view = std::make_shared<const mission::ViewRecord>(std::move(view));
   return record;
 }
 

@@ -94,10 +94,9 @@ Status read_meta(const storage::TableStore& map, Content& content) {
   if (!names) return tl::unexpected(names.error());
   content.names = std::move(*names);
   Content::Table& table = content.tables["meta"];
-  return map.scan("meta", {}, [&](std::string_view key, std::string_view bytes) {
+  return map.sizes("meta", [&](std::string_view key, std::size_t size) {
     ++table.rows;
-    table.bytes += key.size() + bytes.size();
-    return true;
+    table.bytes += key.size() + size;
   });
 }
 

@@ -30,7 +30,7 @@ struct AskedWord {
 struct ViewedMission {
   std::string name;
   std::string version;
-  const storage::TableStore& map;
+  storage::TableStore& map;  ///< Viewers write nothing but marks (mapfile/marks.hpp) in it.
   std::shared_ptr<const server::ClosureFinder> finder;
   std::filesystem::path pki;  ///< Of `tutti pki`; empty: whoever reaches the server may do all.
   std::function<void(Level, const std::string&)> say;

@@ -15,10 +15,10 @@
 #include "tutti/base/random.hpp"
 #include "tutti/consistency/chain_uncertainty.hpp"
 #include "tutti/estimation/influence.hpp"
-#include "tutti/estimation/marginals.hpp"
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/server/georeference.hpp"
 #include "tutti/server/map_components.hpp"
+#include "tutti/server/map_posterior.hpp"
 
 namespace tutti::server {
 namespace {
@@ -170,6 +170,12 @@ std::vector<double> honest_weights(const MapEstimate& map, std::size_t edges) {
 
 }  // namespace
 
+std::unique_ptr<const estimation::JointPosterior> posterior_of(
+    const MapEstimate& map, const PoseGraph& on_earth, std::span<const estimation::JointPosterior::Pair> pairs) {
+  const std::vector<double> weights = honest_weights(map, on_earth.edges.size());
+  return std::make_unique<const estimation::JointPosterior>(on_earth, on_earth.poses, pairs, weights);
+}
+
 ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const consistency::ProxyGraphConfig& config,
                          MonitorWork* work) {
   MonitorWork unasked;
@@ -184,7 +190,7 @@ ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const c
   if (!map.fixes.edges.empty()) with_fixes = graph_on_earth(map);
   const PoseGraph& on_earth = with_fixes ? *with_fixes : map.graph;
   const std::vector<double> weights = honest_weights(map, on_earth.edges.size());
-  auto posterior = std::make_unique<const estimation::JointPosterior>(on_earth, on_earth.poses, stretches, weights);
+  auto posterior = posterior_of(map, on_earth, stretches);
   ++counted.factorisations;
   const std::vector<Matrix6d> covariances = posterior->relative_covariances();
 

@@ -9,6 +9,7 @@
 
 #include "support/paths.hpp"
 #include "support/wire/messages.hpp"
+#include "tutti/model/map_mark.hpp"
 #include "tutti/v1/messages.pb.h"
 #include "tutti/wire/frame.hpp"
 #include "tutti/wire/refinement_codec.hpp"
@@ -110,6 +111,8 @@ TEST(FieldBytes, TheFilesForOtherLanguagesHaveTheSameFields) {
   expect_in_proto<MissionStatus::Refusals>("status.proto", "RefusedMessages");
   expect_in_proto<MissionStatus::Word>("status.proto", "AnsweredWord");
   expect_in_proto<ClosureWord>("status.proto", "Word");
+  expect_in_proto<MapMark>("status.proto", "Mark");
+  expect_in_proto<SubmapId>("status.proto", "SubmapId");
   expect_in_proto<Health>("status.proto", "Health");
   expect_in_proto<Health>("feed.proto", "Health");
   expect_in_proto<MethodId>("messages.proto", "Method");

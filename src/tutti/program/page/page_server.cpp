@@ -17,6 +17,7 @@
 #include "tutti/pki/pki.hpp"
 #include "tutti/program/clock.hpp"
 #include "tutti/program/incarnation.hpp"
+#include "tutti/program/page/internal/mark_routes.hpp"
 #include "tutti/program/page/internal/routes.hpp"
 #include "tutti/program/page/view.hpp"
 
@@ -80,6 +81,7 @@ class PageViewer final : public program::MapViewer {
   PageViewer& operator=(const PageViewer&) = delete;
 
   Status open(const bus::HostPort& address, const std::filesystem::path& pki) {
+    if (Status ok = open_marks(); !ok) return in_context("--view", ok.error());
     if (pki.empty())
       server_ = std::make_unique<httplib::Server>();
     else
@@ -121,6 +123,7 @@ class PageViewer final : public program::MapViewer {
   }
   void tell(const MissionStatus& status) override {
     const double time_s = status.time - Timestamp{};
+    site_.time_s = time_s;
     const auto alerts = joined(alerts_.of_status(status), map_alerts());
     site_.metrics.tell(status);
     site_.board.put([&](Board& board) {
@@ -131,6 +134,15 @@ class PageViewer final : public program::MapViewer {
   std::vector<program::AskedWord> take_words() override { return site_.words.take(); }
 
  private:
+  Status open_marks() {
+    const auto marks = site_.marks.open();
+    if (!marks) return tl::unexpected(marks.error());
+    site_.board.put([&](Board& board) {
+      for (const auto& [number, mark] : *marks)
+        board.put(mark_message(number, mark, mark.photo_type.empty() ? "" : photo_path(number), 0.0));
+    });
+    return {};
+  }
   std::vector<Alert> map_alerts() {
     const std::scoped_lock lock(mutex_);
     return map_alerts_;

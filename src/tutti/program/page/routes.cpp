@@ -17,6 +17,7 @@
 #include "tutti/program/page/cloud_bytes.hpp"
 #include "tutti/program/page/internal/answers.hpp"
 #include "tutti/program/page/internal/by_hand.hpp"
+#include "tutti/program/page/internal/mark_routes.hpp"
 #include "tutti/program/page/internal/page_data.hpp"
 #include "tutti/program/page/view.hpp"
 
@@ -31,8 +32,8 @@ constexpr std::size_t kMostPoints = 20'000;  // of one submap's cloud
 constexpr auto kSignOfLife = std::chrono::milliseconds(1000);
 constexpr auto kAnswer = std::chrono::seconds(10);  // the server's thread may be at a map
 constexpr const char* kPolicy =
-    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'; img-src data: "
-    "blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'; img-src "
+    "'self' data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 std::string token_of(const Request& request) {
   const std::string cookies = request.get_header_value("Cookie"), name = std::string(kCookie) + "=";
@@ -72,7 +73,7 @@ class Routes {
                                          : Json(nullptr)},
              {"mission", site_.mission_name},
              {"may_decide", visitor.may_decide},
-             {"offers", {"decide", "register", "closure", "why", "disagreement"}}};
+             {"offers", {"decide", "register", "closure", "mark", "why", "disagreement"}}};
     if (!site_.sign_in.is_open()) out["nonce"] = site_.sign_in.nonce(program::Clock::steady_s());
     say(response, out);
   }
@@ -296,6 +297,13 @@ void add_routes(httplib::Server& server, Site& site) {
   server.Post("/api/closure", routes->decided([routes](const Visitor& visitor, const Json& body, Response& r) {
     routes->keep(visitor, body, r);
   }));
+  server.Post("/api/mark", routes->decided([&site](const Visitor& visitor, const Json& body, Response& r) {
+    put_mark(site, visitor, body, r);
+  }));
+  server.Post("/api/unmark",
+              routes->decided([&site](const Visitor&, const Json& body, Response& r) { remove_mark(site, body, r); }));
+  server.Get(R"(/api/photo/(\d{1,20}))",
+             routes->seen([&site](const Request& q, Response& r) { show_photo(site, q, r); }));
   server.Get("/api/why", routes->seen([routes](const Request& q, Response& r) { routes->why(q, r); }));
   server.Get("/metrics", routes->seen([routes](const Request&, Response& r) { routes->metrics(r); }));
   server.Get("/healthz", [routes](const Request&, Response& r) { routes->health(r); });

@@ -11,6 +11,7 @@
 #include "tutti/consistency/explanation.hpp"
 #include "tutti/consistency/robot_node.hpp"
 #include "tutti/mapfile/shown_map.hpp"
+#include "tutti/model/map_mark.hpp"
 #include "tutti/model/status.hpp"
 #include "tutti/program/page/board.hpp"
 
@@ -115,6 +116,12 @@ struct Comparisons {
   std::map<SubmapId, double> sigma_m;
 };
 Comparisons compare_all(const mapfile::ShownMap& map);
+
+/// "mark/NUMBER". `photo`: where it is, a path of the page's server or the picture itself as data:; empty: none.
+Message mark_message(std::uint64_t number, const MapMark& mark, const std::string& photo, double time_s);
+/// All marks of a map's store, with their photos in them, for a page that asks no server. Fails when they cannot be
+/// read.
+Result<std::vector<Message>> marks_with_photos(const storage::TableStore& map, double time_s);
 
 /// A closure's relative pose of the two submap frames.
 Pose3 between_submaps(const mapfile::ShownMap& map, const SubmapPair& pair, const LoopClosure& closure);

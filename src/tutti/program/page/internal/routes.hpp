@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <future>
 #include <mutex>
@@ -11,6 +12,7 @@
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/program/incarnation.hpp"
 #include "tutti/program/map_viewer.hpp"
+#include "tutti/program/page/internal/mark_book.hpp"
 #include "tutti/program/page/live_board.hpp"
 #include "tutti/program/page/metrics.hpp"
 #include "tutti/program/page/sign_in.hpp"
@@ -67,7 +69,8 @@ struct Site {
         store(mission.map),
         finder(mission.finder),
         sign_in(mission.pki),
-        clouds(node::SubmapFrames::of(mission.map)) {}
+        clouds(node::SubmapFrames::of(mission.map)),
+        marks(mission.map) {}
 
   bool is_secure = false;
   const std::string mission_name;
@@ -80,6 +83,8 @@ struct Site {
   Metrics metrics;
   std::shared_ptr<const node::SubmapFrames> clouds;
   LastMap last_map;
+  MarkBook marks;
+  std::atomic<double> time_s = 0.0;  ///< Mission time of the last status.
 };
 
 /// Everything that the page asks for (docs/page.md). `site` outlives the server.

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+
+#include "tutti/base/fields.hpp"
+#include "tutti/base/ids.hpp"
+
+namespace tutti {
+
+/// What somebody has written on the map: a place in a submap, so that it moves with the map, and words.
+struct MapMark {
+  static constexpr std::size_t kMostBytes = 2'000;           ///< The words may have so many,
+  static constexpr std::size_t kMostPhotoBytes = 1U << 20U;  ///< and the photo, which is kept beside it.
+  static constexpr double kFarthest_m = 1'000.0;             ///< From the submap's first keyframe.
+
+  SubmapId submap;
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< In the submap's frame, m.
+  std::string words;                             ///< UTF-8, any; may be empty.
+  std::string by;                                ///< Who said it, for people; may be empty.
+  std::int64_t given_ns = 0;                     ///< When, since the Unix epoch.
+  std::string photo_type;                        ///< "image/jpeg" or "image/png"; empty: there is no photo.
+  template <class V>
+  void describe(V& v) {
+    constexpr std::size_t kLongestName = 200;
+    v.field(1, "submap", submap);
+    v.field(2, "x", at.x(), {.low = -kFarthest_m, .high = kFarthest_m});
+    v.field(3, "y", at.y(), {.low = -kFarthest_m, .high = kFarthest_m});
+    v.field(4, "z", at.z(), {.low = -kFarthest_m, .high = kFarthest_m});
+    v.field(5, "words", words, {.text = FieldRule::Text::any, .at_most = kMostBytes});
+    v.field(6, "by", by, {.at_most = kLongestName});
+    v.field(7, "given_ns", given_ns);
+    v.field(8, "photo_type", photo_type, {.at_most = 16});
+  }
+  friend bool operator==(const MapMark&, const MapMark&) = default;
+};
+
+/// By number, which never names another mark.
+using MarkSet = std::map<std::uint64_t, MapMark>;
+
+/// The type of a picture that the page can show, by what its bytes begin with; empty: it is none of these.
+constexpr std::string_view picture_type(std::string_view bytes) {
+  if (bytes.starts_with("\xff\xd8\xff")) return "image/jpeg";
+  if (bytes.starts_with("\x89PNG\r\n\x1a\n")) return "image/png";
+  return {};
+}
+
+}  // namespace tutti

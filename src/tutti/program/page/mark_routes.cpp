@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/page/internal/mark_routes.hpp"
+
+#include <fmt/format.h>
+#include <httplib.h>
+
+#include <algorithm>
+#include <charconv>
+
+#include "tutti/program/clock.hpp"
+#include "tutti/program/page/base64.hpp"
+#include "tutti/program/page/view.hpp"
+
+namespace tutti::page {
+namespace {
+
+std::optional<std::uint64_t> number_of(const std::string& text) {
+  std::uint64_t out = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), out);
+  return error == std::errc() && end == text.data() + text.size() ? std::optional(out) : std::nullopt;
+}
+
+/// The bytes of "data:..;base64,..", whose type is not believed; nothing: it is no such text.
+std::optional<std::string> bytes_of_data(const std::string& url) {
+  constexpr std::string_view kBase64 = ";base64,";
+  const std::size_t comma = url.find(kBase64);
+  if (!url.starts_with("data:") || comma == std::string::npos) return std::nullopt;
+  return bytes_of_base64(url.substr(comma + kBase64.size()));
+}
+
+/// Nothing: the answer says why.
+std::optional<MapMark> mark_of(const Site& site, const Visitor& visitor, const Json& body, Response& response) {
+  const auto refuse = [&](int status, const std::string& why) {
+    say(response, status, why);
+    return std::nullopt;
+  };
+  const auto map = site.last_map.get();
+  if (map == nullptr) return refuse(409, "there is no map yet");
+  const std::string id = body.value("submap", "");
+  const auto& submaps = map->content.submaps;
+  const auto submap = std::ranges::find_if(submaps, [&](const auto& entry) { return to_string(entry.first) == id; });
+  if (submap == submaps.end()) return refuse(404, "submap: expected one of the map");
+  const Json at = body.value("at", Json());
+  if (!at.is_array() || at.size() != 3 || !std::ranges::all_of(at, [](const Json& one) { return one.is_number(); }))
+    return refuse(400, "at: expected [x, y, z] in the submap's frame");
+  return MapMark{.submap = submap->first,
+                 .at = {at[0].get<double>(), at[1].get<double>(), at[2].get<double>()},
+                 .words = body.value("text", ""),
+                 .by = name_of(visitor, body),
+                 .given_ns = static_cast<std::int64_t>(program::wall_clock_ns())};
+}
+
+}  // namespace
+
+std::string photo_path(std::uint64_t number) { return fmt::format("/api/photo/{}", number); }
+
+void put_mark(Site& site, const Visitor& visitor, const Json& body, Response& response) {
+  auto mark = mark_of(site, visitor, body, response);
+  if (!mark) return;
+  std::string photo;
+  if (body.contains("photo") && !body.at("photo").is_null()) {
+    const auto bytes = bytes_of_data(body.at("photo").get<std::string>());
+    if (!bytes || bytes->empty()) return say(response, 400, "photo: expected data:image/jpeg;base64,.. or PNG");
+    photo = *bytes;
+  }
+  const auto stored = site.marks.add(std::move(*mark), photo);
+  if (!stored) return say(response, stored.error().code == ErrorCode::invalid ? 400 : 503, stored.error().message);
+  site.board.put([&](Board& board) {
+    board.put(mark_message(stored->first, stored->second, photo.empty() ? "" : photo_path(stored->first), site.time_s));
+  });
+  say(response, Json{{"id", std::to_string(stored->first)}});
+}
+
+void remove_mark(Site& site, const Json& body, Response& response) {
+  const auto number = number_of(body.value("id", ""));
+  if (!number) return say(response, 404, "there is no such mark");
+  const Status removed = site.marks.remove(*number);
+  if (!removed) return say(response, removed.error().code == ErrorCode::invalid ? 404 : 503, removed.error().message);
+  site.board.put([&](Board& board) { board.put({fmt::format("mark/{}", *number), site.time_s, "null"}); });
+  say(response, Json::object());
+}
+
+void show_photo(const Site& site, const Request& request, Response& response) {
+  const auto number = number_of(request.matches[1]);
+  const auto photo = number ? mapfile::read_photo(site.store, *number) : Result<std::optional<std::string>>();
+  if (!photo || !*photo || picture_type(**photo).empty()) return say(response, 404, "there is no such photo");
+  response.set_header("Cache-Control", "private, max-age=31536000, immutable");
+  response.set_content(**photo, std::string(picture_type(**photo)));
+}
+
+}  // namespace tutti::page
