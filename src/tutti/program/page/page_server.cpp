@@ -126,7 +126,9 @@ class PageViewer final : public program::MapViewer {
     site_.time_s = time_s;
     const auto alerts = joined(alerts_.of_status(status), map_alerts());
     site_.metrics.tell(status);
+    const auto held = site_.held.with([&](Holders& holders) { return holders.message(Clock::steady_s(), time_s); });
     site_.board.put([&](Board& board) {
+      board.put(held);
       board.put(status_message(status));
       board.put(alerts_message(alerts, time_s));
     });

@@ -129,6 +129,14 @@ TEST_F(PageServer, TheMapWithAClosureIsShownAndNothingIsStored) {
   EXPECT_EQ(ask(client(), "/api/change", {{"look", "x"}}).first, 400);
 }
 
+TEST_F(PageServer, WhoLooksAtWhatIsToldToAll) {
+  start();
+  EXPECT_EQ(ask(client(), "/api/hold", {{"what", "robot/1"}, {"by", "anna"}}).first, 200);
+  EXPECT_EQ(events().at("held"), json::parse(R"([{"by":"anna","what":"robot/1"}])"));
+  EXPECT_EQ(ask(client(), "/api/hold", {{"what", "the door"}, {"by", "anna"}}).first, 400);
+  EXPECT_EQ(ask(client(), "/api/hold", {{"what", "robot/1"}}).first, 400) << "nobody";
+  EXPECT_EQ(ask(client(), "/api/hold", {{"what", ""}, {"by", "anna"}}).first, 200);
+  EXPECT_EQ(events().at("held"), json::array());
 }
 
 TEST_F(PageServer, WhatCannotBeLookedAtIsSaid) {

@@ -73,7 +73,7 @@ class Routes {
                                          : Json(nullptr)},
              {"mission", site_.mission_name},
              {"may_decide", visitor.may_decide},
-             {"offers", {"decide", "register", "closure", "mark", "why", "disagreement"}}};
+             {"offers", {"decide", "register", "closure", "mark", "hold", "why", "disagreement"}}};
     if (!site_.sign_in.is_open()) out["nonce"] = site_.sign_in.nonce(program::Clock::steady_s());
     say(response, out);
   }
@@ -154,6 +154,18 @@ class Routes {
                      (seen->look.refusal ? to_string(*seen->look.refusal) : std::string("none")));
     ClosureWord word{.closure = seen->name, .wish = Wish::accept, .by_hand = {*seen->look.best}};
     if (give(visitor, body, std::move(word), response)) say(response, Json{{"name", seen->name}});
+  }
+
+  /// Who looks at what; nothing waits for it.
+  void hold(const Visitor& visitor, const Json& body, Response& response) {
+    const std::string by = name_of(visitor, body), what = body.value("what", "");
+    const double now_s = program::Clock::steady_s();
+    const auto held = site_.held.with([&](Holders& holders) {
+      return holders.hold(by, what, now_s).map([&] { return holders.message(now_s, site_.time_s); });
+    });
+    if (!held) return say(response, 400, held.error().message);
+    site_.board.put([&](Board& board) { board.put(*held); });
+    say(response, Json::object());
   }
 
   void why(const Request& request, Response& response) {
@@ -296,6 +308,9 @@ void add_routes(httplib::Server& server, Site& site) {
   }));
   server.Post("/api/closure", routes->decided([routes](const Visitor& visitor, const Json& body, Response& r) {
     routes->keep(visitor, body, r);
+  }));
+  server.Post("/api/hold", routes->decided([routes](const Visitor& visitor, const Json& body, Response& r) {
+    routes->hold(visitor, body, r);
   }));
   server.Post("/api/mark", routes->decided([&site](const Visitor& visitor, const Json& body, Response& r) {
     put_mark(site, visitor, body, r);

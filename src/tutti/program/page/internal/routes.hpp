@@ -12,6 +12,7 @@
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/program/incarnation.hpp"
 #include "tutti/program/map_viewer.hpp"
+#include "tutti/program/page/holders.hpp"
 #include "tutti/program/page/internal/mark_book.hpp"
 #include "tutti/program/page/live_board.hpp"
 #include "tutti/program/page/metrics.hpp"
@@ -62,6 +63,20 @@ class LastMap {
   std::shared_ptr<const mapfile::ShownMap> map_;
 };
 
+/// Who holds what, for several threads.
+class HeldThings {
+ public:
+  template <class Call>
+  auto with(Call&& call) {
+    const std::scoped_lock lock(mutex_);
+    return std::forward<Call>(call)(holders_);
+  }
+
+ private:
+  std::mutex mutex_;
+  Holders holders_;
+};
+
 /// What the page's threads share.
 struct Site {
   explicit Site(const program::ViewedMission& mission)
@@ -84,6 +99,7 @@ struct Site {
   std::shared_ptr<const node::SubmapFrames> clouds;
   LastMap last_map;
   MarkBook marks;
+  HeldThings held;
   std::atomic<double> time_s = 0.0;  ///< Mission time of the last status.
 };
 
