@@ -77,7 +77,7 @@ function(tutti_install_program target component package)
           FILES_MATCHING PATTERN "*.md" PATTERN results EXCLUDE PATTERN decisions EXCLUDE PATTERN images EXCLUDE)
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/missions" DESTINATION "${CMAKE_INSTALL_DATADIR}/tutti" COMPONENT ${component} ${ARGN})
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/proto" DESTINATION "${docs}/examples" COMPONENT ${component} ${ARGN})
-  install(FILES "${PROJECT_SOURCE_DIR}/examples/feed_client.py" DESTINATION "${docs}/examples" COMPONENT ${component} ${ARGN})
+  install(FILES "${PROJECT_SOURCE_DIR}/examples/feed_client.py" "${PROJECT_SOURCE_DIR}/deploy/grafana-dashboard.json" DESTINATION "${docs}/examples" COMPONENT ${component} ${ARGN})
   tutti_install_debian(${component} ${package} ${ARGN})
 endfunction()
 

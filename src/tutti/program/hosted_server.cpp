@@ -14,7 +14,7 @@ bus::Envelope HostedServer::mission_status(Timestamp now) {
   status.version = version_;
   status.wall_ns = static_cast<std::int64_t>(wall_clock_ns());
   status.trouble = trouble_();
-  for (const auto& viewer : viewers_) viewer->tell(status);
+  for (const auto& viewer : viewers_) viewer->tell(status, radio_.sums());
   return node::to_viewers(std::move(status));
 }
 

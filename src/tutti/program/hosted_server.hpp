@@ -28,9 +28,10 @@ class HostedServer final : public Hosted {
         is_over_(is_over),
         viewers_(viewers),
         clock_(clock) {}
-  Answer start(Timestamp now) override { return {node_->resume(now), {}}; }
+  Answer start(Timestamp now) override { return counted({node_->resume(now), {}}); }
   Answer receive(const bus::Received& message, Timestamp now) override {
-    return {node_->receive(message.envelope, now), {message.ticket}};
+    radio_.count(message.envelope);
+    return counted({node_->receive(message.envelope, now), {message.ticket}});
   }
   Answer put_aside(const bus::Received& message, const std::string& why, Timestamp now) override {
     return {node_->put_aside(message.envelope, why, now), {message.ticket}};
@@ -43,7 +44,7 @@ class HostedServer final : public Hosted {
     for (AskedWord& word : std::exchange(asked_, {})) take(word, now, answer.step);
     answer.step.add(node_->on_timer(now));
     if (node_->changes() != told_changes_) answer.step.messages.push_back(mission_status(now));
-    return answer;
+    return counted(std::move(answer));
   }
   Answer report(Timestamp now) override { return {{.messages = {mission_status(now)}}, {}}; }
   [[nodiscard]] Json status(Timestamp now) const override;
@@ -56,6 +57,10 @@ class HostedServer final : public Hosted {
 
  private:
   bus::Envelope mission_status(Timestamp now);
+  Answer counted(Answer answer) {
+    for (const bus::Envelope& message : answer.step.messages) radio_.count(message);
+    return answer;
+  }
   void tend_viewers(Timestamp now);
   /// As if it had come by the bus.
   void take(AskedWord& asked, Timestamp now, node::Step& step);
@@ -66,6 +71,7 @@ class HostedServer final : public Hosted {
   const bool& is_over_;
   const std::vector<std::unique_ptr<MapViewer>>& viewers_;
   const Clock& clock_;
+  RadioCount radio_;
   std::vector<AskedWord> asked_;
   /// Answers to words whose step is being carried out.
   std::vector<std::pair<std::promise<std::string>, std::string>> answers_;

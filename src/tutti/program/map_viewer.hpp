@@ -13,6 +13,7 @@
 #include "tutti/model/closure_word.hpp"
 #include "tutti/model/status.hpp"
 #include "tutti/program/event_log.hpp"
+#include "tutti/program/radio_count.hpp"
 #include "tutti/server/closure_finder.hpp"
 #include "tutti/storage/table_store.hpp"
 
@@ -45,7 +46,7 @@ class MapViewer {
   [[nodiscard]] virtual bool wants(std::uint64_t revision) const = 0;
   virtual void show(std::shared_ptr<const mapfile::ShownMap> map) = 0;
   /// Every two seconds, and when something has changed.
-  virtual void tell(const MissionStatus& /*status*/) {}
+  virtual void tell(const MissionStatus& /*status*/, const RadioCount::Sums& /*radio*/) {}
   /// What operators have decided at this viewer since the last call.
   [[nodiscard]] virtual std::vector<AskedWord> take_words() { return {}; }
 

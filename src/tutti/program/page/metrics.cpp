@@ -7,6 +7,8 @@
 #include <type_traits>
 #include <vector>
 
+#include "tutti/program/field_json.hpp"
+
 namespace tutti::page {
 namespace {
 
@@ -60,11 +62,36 @@ void add_members(const Members& members, const std::string& role, Timestamp now,
   }
 }
 
+/// A robot that has no status yet has its number for a name.
+std::string radio_text(const program::RadioCount::Sums& radio, const MissionStatus& status) {
+  std::map<RobotId, std::string> names;
+  for (const MissionStatus::Robot& robot : status.robots) names[robot.robot] = label_value(robot.status.name);
+  std::string bytes, messages;
+  for (const auto& [key, sum] : radio) {
+    const auto name = names.find(key.robot);
+    const std::string labels = fmt::format("{{name=\"{}\",direction=\"{}\",kind=\"{}\"}}",
+                                           name == names.end() ? std::to_string(key.robot.value) : name->second,
+                                           key.is_down ? "down" : "up", wire::name(key.kind));
+    bytes += fmt::format("tutti_radio_bytes_total{} {}\n", labels, sum.bytes);
+    messages += fmt::format("tutti_radio_messages_total{} {}\n", labels, sum.messages);
+  }
+  if (radio.empty()) return {};
+  return "# TYPE tutti_radio_bytes_total counter\n" + bytes + "# TYPE tutti_radio_messages_total counter\n" + messages;
+}
+
 }  // namespace
 
-void Metrics::tell(const MissionStatus& status) {
+Message radio_message(const program::RadioCount::Sums& radio, double time_s) {
+  FieldJson out = FieldJson::object();
+  for (const auto& [key, sum] : radio)
+    out[std::to_string(key.robot.value)][key.is_down ? "down" : "up"][wire::name(key.kind)] = sum.bytes;
+  return {"radio", time_s, text_of(out)};
+}
+
+void Metrics::tell(const MissionStatus& status, const program::RadioCount::Sums& radio) {
   const std::scoped_lock lock(mutex_);
   last_ = status;
+  radio_ = radio;
 }
 
 std::optional<std::string> Metrics::trouble() const {
@@ -89,7 +116,7 @@ std::string Metrics::text() const {
     out += fmt::format("# TYPE {} gauge\n", name);
     for (const std::string& sample : samples) out += sample;
   }
-  return out;
+  return out + radio_text(radio_, *last_);
 }
 
 }  // namespace tutti::page

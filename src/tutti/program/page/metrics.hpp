@@ -6,15 +6,18 @@
 #include <string>
 
 #include "tutti/model/status.hpp"
+#include "tutti/program/page/board.hpp"
+#include "tutti/program/radio_count.hpp"
 
 namespace tutti::page {
 
 /// The last status as Prometheus reads it: every number of the mission's, its robots' and its workers' statuses is a
 /// gauge called tutti_mission_.., tutti_robot_.. or tutti_worker_.. after its field, robots and workers with the label
-/// `name`; times as seconds before it. May be called from several threads.
+/// `name`; times as seconds before it. What robots have sent and were sent by kind are counters,
+/// tutti_radio_bytes_total and tutti_radio_messages_total. May be called from several threads.
 class Metrics {
  public:
-  void tell(const MissionStatus& status);
+  void tell(const MissionStatus& status, const program::RadioCount::Sums& radio = {});
   /// The text format of Prometheus, version 0.0.4.
   [[nodiscard]] std::string text() const;
   /// The server's trouble; empty: it is well; nothing: nothing is known yet.
@@ -23,6 +26,10 @@ class Metrics {
  private:
   mutable std::mutex mutex_;
   std::optional<MissionStatus> last_;
+  program::RadioCount::Sums radio_;
 };
+
+/// "radio": the bytes that robots have sent ("up") and were sent ("down"), by robot and kind.
+Message radio_message(const program::RadioCount::Sums& radio, double time_s);
 
 }  // namespace tutti::page
