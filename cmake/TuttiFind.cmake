@@ -2,7 +2,7 @@
 # Third-party libraries, found when a module first links them, here and by find_package(tutti), which installs this file.
 # Packages of Debian 12: scripts/install_dependencies.sh lists them.
 
-# SuiteSparse 5.12, LAPACKE, zstd, lz4, bz2, libcrypto, SQLite, NATS, CycloneDDS and OpenCV ship no CMake configuration that works
+# SuiteSparse 5.12, LAPACKE, zstd, lz4, bz2, OpenSSL, SQLite, NATS, CycloneDDS and OpenCV ship no CMake configuration that works
 # everywhere: plain imported targets. OpenCV's own is only in libopencv-dev, which wants everything that OpenCV has.
 function(tutti_import_library target header)
   cmake_parse_arguments(ARG "" "" "LIBS;SUFFIXES" ${ARGN})
@@ -38,6 +38,7 @@ set(TUTTI_THIRD_PARTY
   "tutti::lz4|import lz4frame.h LIBS lz4"
   "tutti::bz2|import bzlib.h LIBS bz2"
   "tutti::crypto|import openssl/evp.h LIBS crypto"
+  "tutti::ssl|import openssl/ssl.h LIBS ssl crypto"
   "tutti::httplib|import httplib.h LIBS cpp-httplib"
   "tutti::cyclonedds|import dds/dds.h LIBS ddsc"
   "tutti::nanoflann|import nanoflann.hpp"

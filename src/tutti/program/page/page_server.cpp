@@ -61,6 +61,20 @@ class BoundedPool final : public httplib::TaskQueue {
   std::size_t free_;
 };
 
+/// The bus's certificate, read for each connection, so that a renewed one needs no restart. Between the two files of a
+/// renewal a connection may be refused; the next one is not.
+struct CertificateFiles {
+  std::string certificate, key;
+
+  static int use(SSL* connection, void* files) {
+    const auto& own = *static_cast<const CertificateFiles*>(files);
+    if (SSL_use_certificate_chain_file(connection, own.certificate.c_str()) == 1)
+      static_cast<void>(SSL_use_PrivateKey_file(connection, own.key.c_str(), SSL_FILETYPE_PEM));
+    ERR_clear_error();  // without files, what it began with holds
+    return 1;
+  }
+};
+
 class PageViewer final : public program::MapViewer {
  public:
   PageViewer(const PageOptions& options, const program::ViewedMission& mission)
@@ -82,11 +96,14 @@ class PageViewer final : public program::MapViewer {
 
   Status open(const bus::HostPort& address, const std::filesystem::path& pki) {
     if (Status ok = open_marks(); !ok) return in_context("--view", ok.error());
-    if (pki.empty())
+    if (pki.empty()) {
       server_ = std::make_unique<httplib::Server>();
-    else
-      server_ =
-          std::make_unique<httplib::SSLServer>((pki / pki::kBusCertificate).c_str(), (pki / pki::kBusKey).c_str());
+    } else {
+      certificate_ = {pki / pki::kBusCertificate, pki / pki::kBusKey};
+      auto secure = std::make_unique<httplib::SSLServer>(certificate_.certificate.c_str(), certificate_.key.c_str());
+      if (secure->is_valid()) SSL_CTX_set_cert_cb(secure->ssl_context(), &CertificateFiles::use, &certificate_);
+      server_ = std::move(secure);
+    }
     if (!server_->is_valid()) return fail(ErrorCode::io, "--view: the certificate of {} cannot be used", pki.string());
     server_->new_task_queue = [] { return new BoundedPool(kConnections); };
     server_->set_read_timeout(kRead_s);
@@ -182,6 +199,7 @@ class PageViewer final : public program::MapViewer {
   Site site_;
   std::function<void(Level, const std::string&)> say_;
   std::function<void(const std::string&)> announce_;
+  CertificateFiles certificate_;
   std::unique_ptr<httplib::Server> server_;
   Alerts alerts_;       // the server's thread's
   Alerts maps_alerts_;  // of the thread that makes messages

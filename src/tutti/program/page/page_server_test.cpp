@@ -198,6 +198,39 @@ TEST_F(PageServer, WithCredentialsShowsNothingToStrangersAndLetsOperatorsDecide)
   EXPECT_EQ(decide("alpha/0-bravo/1", "accept", ours(anna)), "401");
 }
 
+/// The certificate that a server shows, as PEM.
+std::string shown_certificate(const std::string& host_port) {
+  const std::unique_ptr<SSL_CTX, decltype(&SSL_CTX_free)> context(SSL_CTX_new(TLS_client_method()), SSL_CTX_free);
+  const std::unique_ptr<BIO, decltype(&BIO_free_all)> connection(BIO_new_ssl_connect(context.get()), BIO_free_all);
+  BIO_set_conn_hostname(connection.get(), host_port.c_str());
+  if (BIO_do_connect(connection.get()) != 1) return "no connection";
+  SSL* ssl = nullptr;
+  BIO_get_ssl(connection.get(), &ssl);
+  const std::unique_ptr<X509, decltype(&X509_free)> certificate(SSL_get1_peer_certificate(ssl), X509_free);
+  const std::unique_ptr<BIO, decltype(&BIO_free_all)> text(BIO_new(BIO_s_mem()), BIO_free_all);
+  PEM_write_bio_X509(text.get(), certificate.get());
+  char* bytes = nullptr;
+  const auto size = BIO_get_mem_data(text.get(), &bytes);
+  return {bytes, static_cast<std::size_t>(size)};
+}
+
+TEST_F(PageServer, ARenewedCertificateIsShownWithoutARestart) {
+  fs::create_directories(folder_);
+  auto pki = pki::Pki::make(folder_ / "pki", "cave").value();
+  start(folder_ / "pki");
+  const std::string host_port = url_.substr(8, url_.size() - 9);
+  const auto stored = [&] { return read_file((folder_ / "pki" / pki::kBusCertificate).string()).value(); };
+  const std::string before = stored();
+  EXPECT_NE(before.find(shown_certificate(host_port)), std::string::npos);
+  ASSERT_TRUE(pki.renew(""));
+  ASSERT_NE(stored(), before);
+  EXPECT_NE(stored().find(shown_certificate(host_port)), std::string::npos);
+  EXPECT_EQ(client().Get("/api/me")->status, 200);
+  fs::remove(folder_ / "pki" / pki::kBusKey);
+  fs::remove(folder_ / "pki" / pki::kBusCertificate);
+  EXPECT_EQ(client().Get("/api/me")->status, 200) << "without files what it began with holds";
+}
+
 TEST_F(PageServer, ConnectionsThatSayNothingTakeNothingFromTheMission) {
   start();
   std::vector<int> sockets;
