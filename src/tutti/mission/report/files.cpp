@@ -9,9 +9,9 @@
 #include "tutti/formats/graph_stamps.hpp"
 #include "tutti/formats/ply.hpp"
 #include "tutti/formats/trajectory_file.hpp"
-#include "tutti/mission/report/colours.hpp"
 #include "tutti/mission/report/file_names.hpp"
 #include "tutti/mission/report/report.hpp"
+#include "tutti/program/page/colours.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -67,7 +67,9 @@ Status write_map(const MissionRecord& record, const fs::path& out_dir) {
     const auto robot = std::find_if(record.robots.begin(), record.robots.end(),
                                     [&](const RobotRecord& r) { return r.id == seen.robot; });
     points.insert(points.end(), seen.cloud.points.begin(), seen.cloud.points.end());
-    colours.resize(points.size(), robot_rgb(static_cast<std::size_t>(robot - record.robots.begin())));
+    const page::Colour& of_robot =
+        page::kOnLight[static_cast<std::size_t>(robot - record.robots.begin()) % page::kRobotColours];
+    colours.resize(points.size(), {of_robot[0], of_robot[1], of_robot[2]});
   }
   if (!points.empty())
     if (auto status = formats::write_ply((out_dir / "map.ply").string(), points, colours); !status) return status;

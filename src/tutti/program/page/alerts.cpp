@@ -13,7 +13,6 @@
 namespace tutti::page {
 namespace {
 
-constexpr double kSilent_s = 10.0;          // five statuses that did not come
 constexpr double kNoUpdate_s = 300.0;       // a robot that is heard, and does not use the map
 constexpr std::uint64_t kLongBacklog = 30;  // submaps, five minutes of mapping
 constexpr double kLowBattery_percent = 20.0;

@@ -34,7 +34,9 @@ struct Mission {
     v.field(5, "duration_s", duration_s);
   }
 };
+/// With what the page is to do as the program does: the robots' colours, and after how long one is silent.
 Message mission_message(const Mission& mission);
+inline constexpr double kSilent_s = 10.0;  ///< Five statuses that did not come.
 
 /// A problem, for people: what, where, since when, and what to do about it.
 struct Alert {

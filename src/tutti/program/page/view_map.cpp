@@ -10,6 +10,7 @@
 #include "tutti/mapfile/closures.hpp"
 #include "tutti/mapfile/placement.hpp"
 #include "tutti/program/field_json.hpp"
+#include "tutti/program/page/colours.hpp"
 #include "tutti/program/page/view.hpp"
 
 namespace tutti::page {
@@ -191,7 +192,12 @@ MapMessages map_messages(const ShownMap& map, const std::map<SubmapId, std::size
   return out;
 }
 
-Message mission_message(const Mission& mission) { return {"mission", 0.0, text_of(json_of_fields(mission))}; }
+Message mission_message(const Mission& mission) {
+  FieldJson out = json_of_fields(mission);
+  out["robot_silent_s"] = kSilent_s;
+  out["robot_colours"] = {{"light", kOnLight}, {"dark", kOnDark}};
+  return {"mission", 0.0, text_of(out)};
+}
 
 Message status_message(const MissionStatus& status) {
   return {"status", status.time - Timestamp{}, text_of(json_of_fields(status, status.time))};
