@@ -13,10 +13,12 @@ namespace tutti::mission {
 void ViewRecorder::take(const mapfile::ShownMap& map, const std::map<SubmapId, double>& sigma_m) {
   const double time_s = map.time - Timestamp{};
   const std::uint64_t before = board_.sequence();
-  page::MapMessages messages = page::map_messages(map, page::closures_holding(map.content.submaps, map.map), sigma_m);
+  const auto holding = page::closures_holding(map.content.submaps, map.map);
+  page::MapMessages messages = page::map_messages(map, holding, sigma_m);
   board_.put_all("submap/", std::move(messages.submaps), time_s);
   board_.put(std::move(messages.poses));
   board_.put_all("closure/", std::move(messages.closures), time_s);
+  board_.put(page::alerts_message(alerts_.of_map(map, holding), time_s));
   for (const auto& message : board_.after(before)) messages_.push_back(*message);
 }
 

@@ -9,6 +9,7 @@
 
 #include "tutti/mapfile/shown_map.hpp"
 #include "tutti/program/page/board.hpp"
+#include "tutti/program/page/view.hpp"
 #include "tutti/server/payload_store.hpp"
 
 namespace tutti::mission {
@@ -40,6 +41,7 @@ class ViewRecorder {
   std::size_t every_;
   std::size_t updates_ = 0;
   page::Board board_;
+  page::Alerts alerts_;  // of maps; robots' need statuses, which are sent to a running server alone
   std::vector<page::Message> messages_;
 };
 
