@@ -2,6 +2,7 @@
 /** The state of the page beside the store: what is looked at, when, by whom. */
 import { api, kNobody } from "./api";
 import { Clouds } from "./cloud";
+import { set_robot_colours } from "./colours";
 import { correction_at, robots_at, time_range } from "./derive";
 import type { Correction, RobotView } from "./derive";
 import { TIMES } from "./limits";
@@ -39,11 +40,16 @@ export class App {
   cursor: number | null = null;
   robots: RobotView[] = [];
   correction: Correction | null = null;
+  /** What somebody considers keeping would change. */
+  preview: Correction | null = null;
   dark = true;
   ready = false;
   /** Who decides, where nobody logs in. */
   by: string = memory.read("by", "");
+  /** The tab that is open. */
+  tab = "";
   private heard = { t: 0, ms: 0 };
+  private held = "";
   private cloud_waits = false;
   private listeners: ((topic: Topic) => void)[] = [];
 
@@ -55,7 +61,9 @@ export class App {
     if (!(this.phase in PHASES)) this.phase = "explore";
     this.options = default_options();
     this.store.on_change((changed) => {
-      if (changed.has("mission") && this.store.get("mission")?.mode === "compare") this.options.layers.estimates = true;
+      const mission = changed.has("mission") ? this.store.get("mission") : null;
+      if (mission?.mode === "compare") this.options.layers.estimates = true;
+      if (mission?.robot_colours) set_robot_colours(mission.robot_colours);
     });
     this.store.on_change(() => this.refresh("data"));
   }
@@ -81,6 +89,7 @@ export class App {
       },
     });
     setInterval(() => this.refresh("tick"), 1000);
+    setInterval(() => this.hold(), TIMES.hold_ms);
   }
 
   on(listener: (topic: Topic) => void): void {
@@ -106,6 +115,7 @@ export class App {
 
   select(selection: Selection): void {
     this.selection = selection;
+    this.hold();
     this.say("selection");
   }
   set_time(time: number | null): void {
@@ -142,6 +152,25 @@ export class App {
     } catch {
       // without an answer nothing is offered
     }
+  }
+
+  /** Who else looks at this now: a robot or a closure that two people decide on is to be known to both. */
+  holders(what: string): string[] {
+    return (this.store.get("held", this.at()) ?? []).filter((held) => held.what === what && held.by !== this.name()).map((held) => held.by);
+  }
+  /** As the server knows this person; "": it does not. */
+  name(): string {
+    return this.me.login ? this.me.name : this.by;
+  }
+  /** Says what this person looks at; nothing waits for it. */
+  private hold(): void {
+    const s = this.selection;
+    const what = s?.kind === "closure" ? `closure/${s.name}` : s?.kind === "robot" ? `robot/${s.number}` : "";
+    if (!this.may("hold") || this.name() === "" || (what === "" && this.held === "")) return;
+    this.held = what;
+    void api.hold(what, this.name()).catch(() => {
+      // the others do not see it then
+    });
   }
 
   robot_index(number: number): number {

@@ -2,11 +2,19 @@
 /** Colours of robots and scales. Hues keep apart under the common colour deficiencies. */
 export type Rgb = [number, number, number];
 
-const kDark: Rgb[] = [[79, 179, 255], [255, 138, 76], [47, 211, 160], [197, 139, 224], [224, 181, 65], [95, 211, 234], [244, 127, 181], [169, 200, 106]];
-const kLight: Rgb[] = [[15, 111, 181], [194, 65, 12], [11, 143, 106], [139, 63, 168], [166, 124, 0], [27, 155, 184], [194, 57, 122], [95, 125, 42]];
+export interface RobotColours {
+  light: Rgb[];
+  dark: Rgb[];
+}
+/** Grey until the program has said them. */
+let robots: RobotColours = { light: [[88, 97, 113]], dark: [[154, 164, 178]] };
+export const set_robot_colours = (colours: RobotColours): void => void (robots = colours);
 
 /** Colour of the robot at `index` of the robots in the order of their numbers. */
-export const robot_rgb = (index: number, dark: boolean): Rgb => (dark ? kDark : kLight)[index % kDark.length];
+export function robot_rgb(index: number, dark: boolean): Rgb {
+  const all = dark ? robots.dark : robots.light;
+  return all[index % all.length];
+}
 
 export const css = ([r, g, b]: Rgb, alpha = 1): string => `rgba(${r | 0},${g | 0},${b | 0},${alpha})`;
 export const abgr = ([r, g, b]: Rgb): number => (0xff000000 | (b << 16) | (g << 8) | (r | 0)) >>> 0;

@@ -2,6 +2,7 @@
 /** From JSON to the values of schema.ts; one function per kind of key, one table of all of them. */
 import { count, DecodeError, fields, list, maybe, maybe_list, number, numbers, one_of, text, words } from "./reading";
 import type { Fields } from "./reading";
+import type { Rgb, RobotColours } from "./colours";
 import { POSE_ROW } from "./schema";
 import type * as s from "./schema";
 
@@ -25,7 +26,18 @@ function mission(value: unknown): s.Mission {
     mode: f.mode === "report" || f.mode === "compare" ? f.mode : "live",
     duration_s: maybe(f.duration_s, "duration_s"),
     robots: maybe_list(f.robots, "robots", text),
+    robot_silent_s: maybe(f.robot_silent_s, "robot_silent_s") ?? Infinity,
+    robot_colours: robot_colours(f.robot_colours),
   };
+}
+
+function robot_colours(value: unknown): RobotColours | null {
+  if (value === null || value === undefined) return null;
+  const f = fields(value, "robot_colours");
+  const all = (of: unknown, what: string) => list(of, what, (one) => numbers<Rgb>(one, what, 3));
+  const out = { light: all(f.light, "light"), dark: all(f.dark, "dark") };
+  if (out.light.length === 0 || out.dark.length === 0) throw new DecodeError("robot_colours: expected some");
+  return out;
 }
 
 function position(value: unknown): s.Vec3 | null {
@@ -235,8 +247,8 @@ function survey(value: unknown): s.Survey {
   return { component: count(f.component, "component"), cloud: text(f.cloud, "cloud") };
 }
 
-/** Photos are pictures inside the message; anything else could be fetched from elsewhere. */
-export const is_photo = (url: string): boolean => /^data:image\/(jpeg|png|webp);base64,[A-Za-z0-9+/=]*$/.test(url);
+/** Photos are the server's, or pictures inside the message; anything else could be fetched from elsewhere. */
+export const is_photo = (url: string): boolean => /^(\/api\/photo\/\d{1,20}|data:image\/(jpeg|png);base64,[A-Za-z0-9+/=]*)$/.test(url);
 
 function mark(value: unknown): s.Mark {
   const f = fields(value, "mark");
@@ -249,6 +261,19 @@ function mark(value: unknown): s.Mark {
     wall_ns: maybe(f.wall_ns, "wall_ns"),
     photo: typeof f.photo === "string" && is_photo(f.photo) ? f.photo : null,
   };
+}
+
+function held(value: unknown, what: string): s.Held {
+  const f = fields(value, what);
+  return { by: text(f.by, "by"), what: text(f.what, "what") };
+}
+
+function radio(value: unknown): Map<number, s.RadioBytes> {
+  const sums = (of: unknown) => Object.fromEntries(Object.entries(of === undefined ? {} : fields(of, "radio")).map(([kind, bytes]) => [kind, number(bytes, kind)]));
+  return new Map(Object.entries(fields(value, "radio")).map(([robot, of]) => {
+    const f = fields(of, robot);
+    return [Number(robot), { up: sums(f.up), down: sums(f.down) }];
+  }));
 }
 
 /** Every kind of key and what reads its values. */
@@ -270,6 +295,8 @@ export const DECODERS: { [K in s.Kind]: (value: unknown, ids: IdTable) => s.Valu
   compare: (value) => fields(value, "compare"),
   odometry: (value) => new Map(Object.entries(fields(fields(value, "odometry").submaps, "submaps")).map(([id, T]) => [id, pose(T, id)])),
   mark,
+  held: (value) => list(value, "held", held),
+  radio,
 };
 
 export function decode_me(value: unknown): s.Me {
@@ -292,7 +319,7 @@ export function decode_registration(value: unknown): s.Registration {
     why: words(f.why, "why"),
     T_from_to: f.T_from_to ? pose(f.T_from_to, "T_from_to") : null,
     evidence: maybe_list(f.evidence, "evidence", gate),
-    map_change_m: maybe(f.map_change_m, "map_change_m"),
+    look: maybe(f.look, "look"),
   };
 }
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /** What follows from the store and is in no message: where robots may be, when backlogs are empty, what a correction moved. */
 import { REACH_M, SLOWEST_MPS, TIMES } from "./limits";
-import { distance } from "./pose";
+import { compose, distance, inverse } from "./pose";
 import { POSE_ROW } from "./schema";
-import type { Poses, RobotStatus, Submap, SubmapId } from "./schema";
+import type { Pose, Poses, RobotStatus, Submap, SubmapId } from "./schema";
 import type { Store } from "./store";
 
 export type Presence = "here" | "silent" | "lost" | "finished" | "unknown";
@@ -59,7 +59,7 @@ function view_of(store: Store, t: number, age_s: number, number: number, index: 
   submaps.sort((a, b) => a.until_s - b.until_s);
   const newest = submaps.at(-1) ?? null;
   const silent_s = status?.last_seen_s_ago == null ? null : status.last_seen_s_ago + age_s;
-  const presence = presence_of(status, silent_s);
+  const presence = presence_of(status, silent_s, silent_after(store));
   const speed_mps = speed_of(submaps.slice(-3));
   const away = presence === "silent" || presence === "lost";
   const name = status?.name || newest?.name.split("/")[0] || otherwise || `robot ${number}`;
@@ -67,10 +67,13 @@ function view_of(store: Store, t: number, age_s: number, number: number, index: 
   return { number, index, name, status, presence, silent_s, newest, submaps: submaps.length, speed_mps, reach_m, drain: drain_of(store, t, number) };
 }
 
-function presence_of(status: RobotStatus | null, silent_s: number | null): Presence {
+/** As the program says it, whose alerts follow from the same. */
+export const silent_after = (store: Store): number => store.get("mission")?.robot_silent_s ?? Infinity;
+
+function presence_of(status: RobotStatus | null, silent_s: number | null, silent_after_s: number): Presence {
   if (!status || silent_s === null) return "unknown";
   if (status.finished && status.backlog_submaps === 0) return "finished";
-  if (silent_s < TIMES.robot_silent_s) return "here";
+  if (silent_s < silent_after_s) return "here";
   return silent_s < TIMES.robot_lost_s ? "silent" : "lost";
 }
 
@@ -101,6 +104,7 @@ export function drain_of(store: Store, t: number, robot: number): Drain {
 
 export interface Correction {
   t: number;
+  /** Each part as it was, laid where its first submap is now. */
   before: Poses;
   after: Poses;
   /** How far each submap moved, by place; NaN: not comparable. */
@@ -109,6 +113,8 @@ export interface Correction {
   largest: SubmapId;
   /** Parts of the map that became one. */
   joined: number;
+  /** By part after it: the part before it whose frame it has. */
+  keeper: Map<number, number>;
 }
 
 /** What the newest poses at t changed; null when nothing did. */
@@ -119,32 +125,49 @@ export function correction_at(store: Store, t: number): Correction | null {
   return correction_between(store, track!.times[i], track!.values[i - 1]!, track!.values[i]!);
 }
 
+/** By part: how many submaps it has in common with each part of the other map. */
+function common_parts(n: number, of: Poses, other: Poses): Map<number, Map<number, number>> {
+  const out = new Map<number, Map<number, number>>();
+  for (let p = 0; p < n; ++p) {
+    const [here, there] = [of.rows[p * POSE_ROW], other.rows[p * POSE_ROW]];
+    if (!Number.isFinite(here) || !Number.isFinite(there)) continue;
+    const parts = out.get(here) ?? new Map<number, number>();
+    parts.set(there, (parts.get(there) ?? 0) + 1);
+    out.set(here, parts);
+  }
+  return out;
+}
+
+/** By part: the part of the other map that most of it is in. */
+const most_of = (common: Map<number, Map<number, number>>): Map<number, number> =>
+  new Map([...common].map(([part, parts]) => [part, [...parts].sort((a, b) => b[1] - a[1] || a[0] - b[0])[0][0]]));
+
 /**
  * Distances make sense inside one frame only: of the old parts that are now in one, the largest keeps its frame; the
- * others were joined to it.
+ * others were joined to it. Where a part as a whole lies is nobody's choice, so it is seen from its first submap.
  */
-export function correction_between(store: Store, t: number, before: Poses, after: Poses): Correction {
-  const n = Math.min(before.rows.length, after.rows.length) / POSE_ROW;
-  const sizes = new Map<number, Map<number, number>>();
-  for (let p = 0; p < n; ++p) {
-    const [was, is] = [before.rows[p * POSE_ROW], after.rows[p * POSE_ROW]];
-    if (!Number.isFinite(was) || !Number.isFinite(is)) continue;
-    const parts = sizes.get(is) ?? new Map<number, number>();
-    parts.set(was, (parts.get(was) ?? 0) + 1);
-    sizes.set(is, parts);
-  }
-  const keeper = new Map([...sizes].map(([is, parts]) => [is, [...parts].sort((a, b) => b[1] - a[1] || a[0] - b[0])[0][0]]));
+export function correction_between(store: Store, t: number, was: Poses, after: Poses): Correction {
+  const n = Math.min(was.rows.length, after.rows.length) / POSE_ROW;
+  const sizes = common_parts(n, after, was);
+  const keeper = most_of(sizes);
+  const heir = most_of(common_parts(n, was, after));
+  const before: Poses = { ...was, rows: was.rows.slice() };
+  const shift = new Map<number, Pose>();
   const moved_m = new Float64Array(n).fill(Number.NaN);
   let largest_m = 0;
   let largest = "";
   for (let p = 0; p < n; ++p) {
     const at = p * POSE_ROW;
-    if (keeper.get(after.rows[at]) !== before.rows[at]) continue;
+    const [part, old] = [after.rows[at], was.rows[at]];
+    if (keeper.get(part) !== old || heir.get(old) !== part) continue;
+    const [now, then] = [after.rows.subarray(at + 1, at + 8), was.rows.subarray(at + 1, at + 8)].map((row) => Array.from(row));
+    if (!shift.has(part)) shift.set(part, compose(now, inverse(then)));
+    before.rows.set(compose(shift.get(part)!, then), at + 1);
     moved_m[p] = distance(before.rows.subarray(at + 1, at + 4) as unknown as number[], after.rows.subarray(at + 1, at + 4) as unknown as number[]);
     if (moved_m[p] > largest_m) [largest_m, largest] = [moved_m[p], store.id_at(p)];
   }
   const joined = [...sizes.values()].reduce((sum, parts) => sum + parts.size - 1, 0);
-  return { t, before, after, moved_m, largest_m, largest, joined };
+  return { t, before, after, moved_m, largest_m, largest, joined, keeper };
 }
 
 /** Ways between the mission's first and last message, for the time line. */

@@ -2,7 +2,7 @@
 /** The mission so far as one file, to hand over: this page, with everything that it knows in it. */
 import type { App } from "./app";
 import { base64_of_cloud } from "./cloud";
-import type { Disagreement, Kind, Mission, Poses, Status } from "./schema";
+import type { Disagreement, Kind, Mark, Mission, Poses, Status } from "./schema";
 import { POSE_ROW } from "./schema";
 import { MISSION_ELEMENT } from "./sources/inlined";
 import type { Store } from "./store";
@@ -31,9 +31,24 @@ export async function saved_page(app: App): Promise<string> {
   const [before, after] = (await answer.text()).split(slot(""));
   if (after === undefined) throw new Error("The server's page has no place for a mission.");
   const messages: unknown[] = [];
-  for (const { key, kind, t, value } of app.store.everything()) messages.push({ key, t, value: value === null ? null : (ENCODERS[kind]?.(value as never, app.store) ?? value) });
+  for (const { key, kind, t, value } of app.store.everything()) {
+    const said = value === null ? null : (ENCODERS[kind]?.(value as never, app.store) ?? value);
+    messages.push({ key, t, value: kind === "mark" && said !== null ? await with_photo(said as Mark) : said });
+  }
   const clouds = Object.fromEntries([...app.clouds].map(([name, cloud]) => [name, base64_of_cloud(cloud)]));
   return before + slot(JSON.stringify({ messages, clouds }).replaceAll("<", "\\u003c")) + after;
+}
+
+/** Its photo is in it; one that has gone meanwhile is left out. */
+async function with_photo(mark: Mark): Promise<Mark> {
+  if (mark.photo === null || mark.photo.startsWith("data:")) return mark;
+  const answer = await fetch(mark.photo);
+  if (!answer.ok) return { ...mark, photo: null };
+  const photo = await answer.blob();
+  return { ...mark, photo: await new Promise<string>((resolve, reject) => {
+    const reader = Object.assign(new FileReader(), { onload: () => resolve(String(reader.result)), onerror: () => reject(reader.error!) });
+    reader.readAsDataURL(photo);
+  }) };
 }
 
 /** Made of pieces: the page itself has this text exactly once. */

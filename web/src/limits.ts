@@ -20,6 +20,8 @@ export const LIMITS = {
     compare: 1,
     odometry: 1,
     mark: 8,
+    held: 1,
+    radio: 40,
   },
   /** Most keys of one kind; beyond, the oldest goes. */
   keys: 20_000,
@@ -39,8 +41,8 @@ export const TIMES = {
   /** The server sends a sign of life every second. */
   server_silent_s: 3,
   reconnect_ms: 400,
-  /** Robots report every two seconds. */
-  robot_silent_s: 7,
+  /** The server tells its status every two seconds. */
+  status_old_s: 14,
   robot_lost_s: 60,
   /** Over which the drain of a backlog is measured. */
   drain_window_s: 60,
@@ -54,6 +56,10 @@ export const TIMES = {
   /** What a picture that moves may take. */
   moving_ms: 24,
   answer_ms: 20_000,
+  /** The map is made once more to say what a closure by hand would change. */
+  change_ms: 300_000,
+  /** The server forgets who looks at what after three times this. */
+  hold_ms: 10_000,
 } as const;
 
 /** A silent robot is somewhere in a circle: the speed it had, times its silence, at most this. */

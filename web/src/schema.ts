@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /** What the program tells the page: {key, t, value}. A key is KIND or KIND/NAME. */
+import type { RobotColours } from "./colours";
 
 /** "ROBOT:SESSION/INDEX"; text, because a session may have 64 bits. */
 export type SubmapId = string;
@@ -20,6 +21,9 @@ export interface Mission {
   mode: "live" | "report" | "compare";
   duration_s: number | null;
   robots: string[];
+  /** A robot that was not heard for so long is silent. */
+  robot_silent_s: number;
+  robot_colours: RobotColours | null;
 }
 
 /** Of a robot's status, what the page shows. */
@@ -191,6 +195,19 @@ export interface Mark {
   photo: string | null;
 }
 
+/** Who is looking at what now. */
+export interface Held {
+  by: string;
+  /** A key: closure/NAME or robot/NUMBER. */
+  what: string;
+}
+
+/** Bytes since the server's start, by kind of message. */
+export interface RadioBytes {
+  up: Record<string, number>;
+  down: Record<string, number>;
+}
+
 /** The types of values by kind of key. */
 export interface Values {
   mission: Mission;
@@ -212,13 +229,15 @@ export interface Values {
   compare: Report;
   odometry: Map<SubmapId, Pose>;
   mark: Mark;
+  held: Held[];
+  radio: Map<number, RadioBytes>;
 }
 export type Kind = keyof Values;
 
 /** report.json and timing.json of docs/report.md; read where they are shown. */
 export type Report = Record<string, unknown>;
 
-export type Offer = "decide" | "register" | "closure" | "mark" | "why" | "disagreement";
+export type Offer = "decide" | "register" | "closure" | "mark" | "hold" | "why" | "disagreement";
 export interface Me {
   login: boolean;
   name: string;
@@ -234,7 +253,8 @@ export interface Registration {
   why: string;
   T_from_to: Pose | null;
   evidence: Gate[];
-  map_change_m: number | null;
+  /** What to ask for the map with it by; null: nothing was found. */
+  look: number | null;
 }
 
 export interface Why {

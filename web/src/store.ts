@@ -3,7 +3,7 @@
 import { DECODERS } from "./decode";
 import { LIMITS } from "./limits";
 import { DecodeError } from "./reading";
-import type { Kind, Message, Values } from "./schema";
+import type { Kind, Message, Poses, Values } from "./schema";
 import { Track } from "./track";
 
 export type Listener = (changed: ReadonlySet<Kind>) => void;
@@ -95,6 +95,11 @@ export class Store {
     for (const [kind, named] of this.tracks)
       for (const [name, track] of named) track.times.forEach((t, i) => out.push({ key: name === "" ? kind : `${kind}/${name}`, kind, t, value: track.values[i] }));
     return out.sort((a, b) => a.t - b.t);
+  }
+
+  /** Poses that no message has, such as those of a map that might be. */
+  read_poses(value: unknown): Poses {
+    return DECODERS.poses(value, { place: (id) => this.place(id) });
   }
 
   /** Place of a submap in the rows of poses; -1 when it is in none. */

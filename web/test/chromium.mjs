@@ -44,7 +44,7 @@ export class Page {
   }
   async until(what, condition, argument, timeout = 30_000) {
     await this.page.waitForFunction(condition, { timeout, polling: 50 }, argument).catch(async () => {
-      throw new Error(`not seen within ${timeout} ms: ${what}. The page: ${(await this.page.evaluate(() => document.body.innerText)).slice(0, 600)} ${this.errors.join("; ")}`);
+      throw new Error(`not seen within ${timeout} ms: ${what}. The page: ${(await this.page.evaluate(() => document.body.innerText)).slice(-1200)} ${this.errors.join("; ")}`);
     });
   }
   texts(selector) {

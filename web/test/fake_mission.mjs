@@ -56,6 +56,9 @@ export function cloud_of(robot, index, points, speed = 0.9) {
   return bytes;
 }
 
+/** As the program says them. */
+export const kSaid = { robot_silent_s: 10, robot_colours: { light: [[15, 111, 181], [194, 65, 12], [11, 143, 106]], dark: [[79, 179, 255], [255, 138, 76], [47, 211, 160]] } };
+
 export class FakeMission {
   constructor({ robots = ["alpha", "bravo", "charlie"], submaps = 24, points = 6000, apart = [2], name = "adit north" } = {}) {
     Object.assign(this, { robots, points, name });
@@ -168,7 +171,7 @@ export class FakeMission {
 
   /** All that is known now. */
   everything() {
-    const out = [this.message("mission", { name: this.name, description: "Three robots in a made-up mine.", version: "0.3.0", mode: "live", duration_s: null, robots: this.robots })];
+    const out = [this.message("mission", { name: this.name, description: "Three robots in a made-up mine.", version: "0.3.0", mode: "live", duration_s: null, robots: this.robots, ...kSaid })];
     for (const s of this.submaps) out.push({ key: `submap/${s.id}`, t: s.until_s, value: s });
     out.push(this.message("poses", this.poses()), this.message("status", this.status()), this.message("alerts", this.alerts()));
     for (const c of this.closures.values()) out.push(this.message(`closure/${c.name}`, c));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A made-up mission as a file, as `tutti run` writes its report.html. By hand: node web/test/fake_report.mjs OUT.html
 import { readFileSync, writeFileSync } from "node:fs";
-import { FakeMission } from "./fake_mission.mjs";
+import { FakeMission, kSaid } from "./fake_mission.mjs";
 
 const read = (name) => readFileSync(new URL(name, import.meta.url), "utf8");
 const kSlot = '<script type="application/json" id="tutti-mission"></script>';
@@ -19,7 +19,7 @@ export function recorded_mission({ robots = ["alpha", "bravo"], submaps = 36, po
   const clouds = {};
   const say = (key, value) => messages.push(mission.message(key, value));
   mission.time = 0;
-  say("mission", { name, description: "Two robots in a made-up mine.", version: "0.3.0", mode: "report", duration_s: submaps * 10, robots });
+  say("mission", { name, description: "Two robots in a made-up mine.", version: "0.3.0", mode: "report", duration_s: submaps * 10, robots, ...kSaid });
   for (let i = 0; i < submaps; ++i) {
     mission.time = 10 * (i + 1);
     for (let r = 0; r < robots.length; ++r) {

@@ -5,14 +5,16 @@ import { createServer } from "node:http";
 import { FakeMission, relative } from "./fake_mission.mjs";
 
 const kPage = new URL("../dist/index.html", import.meta.url);
-const kPolicy = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'; img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+const kPolicy = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'; img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 export class FakeServer {
   constructor(mission = new FakeMission(), options = {}) {
     this.mission = mission;
-    this.me = { login: false, name: "", role: null, mission: mission.name, may_decide: true, nonce: "n", offers: ["decide", "register", "closure", "mark", "why", "disagreement"], ...options.me };
+    this.me = { login: false, name: "", role: null, mission: mission.name, may_decide: true, nonce: "n", offers: ["decide", "register", "closure", "mark", "hold", "why", "disagreement"], ...options.me };
     this.incarnation = 1;
     this.listeners = new Set();
+    this.held = new Map();
+    this.photos = new Map();
     this.asked = []; // POST requests, for tests
     this.events = 0;
   }
@@ -62,6 +64,7 @@ export class FakeServer {
       const [, , , robot, , index] = url.pathname.split("/");
       return response.writeHead(200, { "Content-Type": "application/octet-stream", "Cache-Control": "immutable" }).end(this.mission.cloud(Number(robot), Number(index)));
     }
+    if (url.pathname.startsWith("/api/photo/")) return response.writeHead(200, { "Content-Type": "image/jpeg" }).end(this.photos.get(url.pathname.split("/").at(-1)));
     if (url.pathname === "/api/why") return this.say(response, 200, this.why(url.searchParams));
     if (request.method !== "POST" || request.headers["x-tutti"] !== "1") return this.say(response, 404, { error: "Not offered." });
     let text = "";
@@ -102,7 +105,20 @@ export class FakeServer {
       const [a, b] = [submap(body.from), submap(body.to)];
       const T = relative(mission.truth(a.robot, a.index), mission.truth(b.robot, b.index));
       const found = Math.hypot(T[0], T[1]) < 15;
-      return ok({ found, why: found ? "Both clouds fit." : "no alignment comes near", T_from_to: T, evidence: [{ reason: "overlap", value: found ? 0.55 : 0.04, limit: 0.3, unit: "", at_least: true, ok: found }, { reason: "plane RMSE", value: 0.05, limit: 0.12, unit: "m", ok: true }], map_change_m: found ? 2.7 : null });
+      return ok({ found, why: found ? "Both clouds fit." : "no alignment comes near", T_from_to: T, evidence: [{ reason: "overlap", value: found ? 0.55 : 0.04, limit: 0.3, unit: "", at_least: true, ok: found }, { reason: "plane RMSE", value: 0.05, limit: 0.12, unit: "m", ok: true }], look: found ? 1 : null });
+    }
+    if (path === "/api/change") {
+      const [apart, wobble] = [mission.apart, mission.wobble];
+      Object.assign(mission, { apart: new Set(), wobble: 0.1 });
+      const poses = mission.poses();
+      Object.assign(mission, { apart, wobble });
+      return ok({ poses });
+    }
+    if (path === "/api/hold") {
+      if (body.what) this.held.set(body.by, body.what);
+      else this.held.delete(body.by);
+      this.send(mission.message("held", [...this.held].map(([by, what]) => ({ by, what }))));
+      return ok();
     }
     if (path === "/api/closure") {
       const [a, b] = [submap(body.from), submap(body.to)];
@@ -111,8 +127,9 @@ export class FakeServer {
       return ok({ name });
     }
     if (path === "/api/mark") {
-      const id = `m${mission.marks.size + 1}`;
-      const mark = { id, ...body, wall_ns: Date.now() * 1e6 };
+      const id = String(1e6 + mission.marks.size);
+      if (body.photo) this.photos.set(id, Buffer.from(body.photo.split(",")[1], "base64"));
+      const mark = { id, ...body, photo: body.photo ? `/api/photo/${id}` : null, wall_ns: Date.now() * 1e6 };
       mission.marks.set(id, mark);
       this.send(mission.message(`mark/${id}`, mark));
       return ok({ id });

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Pictures of the page. usage: screenshots.mjs OUT [REPORT.html]
+// Pictures of the page. usage: screenshots.mjs OUT [report|live URL]
 import { join } from "node:path";
 import { Browser } from "./chromium.mjs";
 import { FakeMission } from "./fake_mission.mjs";
 import { FakeServer } from "./fake_server.mjs";
 
-const [, , out, report] = process.argv;
+const [, , out, what, url] = process.argv;
 const browser = await Browser.launch();
 
 /** One picture: where, what is done before it, how large. */
@@ -28,8 +28,16 @@ async function live(name, steps, size) {
 }
 
 const nothing = () => {};
-if (report) {
-  const url = `file://${report}`;
+if (what === "live") {
+  await picture("room", url, async (page) => {
+    await page.click(".robot .who");
+    await page.evaluate(() => tutti.view.fit());
+  });
+  await picture("room_closure", url, async (page) => {
+    await page.press("Closures");
+    await page.click(".closure");
+  });
+} else if (what === "report") {
   await picture("report", url, nothing);
   await picture("report_drift", url, async (page) => {
     await page.evaluate(() => document.querySelector(".report .plot")?.scrollIntoView({ block: "center" }));

@@ -2,6 +2,7 @@
 /** Everything over the points: tracks, closures, robots, circles, ghosts, marks, scales. */
 import type { App } from "../app";
 import { css, robot_rgb } from "../colours";
+import type { Correction } from "../derive";
 import { metres, moment, span } from "../format";
 import { TIMES } from "../limits";
 import { distance, transform } from "../pose";
@@ -38,7 +39,8 @@ export function draw_picture(app: App, ink: Ink): void {
   if (layers.estimates) draw_estimates(app, ink, palette);
   if (layers.tracks) draw_tracks(app, ink);
   draw_closures(app, ink, palette);
-  if (app.shows_ghost()) draw_ghost(app, ink, palette);
+  if (app.preview && app.tab === "by hand") draw_preview(app, app.preview, ink, palette);
+  else if (app.shows_ghost()) draw_ghost(app, ink, palette);
   draw_selection(app, ink, palette);
   if (layers.robots || layers.reach) draw_robots(app, ink, palette);
   if (layers.marks) draw_marks(app, ink, palette);
@@ -160,6 +162,24 @@ function draw_ghost(app: App, ink: Ink, palette: Palette): void {
   }
   const at = app.world.placed.get(largest);
   if (at) ink.label(transform(at.T, at.submap.path[at.submap.path.length >> 1] ?? [0, 0, 0]), `corrected by ${metres(largest_m)}`, palette.ghost, palette.halo, undefined, true);
+}
+
+/** Where everything would be if a closure by hand were kept; parts that it joins come to the part that keeps its frame. */
+function draw_preview(app: App, { before, after, moved_m, largest, largest_m, keeper }: Correction, ink: Ink, palette: Palette): void {
+  for (const [id, placed] of app.world.placed) {
+    const at = app.store.place_of(id) * POSE_ROW;
+    const part = keeper.get(after.rows[at]);
+    if (part === undefined || !(moved_m[at / POSE_ROW] > TIMES.ghost_m || part !== before.rows[at])) continue;
+    const offset = app.world.offset_of(part);
+    const next = Array.from(after.rows.subarray(at + 1, at + 8), (x, k) => x + (offset[k] ?? 0));
+    const points = placed.submap.path.map((p) => transform(next, p));
+    ink.line(points, { colour: palette.ghost, width: 1.6, dash: [4, 4] });
+    const middle = points.length >> 1;
+    const now = app.world.point(id, placed.submap.path[middle] ?? [0, 0, 0]);
+    if (points[middle] && now && part === before.rows[at]) ink.line([now, points[middle]], { colour: palette.ghost, width: 1 });
+  }
+  const at = app.world.placed.get(largest);
+  if (at && largest_m > TIMES.ghost_m) ink.label(transform(at.T, at.submap.path[at.submap.path.length >> 1] ?? [0, 0, 0]), `would move by ${metres(largest_m)}`, palette.ghost, palette.halo, undefined, true);
 }
 
 function draw_marks(app: App, ink: Ink, palette: Palette): void {

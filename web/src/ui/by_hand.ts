@@ -2,7 +2,9 @@
 /** A closure by hand: pick two places, register them, see both clouds and how the map would change, keep it or not, undo it. */
 import { api } from "../api";
 import type { App } from "../app";
-import { metres } from "../format";
+import { correction_between } from "../derive";
+import { many, metres } from "../format";
+import { TIMES } from "../limits";
 import { compose, inverse, kIdentity } from "../pose";
 import type { Pose, Registration, SubmapId } from "../schema";
 import type { Ink } from "../scene/ink";
@@ -19,14 +21,22 @@ interface Draft {
   /** Where the second is laid before it is registered; null: Tutti searches. */
   guess: Pose | null;
   answer: Registration | null;
+  /** Why it is not known what it would change; "": it is, or is being computed. */
+  change_why: string;
   /** Name of the closure, once it is kept. */
   kept: string | null;
   busy: boolean;
 }
-const draft: Draft = { from: null, to: null, guess: null, answer: null, kept: null, busy: false };
+const draft: Draft = { from: null, to: null, guess: null, answer: null, change_why: "", kept: null, busy: false };
 
 export function propose(app: App, from: SubmapId, to: SubmapId): void {
-  Object.assign(draft, { from, to, guess: null, answer: null, kept: null });
+  begin(app, { from, to });
+}
+
+/** Another pair, or another place for it: what was found before holds no more. */
+function begin(app: App, change: Partial<Draft>): void {
+  Object.assign(draft, { guess: null, answer: null, kept: null, change_why: "" }, change);
+  app.preview = null;
   app.say("tool");
 }
 
@@ -48,9 +58,7 @@ class Pick implements Tool {
 }
 
 function set_end(app: App, end: "from" | "to", id: SubmapId | null): void {
-  draft[end] = id;
-  Object.assign(draft, { guess: null, answer: null, kept: null });
-  app.say("tool");
+  begin(app, { [end]: id });
 }
 
 export function by_hand_panel(app: App, view: View): HTMLElement {
@@ -90,9 +98,8 @@ function nudges(app: App): Child {
     const yaw = (degrees * Math.PI) / 360;
     const base = draft.answer?.T_from_to ?? draft.guess ?? start_of(app);
     const turned = compose(base, [0, 0, 0, 0, 0, Math.sin(yaw), Math.cos(yaw)]);
-    draft.guess = [turned[0] + x, turned[1] + y, turned[2], turned[3], turned[4], turned[5], turned[6]];
-    draft.answer = null;
-    app.say("tool");
+    const guess: Pose = [turned[0] + x, turned[1] + y, turned[2], turned[3], turned[4], turned[5], turned[6]];
+    begin(app, { guess });
   };
   const nudge = (text: string, title: string, x: number, y: number, degrees: number) => button(text, () => move(x, y, degrees), { key: `nudge ${title}`, title, "aria-label": title, class: "square" });
   return h("div", { class: "row" }, h("span", { class: "soft" }, "Lay the second"), nudge("←", "1 m left", -1, 0, 0), nudge("→", "1 m right", 1, 0, 0), nudge("↑", "1 m forward", 0, 1, 0), nudge("↓", "1 m back", 0, -1, 0), nudge("⟲", "10° to the left", 0, 0, 10), nudge("⟳", "10° to the right", 0, 0, -10));
@@ -108,7 +115,7 @@ function ask_row(app: App): Child {
   if (draft.kept) return null;
   const label = draft.busy ? "Registering …" : draft.guess ? "Register from here" : "Register";
   return h("div", { class: "row" }, button(label, () => void register(app), { key: "register", class: draft.answer ? "" : "primary", disabled: draft.busy || !app.may("register") }),
-    draft.guess ? button("Let Tutti search", () => (Object.assign(draft, { guess: null, answer: null }), app.say("tool")), { class: "plain" }) : null);
+    draft.guess ? button("Let Tutti search", () => begin(app, {}), { class: "plain" }) : null);
 }
 
 async function register(app: App): Promise<void> {
@@ -117,10 +124,42 @@ async function register(app: App): Promise<void> {
   app.say("tool");
   await attempt(async () => {
     const answer = await api.register(from!, to!, guess);
-    if (draft.from === from && draft.to === to) draft.answer = answer;
+    if (draft.from !== from || draft.to !== to) return;
+    draft.answer = answer;
+    if (answer.look !== null) void change(app, answer);
   });
   draft.busy = false;
   app.say("tool");
+}
+
+/** The map as it would be; it comes when it is there, and nothing waits for it. */
+async function change(app: App, answer: Registration): Promise<void> {
+  try {
+    const after = app.store.read_poses(await api.change(answer.look!));
+    const before = app.store.get("poses");
+    if (draft.answer !== answer || draft.kept || !before) return;
+    app.preview = correction_between(app.store, app.now(), before, after);
+  } catch (error) {
+    draft.change_why = error instanceof Error ? error.message : String(error);
+  }
+  app.say("tool");
+}
+
+/** How far the map would move: largest, where, and per robot. */
+function change_words(app: App): Child {
+  const change = app.preview;
+  if (!change) return h("p", { class: "soft" }, draft.change_why || "Computing what it would change …");
+  const per_robot = new Map<number, number>();
+  for (const [id, { submap }] of app.world.placed) {
+    const moved = change.moved_m[app.store.place_of(id)];
+    if (moved > 0) per_robot.set(submap.robot, Math.max(per_robot.get(submap.robot) ?? 0, moved));
+  }
+  return [
+    change.joined > 0 ? h("p", {}, `It would join ${many(change.joined + 1, "part")} of the map.`) : null,
+    change.largest_m > TIMES.ghost_m
+      ? h("p", {}, "The map would move by up to ", h("b", {}, metres(change.largest_m)), ` (${app.submap_name(change.largest)}); `, [...per_robot].map(([robot, m]) => `${app.robot_name(robot)} ${metres(m)}`).join(", "), ". Dashed lines show where to.")
+      : h("p", {}, `What is joined already would move by less than ${metres(TIMES.ghost_m)}.`),
+  ];
 }
 
 function answer(app: App, found: Registration): Child {
@@ -128,7 +167,7 @@ function answer(app: App, found: Registration): Child {
   const may_keep = found.T_from_to && app.may("closure") && !draft.kept;
   return [
     h("p", { class: `state ${fits ? "" : "warn"}` }, h("b", {}, fits ? "They fit." : found.found ? "Tutti would refuse this:" : "They do not fit."), ` ${found.why}`),
-    found.map_change_m === null ? null : h("p", {}, "The map would change by up to ", h("b", {}, metres(found.map_change_m)), "."),
+    found.look === null || draft.kept ? null : change_words(app),
     gates(found.evidence),
     may_keep ? h("div", { class: "row decide" }, button(fits ? "Keep it in the map" : "Keep it all the same", () => void keep(app), { key: "keep", class: fits ? "primary" : "danger" })) : null,
   ];
@@ -140,6 +179,7 @@ async function keep(app: App): Promise<void> {
   const { from, to, answer: found } = draft;
   await attempt(async () => {
     draft.kept = await api.keep_closure(from!, to!, found!.T_from_to!, by);
+    app.preview = null;
     notice("Kept. The map follows with the next update.");
   });
   app.say("tool");

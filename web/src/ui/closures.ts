@@ -6,7 +6,7 @@ import { LIMITS } from "../limits";
 import type { Closure, ClosureState } from "../schema";
 import { ends_of, palette_of, state_colour } from "../scene/picture";
 import type { View } from "../scene/view";
-import { button, h, panel, swatch } from "./dom";
+import { button, h, held, panel, swatch } from "./dom";
 import type { Child } from "./dom";
 
 export const STATE_WORDS: Record<ClosureState, string> = { accepted: "in the map", candidate: "waiting", rejected: "refused" };
@@ -59,6 +59,7 @@ function row(app: App, view: View, name: string, closure: Closure): HTMLElement 
   } } },
     h("span", { class: "line" }, swatch(state_colour(palette, closure.state)), h("b", {}, pair_name(app, closure)), h("span", { class: "seen" }, closure.by_hand ? "by hand" : misfit == null ? STATE_WORDS[closure.state] : `off ${figure(misfit, "m")}`)),
     closure.state !== "accepted" && closure.reason ? h("span", { class: "detail" }, closure.reason) : null,
+    held(app, `closure/${name}`),
     closure.word ? h("span", { class: "detail" }, `${closure.word.by || "somebody"}: ${closure.word.wish}`) : null);
 }
 

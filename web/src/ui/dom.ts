@@ -43,6 +43,12 @@ export function swatch(colour: string): HTMLElement {
   return h("span", { class: "swatch", style: { background: colour } });
 }
 
+/** Who else looks at something now. */
+export function held(app: App, what: string): Child {
+  const names = app.holders(what);
+  return names.length === 0 ? null : h("span", { class: "detail held" }, `${names.join(", ")} ${names.length === 1 ? "looks" : "look"} at this`);
+}
+
 const kIcons = {
   link: "M2 6.5a8.5 8.5 0 0 1 12 0M4.4 9a5 5 0 0 1 7.2 0M8 12.2h.01",
   joined: "M6.5 9.5l3-3M7 4.6l1-1a3 3 0 0 1 4.3 4.3l-1 1M9 11.4l-1 1A3 3 0 0 1 3.7 8.1l1-1",
@@ -94,7 +100,7 @@ export function panel(app: App, topics: readonly Topic[], props: Props, render: 
     stale = !element.isConnected || element.closest("[hidden]") !== null;
     if (stale) return;
     const active = document.activeElement;
-    if (active && element.contains(active) && /^(INPUT|TEXTAREA|SELECT)$/.test(active.tagName) && active.getAttribute("type") !== "checkbox") {
+    if (active && element.contains(active) && /^(INPUT|TEXTAREA|SELECT)$/.test(active.tagName) && !/^(checkbox|file)$/.test(active.getAttribute("type") ?? "")) {
       stale = true; // somebody is typing
       return;
     }

@@ -8,7 +8,7 @@ import type { Closure, Gate, Link, Wish } from "../schema";
 import { kPairColours, PairView } from "../scene/pair_view";
 import { palette_of, state_colour } from "../scene/picture";
 import { pair_name, STATE_WORDS } from "./closures";
-import { attempt, button, h, notice, panel, swatch } from "./dom";
+import { attempt, button, h, held, notice, panel, swatch } from "./dom";
 import type { Child } from "./dom";
 import { who } from "./login";
 
@@ -29,6 +29,7 @@ function heading(app: App, name: string, closure: Closure): Child {
   return [
     h("div", { class: "line" }, h("h2", {}, pair_name(app, closure)), button("×", () => app.select(null), { class: "plain", "aria-label": "Close", key: `close ${name}` })),
     h("p", { class: "state" }, swatch(colour), h("b", {}, `${closure.by_hand ? "By hand, " : ""}${STATE_WORDS[closure.state]}`), closure.reason ? `: ${closure.reason}` : ""),
+    held(app, `closure/${name}`),
     closure.word ? h("p", { class: "word" }, `${closure.word.by || "Somebody"} said ${closure.word.wish}${closure.word.wall_ns ? ` at ${wall(closure.word.wall_ns)}` : ""}.`) : null,
   ];
 }

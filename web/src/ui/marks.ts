@@ -13,6 +13,8 @@ import type { Child } from "./dom";
 import { who } from "./login";
 
 const kPhoto_px = 1280;
+/** The server takes 1 MiB. */
+const kPhoto_bytes = 1_000_000;
 
 const draft: { spot: Spot | null; photo: string | null } = { spot: null, photo: null };
 
@@ -77,7 +79,8 @@ async function shrink(file: Blob): Promise<string> {
   const scale = Math.min(1, kPhoto_px / Math.max(image.width, image.height));
   const canvas = h("canvas", { width: Math.round(image.width * scale), height: Math.round(image.height * scale) });
   canvas.getContext("2d")!.drawImage(image, 0, 0, canvas.width, canvas.height);
-  return canvas.toDataURL("image/jpeg", 0.8);
+  const at = (quality: number) => canvas.toDataURL("image/jpeg", quality);
+  return [0.8, 0.6, 0.4].map(at).find((url) => url.length * 0.75 < kPhoto_bytes) ?? at(0.2);
 }
 
 function line(app: App, view: View, id: string, mark: Mark): HTMLElement {

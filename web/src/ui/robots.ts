@@ -2,12 +2,13 @@
 /** One card per robot: is it there, what can it do now, what does it still hold. */
 import type { App } from "../app";
 import { css, robot_rgb } from "../colours";
+import { silent_after } from "../derive";
 import type { RobotView } from "../derive";
 import { bytes, many, metres, span } from "../format";
 import { LIMITS, TIMES } from "../limits";
 import type { View } from "../scene/view";
 import { position_of } from "../scene/where";
-import { button, h, icon, panel, swatch } from "./dom";
+import { button, h, held, icon, panel, swatch } from "./dom";
 import type { Child } from "./dom";
 
 export function robots_panel(app: App, view: View): HTMLElement {
@@ -40,7 +41,7 @@ function card(app: App, view: View, robot: RobotView): HTMLElement {
   const body = h("button", { type: "button", class: "who", key: `robot ${robot.number}`, "aria-pressed": String(chosen), on: { click: () => choose(app, view, robot, chosen) } },
     h("span", { class: "line" }, swatch(away ? "var(--soft)" : colour), h("b", {}, robot.name), h("span", { class: "seen" }, seen(app, robot))),
     h("span", { class: "icons" }, icons(app, robot), h("span", { class: "right" }, many(robot.submaps, "submap"))),
-    details(app, robot));
+    details(app, robot), held(app, `robot/${robot.number}`), chosen ? radio(app, robot) : null);
   return h("article", { class: `robot ${robot.presence}${chosen ? " chosen" : ""}` }, body, chosen ? actions(app, view, robot) : null);
 }
 
@@ -113,6 +114,25 @@ function details(app: App, robot: RobotView): Child[] {
   return out;
 }
 
+/** What it has sent and was sent since the server's start, the most first; and at what rate of late. */
+function radio(app: App, robot: RobotView): Child[] {
+  const track = app.store.track("radio");
+  const last = track ? track.index(app.at()) : -1;
+  const now = last < 0 ? undefined : track!.values[last]?.get(robot.number);
+  if (!now) return [];
+  let first = last;
+  while (first > 0 && track!.times[last] - track!.times[first] < TIMES.drain_window_s) --first;
+  const before = track!.values[first]?.get(robot.number);
+  const seconds = track!.times[last] - track!.times[first];
+  const total = (of: Record<string, number> = {}) => Object.values(of).reduce((sum, n) => sum + n, 0);
+  const line = (way: "up" | "down", words: string) => {
+    const rate = before && seconds > 0 ? ` · ${bytes(Math.max(0, total(now[way]) - total(before[way])) / seconds)}/s` : "";
+    const kinds = Object.entries(now[way]).sort((a, b) => b[1] - a[1]).map(([kind, n]) => `${kind} ${bytes(n)}`).join(", ");
+    return h("span", { class: "detail" }, `${words} ${bytes(total(now[way]))}${rate}${kinds ? `: ${kinds}` : ""}`);
+  };
+  return [line("up", "Sent"), line("down", "Was sent")];
+}
+
 function drains(robot: RobotView, drain: RobotView["drain"]): string {
   if (robot.presence === "silent" || robot.presence === "lost") return "waits for the link";
   return drain.state === "drains" ? `sent in ${span(drain.seconds)}` : drain.state === "grows" ? "grows" : "not moving";
@@ -121,6 +141,7 @@ function drains(robot: RobotView, drain: RobotView["drain"]): string {
 function workers(app: App): Child {
   const status = app.store.get("status", app.at());
   if (!status || status.workers.length === 0) return null;
-  const late = status.workers.filter((w) => (w.last_seen_s_ago ?? 0) > TIMES.robot_silent_s).length;
+  const silent_s = silent_after(app.store);
+  const late = status.workers.filter((w) => (w.last_seen_s_ago ?? 0) > silent_s).length;
   return h("p", { class: "workers" }, `${many(status.workers.length, "worker")} look${status.workers.length === 1 ? "s" : ""} for closures`, late ? h("em", {}, ` · ${late} silent`) : null);
 }

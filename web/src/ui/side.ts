@@ -45,7 +45,7 @@ export function side_panel(app: App, view: View): HTMLElement {
   const bodies = new Map<string, HTMLElement>();
   const body = h("div", { class: "tab-body", role: "tabpanel" });
   const show = (name: string): void => {
-    tab = name;
+    tab = app.tab = name;
     if (!kBesideClosures.includes(name) && app.selection?.kind === "closure") app.select(null);
     if (!bodies.has(name)) {
       const made = TABS.find((t) => t.name === name)!.make(app, view, show);

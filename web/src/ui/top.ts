@@ -39,7 +39,7 @@ function badge(app: App): Child {
   if (state === "connecting") return h("span", { class: "badge old" }, why ? `No server (${why})` : "Connecting …");
   if (state === "silent") return h("span", { class: "badge bad", role: "alert" }, `The server is silent since ${span((performance.now() - heard_ms) / 1000)}`);
   const age = status_age(app);
-  if (age !== null && age > 2 * TIMES.robot_silent_s) return h("span", { class: "badge old", role: "alert" }, `Status is ${span(age)} old`);
+  if (age !== null && age > TIMES.status_old_s) return h("span", { class: "badge old", role: "alert" }, `Status is ${span(age)} old`);
   if (app.time !== null) return h("span", { class: "badge old" }, `Past: ${moment(app.time)}`);
   return h("span", { class: "badge live", title: "The server is heard" }, "Live");
 }
