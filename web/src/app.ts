@@ -63,14 +63,17 @@ export class App {
     this.store.on_change((changed) => {
       const mission = changed.has("mission") ? this.store.get("mission") : null;
       if (mission?.mode === "compare") this.options.layers.estimates = true;
-      if (mission?.robot_colours) set_robot_colours(mission.robot_colours);
     });
     this.store.on_change(() => this.refresh("data"));
   }
 
   start(): void {
     this.source.start({
-      message: (m) => this.hear(m.t, () => this.store.apply(m)),
+      message: (m) => this.hear(m.t, () => {
+        this.store.apply(m);
+        const colours = m.key === "mission" ? this.store.get("mission")?.robot_colours : null;
+        if (colours) set_robot_colours(colours); // before anything is drawn
+      }),
       reset: () => {
         this.store.clear();
         this.clouds.clear();

@@ -327,6 +327,7 @@ test("a report opens as a file without a network, and its time can be scrubbed",
   await page.until("clouds", () => tutti.view.last.points > 100_000);
   assert.match((await page.texts(".report .cards.wide .value")).join(), /2\.32\sm → 0\.059\sm/);
   assert.match((await page.texts(".report")).join(), /A note with <b>markup<\/b>/);
+  assert.equal(await page.evaluate(() => getComputedStyle(document.querySelector(".report .cards.wide .swatch")).backgroundColor), "rgb(79, 179, 255)", "alpha's colour");
   await page.until("four pictures", () => document.querySelectorAll(".report figure canvas").length === 4);
   assert.ok((await page.texts(".report h2")).includes("Who drifted where and when"));
   await page.evaluate(() => tutti.app.set_time(120));
