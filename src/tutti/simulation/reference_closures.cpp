@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <mutex>
 #include <numbers>
 #include <string>
 #include <utility>
@@ -66,6 +68,14 @@ struct ReferenceClosures::PlacedSubmap {
   Pose3 anchor;               ///< The keyframe shared by the submaps 2 n and 2 n + 1: one for the whole block.
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double radius_m = 0.0;
+  std::vector<Keyframe> of;  ///< The submap's keyframes: another one may come under its id.
+};
+
+/// Submaps that were placed, for the pairs that they are in again.
+struct ReferenceClosures::Known {
+  std::mutex mutex;  // guards what follows
+  std::map<SubmapId, std::shared_ptr<const PlacedSubmap>> placed;
+  std::size_t times = 0;
 };
 
 struct ReferenceClosures::Assessment {
@@ -76,7 +86,7 @@ struct ReferenceClosures::Assessment {
 
 ReferenceClosures::ReferenceClosures(std::map<RobotId, Trajectory> reference, const ReferenceClosureConfig& config,
                                      std::uint64_t seed)
-    : reference_(std::move(reference)), config_(config), seed_(seed) {
+    : reference_(std::move(reference)), config_(config), seed_(seed), known_(std::make_shared<Known>()) {
   set_wrong_probabilities();
 }
 
@@ -108,6 +118,24 @@ ReferenceClosures::PlacedSubmap ReferenceClosures::place(const Submap& submap) c
   for (const Place& at : placed.places)
     placed.radius_m = std::max(placed.radius_m, (at.T_reference_body.translation - placed.centre).norm());
   return placed;
+}
+
+std::shared_ptr<const ReferenceClosures::PlacedSubmap> ReferenceClosures::placed(const Submap& submap) const {
+  {
+    const std::scoped_lock lock(known_->mutex);
+    const auto found = known_->placed.find(submap.id);
+    if (found != known_->placed.end() && found->second->of == submap.keyframes) return found->second;
+  }
+  auto made = std::make_shared<PlacedSubmap>(place(submap));
+  made->of = submap.keyframes;
+  const std::scoped_lock lock(known_->mutex);
+  ++known_->times;
+  return known_->placed[submap.id] = std::move(made);
+}
+
+std::size_t ReferenceClosures::submaps_placed() const {
+  const std::scoped_lock lock(known_->mutex);
+  return known_->times;
 }
 
 ReferenceClosures::Assessment ReferenceClosures::assess(const PlacedSubmap& first, const PlacedSubmap& second) const {
@@ -203,8 +231,8 @@ bool ReferenceClosures::is_candidate(const Submap& a, const Submap& b) const { r
 
 ClosureVerdict ReferenceClosures::verify(const Submap& a, const Submap& b) const {
   const bool in_order = a.id < b.id;
-  const PlacedSubmap first = place(in_order ? a : b);
-  const PlacedSubmap second = place(in_order ? b : a);
+  const auto placed_first = placed(in_order ? a : b), placed_second = placed(in_order ? b : a);
+  const PlacedSubmap &first = *placed_first, &second = *placed_second;
   ClosureVerdict verdict{.pair = {first.id, second.id}};
   if (first.id == second.id) {
     verdict.refusal = Refusal{RefusalReason::same_submap};

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -66,12 +68,16 @@ class ReferenceClosures {
   /// reference.
   [[nodiscard]] std::optional<Pose3> true_relative_pose(RobotId robot_a, Timestamp stamp_a, RobotId robot_b,
                                                         Timestamp stamp_b) const;
+  /// How many submaps were looked up in the reference so far. Each is once, however many pairs it is in.
+  [[nodiscard]] std::size_t submaps_placed() const;
 
  private:
   struct PlacedSubmap;
   struct Assessment;
+  struct Known;
   [[nodiscard]] std::optional<Pose3> pose_at(RobotId robot, Timestamp stamp) const;
   [[nodiscard]] PlacedSubmap place(const Submap& submap) const;
+  [[nodiscard]] std::shared_ptr<const PlacedSubmap> placed(const Submap& submap) const;
   [[nodiscard]] Assessment assess(const PlacedSubmap& first, const PlacedSubmap& second) const;
   [[nodiscard]] std::vector<PlacedSubmap> cut_reference() const;
   void set_wrong_probabilities();
@@ -83,6 +89,7 @@ class ReferenceClosures {
   std::uint64_t seed_;
   double overlap_wrong_probability_ = 0.0;
   double distant_wrong_probability_ = 0.0;
+  std::shared_ptr<Known> known_;
 };
 
 }  // namespace tutti::simulation

@@ -76,6 +76,21 @@ Pose3 error_of(const ReferenceClosures& finder, const Mission& mission, const Lo
 
 bool is_wrong(const Pose3& error) { return error.translation.norm() > 0.5 || rotation_angle(error) > 0.05; }
 
+TEST(ReferenceClosures, EachSubmapIsPlacedOnceHoweverManyPairsItIsIn) {
+  const Mission mission = make_mission(5, 120.0);
+  const ReferenceClosures finder(mission.reference, {}, 1);
+  const auto verdicts = all_verdicts(finder, mission.submaps);
+  EXPECT_EQ(finder.submaps_placed(), mission.submaps.size());
+  for (std::size_t i = 0; i + 1 < mission.submaps.size(); ++i)
+    EXPECT_EQ(finder.verify(mission.submaps[i], mission.submaps[i + 1]),
+              ReferenceClosures(mission.reference, {}, 1).verify(mission.submaps[i], mission.submaps[i + 1]));
+  EXPECT_EQ(finder.submaps_placed(), mission.submaps.size());
+  Submap other = mission.submaps[1];  // under an id that is known
+  other.id = mission.submaps[0].id;
+  EXPECT_EQ(finder.verify(other, mission.submaps.back()),
+            ReferenceClosures(mission.reference, {}, 1).verify(other, mission.submaps.back()));
+}
+
 TEST(ReferenceClosures, TheAskedShareIsWrongAndTheRestIsAsGoodAsItsCovariance) {
   const Mission& mission = shared_mission();
   ReferenceClosureConfig config;
