@@ -31,10 +31,27 @@ std::optional<std::uint64_t> JobBook::number_of(std::string_view name) const {
   return is_given ? std::optional(number) : std::nullopt;
 }
 
+std::set<SubmapId> JobBook::submaps_of(const OpenJob& job) {
+  std::set<SubmapId> out;
+  for (const SubmapPair& pair : job.pairs) out.insert({pair.first, pair.second});
+  if (job.refinement)
+    for (const RefinementJob::Part& part : job.refinement->parts) out.insert(part.submap);
+  return out;
+}
+
+void JobBook::open(OpenJob job) {
+  std::ranges::sort(job.pairs);
+  for (const SubmapId& submap : submaps_of(job)) ++needed_[submap];
+  open_.emplace(given_++, std::move(job));
+}
+
 std::optional<JobBook::OpenJob> JobBook::close(std::string_view name, Timestamp now) {
   const auto number = number_of(name);
   if (!number) return std::nullopt;
   auto job = open_.extract(*number);
+  if (job)
+    for (const SubmapId& submap : submaps_of(job.mapped()))
+      if (const auto needed = needed_.find(submap); --needed->second == 0) needed_.erase(needed);
   for (auto later = open_.upper_bound(*number); later != open_.end(); ++later) later->second.since = now;
   return job ? std::optional(std::move(job.mapped())) : std::nullopt;
 }
@@ -43,15 +60,6 @@ std::optional<JobBook::OpenJob> JobBook::find(std::string_view name) const {
   const auto number = number_of(name);
   const auto found = number ? open_.find(*number) : open_.end();
   return found == open_.end() ? std::nullopt : std::optional(found->second);
-}
-
-bool JobBook::needs(SubmapId submap) const {
-  const auto is_in = [&](const OpenJob& job) {
-    const auto is_of_pair = [&](const SubmapPair& pair) { return pair.first == submap || pair.second == submap; };
-    if (std::ranges::any_of(job.pairs, is_of_pair)) return true;
-    return job.refinement && std::ranges::count(job.refinement->parts, submap, &RefinementJob::Part::submap) > 0;
-  };
-  return std::ranges::any_of(open_, is_in, [](const auto& entry) -> const OpenJob& { return entry.second; });
 }
 
 Timestamp JobBook::due(const OpenJob& job) const {

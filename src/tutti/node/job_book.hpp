@@ -6,8 +6,10 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 #include <vector>
 
 #include "tutti/base/timestamp.hpp"
@@ -38,10 +40,7 @@ class JobBook {
   /// The name that the next open() gives.
   [[nodiscard]] std::string next_name() const;
   /// Adds a job that is being sent under next_name().
-  void open(OpenJob job) {
-    std::ranges::sort(job.pairs);
-    open_.emplace(given_++, std::move(job));
-  }
+  void open(OpenJob job);
   /// Removes the job of this name, which is answered, and returns it. Nothing when it is not open, or of an earlier
   /// start.
   std::optional<OpenJob> close(std::string_view name, Timestamp now);
@@ -55,8 +54,8 @@ class JobBook {
         std::ranges::count(open_, false, [](const auto& job) { return job.second.is_replaced; }));
   }
 
-  /// True if an open job needs this submap.
-  [[nodiscard]] bool needs(SubmapId submap) const;
+  /// True if an open job needs this submap. Workers ask it of every submap of every job, so it is looked up.
+  [[nodiscard]] bool needs(SubmapId submap) const { return needed_.contains(submap); }
   /// The job of this name, which stays open; nothing likewise.
   [[nodiscard]] std::optional<OpenJob> find(std::string_view name) const;
   /// True if this book has given the name, whether or not the job is open.
@@ -65,11 +64,14 @@ class JobBook {
  private:
   [[nodiscard]] std::optional<std::uint64_t> number_of(std::string_view name) const;
   [[nodiscard]] Timestamp due(const OpenJob& job) const;
+  /// The submaps that a job needs, each once.
+  static std::set<SubmapId> submaps_of(const OpenJob& job);
 
   std::string prefix_;
   double timeout_s_;
   std::uint64_t given_ = 0;
-  std::map<std::uint64_t, OpenJob> open_;  // by number
+  std::map<std::uint64_t, OpenJob> open_;             // by number
+  std::unordered_map<SubmapId, std::size_t> needed_;  // by how many open jobs
 };
 
 /// The pairs of submaps that no worker could verify when they were asked, with the time of the next try.

@@ -3,6 +3,15 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <iterator>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tutti/base/random.hpp"
+
 namespace tutti::node {
 namespace job_book_test {
 
@@ -23,6 +32,44 @@ TEST(JobBook, ClosesOnlyWhatItHasOpened) {
   ASSERT_TRUE(closed);
   EXPECT_EQ(closed->pairs, std::vector{pair_of(0, 1)});
   EXPECT_FALSE(jobs.close(name, kStart));
+}
+
+TEST(JobBook, NeedsTheSubmapsOfOpenJobsAndNoOthers) {
+  Rng rng(7);
+  JobBook jobs("", 100.0);
+  std::map<std::string, std::vector<SubmapPair>> open;
+  for (int round = 0; round < 300; ++round) {
+    if (rng.bernoulli(0.5)) {
+      std::vector<SubmapPair> pairs;
+      for (std::size_t k = 1 + rng.index(4); k > 0; --k)
+        pairs.push_back(pair_of(static_cast<std::uint32_t>(rng.index(12)), static_cast<std::uint32_t>(rng.index(12))));
+      open[jobs.next_name()] = pairs;
+      jobs.open({.pairs = pairs, .refinement = nullptr, .since = kStart});
+    } else if (!open.empty()) {
+      const auto any = std::next(open.begin(), static_cast<std::ptrdiff_t>(rng.index(open.size())));
+      EXPECT_TRUE(jobs.close(any->first, kStart));
+      open.erase(any);
+    }
+    for (std::uint32_t i = 0; i < 12; ++i) {
+      const auto is_in = [&](const SubmapId& id) {
+        return std::ranges::any_of(open, [&](const auto& job) {
+          return std::ranges::any_of(job.second, [&](const auto& p) { return p.first == id || p.second == id; });
+        });
+      };
+      for (const SubmapId& id : {pair_of(i, 0).first, pair_of(0, i).second}) EXPECT_EQ(jobs.needs(id), is_in(id));
+    }
+  }
+}
+
+TEST(JobBook, NeedsWhatARefinementIsOf) {
+  JobBook jobs("", 100.0);
+  auto refinement = std::make_shared<RefinementJob>();
+  refinement->parts.push_back({.submap = pair_of(3, 0).first});
+  const std::string name = jobs.next_name();
+  jobs.open({.pairs = {}, .refinement = refinement, .since = kStart});
+  EXPECT_TRUE(jobs.needs(pair_of(3, 0).first));
+  jobs.close(name, kStart);
+  EXPECT_FALSE(jobs.needs(pair_of(3, 0).first));
 }
 
 TEST(JobBook, WhatWaitsBehindAnotherCountsFromItsTurn) {
