@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "tutti/base/check.hpp"
+#include "tutti/base/freed_memory.hpp"
 #include "tutti/bus/simulated_network.hpp"
 #include "tutti/finders/parallel.hpp"
 #include "tutti/finders/sensor_finder_maker.hpp"
@@ -82,6 +83,7 @@ class MissionRun {
         worker_port_(network_.connect(kWorker)),
         pace_(options.rate),
         view_(static_cast<std::size_t>(duration_of(config, recordings_) / config.server.update_period_s)) {
+    keep_freed_memory();
     worker_.refine_with(meter_.refiner());
     for (const MissionRecording& recording : recordings_) {
       robots_.push_back(
@@ -237,7 +239,11 @@ class MissionRun {
   }
 
   void update_map() {
-    carry_out(*server_port_, meter_.update(time_s_, [&] { return server_->on_timer(now()); }));
+    carry_out(*server_port_, meter_.update(time_s_, [&] {
+      node::Step step = server_->on_timer(now());
+      return_freed_memory();
+      return step;
+    }));
     std::vector<const MissionRecording*> recordings;
     for (const MissionRecording& recording : recordings_) recordings.push_back(&recording);
     if (const auto check =
