@@ -16,10 +16,10 @@ bus::Envelope to_robot(RobotId robot, bus::MessageKind kind, std::shared_ptr<con
 void Broadcast::send(ProxyGraphMessage map, std::shared_ptr<const server::Beliefs> beliefs,
                      const std::set<RobotId>& robots, const ChangeWatch::LoneClosures& lone, Timestamp now,
                      Step& step) {
-  last_ = std::move(map);
+  last_ = std::make_shared<const ProxyGraphMessage>(std::move(map));
   std::shared_ptr<const std::string> whole;
   for (const RobotId robot : robots) {
-    ProxyGraph own = consistency::own_part(last_.graph, robot);
+    ProxyGraph own = consistency::own_part(last_->graph, robot);
     ChangeWatch::Decision decision = watch_.take(robot, {own, beliefs}, lone, now);
     if (decision.send) send_last(robot, std::move(own), whole, step);
     for (ChangeOfMind& told : decision.told) step.tell(now, std::move(told));
@@ -30,7 +30,7 @@ void Broadcast::send_waiting(const std::set<RobotId>& robots, Timestamp now, Ste
   std::shared_ptr<const std::string> whole;
   for (const RobotId robot : robots)
     if (auto told = watch_.follow(robot, now)) {
-      send_last(robot, consistency::own_part(last_.graph, robot), whole, step);
+      send_last(robot, consistency::own_part(last_->graph, robot), whole, step);
       step.tell(now, std::move(*told));
     }
 }
@@ -40,14 +40,14 @@ void Broadcast::send_last(RobotId robot, ProxyGraph own, std::shared_ptr<const s
     step.messages.push_back(own_graph(robot, std::move(own)));
     return;
   }
-  if (whole == nullptr) whole = std::make_shared<const std::string>(wire::encode(last_));
+  if (whole == nullptr) whole = std::make_shared<const std::string>(wire::encode(*last_));
   step.messages.push_back(to_robot(robot, bus::MessageKind::proxy_graph, whole));
 }
 
 /// Deltas grow as the map leaves the base behind. The mean of what is sent is smallest when the full graph is sent
 /// again as soon as a delta is larger than that mean.
 bus::Envelope Broadcast::own_graph(RobotId robot, ProxyGraph own) {
-  const ProxyGraphMessage part{last_.header, std::move(own)};
+  const ProxyGraphMessage part{last_->header, std::move(own)};
   Base& base = bases_[robot];
   if (base.messages > 0) {
     auto delta = std::make_shared<const std::string>(wire::encode_delta(part, base.graph));

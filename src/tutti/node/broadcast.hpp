@@ -33,7 +33,7 @@ class Broadcast {
   /// Sends the last map to the robots that wait for it, because it has stood.
   void send_waiting(const std::set<RobotId>& robots, Timestamp now, Step& step);
   /// The last map; empty before the first.
-  [[nodiscard]] const ProxyGraph& last() const { return last_.graph; }
+  [[nodiscard]] std::shared_ptr<const ProxyGraph> last() const { return {last_, &last_->graph}; }
 
  private:
   /// Sends `own`, the robot's part of the last map. `whole` is the whole map, encoded when it is first needed.
@@ -43,7 +43,7 @@ class Broadcast {
   [[nodiscard]] bus::Envelope own_graph(RobotId robot, ProxyGraph own);
 
   bool to_all_;
-  ProxyGraphMessage last_;
+  std::shared_ptr<const ProxyGraphMessage> last_ = std::make_shared<const ProxyGraphMessage>();
   ChangeWatch watch_;
   /// What a robot was last sent in full, and what was sent as differences from it since.
   struct Base {

@@ -196,9 +196,13 @@ bool ServerNode::give_back(const SubmapPair& pair) {
 
 std::optional<Timestamp> ServerNode::next_timer() const {
   std::optional<Timestamp> next;
-  for (const auto& due :
-       {timer_, compute_at_, settle_at_, jobs_.next_due(), failed_.next_due(), refinements_.next_due()})
+  const auto note = [&](const std::optional<Timestamp>& due) {
     if (due) next = std::min(next.value_or(*due), *due);
+  };
+  for (const auto& due : {settle_at_, jobs_.next_due(), failed_.next_due(), refinements_.next_due()}) note(due);
+  if (is_making_map_) return next;
+  note(timer_);
+  note(compute_at_);
   return next;
 }
 

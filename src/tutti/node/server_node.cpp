@@ -4,26 +4,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "tutti/base/check.hpp"
-#include "tutti/consistency/proxy_graph_builder.hpp"
 #include "tutti/node/internal/opened_map.hpp"
 #include "tutti/node/map_meta.hpp"
 #include "tutti/node/meta_keys.hpp"
 #include "tutti/node/worker_node.hpp"
-#include "tutti/server/change_support.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/submap_copy_codec.hpp"
 
 namespace tutti::node {
 namespace {
-
-/// The first multiple of the period that is not before `now`.
-Timestamp next_update(Timestamp now, double period_s) {
-  return Timestamp{} + std::ceil((now - Timestamp{}) / period_s - 1e-9) * period_s;
-}
 
 /// What the names of all jobs of a start begin with: no other map's do. An older map that was put back counts its
 /// starts once more.
@@ -93,7 +85,7 @@ Step ServerNode::resume(Timestamp now) {
     server_.nothing_is_new();
     compute_at_ = now;
   }
-  if (server_.has_news()) timer_ = next_update(now, config_.server.update_period_s);
+  if (server_.has_news()) timer_ = next_update(now);
   step.writes.push_back(meta());
   step.writes.push_back(to_row(config_.server));
   tell_unread_rows(now, step);
@@ -140,7 +132,7 @@ Step ServerNode::put_aside(const bus::Envelope& envelope, const std::string& why
 void ServerNode::note_news(Timestamp now, bool before, Step& step) {
   if (before == server_.has_news()) return;
   compute_at_.reset();  // the map with the news takes its place
-  timer_ = next_update(now, config_.server.update_period_s);
+  timer_ = next_update(now);
   step.writes.push_back(meta());
 }
 
@@ -280,63 +272,6 @@ void ServerNode::send_receipt(Receipt receipt, Step& step) const {
   receipt.incarnation = config_.incarnation;
   step.messages.push_back(
       to_robot(receipt.robot, bus::MessageKind::receipt, std::make_shared<const std::string>(wire::encode(receipt))));
-}
-
-MapCounts ServerNode::counts() const {
-  if (!has_map_ && stored_counts_) return *stored_counts_;
-  const server::MapEstimate& map = server_.map();
-  const auto accepted = std::ranges::count_if(map.closures, &server::JudgedClosure::accepted);
-  return {server_.state().revision, map.nodes.size(), static_cast<std::uint64_t>(accepted), map.components};
-}
-
-void ServerNode::send_map(ProxyGraphMessage message, Timestamp now, Step& step) {
-  has_map_ = true;
-  compute_at_.reset();
-  ++changes_;
-  message.graph.incarnation = config_.incarnation;
-  for (const RobotId robot : robots_)
-    if (const auto owner = registry_.owner(robot)) consistency::see_last_in(message.graph, *owner);
-  const bool wait = config_.server.change_of_mind == "wait" && !std::exchange(operator_spoke_, false);
-  const auto lone = [&](const ChangeWatch::Map& followed, const ProxyGraph& own) {
-    return server::change_support(server_.map(), *followed.beliefs, followed.own, own, own.nodes.front().chain,
-                                  config_.server.map.gnc.solver)
-        .lone_closures;
-  };
-  broadcast_.send(std::move(message), std::make_shared<const server::Beliefs>(server::beliefs_of(server_.map())),
-                  robots_, wait ? ChangeWatch::LoneClosures(lone) : nullptr, now, step);
-  look_again_at_what_waits(now);
-  if (const MapCounts now_there = counts(); stored_counts_ != now_there) {
-    stored_counts_ = now_there;
-    step.writes.push_back(to_row(now_there));
-  }
-  send_refinement_job(now, step);
-  note_settling(now);
-}
-
-/// At the next update, whether or not there is news by then.
-void ServerNode::look_again_at_what_waits(Timestamp now) {
-  if (broadcast_.anything_waits()) timer_ = now + config_.server.update_period_s;
-}
-
-Step ServerNode::on_timer(Timestamp now) {
-  Step step;
-  ask_again(now, step);
-  settle(now, step);
-  if (timer_ && *timer_ <= now) {
-    timer_.reset();
-    if (!server_.has_news() && broadcast_.anything_waits()) {
-      broadcast_.send_waiting(robots_, now, step);
-      look_again_at_what_waits(now);
-      return step;
-    }
-    send_map(server_.optimise(), now, step);
-    step.writes.push_back(meta());
-    step.tell(now, MapUpdated{server_.state().revision, server_.state().submaps.size(),
-                              static_cast<std::size_t>(counts().closures)});
-  } else if (compute_at_ && *compute_at_ <= now) {
-    send_map(server_.rebuild(), now, step);
-  }
-  return step;
 }
 
 }  // namespace tutti::node

@@ -15,6 +15,7 @@
 #include "tutti/node/broadcast.hpp"
 #include "tutti/node/job_book.hpp"
 #include "tutti/node/map_meta.hpp"
+#include "tutti/node/map_task.hpp"
 #include "tutti/node/receipts.hpp"
 #include "tutti/node/refinement_queue.hpp"
 #include "tutti/node/robot_registry.hpp"
@@ -76,10 +77,19 @@ class ServerNode {
   /// Instead of receive(), for messages that the host does not pass on (program/host.hpp): tells and counts them as
   /// refused.
   Step put_aside(const bus::Envelope& envelope, const std::string& why, Timestamp now);
-  /// When on_timer() is to be called next; nothing while there is no news and every job is answered.
+  /// When on_timer() is to be called next; nothing while there is no news and every job is answered. While a map is
+  /// made, no other one is due.
   [[nodiscard]] std::optional<Timestamp> next_timer() const;
-  /// Optimises the map and asks workers again, when it is time for either.
+  /// Makes the map and asks workers again, when it is time for either: tend(), begin_map(), make_map() and end_map().
   Step on_timer(Timestamp now);
+  /// Does what is due except making a map.
+  Step tend(Timestamp now);
+  /// The map that is due, if no other one is being made. The node takes all that comes until its end_map(), on which no
+  /// receipt waits; what comes is in the next map. A node that ends before has news when it starts again.
+  std::optional<MapTask> begin_map(Timestamp now);
+  /// Takes what make_map() has made of the task that was begun.
+  Step end_map(MapOfTask made, Timestamp now);
+  [[nodiscard]] bool is_making_map() const { return is_making_map_; }
 
   /// Everything known of the mission, without what only the host knows: version, wall_ns, trouble.
   [[nodiscard]] MissionStatus mission_status(Timestamp now) const;
@@ -92,7 +102,7 @@ class ServerNode {
   /// False after a start until the first update; mission_status() then has the figures of the last update before the
   /// start.
   [[nodiscard]] bool has_map() const { return has_map_; }
-  [[nodiscard]] const ProxyGraph& broadcast() const { return broadcast_.last(); }
+  [[nodiscard]] const ProxyGraph& broadcast() const { return *last_broadcast_; }
 
  private:
   ServerNode(std::set<RobotId> robots, std::shared_ptr<const server::ClosureFinder> finder,
@@ -165,9 +175,9 @@ class ServerNode {
   bool give_back(const SubmapPair& pair);
   void send_receipt(RobotId robot, Step& step) const;
   [[nodiscard]] MapCounts counts() const;
-  /// Sends a map that has just been computed.
-  void send_map(ProxyGraphMessage message, Timestamp now, Step& step);
+  [[nodiscard]] bool is_due(const std::optional<Timestamp>& timer, Timestamp now) const;
   void look_again_at_what_waits(Timestamp now);
+  [[nodiscard]] Timestamp next_update(Timestamp now) const;
   /// Sets the timer when something new has come, and stores whether it has.
   void note_news(Timestamp now, bool before, Step& step);
   [[nodiscard]] storage::Write meta() const;
@@ -195,7 +205,9 @@ class ServerNode {
   std::optional<Timestamp> compute_at_;  // when to compute the map that the store had when it was opened
   std::optional<MapCounts> stored_counts_;
   bool has_map_ = false;
-  Broadcast broadcast_{config_.server.broadcast == "all"};
+  bool is_making_map_ = false;
+  Broadcast broadcast_{config_.server.broadcast == "all"};  // the task has it while a map is made
+  std::shared_ptr<const ProxyGraph> last_broadcast_ = broadcast_.last();
   bool operator_spoke_ = false;  // since the last map
 };
 

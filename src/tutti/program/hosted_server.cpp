@@ -3,10 +3,62 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
+
+#include "tutti/base/freed_memory.hpp"
 #include "tutti/node/status_envelope.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::program {
+
+HostedServer::HostedServer(std::unique_ptr<node::ServerNode> node, std::string version,
+                           std::function<std::string()> trouble, const bool& is_over,
+                           const std::vector<std::unique_ptr<MapViewer>>& viewers, const Clock& clock, MakeMap make_map)
+    : node_(std::move(node)),
+      version_(std::move(version)),
+      trouble_(std::move(trouble)),
+      is_over_(is_over),
+      viewers_(viewers),
+      clock_(clock),
+      make_map_(std::move(make_map)) {}
+
+bool HostedServer::is_made() const {
+  return making_.valid() && making_.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+}
+
+std::optional<Timestamp> HostedServer::next_work() const {
+  return asked_.empty() && !is_made() ? node_->next_timer() : kFirstTimestamp;
+}
+
+Answer HostedServer::work(Timestamp now) {
+  Answer answer;
+  for (AskedWord& word : std::exchange(asked_, {})) take(word, now, answer.step);
+  answer.step.add(node_->tend(now));
+  if (is_made()) {
+    answer.step.add(node_->end_map(making_.get(), now));
+    return_freed_memory();
+  }
+  if (auto task = node_->begin_map(now))
+    making_ = std::async(std::launch::async,
+                         [make = make_map_, task = std::move(*task)]() mutable { return make(std::move(task)); });
+  if (node_->changes() != told_changes_) answer.step.messages.push_back(mission_status(now));
+  return counted(std::move(answer));
+}
+
+Answer HostedServer::end() {
+  Answer answer;
+  if (making_.valid()) answer.step.add(node_->end_map(making_.get(), clock_.now()));
+  return counted(std::move(answer));
+}
+
+void HostedServer::wait(double wall_s) {
+  tend_viewers(clock_.now());
+  if (!asked_.empty()) return;
+  if (making_.valid())
+    making_.wait_for(std::chrono::duration<double>(wall_s));
+  else
+    Hosted::wait(wall_s);
+}
 
 bus::Envelope HostedServer::mission_status(Timestamp now) {
   told_changes_ = node_->changes();

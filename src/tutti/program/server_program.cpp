@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "tutti/base/file.hpp"
+#include "tutti/base/freed_memory.hpp"
 #include "tutti/base/utc_text.hpp"
 #include "tutti/bus/mission_lease.hpp"
 #include "tutti/bus/nats_child.hpp"
@@ -314,6 +315,7 @@ Status ServerProgram::run(const std::atomic<bool>& stop) {
 }  // namespace
 
 Status run_server(const ServerOptions& options, const std::atomic<bool>& stop) {
+  keep_freed_memory();
   ServerProgram program(options);
   if (Status started = program.start(); !started) return started;
   return program.run(stop);

@@ -14,6 +14,11 @@ namespace tutti::server {
 struct MonitorWork {
   std::size_t factorisations = 0;  ///< The whole graph's, and the graph's of the closures' ends.
   std::size_t products = 0;        ///< Columns of samples times products with the graph's Laplacian.
+  MonitorWork& operator+=(const MonitorWork& other) {
+    factorisations += other.factorisations;
+    products += other.products;
+    return *this;
+  }
 };
 
 /// The graph monitor: makes a proxy graph of the latest estimates of the representative nodes, with the covariance of

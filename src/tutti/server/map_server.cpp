@@ -8,9 +8,6 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/geometry/covariance.hpp"
-#include "tutti/server/georeference.hpp"
-#include "tutti/server/graph_monitor.hpp"
-#include "tutti/server/refuted_closures.hpp"
 
 namespace tutti::server {
 namespace {
@@ -312,13 +309,8 @@ Status MapServer::receive(const SubmapPair& pair, const ClosureWord& given) {
   return {};
 }
 
-ProxyGraphMessage MapServer::optimise() {
-  ++state_.revision;
-  return rebuild();
-}
-
 void MapServer::note_news() {
-  news_ = true;
+  news_ = graph_is_new_ = true;
   estimate_.reset();
 }
 
@@ -340,34 +332,65 @@ Status MapServer::receive(const Refinement& refinement) {
 }
 
 void MapServer::settle() {
-  if (estimate_) plan_refinement(true);
+  if (estimate_) plan_refinement(*estimate_, state_.submaps, state_.payload_sizes, state_.verdicts, true);
 }
 
-void MapServer::plan_refinement(bool settle) {
+void MapServer::plan_refinement(const MapEstimate& estimate, const SubmapSet& submaps,
+                                const std::map<SubmapId, PayloadSize>& sizes, const VerdictSet& verdicts, bool settle) {
   if (refiner_ == nullptr || config_.refine_every == 0 || refining_) return;
-  RefinementScope scope = refinable(*estimate_, state_.submaps, state_.payload_sizes, state_.verdicts, *refiner_);
+  RefinementScope scope = refinable(estimate, submaps, sizes, verdicts, *refiner_);
   if (asked_ && asked_->whole && asked_->scope == scope) return;
-  refinement_job_ = server::plan_refinement(scope, state_.refinements, *estimate_, map_, state_.submaps,
+  refinement_job_ = server::plan_refinement(scope, state_.refinements, estimate, map_, submaps,
                                             {static_cast<std::size_t>(config_.refine_every), settle}, state_.revision);
   if (!refinement_job_) return;
   refining_ = state_.revision;
   asked_ = Asked{std::move(scope), refinement_job_->whole};
 }
 
-ProxyGraphMessage MapServer::rebuild() {
-  news_ = false;
+MapJob MapServer::begin(std::uint64_t revision) {
+  makes_news_ = std::exchange(news_, false);
+  graph_is_new_ = false;
+  MapJob job{.submaps = state_.submaps,
+             .payload_sizes = {},
+             .verdicts = state_.verdicts,
+             .words = state_.words,
+             .refinements = state_.refinements,
+             .map = config_.map,
+             .proxy_graph = config_.proxy_graph,
+             .epoch = state_.epoch,
+             .revision = revision,
+             .estimate = estimate_,
+             .keeps_estimate = refiner_ != nullptr};
+  if (job.keeps_estimate) job.payload_sizes = state_.payload_sizes;
+  return job;
+}
+
+MapJob MapServer::begin_update() { return begin(state_.revision + 1); }
+MapJob MapServer::begin_rebuild() { return begin(state_.revision); }
+
+void MapServer::finish(MadeMap made) {
+  makes_news_ = false;
+  state_.revision = made.job.revision;
   ++work_.updates;
-  if (!estimate_) {
-    estimate_ = estimate_map_with_fixes(state_.submaps, state_.verdicts, config_.map, state_.words);
-    work_.search += estimate_->work;
-  }
-  map_ = georeferenced(refined(*estimate_, state_.submaps, state_.refinements), state_.submaps,
-                       config_.map.georeference, config_.map.gnc);
-  plan_refinement(false);
-  if (refiner_ == nullptr) estimate_.reset();  // nobody asks for it
-  ProxyGraphMessage message{.header = {.robot = {}, .session = state_.epoch, .sequence = state_.revision},
-                            .graph = monitor_graph(map_, state_.revision, config_.proxy_graph, &work_.monitor)};
-  message.graph.epoch = state_.epoch;
+  work_.search += made.search;
+  work_.monitor += made.monitor;
+  map_ = std::move(made.map);
+  if (made.estimate)
+    plan_refinement(*made.estimate, made.job.submaps, made.job.payload_sizes, made.job.verdicts, false);
+  if (!graph_is_new_) estimate_ = std::move(made.estimate);
+}
+
+ProxyGraphMessage MapServer::optimise() {
+  MadeMap made = make_map(begin_update());
+  ProxyGraphMessage message = std::move(made.message);
+  finish(std::move(made));
+  return message;
+}
+
+ProxyGraphMessage MapServer::rebuild() {
+  MadeMap made = make_map(begin_rebuild());
+  ProxyGraphMessage message = std::move(made.message);
+  finish(std::move(made));
   return message;
 }
 

@@ -18,6 +18,7 @@
 #include "tutti/server/closure_finder.hpp"
 #include "tutti/server/graph_monitor.hpp"
 #include "tutti/server/map_estimate.hpp"
+#include "tutti/server/map_job.hpp"
 #include "tutti/server/payload_store.hpp"
 #include "tutti/server/refinements.hpp"
 #include "tutti/server/refusal_counts.hpp"
@@ -149,14 +150,21 @@ class MapServer {
   /// The job that is out will never be answered.
   void give_up_refinement() { refining_.reset(); }
 
-  /// True when something came since the last optimise().
-  [[nodiscard]] bool has_news() const { return news_; }
-  /// Optimises the joint map and returns its whole proxy graph, as a new revision.
-  ProxyGraphMessage optimise();
-  /// Computes the last revision again, for a server that goes on from a state to which nothing was added;
+  /// True when something has come that map() was made without.
+  [[nodiscard]] bool has_news() const { return news_ || makes_news_; }
+  /// What the map of the next revision is to be made of. The server takes whatever comes until finish(), which is to
+  /// be called with this job's map before another job is begun; only then is there a new revision.
+  [[nodiscard]] MapJob begin_update();
+  /// The same for the last revision again, for a server that goes on from a state to which nothing was added;
   /// nothing_is_new() then tells the server so.
-  ProxyGraphMessage rebuild();
+  [[nodiscard]] MapJob begin_rebuild();
+  /// Takes the map that was begun. What has come since is news.
+  void finish(MadeMap made);
   void nothing_is_new() { news_ = false; }
+  /// Begins, makes and finishes a map, and returns its whole proxy graph, as a new revision.
+  ProxyGraphMessage optimise();
+  /// The same for the last revision again.
+  ProxyGraphMessage rebuild();
 
   [[nodiscard]] const MapEstimate& map() const { return map_; }
   [[nodiscard]] const ServerWork& work() const { return work_; }
@@ -182,8 +190,10 @@ class MapServer {
   void judge_waiting();
   /// Notes that something has come that changes the pose graph.
   void note_news();
-  /// Makes a refinement job for the present map, if one is due.
-  void plan_refinement(bool settle);
+  [[nodiscard]] MapJob begin(std::uint64_t revision);
+  /// Makes a refinement job for the present map, which was made of this, if one is due.
+  void plan_refinement(const MapEstimate& estimate, const SubmapSet& submaps,
+                       const std::map<SubmapId, PayloadSize>& sizes, const VerdictSet& verdicts, bool settle);
   /// Takes a verdict that was checked.
   void take(const ClosureVerdict& verdict);
 
@@ -195,9 +205,9 @@ class MapServer {
   std::vector<VerificationJob> jobs_;
   std::vector<ClosureVerdict> waiting_;  // not in the state: their pairs are verified again when the submaps come
   std::vector<Error> late_errors_;
-  std::optional<MapEstimate> estimate_;        // of the pose graph alone; nothing when it must be made
-  MapEstimate map_;                            // with refinements
-  std::shared_ptr<const MapRefiner> refiner_;  // null: nothing is refined
+  std::shared_ptr<const MapEstimate> estimate_;  // of the pose graph alone; null when it must be made, or not kept
+  MapEstimate map_;                              // with refinements
+  std::shared_ptr<const MapRefiner> refiner_;    // null: nothing is refined
   std::optional<RefinementJob> refinement_job_;
   std::optional<std::uint64_t> refining_;  // revision of the job that is out
   struct Asked {
@@ -205,7 +215,9 @@ class MapServer {
     bool whole = false;
   };
   std::optional<Asked> asked_;  // the last refinement asked for
-  bool news_ = false;
+  bool news_ = false;           // since the map was begun that is made, or was made last
+  bool makes_news_ = false;     // the map that is made has news
+  bool graph_is_new_ = false;   // something has come since then that changes the pose graph
   ServerWork work_;
 };
 

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/node/map_task.hpp"
+
+#include <memory>
+#include <utility>
+
+#include "tutti/consistency/proxy_graph_builder.hpp"
+#include "tutti/server/change_support.hpp"
+
+namespace tutti::node {
+
+MapOfTask make_map(MapTask task) {
+  MapOfTask out{.made = server::make_map(std::move(task.job)),
+                .is_update = task.is_update,
+                .broadcast = std::move(task.broadcast),
+                .step = {}};
+  const server::MadeMap& made = out.made;
+  const auto lone = [&](const ChangeWatch::Map& followed, const ProxyGraph& own) {
+    return server::change_support(made.map, *followed.beliefs, followed.own, own, own.nodes.front().chain,
+                                  made.job.map.gnc.solver)
+        .lone_closures;
+  };
+  ProxyGraphMessage message = std::move(out.made.message);
+  message.graph.incarnation = task.incarnation;
+  for (const ChainId& owner : task.owners) consistency::see_last_in(message.graph, owner);
+  out.broadcast.send(std::move(message), std::make_shared<const server::Beliefs>(server::beliefs_of(made.map)),
+                     task.robots, task.follow ? nullptr : ChangeWatch::LoneClosures(lone), task.begun, out.step);
+  return out;
+}
+
+}  // namespace tutti::node

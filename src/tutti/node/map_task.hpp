@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <set>
+#include <vector>
+
+#include "tutti/base/timestamp.hpp"
+#include "tutti/node/broadcast.hpp"
+#include "tutti/node/step.hpp"
+#include "tutti/server/map_job.hpp"
+
+namespace tutti::node {
+
+/// A map that a server is to make, and those who are to hear of it. It shares nothing with its node that changes, so
+/// make_map() may run on another thread while the node takes what comes.
+struct MapTask {
+  server::MapJob job;
+  bool is_update = false;  ///< Makes a new revision.
+  Timestamp begun;
+  std::uint32_t incarnation = 0;
+  std::set<RobotId> robots;
+  std::vector<ChainId> owners;  ///< The sessions that own robots' numbers.
+  bool follow = false;          ///< A change of mind does not wait.
+  Broadcast broadcast;
+};
+
+/// What became of a task.
+struct MapOfTask {
+  server::MadeMap made;
+  bool is_update = false;
+  Broadcast broadcast;
+  Step step;  ///< What robots are sent of the map, and what is told of that.
+};
+
+/// Makes the map, and what robots are sent of it.
+MapOfTask make_map(MapTask task);
+
+}  // namespace tutti::node

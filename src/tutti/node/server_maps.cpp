@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// When a ServerNode makes its map, and what follows.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "tutti/base/check.hpp"
+#include "tutti/node/server_node.hpp"
+
+namespace tutti::node {
+
+/// The first multiple of the period that is not before `now`.
+Timestamp ServerNode::next_update(Timestamp now) const {
+  const double period_s = config_.server.update_period_s;
+  return Timestamp{} + std::ceil((now - Timestamp{}) / period_s - 1e-9) * period_s;
+}
+
+MapCounts ServerNode::counts() const {
+  if (!has_map_ && stored_counts_) return *stored_counts_;
+  const server::MapEstimate& map = server_.map();
+  const auto accepted = std::ranges::count_if(map.closures, &server::JudgedClosure::accepted);
+  return {server_.state().revision, map.nodes.size(), static_cast<std::uint64_t>(accepted), map.components};
+}
+
+/// At the next update, whether or not there is news by then.
+void ServerNode::look_again_at_what_waits(Timestamp now) {
+  if (broadcast_.anything_waits()) timer_ = now + config_.server.update_period_s;
+}
+
+bool ServerNode::is_due(const std::optional<Timestamp>& timer, Timestamp now) const {
+  return !is_making_map_ && timer && *timer <= now;
+}
+
+Step ServerNode::tend(Timestamp now) {
+  Step step;
+  ask_again(now, step);
+  settle(now, step);
+  if (is_due(timer_, now) && !server_.has_news() && broadcast_.anything_waits()) {
+    timer_.reset();
+    broadcast_.send_waiting(robots_, now, step);
+    look_again_at_what_waits(now);
+  }
+  return step;
+}
+
+std::optional<MapTask> ServerNode::begin_map(Timestamp now) {
+  const bool is_update = is_due(timer_, now);
+  if (!is_update && !is_due(compute_at_, now)) return std::nullopt;
+  timer_.reset();
+  compute_at_.reset();
+  is_making_map_ = true;
+  MapTask task{.job = is_update ? server_.begin_update() : server_.begin_rebuild(),
+               .is_update = is_update,
+               .begun = now,
+               .incarnation = config_.incarnation,
+               .robots = robots_,
+               .owners = {},
+               .follow = config_.server.change_of_mind != "wait" || std::exchange(operator_spoke_, false),
+               .broadcast = std::move(broadcast_)};
+  for (const RobotId robot : robots_)
+    if (const auto owner = registry_.owner(robot)) task.owners.push_back(*owner);
+  return task;
+}
+
+Step ServerNode::end_map(MapOfTask made, Timestamp now) {
+  TUTTI_CHECK(is_making_map_, "a map that was not begun");
+  Step step = std::move(made.step);
+  const std::size_t submaps = made.made.job.submaps.size();
+  server_.finish(std::move(made.made));
+  broadcast_ = std::move(made.broadcast);
+  last_broadcast_ = broadcast_.last();
+  is_making_map_ = false;
+  has_map_ = true;
+  ++changes_;
+  if (server_.has_news())
+    timer_ = next_update(now);
+  else
+    look_again_at_what_waits(now);
+  if (const MapCounts now_there = counts(); stored_counts_ != now_there) {
+    stored_counts_ = now_there;
+    step.writes.push_back(to_row(now_there));
+  }
+  send_refinement_job(now, step);
+  note_settling(now);
+  if (!made.is_update) return step;
+  step.writes.push_back(meta());
+  step.tell(now, MapUpdated{server_.state().revision, submaps, static_cast<std::size_t>(counts().closures)});
+  return step;
+}
+
+Step ServerNode::on_timer(Timestamp now) {
+  Step step = tend(now);
+  if (auto task = begin_map(now)) step.add(end_map(make_map(std::move(*task)), now));
+  return step;
+}
+
+}  // namespace tutti::node

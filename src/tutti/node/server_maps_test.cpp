@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What a server takes while it makes a map. The map is made when the test says so: no clock and no thread decides.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "support/node/stored_server.hpp"
+#include "tutti/node/words.hpp"
+#include "tutti/node/worker_node.hpp"
+#include "tutti/storage/memory_store.hpp"
+
+namespace tutti::node {
+namespace server_maps_test {
+
+using bus::MessageKind;
+const ChainId kAlpha{RobotId{0}, 7}, kBravo{RobotId{1}, 7};
+
+class MapBeingMade : public test::StoredServer {
+ protected:
+  MapBeingMade() {
+    start({RobotId{0}, RobotId{1}}, {});
+    for (std::uint32_t i = 0; i < 4; ++i) take_both(i);
+    now_ = node_->next_timer().value();
+    done(node_->tend(now_));
+    task_ = node_->begin_map(now_);
+  }
+  /// A submap of each robot, and what workers say of it.
+  void take_both(std::uint32_t index) {
+    WorkerNode worker(bus::Endpoint::worker(0), finder_, SubmapFrames::of(*store_));
+    for (const ChainId& chain : {kAlpha, kBravo})
+      for (const auto& job : of_kind(receive(test::submap(chain, index)), MessageKind::job))
+        for (const auto& verdicts : worker.receive(job, now_).messages) receive(verdicts);
+  }
+  [[nodiscard]] std::size_t submaps_in_map() const {
+    std::set<SubmapId> in;  // a submap is in the map if its second keyframe is
+    for (const auto& [id, submap] : node_->map_server().state().submaps)
+      if (server::find_node(node_->map_server().map(), {id.chain, submap->keyframes[1].index}) != nullptr)
+        in.insert(id);
+    return in.size();
+  }
+  static std::vector<std::size_t> updates(const Step& step) {
+    std::vector<std::size_t> out;
+    for (const Event& event : step.events)
+      if (const auto* told = std::get_if<MapUpdated>(&event.what)) out.push_back(told->submaps);
+    return out;
+  }
+
+  std::optional<MapTask> task_;
+};
+
+TEST_F(MapBeingMade, SubmapsAreStoredAndAcknowledgedBeforeItIsThere) {
+  ASSERT_TRUE(task_.has_value());
+  EXPECT_TRUE(node_->is_making_map());
+  const Step step = receive(test::submap(kAlpha, 4));
+  EXPECT_EQ(store_->tables().at("submaps").size(), 9U);
+  const auto receipts = of_kind(step, MessageKind::receipt);
+  ASSERT_EQ(receipts.size(), 1U);
+  EXPECT_TRUE(wire::decode_receipt(*receipts[0].bytes)->contains({kAlpha, 4}));
+  EXPECT_EQ(of_kind(step, MessageKind::job).size(), 1U);
+  EXPECT_EQ(submaps_in_map(), 0U);
+
+  const Step end = done(node_->end_map(make_map(std::move(*task_)), now_));
+  EXPECT_EQ(updates(end), std::vector<std::size_t>{8});
+  EXPECT_EQ(of_kind(end, MessageKind::proxy_graph).size(), 2U);
+  EXPECT_EQ(submaps_in_map(), 8U);
+  EXPECT_TRUE(node_->map_server().has_news());
+}
+
+TEST_F(MapBeingMade, WhatComesMeanwhileIsInTheNextWhichIsOneOfTheWholeSet) {
+  take_both(4);
+  now_ = now_ + 25.0;                                // it takes longer than a period
+  EXPECT_FALSE(node_->begin_map(now_).has_value());  // one at a time
+  EXPECT_EQ(node_->next_timer(), std::nullopt);      // and nobody is to ask
+  done(node_->end_map(make_map(std::move(*task_)), now_));
+  ASSERT_TRUE(node_->next_timer().has_value());
+  now_ = *node_->next_timer();
+  EXPECT_EQ(updates(done(node_->on_timer(now_))), std::vector<std::size_t>{10});
+  EXPECT_FALSE(node_->map_server().has_news());
+  const server::MapEstimate interleaved = node_->map_server().map();
+
+  store_.reset();
+  start({RobotId{0}, RobotId{1}}, {});
+  for (std::uint32_t i = 0; i < 5; ++i) take_both(i);
+  done(node_->on_timer(node_->next_timer().value()));
+  const server::MapEstimate& at_once = node_->map_server().map();
+  ASSERT_EQ(interleaved.nodes.size(), at_once.nodes.size());
+  for (std::size_t i = 0; i < at_once.nodes.size(); ++i) {
+    EXPECT_EQ(interleaved.nodes[i].id, at_once.nodes[i].id);
+    EXPECT_EQ(interleaved.nodes[i].T_world_body, at_once.nodes[i].T_world_body);
+  }
+}
+
+TEST_F(MapBeingMade, AServerThatIsKilledMeanwhileMakesItAgain) {
+  take_both(4);
+  const auto told = read_map_meta(*store_).value();
+  EXPECT_TRUE(told->news);
+  EXPECT_EQ(told->revision, 0U);
+  start({RobotId{0}, RobotId{1}}, {});
+  EXPECT_EQ(updates(done(node_->on_timer(node_->next_timer().value()))), std::vector<std::size_t>{10});
+  EXPECT_EQ(node_->map_server().state().revision, 1U);
+}
+
+TEST_F(MapBeingMade, HasNewsUntilItIsThere) {
+  EXPECT_TRUE(node_->mission_status(now_).has_news);
+  done(node_->end_map(make_map(std::move(*task_)), now_));
+  EXPECT_FALSE(node_->mission_status(now_).has_news);
+  EXPECT_FALSE(read_map_meta(*store_).value()->news);
+}
+
+TEST_F(MapBeingMade, ARobotThatJoinsMeanwhileHearsOfTheNext) {
+  done(node_->end_map(make_map(std::move(*task_)), now_));
+  start({}, {.accepts_others = true});
+  take_both(4);
+  now_ = node_->next_timer().value();
+  auto task = node_->begin_map(now_);
+  const ChainId charlie{RobotId{2}, 7};
+  receive(test::submap(charlie, 0));
+  const auto to_charlie = [&](const Step& step) {
+    return std::ranges::count(step.messages, bus::Endpoint::of(charlie.robot), &bus::Envelope::to);
+  };
+  EXPECT_EQ(to_charlie(done(node_->end_map(make_map(std::move(*task)), now_))), 0);
+  now_ = node_->next_timer().value();
+  EXPECT_EQ(to_charlie(done(node_->on_timer(now_))), 1);
+}
+
+}  // namespace server_maps_test
+}  // namespace tutti::node

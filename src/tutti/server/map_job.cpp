@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/server/map_job.hpp"
+
+#include <utility>
+
+#include "tutti/server/georeference.hpp"
+#include "tutti/server/refuted_closures.hpp"
+
+namespace tutti::server {
+
+MadeMap make_map(MapJob job) {
+  MadeMap out{.job = {}, .estimate = job.estimate, .map = {}, .message = {}, .search = {}, .monitor = {}};
+  if (out.estimate == nullptr) {
+    out.estimate =
+        std::make_shared<const MapEstimate>(estimate_map_with_fixes(job.submaps, job.verdicts, job.map, job.words));
+    out.search = out.estimate->work;
+  }
+  out.map = georeferenced(refined(*out.estimate, job.submaps, job.refinements), job.submaps, job.map.georeference,
+                          job.map.gnc);
+  if (!job.keeps_estimate) out.estimate.reset();
+  out.message = {.header = {.robot = {}, .session = job.epoch, .sequence = job.revision},
+                 .graph = monitor_graph(out.map, job.revision, job.proxy_graph, &out.monitor)};
+  out.message.graph.epoch = job.epoch;
+  out.job = std::move(job);
+  return out;
+}
+
+}  // namespace tutti::server

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+
+#include "tutti/consistency/proxy_graph_builder.hpp"
+#include "tutti/model/messages.hpp"
+#include "tutti/server/closure_finder.hpp"
+#include "tutti/server/graph_monitor.hpp"
+#include "tutti/server/map_estimate.hpp"
+#include "tutti/server/refinements.hpp"
+
+namespace tutti::server {
+
+/// All that a map is made of, as the server had it when the map was begun. A job shares nothing that changes with its
+/// server, so make_map() may run on another thread while the server takes what comes.
+struct MapJob {
+  SubmapSet submaps;
+  std::map<SubmapId, PayloadSize> payload_sizes;  ///< For a server that has its map refined.
+  VerdictSet verdicts;
+  WordSet words;
+  Refinements refinements;
+  MapConfig map;
+  consistency::ProxyGraphConfig proxy_graph;
+  std::uint64_t epoch = 0;
+  std::uint64_t revision = 0;
+  /// The map of the pose graph alone, when nothing has come that changes it; else null.
+  std::shared_ptr<const MapEstimate> estimate;
+  bool keeps_estimate = false;  ///< It is asked for again, to refine the map.
+};
+
+/// The map of a job.
+struct MadeMap {
+  MapJob job;
+  std::shared_ptr<const MapEstimate> estimate;  ///< The pose graph alone; null if it is not kept.
+  MapEstimate map;                              ///< With refinements and fixes.
+  ProxyGraphMessage message;                    ///< Its whole proxy graph.
+  judge::SearchWork search;
+  MonitorWork monitor;
+};
+
+/// Makes the map: a pure function of the job.
+MadeMap make_map(MapJob job);
+
+}  // namespace tutti::server
