@@ -106,7 +106,7 @@ TEST(Scenarios, InAgreeTheServersUncertaintyExplainsTheWholeDifference) {
   for (const std::uint64_t seed : {1U, 2U}) {
     const MissionRecord record = run(scenario("agree", {"server.update_period_s=40"}), seed);
     EXPECT_EQ(record.server.components, 1U);
-    if (seed == 1) expect_work(record, {11, 3160, 350, 14, 190, 510'000});  // 11, 3160, 279, 11, 151, 408,672
+    if (seed == 1) expect_work(record, {11, 3160, 350, 14, 176, 510'000});  // 11, 3160, 279, 11, 141, 408,672
     for (const RobotRecord& robot : record.robots) {
       EXPECT_LT(*robot.onboard.rmse_m, 0.7 * *robot.server.rmse_m) << robot.name;  // nothing to gain
       ASSERT_TRUE(robot.explanation.has_value());

@@ -48,7 +48,7 @@ class Optimiser {
   [[nodiscard]] Optimum decide() const {
     Optimum best = settle(map_.searched, explain());
     for (int round = 0; round < kRefusals && refuse_lone_witness(best);) ++round;
-    return settle(map_.graph, std::move(best));
+    return solved(settle(map_.graph, std::move(best)));
   }
 
  private:
@@ -102,7 +102,8 @@ class Optimiser {
   }
 
   /// The map with the closures that are worth what it pays for them, from the objections, the failed odometry and the
-  /// work of `out`. Closures that are not asked keep the price that they were refused for.
+  /// work of `out`. Closures that are not asked keep the price that they were refused for. Its poses are those of the
+  /// graph of the closures' ends, with odometry bent to meet them.
   [[nodiscard]] Optimum settle(const PoseGraph& odometry, Optimum out) const {
     out.graph = odometry;
     out.closure_of_edge.clear();
@@ -136,7 +137,13 @@ class Optimiser {
       out.closure_of_edge.push_back(asked[k]);
     }
     out.solution.summary.termination = settled.termination;
-    if (!estimation::is_usable(settled.termination)) return out;
+    out.solution.poses = out.graph.poses;
+    return out;
+  }
+
+  /// The map in full, from where its closures' ends are. Nothing is asked of it before the last closure is decided.
+  [[nodiscard]] Optimum solved(Optimum out) const {
+    if (!estimation::is_usable(out.solution.summary.termination)) return out;
     estimation::SolverConfig from_there = gnc_.solver;
     from_there.initialisation = "given";
     out.solution = estimation::solve_pose_graph(out.graph, from_there);
