@@ -232,8 +232,9 @@ test("time is scrubbed: what was known then, and nothing can be decided there", 
   served(small(), async (page) => {
     await page.evaluate(() => tutti.app.set_time(100));
     await page.until("ten submaps each", () => tutti.app.world.placed.size === 30);
-    assert.match((await page.texts(".badge"))[0], /Past: 0:01:40/);
-    assert.equal((await page.texts(".tabs button")).includes("By hand"), false);
+    await page.until("the page says so", () => /Past: 0:01:40/.test(document.querySelector(".badge").textContent));
+    await page.until("no decision is offered", () =>
+      [...document.querySelectorAll(".tabs button")].every((b) => b.textContent !== "By hand"));
     await page.press("Live");
     await page.until("all again", () => tutti.app.world.placed.size === 72);
   }));
@@ -435,9 +436,9 @@ for (const { name, run } of tests) {
   const start = Date.now();
   try {
     await run().catch(async (error) => {
-      if (browser.lives) throw error;
-      console.log(`     Chromium itself ended in: ${name}; once more with another one`);
-      browser = await Browser.launch();
+      // A busy machine draws late: what fails twice is wrong.
+      console.log(`     ${browser.lives ? error.stack ?? error : "Chromium itself ended"} in: ${name}; once more`);
+      if (!browser.lives) browser = await Browser.launch();
       await run();
     });
     console.log(`ok   ${name} (${Date.now() - start} ms)`);
