@@ -53,6 +53,14 @@ class HostedServerTest : public testing::Test {
     return std::make_unique<Host>(std::move(parts), clock_, *log_);
   }
   void bring(std::uint32_t index) { owed_.push_back(node::test::envelope(node::test::submap(kAlpha, index))); }
+  /// Opens the server and gives it a submap, of which it begins a map.
+  void begin_map(Host& server) {
+    ASSERT_TRUE(server.open().has_value());
+    bring(0);
+    server.turn();
+    wall_s_ += 10.0;
+    server.turn();
+  }
   [[nodiscard]] std::size_t sent(MessageKind kind) const {
     return static_cast<std::size_t>(std::ranges::count(sent_, kind, &bus::Envelope::kind));
   }
@@ -74,11 +82,7 @@ TEST_F(HostedServerTest, ReceiptsDoNotWaitForAMap) {
     may_end.wait();
     return node::make_map(std::move(task));
   });
-  ASSERT_TRUE(server->open().has_value());
-  bring(0);
-  server->turn();
-  wall_s_ += 10.0;
-  server->turn();
+  ASSERT_NO_FATAL_FAILURE(begin_map(*server));
   begun.wait();  // the map is being made, and stays so
   for (std::uint32_t i = 1; i < 4; ++i) {
     bring(i);
@@ -102,11 +106,7 @@ TEST_F(HostedServerTest, ReceiptsDoNotWaitForAMap) {
 
 TEST_F(HostedServerTest, AMapThatIsBeingMadeIsSentBeforeItEnds) {
   const auto server = host(&node::make_map);
-  ASSERT_TRUE(server->open().has_value());
-  bring(0);
-  server->turn();
-  wall_s_ += 10.0;
-  server->turn();
+  ASSERT_NO_FATAL_FAILURE(begin_map(*server));
   const std::atomic<bool> stop = true;
   server->run(stop);
   EXPECT_EQ(sent(MessageKind::proxy_graph), 1U);
@@ -118,11 +118,7 @@ TEST_F(HostedServerTest, WhatMakingAMapThrowsIsToldAndTriedAgainWhileSubmapsAreT
     if (++tries == 1) throw std::logic_error("no map");
     return node::make_map(std::move(task));
   });
-  ASSERT_TRUE(server->open().has_value());
-  bring(0);
-  server->turn();
-  wall_s_ += 10.0;
-  server->turn();
+  ASSERT_NO_FATAL_FAILURE(begin_map(*server));
   while (server->hosted() != nullptr) {
     server->wait(1.0);
     server->turn();
