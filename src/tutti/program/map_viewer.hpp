@@ -33,6 +33,7 @@ struct ViewedMission {
   std::string version;
   storage::TableStore& map;  ///< Viewers write nothing but marks (mapfile/marks.hpp) in it.
   std::shared_ptr<const server::ClosureFinder> finder;
+  double rate = 1.0;          ///< Mission time per wall time.
   std::filesystem::path pki;  ///< Of `tutti pki`; empty: whoever reaches the server may do all.
   std::function<void(Level, const std::string&)> say;
 };

@@ -287,6 +287,7 @@ Status ServerProgram::start() {
                              .version = options_.version,
                              .map = *store_,
                              .finder = finder_,
+                             .rate = options_.rate,
                              .pki = options_.pki,
                              .say = [this](Level level, const std::string& sentence) { log_->say(level, sentence); }};
   for (const auto& view : options_.views) {

@@ -14,6 +14,7 @@
 
 #include "support/bus/nats_network.hpp"
 #include "tutti/base/file.hpp"
+#include "tutti/bus/internal/nats_connection.hpp"
 #include "tutti/bus/nats_child.hpp"
 #include "tutti/bus/transport.hpp"
 #include "tutti/pki/pki.hpp"
@@ -53,8 +54,15 @@ class PkiBus : public ::testing::Test {
                           int days = pki::kDays) {
     const auto file = pki_->add(role, name, number, days);
     EXPECT_TRUE(file.has_value()) << file.error().message;
-    if (child_) tend();
+    if (!child_) return credentials(name);
+    tend();
+    wait_until_known(credentials(name));
     return credentials(name);
+  }
+  /// The bus reads its new rights when it gets to it: who comes before is refused once, and a test counts refusals.
+  void wait_until_known(const bus::BusCredentials& who) {
+    EXPECT_TRUE(test::within(30.0, [&] { return bus::NatsConnection::open(options(who), "newcomer").has_value(); }));
+    static_cast<void>(child_->take_refusals());
   }
   [[nodiscard]] bus::BusCredentials credentials(const std::string& name) const {
     return bus::parse_credentials(read_file(pki_->credential(name).string()).value()).value();

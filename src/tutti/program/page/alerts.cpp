@@ -29,7 +29,8 @@ Alert robot_alert(const MissionStatus::Robot& robot, const char* kind, const cha
 }
 
 /// When the robot was last heard is known, so that is when this began.
-void look_at_silence(const MissionStatus& status, const MissionStatus::Robot& robot, std::vector<Alert>& out) {
+void look_at_silence(const MissionStatus& status, const MissionStatus::Robot& robot, double limit_s,
+                     std::vector<Alert>& out) {
   if (robot.status.finished) return;
   if (!robot.last_seen) {
     out.push_back(robot_alert(robot, "unseen", "info", "not heard since the server started",
@@ -37,17 +38,18 @@ void look_at_silence(const MissionStatus& status, const MissionStatus::Robot& ro
     return;
   }
   const double silent_s = status.time - *robot.last_seen;
-  if (silent_s < kSilent_s) return;
+  if (silent_s < limit_s) return;
   Alert alert = robot_alert(robot, "silent", "warning", "silent",
                             "It maps on and keeps its submaps; it joins again when the radio reaches it.");
   alert.since_s = *robot.last_seen - Timestamp{};
   out.push_back(std::move(alert));
 }
 
-void look_at_robot(const MissionStatus& status, const MissionStatus::Robot& robot, std::vector<Alert>& out) {
-  look_at_silence(status, robot, out);
+void look_at_robot(const MissionStatus& status, const MissionStatus::Robot& robot, double silent_s,
+                   std::vector<Alert>& out) {
+  look_at_silence(status, robot, silent_s, out);
   const NodeStatus& own = robot.status;
-  const bool is_heard = robot.last_seen && status.time - *robot.last_seen < kSilent_s;
+  const bool is_heard = robot.last_seen && status.time - *robot.last_seen < silent_s;
   if (!robot.conflict.empty())
     out.push_back(robot_alert(robot, "conflict", "error", robot.conflict,
                               "Two programs claim to be this robot: stop one, or give it another --name."));
@@ -128,7 +130,7 @@ std::vector<Alert> Alerts::of_status(const MissionStatus& status) {
   if (status.pending_jobs > kManyWaitingJobs)
     out.push_back(server_alert("jobs", "info", fmt::format("{} jobs wait for workers", status.pending_jobs),
                                "Closures come late. Start more workers (tutti worker)."));
-  for (const MissionStatus::Robot& robot : status.robots) look_at_robot(status, robot, out);
+  for (const MissionStatus::Robot& robot : status.robots) look_at_robot(status, robot, silent_s_, out);
   return dated(std::move(out), status_since_, status.time - Timestamp{});
 }
 

@@ -41,6 +41,14 @@ TEST(Alerts, ASilentRobotIsSilentSinceItWasHeard) {
   EXPECT_TRUE(alerts.of_status(finished).empty()) << "who has finished need not speak";
 }
 
+/// Statuses come by the wall clock: at four times its speed one that was late by half a second is 10 s of mission old.
+TEST(Alerts, AMissionThatIsPlayedFasterWaitsAsMuchLonger) {
+  Alerts alerts(silent_after_s(4.0));
+  EXPECT_TRUE(alerts.of_status(status_at(110.0, 98.0)).empty());
+  EXPECT_EQ(alerts.of_status(status_at(150.0, 98.0)).size(), 1U);
+  EXPECT_EQ(silent_after_s(0.5), silent_after_s(1.0)) << "played slowly, statuses come as often";
+}
+
 TEST(Alerts, EveryTroubleIsToldWithWhenItBegan) {
   Alerts alerts;
   MissionStatus status = status_at(100.0, 99.0);

@@ -78,10 +78,12 @@ struct CertificateFiles {
 class PageViewer final : public program::MapViewer {
  public:
   PageViewer(const PageOptions& options, const program::ViewedMission& mission)
-      : site_(mission), say_(mission.say), announce_(options.announce) {
+      : site_(mission), say_(mission.say), announce_(options.announce), alerts_(silent_after_s(mission.rate)) {
     site_.board.put([&](Board& board) {
-      board.put(
-          mission_message({.name = mission.name, .description = options.description, .version = mission.version}));
+      board.put(mission_message({.name = mission.name,
+                                 .description = options.description,
+                                 .version = mission.version,
+                                 .robot_silent_s = silent_after_s(mission.rate)}));
     });
   }
   ~PageViewer() override {

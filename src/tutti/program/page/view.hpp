@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -18,6 +19,10 @@
 /// What the page shows, as messages (docs/page.md): pure functions of a map and a status.
 namespace tutti::page {
 
+/// After how many seconds of mission time a robot is silent: five statuses that did not come. Statuses come by the
+/// wall clock, so a mission that is played `rate` times as fast waits as much longer.
+constexpr double silent_after_s(double rate) { return 10.0 * std::max(1.0, rate); }
+
 /// What the page is told first.
 struct Mission {
   std::string name;
@@ -25,6 +30,7 @@ struct Mission {
   std::string mode = "live";  ///< Or "report".
   std::string version;
   std::optional<double> duration_s;
+  double robot_silent_s = silent_after_s(1.0);
   template <class V>
   void describe(V& v) {
     v.field(1, "name", name);
@@ -32,11 +38,11 @@ struct Mission {
     v.field(3, "mode", mode);
     v.field(4, "version", version);
     v.field(5, "duration_s", duration_s);
+    v.field(6, "robot_silent_s", robot_silent_s);
   }
 };
-/// With what the page is to do as the program does: the robots' colours, and after how long one is silent.
+/// With the robots' colours, which are to be the same everywhere.
 Message mission_message(const Mission& mission);
-inline constexpr double kSilent_s = 10.0;  ///< Five statuses that did not come.
 
 /// A problem, for people: what, where, since when, and what to do about it.
 struct Alert {
@@ -65,6 +71,7 @@ struct Alert {
 /// Follows the problems that statuses and maps show, so that each has a time since when it is there.
 class Alerts {
  public:
+  explicit Alerts(double silent_s = silent_after_s(1.0)) : silent_s_(silent_s) {}
   /// Errors first, the oldest of each first.
   std::vector<Alert> of_status(const MissionStatus& status);
   std::vector<Alert> of_map(const mapfile::ShownMap& map, const std::map<SubmapId, std::size_t>& holding);
@@ -72,6 +79,7 @@ class Alerts {
  private:
   std::vector<Alert> dated(std::vector<Alert> found, std::map<std::string, double>& since, double now_s);
 
+  double silent_s_;
   std::map<std::string, double> status_since_, map_since_;
 };
 /// Both, errors first, the oldest of each first.

@@ -194,7 +194,6 @@ MapMessages map_messages(const ShownMap& map, const std::map<SubmapId, std::size
 
 Message mission_message(const Mission& mission) {
   FieldJson out = json_of_fields(mission);
-  out["robot_silent_s"] = kSilent_s;
   out["robot_colours"] = {{"light", kOnLight}, {"dark", kOnDark}};
   return {"mission", 0.0, text_of(out)};
 }
