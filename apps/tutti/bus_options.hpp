@@ -6,7 +6,6 @@
 #include <memory>
 #include <string>
 
-#include "tutti/base/file.hpp"
 #include "tutti/bus/transport.hpp"
 
 /// The options of all commands that join a bus.
@@ -26,13 +25,9 @@ inline void take_credentials(const std::string& file, bus::BusOptions& options) 
   }
   const char* const given = std::getenv("TUTTI_CREDENTIALS");
   if (file.empty() && (given == nullptr || *given == '\0')) return;
-  const auto text = file.empty() ? Result<std::string>(given) : read_file(file);
-  if (!text) refuse("--credentials", text.error());
-  auto parsed = bus::parse_credentials(*text);
-  if (!parsed && file.empty()) refuse("TUTTI_CREDENTIALS", parsed.error());
-  if (!parsed) refuse("--credentials", in_context(file, parsed.error()).value());
-  options.credentials = std::move(*parsed);
-  options.credentials.file = file;
+  auto taken = file.empty() ? bus::parse_credentials(given) : bus::read_credentials(file);
+  if (!taken) refuse(file.empty() ? "TUTTI_CREDENTIALS" : "--credentials", taken.error());
+  options.credentials = std::move(*taken);
 }
 
 inline constexpr const char* kBusHelp = "The bus, as the server prints it";

@@ -54,7 +54,7 @@ class IntrudersSystem : public ::testing::Test {
   void TearDown() override { fs::remove_all(folder_); }
 
   [[nodiscard]] bus::BusCredentials credentials(const std::string& name) const {
-    return bus::parse_credentials(read_file(pki_->credential(name).string()).value()).value();
+    return bus::read_credentials(pki_->credential(name).string()).value();
   }
   void start_server() {
     server_.emplace([this](const std::atomic<bool>& stop) {

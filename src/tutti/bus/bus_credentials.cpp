@@ -98,12 +98,19 @@ Result<BusCredentials> parse_credentials(std::string_view text) {
   return out;
 }
 
+Result<BusCredentials> read_credentials(const std::string& file) {
+  const auto text = read_file(file, kLargestFile);
+  if (!text) return tl::unexpected(text.error());
+  auto out = parse_credentials(*text);
+  if (!out) return in_context(file, out.error());
+  out->file = file;
+  return out;
+}
+
 BusCredentials read_again(const BusCredentials& credentials) {
   if (credentials.file.empty()) return credentials;
-  const auto text = read_file(credentials.file, kLargestFile);
-  auto now = text ? parse_credentials(*text) : Result<BusCredentials>(tl::unexpected(text.error()));
+  auto now = read_credentials(credentials.file);
   if (!now || now->known != credentials.known || now->user != credentials.user) return credentials;
-  now->file = credentials.file;
   return std::move(*now);
 }
 

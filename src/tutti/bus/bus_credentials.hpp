@@ -54,6 +54,8 @@ struct BusCredentials {
   std::string file = {};       ///< From which they were read; empty: from elsewhere.
   friend bool operator==(const BusCredentials&, const BusCredentials&) = default;
 };
+/// Those in a file, with its name; errors name it, and do not repeat what is in it.
+Result<BusCredentials> read_credentials(const std::string& file);
 /// What is in their file now, if that is still for the same user; otherwise the same again.
 BusCredentials read_again(const BusCredentials& credentials);
 /// "USER:PASSWORD" or "TOKEN" in the first line of a text, or the text of a file of `tutti pki`. Errors do not repeat

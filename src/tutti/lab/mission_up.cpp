@@ -179,9 +179,7 @@ Status MissionUp::watch(const std::atomic<bool>& stop) {
   bus::BusOptions on_bus{.url = bus_, .mission = name_};
   const auto watcher = bus::Endpoint::viewer(static_cast<std::uint32_t>(getpid()));
   if (pki_) {
-    const auto text = read_file(pki_->credential(kWatcher).string());
-    if (!text) return tl::unexpected(text.error());
-    auto credentials = bus::parse_credentials(*text);
+    auto credentials = bus::read_credentials(pki_->credential(kWatcher).string());
     if (!credentials) return tl::unexpected(credentials.error());
     on_bus.credentials = std::move(*credentials);
   }

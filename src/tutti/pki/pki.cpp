@@ -254,10 +254,8 @@ Status Pki::renew(const std::string& name, int days) {
   Member* const member = find(name);
   if (member == nullptr || member->is_revoked)
     return fail(ErrorCode::configuration, "{}: nobody is called so, or not any more (tutti pki list)", name);
-  const auto text = read_file(credential(name).string());
-  if (!text) return in_context("its credential is needed here, for the key that stays", text.error());
-  const auto credentials = bus::parse_credentials(*text);
-  if (!credentials) return in_context(credential(name).string(), credentials.error());
+  const auto credentials = bus::read_credentials(credential(name).string());
+  if (!credentials) return in_context("its credential is needed here, for the key that stays", credentials.error());
   if (credentials->key.open != member->key)
     return fail(ErrorCode::invalid, "{}: another key than {} has", credential(name).string(), to_string(member->user));
   if (Status done = write_credential(member->user, credentials->key, days, member->until); !done) return done;

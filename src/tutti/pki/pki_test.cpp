@@ -153,7 +153,7 @@ TEST_F(PkiTest, WhoHasNoCertificateOfOursIsNotLetIn) {
   const auto alpha = add(BusRole::robot, "alpha", 3);
   auto foreign = Pki::make(folder_ / "foreign", "cave").value();
   auto stranger = alpha, without = alpha;
-  stranger.certificate = bus::parse_credentials(read_file(foreign.credential("server").string()).value())->certificate;
+  stranger.certificate = bus::read_credentials(foreign.credential("server").string())->certificate;
   const auto expired = add(BusRole::robot, "old", 5, -1);
   auto astray = alpha;
   astray.authority = read_file((folder_ / "foreign" / "authority.pem").string()).value();

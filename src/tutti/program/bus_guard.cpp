@@ -5,7 +5,6 @@
 
 #include <utility>
 
-#include "tutti/base/file.hpp"
 #include "tutti/base/plain_text.hpp"
 #include "tutti/pki/pki.hpp"
 
@@ -18,14 +17,10 @@ Result<BusGuard> BusGuard::open(const std::filesystem::path& folder, const std::
   if (there->mission() != mission)
     return fail(ErrorCode::configuration, "--pki {}: is of mission '{}', and this server's is '{}' (--mission)",
                 folder.string(), there->mission(), mission);
-  const std::string file = there->credential(pki::kServer).string();
-  const auto text = read_file(file);
-  if (!text) return tl::unexpected(text.error());
-  auto credentials = bus::parse_credentials(*text);
-  if (!credentials) return in_context(file, credentials.error());
+  auto credentials = bus::read_credentials(there->credential(pki::kServer).string());
+  if (!credentials) return tl::unexpected(credentials.error());
   BusGuard guard(folder);
   guard.credentials_ = std::move(*credentials);
-  guard.credentials_.file = file;
   auto rights = there->bus_configuration(now);
   if (!rights) return tl::unexpected(rights.error());
   guard.rights_ = std::move(*rights);

@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include "support/pki/sign.hpp"
-#include "tutti/base/file.hpp"
 #include "tutti/pki/pki.hpp"
 
 namespace tutti::page {
@@ -25,7 +24,7 @@ class SignInTest : public ::testing::Test {
   }
   void TearDown() override { fs::remove_all(folder_); }
   [[nodiscard]] bus::NatsKey key(const std::string& name) const {
-    return bus::parse_credentials(read_file(pki_->credential(name).string()).value())->key;
+    return bus::read_credentials(pki_->credential(name).string())->key;
   }
   Result<std::string> open(const std::string& name, double now_s) {
     const std::string nonce = at_->nonce(now_s);

@@ -18,7 +18,6 @@
 
 #include "support/mapfile/small_map.hpp"
 #include "support/pki/sign.hpp"
-#include "tutti/base/file.hpp"
 #include "tutti/pki/pki.hpp"
 #include "tutti/program/page/base64.hpp"
 #include "tutti/program/page/page_server.hpp"
@@ -142,7 +141,7 @@ class ServedPage : public ::testing::Test {
   /// The cookie of a member who has signed in as the page does it.
   std::string sign_in(const pki::Pki& pki, const std::string& name) {
     auto http = client();
-    const auto key = bus::parse_credentials(read_file(pki.credential(name).string()).value())->key;
+    const auto key = bus::read_credentials(pki.credential(name).string())->key;
     const json me = json::parse(http.Get("/api/me")->body);
     EXPECT_TRUE(me.at("login"));
     const std::string nonce = me.at("nonce");
