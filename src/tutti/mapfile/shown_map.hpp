@@ -6,6 +6,7 @@
 #include "tutti/base/timestamp.hpp"
 #include "tutti/mapfile/content.hpp"
 #include "tutti/node/server_node.hpp"
+#include "tutti/storage/table_store.hpp"
 
 namespace tutti::mapfile {
 
@@ -18,7 +19,18 @@ struct ShownMap {
   ProxyGraph broadcast;  ///< The last proxy graph; empty: there was none yet.
 };
 
-/// A copy of the server's map: none of its parts is the server's any more, but for the submaps, which never change.
-ShownMap shown_map(const node::ServerNode& server, Timestamp now);
+/// Makes copies of a server's map: none of their parts is the server's any more, but for the submaps, which never
+/// change. What a verdict's finder measured, where and when, the server does not keep in memory: it is read from the
+/// server's store, each row once. Where that has no such row yet, or cannot be read, it is missing.
+class ShownMaps {
+ public:
+  /// `store` must outlive this.
+  explicit ShownMaps(const storage::TableStore& store) : store_(store) {}
+  [[nodiscard]] ShownMap of(const node::ServerNode& server, Timestamp now);
+
+ private:
+  const storage::TableStore& store_;
+  server::VerdictSet known_;  // as last shown, with what was measured
+};
 
 }  // namespace tutti::mapfile

@@ -254,8 +254,8 @@ class MissionRun {
   }
 
   /// With the names that robots tell in statuses, which a mission in virtual time does not send.
-  [[nodiscard]] mapfile::ShownMap shown_map() const {
-    mapfile::ShownMap shown = mapfile::shown_map(*server_, now());
+  [[nodiscard]] mapfile::ShownMap shown_map() {
+    mapfile::ShownMap shown = shown_maps_.of(*server_, now());
     for (const MissionRecording& recording : recordings_)
       shown.content.names[recording.recording.robot] = recording.recording.name;
     return shown;
@@ -283,6 +283,7 @@ class MissionRun {
   node::WorkerNode worker_;
   std::unique_ptr<bus::Port> server_port_, worker_port_;
   Pace pace_;
+  mapfile::ShownMaps shown_maps_{store_};
   ViewRecorder view_;
   std::vector<Robot> robots_;  // by RobotId
   MissionEvents events_;

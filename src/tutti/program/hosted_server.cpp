@@ -11,10 +11,11 @@
 
 namespace tutti::program {
 
-HostedServer::HostedServer(std::unique_ptr<node::ServerNode> node, std::string version,
+HostedServer::HostedServer(std::unique_ptr<node::ServerNode> node, const storage::TableStore& map, std::string version,
                            std::function<std::string()> trouble, const bool& is_over,
                            const std::vector<std::unique_ptr<MapViewer>>& viewers, const Clock& clock, MakeMap make_map)
     : node_(std::move(node)),
+      shown_maps_(map),
       version_(std::move(version)),
       trouble_(std::move(trouble)),
       is_over_(is_over),
@@ -76,7 +77,7 @@ void HostedServer::tend_viewers(Timestamp now) {
   for (const auto& viewer : viewers_) {
     for (AskedWord& word : viewer->take_words()) asked_.push_back(std::move(word));
     if (!node_->has_map() || !viewer->wants(node_->map_server().state().revision)) continue;
-    if (!shown) shown = std::make_shared<const mapfile::ShownMap>(mapfile::shown_map(*node_, now));
+    if (!shown) shown = std::make_shared<const mapfile::ShownMap>(shown_maps_.of(*node_, now));
     viewer->show(shown);
   }
 }

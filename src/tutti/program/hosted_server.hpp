@@ -24,9 +24,11 @@ class HostedServer final : public Hosted {
   /// Called on the second thread; what it throws is thrown by work().
   using MakeMap = std::function<node::MapOfTask(node::MapTask)>;
 
-  /// `trouble` says what is wrong with the program. `is_over`: the mission is another server's. All must outlive this.
-  HostedServer(std::unique_ptr<node::ServerNode> node, std::string version, std::function<std::string()> trouble,
-               const bool& is_over, const std::vector<std::unique_ptr<MapViewer>>& viewers, const Clock& clock,
+  /// `map` is the node's store; `trouble` says what is wrong with the program. `is_over`: the mission is another
+  /// server's. All must outlive this.
+  HostedServer(std::unique_ptr<node::ServerNode> node, const storage::TableStore& map, std::string version,
+               std::function<std::string()> trouble, const bool& is_over,
+               const std::vector<std::unique_ptr<MapViewer>>& viewers, const Clock& clock,
                MakeMap make_map = &node::make_map);
   Answer start(Timestamp now) override { return counted({node_->resume(now), {}}); }
   Answer receive(const bus::Received& message, Timestamp now) override {
@@ -58,6 +60,7 @@ class HostedServer final : public Hosted {
   [[nodiscard]] bool is_made() const;
 
   std::unique_ptr<node::ServerNode> node_;
+  mapfile::ShownMaps shown_maps_;
   std::string version_;
   std::function<std::string()> trouble_;
   const bool& is_over_;

@@ -185,7 +185,8 @@ Result<std::unique_ptr<Hosted>> ServerProgram::open_node() {
   auto node = node::ServerNode::open(std::move(robots), finder_, config, folder_->made_ns(), *store_);
   if (!node) return in_context((folder_->path() / kMapFile).string(), node.error());
   return std::make_unique<HostedServer>(
-      std::move(*node), options_.version, [this] { return host_->all_trouble(); }, is_over_, viewers_, *clock_);
+      std::move(*node), *store_, options_.version, [this] { return host_->all_trouble(); }, is_over_, viewers_,
+      *clock_);
 }
 
 Status ServerProgram::check_lease(const bus::MissionLease::State& seen) const {

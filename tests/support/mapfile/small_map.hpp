@@ -72,6 +72,7 @@ class Mapper {
     take(node_->on_timer(now_));
   }
   [[nodiscard]] const server::MapServer& server() const { return node_->map_server(); }
+  [[nodiscard]] const node::ServerNode& node() const { return *node_; }
 
  private:
   void take(node::Step step) {

@@ -31,11 +31,11 @@ class ViewOfAMap : public testing::Test {
     mapfile::test::Mapper mapper({kAlpha, kBravo}, store_);
     mapper.walk({kAlpha, 5});
     mapper.walk({kBravo, 5});
-    shown_.content = mapfile::read(store_).value();
+    mapfile::ShownMaps shown(store_);
+    static_cast<void>(shown.of(mapper.node(), Timestamp{} + 41.0));
+    shown_ = shown.of(mapper.node(), Timestamp{} + 42.0);
     shown_.content.names = {{kAlpha, "alpha"}, {kBravo, "<b>"}};
-    shown_.map = mapfile::estimate(shown_.content);
     shown_.revision = 7;
-    shown_.time = Timestamp{} + 42.0;
     messages_ = map_messages(shown_, closures_holding(shown_.content.submaps, shown_.map));
   }
   storage::MemoryStore store_{storage::map_schema()};
