@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /** What follows from the store and is in no message: where robots may be, when backlogs are empty, what a correction moved. */
-import { REACH_M, SLOWEST_MPS, TIMES } from "./limits";
+import { LOST_ROBOT, REACH_M, SLOWEST_MPS, TIMES } from "./limits";
 import { compose, distance, inverse } from "./pose";
 import { POSE_ROW } from "./schema";
 import type { Pose, Poses, RobotStatus, Submap, SubmapId } from "./schema";
@@ -74,7 +74,7 @@ function presence_of(status: RobotStatus | null, silent_s: number | null, silent
   if (!status || silent_s === null) return "unknown";
   if (status.finished && status.backlog_submaps === 0) return "finished";
   if (silent_s < silent_after_s) return "here";
-  return silent_s < TIMES.robot_lost_s ? "silent" : "lost";
+  return silent_s < LOST_ROBOT * silent_after_s ? "silent" : "lost";
 }
 
 function speed_of(submaps: Submap[]): number {

@@ -41,9 +41,6 @@ export const TIMES = {
   /** The server sends a sign of life every second. */
   server_silent_s: 3,
   reconnect_ms: 400,
-  /** The server tells its status every two seconds. */
-  status_old_s: 14,
-  robot_lost_s: 60,
   /** Over which the drain of a backlog is measured. */
   drain_window_s: 60,
   /** How long a correction stays in sight. */
@@ -62,6 +59,9 @@ export const TIMES = {
   hold_ms: 10_000,
 } as const;
 
+/** A status is old when it is older than what makes a robot silent by this factor; a robot that is silent as much longer is lost. */
+export const OLD_STATUS = 1.4;
+export const LOST_ROBOT = 6;
 /** A silent robot is somewhere in a circle: the speed it had, times its silence, at most this. */
 export const REACH_M = 150;
 /** A robot that never moved may start to. */

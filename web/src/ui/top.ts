@@ -2,7 +2,8 @@
 /** The bar on top: which mission, whether the server is there, the phase, the person. */
 import type { App } from "../app";
 import { many, moment, span } from "../format";
-import { TIMES } from "../limits";
+import { silent_after } from "../derive";
+import { OLD_STATUS } from "../limits";
 import { PHASES } from "../options";
 import type { Phase } from "../options";
 import { THEMES } from "../theme";
@@ -39,7 +40,7 @@ function badge(app: App): Child {
   if (state === "connecting") return h("span", { class: "badge old" }, why ? `No server (${why})` : "Connecting …");
   if (state === "silent") return h("span", { class: "badge bad", role: "alert" }, `The server is silent since ${span((performance.now() - heard_ms) / 1000)}`);
   const age = status_age(app);
-  if (age !== null && age > TIMES.status_old_s) return h("span", { class: "badge old", role: "alert" }, `Status is ${span(age)} old`);
+  if (age !== null && age > OLD_STATUS * silent_after(app.store)) return h("span", { class: "badge old", role: "alert" }, `Status is ${span(age)} old`);
   if (app.time !== null) return h("span", { class: "badge old" }, `Past: ${moment(app.time)}`);
   return h("span", { class: "badge live", title: "The server is heard" }, "Live");
 }
