@@ -2,17 +2,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # The page of web/: types, unit tests in Node, that web/dist is what the sources make, and a headless Chromium that drives it.
 # Skips, and says so, without what it needs; without an option it installs Chromium and Node where they are missing.
-#   scripts/test_web.sh [--write | --quick | --chromium]
-# --write: renews web/dist instead of comparing it; --quick: no Chromium; --chromium: nothing else. The last two install no packages.
+#   scripts/test_web.sh [--write | --quick | --chromium | --programs TUTTI]
+# --write: renews web/dist instead of comparing it; --quick: no Chromium; --chromium: nothing else;
+# --programs: Chromium drives the page of this program instead of a made-up mission. The last three install no packages.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 mode="${1-}"
+program="${2:+$(realpath "$2")}"
 missing=()
 [ "$mode" = --quick ] || command -v chromium >/dev/null || missing+=(chromium)
 command -v npm >/dev/null || missing+=(nodejs npm)
 if [ "${#missing[@]}" -gt 0 ]; then
-  case "$mode" in --quick | --chromium) skip "missing: ${missing[*]}" ;; esac
+  case "$mode" in --quick | --chromium | --programs) skip "missing: ${missing[*]}" ;; esac
   [ "$(id -u)" = 0 ] || skip "not root, and missing: ${missing[*]}"
   say "packages: ${missing[*]}"
   export DEBIAN_FRONTEND=noninteractive
@@ -32,6 +34,11 @@ exec {turn}>&-
 if grep -q '"resolved"' package-lock.json; then
   echo "web/package-lock.json names where packages were loaded from: npm install --omit-lockfile-registry-resolved" >&2
   exit 1
+fi
+
+if [ "$mode" = --programs ]; then
+  node test/programs.mjs "$program" "$root/tests/system/page_mission.yaml"
+  exit
 fi
 
 if [ "$mode" != --chromium ]; then

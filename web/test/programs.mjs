@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Drives the built page in a headless Chromium against tutti's own programs: one server and three robots that replay a simulated mission,
+// through what an operator lives through. usage: programs.mjs TUTTI MISSION. Ends with 1 if anything is not as it should be.
+import assert from "node:assert/strict";
+import { execFileSync, spawn } from "node:child_process";
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { createInterface } from "node:readline";
+import { Browser } from "./chromium.mjs";
+
+const [, , tutti, mission] = process.argv;
+const kRate = 4; // times as fast as the robots walk; statuses come by the wall clock
+const kPatience_ms = 120_000; // of a busy machine
+const work = mkdtempSync(join(tmpdir(), "tutti-web-"));
+const programs = [];
+
+function start(...words) {
+  const program = spawn(tutti, words, { stdio: ["ignore", "pipe", "inherit"] });
+  programs.push(program);
+  return program;
+}
+const common = [mission, "--rate", String(kRate)];
+
+/** The server, where robots reach it and where its page is, as it says itself. */
+async function start_server() {
+  const program = spawn(tutti, ["server", ...common, "--state", join(work, "server"), "--view", "0"], { stdio: ["ignore", "pipe", "pipe"] });
+  programs.push(program);
+  let bus, page;
+  await new Promise((resolve, reject) => {
+    for (const stream of [program.stdout, program.stderr])
+      createInterface({ input: stream }).on("line", (line) => {
+        bus ??= line.match(/--bus (nats:\S+)/)?.[1];
+        page ??= line.match(/the page is at (\S+)/)?.[1];
+        if (bus && page) resolve();
+        else console.log(`    ${line}`);
+      });
+    program.on("exit", () => reject(new Error("the server ended")));
+  });
+  return { program, bus, page };
+}
+function start_robot(name, bus, ...more) {
+  const program = start("robot", ...common, ...more, "--name", name, "--bus", bus, "--state", join(work, name), "--session", "0");
+  program.stdout.resume();
+  return program;
+}
+/** The process ids of the bus that the server has started. */
+const buses_of = (server) =>
+  execFileSync("ps", ["--ppid", String(server.pid), "-o", "pid=,comm="], { encoding: "utf8" })
+    .split("\n").filter((line) => /nats-server/.test(line)).map((line) => Number.parseInt(line, 10));
+
+const until_presence = (page, name, wanted) =>
+  page.until(`${name} is ${wanted}`, ([n, all]) => all.includes(tutti.app.robots.find((r) => r.name === n)?.presence), [name, wanted], kPatience_ms);
+const step = (what) => console.log(`ok   ${what}`);
+
+async function play(browser) {
+  const { program: server, bus, page: url } = await start_server();
+  const page = await browser.open(url);
+  await page.evaluate(() => localStorage.setItem("tutti.by", JSON.stringify("eva")));
+  await page.reload();
+  const robots = { alpha: start_robot("alpha", bus), bravo: start_robot("bravo", bus) };
+  await page.until("alpha and bravo are joined", () => tutti.app.world.parts.size === 1 && new Set([...tutti.app.world.placed.values()].map((p) => p.submap.robot)).size === 2 && (tutti.app.world.poses?.accepted ?? 0) > 0, undefined, kPatience_ms);
+  await page.until("clouds are drawn", () => tutti.view.last.points > 1000, undefined, kPatience_ms);
+  assert.match((await page.texts(".badge"))[0], /Live/);
+  step("two robots in one map, live");
+
+  robots.charlie = start_robot("charlie", bus, "--set", "simulation.lidar.range_sigma_m=0.5"); // fits nobody's scans
+  await page.until("charlie is in the picture, apart from the others", () => tutti.app.robots.some((r) => r.name === "charlie" && r.submaps > 1) && tutti.app.world.parts.size === 2, undefined, kPatience_ms);
+  await page.until("that is an alert", () => /charlie/.test([...document.querySelectorAll(".alert")].find((a) => /joined to no other/.test(a.textContent))?.textContent ?? ""), undefined, kPatience_ms);
+  step("a third robot comes later, and is said to be joined to nobody");
+
+  const [killed] = buses_of(server);
+  assert.ok(killed > 0, "the server has a bus");
+  const then = await page.evaluate(() => tutti.app.store.track("status").times.at(-1));
+  process.kill(killed, "SIGKILL");
+  const at = Date.now();
+  await page.until("all robots are heard over another bus", (t) => {
+    const { times, values } = tutti.app.store.track("status");
+    return values.at(-1).robots.length === 3 && values.at(-1).robots.every((r) => r.finished || times.at(-1) - r.last_seen_s_ago > t + 2);
+  }, then, kPatience_ms);
+  console.log(`    heard again ${Date.now() - at} ms after the bus was killed`);
+  const [again] = buses_of(server);
+  assert.ok(again > 0 && again !== killed, "the server has started another");
+  assert.match((await page.texts(".badge"))[0], /Live/);
+  step("the bus is killed: the page stays, and the robots are heard again");
+
+  robots.bravo.kill("SIGSTOP");
+  await until_presence(page, "bravo", ["silent", "lost"]);
+  await page.until("its card says so", () => document.querySelectorAll(".robot.silent, .robot.lost").length === 1);
+  assert.match((await page.texts(".robot.silent .detail, .robot.lost .detail")).join(), /May be within/);
+  const is_told = () => [...document.querySelectorAll(".alert:not(.seen)")].some((a) => /silent/.test(a.textContent) && /bravo/.test(a.textContent));
+  await page.until("an alert says so", is_told, undefined, kPatience_ms);
+  robots.bravo.kill("SIGCONT");
+  await until_presence(page, "bravo", ["here", "finished"]);
+  await page.until("it has sent what it had", () => tutti.app.robots.find((r) => r.name === "bravo").drain.state === "empty", undefined, kPatience_ms);
+  await page.until("nothing says so any more", () => ![...document.querySelectorAll(".alert:not(.seen)")].some((a) => /silent/.test(a.textContent) && /bravo/.test(a.textContent)));
+  step("a robot goes silent, comes back and drains");
+
+  await page.press("Closures");
+  await page.press(/^In the map/);
+  await page.click(".closure");
+  await page.until("both clouds are laid over each other", () => document.querySelector(".inspector .pair canvas") !== null);
+  assert.match((await page.texts(".inspector .gates")).join(), /overlap/i);
+  const before = await page.evaluate(() => tutti.app.world.poses.accepted);
+  await page.press("Reject");
+  await page.until("it is out of the map", () => /refused/.test(document.querySelector(".inspector .state").textContent), undefined, kPatience_ms);
+  await page.until("eva's word stands beside it", () => /eva said reject/.test(document.querySelector(".inspector").textContent));
+  await page.press(/^Take back/);
+  await page.until("it is in the map again", () => /in the map/.test(document.querySelector(".inspector .state").textContent), undefined, kPatience_ms);
+  step(`a closure of ${before} is inspected, rejected, taken back`);
+
+  for (const name of Object.keys(robots)) await until_presence(page, name, ["finished"]);
+  assert.equal(await page.evaluate(() => tutti.app.world.parts.size), 2);
+  await page.press("Why not?");
+  await page.evaluate(() => {
+    const [, other] = document.querySelectorAll(".why select");
+    other.value = "charlie";
+    other.dispatchEvent(new Event("change"));
+  });
+  await page.press("Ask");
+  await page.until("why they are not joined", () => document.querySelectorAll(".why .alert").length > 0, undefined, kPatience_ms);
+  const [pair] = await page.texts(".why .alert b");
+  await page.press("Join by hand");
+  await page.press("Register");
+  await page.until("both are laid over each other", () => document.querySelector(".by-hand .gates") !== null, undefined, kPatience_ms);
+  await page.until("what it would change", () => /would join 2 parts/.test(document.querySelector(".by-hand").textContent), undefined, kPatience_ms);
+  await page.press(/^Keep it /);
+  await page.until("the map follows: one part", () => tutti.app.world.parts.size === 1, undefined, kPatience_ms);
+  await page.press("Undo");
+  await page.until("two parts again", () => tutti.app.world.parts.size === 2, undefined, kPatience_ms);
+  step(`what no gate lets pass is joined by hand (${pair}), and undone`);
+
+  const photo = join(work, "photo.png");
+  writeFileSync(photo, await page.page.screenshot());
+  await page.press("Marks");
+  await page.press("New mark");
+  await page.evaluate(() => tutti.view.fit());
+  await page.until("the picture stands still", () => tutti.view.last.points > 0);
+  await page.pause(500);
+  await page.click_in(".middle .view", await page.evaluate(() => tutti.view.eye.project([...tutti.app.world.placed.values()].find((p) => p.submap.robot === 0).target).slice(0, 2)));
+  await page.fill(".marks textarea", "door, locked");
+  await page.evaluate(() => document.activeElement.blur()); // as a press on "Photo" does
+  await (await page.page.$('.marks [aria-label="Photo"]')).uploadFile(photo);
+  await page.until("its picture", () => document.querySelector(".marks img") !== null);
+  await page.press("Save");
+  await page.until("it is there", () => document.querySelector(".mark b")?.textContent === "door, locked");
+  await page.click(".mark .closure");
+  await page.until("its photo", () => document.querySelector(".mark img")?.naturalWidth > 0, undefined, kPatience_ms);
+  const marks = join(work, "marks.csv");
+  execFileSync(tutti, ["export", join(work, "server", "map.tutti"), "--live", "-o", marks]);
+  assert.match(readFileSync(marks, "utf8"), /door, locked/);
+  step("a mark with a photo is in the map's file");
+
+  const late = await browser.open(url);
+  const submaps = await page.evaluate(() => tutti.app.world.placed.size);
+  await late.until("all that the first page has", (n) => tutti.app.world.placed.size === n && tutti.app.clouds.points > 0 && document.querySelector(".robot") !== null, submaps, kPatience_ms);
+  assert.equal(await late.evaluate(() => tutti.app.store.unread.count), 0);
+  assert.deepEqual(late.errors, []);
+  await late.close();
+  step("who comes late sees all");
+
+  assert.deepEqual(page.errors, [], "errors on the page");
+  await page.close();
+}
+
+const browser = await Browser.launch();
+let failed = false;
+try {
+  await play(browser);
+} catch (error) {
+  failed = true;
+  console.log(`FAIL ${error.stack ?? error}`);
+}
+await browser.close();
+for (const program of programs) {
+  program.kill("SIGCONT");
+  program.kill("SIGTERM");
+}
+await Promise.all(programs.map((p) => p.exitCode !== null || p.signalCode !== null || new Promise((resolve) => p.on("exit", resolve))));
+rmSync(work, { recursive: true });
+console.log(failed ? "failed" : "all is as it should be");
+process.exit(failed ? 1 : 0);
