@@ -117,11 +117,19 @@ Result<bus::Certificate> make_certificate(const bus::Certificate& authority, con
 }
 
 Result<std::string> valid_until(const std::string& certificate) {
-  const Owned<X509> read = certificate_of(certificate);
+  return holder_of(certificate_of(certificate).get()).map(&CertificateHolder::until);
+}
+
+Result<CertificateHolder> holder_of(const X509* certificate) {
   std::tm time{};
-  if (!read || ASN1_TIME_to_tm(X509_get0_notAfter(read.get()), &time) != 1) return failure("a certificate");
-  return fmt::format("{:04}-{:02}-{:02} {:02}:{:02}:{:02} UTC", time.tm_year + 1900, time.tm_mon + 1, time.tm_mday,
-                     time.tm_hour, time.tm_min, time.tm_sec);
+  std::array<char, 256> name{};
+  if (certificate == nullptr || ASN1_TIME_to_tm(X509_get0_notAfter(certificate), &time) != 1 ||
+      X509_NAME_get_text_by_NID(X509_get_subject_name(certificate), NID_commonName, name.data(),
+                                static_cast<int>(name.size())) < 0)
+    return failure("a certificate");
+  return CertificateHolder{name.data(),
+                           fmt::format("{:04}-{:02}-{:02} {:02}:{:02}:{:02} UTC", time.tm_year + 1900, time.tm_mon + 1,
+                                       time.tm_mday, time.tm_hour, time.tm_min, time.tm_sec)};
 }
 
 }  // namespace tutti::pki

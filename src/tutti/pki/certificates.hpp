@@ -6,6 +6,8 @@
 #include "tutti/base/result.hpp"
 #include "tutti/bus/bus_credentials.hpp"
 
+struct x509_st;
+
 namespace tutti::pki {
 
 /// Certificates by OpenSSL: keys of the curve P-256, signed with SHA-256. `days` is how long they are valid from now
@@ -18,5 +20,12 @@ Result<bus::Certificate> make_certificate(const bus::Certificate& authority, con
                                           int days);
 /// "2027-01-31 12:00:00 UTC", until when a certificate is valid.
 Result<std::string> valid_until(const std::string& certificate);
+/// Whose a certificate is, as make_certificate() was told, and until when it is valid. Who signed it is for the TLS
+/// connection to check.
+struct CertificateHolder {
+  std::string name, until;
+};
+/// `certificate`: OpenSSL's X509; it may be null.
+Result<CertificateHolder> holder_of(const x509_st* certificate);
 
 }  // namespace tutti::pki

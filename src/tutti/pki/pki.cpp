@@ -27,7 +27,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kAuthority = "authority.pem";
 constexpr const char* kAuthorityKey = "authority.key";
 constexpr const char* kUsers = "users";
 constexpr const char* kCredentials = "credentials";

@@ -73,8 +73,9 @@ class Pki {
   std::vector<Member> members_;
 };
 
-/// In the folder: the file to be included in a nats-server's configuration, the bus's certificate and its key, and the
-/// name of the server's own credential.
+/// In the folder: the authority's certificate, the file to be included in a nats-server's configuration, the bus's
+/// certificate and its key, and the name of the server's own credential.
+inline constexpr const char* kAuthority = "authority.pem";
 inline constexpr const char* kBusConfiguration = "bus.conf";
 inline constexpr const char* kBusCertificate = "bus.pem";
 inline constexpr const char* kBusKey = "bus.key";

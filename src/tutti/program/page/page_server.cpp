@@ -103,7 +103,13 @@ class PageViewer final : public program::MapViewer {
     } else {
       certificate_ = {pki / pki::kBusCertificate, pki / pki::kBusKey};
       auto secure = std::make_unique<httplib::SSLServer>(certificate_.certificate.c_str(), certificate_.key.c_str());
-      if (secure->is_valid()) SSL_CTX_set_cert_cb(secure->ssl_context(), &CertificateFiles::use, &certificate_);
+      if (secure->is_valid()) {
+        SSL_CTX_set_cert_cb(secure->ssl_context(), &CertificateFiles::use, &certificate_);
+        // Who has a certificate may show it (Routes::metrics()); browsers have none.
+        SSL_CTX_set_session_id_context(secure->ssl_context(), reinterpret_cast<const unsigned char*>("tutti"), 5);
+        SSL_CTX_load_verify_locations(secure->ssl_context(), (pki / pki::kAuthority).c_str(), nullptr);
+        SSL_CTX_set_verify(secure->ssl_context(), SSL_VERIFY_PEER, nullptr);
+      }
       server_ = std::move(secure);
     }
     if (!server_->is_valid()) return fail(ErrorCode::io, "--view: the certificate of {} cannot be used", pki.string());

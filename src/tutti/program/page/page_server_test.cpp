@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "support/bus/nats_network.hpp"
 #include "support/program/page/served_page.hpp"
 #include "tutti/base/file.hpp"
 #include "tutti/pki/pki.hpp"
@@ -196,6 +197,37 @@ TEST_F(PageServer, WithCredentialsShowsNothingToStrangersAndLetsOperatorsDecide)
   }
   EXPECT_EQ(http.Post("/api/logout", ours(anna), "{}", "application/json")->status, 200);
   EXPECT_EQ(decide("alpha/0-bravo/1", "accept", ours(anna)), "401");
+}
+
+/// Prometheus cannot sign, and has the file of a credential.
+TEST_F(PageServer, MetricsAreForWhoShowsACertificateToo) {
+  fs::create_directories(folder_);
+  auto pki = pki::Pki::make(folder_ / "pki", "cave").value();
+  for (const auto& [role, name] : {std::pair(bus::BusRole::views, "prometheus"),
+                                   std::pair(bus::BusRole::robot, "alpha"), std::pair(bus::BusRole::views, "gone")})
+    ASSERT_TRUE(pki.add(role, name, {}));
+  auto foreign = pki::Pki::make(folder_ / "foreign", "cave").value();
+  ASSERT_TRUE(foreign.add(bus::BusRole::views, "prometheus", {}));
+  start(folder_ / "pki");
+  const int port = std::stoi(url_.substr(url_.rfind(':') + 1));
+  const auto get = [&](const fs::path& credential, const std::string& path) {
+    const std::string pem = (folder_ / "one.pem").string();
+    const bus::Certificate own = bus::read_credentials(credential.string())->certificate;
+    static_cast<void>(write_file(pem, own.text + own.key));
+    httplib::SSLClient http("127.0.0.1", port, pem, pem);
+    http.enable_server_certificate_verification(false);
+    const auto answer = http.Get(path);
+    return answer ? answer->status : 0;
+  };
+  const fs::path gone = folder_ / "gone.cred";
+  fs::copy(pki.credential("gone"), gone);
+  EXPECT_EQ(get(pki.credential("prometheus"), "/metrics"), 200);
+  EXPECT_EQ(get(pki.credential("prometheus"), "/api/events"), 401) << "and for nothing else";
+  EXPECT_EQ(get(pki.credential("alpha"), "/metrics"), 401);
+  EXPECT_EQ(get(foreign.credential("prometheus"), "/metrics"), 0) << "of another authority";
+  EXPECT_EQ(get(gone, "/metrics"), 200);
+  ASSERT_TRUE(pki.revoke("gone"));
+  EXPECT_TRUE(test::within(10.0, [&] { return get(gone, "/metrics") == 401; }));
 }
 
 /// The certificate that a server shows, as PEM.

@@ -12,6 +12,7 @@
 #include "tutti/base/plain_text.hpp"
 #include "tutti/bus/bus_address.hpp"
 #include "tutti/mapfile/why.hpp"
+#include "tutti/pki/certificates.hpp"
 #include "tutti/program/clock.hpp"
 #include "tutti/program/page/base64.hpp"
 #include "tutti/program/page/cloud_bytes.hpp"
@@ -212,7 +213,20 @@ class Routes {
     if (!trouble || !trouble->empty()) return say(response, 503, trouble ? *trouble : "it has only just started");
     say(response, Json{{"ok", true}});
   }
-  void metrics(Response& response) { response.set_content(site_.metrics.text(), "text/plain; version=0.0.4"); }
+  /// Also for who proves a certificate of the mission's authority with the connection.
+  void metrics(const Request& request, Response& response) {
+    if (!who(request).may_see && !site_.sign_in.visitor(certified(request), program::Clock::steady_s()).may_see)
+      return say(response, 401, "sign in, or connect with the certificate of an operator's or viewer's credential");
+    response.set_content(site_.metrics.text(), "text/plain; version=0.0.4");
+  }
+
+  static pki::CertificateHolder certified(const Request& request) {
+    if (request.ssl == nullptr || SSL_get_verify_result(request.ssl) != X509_V_OK) return {};
+    X509* const proved = SSL_get1_peer_certificate(request.ssl);
+    const auto holder = pki::holder_of(proved);
+    X509_free(proved);
+    return holder.value_or(pki::CertificateHolder());
+  }
 
   [[nodiscard]] Visitor who(const Request& request) {
     return site_.sign_in.visitor(token_of(request), program::Clock::steady_s());
@@ -320,7 +334,7 @@ void add_routes(httplib::Server& server, Site& site) {
   server.Get(R"(/api/photo/(\d{1,20}))",
              routes->seen([&site](const Request& q, Response& r) { show_photo(site, q, r); }));
   server.Get("/api/why", routes->seen([routes](const Request& q, Response& r) { routes->why(q, r); }));
-  server.Get("/metrics", routes->seen([routes](const Request&, Response& r) { routes->metrics(r); }));
+  server.Get("/metrics", [routes](const Request& q, Response& r) { routes->metrics(q, r); });
   server.Get("/healthz", [routes](const Request&, Response& r) { routes->health(r); });
 }
 

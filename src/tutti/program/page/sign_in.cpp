@@ -19,6 +19,10 @@ void make_room(Map& map, double now_s, std::size_t at_most, Until until) {
     map.erase(std::ranges::min_element(map, {}, [&](const auto& entry) { return until(entry.second); }));
 }
 
+bool is_for_people(const bus::BusUser& user) {
+  return user.role == bus::BusRole::operates || user.role == bus::BusRole::views;
+}
+
 }  // namespace
 
 std::string SignIn::nonce(double now_s) {
@@ -29,16 +33,19 @@ std::string SignIn::nonce(double now_s) {
   return out;
 }
 
-const bus::BusUser* SignIn::member(const std::string& key, double now_s) {
-  if (!looked_s_ || now_s - *looked_s_ >= kLookAgain_s) {
-    if (const auto there = pki::Pki::open(pki_)) {  // while it is being changed, what was there before holds
-      const std::string now = utc_text(static_cast<std::int64_t>(program::wall_clock_ns()));
-      members_.clear();
-      for (const pki::Member& one : there->members())
-        if (!one.is_revoked && !one.has_expired(now)) members_[one.key] = one.user;
-    }
-    looked_s_ = now_s;
+void SignIn::look(double now_s) {
+  if (looked_s_ && now_s - *looked_s_ < kLookAgain_s) return;
+  if (const auto there = pki::Pki::open(pki_)) {  // while it is being changed, what was there before holds
+    const std::string now = utc_text(static_cast<std::int64_t>(program::wall_clock_ns()));
+    members_.clear();
+    for (const pki::Member& one : there->members())
+      if (!one.is_revoked && !one.has_expired(now)) members_[one.key] = one;
   }
+  looked_s_ = now_s;
+}
+
+const pki::Member* SignIn::member(const std::string& key, double now_s) {
+  look(now_s);
   const auto found = members_.find(key);
   return found == members_.end() ? nullptr : &found->second;
 }
@@ -46,15 +53,15 @@ const bus::BusUser* SignIn::member(const std::string& key, double now_s) {
 Result<std::string> SignIn::open(const std::string& key, const std::string& nonce, const std::string& signature,
                                  double now_s) {
   const std::scoped_lock lock(mutex_);
-  const auto known = nonces_.extract(nonce);  // good once
-  if (known.empty() || known.mapped() < now_s)
+  const auto asked = nonces_.extract(nonce);  // good once
+  if (asked.empty() || asked.mapped() < now_s)
     return fail(ErrorCode::invalid, "the page was open for too long before signing in: try again");
-  const bus::BusUser* const user = member(key, now_s);
-  if (user == nullptr || !pki::is_signed(key, nonce, signature))
+  const pki::Member* const known = member(key, now_s);
+  if (known == nullptr || !pki::is_signed(key, nonce, signature))
     return fail(ErrorCode::invalid, "this credential is not one of this mission's, or is revoked");
-  if (user->role != bus::BusRole::operates && user->role != bus::BusRole::views)
+  if (!is_for_people(known->user))
     return fail(ErrorCode::invalid, "{}: the page is for operators and viewers (tutti pki add-operator, add-viewer)",
-                to_string(*user));
+                to_string(known->user));
   make_room(sessions_, now_s, kMost, [](const Session& session) { return session.until_s; });
   std::string token = pki::random_token();
   sessions_[token] = {key, now_s + kSession_s};
@@ -71,9 +78,18 @@ Visitor SignIn::visitor(const std::string& token, double now_s) {
   const std::scoped_lock lock(mutex_);
   const auto session = sessions_.find(token);
   if (session == sessions_.end() || session->second.until_s < now_s) return {};
-  const bus::BusUser* const user = member(session->second.key, now_s);
-  if (user == nullptr) return {};
-  return {user->name, true, user->role == bus::BusRole::operates};
+  const pki::Member* const known = member(session->second.key, now_s);
+  if (known == nullptr) return {};
+  return {known->user.name, true, known->user.role == bus::BusRole::operates};
+}
+
+Visitor SignIn::visitor(const pki::CertificateHolder& holder, double now_s) {
+  const std::scoped_lock lock(mutex_);
+  look(now_s);
+  for (const auto& [key, one] : members_)
+    if (is_for_people(one.user) && to_string(one.user) == holder.name && one.until == holder.until)
+      return {one.user.name, true, false};
+  return {};
 }
 
 }  // namespace tutti::page

@@ -8,7 +8,8 @@
 #include <string>
 
 #include "tutti/base/result.hpp"
-#include "tutti/bus/bus_credentials.hpp"
+#include "tutti/pki/certificates.hpp"
+#include "tutti/pki/pki.hpp"
 
 namespace tutti::page {
 
@@ -34,6 +35,9 @@ class SignIn {
   Result<std::string> open(const std::string& key, const std::string& nonce, const std::string& signature,
                            double now_s);
   void close(const std::string& token);
+  /// For programs that cannot sign, as Prometheus: who proves the certificate of a credential sees, and decides
+  /// nothing. It counts until it is renewed, or its member revoked.
+  [[nodiscard]] Visitor visitor(const pki::CertificateHolder& holder, double now_s);
   /// Whose session it is; a revoked member's ends within kLookAgain_s.
   [[nodiscard]] Visitor visitor(const std::string& token, double now_s);
 
@@ -48,13 +52,14 @@ class SignIn {
     double until_s = 0.0;
   };
   /// Members with this key who are not revoked, as the folder said within the last second.
-  const bus::BusUser* member(const std::string& key, double now_s);
+  const pki::Member* member(const std::string& key, double now_s);
+  void look(double now_s);
 
   std::filesystem::path pki_;
   std::mutex mutex_;
   std::map<std::string, double> nonces_;  // and until when they are good
   std::map<std::string, Session> sessions_;
-  std::map<std::string, bus::BusUser> members_;
+  std::map<std::string, pki::Member> members_;  // by key
   std::optional<double> looked_s_;
 };
 
