@@ -267,12 +267,14 @@ void JetStreamPort::make_stream_anew(const NatsConnection& connection) {
   changed_.notify_all();
 }
 
-/// What was acknowledged is so on the bus; what was not comes to the next one at once, not after a time-out.
+/// What was said last is on its way, how a robot has ended above all. What was acknowledged is so on the bus; what was
+/// not comes to the next one at once, not after a time-out.
 void JetStreamPort::say_farewell() {
   const auto present = session();
   if (!present || !present->connection->connected()) return;
   const NatsConnection& connection = *present->connection;
   const auto end = Clock::now() + kFarewell;
+  while (Clock::now() < end && send_one(connection)) continue;
   while (Clock::now() < end && acknowledge_one(connection)) continue;
   const std::scoped_lock guard(mutex_);
   for (const std::string& reply : inbox_.unacknowledged()) static_cast<void>(connection.publish(reply, "", "", "-NAK"));

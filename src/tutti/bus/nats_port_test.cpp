@@ -94,6 +94,25 @@ TEST_F(NatsPortTest, KilledAndStartedAgainTheBusLosesNothing) {
   EXPECT_GE(robot->state().reconnects, 3U);
 }
 
+/// A robot's last status says that it has finished: without it operators would look for it.
+TEST_F(NatsPortTest, WhatIsSaidLastIsHeardThoughThePortGoesAtOnce) {
+  NatsNetwork network;
+  const auto hub = network.open(kServer);
+  ASSERT_TRUE(within(20.0, [&] { return hub->state().connected; }));
+  for (int i = 0; i < 20; ++i) {
+    const std::string last = std::to_string(i);
+    {
+      const auto robot = network.open(kRobot);
+      ASSERT_TRUE(within(20.0, [&] { return robot->state().connected; }));
+      ASSERT_TRUE(robot->send({kRobot, kServer, MessageKind::status, {}, std::make_shared<const std::string>(last)}));
+    }
+    ASSERT_TRUE(within(10.0, [&] {
+      const auto came = hub->receive();
+      return !came.empty() && *came.back().envelope.bytes == last;
+    })) << i;
+  }
+}
+
 TEST_F(NatsPortTest, OverALinkThatBreaksAgainAndAgainNothingIsLost) {
   constexpr int kMessages = 30;
   constexpr std::uint64_t kMost = 80'000;

@@ -193,7 +193,7 @@ void Host::run(const std::atomic<bool>& stop) {
   if (node_) {
     const auto thrown = thrown_by([&] {
       add(node_->end());
-      add(node_->report(clock_.now()));  // how it stays; lost when the port goes sooner
+      add(node_->report(clock_.now()));  // how it stays
     });
     if (thrown) note_thrown("its end", *thrown);
     static_cast<void>(carry_out());
