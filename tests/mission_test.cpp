@@ -3,11 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "support/paths.hpp"
 #include "support/sanitized.hpp"
 #include "tutti/lab/run_mission.hpp"
 #include "tutti/mission/report/report.hpp"
+#include "tutti/mission/view_recorder.hpp"
 
 namespace tutti::mission {
 namespace mission_test {
@@ -128,6 +130,39 @@ TEST(Mission, ABadLinkDelaysTheMapAndTheRobotsAndHarmsNeither) {
     EXPECT_LT(*corrected.rmse_m, 0.5 * *robot.onboard.rmse_m) << robot.name;
     EXPECT_LE(*corrected.rpe_m, *robot.onboard.rpe_m) << robot.name;
   }
+}
+
+/// As somebody would have seen it at the page: the report's page has robots' statuses, and what they make alarm.
+TEST(Mission, TheReportShowsARobotThatWasOutOfRange) {
+  lab::MissionConfig config = small_mission();
+  config.server.update_period_s = 5.0;
+  config.robot_links = {{.robot = "bravo", .link = {.outages = {{.from_s = 60.0, .until_s = 120.0}}}}};
+  const MissionRecord record = run(config);
+  ASSERT_NE(record.view, nullptr);
+  std::vector<double> silent_s, alarmed_s;
+  std::size_t statuses = 0;
+  for (const page::Message& message : record.view->messages) {
+    const auto value = nlohmann::json::parse(message.value);
+    if (message.key == "status") {
+      ++statuses;
+      ASSERT_EQ(value.at("robots").size(), 2U);
+      EXPECT_EQ(value.at("robots").at(1).at("name"), "bravo");
+      EXPECT_EQ(value.at("robots").at(0).at("last_seen_s_ago"), 0.0);
+      if (value.at("robots").at(1).at("last_seen_s_ago").get<double>() > 10.0) silent_s.push_back(message.time_s);
+    }
+    if (message.key == "alerts")
+      for (const auto& alert : value)
+        if (alert.at("what") == "silent") {
+          alarmed_s.push_back(message.time_s);
+          EXPECT_EQ(alert.at("where"), "bravo");
+          EXPECT_DOUBLE_EQ(alert.at("since_s").get<double>(), 60.0);
+        }
+  }
+  EXPECT_GT(statuses, 15U);
+  ASSERT_FALSE(silent_s.empty());
+  EXPECT_GT(silent_s.front(), 70.0);
+  EXPECT_LT(silent_s.back(), 120.0);
+  EXPECT_FALSE(alarmed_s.empty());
 }
 
 TEST(Mission, RobotsThatNeverMeetStaySeparateMaps) {

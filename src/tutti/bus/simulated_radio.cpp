@@ -64,12 +64,32 @@ void SimulatedRadio::set_link(RobotId robot, const LinkConfig& link) {
   links_[robot] = link;
 }
 
+const LinkConfig& SimulatedRadio::link_of(RobotId robot) const {
+  const auto own = links_.find(robot);
+  return own == links_.end() ? link_ : own->second;
+}
+
+Timestamp SimulatedRadio::last_contact(RobotId robot, Timestamp now) const {
+  const LinkConfig& link = link_of(robot);
+  if (in_contact(link, start_, now) == now) return now;
+  Timestamp last = now;
+  for (bool moved = true; moved;) {
+    moved = false;
+    for (const Outage& outage : link.outages) {
+      const Timestamp from = start_ + outage.from_s;
+      if (from >= last || last > start_ + outage.until_s) continue;
+      last = from;
+      moved = true;
+    }
+  }
+  return last;
+}
+
 SimulatedRadio::Direction& SimulatedRadio::direction(Endpoint from, Endpoint to) {
   const auto found = directions_.find({from, to});
   if (found != directions_.end()) return found->second;
   Direction created{.free_at = start_, .last_arrival = start_};
-  const auto own = links_.find(from.robot() ? *from.robot() : *to.robot());
-  created.link = own == links_.end() ? link_ : own->second;
+  created.link = link_of(from.robot() ? *from.robot() : *to.robot());
   return directions_.emplace(std::pair{from, to}, std::move(created)).first->second;
 }
 

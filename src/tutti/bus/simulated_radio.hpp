@@ -94,6 +94,8 @@ class SimulatedRadio {
 
   /// Gives one robot a link of its own; to be called before its first message.
   void set_link(RobotId robot, const LinkConfig& link);
+  /// `now` while the robot is in range, else when it went out of it (LinkConfig::outages).
+  [[nodiscard]] Timestamp last_contact(RobotId robot, Timestamp now) const;
   /// Hands a message to the radio at time `now`, which never goes back. A full queue drops its oldest message.
   void send(Timestamp now, Envelope message);
   /// Returns the messages that have arrived by `now` since the last call, in the order of arrival; one that the link
@@ -121,6 +123,7 @@ class SimulatedRadio {
     Timestamp free_at;  ///< The bandwidth is in use until here.
     Timestamp last_arrival;
   };
+  [[nodiscard]] const LinkConfig& link_of(RobotId robot) const;
   Direction& direction(Endpoint from, Endpoint to);
   void transmit(Direction& direction, Timestamp start);
   void advance(Timestamp now);

@@ -262,6 +262,23 @@ TEST(SimulatedRadio, AnOutageForEverIsOne) {
   }
 }
 
+TEST(SimulatedRadio, KnowsWhenARobotWasInRangeLast) {
+  LinkConfig link;
+  link.outages = {{10.0, 20.0}, {20.0, 25.0}, {18.0, 22.0}, {40.0, std::numeric_limits<double>::infinity()}};
+  SimulatedRadio radio(kStart, {}, 1);
+  radio.set_link(*kAlpha.robot(), link);
+  for (const auto& [now_s, last_s] : {std::pair(0.0, 0.0),
+                                      {9.0, 9.0},
+                                      {10.0, 10.0},
+                                      {15.0, 10.0},
+                                      {24.9, 10.0},
+                                      {25.0, 25.0},
+                                      {39.0, 39.0},
+                                      {90.0, 40.0}})
+    EXPECT_EQ(radio.last_contact(*kAlpha.robot(), at(now_s)), at(last_s)) << now_s;
+  EXPECT_EQ(radio.last_contact(RobotId{99}, at(15.0)), at(15.0)) << "whose link has no outage";
+}
+
 TEST(SimulatedRadio, WhatArrivesAfterTheEndOfTimeNeverArrives) {
   SimulatedRadio radio(kStart, {.bandwidth_bytes_per_s = 1e-12}, 1);
   send(radio, at(0), kAlpha, kServer, MessageKind::submap, "slow");

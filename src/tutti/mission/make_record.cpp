@@ -8,6 +8,7 @@
 #include "tutti/base/config_io.hpp"
 #include "tutti/mission/perfect_judge.hpp"
 #include "tutti/mission/record_notes.hpp"
+#include "tutti/wire/message_kind.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -23,6 +24,23 @@ void record_traffic(const std::vector<TrafficRecord>& traffic, RobotRecord& robo
 }
 
 }  // namespace
+
+std::vector<TrafficRecord> traffic_of(const bus::SimulatedRadio& radio, RobotId robot, const std::string& name) {
+  std::vector<TrafficRecord> traffic;
+  for (const auto& [topic, statistics] : radio.statistics()) {
+    const auto& [from, to, kind] = topic;
+    const bool up = from.robot() == robot;
+    if (!up && to.robot() != robot) continue;
+    traffic.push_back({.from = up ? name : "server",
+                       .to = up ? "server" : name,
+                       .kind = wire::name(kind),
+                       .messages = statistics.published,
+                       .bytes = statistics.published_bytes,
+                       .transmitted_bytes = statistics.transmitted_bytes,
+                       .largest_message = statistics.largest_message});
+  }
+  return traffic;
+}
 
 MissionRecord make_record(const FinishedMission& mission) {
   const MissionConfig& config = mission.config;

@@ -28,7 +28,6 @@
 #include "tutti/node/worker_node.hpp"
 #include "tutti/storage/memory_store.hpp"
 #include "tutti/wire/limits.hpp"
-#include "tutti/wire/message_kind.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -147,7 +146,8 @@ class MissionRun {
   struct Robot {
     std::unique_ptr<RobotActor> actor;
     std::unique_ptr<bus::Port> port;
-    double worst_latency_ms = 0.0;  ///< Among its updates.
+    double worst_latency_ms = 0.0;    ///< Among its updates.
+    std::optional<NodeStatus> heard;  ///< Its status when the radio reached it last.
   };
 
   static std::set<RobotId> robot_ids(const std::vector<MissionRecording>& recordings) {
@@ -249,7 +249,7 @@ class MissionRun {
     if (const auto check =
             check_closures(server_->map_server().map(), recordings, config_.association, config_.closure_check))
       events_.set_wrong(check->wrong);
-    if (server_->has_map() && view_.wants_next()) view_.take(shown_map());
+    if (server_->has_map() && view_.wants_next()) view_.take(shown_map(), status());
     server_latency_ms_ = std::max(server_latency_ms_, pace_.late_ms(time_s_));
   }
 
@@ -261,6 +261,23 @@ class MissionRun {
     return shown;
   }
 
+  /// As the server would know it if robots told their statuses, as programs do: virtual time's radio carries none, so
+  /// that a mission's bytes are those of its map. A robot out of contact is as it was when that was lost.
+  [[nodiscard]] MissionStatus status() {
+    MissionStatus out = server_->mission_status(now());
+    for (Robot& robot : robots_) {
+      const Timestamp heard_at = network_.radio().last_contact(robot.actor->id(), now());
+      if (heard_at == now()) robot.heard = robot.actor->node().status(now());
+      const auto entry = std::ranges::find(out.robots, robot.actor->id(), &MissionStatus::Robot::robot);
+      if (entry == out.robots.end() || !robot.heard) continue;
+      entry->status = *robot.heard;
+      entry->status.name = robot.actor->recording().recording.name;
+      entry->last_seen = heard_at;
+      if (robot.heard->update_age_s) entry->last_update = heard_at - *robot.heard->update_age_s;
+    }
+    return out;
+  }
+
   void tell_progress() const {
     if (!options_.progress) return;
     const server::MapServer& server = server_->map_server();
@@ -268,7 +285,6 @@ class MissionRun {
                        events_.updates().empty() ? 0 : events_.updates().back().closures, server.map().components});
   }
 
-  [[nodiscard]] std::vector<TrafficRecord> traffic_of(const MissionRecording& robot) const;
   void record_timing(MissionRecord& record) const;
 
   const MissionConfig& config_;
@@ -291,23 +307,6 @@ class MissionRun {
   double duration_s_ = 0.0;
   double server_latency_ms_ = 0.0;
 };
-
-std::vector<TrafficRecord> MissionRun::traffic_of(const MissionRecording& robot) const {
-  std::vector<TrafficRecord> traffic;
-  for (const auto& [topic, statistics] : network_.radio().statistics()) {
-    const auto& [from, to, kind] = topic;
-    const bool up = from.robot() == robot.recording.robot;
-    if (!up && to.robot() != robot.recording.robot) continue;
-    traffic.push_back({.from = up ? robot.recording.name : "server",
-                       .to = up ? "server" : robot.recording.name,
-                       .kind = wire::name(kind),
-                       .messages = statistics.published,
-                       .bytes = statistics.published_bytes,
-                       .transmitted_bytes = statistics.transmitted_bytes,
-                       .largest_message = statistics.largest_message});
-  }
-  return traffic;
-}
 
 void MissionRun::record_timing(MissionRecord& record) const {
   meter_.record(duration_s_, record.timing);
@@ -348,13 +347,13 @@ MissionRecord MissionRun::record() {
                               .explanation = actor.explanation(),
                               .troubles = actor.troubles(),
                               .refused_images = actor.refused_images(),
-                              .traffic = traffic_of(actor.recording()),
+                              .traffic = traffic_of(network_.radio(), actor.id(), actor.recording().recording.name),
                               .status = actor.node().status(now())});
   }
   MissionRecord record = make_record(mission);
   record_timing(record);
-  record.view =
-      std::make_shared<const ViewRecord>(std::move(view_).finish(shown_map(), *node::SubmapFrames::of(store_)));
+  record.view = std::make_shared<const ViewRecord>(
+      std::move(view_).finish(shown_map(), status(), *node::SubmapFrames::of(store_)));
   return record;
 }
 

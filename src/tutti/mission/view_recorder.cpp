@@ -10,7 +10,8 @@
 
 namespace tutti::mission {
 
-void ViewRecorder::take(const mapfile::ShownMap& map, const std::map<SubmapId, double>& sigma_m) {
+void ViewRecorder::take(const mapfile::ShownMap& map, const std::optional<MissionStatus>& status,
+                        const std::map<SubmapId, double>& sigma_m) {
   const double time_s = map.time - Timestamp{};
   const std::uint64_t before = board_.sequence();
   const auto holding = page::closures_holding(map.content.submaps, map.map);
@@ -18,12 +19,18 @@ void ViewRecorder::take(const mapfile::ShownMap& map, const std::map<SubmapId, d
   board_.put_all("submap/", std::move(messages.submaps), time_s);
   board_.put(std::move(messages.poses));
   board_.put_all("closure/", std::move(messages.closures), time_s);
-  board_.put(page::alerts_message(alerts_.of_map(map, holding), time_s));
+  std::vector<page::Alert> alerts = alerts_.of_map(map, holding);
+  if (status) {
+    board_.put(page::status_message(*status));
+    alerts = page::joined(std::move(alerts), alerts_.of_status(*status));
+  }
+  board_.put(page::alerts_message(alerts, time_s));
   for (const auto& message : board_.after(before)) messages_.push_back(*message);
 }
 
-ViewRecord ViewRecorder::finish(const mapfile::ShownMap& last, const server::PayloadStore& payloads) && {
-  take(last, page::compare_all(last).sigma_m);
+ViewRecord ViewRecorder::finish(const mapfile::ShownMap& last, const std::optional<MissionStatus>& status,
+                                const server::PayloadStore& payloads) && {
+  take(last, status, page::compare_all(last).sigma_m);
   ViewRecord out{.messages = std::move(messages_), .clouds = {}, .T_odom_submap = {}, .T_upright_world = {}};
   for (std::uint32_t component = 0; component < last.map.components; ++component)
     out.T_upright_world[component] = mapfile::upright_frame(last.map, component);

@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cstddef>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "tutti/mapfile/shown_map.hpp"
+#include "tutti/model/status.hpp"
 #include "tutti/program/page/board.hpp"
 #include "tutti/program/page/view.hpp"
 #include "tutti/server/payload_store.hpp"
@@ -33,15 +35,17 @@ class ViewRecorder {
       : every_(std::max<std::size_t>(1, (expected_updates + kMostMaps - 1) / kMostMaps)) {}
   /// True if this update's map is one to keep.
   [[nodiscard]] bool wants_next() { return updates_++ % every_ == 0; }
-  void take(const mapfile::ShownMap& map, const std::map<SubmapId, double>& sigma_m = {});
+  void take(const mapfile::ShownMap& map, const std::optional<MissionStatus>& status,
+            const std::map<SubmapId, double>& sigma_m = {});
   /// The last map, and the clouds of its submaps; what cannot be read is left out.
-  ViewRecord finish(const mapfile::ShownMap& last, const server::PayloadStore& payloads) &&;
+  ViewRecord finish(const mapfile::ShownMap& last, const std::optional<MissionStatus>& status,
+                    const server::PayloadStore& payloads) &&;
 
  private:
   std::size_t every_;
   std::size_t updates_ = 0;
   page::Board board_;
-  page::Alerts alerts_;  // of maps; robots' need statuses, which are sent to a running server alone
+  page::Alerts alerts_;
   std::vector<page::Message> messages_;
 };
 
