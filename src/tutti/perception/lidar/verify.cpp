@@ -122,15 +122,25 @@ double best_slid_quality(const SubmapFeatures& a, const SubmapFeatures& b, const
   return best;
 }
 
+/// How far refine() goes: to the end, or no farther than one way whose plane RMSE is too large, whatever the other way
+/// says, as with most pairs of a place whose rooms are alike.
+enum class Effort { whole, until_refused };
+
 /// Registers one way, then the other way from where that ended, and takes the middle.
 void refine(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_init, const LidarClosureConfig& config,
-            PairVerification& out, Eigen::Vector3d& weakest_b) {
+            Effort effort, PairVerification& out, Eigen::Vector3d& weakest_b) {
   const RegistrationLevel finest = config.registration.levels.back();
   RegistrationLevel first = finest;
   first.max_points = std::max(first.max_points / 4, 10);  // most of the way is as good with fewer points
   const RegistrationConfig fine = with_levels(config.registration, {finest});
   const RegistrationResult forward =
       register_clouds(a.cloud, b.cloud, T_init, with_levels(config.registration, {first, finest}));
+  if (effort == Effort::until_refused && forward.plane_rmse_m > config.max_plane_rmse_m) {
+    out.T_a_b = forward.T_target_source;
+    out.overlap = forward.overlap;
+    out.plane_rmse_m = forward.plane_rmse_m;
+    return;
+  }
   const RegistrationResult backward = register_clouds(b.cloud, a.cloud, forward.T_target_source.inverse(), fine);
   const RelativePose turned = inverse(RelativePose{backward.T_target_source, backward.covariance});
   const Vector6d gap = local(forward.T_target_source, turned.T_a_b);
@@ -208,9 +218,9 @@ PairVerification verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, c
   out.T_a_b = ranked.front().T_a_b;
   if (ranked.size() > 1 && ranked[0].quality > 0.0) out.rival_ratio = ranked[1].quality / ranked[0].quality;
   Eigen::Vector3d weakest_b;
-  refine(a, b, ranked.front().T_a_b, config, out, weakest_b);
+  refine(a, b, ranked.front().T_a_b, config, Effort::until_refused, out, weakest_b);
+  if (out.plane_rmse_m <= config.max_plane_rmse_m) out.contradiction = contradiction(a, b, out.T_a_b);
   out.viewpoint_distance_m = viewpoint_distance(a, b, out.T_a_b);
-  out.contradiction = contradiction(a, b, out.T_a_b);
   out.refusal = why_refused(out, config);
   if (!out.refusal) {  // worth another look
     const double slid = best_slid_quality(a, b, out.T_a_b, weakest_b, config);
@@ -235,7 +245,7 @@ PairVerification verify_near(const SubmapFeatures& a, const SubmapFeatures& b, c
   out.refusal = Refusal{RefusalReason::no_alignment};
   if (!coarse.converged) return out;
   Eigen::Vector3d weakest_b;
-  refine(a, b, coarse.T_target_source, config, out, weakest_b);
+  refine(a, b, coarse.T_target_source, config, Effort::whole, out, weakest_b);
   if (out.overlap <= 0.0) return out;
   out.viewpoint_distance_m = viewpoint_distance(a, b, out.T_a_b);
   out.contradiction = contradiction(a, b, out.T_a_b);
