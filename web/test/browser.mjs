@@ -170,7 +170,7 @@ test("two people see what the other looks at, and hinder nobody", () =>
     const [name] = [...mission.closures.keys()].slice(-1);
     server.held.set("boris", `closure/${name}`);
     server.held.set("carla", "robot/1");
-    server.send(mission.message("held", [...server.held].map(([by, what]) => ({ by, what }))));
+    server.send(server.holders());
     await page.until("carla is at bravo", () => /carla looks at this/.test(document.querySelectorAll(".robot")[1].textContent));
     await page.press("Closures");
     await page.click(".closure");

@@ -35,6 +35,10 @@ export class FakeServer {
     this.listeners.clear();
   }
 
+  holders() {
+    return this.mission.message("held", [...this.held].map(([by, what]) => ({ by, what })));
+  }
+
   /** Lets time go on, and tells everybody. */
   tick(seconds) {
     this.mission.time += seconds;
@@ -77,7 +81,7 @@ export class FakeServer {
   stream(response) {
     response.writeHead(200, { "Content-Type": "text/event-stream", "Cache-Control": "no-store" });
     response.write(`event: begin\ndata: ${JSON.stringify({ incarnation: this.incarnation })}\n\n`);
-    for (const message of this.mission.everything()) response.write(this.event(message));
+    for (const message of [...this.mission.everything(), this.holders()]) response.write(this.event(message)); // also to who was cut off
     response.write("event: ready\ndata: {}\n\n");
     this.listeners.add(response);
     response.on("close", () => this.listeners.delete(response));
@@ -117,7 +121,7 @@ export class FakeServer {
     if (path === "/api/hold") {
       if (body.what) this.held.set(body.by, body.what);
       else this.held.delete(body.by);
-      this.send(mission.message("held", [...this.held].map(([by, what]) => ({ by, what }))));
+      this.send(this.holders());
       return ok();
     }
     if (path === "/api/closure") {
