@@ -37,6 +37,7 @@ if grep -q '"resolved"' package-lock.json; then
 fi
 
 if [ "$mode" = --programs ]; then
+  PATH="$PATH:/usr/sbin" command -v nats-server >/dev/null || skip "missing: nats-server"
   node test/programs.mjs "$program" "$root/tests/system/page_mission.yaml"
   exit
 fi
