@@ -117,7 +117,7 @@ class Intruders : public test::PkiBus {
     connection->flush();
     std::set<std::string> said;
     within(10.0, [&] {
-      for (const bus::BusRefusal& refusal : child_->take_refusals().all) {
+      for (const bus::BusRefusal& refusal : rights_refused()) {
         EXPECT_EQ(refusal.key, who.key.open) << refusal.what;
         said.insert(refusal.what);
       }
@@ -237,7 +237,7 @@ TEST_F(Intruders, WhatTheBusAnswersIsNobodysWord) {
   EXPECT_EQ(heard(*robot_, 1).size(), 1U);
   expect_all_is_well();
   std::set<std::string> said;
-  for (const bus::BusRefusal& refusal : child_->take_refusals().all) said.insert(refusal.what);
+  for (const bus::BusRefusal& refusal : rights_refused()) said.insert(refusal.what);
   EXPECT_EQ(said, std::set<std::string>{"be answered at $JS.ACK.SUBMAPS_cave.server.1.1.1.1.0"});
   const auto base = connect(credentials("server"));
   for (const char* stream : {"SUBMAPS_cave", "VERDICTS_cave", "JOBS_cave", "KV_GRAPH_cave"})

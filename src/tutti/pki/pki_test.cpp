@@ -66,8 +66,8 @@ TEST_F(PkiTest, EverybodyDoesWhatTheyAreFor) {
   const auto look = bus::MissionLease::open(options(vera), std::nullopt).value();
   EXPECT_NE(look->wait(10.0).server_of("cave"), nullptr) << look->state().last_error;
   for (const auto* port : {&hub, &robot, &helper, &own, &desk, &screen}) EXPECT_EQ((*port)->state().denied, "");
-  const auto refusals = child_->take_refusals();
-  EXPECT_TRUE(refusals.all.empty()) << refusals.all.front().what;
+  const auto refusals = rights_refused();
+  EXPECT_TRUE(refusals.empty()) << refusals.front().what;
 }
 
 TEST_F(PkiTest, WhoIsRevokedIsCutOffAndOthersStay) {

@@ -63,6 +63,13 @@ class PkiBus : public ::testing::Test {
     EXPECT_TRUE(test::within(30.0, [&] { return bus::NatsConnection::open(options(who), "newcomer").has_value(); }));
     static_cast<void>(child_->take_refusals());
   }
+  /// What members were refused since the last call that is not theirs to do. A handshake in whose midst the bus reads
+  /// its rights again is refused, too, and tried again by whoever connects: that is none of these.
+  std::vector<bus::BusRefusal> rights_refused() {
+    std::vector<bus::BusRefusal> out = child_->take_refusals().all;
+    std::erase_if(out, [](const bus::BusRefusal& refusal) { return refusal.key.empty(); });
+    return out;
+  }
   [[nodiscard]] bus::BusCredentials credentials(const std::string& name) const {
     auto out = bus::read_credentials(pki_->credential(name).string()).value();
     out.file.clear();  // tests change them
