@@ -42,10 +42,14 @@ export class Page {
   evaluate(run, ...args) {
     return this.page.evaluate(run, ...args);
   }
+  /** Asks again and again; what it asks about may not be there yet, so a question that throws is one answered with no. */
   async until(what, condition, argument, timeout = 30_000) {
-    await this.page.waitForFunction(condition, { timeout, polling: 50 }, argument).catch(async () => {
-      throw new Error(`not seen within ${timeout} ms: ${what}. The page: ${(await this.page.evaluate(() => document.body.innerText)).slice(-1200)} ${this.errors.join("; ")}`);
-    });
+    const end = Date.now() + timeout;
+    for (let why = ""; ; await this.pause(50)) {
+      if (await this.page.evaluate(condition, argument).catch((error) => void (why = error.message))) return;
+      if (Date.now() < end) continue;
+      throw new Error(`not seen within ${timeout} ms: ${what}. ${why} The page: ${(await this.page.evaluate(() => document.body.innerText)).slice(-1200)} ${this.errors.join("; ")}`);
+    }
   }
   texts(selector) {
     return this.page.$$eval(selector, (all) => all.map((e) => e.textContent));
