@@ -7,6 +7,9 @@ const kNoGpu = ["--disable-gpu"];
 export const WEBGL = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
 const kFlags = ["--no-sandbox", "--disable-dev-shm-usage", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync", "--js-flags=--expose-gc"];
 
+/** Panels are drawn within 200 ms after what they show has changed. */
+const kDrawn_ms = 250;
+
 export class Browser {
   static async launch(graphics = kNoGpu) {
     const out = new Browser();
@@ -46,7 +49,7 @@ export class Page {
   async until(what, condition, argument, timeout = 30_000) {
     const end = Date.now() + timeout;
     for (let why = ""; ; await this.pause(50)) {
-      if (await this.page.evaluate(condition, argument).catch((error) => void (why = error.message))) return;
+      if (await this.page.evaluate(condition, argument).catch((error) => void (why = error.message))) return this.pause(kDrawn_ms);
       if (Date.now() < end) continue;
       throw new Error(`not seen within ${timeout} ms: ${what}. ${why} The page: ${(await this.page.evaluate(() => document.body.innerText)).slice(-1200)} ${this.errors.join("; ")}`);
     }
