@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/mapfile/shown_map.hpp"
 
+#include <optional>
 #include <utility>
 
 #include "tutti/node/words.hpp"
@@ -10,11 +11,11 @@ namespace tutti::mapfile {
 namespace {
 
 /// The store's row of this verdict, if it has one.
-ClosureVerdict with_evidence(const ClosureVerdict& verdict, const storage::TableStore& store) {
+std::optional<ClosureVerdict> stored(const ClosureVerdict& verdict, const storage::TableStore& store) {
   const auto row = store.read("verdicts", node::key_of(verdict.pair));
-  if (!row || !*row) return verdict;
-  auto stored = wire::decode_verdict(**row);
-  return stored && node::without_evidence(*stored) == verdict ? std::move(*stored) : verdict;
+  if (!row || !*row) return std::nullopt;
+  auto out = wire::decode_verdict(**row);
+  return out && node::without_evidence(*out) == verdict ? std::optional(std::move(*out)) : std::nullopt;
 }
 
 }  // namespace
@@ -25,14 +26,19 @@ ShownMap ShownMaps::of(const node::ServerNode& server, Timestamp now) {
   ShownMap shown{.revision = state.revision, .time = now, .map = map.map(), .broadcast = server.broadcast()};
   shown.content.submaps = state.submaps;
   shown.content.payload_sizes = state.payload_sizes;
+  server::VerdictSet known;
   for (const auto& [pair, verdict] : state.verdicts) {
-    const auto known = known_.find(pair);
-    const bool is_known =
-        known != known_.end() && !known->second.evidence.empty() && node::without_evidence(known->second) == verdict;
-    shown.content.verdicts.emplace_hint(shown.content.verdicts.end(), pair,
-                                        is_known ? known->second : with_evidence(verdict, store_));
+    auto row = known_.extract(pair);
+    if (row.empty() || node::without_evidence(row.mapped()) != verdict) {
+      auto found = stored(verdict, store_);
+      shown.content.verdicts.emplace_hint(shown.content.verdicts.end(), pair, found ? *found : verdict);
+      if (found) known.emplace_hint(known.end(), pair, std::move(*found));
+      continue;
+    }
+    shown.content.verdicts.emplace_hint(shown.content.verdicts.end(), pair, row.mapped());
+    known.insert(known.end(), std::move(row));
   }
-  known_ = shown.content.verdicts;
+  known_ = std::move(known);
   shown.content.words = state.words;
   shown.content.names = server.robot_names();
   return shown;

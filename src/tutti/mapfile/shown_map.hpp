@@ -30,7 +30,7 @@ class ShownMaps {
 
  private:
   const storage::TableStore& store_;
-  server::VerdictSet known_;  // as last shown, with what was measured
+  server::VerdictSet known_;  // rows of the store that were last shown
 };
 
 }  // namespace tutti::mapfile
