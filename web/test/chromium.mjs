@@ -82,6 +82,16 @@ export class Page {
       input.dispatchEvent(new Event("change", { bubbles: true }));
     }, selector, text);
   }
+  /** Why the first robot and this one are not joined. */
+  async ask_why(other) {
+    await this.press("Why not?");
+    await this.evaluate((name) => {
+      const [, select] = document.querySelectorAll(".why select");
+      select.value = name;
+      select.dispatchEvent(new Event("change"));
+    }, other);
+    await this.press("Ask");
+  }
   /** Pixels of the points' picture that are not background. */
   pixels() {
     return this.page.evaluate(() => {

@@ -15,8 +15,8 @@ const kPatience_ms = 120_000; // of a busy machine
 const work = mkdtempSync(join(tmpdir(), "tutti-web-"));
 const programs = [];
 
-function start(...words) {
-  const program = spawn(tutti, words, { stdio: ["ignore", "pipe", "inherit"] });
+function start(words, stderr) {
+  const program = spawn(tutti, words, { stdio: ["ignore", "pipe", stderr] });
   programs.push(program);
   return program;
 }
@@ -24,8 +24,7 @@ const common = [mission, "--rate", String(kRate)];
 
 /** The server, where robots reach it and where its page is, as it says itself. */
 async function start_server() {
-  const program = spawn(tutti, ["server", ...common, "--state", join(work, "server"), "--view", "0"], { stdio: ["ignore", "pipe", "pipe"] });
-  programs.push(program);
+  const program = start(["server", ...common, "--state", join(work, "server"), "--view", "0"], "pipe");
   let bus, page;
   await new Promise((resolve, reject) => {
     for (const stream of [program.stdout, program.stderr])
@@ -40,7 +39,7 @@ async function start_server() {
   return { program, bus, page };
 }
 function start_robot(name, bus, ...more) {
-  const program = start("robot", ...common, ...more, "--name", name, "--bus", bus, "--state", join(work, name), "--session", "0");
+  const program = start(["robot", ...common, ...more, "--name", name, "--bus", bus, "--state", join(work, name), "--session", "0"], "inherit");
   program.stdout.resume();
   return program;
 }
@@ -88,12 +87,12 @@ async function play(browser) {
   await until_presence(page, "bravo", ["silent", "lost"]);
   await page.until("its card says so", () => document.querySelectorAll(".robot.silent, .robot.lost").length === 1);
   assert.match((await page.texts(".robot.silent .detail, .robot.lost .detail")).join(), /May be within/);
-  const is_told = () => [...document.querySelectorAll(".alert:not(.seen)")].some((a) => /silent/.test(a.textContent) && /bravo/.test(a.textContent));
-  await page.until("an alert says so", is_told, undefined, kPatience_ms);
+  const is_alert = (wanted) => [...document.querySelectorAll(".alert:not(.seen)")].some((a) => /silent/.test(a.textContent) && /bravo/.test(a.textContent)) === wanted;
+  await page.until("an alert says so", is_alert, true, kPatience_ms);
   robots.bravo.kill("SIGCONT");
   await until_presence(page, "bravo", ["here", "finished"]);
   await page.until("it has sent what it had", () => tutti.app.robots.find((r) => r.name === "bravo").drain.state === "empty", undefined, kPatience_ms);
-  await page.until("nothing says so any more", () => ![...document.querySelectorAll(".alert:not(.seen)")].some((a) => /silent/.test(a.textContent) && /bravo/.test(a.textContent)));
+  await page.until("nothing says so any more", is_alert, false);
   step("a robot goes silent, comes back and drains");
 
   await page.press("Closures");
@@ -111,13 +110,7 @@ async function play(browser) {
 
   for (const name of Object.keys(robots)) await until_presence(page, name, ["finished"]);
   assert.equal(await page.evaluate(() => tutti.app.world.parts.size), 2);
-  await page.press("Why not?");
-  await page.evaluate(() => {
-    const [, other] = document.querySelectorAll(".why select");
-    other.value = "charlie";
-    other.dispatchEvent(new Event("change"));
-  });
-  await page.press("Ask");
+  await page.ask_why("charlie");
   await page.until("why they are not joined", () => document.querySelectorAll(".why .alert").length > 0, undefined, kPatience_ms);
   const [pair] = await page.texts(".why .alert b");
   await page.press("Join by hand");
