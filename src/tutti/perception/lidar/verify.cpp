@@ -123,7 +123,7 @@ double best_slid_quality(const SubmapFeatures& a, const SubmapFeatures& b, const
 }
 
 /// How far refine() goes: to the end, or no farther than one way whose plane RMSE is too large, whatever the other way
-/// says, as with most pairs of a place whose rooms are alike.
+/// says.
 enum class Effort { whole, until_refused };
 
 /// Registers one way, then the other way from where that ended, and takes the middle.
@@ -216,7 +216,12 @@ PairVerification verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, c
   out.correlation_score = ranked.front().score;
   out.overlap = ranked.front().quality;
   out.T_a_b = ranked.front().T_a_b;
+  out.viewpoint_distance_m = viewpoint_distance(a, b, out.T_a_b);
   if (ranked.size() > 1 && ranked[0].quality > 0.0) out.rival_ratio = ranked[1].quality / ranked[0].quality;
+  if (const Refusal rival{RefusalReason::ambiguous, out.rival_ratio, config.max_rival_ratio}; misses(rival)) {
+    out.refusal = rival;  // whatever the finest level would say of the best, as with most pairs where rooms are alike
+    return out;
+  }
   Eigen::Vector3d weakest_b;
   refine(a, b, ranked.front().T_a_b, config, Effort::until_refused, out, weakest_b);
   if (out.plane_rmse_m <= config.max_plane_rmse_m) out.contradiction = contradiction(a, b, out.T_a_b);
