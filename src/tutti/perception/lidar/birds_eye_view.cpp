@@ -12,6 +12,7 @@
 namespace tutti::lidar {
 namespace {
 
+constexpr std::size_t kMinWallCells = 30;
 constexpr float kMaxWallTilt = 0.35F;   // |n_z| of a wall: within 20 degrees of vertical
 constexpr float kMinFloorTilt = 0.94F;  // |n_z| of a floor or ceiling: within 20 degrees of level
 constexpr float kFloorLayer = 0.25F;    // m; floors at different heights are kept apart
@@ -126,6 +127,8 @@ FloorPatch floor_patch(const Eigen::Vector2f& position, bool faces_up, double ce
   return {static_cast<int>(std::floor(position.x() / size)), static_cast<int>(std::floor(position.y() / size)),
           faces_up};
 }
+
+bool has_enough_walls(const BirdsEyeView& view) { return view.walls.size() >= kMinWallCells; }
 
 std::vector<double> wall_directions(const BirdsEyeView& view, int count) {
   auto walls = facing(view);

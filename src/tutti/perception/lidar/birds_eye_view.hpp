@@ -42,6 +42,9 @@ struct BirdsEyeView {
 /// `cell_m` and layers of 0.25 m. `cloud` is in the submap frame.
 BirdsEyeView make_view(const OrientedCloud& cloud, const Eigen::Quaterniond& R_level_submap, double cell_m);
 
+/// False for a view that shows hardly any walls and thus says nothing.
+bool has_enough_walls(const BirdsEyeView& view);
+
 /// At most `count` directions in [0, pi), rad, that most wall faces or face away from, most first. They turn with the
 /// submap and hardly depend on which of the walls were seen, so the yaw between two submaps of one place is the
 /// difference of a direction of each, or half a turn more.

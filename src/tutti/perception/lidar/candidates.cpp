@@ -14,8 +14,7 @@ namespace {
 
 constexpr int kN = kImageSize;
 constexpr int kMask = kN - 1;
-constexpr double kMinScore = 0.1;          // correlation below which a guess is not worth a registration
-constexpr std::size_t kMinWallCells = 30;  // a view from above with fewer (half cells) says nothing
+constexpr double kMinScore = 0.1;  // correlation below which a guess is not worth a registration
 static_assert((kN & kMask) == 0);
 
 /// A pose of b's view on a's, in the level frames, about the centres of the views.
@@ -135,7 +134,7 @@ std::vector<AlignmentGuess> propose_alignments(const SubmapFeatures& a, const Su
 }
 
 bool plausible_pair(const SubmapFeatures& a, const SubmapFeatures& b) {
-  const auto enough = [&](const SubmapFeatures& f) { return f.usable && f.view.walls.size() >= kMinWallCells; };
+  const auto enough = [](const SubmapFeatures& f) { return f.usable && has_enough_walls(f.view); };
   return enough(a) && enough(b);
 }
 

@@ -77,30 +77,54 @@ std::shared_ptr<const std::vector<DepthPanorama>> look_around(const OrientedClou
   return panoramas;
 }
 
+/// The part of a submap's features that says how it looks from above.
+struct SeenFromAbove {
+  std::optional<Refusal> refusal;  ///< Why the submap is not usable; nothing else is there then.
+  std::vector<Eigen::Vector3f> viewpoints;
+  OrientedCloud cloud;
+  Eigen::Quaterniond R_level_submap = Eigen::Quaterniond::Identity();
+  BirdsEyeView view;
+};
+
+SeenFromAbove see_from_above(const Submap& submap, const LidarClosureConfig& config) {
+  SeenFromAbove out;
+  // Finite points in Morton order, whatever the submap came with.
+  auto points = submap.cloud ? voxel_downsample(*submap.cloud, config.voxel_m).points : std::vector<Eigen::Vector3f>{};
+  out.refusal = why_unusable(submap, points.size(), config);
+  if (out.refusal) return out;
+  const auto poses = poses_in_submap(submap);
+  for (const auto& pose : poses) out.viewpoints.push_back(pose.translation.cast<float>());
+  out.cloud = orient(std::move(points), out.viewpoints, config.normals);
+  const Eigen::Vector3d up = find_up(submap, poses, *out.cloud.normals);
+  out.R_level_submap = Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ());
+  out.view = make_view(out.cloud, out.R_level_submap, config.candidates.cell_m);
+  return out;
+}
+
 }  // namespace
 
 SubmapFeatures extract_features(const Submap& submap, const LidarClosureConfig& config) {
-  SubmapFeatures features{.id = submap.id};
-  // Finite points in Morton order, whatever the submap came with.
-  auto points = submap.cloud ? voxel_downsample(*submap.cloud, config.voxel_m).points : std::vector<Eigen::Vector3f>{};
-  features.refusal = why_unusable(submap, points.size(), config);
+  SeenFromAbove seen = see_from_above(submap, config);
+  SubmapFeatures features{.id = submap.id, .refusal = seen.refusal};
   if (features.refusal) return features;
-  const auto poses = poses_in_submap(submap);
-  std::vector<Eigen::Vector3f> viewpoints;
-  for (const auto& pose : poses) viewpoints.push_back(pose.translation.cast<float>());
   const Middle middle = find_middle(submap);
   features.middle = middle.T_submap_keyframe.translation;
   features.bend = std::make_shared<const Bend>(find_bend(submap));
-  features.cloud = orient(std::move(points), viewpoints, config.normals);
+  features.cloud = std::move(seen.cloud);
   features.cloud.roughness =
       std::make_shared<const std::vector<float>>(expected_residuals(features.cloud, middle, config.registration));
-  const Eigen::Vector3d up = find_up(submap, poses, *features.cloud.normals);
-  features.R_level_submap = Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ());
-  features.view = make_view(features.cloud, features.R_level_submap, config.candidates.cell_m);
+  features.R_level_submap = seen.R_level_submap;
+  features.view = std::move(seen.view);
   features.turned_views = std::make_shared<const std::vector<TurnedView>>(turn_views(features.view, config.candidates));
-  features.panoramas = look_around(features.cloud, viewpoints, config);
+  features.panoramas = look_around(features.cloud, seen.viewpoints, config);
   features.usable = true;
   return features;
+}
+
+std::vector<TurnedView> views_from_above(const Submap& submap, const LidarClosureConfig& config) {
+  const SeenFromAbove seen = see_from_above(submap, config);
+  if (seen.refusal || !has_enough_walls(seen.view)) return {};
+  return turn_views(seen.view, config.candidates);
 }
 
 std::size_t bytes_of(const SubmapFeatures& features) {

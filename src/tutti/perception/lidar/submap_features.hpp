@@ -36,6 +36,10 @@ struct SubmapFeatures {
 /// false and a refusal.
 SubmapFeatures extract_features(const Submap& submap, const LidarClosureConfig& config);
 
+/// Only the turned views of these features, for half the work; none when the submap is not usable or has not enough
+/// walls.
+std::vector<TurnedView> views_from_above(const Submap& submap, const LidarClosureConfig& config);
+
 /// Memory held in bytes, with what copies share.
 std::size_t bytes_of(const SubmapFeatures& features);
 
