@@ -86,35 +86,21 @@ class JointClosureFinder final : public server::ClosureFinder {
 };
 
 /// Another finder under an id that covers its settings; its verdicts carry this id too.
-class NamedFinder final : public server::ClosureFinder {
+class NamedFinder final : public server::WrappedFinder {
  public:
   /// `settings` is the text that ClosureFinder::settings() returns.
   NamedFinder(std::shared_ptr<const server::ClosureFinder> finder, MethodId id, std::string settings)
-      : finder_(std::move(finder)), id_(std::move(id)), settings_(std::move(settings)) {}
+      : WrappedFinder(std::move(finder)), id_(std::move(id)), settings_(std::move(settings)) {}
   [[nodiscard]] MethodId id() const override { return id_; }
   [[nodiscard]] std::string settings() const override { return settings_; }
-  [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
-    return finder_->can_compare(first, second);
-  }
-  [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
-    return finder_->is_candidate(first, second);
-  }
-  [[nodiscard]] std::vector<Timestamp> known_at(const Submap& first, const Submap& second) const override {
-    return finder_->known_at(first, second);
-  }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const server::PayloadStore& payloads) const override {
-    auto verdict = finder_->verify(first, second, payloads);
+    auto verdict = wrapped().verify(first, second, payloads);
     if (verdict) verdict->finder = id_;
     return verdict;
   }
-  [[nodiscard]] Result<Look> look(const Submap& first, const Submap& second, const server::PayloadStore& payloads,
-                                  const std::optional<Pose3>& T_first_second) const override {
-    return finder_->look(first, second, payloads, T_first_second);
-  }
 
  private:
-  std::shared_ptr<const server::ClosureFinder> finder_;
   MethodId id_;
   std::string settings_;
 };

@@ -49,15 +49,11 @@ const Pose3& block_anchor(const Submap& submap) {
 
 SpoiledClosureFinder::SpoiledClosureFinder(std::shared_ptr<const server::ClosureFinder> inner, double wrong_share,
                                            const SpoiledClosureConfig& config, std::uint64_t seed)
-    : inner_(std::move(inner)), wrong_share_(wrong_share), config_(config), seed_(seed) {}
-
-bool SpoiledClosureFinder::is_candidate(const Submap& first, const Submap& second) const {
-  return inner_->is_candidate(first, second);
-}
+    : WrappedFinder(std::move(inner)), wrong_share_(wrong_share), config_(config), seed_(seed) {}
 
 Result<ClosureVerdict> SpoiledClosureFinder::verify(const Submap& first, const Submap& second,
                                                     const server::PayloadStore& payloads) const {
-  auto verdict = inner_->verify(first, second, payloads);
+  auto verdict = wrapped().verify(first, second, payloads);
   if (!verdict) return verdict;
   const auto error = draw_error(verdict->pair, wrong_share_, config_, seed_);
   if (!error) return verdict;

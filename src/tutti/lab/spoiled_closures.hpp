@@ -26,24 +26,17 @@ struct SpoiledClosureConfig {
 /// Makes a share of another finder's accepted verdicts wrong, with their covariance unchanged. Which ones, and how
 /// wrong they are, depends on (seed, pair) only; agreeing ones share their error over blocks of two submaps of each
 /// robot.
-class SpoiledClosureFinder final : public server::ClosureFinder {
+class SpoiledClosureFinder final : public server::WrappedFinder {
  public:
+  /// It has the other finder's id; the caller must give it one of its own (finders::NamedFinder).
   SpoiledClosureFinder(std::shared_ptr<const server::ClosureFinder> inner, double wrong_share,
                        const SpoiledClosureConfig& config, std::uint64_t seed);
-  /// The other finder's id; the caller must give this finder one of its own (finders::NamedFinder).
-  [[nodiscard]] MethodId id() const override { return inner_->id(); }
-  [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
-    return inner_->can_compare(first, second);
-  }
-  [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override;
-  [[nodiscard]] std::vector<Timestamp> known_at(const Submap& first, const Submap& second) const override {
-    return inner_->known_at(first, second);
-  }
+  /// Nothing: a worker cannot make it.
+  [[nodiscard]] std::string settings() const override { return {}; }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const server::PayloadStore& payloads) const override;
 
  private:
-  std::shared_ptr<const server::ClosureFinder> inner_;
   double wrong_share_;
   SpoiledClosureConfig config_;
   std::uint64_t seed_;

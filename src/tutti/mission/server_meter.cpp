@@ -12,7 +12,7 @@ Result<ClosureVerdict> MeasuredFinder::verify(const Submap& first, const Submap&
   Stopwatch watch;
   auto verdict = [&] {
     const CpuScope cpu(cpu_s);
-    return finder_->verify(first, second, payloads);
+    return wrapped().verify(first, second, payloads);
   }();
   const double took_ms = watch.lap_ms();
   const std::scoped_lock lock(mutex_);

@@ -17,20 +17,9 @@
 namespace tutti::mission {
 
 /// Wraps a finder and measures how long it takes for each pair.
-class MeasuredFinder final : public server::ClosureFinder {
+class MeasuredFinder final : public server::WrappedFinder {
  public:
-  explicit MeasuredFinder(std::shared_ptr<const server::ClosureFinder> finder) : finder_(std::move(finder)) {}
-  [[nodiscard]] MethodId id() const override { return finder_->id(); }
-  [[nodiscard]] std::string settings() const override { return finder_->settings(); }
-  [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
-    return finder_->can_compare(first, second);
-  }
-  [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
-    return finder_->is_candidate(first, second);
-  }
-  [[nodiscard]] std::vector<Timestamp> known_at(const Submap& first, const Submap& second) const override {
-    return finder_->known_at(first, second);
-  }
+  explicit MeasuredFinder(std::shared_ptr<const server::ClosureFinder> finder) : WrappedFinder(std::move(finder)) {}
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const server::PayloadStore& payloads) const override;
 
@@ -39,7 +28,6 @@ class MeasuredFinder final : public server::ClosureFinder {
   [[nodiscard]] double cpu_s() const { return cpu_s_; }
 
  private:
-  std::shared_ptr<const server::ClosureFinder> finder_;
   mutable std::mutex mutex_;  // guards what follows
   mutable std::vector<double> took_ms_;
   mutable double cpu_s_ = 0.0;

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tutti/base/result.hpp"
@@ -58,6 +59,39 @@ class ClosureFinder {
   [[nodiscard]] virtual std::vector<Timestamp> known_at(const Submap& /*first*/, const Submap& /*second*/) const {
     return {};
   }
+};
+
+/// Another finder, of which who derives from this changes what it overrides. All else is the other finder's, also what
+/// finders are asked in later versions.
+class WrappedFinder : public ClosureFinder {
+ public:
+  [[nodiscard]] MethodId id() const override { return wrapped_->id(); }
+  [[nodiscard]] std::string settings() const override { return wrapped_->settings(); }
+  [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
+    return wrapped_->can_compare(first, second);
+  }
+  [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
+    return wrapped_->is_candidate(first, second);
+  }
+  [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
+                                              const PayloadStore& payloads) const override {
+    return wrapped_->verify(first, second, payloads);
+  }
+  [[nodiscard]] Result<Look> look(const Submap& first, const Submap& second, const PayloadStore& payloads,
+                                  const std::optional<Pose3>& T_first_second) const override {
+    return wrapped_->look(first, second, payloads, T_first_second);
+  }
+  [[nodiscard]] std::vector<Timestamp> known_at(const Submap& first, const Submap& second) const override {
+    return wrapped_->known_at(first, second);
+  }
+
+ protected:
+  /// Must not be null.
+  explicit WrappedFinder(std::shared_ptr<const ClosureFinder> wrapped) : wrapped_(std::move(wrapped)) {}
+  [[nodiscard]] const ClosureFinder& wrapped() const { return *wrapped_; }
+
+ private:
+  std::shared_ptr<const ClosureFinder> wrapped_;
 };
 
 class MapRefiner;
