@@ -115,6 +115,8 @@ void fixes(std::string_view bytes) {
 std::map<std::string, std::vector<std::string>> store_seeds() {
   const std::string robot =
       node::encode(node::RobotRow{.name = "alpha", .session = 7, .former = {3, 4}, .rivals = {5}});
+  const SubmapId submap{ChainId(RobotId{1}, 7), 2};
+  const auto place = node::to_row(submap, {.looks = "a", .is_ranked = true, .candidates = {{submap, 0.5}}});
   return {{"fixes",
            {"stamp_s,latitude_deg,longitude_deg,height_m,sigma_east_m,sigma_north_m,sigma_up_m\n"
             "1700000000.25,46.5,6.6,400.0,0.5,0.5,1.0\n1700000001.25,46.50001,6.6,400.5,0.01,0.02,5\n"}},
@@ -122,7 +124,8 @@ std::map<std::string, std::vector<std::string>> store_seeds() {
            {rows({{"map", storage::key_of({9, 3, 1, 2})},
                   {"counts", storage::key_of({3, 100, 20, 1})},
                   {"settings", "broadcast: own\nmap:\n  most_closed_pairs: 40\n"},
-                  {"robot/1", robot}}),
+                  {"robot/1", robot},
+                  {place.key, *place.bytes}}),
             rows({{"robot", storage::key_of({1})},
                   {"starts", storage::key_of({4})},
                   {"session", storage::key_of({7})},

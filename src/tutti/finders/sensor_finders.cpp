@@ -7,6 +7,7 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/perception/lidar/candidates.hpp"
+#include "tutti/perception/lidar/place_descriptor.hpp"
 #include "tutti/perception/lidar/verify.hpp"
 #include "tutti/perception/visual/verify.hpp"
 
@@ -58,6 +59,18 @@ Result<LidarClosureFinder::Look> LidarClosureFinder::look(const Submap& first, c
   seen.accepted = true;
   seen.refusal.reset();
   out.best = lidar::to_verdict(first, second, seen).closures.front();
+  return out;
+}
+
+std::string LidarClosureFinder::place_of(const Submap& submap) const { return lidar::describe_place(submap, config_); }
+
+bool LidarClosureFinder::can_rank(std::string_view place) const { return lidar::is_descriptor(place, config_); }
+
+std::vector<double> LidarClosureFinder::likeness(std::string_view place,
+                                                 std::span<const std::string_view> others) const {
+  const lidar::PlaceMatcher matcher(place);
+  std::vector<double> out;
+  for (const std::string_view other : others) out.push_back(matcher.likeness(other));
   return out;
 }
 
@@ -139,6 +152,29 @@ Result<JointClosureFinder::Look> JointClosureFinder::look(const Submap& first, c
     if (look->refusal && look->refusal->reason != RefusalReason::too_small) out = std::move(*look);
   }
   return out;
+}
+
+std::string JointClosureFinder::place_of(const Submap& submap) const {
+  const PayloadSize size = payload_size(submap);
+  const server::ClosureFinder* only = nullptr;
+  for (const auto& finder : finders_) {
+    if (!finder->can_compare(size, size)) continue;
+    if (only != nullptr) return {};
+    only = finder.get();
+  }
+  return only == nullptr ? std::string() : only->place_of(submap);
+}
+
+const server::ClosureFinder* JointClosureFinder::ranking(std::string_view place) const {
+  const auto found = std::ranges::find_if(finders_, [&](const auto& finder) { return finder->can_rank(place); });
+  return found == finders_.end() ? nullptr : found->get();
+}
+
+std::vector<double> JointClosureFinder::likeness(std::string_view place,
+                                                 std::span<const std::string_view> others) const {
+  const server::ClosureFinder* const finder = ranking(place);
+  TUTTI_CHECK(finder != nullptr, "a place that nobody ranks");
+  return finder->likeness(place, others);
 }
 
 namespace {

@@ -4,7 +4,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -33,6 +35,10 @@ class LidarClosureFinder final : public server::ClosureFinder {
                                               const server::PayloadStore& payloads) const override;
   [[nodiscard]] Result<Look> look(const Submap& first, const Submap& second, const server::PayloadStore& payloads,
                                   const std::optional<Pose3>& T_first_second) const override;
+  [[nodiscard]] std::string place_of(const Submap& submap) const override;
+  [[nodiscard]] bool can_rank(std::string_view place) const override;
+  [[nodiscard]] std::vector<double> likeness(std::string_view place,
+                                             std::span<const std::string_view> others) const override;
   [[nodiscard]] const FeatureCache<lidar::SubmapFeatures>& cache() const { return cache_; }
 
  private:
@@ -67,7 +73,8 @@ class VisualClosureFinder final : public server::ClosureFinder {
 };
 
 /// Combines several finders, one per kind of payload: each pair is compared by every finder that can. Robots with
-/// different sensors are joined through robots that carry both kinds.
+/// different sensors are joined through robots that carry both kinds. Only places of submaps that a single finder can
+/// compare are known: what another one finds of a pair does not depend on how alike the first says that it looks.
 class JointClosureFinder final : public server::ClosureFinder {
  public:
   explicit JointClosureFinder(std::vector<std::shared_ptr<const server::ClosureFinder>> finders);
@@ -80,8 +87,14 @@ class JointClosureFinder final : public server::ClosureFinder {
                                               const server::PayloadStore& payloads) const override;
   [[nodiscard]] Result<Look> look(const Submap& first, const Submap& second, const server::PayloadStore& payloads,
                                   const std::optional<Pose3>& T_first_second) const override;
+  [[nodiscard]] std::string place_of(const Submap& submap) const override;
+  [[nodiscard]] bool can_rank(std::string_view place) const override { return ranking(place) != nullptr; }
+  [[nodiscard]] std::vector<double> likeness(std::string_view place,
+                                             std::span<const std::string_view> others) const override;
 
  private:
+  /// The finder that ranks this place; null: none.
+  [[nodiscard]] const server::ClosureFinder* ranking(std::string_view place) const;
   std::vector<std::shared_ptr<const server::ClosureFinder>> finders_;
 };
 

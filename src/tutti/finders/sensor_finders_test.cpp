@@ -5,6 +5,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <memory>
+#include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -99,6 +102,35 @@ TEST(LidarClosureFinder, FindsTheSameWhateverItKeeps) {
     EXPECT_LE(finder.cache().held_bytes(), budget);
     EXPECT_GE(finder.cache().held_bytes(), budget / 3);
   }
+}
+
+TEST(SensorFinders, SayWhatAPlaceLooksLikeWhereOneKindOfSensorAloneComparesIt) {
+  Rooms rooms(2);
+  Submap seen = rooms.submaps[0];
+  seen.cloud = rooms.store.cloud(seen.id).value();
+  const auto lidar = std::make_shared<LidarClosureFinder>(lidar::LidarClosureConfig{}, 1, kMuch);
+  const auto visual = std::make_shared<VisualClosureFinder>(visual::VisualClosureConfig{}, 1, kMuch);
+  const JointClosureFinder joint({lidar, visual});
+  const std::string place = lidar->place_of(seen);
+  ASSERT_FALSE(place.empty());
+  EXPECT_EQ(joint.place_of(seen), place);
+  EXPECT_EQ(NamedFinder(lidar, {"named", 1, 0}, "").place_of(seen), place);
+  EXPECT_TRUE(joint.can_rank(place));
+  EXPECT_FALSE(joint.can_rank("somewhere"));
+  Submap other = rooms.submaps[1];
+  other.cloud = rooms.store.cloud(other.id).value();
+  const std::string elsewhere = lidar->place_of(other);
+  const std::vector<std::string_view> both{place, elsewhere};
+  const std::vector<double> likeness = joint.likeness(place, both);
+  EXPECT_EQ(likeness, lidar->likeness(place, both));
+  EXPECT_GT(likeness[0], likeness[1]);
+  auto images = std::make_shared<VisualPayload>();
+  images->frames.emplace_back();
+  images->frames.back().observations.emplace_back();
+  seen.visual = images;
+  EXPECT_EQ(joint.place_of(seen), "");  // cameras may find closures that do not look alike from above
+  EXPECT_EQ(visual->place_of(seen), "");
+  EXPECT_EQ(joint.place_of({.id = seen.id}), "");
 }
 
 }  // namespace sensor_finders_test

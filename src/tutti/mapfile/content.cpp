@@ -90,6 +90,9 @@ Status read_meta(const storage::TableStore& map, Content& content) {
   auto refinements = node::read_refinements(map);
   if (!refinements) return tl::unexpected(refinements.error());
   content.refinements = std::move(*refinements);
+  const auto places = node::read_places(map);
+  if (!places) return tl::unexpected(places.error());
+  content.candidates = server::restored(*places, static_cast<std::size_t>(content.settings.candidates_per_submap));
   auto names = node::read_robot_names(map);
   if (!names) return tl::unexpected(names.error());
   content.names = std::move(*names);
@@ -117,8 +120,9 @@ Result<Content> read(const storage::TableStore& map) {
 
 server::MapEstimate estimate(const Content& content) {
   const server::MapConfig& config = content.settings.map;
+  const server::VerdictSet verdicts = server::of_candidates(content.verdicts, content.candidates, content.words);
   return server::georeferenced(
-      server::refined(server::estimate_map_with_fixes(content.submaps, content.verdicts, config, content.words),
+      server::refined(server::estimate_map_with_fixes(content.submaps, verdicts, config, content.words),
                       content.submaps, content.refinements),
       content.submaps, config.georeference, config.gnc);
 }

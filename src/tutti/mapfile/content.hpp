@@ -26,6 +26,7 @@ struct Content {
   server::VerdictSet verdicts;                    ///< With their evidence.
   WordSet words;
   server::Refinements refinements;
+  server::CandidatePairs candidates;  ///< Verdicts of other pairs are not in the map.
   std::map<RobotId, std::string> names;
   std::map<MethodId, std::size_t> refused;  ///< Refused pairs, by the finder that refused them.
   /// Pairs with closures of other finders than the server's, which are not believed.

@@ -24,9 +24,11 @@ using storage::TableStore, storage::Write;
 /// What becomes of a row of `b` when there is another one in `a`: the bytes that are taken.
 using Choose = std::function<Result<std::string>(std::string_view key, std::string a, std::string b)>;
 
-/// Rows that say something of one map alone: what became of it, and refinements, which join_refinements() puts.
+/// Rows that say something of one map alone: what became of it, and refinements and places, which join_refinements()
+/// and join_places() put.
 bool is_of_one_map(const std::string& table, std::string_view key) {
-  return table == node::kMetaTable && (key == node::kCountsKey || key.starts_with(node::kRefinementPrefix));
+  return table == node::kMetaTable &&
+         (key == node::kCountsKey || key.starts_with(node::kRefinementPrefix) || key.starts_with(node::kPlacePrefix));
 }
 
 /// Rows of `a`, and those of `b`, into the table; counts the keys that are in both.
@@ -160,6 +162,20 @@ Result<std::uint64_t> join_refinements(const Content& a, const Content& b, std::
   return revision;
 }
 
+/// The first map's were compared with each other; those that only the second has, with none of them: the server that
+/// opens the map does that.
+Status join_places(const TableStore& a, const TableStore& b, Writer& out) {
+  const auto one = node::read_places(a), other = node::read_places(b);
+  if (!one) return tl::unexpected(one.error());
+  if (!other) return tl::unexpected(other.error());
+  for (const auto& [id, place] : *one)
+    if (auto ok = out.put(node::to_row(id, place)); !ok) return ok;
+  for (const auto& [id, place] : *other)
+    if (!one->contains(id))
+      if (auto ok = out.put(node::to_row(id, {.looks = place.looks, .candidates = {}})); !ok) return ok;
+  return {};
+}
+
 /// Answers are named after jobs, which servers count: one name, two jobs.
 Status join_answers(const TableStore& a, const TableStore& b, Writer& out) {
   Status ok;
@@ -197,6 +213,7 @@ Result<Merged> merge(const TableStore& a, const TableStore& b, TableStore& out) 
        {std::pair<const char*, Choose>{"verdicts", newer_verdict}, {"words", later_word}, {"meta", joined_meta}})
     if (const auto done = join(a, b, table, choose, writer); !done) return tl::unexpected(done.error());
   if (auto done = join_answers(a, b, writer); !done) return tl::unexpected(done.error());
+  if (auto done = join_places(a, b, writer); !done) return tl::unexpected(done.error());
   const auto revision = join_refinements(*one, *other, std::max(one->meta.revision, other->meta.revision), writer);
   if (!revision) return tl::unexpected(revision.error());
   const node::MapMeta meta{.epoch = std::max(one->meta.epoch, other->meta.epoch) + 1,

@@ -331,6 +331,7 @@ struct ServerWorkRecord {
   std::size_t hypotheses = 0;       ///< Hypotheses tried about who is wrong.
   std::size_t factorisations = 0;   ///< Factorisations of normal equations of poses.
   std::size_t sample_products = 0;  ///< Columns of samples times products with a graph's Laplacian.
+  std::size_t places_compared = 0;  ///< Pairs of what submaps look like from above.
 };
 
 /// The cost of one refinement of the map.

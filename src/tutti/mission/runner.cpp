@@ -316,7 +316,8 @@ void MissionRun::record_timing(MissionRecord& record) const {
                                .pairs_verified = work.pairs_verified,
                                .hypotheses = work.search.hypotheses,
                                .factorisations = work.search.factorisations + work.monitor.factorisations,
-                               .sample_products = work.monitor.products};
+                               .sample_products = work.monitor.products,
+                               .places_compared = work.places_compared};
   record.timing.machine = machine_description();
   record.timing.wall_s = pace_.wall_s();
   record.timing.rate = options_.rate;

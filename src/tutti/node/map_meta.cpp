@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/node/map_meta.hpp"
 
+#include <bit>
+#include <cmath>
 #include <utility>
 
 #include "tutti/base/config_io.hpp"
 #include "tutti/node/meta_keys.hpp"
 #include "tutti/node/robot_registry.hpp"
+#include "tutti/node/submap_frames.hpp"
 #include "tutti/wire/refinement_codec.hpp"
 
 namespace tutti::node {
@@ -70,6 +73,45 @@ Result<server::Refinements> read_refinements(const storage::TableStore& map) {
   });
   if (!scanned) return tl::unexpected(scanned.error());
   return refinements;
+}
+
+storage::Write to_row(SubmapId id, const server::Place& place) {
+  std::string bytes = storage::key_of({place.is_ranked ? 1U : 0U, place.candidates.size()});
+  for (const auto& [other, likeness] : place.candidates)
+    bytes += storage::key_of(
+        {other.chain.robot.value, other.chain.session, other.index, std::bit_cast<std::uint64_t>(likeness)});
+  return {kMetaTable, std::string(kPlacePrefix) + key_of(id), bytes + place.looks};
+}
+
+std::optional<std::pair<SubmapId, server::Place>> place_of_row(std::string_view key, std::string_view bytes) {
+  constexpr std::size_t kHead = 16, kCandidate = 32;
+  if (!key.starts_with(kPlacePrefix)) return std::nullopt;
+  const auto id = submap_of_key(key.substr(kPlacePrefix.size()));
+  const auto head = storage::numbers_of(bytes.substr(0, kHead), 2);
+  if (!id || !head || (*head)[1] > bytes.size() / kCandidate) return std::nullopt;
+  bytes.remove_prefix(kHead);
+  server::Place place{.looks = {}, .is_ranked = (*head)[0] != 0, .candidates = {}};
+  for (std::uint64_t i = 0; i < (*head)[1]; ++i) {
+    const auto other = bytes.size() < kCandidate ? std::nullopt : submap_of_key(bytes.substr(0, 24));
+    if (!other) return std::nullopt;
+    const double likeness = std::bit_cast<double>(storage::numbers_of(bytes.substr(24, 8), 1)->front());
+    if (!std::isfinite(likeness)) return std::nullopt;
+    place.candidates.push_back({*other, likeness});
+    bytes.remove_prefix(kCandidate);
+  }
+  place.looks = bytes;
+  return std::pair(*id, std::move(place));
+}
+
+Result<server::PlaceSet> read_places(const storage::TableStore& map) {
+  server::PlaceSet places;
+  const auto scanned = map.scan(kMetaTable, kPlacePrefix, [&](std::string_view key, std::string_view bytes) {
+    if (!key.starts_with(kPlacePrefix)) return false;
+    if (auto place = place_of_row(key, bytes)) places.insert(std::move(*place));
+    return true;
+  });
+  if (!scanned) return tl::unexpected(scanned.error());
+  return places;
 }
 
 std::string encode(const RobotRow& row) {

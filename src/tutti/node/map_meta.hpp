@@ -7,6 +7,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "tutti/server/map_server.hpp"
 #include "tutti/storage/table_store.hpp"
@@ -49,6 +50,14 @@ Result<server::ServerConfig> read_settings(const storage::TableStore& map);
 /// the refinement is then made again.
 std::string refinement_key(std::uint64_t revision);
 Result<server::Refinements> read_refinements(const storage::TableStore& map);
+
+/// Rows `place/SUBMAP`: what the places of submaps look like, and their candidates. Encoded as numbers of 8 bytes
+/// (whether it was compared, how many candidates; for each its robot, session, index and the bits of its likeness),
+/// followed by what it looks like. Rows that cannot be read are skipped: the pairs of these submaps are all verified.
+storage::Write to_row(SubmapId id, const server::Place& place);
+/// The place of a row; nothing when it is no such row.
+std::optional<std::pair<SubmapId, server::Place>> place_of_row(std::string_view key, std::string_view bytes);
+Result<server::PlaceSet> read_places(const storage::TableStore& map);
 
 /// A row `robot/NUMBER` (RobotRegistry::key()): a robot's name and its sessions. It is encoded as numbers of 8 bytes
 /// (the session, the number of former sessions, the number of rivals, then those sessions), followed by the name.

@@ -88,6 +88,7 @@ Step ServerNode::resume(Timestamp now) {
   if (server_.has_news()) timer_ = next_update(now);
   step.writes.push_back(meta());
   step.writes.push_back(to_row(config_.server));
+  keep_places(step);
   tell_unread_rows(now, step);
   recall_words();
   for (const auto& [robot, receipt] : receipts_.members()) send_receipt(robot, step);
@@ -213,11 +214,16 @@ Status ServerNode::take_submap(const bus::Envelope& envelope, Timestamp now, Ste
     if (registry_.note_session(id.chain))
       step.writes.push_back({kMetaTable, RobotRegistry::key(id.chain.robot), registry_.row(id.chain.robot)});
     step.writes.push_back({"submaps", key_of(id), *envelope.bytes});
+    keep_places(step);
     step.tell(now, SubmapStored{id});
   }
   send_receipt(id.chain.robot, step);
   send_jobs(id, now, 0, config_.pairs_per_job, step);
   return {};
+}
+
+void ServerNode::keep_places(Step& step) {
+  for (const SubmapId& id : server_.take_places()) step.writes.push_back(to_row(id, server_.state().places.at(id)));
 }
 
 void ServerNode::tell_unread_rows(Timestamp now, Step& step) {

@@ -124,6 +124,8 @@ class ServerNode {
   [[nodiscard]] std::set<RobotId> strangers_there(Timestamp now) const;
   void receive_status_of_robot(RobotId robot, const NodeStatus& status, Timestamp now, Step& step);
   Status take_submap(const bus::Envelope& envelope, Timestamp now, Step& step);
+  /// Stores what is new of submaps' places.
+  void keep_places(Step& step);
   /// Refuses a submap for good: the robot need not send it again.
   void note_refused(SubmapId id, const bus::Envelope& envelope, const std::string& why, Timestamp now, Step& step);
   /// Receipts::of_anybody()

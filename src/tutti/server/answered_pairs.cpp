@@ -29,6 +29,24 @@ bool AnsweredPairs::insert(const SubmapPair& pair) {
   return true;
 }
 
+void AnsweredPairs::insert_all_but(SubmapId id, std::span<const SubmapId> open) {
+  const std::uint32_t later = number_.at(id);
+  std::vector<std::uint64_t> left;
+  for (const SubmapId& other : open)
+    if (const std::uint32_t number = number_.at(other); number < later && !answered_[later].contains(number))
+      left.push_back(number);
+  std::ranges::sort(left);
+  left.erase(std::ranges::unique(left).begin(), left.end());
+  left.push_back(later);
+  NumberSet all;
+  std::uint64_t begin = 0;
+  for (const std::uint64_t end : left) {
+    all.append({begin, end});
+    begin = end + 1;
+  }
+  answered_[later] = std::move(all);
+}
+
 bool AnsweredPairs::contains(const SubmapPair& pair) const {
   if (!has_both(pair)) return false;
   const auto [later, earlier] = place_of(pair);

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <unordered_map>
 #include <vector>
 
@@ -23,6 +24,9 @@ class AnsweredPairs {
   [[nodiscard]] bool has_both(const SubmapPair& pair) const;
   /// Adds a pair, of which both submaps must have been added. False when the set has it already.
   bool insert(const SubmapPair& pair);
+  /// Adds the pairs of this submap with all that came before it, except with `open` (in any order), whose answers stay
+  /// as they are.
+  void insert_all_but(SubmapId id, std::span<const SubmapId> open);
   [[nodiscard]] bool contains(const SubmapPair& pair) const;
   /// The pairs that are not in the set, smaller submap first, sorted. Takes time in proportion to these pairs and the
   /// submaps, not to all pairs.

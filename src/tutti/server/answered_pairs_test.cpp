@@ -9,11 +9,10 @@
 #include <vector>
 
 #include "tutti/base/random.hpp"
+#include "tutti/server/candidate_pairs.hpp"
 
 namespace tutti::server {
 namespace answered_pairs_test {
-
-SubmapPair ordered(SubmapId a, SubmapId b) { return a < b ? SubmapPair{a, b} : SubmapPair{b, a}; }
 
 template <class T>
 void shuffle(std::vector<T>& list, Rng& rng) {
@@ -82,6 +81,29 @@ TEST(AnsweredPairs, ASubmapThatIsNeverAnsweredCostsOneStretchOfEveryLaterOne) {
     if (pair.first != ids[20] && pair.second != ids[20]) answered.insert(pair);
   EXPECT_EQ(answered.stretches_beyond(), ids.size() - 22);  // the next one has nothing beyond
   EXPECT_EQ(answered.watermark(ids.back()), 20U);
+}
+
+TEST(AnsweredPairs, TakesAllEarlierOnesButAFewAtOnce) {
+  Rng rng(4);
+  const std::vector<SubmapId> ids = arrivals(8, rng);
+  for (int trial = 0; trial < 20; ++trial) {
+    AnsweredPairs at_once, one_by_one;
+    for (const SubmapId id : ids)
+      for (AnsweredPairs* set : {&at_once, &one_by_one}) set->add_submap(id);
+    for (std::size_t later = 0; later < ids.size(); ++later) {
+      if (later > 0 && rng.bernoulli(0.5)) {  // some were answered before
+        const SubmapPair pair = ordered(ids[later], ids[rng.index(later)]);
+        at_once.insert(pair);
+        one_by_one.insert(pair);
+      }
+      std::vector<SubmapId> open;
+      for (std::size_t k = rng.index(6); k > 0; --k) open.push_back(ids[rng.index(ids.size())]);  // later ones, too
+      at_once.insert_all_but(ids[later], open);
+      for (std::size_t earlier = 0; earlier < later; ++earlier)
+        if (std::ranges::find(open, ids[earlier]) == open.end()) one_by_one.insert(ordered(ids[later], ids[earlier]));
+    }
+    EXPECT_EQ(at_once, one_by_one);
+  }
 }
 
 TEST(AnsweredPairs, KnowsNothingOfSubmapsThatHaveNotCome) {

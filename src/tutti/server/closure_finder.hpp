@@ -3,7 +3,9 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -33,6 +35,17 @@ class ClosureFinder {
   [[nodiscard]] virtual bool can_compare(const PayloadSize& first, const PayloadSize& second) const = 0;
   /// Cheap test whether verifying the pair is worth its cost.
   [[nodiscard]] virtual bool is_candidate(const Submap& first, const Submap& second) const = 0;
+  /// What the place looks like that a submap shows, which it has its payloads for; the same bytes whenever and wherever
+  /// they are computed. Empty: unknown, and each of its pairs is verified.
+  [[nodiscard]] virtual std::string place_of(const Submap& /*submap*/) const { return {}; }
+  /// True if likeness() can compare this place, which another version may have made, or other settings.
+  [[nodiscard]] virtual bool can_rank(std::string_view /*place*/) const { return false; }
+  /// How alike the place and each of the others look, the larger the more: of those that look most alike to a submap,
+  /// verify() finds closures most often. Takes far less time than verify(), and all places can_rank() allows.
+  [[nodiscard]] virtual std::vector<double> likeness(std::string_view /*place*/,
+                                                     std::span<const std::string_view> others) const {
+    return std::vector<double>(others.size(), 0.0);
+  }
   /// Verifies the pair; expensive, so it runs in a worker. Payloads are loaded from `payloads` when they are needed. An
   /// error means that one could not be read: there is no verdict, and the pair may be verified another time.
   [[nodiscard]] virtual Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
@@ -72,6 +85,12 @@ class WrappedFinder : public ClosureFinder {
   }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
     return wrapped_->is_candidate(first, second);
+  }
+  [[nodiscard]] std::string place_of(const Submap& submap) const override { return wrapped_->place_of(submap); }
+  [[nodiscard]] bool can_rank(std::string_view place) const override { return wrapped_->can_rank(place); }
+  [[nodiscard]] std::vector<double> likeness(std::string_view place,
+                                             std::span<const std::string_view> others) const override {
+    return wrapped_->likeness(place, others);
   }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const PayloadStore& payloads) const override {

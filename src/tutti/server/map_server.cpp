@@ -57,8 +57,6 @@ Status check_submap(const Submap& submap) {
   return {};
 }
 
-SubmapPair ordered(SubmapId a, SubmapId b) { return a < b ? SubmapPair{a, b} : SubmapPair{b, a}; }
-
 std::string name_of(const ClosureVerdict& verdict) {
   const auto& [first, second] = verdict.pair;
   return fmt::format("verdict on submaps {} and {}", to_string(first), to_string(second));
@@ -131,6 +129,7 @@ MapServer::MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFind
     state_.refused.clear();
   }
   for (const auto& [id, submap] : state_.submaps) state_.answered.add_submap(id);
+  restore_candidates();
   for (const SubmapPair& pair : state_.answered.open()) plan_verification(pair);
   news_ = !state_.submaps.empty();
 }
@@ -155,9 +154,13 @@ Status MapServer::receive(const SubmapMessage& message) {
   }
   state_.submaps[id] = std::make_shared<const Submap>(without_payloads(message.submap));
   state_.answered.add_submap(id);
+  if (config_.candidates_per_submap > 0)
+    if (std::string looks = finder_->place_of(message.submap); !looks.empty()) {
+      state_.places[id] = {.looks = std::move(looks), .candidates = {}};
+      compare_place(id);
+    }
   judge_waiting();
-  for (const auto& [other, there] : state_.submaps)
-    if (other != id) plan_verification(ordered(id, other));
+  plan_verifications(id);
   note_news();
   return {};
 }
@@ -214,7 +217,7 @@ void MapServer::plan_verification(const SubmapPair& pair) {
 std::vector<VerificationJob> MapServer::take_jobs() { return std::exchange(jobs_, {}); }
 
 void MapServer::give_back(VerificationJob job) {
-  if (!is_answered(job.pair) && is_asked(job.pair)) jobs_.push_back(std::move(job));
+  if (!is_answered(job.pair) && is_asked(job.pair) && !candidates_.excludes(job.pair)) jobs_.push_back(std::move(job));
 }
 
 Status MapServer::receive(const ClosureVerdict& verdict) {
@@ -352,7 +355,7 @@ MapJob MapServer::begin(std::uint64_t revision) {
   graph_is_new_ = false;
   MapJob job{.submaps = state_.submaps,
              .payload_sizes = {},
-             .verdicts = state_.verdicts,
+             .verdicts = of_candidates(state_.verdicts, candidates_, state_.words),
              .words = state_.words,
              .refinements = state_.refinements,
              .map = config_.map,

@@ -15,6 +15,7 @@
 #include "tutti/consistency/proxy_graph_builder.hpp"
 #include "tutti/model/messages.hpp"
 #include "tutti/server/answered_pairs.hpp"
+#include "tutti/server/candidate_pairs.hpp"
 #include "tutti/server/closure_finder.hpp"
 #include "tutti/server/graph_monitor.hpp"
 #include "tutti/server/map_estimate.hpp"
@@ -33,6 +34,7 @@ struct ServerConfig {
   double update_period_s = 10.0;
   std::string broadcast = "own";
   std::string change_of_mind = "wait";
+  int candidates_per_submap = 75;
   template <class V>
   void describe(V& v) {
     v.field("map", map);
@@ -51,6 +53,9 @@ struct ServerConfig {
             "'wait' = the robot is sent it once it has stood for another update (for two minutes, if it rests on the "
             "closures of one place), or an operator has spoken since; "
             "'follow' = at once.");
+    v.field("candidates_per_submap", candidates_per_submap, at_least(0),
+            "LiDAR: a pair of submaps is verified when either is among so many that look most alike to the other from "
+            "above. With no more submaps than that, these are all pairs. 0: all pairs always.");
   }
 };
 
@@ -74,6 +79,7 @@ struct MapServerState {
   MethodId finder;
   WordSet words;           ///< Words of operators.
   AnsweredPairs answered;  ///< Pairs that `finder` has answered, or that are not to be verified.
+  PlaceSet places;         ///< Each tells which candidates its submap has.
   RefusalCounts refused;   ///< Refusals by `finder`.
   Refinements refinements;
   std::uint64_t epoch = 0;  ///< Epoch of the server whose state this is.
@@ -83,6 +89,7 @@ struct MapServerState {
 /// Work done since the server started. The figures are deterministic, so that tests can bound the cost.
 struct ServerWork {
   std::size_t pairs_looked_at = 0;  ///< Pairs of submaps.
+  std::size_t places_compared = 0;  ///< Pairs of places.
   std::size_t pairs_verified = 0;   ///< Verdicts taken.
   std::size_t updates = 0;
   judge::SearchWork search;  ///< Over all updates.
@@ -136,6 +143,8 @@ class MapServer {
   Status receive(const Refinement& refinement);
   /// The errors since the last call, of verdicts that had waited for submaps and proved invalid when these came.
   std::vector<Error> take_late_errors() { return std::exchange(late_errors_, {}); }
+  /// The submaps whose places were described or compared since the last call: MapServerState::places has news of them.
+  std::vector<SubmapId> take_places() { return std::exchange(new_places_, {}); }
   /// The verifications to be done; each is handed out once.
   std::vector<VerificationJob> take_jobs();
   /// Returns a job that failed; the next take_jobs() hands it out again if it is still needed.
@@ -184,6 +193,12 @@ class MapServer {
   /// True if the server's finder has answered the pair, or an operator's word stands instead.
   [[nodiscard]] bool is_answered(const SubmapPair& pair) const;
   void plan_verification(const SubmapPair& pair);
+  /// Plans the pairs of a new submap with those that are there.
+  void plan_verifications(SubmapId id);
+  /// Goes on from the places of the state.
+  void restore_candidates();
+  /// Compares the place of this submap with all that were compared before.
+  void compare_place(SubmapId id);
   [[nodiscard]] bool has_submaps_of(const ClosureVerdict& verdict) const;
   [[nodiscard]] Status check_against_submaps(const ClosureVerdict& verdict) const;
   Status wait_for_submaps(const ClosureVerdict& verdict);
@@ -202,6 +217,8 @@ class MapServer {
   std::shared_ptr<PayloadStore> payloads_;
   ServerConfig config_;
   MapServerState state_;
+  CandidatePairs candidates_;
+  std::vector<SubmapId> new_places_;
   std::vector<VerificationJob> jobs_;
   std::vector<ClosureVerdict> waiting_;  // not in the state: their pairs are verified again when the submaps come
   std::vector<Error> late_errors_;

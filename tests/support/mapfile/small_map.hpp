@@ -42,8 +42,12 @@ class ExplainingFinder final : public server::ClosureFinder {
 /// A server on a store, everything that it asks for answered by a worker.
 class Mapper {
  public:
-  Mapper(std::set<RobotId> robots, storage::TableStore& store, std::uint64_t epoch = 1000) : store_(store) {
-    auto opened = node::ServerNode::open(std::move(robots), finder_, {}, epoch, store);
+  Mapper(std::set<RobotId> robots, storage::TableStore& store, std::uint64_t epoch = 1000)
+      : Mapper(std::move(robots), store, std::make_shared<ExplainingFinder>(), {}, epoch) {}
+  Mapper(std::set<RobotId> robots, storage::TableStore& store, std::shared_ptr<const server::ClosureFinder> finder,
+         const server::ServerConfig& config, std::uint64_t epoch = 1000)
+      : store_(store), finder_(std::move(finder)) {
+    auto opened = node::ServerNode::open(std::move(robots), finder_, {.server = config}, epoch, store);
     EXPECT_TRUE(opened.has_value()) << opened.error().message;
     node_ = std::move(*opened);
     take(node_->resume(now_));
@@ -86,7 +90,7 @@ class Mapper {
   }
 
   storage::TableStore& store_;
-  std::shared_ptr<const server::ClosureFinder> finder_ = std::make_shared<ExplainingFinder>();
+  std::shared_ptr<const server::ClosureFinder> finder_;
   std::unique_ptr<node::ServerNode> node_;
   Timestamp now_;
 };

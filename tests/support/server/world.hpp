@@ -1,9 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <memory>
 #include <numbers>
+#include <span>
+#include <sstream>
+#include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -98,6 +104,32 @@ class TestFinder final : public ClosureFinder {
   std::uint64_t seed_;
   std::uint32_t wrong_every_;
   std::uint32_t version_;
+};
+
+/// A finder that says what places look like: where on the circle they are. The nearer, the more alike.
+class RankingFinder final : public WrappedFinder {
+ public:
+  explicit RankingFinder(std::shared_ptr<const ClosureFinder> finder) : WrappedFinder(std::move(finder)) {}
+  [[nodiscard]] std::string place_of(const Submap& submap) const override {
+    const Keyframe& middle = submap.keyframes[submap.keyframes.size() / 2];
+    const Eigen::Vector3d at = true_pose(submap.id.chain.robot, middle.index).translation;
+    return fmt::format("{:.6f} {:.6f}", at.x(), at.y());
+  }
+  [[nodiscard]] bool can_rank(std::string_view place) const override { return place.find(' ') != place.npos; }
+  [[nodiscard]] std::vector<double> likeness(std::string_view place,
+                                             std::span<const std::string_view> others) const override {
+    std::vector<double> out;
+    for (const std::string_view other : others) out.push_back(-(at(place) - at(other)).norm());
+    return out;
+  }
+
+ private:
+  static Eigen::Vector2d at(std::string_view place) {
+    std::istringstream in{std::string(place)};
+    Eigen::Vector2d out;
+    in >> out.x() >> out.y();
+    return out;
+  }
 };
 
 }  // namespace tutti::server::test

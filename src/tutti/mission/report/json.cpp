@@ -316,6 +316,7 @@ Json load_json(const ServerLoadRecord& load) {
 Json work_json(const ServerWorkRecord& work) {
   return {{"updates", work.updates},
           {"pairs_looked_at", work.pairs_looked_at},
+          {"places_compared", work.places_compared},
           {"pairs_verified", work.pairs_verified},
           {"hypotheses", work.hypotheses},
           {"factorisations", work.factorisations},

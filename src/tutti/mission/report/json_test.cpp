@@ -55,7 +55,7 @@ TEST(ReportJson, SaysWhatTheAdjustmentMadeOfTheMap) {
   EXPECT_TRUE(json::parse(report_json(record))["server"]["refinement"].is_null());
   record.server.refinement = RefinementCounts{152, 7417, 26486, 811, 1204, 93, 12, 377, 41, 2.5, 1.125};
   record.timing.server_refinements = {{false, 2, 5, 0.25}};
-  record.timing.server_work = {31, 27730, 36, 33, 230, 2303424};
+  record.timing.server_work = {31, 27730, 36, 33, 230, 2303424, 190};
   const json refinement = json::parse(report_json(record))["server"]["refinement"];
   EXPECT_EQ(refinement["joined_by_keyframe"], 811);
   EXPECT_EQ(refinement["two_positions"], 93);
@@ -63,6 +63,7 @@ TEST(ReportJson, SaysWhatTheAdjustmentMadeOfTheMap) {
   EXPECT_EQ(json::parse(timing_json(record))["server"]["refinements"][0]["submaps"], 5);
   EXPECT_EQ(json::parse(timing_json(record))["server"]["work"], (json{{"updates", 31},
                                                                       {"pairs_looked_at", 27730},
+                                                                      {"places_compared", 190},
                                                                       {"pairs_verified", 36},
                                                                       {"hypotheses", 33},
                                                                       {"factorisations", 230},

@@ -113,6 +113,9 @@ Result<OpenedMap> OpenedMap::from(const storage::TableStore& store, MethodId fin
   auto refinements = read_refinements(store);
   if (!refinements) return tl::unexpected(refinements.error());
   opened.state.refinements = std::move(*refinements);
+  auto places = read_places(store);
+  if (!places) return tl::unexpected(places.error());
+  opened.state.places = std::move(*places);
   const auto leave_submap = [&](std::string_view key, const std::string& why) {  // it is in the map all the same
     if (const auto id = submap_of_key(key)) opened.note_stored(*id);
     opened.leave("submaps", why);

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "tutti/server/map_estimate.hpp"
+
+namespace tutti::server {
+
+/// The pair of two submaps, the smaller first.
+inline SubmapPair ordered(SubmapId a, SubmapId b) { return a < b ? SubmapPair{a, b} : SubmapPair{b, a}; }
+
+/// Another submap, and how alike it looks (ClosureFinder::likeness()).
+struct Alike {
+  SubmapId submap;
+  double likeness = 0.0;
+  friend bool operator==(const Alike&, const Alike&) = default;
+};
+
+/// What the place looks like that a submap shows, and which submaps it made a candidate with when it came.
+struct Place {
+  std::string looks;       ///< ClosureFinder::place_of().
+  bool is_ranked = false;  ///< False: it was not compared with others yet.
+  std::vector<Alike> candidates;
+  friend bool operator==(const Place&, const Place&) = default;
+};
+using PlaceSet = std::map<SubmapId, Place>;
+
+/// Which pairs of submaps are worth verifying, where every submap says what its place looks like: those of which either
+/// is among the `most` that look most alike to the other. Their number thus grows with the submaps and not with their
+/// square.
+///
+/// What is a candidate is a function of the set of submaps and their likeness. A further submap takes candidates away
+/// from others and never gives them any but itself, so whatever is a candidate in the end was one as soon as both were
+/// there.
+class CandidatePairs {
+ public:
+  CandidatePairs() = default;  ///< Excludes none.
+  explicit CandidatePairs(std::size_t most) : most_(most) {}
+  /// Compares a new submap with earlier ones, of which each may be in it once. Returns those with which it is a
+  /// candidate now, smallest first.
+  std::vector<Alike> add(SubmapId id, const std::vector<Alike>& others);
+  /// Adds a submap with what add() has returned of it. In any order; it makes no difference which of two is added with
+  /// the other.
+  void restore(SubmapId id, const std::vector<Alike>& candidates);
+  /// True if the submap was added.
+  [[nodiscard]] bool has(SubmapId id) const { return most_alike_.contains(id); }
+  /// True if both were added and are no candidate.
+  [[nodiscard]] bool excludes(const SubmapPair& pair) const;
+  /// The candidates of every submap that was added, in any order, some twice.
+  [[nodiscard]] std::map<SubmapId, std::vector<SubmapId>> all() const;
+
+ private:
+  /// True if it is among the most alike now.
+  bool insert(SubmapId of, const Alike& other);
+  [[nodiscard]] bool prefers(SubmapId of, SubmapId other) const;
+
+  std::size_t most_ = 0;
+  std::map<SubmapId, std::vector<Alike>> most_alike_;  // best first, at most most_
+};
+
+/// The candidates that a map's store tells of; none are excluded when some place was not compared yet.
+CandidatePairs restored(const PlaceSet& places, std::size_t most);
+
+/// The verdicts that the map is made with: of candidates, and those that an operator has spoken of.
+VerdictSet of_candidates(const VerdictSet& verdicts, const CandidatePairs& candidates, const WordSet& words);
+
+}  // namespace tutti::server

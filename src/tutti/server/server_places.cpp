@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Which pairs a MapServer has verified, by what the places of submaps look like.
+#include <algorithm>
+#include <string_view>
+#include <vector>
+
+#include "tutti/base/check.hpp"
+#include "tutti/server/map_server.hpp"
+
+namespace tutti::server {
+
+void MapServer::compare_place(SubmapId id) {
+  Place& place = state_.places.at(id);
+  std::vector<Alike> others;
+  std::vector<std::string_view> looks;
+  for (const auto& [other, known] : state_.places)
+    if (candidates_.has(other) && is_asked(ordered(id, other))) {
+      others.push_back({other});
+      looks.push_back(known.looks);
+    }
+  const std::vector<double> likeness = finder_->likeness(place.looks, looks);
+  TUTTI_CHECK(likeness.size() == others.size(), "{} of {} places compared", likeness.size(), others.size());
+  for (std::size_t i = 0; i < others.size(); ++i) others[i].likeness = likeness[i];
+  work_.places_compared += others.size();
+  place.candidates = candidates_.add(id, others);
+  place.is_ranked = true;
+  new_places_.push_back(id);
+}
+
+void MapServer::plan_verifications(SubmapId id) {
+  std::vector<SubmapId> open;
+  for (const auto& [other, there] : state_.submaps) {
+    if (other == id || candidates_.excludes(ordered(id, other))) continue;
+    plan_verification(ordered(id, other));
+    open.push_back(other);
+  }
+  state_.answered.insert_all_but(id, open);
+}
+
+void MapServer::restore_candidates() {
+  const bool is_on = config_.candidates_per_submap > 0;
+  std::erase_if(state_.places, [&](const auto& entry) {
+    return !is_on || !state_.submaps.contains(entry.first) || !finder_->can_rank(entry.second.looks);
+  });
+  PlaceSet compared = state_.places;
+  std::erase_if(compared, [](const auto& entry) { return !entry.second.is_ranked; });
+  candidates_ = restored(compared, static_cast<std::size_t>(config_.candidates_per_submap));
+  for (const auto& [id, place] : state_.places)
+    if (!place.is_ranked) compare_place(id);
+  std::vector<SubmapId> unknown;
+  for (const auto& [id, submap] : state_.submaps)
+    if (!candidates_.has(id)) unknown.push_back(id);
+  auto all = candidates_.all();
+  for (auto& [id, open] : all) {
+    open.insert(open.end(), unknown.begin(), unknown.end());
+    state_.answered.insert_all_but(id, open);
+  }
+}
+
+}  // namespace tutti::server
