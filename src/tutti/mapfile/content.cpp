@@ -12,6 +12,7 @@
 #include "tutti/node/words.hpp"
 #include "tutti/server/georeference.hpp"
 #include "tutti/server/refuted_closures.hpp"
+#include "tutti/storage/map_tables.hpp"
 #include "tutti/storage/sqlite_copy.hpp"
 #include "tutti/storage/sqlite_store.hpp"
 #include "tutti/wire/codec.hpp"
@@ -53,7 +54,7 @@ Status read_submaps(const storage::TableStore& map, Content& content) {
     if (outline.size != PayloadSize()) content.payload_sizes[id] = outline.size;
     content.submaps[id] = std::make_shared<const Submap>(std::move(outline.submap));
   };
-  return read_table(map, "submaps", wire::decode_outline, take, content);
+  return read_table(map, map_tables::kSubmaps, wire::decode_outline, take, content);
 }
 
 Status read_verdicts(const storage::TableStore& map, Content& content) {
@@ -65,8 +66,8 @@ Status read_verdicts(const storage::TableStore& map, Content& content) {
     for (const ClosureVerdict& verdict : answer.verdicts)
       ++(verdict.refusal ? content.refused : content.aside)[verdict.finder];
   };
-  if (auto ok = read_table(map, "verdicts", wire::decode_verdict, take, content); !ok) return ok;
-  return read_table(map, "answers", wire::decode_verdicts, count, content);
+  if (auto ok = read_table(map, map_tables::kVerdicts, wire::decode_verdict, take, content); !ok) return ok;
+  return read_table(map, map_tables::kAnswers, wire::decode_verdicts, count, content);
 }
 
 Status read_words(const storage::TableStore& map, Content& content) {
@@ -74,7 +75,7 @@ Status read_words(const storage::TableStore& map, Content& content) {
   if (!words) return tl::unexpected(words.error());
   content.words = std::move(*words);
   return read_table(
-      map, "words", wire::decode_word, [](auto&&...) {}, content);
+      map, map_tables::kWords, wire::decode_word, [](auto&&...) {}, content);
 }
 
 Status read_meta(const storage::TableStore& map, Content& content) {
@@ -96,8 +97,8 @@ Status read_meta(const storage::TableStore& map, Content& content) {
   auto names = node::read_robot_names(map);
   if (!names) return tl::unexpected(names.error());
   content.names = std::move(*names);
-  Content::Table& table = content.tables["meta"];
-  return map.sizes("meta", [&](std::string_view key, std::size_t size) {
+  Content::Table& table = content.tables[map_tables::kMeta];
+  return map.sizes(map_tables::kMeta, [&](std::string_view key, std::size_t size) {
     ++table.rows;
     table.bytes += key.size() + size;
   });
@@ -165,7 +166,8 @@ Status put_word(storage::TableStore& map, const ClosureWord& word) {
                 to_string(known->second.wish), known->second.given_ns);
   node::MapMeta meta = content->meta;
   meta.news = true;  // whoever opens it makes the next revision
-  const std::vector<storage::Write> writes{{"words", node::key_of(*pair), wire::encode(word)}, node::to_row(meta)};
+  const std::vector<storage::Write> writes{{map_tables::kWords, node::key_of(*pair), wire::encode(word)},
+                                           node::to_row(meta)};
   return map.commit(writes);
 }
 

@@ -101,7 +101,7 @@ constexpr const char* kHeading =
 
 Result<MarkSet> read_marks(const storage::TableStore& map) {
   MarkSet out;
-  const auto scanned = map.scan(node::kMetaTable, kMark, [&](std::string_view key, std::string_view bytes) {
+  const auto scanned = map.scan(map_tables::kMeta, kMark, [&](std::string_view key, std::string_view bytes) {
     if (!key.starts_with(kMark)) return false;
     const auto number = number_of(key, kMark);
     auto mark = wire::read_fields<MapMark>(bytes);
@@ -113,7 +113,7 @@ Result<MarkSet> read_marks(const storage::TableStore& map) {
 }
 
 Result<std::optional<std::string>> read_photo(const storage::TableStore& map, std::uint64_t number) {
-  return map.read(node::kMetaTable, key(kPhoto, number));
+  return map.read(map_tables::kMeta, key(kPhoto, number));
 }
 
 Result<std::uint64_t> put_mark(storage::TableStore& map, const MarkSet& known, MapMark& mark,
@@ -122,15 +122,15 @@ Result<std::uint64_t> put_mark(storage::TableStore& map, const MarkSet& known, M
   if (auto ok = check(mark, photo, known.size()); !ok) return tl::unexpected(ok.error());
   auto number = static_cast<std::uint64_t>(std::max<std::int64_t>(mark.given_ns, 0));
   while (known.contains(number)) ++number;
-  std::vector<storage::Write> rows{{node::kMetaTable, key(kMark, number), wire::field_bytes(mark)}};
-  if (!photo.empty()) rows.push_back({node::kMetaTable, key(kPhoto, number), photo});
+  std::vector<storage::Write> rows{{map_tables::kMeta, key(kMark, number), wire::field_bytes(mark)}};
+  if (!photo.empty()) rows.push_back({map_tables::kMeta, key(kPhoto, number), photo});
   if (auto ok = map.commit(rows); !ok) return tl::unexpected(ok.error());
   return number;
 }
 
 Status remove_mark(storage::TableStore& map, std::uint64_t number) {
-  const std::vector<storage::Write> rows{{node::kMetaTable, key(kMark, number), std::nullopt},
-                                         {node::kMetaTable, key(kPhoto, number), std::nullopt}};
+  const std::vector<storage::Write> rows{{map_tables::kMeta, key(kMark, number), std::nullopt},
+                                         {map_tables::kMeta, key(kPhoto, number), std::nullopt}};
   return map.commit(rows);
 }
 

@@ -11,6 +11,7 @@
 #include "tutti/node/meta_keys.hpp"
 #include "tutti/node/robot_registry.hpp"
 #include "tutti/node/words.hpp"
+#include "tutti/storage/map_tables.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/limits.hpp"
 #include "tutti/wire/refinement_codec.hpp"
@@ -27,7 +28,7 @@ using Choose = std::function<Result<std::string>(std::string_view key, std::stri
 /// Rows that say something of one map alone: what became of it, and refinements and places, which join_refinements()
 /// and join_places() put.
 bool is_of_one_map(const std::string& table, std::string_view key) {
-  return table == node::kMetaTable &&
+  return table == map_tables::kMeta &&
          (key == node::kCountsKey || key.starts_with(node::kRefinementPrefix) || key.starts_with(node::kPlacePrefix));
 }
 
@@ -156,7 +157,7 @@ Result<std::uint64_t> join_refinements(const Content& a, const Content& b, std::
       Refinement part = *refinement;
       part.revision = ++revision;
       part.whole = false;
-      if (auto ok = out.put({node::kMetaTable, node::refinement_key(revision), wire::encode(part)}); !ok)
+      if (auto ok = out.put({map_tables::kMeta, node::refinement_key(revision), wire::encode(part)}); !ok)
         return tl::unexpected(ok.error());
     }
   return revision;
@@ -180,13 +181,13 @@ Status join_places(const TableStore& a, const TableStore& b, Writer& out) {
 Status join_answers(const TableStore& a, const TableStore& b, Writer& out) {
   Status ok;
   const auto put = [&](std::string key, std::string_view bytes) {
-    ok = out.put({"answers", std::move(key), std::string(bytes)});
+    ok = out.put({map_tables::kAnswers, std::move(key), std::string(bytes)});
     return ok.has_value();
   };
   const auto as_it_is = [&](std::string_view key, std::string_view bytes) { return put(std::string(key), bytes); };
   const auto renamed = [&](std::string_view key, std::string_view bytes) {
     std::string free(key);
-    for (auto there = a.read("answers", free);; there = a.read("answers", free)) {
+    for (auto there = a.read(map_tables::kAnswers, free);; there = a.read(map_tables::kAnswers, free)) {
       if (!there) ok = tl::unexpected(there.error());
       if (!ok || !*there) break;
       if (**there == bytes) return true;
@@ -194,8 +195,8 @@ Status join_answers(const TableStore& a, const TableStore& b, Writer& out) {
     }
     return ok && put(std::move(free), bytes);
   };
-  if (auto scanned = a.scan("answers", {}, as_it_is); !scanned || !ok) return scanned ? ok : scanned;
-  const auto scanned = b.scan("answers", {}, renamed);
+  if (auto scanned = a.scan(map_tables::kAnswers, {}, as_it_is); !scanned || !ok) return scanned ? ok : scanned;
+  const auto scanned = b.scan(map_tables::kAnswers, {}, renamed);
   return scanned ? ok : scanned;
 }
 
@@ -207,10 +208,11 @@ Result<Merged> merge(const TableStore& a, const TableStore& b, TableStore& out) 
   if (!other) return in_context("the second map", other.error());
   if (auto ok = check_robots(*one, *other); !ok) return tl::unexpected(ok.error());
   Writer writer(out);
-  const auto shared = join(a, b, "submaps", no_two_submaps, writer);
+  const auto shared = join(a, b, map_tables::kSubmaps, no_two_submaps, writer);
   if (!shared) return tl::unexpected(shared.error());
-  for (const auto& [table, choose] :
-       {std::pair<const char*, Choose>{"verdicts", newer_verdict}, {"words", later_word}, {"meta", joined_meta}})
+  for (const auto& [table, choose] : {std::pair<const char*, Choose>{map_tables::kVerdicts, newer_verdict},
+                                      {map_tables::kWords, later_word},
+                                      {map_tables::kMeta, joined_meta}})
     if (const auto done = join(a, b, table, choose, writer); !done) return tl::unexpected(done.error());
   if (auto done = join_answers(a, b, writer); !done) return tl::unexpected(done.error());
   if (auto done = join_places(a, b, writer); !done) return tl::unexpected(done.error());

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "tutti/node/words.hpp"
+#include "tutti/storage/map_tables.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::mapfile {
@@ -12,7 +13,7 @@ namespace {
 
 /// The store's row of this verdict, if it has one.
 std::optional<ClosureVerdict> stored(const ClosureVerdict& verdict, const storage::TableStore& store) {
-  const auto row = store.read("verdicts", node::key_of(verdict.pair));
+  const auto row = store.read(map_tables::kVerdicts, node::key_of(verdict.pair));
   if (!row || !*row) return std::nullopt;
   auto out = wire::decode_verdict(**row);
   return out && node::without_evidence(*out) == verdict ? std::optional(std::move(*out)) : std::nullopt;

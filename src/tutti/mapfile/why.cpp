@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "tutti/server/map_components.hpp"
+#include "tutti/storage/map_tables.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::mapfile {
@@ -55,7 +56,7 @@ Result<std::vector<std::pair<SubmapPair, Refusal>>> refused_between(const storag
                                                                     RobotId other) {
   std::vector<std::pair<SubmapPair, Refusal>> out;
   Status ok;
-  const auto scanned = store.scan("answers", {}, [&](std::string_view, std::string_view bytes) {
+  const auto scanned = store.scan(map_tables::kAnswers, {}, [&](std::string_view, std::string_view bytes) {
     const auto answer = wire::decode_verdicts(bytes);
     if (!answer && answer.error().code != ErrorCode::unsupported) ok = tl::unexpected(answer.error());
     if (!answer) return ok.has_value();

@@ -131,10 +131,10 @@ class MissionRun {
     std::vector<storage::Write> rows;
     for (const MissionRecording& recording : recordings_) {
       const std::string key = node::RobotRegistry::key(recording.recording.robot);
-      const auto stored = store_.read(node::kMetaTable, key).value();
+      const auto stored = store_.read(map_tables::kMeta, key).value();
       node::RobotRow row = stored ? node::decode_robot(*stored).value() : node::RobotRow{};
       row.name = recording.recording.name;
-      rows.push_back({node::kMetaTable, key, node::encode(row)});
+      rows.push_back({map_tables::kMeta, key, node::encode(row)});
     }
     TUTTI_CHECK(store_.commit(rows).has_value(), "a store in memory");
     return store_;

@@ -20,11 +20,11 @@ constexpr const char* kSettings = "settings";
 }  // namespace
 
 storage::Write to_row(const MapMeta& meta) {
-  return {kMetaTable, kMap, storage::key_of({meta.epoch, meta.revision, meta.news ? 1U : 0U, meta.start})};
+  return {map_tables::kMeta, kMap, storage::key_of({meta.epoch, meta.revision, meta.news ? 1U : 0U, meta.start})};
 }
 
 Result<std::optional<MapMeta>> read_map_meta(const storage::TableStore& map) {
-  const auto row = map.read(kMetaTable, kMap);
+  const auto row = map.read(map_tables::kMeta, kMap);
   if (!row) return tl::unexpected(row.error());
   if (!*row) return std::nullopt;
   const auto numbers = storage::numbers_of(**row, 4);
@@ -33,12 +33,12 @@ Result<std::optional<MapMeta>> read_map_meta(const storage::TableStore& map) {
 }
 
 storage::Write to_row(const MapCounts& counts) {
-  return {kMetaTable, std::string(kCountsKey),
+  return {map_tables::kMeta, std::string(kCountsKey),
           storage::key_of({counts.revision, counts.keyframes, counts.closures, counts.components})};
 }
 
 Result<std::optional<MapCounts>> read_map_counts(const storage::TableStore& map) {
-  const auto row = map.read(kMetaTable, kCountsKey);
+  const auto row = map.read(map_tables::kMeta, kCountsKey);
   if (!row) return tl::unexpected(row.error());
   const auto numbers = storage::numbers_of(row->value_or(""), 4);
   if (!numbers) return std::nullopt;
@@ -46,12 +46,12 @@ Result<std::optional<MapCounts>> read_map_counts(const storage::TableStore& map)
 }
 
 storage::Write to_row(const server::ServerConfig& settings) {
-  return {kMetaTable, kSettings, to_yaml(dump_config(settings))};
+  return {map_tables::kMeta, kSettings, to_yaml(dump_config(settings))};
 }
 
 Result<server::ServerConfig> read_settings(const storage::TableStore& map) {
   server::ServerConfig settings;
-  const auto row = map.read(kMetaTable, kSettings);
+  const auto row = map.read(map_tables::kMeta, kSettings);
   if (!row) return tl::unexpected(row.error());
   if (!*row) return settings;
   const auto node = parse_yaml(**row, "the map's settings");
@@ -66,11 +66,12 @@ std::string refinement_key(std::uint64_t revision) { return fmt::format("{}{:020
 
 Result<server::Refinements> read_refinements(const storage::TableStore& map) {
   server::Refinements refinements;
-  const auto scanned = map.scan(kMetaTable, kRefinementPrefix, [&](std::string_view key, std::string_view bytes) {
-    if (!key.starts_with(kRefinementPrefix)) return false;
-    if (auto refinement = wire::decode_refinement(bytes)) refinements.add(std::move(*refinement));
-    return true;
-  });
+  const auto scanned =
+      map.scan(map_tables::kMeta, kRefinementPrefix, [&](std::string_view key, std::string_view bytes) {
+        if (!key.starts_with(kRefinementPrefix)) return false;
+        if (auto refinement = wire::decode_refinement(bytes)) refinements.add(std::move(*refinement));
+        return true;
+      });
   if (!scanned) return tl::unexpected(scanned.error());
   return refinements;
 }
@@ -80,7 +81,7 @@ storage::Write to_row(SubmapId id, const server::Place& place) {
   for (const auto& [other, likeness] : place.candidates)
     bytes += storage::key_of(
         {other.chain.robot.value, other.chain.session, other.index, std::bit_cast<std::uint64_t>(likeness)});
-  return {kMetaTable, std::string(kPlacePrefix) + key_of(id), bytes + place.looks};
+  return {map_tables::kMeta, std::string(kPlacePrefix) + key_of(id), bytes + place.looks};
 }
 
 std::optional<std::pair<SubmapId, server::Place>> place_of_row(std::string_view key, std::string_view bytes) {
@@ -105,7 +106,7 @@ std::optional<std::pair<SubmapId, server::Place>> place_of_row(std::string_view 
 
 Result<server::PlaceSet> read_places(const storage::TableStore& map) {
   server::PlaceSet places;
-  const auto scanned = map.scan(kMetaTable, kPlacePrefix, [&](std::string_view key, std::string_view bytes) {
+  const auto scanned = map.scan(map_tables::kMeta, kPlacePrefix, [&](std::string_view key, std::string_view bytes) {
     if (!key.starts_with(kPlacePrefix)) return false;
     if (auto place = place_of_row(key, bytes)) places.insert(std::move(*place));
     return true;
@@ -139,7 +140,7 @@ std::optional<RobotRow> decode_robot(std::string_view bytes) {
 
 Result<std::map<RobotId, std::string>> read_robot_names(const storage::TableStore& map) {
   std::map<RobotId, std::string> names;
-  const auto scanned = map.scan(kMetaTable, {}, [&](std::string_view key, std::string_view bytes) {
+  const auto scanned = map.scan(map_tables::kMeta, {}, [&](std::string_view key, std::string_view bytes) {
     const auto robot = RobotRegistry::robot_of(key);
     const auto row = robot ? decode_robot(bytes) : std::nullopt;
     if (row) names[*robot] = row->name;

@@ -10,12 +10,11 @@
 #include <utility>
 
 #include "tutti/server/map_server.hpp"
+#include "tutti/storage/map_tables.hpp"
 #include "tutti/storage/table_store.hpp"
 
 /// The rows of table `meta` in a map's store.
 namespace tutti::node {
-
-inline constexpr const char* kMetaTable = "meta";
 
 /// The row `map`: the server's own counters.
 struct MapMeta {

@@ -88,7 +88,7 @@ storage::Write refusals_row(const Receipt& receipt) {
                      .refused = receipt.refused,
                      .why_refused = receipt.why_refused,
                      .refusals = receipt.refusals};
-  return {kMetaTable, fmt::format("{}{}", kRefusedPrefix, receipt.robot.value), wire::encode(kept)};
+  return {map_tables::kMeta, fmt::format("{}{}", kRefusedPrefix, receipt.robot.value), wire::encode(kept)};
 }
 
 }  // namespace tutti::node

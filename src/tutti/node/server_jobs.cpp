@@ -10,6 +10,7 @@
 #include "tutti/base/plain_text.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/words.hpp"
+#include "tutti/storage/map_tables.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::node {
@@ -79,7 +80,7 @@ void ServerNode::set_aside(const bus::Envelope& envelope, const std::vector<Clos
     if (verdict.closures.empty()) continue;
     Verdicts aside{.job = fmt::format("aside/{}-{}", to_string(pair.first), to_string(pair.second)),
                    .verdicts = {verdict}};
-    step.writes.push_back({"answers", aside.job, wire::encode(aside)});
+    step.writes.push_back({map_tables::kAnswers, aside.job, wire::encode(aside)});
   }
   note_waiting(pairs, why, now, step);
 }
@@ -102,7 +103,7 @@ void ServerNode::ask_waiting(Timestamp now, Step& step) {
 }
 
 void ServerNode::keep(const Verdicts& refused, Step& step) {
-  if (!refused.verdicts.empty()) step.writes.push_back({"answers", refused.job, wire::encode(refused)});
+  if (!refused.verdicts.empty()) step.writes.push_back({map_tables::kAnswers, refused.job, wire::encode(refused)});
 }
 
 /// It has ended every worker that had it (bus::Port::receive()). If the job has many pairs, one of them may have
@@ -160,7 +161,7 @@ Status ServerNode::take(const ClosureVerdict& verdict, Verdicts& refused, Step& 
   if (before != after) {
     std::optional<std::string> row;
     if (after) row = wire::encode(verdict);
-    step.writes.push_back({"verdicts", key_of(verdict.pair), std::move(row)});
+    step.writes.push_back({map_tables::kVerdicts, key_of(verdict.pair), std::move(row)});
   }
   if (verdict.refusal && !after && (before || was_answered != is_answered)) refused.verdicts.push_back(verdict);
   return {};

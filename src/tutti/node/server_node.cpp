@@ -11,6 +11,7 @@
 #include "tutti/node/map_meta.hpp"
 #include "tutti/node/meta_keys.hpp"
 #include "tutti/node/worker_node.hpp"
+#include "tutti/storage/map_tables.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/submap_copy_codec.hpp"
 
@@ -25,10 +26,10 @@ std::string names_of_jobs(std::uint64_t epoch, std::uint64_t start, std::uint32_
 }
 
 bus::MessageKind kind_of(std::string_view table) {
-  if (table == "submaps") return bus::MessageKind::submap;
-  if (table == "words") return bus::MessageKind::word;
-  if (table == kMetaTable) return bus::MessageKind::receipt;
-  return table == "verdicts" ? bus::MessageKind::verdict : bus::MessageKind::verdicts;
+  if (table == map_tables::kSubmaps) return bus::MessageKind::submap;
+  if (table == map_tables::kWords) return bus::MessageKind::word;
+  if (table == map_tables::kMeta) return bus::MessageKind::receipt;
+  return table == map_tables::kVerdicts ? bus::MessageKind::verdict : bus::MessageKind::verdicts;
 }
 
 }  // namespace
@@ -212,8 +213,8 @@ Status ServerNode::take_submap(const bus::Envelope& envelope, Timestamp now, Ste
       step.writes.push_back(refusals_row(receipt));
     }
     if (registry_.note_session(id.chain))
-      step.writes.push_back({kMetaTable, RobotRegistry::key(id.chain.robot), registry_.row(id.chain.robot)});
-    step.writes.push_back({"submaps", key_of(id), *envelope.bytes});
+      step.writes.push_back({map_tables::kMeta, RobotRegistry::key(id.chain.robot), registry_.row(id.chain.robot)});
+    step.writes.push_back({map_tables::kSubmaps, key_of(id), *envelope.bytes});
     keep_places(step);
     step.tell(now, SubmapStored{id});
   }

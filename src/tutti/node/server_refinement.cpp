@@ -67,9 +67,10 @@ void ServerNode::receive_refinement(const bus::Envelope& envelope, Timestamp now
   refinements_.start_anew();
   const std::set<std::uint64_t> after = revisions(server_.state().refinements);
   for (const std::uint64_t revision : before)
-    if (!after.contains(revision)) step.writes.push_back({kMetaTable, refinement_key(revision), std::nullopt});
+    if (!after.contains(revision)) step.writes.push_back({map_tables::kMeta, refinement_key(revision), std::nullopt});
   for (const std::uint64_t revision : after)
-    if (!before.contains(revision)) step.writes.push_back({kMetaTable, refinement_key(revision), *envelope.bytes});
+    if (!before.contains(revision))
+      step.writes.push_back({map_tables::kMeta, refinement_key(revision), *envelope.bytes});
   step.tell(now, RefinementTaken{refinement->job, refinement->revision, refinement->whole, refinement->steps.size(),
                                  refinement->remarks});
 }

@@ -12,6 +12,7 @@
 #include "tutti/base/plain_text.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/words.hpp"
+#include "tutti/storage/map_tables.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::node {
@@ -44,7 +45,8 @@ Result<bool> ServerNode::take_word(const bus::Envelope& envelope, const ClosureW
   const auto before = known == words.end() ? std::nullopt : std::optional(known->second);
   if (auto taken = server_.receive(*pair, word); !taken) return tl::unexpected(taken.error());
   if (before == words.at(*pair)) return before != word;
-  step.writes.push_back({"words", key_of(*pair), envelope.user.empty() ? *envelope.bytes : wire::encode(word)});
+  step.writes.push_back(
+      {map_tables::kWords, key_of(*pair), envelope.user.empty() ? *envelope.bytes : wire::encode(word)});
   step.tell(now, WordTaken{*pair, word.wish});
   operator_spoke_ = true;
   send_jobs(std::nullopt, now, 0, config_.pairs_per_job, step);

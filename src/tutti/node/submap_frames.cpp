@@ -3,6 +3,7 @@
 
 #include <charconv>
 
+#include "tutti/storage/map_tables.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::node {
@@ -40,7 +41,7 @@ std::optional<SubmapId> submap_of(std::string_view message_id) {
 }
 
 std::shared_ptr<SubmapFrames> SubmapFrames::of(const storage::TableStore& map) {
-  return std::make_shared<SubmapFrames>([&map](SubmapId id) { return map.read("submaps", key_of(id)); });
+  return std::make_shared<SubmapFrames>([&map](SubmapId id) { return map.read(map_tables::kSubmaps, key_of(id)); });
 }
 
 Result<std::string> SubmapFrames::frame(SubmapId id) const {

@@ -2,6 +2,7 @@
 #include "tutti/node/words.hpp"
 
 #include "tutti/node/submap_frames.hpp"
+#include "tutti/storage/map_tables.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::node {
@@ -22,7 +23,7 @@ std::optional<SubmapPair> pair_of(std::string_view key) {
 Result<WordSet> read_words(const storage::TableStore& map, const std::function<void(const std::string&)>& leave) {
   WordSet words;
   Status ok;
-  const auto scanned = map.scan("words", {}, [&](std::string_view key, std::string_view bytes) {
+  const auto scanned = map.scan(map_tables::kWords, {}, [&](std::string_view key, std::string_view bytes) {
     const auto pair = pair_of(key);
     auto word = wire::decode_word(bytes);
     if (!pair)

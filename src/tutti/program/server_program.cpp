@@ -279,7 +279,7 @@ Status ServerProgram::start() {
                             .open_node = [this](bus::Port&) { return open_node(); },
                             .each_second = [this] { tend(); },
                             .status_file = folder_->path() / kStatusFile,
-                            .table_aside = node::kMetaTable,
+                            .table_aside = map_tables::kMeta,
                             .version = options_.version,
                             .trouble = [this] { return trouble_; }},
                 *clock_, *log_);

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/storage/table_store.hpp"
 
+#include "tutti/storage/map_tables.hpp"
+
 namespace tutti::storage {
 
 const Schema& map_schema() {
-  static const Schema schema{.kind = "map", .tables = {"submaps", "verdicts", "answers", "words", "meta"}};
+  static const Schema schema{.kind = "map",
+                             .tables = {map_tables::kSubmaps, map_tables::kVerdicts, map_tables::kAnswers,
+                                        map_tables::kWords, map_tables::kMeta}};
   return schema;
 }
 

@@ -9,6 +9,7 @@
 #include "tutti/node/meta_keys.hpp"
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/node/words.hpp"
+#include "tutti/storage/map_tables.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::node {
@@ -42,7 +43,7 @@ Status OpenedMap::read_robot_or_refusals(std::string_view key, std::string_view 
     if (receipt)
       receipts[receipt->robot] = std::move(*receipt);
     else if (receipt.error().code == ErrorCode::unsupported)
-      leave(kMetaTable, receipt.error().message);
+      leave(map_tables::kMeta, receipt.error().message);
     else
       return in_context(fmt::format("the map's row '{}'", key), receipt.error());
   }
@@ -52,10 +53,10 @@ Status OpenedMap::read_robot_or_refusals(std::string_view key, std::string_view 
 Status OpenedMap::read_meta(const storage::TableStore& store) {
   Status ok;
   const auto visit = [&](std::string_view key, std::string_view bytes) {
-    if (const auto why = thrown_by([&] { ok = read_robot_or_refusals(key, bytes); })) leave(kMetaTable, *why);
+    if (const auto why = thrown_by([&] { ok = read_robot_or_refusals(key, bytes); })) leave(map_tables::kMeta, *why);
     return ok.has_value();
   };
-  if (auto scanned = store.scan(kMetaTable, {}, visit); !scanned) return scanned;
+  if (auto scanned = store.scan(map_tables::kMeta, {}, visit); !scanned) return scanned;
   return ok;
 }
 
@@ -103,7 +104,7 @@ Result<OpenedMap> OpenedMap::from(const storage::TableStore& store, MethodId fin
     for (ClosureVerdict& verdict : answer.verdicts) opened.add_answer(std::move(verdict));
   };
   if (auto ok = opened.read_meta(store); !ok) return tl::unexpected(ok.error());
-  const auto leave_word = [&](const std::string& why) { opened.leave("words", why); };
+  const auto leave_word = [&](const std::string& why) { opened.leave(map_tables::kWords, why); };
   auto words = read_words(store, leave_word);
   if (!words) return tl::unexpected(words.error());
   opened.state.words = std::move(*words);
@@ -118,16 +119,17 @@ Result<OpenedMap> OpenedMap::from(const storage::TableStore& store, MethodId fin
   opened.state.places = std::move(*places);
   const auto leave_submap = [&](std::string_view key, const std::string& why) {  // it is in the map all the same
     if (const auto id = submap_of_key(key)) opened.note_stored(*id);
-    opened.leave("submaps", why);
+    opened.leave(map_tables::kSubmaps, why);
   };
   const auto leave = [&](const char* table) {
     return [&opened, table](std::string_view, const std::string& why) { opened.leave(table, why); };
   };
-  if (auto ok = read_rows(store, "submaps", wire::decode_outline, add, leave_submap); !ok)
+  if (auto ok = read_rows(store, map_tables::kSubmaps, wire::decode_outline, add, leave_submap); !ok)
     return tl::unexpected(ok.error());
-  if (auto ok = read_rows(store, "verdicts", wire::decode_verdict, add, leave("verdicts")); !ok)
+  if (auto ok = read_rows(store, map_tables::kVerdicts, wire::decode_verdict, add, leave(map_tables::kVerdicts)); !ok)
     return tl::unexpected(ok.error());
-  if (auto ok = read_rows(store, "answers", wire::decode_verdicts, add_answers, leave("answers")); !ok)
+  if (auto ok = read_rows(store, map_tables::kAnswers, wire::decode_verdicts, add_answers, leave(map_tables::kAnswers));
+      !ok)
     return tl::unexpected(ok.error());
   return opened;
 }
