@@ -21,18 +21,14 @@ namespace {
 using enum RefusalReason;
 
 /// In the order in which a pair passes them: what is stopped later was nearer to a closure.
-constexpr std::array kStages{unverified,         too_small,
-                             too_few_keyframes,  too_short,
-                             no_images,          descriptor_kinds,
-                             too_few_landmarks,  unlike_from_above,
-                             no_alignment,       too_few_matches,
-                             too_few_inliers,    overlap,
-                             plane_rmse,         misfit,
-                             free_to_slide,      viewpoints,
-                             both_ways_distance, both_ways_angle,
-                             contradicted,       ambiguous,
-                             ambiguous_along,    landmark_residual,
-                             position_sigma,     image_spread,
+constexpr std::array kStages{unverified,        too_small,         too_few_keyframes,
+                             too_short,         no_images,         descriptor_kinds,
+                             too_few_landmarks, unlike_from_above, no_alignment,
+                             too_few_matches,   too_few_inliers,   ambiguous,
+                             overlap,           plane_rmse,        misfit,
+                             free_to_slide,     viewpoints,        both_ways_distance,
+                             both_ways_angle,   contradicted,      ambiguous_along,
+                             landmark_residual, position_sigma,    image_spread,
                              inconsistent};
 
 std::ptrdiff_t stage_of(RefusalReason reason) { return std::ranges::find(kStages, reason) - kStages.begin(); }
@@ -81,7 +77,10 @@ std::string sentence_of(const WhyNotJoined& why, const std::string& robot, const
     return fmt::format("{} and {} are joined: {} pairs of their submaps have closures in the map", robot, other,
                        why.accepted);
   if (why.compared == 0)
-    return fmt::format("{} and {} are not joined: none of their submaps were compared yet", robot, other);
+    return fmt::format(
+        "{} and {} are not joined: none of their submaps were compared, not yet or because others look more alike from "
+        "above (server.candidates_per_submap)",
+        robot, other);
   if (why.nearest.empty())
     return fmt::format("{} and {} are not joined: of {} pairs of submaps none came near", robot, other, why.compared);
   return fmt::format("{} and {} are not joined: of {} pairs of submaps the nearest is {}, stopped by: {}", robot, other,

@@ -51,17 +51,18 @@ TEST_F(WhyNot, TheNearestIsWhatWasStoppedLastAndByLeast) {
   refuse(0, 1, {RefusalReason::overlap, 0.28, 0.3});
   refuse(0, 2, {RefusalReason::overlap, 0.10, 0.3});
   refuse(1, 3, {RefusalReason::unlike_from_above});
-  refuse(2, 2, {RefusalReason::ambiguous, 0.95, 0.8});
+  refuse(2, 2, {RefusalReason::ambiguous_along, 0.95, 0.65});
+  refuse(3, 3, {RefusalReason::ambiguous, 0.95, 0.75});  // rivals are compared before anything else is measured
   const auto why = ask(apart, "bravo", "alpha");
   ASSERT_TRUE(why.has_value()) << why.error().message;
   EXPECT_FALSE(why->is_joined);
   std::vector<std::string> names;
   for (const NearMiss& miss : why->nearest)
     if (miss.refusal.reason != RefusalReason::no_alignment) names.push_back(miss.name);
-  ASSERT_GE(names.size(), 4U);
-  names.resize(4);
-  EXPECT_EQ(names,
-            (std::vector<std::string>{"alpha/2-bravo/2", "alpha/0-bravo/1", "alpha/0-bravo/2", "alpha/1-bravo/3"}));
+  ASSERT_GE(names.size(), 5U);
+  names.resize(5);
+  EXPECT_EQ(names, (std::vector<std::string>{"alpha/2-bravo/2", "alpha/0-bravo/1", "alpha/0-bravo/2", "alpha/3-bravo/3",
+                                             "alpha/1-bravo/3"}));
   EXPECT_NE(why->sentence.find("ambiguous"), std::string::npos) << why->sentence;
   EXPECT_EQ(why->stopped_by.at("overlap"), 2U);
   EXPECT_NE(why->nearest.front().hint.find("crossing"), std::string::npos);
