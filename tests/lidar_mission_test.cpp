@@ -45,5 +45,22 @@ TEST(LidarMission, HalfOfTheDemoIsMappedFromItsScans) {
   }
 }
 
+/// Measured with 10 candidates a submap: 370 of 596 pairs verified, and 57 of the 87 closures found in this small
+/// place; RMSE 0.165 m. Counts may be a quarter more.
+TEST(LidarMission, TheMostAlikeSubmapsMakeNearlyTheSameMapOfIt) {
+  const auto config = lab::demo_mission({"duration_s=180", "server.candidates_per_submap=10"});
+  ASSERT_TRUE(config.has_value()) << config.error().message;
+  const auto run = lab::run_mission(*config, {.seed = 1});
+  ASSERT_TRUE(run.has_value()) << run.error().message;
+  const ServerWorkRecord& work = run->timing.server_work;
+  EXPECT_GT(work.places_compared, 0U);
+  EXPECT_LE(work.places_compared, 745U);
+  EXPECT_LE(work.pairs_verified, 462U);
+  EXPECT_GE(run->server.closures.size(), 43U);
+  EXPECT_EQ(run->server.components, 1U);
+  EXPECT_EQ(run->server.closure_check->wrong, 0U);
+  EXPECT_LT(*run->server.joint.rmse_m, 0.28);
+}
+
 }  // namespace lidar_mission_test
 }  // namespace tutti::mission
