@@ -6,15 +6,16 @@
 #include <algorithm>
 #include <chrono>
 #include <exception>
-#include <map>
 #include <optional>
 #include <thread>
 #include <utility>
 
 #include "tutti/bags/ros_definitions.hpp"
+#include "tutti/intake/sensor_intake.hpp"
 #include "tutti/program/clock.hpp"
 #include "tutti/program/feed/ros_answers.hpp"
 #include "tutti/program/ros/complaints.hpp"
+#include "tutti/program/ros/robot_topics.hpp"
 #include "tutti/program/ros/ros_diagnosis.hpp"
 #include "tutti/program/ros/ros_images.hpp"
 #include "tutti/program/ros/unstored.hpp"
@@ -40,7 +41,8 @@ class Robot final : public RosRobot {
       : options_(std::move(options)),
         participant_(std::move(participant)),
         intake_(options_.intake),
-        complaints_(options_.say) {}
+        complaints_(options_.say),
+        topics_(options_.name_space, participant_, complaints_) {}
   ~Robot() override {
     thread_.request_stop();
     if (thread_.joinable()) thread_.join();
@@ -52,10 +54,8 @@ class Robot final : public RosRobot {
 
  private:
   [[nodiscard]] bool by_tf() const { return !options_.intake.odometry_frames.empty(); }
-  Result<std::unique_ptr<Writer>> writer(const std::string& topic, const std::string& type, const Qos& qos);
   Status subscribe();
   Status subscribe_points();
-  void open_own_tf();
   void run(const std::stop_token& stop);
   void turn();
   bool connect();
@@ -70,7 +70,6 @@ class Robot final : public RosRobot {
   [[nodiscard]] intake::FeedSensors sensors() const;
   void hear(int timeout_ms, const std::function<bool(const program::FromRobot&)>& until);
   void note(const program::FromRobot& said);
-  void publish_situation();
   void each_second();
   void look_for_odometry();
   void publish_diagnostics();
@@ -80,8 +79,6 @@ class Robot final : public RosRobot {
   RosRobotOptions options_;
   std::shared_ptr<Participant> participant_;
   intake::RosIntake intake_;
-  std::unique_ptr<Writer> tf_out_, own_tf_out_, pose_, path_, mates_, diagnostics_;
-  std::map<std::string, std::unique_ptr<Writer>> mate_poses_;
   std::unique_ptr<Reader> odometry_, points_, fixes_, battery_, tf_, tf_static_, own_tf_, own_tf_static_;
   std::unique_ptr<FeedClient> client_;
   std::optional<program::RosAnswers> answers_;
@@ -92,6 +89,7 @@ class Robot final : public RosRobot {
   double last_odometry_s_ = 0.0, last_message_s_ = 0.0, path_s_ = 0.0, second_s_ = 0.0;
   bool said_no_odometry_ = false;
   Complaints complaints_;
+  RobotTopics topics_;
   std::unique_ptr<RosImages> images_;  // null: none are wanted
   intake::FeedSensors sensors_;        // that the robot was told of
   std::optional<Timestamp> fed_;       // the newest odometry
@@ -99,17 +97,7 @@ class Robot final : public RosRobot {
 };
 
 Status Robot::open() {
-  const auto make = [&](std::unique_ptr<Writer>& out, const char* topic, const char* type, const Qos& qos) -> Status {
-    auto made = writer(topic, type, qos);
-    if (!made) return tl::unexpected(made.error());
-    out = std::move(*made);
-    return {};
-  };
-  if (Status ok = make(tf_out_, "/tf", kTfType, kTfQos); !ok) return ok;
-  if (Status ok = make(pose_, "corrected_pose", "geometry_msgs/msg/PoseWithCovarianceStamped", {}); !ok) return ok;
-  if (Status ok = make(path_, "corrected_path", "nav_msgs/msg/Path", kLatchedQos); !ok) return ok;
-  if (Status ok = make(mates_, "team_mates", "visualization_msgs/msg/MarkerArray", kLatchedQos); !ok) return ok;
-  if (Status ok = make(diagnostics_, "/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", {}); !ok) return ok;
+  if (Status ok = topics_.open(); !ok) return ok;
   for (const std::string& topic : {by_tf() ? "/tf" : options_.odometry, options_.points, options_.fixes})
     if (const auto name = resolve(topic.empty() ? "none" : topic, options_.name_space); !name)
       return tl::unexpected(name.error());
@@ -121,12 +109,6 @@ Status Robot::open() {
   }
   thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
   return {};
-}
-
-Result<std::unique_ptr<Writer>> Robot::writer(const std::string& topic, const std::string& type, const Qos& qos) {
-  const auto name = resolve(topic, options_.name_space);
-  if (!name) return tl::unexpected(name.error());
-  return participant_->writer(*name, type, qos, bags::ros_type_hash(type));
 }
 
 /// Once the robot is there: who waits for subscribers may begin then.
@@ -170,14 +152,6 @@ Status Robot::subscribe_points() {
   if (!made) return tl::unexpected(made.error());
   points_ = std::move(*made);
   return {};
-}
-
-/// Who has a tree of its own looks for map -> odom there.
-void Robot::open_own_tf() {
-  auto made = writer("tf", kTfType, kTfQos);
-  if (!made) return complain("tf", tl::unexpected(made.error()));
-  own_tf_out_ = std::move(*made);
-  options_.say(Level::info, fmt::format("transforms come on {}: map -> odom is published there", own_tf_->topic()));
 }
 
 void Robot::run(const std::stop_token& stop) {
@@ -243,7 +217,8 @@ void Robot::take_messages() {
   take(tf_, [&](std::string_view cdr) { return intake_.add_tf(cdr, false); });
   take(own_tf_static_, [&](std::string_view cdr) { return intake_.add_tf(cdr, true, intake::RosIntake::TfOf::robot); });
   take(own_tf_, [&](std::string_view cdr) {
-    if (!own_tf_out_) open_own_tf();
+    if (topics_.open_own_tf())
+      options_.say(Level::info, fmt::format("transforms come on {}: map -> odom is published there", own_tf_->topic()));
     return intake_.add_tf(cdr, false, intake::RosIntake::TfOf::robot);
   });
   take(odometry_, [&](std::string_view cdr) { return intake_.add_odometry(cdr); });
@@ -291,23 +266,16 @@ void Robot::say_sample(const node::OdometrySample& sample) {
     if (answer == nullptr || answer->stamp != sample.stamp) return refused != nullptr && refused->stamp == sample.stamp;
     wants_scan_ = answer->wants_scan;
     answers_->hear(*answer, sample.T_odom_body);
-    if (const auto transform = answers_->transform())
-      complain("map -> odom", (own_tf_out_ ? own_tf_out_ : tf_out_)->write(*transform));
-    complain("corrected_pose", pose_->write(answers_->pose()));
+    topics_.publish_pose(*answers_);
     return true;
   });
   say_sensors();
 }
 
-/// What is no number, or no share of 1, the robot's driver does not know.
 Status Robot::say_battery(std::string_view cdr) {
-  const auto message = bags::decode_battery_state(cdr);
-  if (!message) return tl::unexpected(message.error());
-  Health health;
-  if (message->voltage_v >= 0.0F) health.battery_v = static_cast<double>(message->voltage_v);
-  if (message->percentage >= 0.0F && message->percentage <= 1.0F)
-    health.battery_percent = 100.0 * static_cast<double>(message->percentage);
-  if (client_ && !client_->say(health)) client_.reset();
+  const auto health = intake::read_battery(cdr);
+  if (!health) return tl::unexpected(health.error());
+  if (client_ && !client_->say(*health)) client_.reset();
   return {};
 }
 
@@ -371,32 +339,15 @@ void Robot::note(const program::FromRobot& said) {
   if (const auto* situation = std::get_if<program::FeedSituation>(&said)) {
     situation_ = *situation;
     if (answers_) answers_->hear(situation->team_mates);
-    publish_situation();
+    if (answers_) topics_.publish_team_mates(*answers_);
   }
   if (const auto* over = std::get_if<program::FeedOver>(&said))
     complain("the robot ends the connection", fail(ErrorCode::io, "{}", over->why));
 }
 
-void Robot::publish_situation() {
-  if (!answers_) return;
-  complain("team_mates", mates_->write(answers_->team_mates()));
-  for (const auto& [name, cdr] : answers_->team_mate_poses()) {
-    std::unique_ptr<Writer>& out = mate_poses_[name];
-    if (!out) {
-      auto made = writer("team_mates/" + name + "/pose", "geometry_msgs/msg/PoseStamped", kLatchedQos);
-      if (!made) return complain("team_mates", tl::unexpected(made.error()));
-      out = std::move(*made);
-    }
-    complain("team_mates", out->write(cdr));
-  }
-}
-
 void Robot::each_second() {
   const double now_s = Clock::steady_s();
-  if (answers_ && now_s - path_s_ > kPath_s && path_->readers() > 0) {
-    path_s_ = now_s;
-    complain("corrected_path", path_->write(answers_->path()));
-  }
+  if (answers_ && now_s - path_s_ > kPath_s && topics_.publish_path(*answers_)) path_s_ = now_s;
   if (now_s - second_s_ < kDiagnostics_s) return;
   second_s_ = now_s;
   look_for_odometry();
@@ -425,8 +376,7 @@ void Robot::publish_diagnostics() {
                                              .status = situation_.status,
                                              .alerts = situation_.alerts,
                                              .troubles = complaints_.take()});
-  const Timestamp now{static_cast<std::int64_t>(program::wall_clock_ns())};
-  complain("/diagnostics", diagnostics_->write(bags::encode({now, ""}, std::span(&out, 1))));
+  topics_.publish(out, Timestamp{static_cast<std::int64_t>(program::wall_clock_ns())});
 }
 
 /// Where nothing may be lost: true while the robot has to catch up with what it was told.
