@@ -15,25 +15,32 @@ bool is_more_alike(const Alike& a, const Alike& b) {
 
 }  // namespace
 
-bool CandidatePairs::insert(SubmapId of, const Alike& other) {
-  std::vector<Alike>& list = most_alike_[of];
-  const auto at = std::ranges::lower_bound(list, other, is_more_alike);
-  if (at != list.end() && *at == other) return true;
-  if (at == list.end() && list.size() >= most_) return false;
-  list.insert(at, other);
+bool CandidatePairs::comes_first(const Ranked& a, const Ranked& b) {
+  return a.turn != b.turn ? a.turn < b.turn : is_more_alike(a.alike, b.alike);
+}
+
+/// What was dropped before needs no place here: whatever looks less alike than it and is the same robot's comes after
+/// it.
+void CandidatePairs::insert(SubmapId of, const Alike& other) {
+  std::vector<Ranked>& list = most_alike_[of];
+  Ranked added{other};
+  for (const Ranked& known : list) {
+    if (known.alike == other) return;
+    if (known.alike.submap.chain.robot == other.submap.chain.robot && is_more_alike(known.alike, other)) ++added.turn;
+  }
+  if (list.size() >= most_ && (list.empty() || !comes_first(added, list.back()))) return;
+  for (Ranked& known : list)
+    if (known.alike.submap.chain.robot == other.submap.chain.robot && known.turn >= added.turn) ++known.turn;
+  list.push_back(added);
+  std::ranges::sort(list, comes_first);
   if (list.size() > most_) list.pop_back();
-  return true;
 }
 
 std::vector<Alike> CandidatePairs::add(SubmapId id, const std::vector<Alike>& others) {
-  std::vector<Alike>& own = most_alike_[id];
-  own = others;
-  const auto kept = own.begin() + static_cast<std::ptrdiff_t>(std::min(most_, own.size()));
-  std::ranges::partial_sort(own, kept, is_more_alike);
-  own.erase(kept, own.end());
-  std::vector<Alike> candidates = own;
+  restore(id, others);
+  std::vector<Alike> candidates;
   for (const Alike& other : others)
-    if (insert(other.submap, {id, other.likeness}) && !prefers(id, other.submap)) candidates.push_back(other);
+    if (!excludes(ordered(id, other.submap))) candidates.push_back(other);
   std::ranges::sort(candidates, {}, &Alike::submap);
   return candidates;
 }
@@ -47,7 +54,7 @@ void CandidatePairs::restore(SubmapId id, const std::vector<Alike>& candidates) 
 }
 
 bool CandidatePairs::prefers(SubmapId of, SubmapId other) const {
-  return std::ranges::find(most_alike_.at(of), other, &Alike::submap) != most_alike_.at(of).end();
+  return std::ranges::any_of(most_alike_.at(of), [&](const Ranked& ranked) { return ranked.alike.submap == other; });
 }
 
 bool CandidatePairs::excludes(const SubmapPair& pair) const {
@@ -58,9 +65,9 @@ std::map<SubmapId, std::vector<SubmapId>> CandidatePairs::all() const {
   std::map<SubmapId, std::vector<SubmapId>> out;
   for (const auto& [id, list] : most_alike_) {
     std::vector<SubmapId>& own = out[id];
-    for (const Alike& other : list) {
-      own.push_back(other.submap);
-      out[other.submap].push_back(id);
+    for (const Ranked& other : list) {
+      own.push_back(other.alike.submap);
+      out[other.alike.submap].push_back(id);
     }
   }
   return out;

@@ -31,7 +31,8 @@ using PlaceSet = std::map<SubmapId, Place>;
 
 /// Which pairs of submaps are worth verifying, where every submap says what its place looks like: those of which either
 /// is among the `most` that look most alike to the other. Their number thus grows with the submaps and not with their
-/// square.
+/// square. Robots take turns: first comes the one of each robot that looks most alike, then the second of each. So a
+/// robot that stands in one place for hours, or makes up submaps, does not keep others from being compared there.
 ///
 /// What is a candidate is a function of the set of submaps and their likeness. A further submap takes candidates away
 /// from others and never gives them any but itself, so whatever is a candidate in the end was one as soon as both were
@@ -54,12 +55,16 @@ class CandidatePairs {
   [[nodiscard]] std::map<SubmapId, std::vector<SubmapId>> all() const;
 
  private:
-  /// True if it is among the most alike now.
-  bool insert(SubmapId of, const Alike& other);
+  struct Ranked {
+    Alike alike;
+    std::size_t turn = 0;  ///< How many of the same robot look more alike.
+  };
+  static bool comes_first(const Ranked& a, const Ranked& b);
+  void insert(SubmapId of, const Alike& other);
   [[nodiscard]] bool prefers(SubmapId of, SubmapId other) const;
 
   std::size_t most_ = 0;
-  std::map<SubmapId, std::vector<Alike>> most_alike_;  // best first, at most most_
+  std::map<SubmapId, std::vector<Ranked>> most_alike_;  // best first, at most most_
 };
 
 /// The candidates that a map's store tells of; none are excluded when some place was not compared yet.

@@ -54,24 +54,58 @@ std::vector<std::size_t> numbers(std::size_t count) {
   return out;
 }
 
+/// Position of `other` among those that look most alike to `of`, robots taking turns.
+std::size_t rank_of(SubmapId of, SubmapId other, std::size_t count, const std::map<SubmapPair, double>& likeness) {
+  const auto is_better = [&](SubmapId a, SubmapId b) {
+    return std::pair(-likeness.at(ordered(of, a)), a) < std::pair(-likeness.at(ordered(of, b)), b);
+  };
+  const auto turn_of = [&](SubmapId id) {
+    std::size_t turn = 0;
+    for (std::size_t k = 0; k < count; ++k)
+      if (submap(k) != of && submap(k).chain == id.chain && submap(k) != id && is_better(submap(k), id)) ++turn;
+    return turn;
+  };
+  const std::size_t turn = turn_of(other);
+  std::size_t rank = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    const SubmapId third = submap(k);
+    if (third == of || third == other) continue;
+    const std::size_t theirs = turn_of(third);
+    if (theirs < turn || (theirs == turn && is_better(third, other))) ++rank;
+  }
+  return rank;
+}
+
 TEST(CandidatePairs, AreThoseThatEitherSubmapFindsMostAlike) {
-  constexpr std::size_t kMost = 4;
+  constexpr std::size_t kMost = 5;
   const auto likeness = any_likeness(40);
   const Filled made = filled(numbers(40), kMost, likeness);
   for (const auto& [pair, value] : likeness) {
-    const auto rank = [&](SubmapId of, SubmapId other) {
-      std::size_t better = 0;
-      for (std::size_t k = 0; k < 40; ++k) {
-        const SubmapId third = submap(k);
-        if (third == of || third == other) continue;
-        const double theirs = likeness.at(ordered(of, third));
-        if (theirs > value || (theirs == value && third < other)) ++better;
-      }
-      return better;
-    };
-    const bool is_one = rank(pair.first, pair.second) < kMost || rank(pair.second, pair.first) < kMost;
+    const bool is_one = rank_of(pair.first, pair.second, 40, likeness) < kMost ||
+                        rank_of(pair.second, pair.first, 40, likeness) < kMost;
     EXPECT_EQ(made.pairs.excludes(pair), !is_one) << to_string(pair.first) << " " << to_string(pair.second);
   }
+}
+
+TEST(CandidatePairs, OfOneRobotDoNotCrowdOutThoseOfAnother) {
+  CandidatePairs pairs(6);
+  const SubmapId alpha{ChainId(RobotId{0}), 0};
+  pairs.add(alpha, {});
+  std::vector<Alike> there{{alpha, 0.5}};
+  for (std::uint32_t i = 0; i < 4; ++i) {  // bravo comes by
+    const SubmapId bravo{ChainId(RobotId{1}), i};
+    there.front().likeness = 0.5;
+    pairs.add(bravo, {there.front()});
+  }
+  for (std::uint32_t i = 0; i < 200; ++i) {  // charlie stands there, in several sessions
+    const SubmapId charlie{ChainId(RobotId{2}, i / 20), i};
+    pairs.add(charlie, {{alpha, 0.9}});
+  }
+  std::size_t bravos = 0;
+  for (std::uint32_t i = 0; i < 4; ++i)
+    if (!pairs.excludes({alpha, {ChainId(RobotId{1}), i}})) ++bravos;
+  EXPECT_EQ(bravos, 4U);
+  EXPECT_EQ(pairs.all().at(alpha).size(), 6U + 4U + 200U);  // both ways: each of theirs has only alpha
 }
 
 TEST(CandidatePairs, AreAFunctionOfTheSetAndWereAllCandidatesBefore) {

@@ -34,7 +34,7 @@ struct ServerConfig {
   double update_period_s = 10.0;
   std::string broadcast = "own";
   std::string change_of_mind = "wait";
-  int candidates_per_submap = 75;
+  int candidates_per_submap = 100;
   template <class V>
   void describe(V& v) {
     v.field("map", map);
@@ -55,7 +55,7 @@ struct ServerConfig {
             "'follow' = at once.");
     v.field("candidates_per_submap", candidates_per_submap, at_least(0),
             "LiDAR: a pair of submaps is verified when either is among so many that look most alike to the other from "
-            "above. With no more submaps than that, these are all pairs. 0: all pairs always.");
+            "above, robots taking turns. With no more submaps than that, these are all pairs. 0: all pairs always.");
   }
 };
 
