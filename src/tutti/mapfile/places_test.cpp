@@ -55,6 +55,23 @@ TEST_F(MapOfPlaces, MergedWithAnotherIsAsIfOneServerHadHadBoth) {
   for (const auto& [id, place] : *stored) EXPECT_TRUE(place.is_ranked);
 }
 
+TEST_F(MapOfPlaces, PlacesThatTheServerCannotReadAreNobodysAfterItsStart) {
+  test::Mapper first = mapper(store_);
+  for (const RobotId robot : {kAlpha, kBravo, kCharlie}) first.walk(robot);
+  ASSERT_LT(first.server().map().closures.size(), first.server().state().verdicts.size());
+  std::vector<Write> rows;
+  server::PlaceSet places = node::read_places(store_).value();
+  for (auto& [id, place] : places) {
+    place.looks = "of_another_version";
+    rows.push_back(node::to_row(id, place));
+  }
+  ASSERT_TRUE(store_.commit(rows).has_value());
+  test::Mapper again = mapper(store_);
+  again.update();
+  EXPECT_TRUE(node::read_places(store_).value().empty());
+  EXPECT_EQ(estimate(read(store_).value()).graph.poses, again.server().map().graph.poses);
+}
+
 TEST_F(MapOfPlaces, ADamagedRowIsASubmapWhosePairsAreAllVerified) {
   test::Mapper first = mapper(store_);
   for (const RobotId robot : {kAlpha, kBravo}) first.walk(robot);

@@ -76,12 +76,14 @@ Result<server::Refinements> read_refinements(const storage::TableStore& map) {
   return refinements;
 }
 
+std::string place_key(SubmapId id) { return std::string(kPlacePrefix) + key_of(id); }
+
 storage::Write to_row(SubmapId id, const server::Place& place) {
   std::string bytes = storage::key_of({place.is_ranked ? 1U : 0U, place.candidates.size()});
   for (const auto& [other, likeness] : place.candidates)
     bytes += storage::key_of(
         {other.chain.robot.value, other.chain.session, other.index, std::bit_cast<std::uint64_t>(likeness)});
-  return {map_tables::kMeta, std::string(kPlacePrefix) + key_of(id), bytes + place.looks};
+  return {map_tables::kMeta, place_key(id), bytes + place.looks};
 }
 
 std::optional<std::pair<SubmapId, server::Place>> place_of_row(std::string_view key, std::string_view bytes) {

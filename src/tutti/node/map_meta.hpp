@@ -54,6 +54,8 @@ Result<server::Refinements> read_refinements(const storage::TableStore& map);
 /// (whether it was compared, how many candidates; for each its robot, session, index and the bits of its likeness),
 /// followed by what it looks like. Rows that cannot be read are skipped: the pairs of these submaps are all verified.
 storage::Write to_row(SubmapId id, const server::Place& place);
+/// The key of a submap's row.
+std::string place_key(SubmapId id);
 /// The place of a row; nothing when it is no such row.
 std::optional<std::pair<SubmapId, server::Place>> place_of_row(std::string_view key, std::string_view bytes);
 Result<server::PlaceSet> read_places(const storage::TableStore& map);

@@ -224,7 +224,12 @@ Status ServerNode::take_submap(const bus::Envelope& envelope, Timestamp now, Ste
 }
 
 void ServerNode::keep_places(Step& step) {
-  for (const SubmapId& id : server_.take_places()) step.writes.push_back(to_row(id, server_.state().places.at(id)));
+  const server::PlaceSet& places = server_.state().places;
+  for (const SubmapId& id : server_.take_places()) {
+    const auto place = places.find(id);
+    step.writes.push_back(place != places.end() ? to_row(id, place->second)
+                                                : storage::Write{map_tables::kMeta, place_key(id), std::nullopt});
+  }
 }
 
 void ServerNode::tell_unread_rows(Timestamp now, Step& step) {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "tutti/base/random.hpp"
-#include "tutti/server/candidate_pairs.hpp"
+#include "tutti/server/map_estimate.hpp"
 
 namespace tutti::server {
 namespace answered_pairs_test {

@@ -73,17 +73,24 @@ std::map<SubmapId, std::vector<SubmapId>> CandidatePairs::all() const {
   return out;
 }
 
-CandidatePairs restored(const PlaceSet& places, std::size_t most) {
+CandidatePairs of_compared(const PlaceSet& places, std::size_t most) {
   CandidatePairs out(most);
-  if (most == 0) return out;
-  for (const auto& [id, place] : places)
-    if (!place.is_ranked) return CandidatePairs(most);
+  const auto is_there = [&](SubmapId id) {
+    const auto found = places.find(id);
+    return found != places.end() && found->second.is_ranked;
+  };
   for (const auto& [id, place] : places) {
+    if (!place.is_ranked) continue;
     std::vector<Alike> there = place.candidates;
-    std::erase_if(there, [&](const Alike& other) { return !places.contains(other.submap); });
+    std::erase_if(there, [&](const Alike& other) { return !is_there(other.submap); });
     out.restore(id, there);
   }
   return out;
+}
+
+CandidatePairs restored(const PlaceSet& places, std::size_t most) {
+  const bool is_whole = std::ranges::all_of(places, [](const auto& entry) { return entry.second.is_ranked; });
+  return most > 0 && is_whole ? of_compared(places, most) : CandidatePairs();
 }
 
 VerdictSet of_candidates(const VerdictSet& verdicts, const CandidatePairs& candidates, const WordSet& words) {

@@ -10,9 +10,6 @@
 
 namespace tutti::server {
 
-/// The pair of two submaps, the smaller first.
-inline SubmapPair ordered(SubmapId a, SubmapId b) { return a < b ? SubmapPair{a, b} : SubmapPair{b, a}; }
-
 /// Another submap, and how alike it looks (ClosureFinder::likeness()).
 struct Alike {
   SubmapId submap;
@@ -67,6 +64,8 @@ class CandidatePairs {
   std::map<SubmapId, std::vector<Ranked>> most_alike_;  // best first, at most most_
 };
 
+/// The candidates of the places that were compared; others are unknown.
+CandidatePairs of_compared(const PlaceSet& places, std::size_t most);
 /// The candidates that a map's store tells of; none are excluded when some place was not compared yet.
 CandidatePairs restored(const PlaceSet& places, std::size_t most);
 

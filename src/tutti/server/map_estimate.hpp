@@ -29,6 +29,9 @@ namespace tutti::server {
 /// The submaps that a map is made from; sorted by id, so that the map is a function of the set. Never null.
 using SubmapSet = std::map<SubmapId, std::shared_ptr<const Submap>>;
 
+/// The pair of two submaps, the smaller first.
+inline SubmapPair ordered(SubmapId a, SubmapId b) { return a < b ? SubmapPair{a, b} : SubmapPair{b, a}; }
+
 /// True if the set has both submaps of the pair.
 inline bool has_both(const SubmapSet& submaps, const SubmapPair& pair) {
   return submaps.contains(pair.first) && submaps.contains(pair.second);

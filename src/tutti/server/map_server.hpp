@@ -143,7 +143,8 @@ class MapServer {
   Status receive(const Refinement& refinement);
   /// The errors since the last call, of verdicts that had waited for submaps and proved invalid when these came.
   std::vector<Error> take_late_errors() { return std::exchange(late_errors_, {}); }
-  /// The submaps whose places were described or compared since the last call: MapServerState::places has news of them.
+  /// The submaps whose places were described, compared or dropped since the last call; MapServerState::places has those
+  /// that were not dropped.
   std::vector<SubmapId> take_places() { return std::exchange(new_places_, {}); }
   /// The verifications to be done; each is handed out once.
   std::vector<VerificationJob> take_jobs();

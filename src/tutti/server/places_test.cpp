@@ -133,8 +133,9 @@ TEST_F(Places, OfAnotherVersionAreUnknown) {
   MapServerState state = whole.state();
   state.places.begin()->second.looks = "of_another_version";
   const SubmapId unknown = state.places.begin()->first;
-  const MapServer again = server(4, state);
+  MapServer again = server(4, state);
   EXPECT_FALSE(again.state().places.contains(unknown));
+  EXPECT_EQ(again.take_places(), std::vector{unknown});
   EXPECT_EQ(again.state().places.size(), uploads_.size() - 1);
   EXPECT_TRUE(server(0, state).state().places.empty());
 }

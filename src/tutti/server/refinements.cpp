@@ -60,9 +60,8 @@ std::map<KeyframeId, std::vector<SubmapId>> submaps_of_closures(const MapEstimat
 
 bool ties(const Refinement& refinement, const std::vector<SubmapId>& some, const std::vector<SubmapId>& others) {
   return std::ranges::any_of(some, [&](const SubmapId& a) {
-    return std::ranges::any_of(others, [&](const SubmapId& b) {
-      return std::ranges::binary_search(refinement.closed, a < b ? SubmapPair{a, b} : SubmapPair{b, a});
-    });
+    return std::ranges::any_of(
+        others, [&](const SubmapId& b) { return std::ranges::binary_search(refinement.closed, ordered(a, b)); });
   });
 }
 

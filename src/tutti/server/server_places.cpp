@@ -38,13 +38,14 @@ void MapServer::plan_verifications(SubmapId id) {
 }
 
 void MapServer::restore_candidates() {
-  const bool is_on = config_.candidates_per_submap > 0;
+  if (config_.candidates_per_submap == 0) return state_.places.clear();
   std::erase_if(state_.places, [&](const auto& entry) {
-    return !is_on || !state_.submaps.contains(entry.first) || !finder_->can_rank(entry.second.looks);
+    const bool is_read = finder_->can_rank(entry.second.looks);
+    if (!is_read)
+      new_places_.push_back(entry.first);  // who reads the map's file is not to believe its candidates either
+    return !is_read || !state_.submaps.contains(entry.first);
   });
-  PlaceSet compared = state_.places;
-  std::erase_if(compared, [](const auto& entry) { return !entry.second.is_ranked; });
-  candidates_ = restored(compared, static_cast<std::size_t>(config_.candidates_per_submap));
+  candidates_ = of_compared(state_.places, static_cast<std::size_t>(config_.candidates_per_submap));
   for (const auto& [id, place] : state_.places)
     if (!place.is_ranked) compare_place(id);
   std::vector<SubmapId> unknown;
