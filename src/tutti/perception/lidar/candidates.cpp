@@ -24,14 +24,6 @@ struct Peak {
   float value = 0.0F;
 };
 
-/// f(-x) from f(x): of a spectrum as well as of an image.
-ComplexImage mirrored(const ComplexImage& f) {
-  ComplexImage out(kN, kN);
-  for (int row = 0; row < kN; ++row)
-    for (int column = 0; column < kN; ++column) out(row, column) = f((kN - row) & kMask, (kN - column) & kMask);
-  return out;
-}
-
 /// Correlations c(s) = sum_x Re(conj(f_b(x - s)) f_a(x)) of image a with image b (real part of the result) and with b
 /// turned by half (imaginary part). With A, B the spectra, C = A conj(B); the half turn gives C' = -A conj(B(-k)); the
 /// spectrum of Re c is H(k) = (C(k) + conj(C(-k))) / 2; one inverse transform of H + i H' yields both.

@@ -11,14 +11,14 @@
 #include <vector>
 
 #include "tutti/base/check.hpp"
-#include "tutti/perception/lidar/candidates.hpp"
+#include "tutti/perception/lidar/birds_eye_view.hpp"
+#include "tutti/perception/lidar/fft.hpp"
 #include "tutti/perception/lidar/submap_features.hpp"
 
 namespace tutti::lidar {
 namespace {
 
 constexpr int kSize = 32;
-constexpr int kLast = kSize - 1;
 constexpr std::uint8_t kDescriptorVersion = 1;  // raised with every change of the bytes, or of what they are made of
 constexpr std::size_t kViewBytes = 2 * kSize * kSize;
 
@@ -70,17 +70,8 @@ Spectrum read_view(const char* bytes) {
   return out;
 }
 
-/// conj(B(k)) - i conj(B(-k)), from which correlate() makes the correlation with b and with b turned by half.
-Spectrum both_ways(const Spectrum& b) {
-  Spectrum out;
-  for (int row = 0; row < kSize; ++row)
-    for (int column = 0; column < kSize; ++column) {
-      const int r = (kSize - row) & kLast, c = (kSize - column) & kLast;
-      out.re(row, column) = b.re(row, column) - b.im(r, c);
-      out.im(row, column) = -b.im(row, column) - b.re(r, c);
-    }
-  return out;
-}
+/// conj(B(k)) - i conj(B(-k)), from which highest() makes the correlation with b and with b turned by half.
+Spectrum both_ways(const Spectrum& b) { return {b.re - mirrored(b.im), -b.im - mirrored(b.re)}; }
 
 /// A view to be correlated with others: the factors of highest(), with M = conj(A(-k)).
 struct View {
@@ -89,16 +80,8 @@ struct View {
 };
 
 View prepared(const Spectrum& a) {
-  View out;
-  for (int row = 0; row < kSize; ++row)
-    for (int column = 0; column < kSize; ++column) {
-      const int r = (kSize - row) & kLast, c = (kSize - column) & kLast;
-      out.sum_re(row, column) = a.re(row, column) - a.im(r, c);
-      out.sum_im(row, column) = a.im(row, column) + a.re(r, c);
-      out.difference_re(row, column) = a.re(row, column) + a.im(r, c);
-      out.difference_im(row, column) = a.im(row, column) - a.re(r, c);
-    }
-  return out;
+  const Part re = mirrored(a.re), im = mirrored(a.im);
+  return {a.re - im, a.im + re, a.re + im, a.im - re};
 }
 
 struct Turn {
