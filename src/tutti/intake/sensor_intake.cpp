@@ -135,7 +135,6 @@ Status SensorIntake::take_camera(std::string_view topic, std::string_view bytes,
   return first;
 }
 
-/// What is no number, or no share of 1, the robot's driver does not know.
 Result<Health> read_battery(std::string_view bytes, bags::RosEncoding encoding) {
   const auto message = bags::decode_battery_state(bytes, encoding);
   if (!message) return tl::unexpected(message.error());

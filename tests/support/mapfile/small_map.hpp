@@ -21,22 +21,15 @@
 namespace tutti::mapfile::test {
 
 /// True relative poses with evidence; every fourth is wrong. Sessions of one robot walk the same way at other times.
-class ExplainingFinder final : public server::ClosureFinder {
+class ExplainingFinder final : public server::WrappedFinder {
  public:
-  [[nodiscard]] MethodId id() const override { return finder_.id(); }
-  [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return true; }
-  [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
-    return finder_.is_candidate(first, second);
-  }
+  ExplainingFinder() : WrappedFinder(std::make_shared<server::test::TestFinder>(7, 4)) {}
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const server::PayloadStore& payloads) const override {
-    auto verdict = finder_.verify(first, second, payloads);
+    auto verdict = wrapped().verify(first, second, payloads);
     verdict->evidence = {{RefusalReason::overlap, 0.75, 0.3}};
     return verdict;
   }
-
- private:
-  server::test::TestFinder finder_{7, 4};
 };
 
 /// A server on a store, everything that it asks for answered by a worker.

@@ -7,11 +7,6 @@
 #include "tutti/bags/ros_definitions.hpp"
 
 namespace tutti::ros {
-namespace {
-
-constexpr const char* kTransforms = "tf2_msgs/msg/TFMessage";
-
-}  // namespace
 
 Status RobotTopics::open() {
   struct Topic {
@@ -19,7 +14,7 @@ Status RobotTopics::open() {
     const char *name, *type;
     Qos qos;
   };
-  for (const Topic& topic : {Topic{tf_, "/tf", kTransforms, kTfQos},
+  for (const Topic& topic : {Topic{tf_, "/tf", kTfType, kTfQos},
                              {pose_, "corrected_pose", "geometry_msgs/msg/PoseWithCovarianceStamped", {}},
                              {path_, "corrected_path", "nav_msgs/msg/Path", kLatchedQos},
                              {mates_, "team_mates", "visualization_msgs/msg/MarkerArray", kLatchedQos},
@@ -33,7 +28,7 @@ Status RobotTopics::open() {
 
 bool RobotTopics::open_own_tf() {
   if (own_tf_) return false;
-  auto made = writer("tf", kTransforms, kTfQos);
+  auto made = writer("tf", kTfType, kTfQos);
   if (!made) {
     complaints_.add("tf", tl::unexpected(made.error()));
     return false;

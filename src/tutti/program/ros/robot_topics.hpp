@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "tutti/bags/ros_encode.hpp"
 #include "tutti/base/result.hpp"

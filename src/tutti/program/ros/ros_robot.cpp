@@ -26,7 +26,7 @@ namespace {
 using program::Clock, program::FeedClient, program::Level;
 
 constexpr const char *kOdometryType = "nav_msgs/msg/Odometry", *kFixType = "sensor_msgs/msg/NavSatFix",
-                     *kBatteryType = "sensor_msgs/msg/BatteryState", *kTfType = "tf2_msgs/msg/TFMessage";
+                     *kBatteryType = "sensor_msgs/msg/BatteryState";
 constexpr double kWait_s = 0.02;
 constexpr double kAnswers_s = 2.0;  // more than the robot takes for any
 constexpr double kConnectsAgain_s = 0.1;
