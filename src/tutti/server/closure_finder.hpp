@@ -75,7 +75,7 @@ class ClosureFinder {
 };
 
 /// Another finder, of which who derives from this changes what it overrides. All else is the other finder's, also what
-/// finders are asked in later versions.
+/// finders are asked in later versions; look() too, so that who changes what verify() finds says what look() shows.
 class WrappedFinder : public ClosureFinder {
  public:
   [[nodiscard]] MethodId id() const override { return wrapped_->id(); }

@@ -30,6 +30,11 @@ class ExplainingFinder final : public server::WrappedFinder {
     verdict->evidence = {{RefusalReason::overlap, 0.75, 0.3}};
     return verdict;
   }
+  /// What verify() says, not what the wrapped finder would.
+  [[nodiscard]] Result<Look> look(const Submap& first, const Submap& second, const server::PayloadStore& payloads,
+                                  const std::optional<Pose3>& T_first_second) const override {
+    return ClosureFinder::look(first, second, payloads, T_first_second);
+  }
 };
 
 /// A server on a store, everything that it asks for answered by a worker.
