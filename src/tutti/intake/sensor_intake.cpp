@@ -184,10 +184,26 @@ Result<std::optional<Input>> SensorIntake::next(bool wants_scan) {
   auto out = next_beside(wants_scan);
   for (std::string text = ros_.take_note(); !text.empty(); text.clear()) note(text);
   if (!out || *out) return out;
-  const auto sample = ros_.next_odometry(false);
+  if (waits_for_images()) return out;
+  const auto sample = ros_.next_odometry(holds_for_scans_);
   if (!sample) return out;
   fed_ = sample->stamp;
   return std::optional<Input>(*sample);
+}
+
+bool SensorIntake::waits_for_images() const {
+  constexpr double kLongest_s = 5.0;
+  const auto waiting = ros_.waiting();
+  if (!holds_for_images_ || !waiting || waiting->second - waiting->first > kLongest_s) return false;
+  return sensors_.cameras.empty() || (images_ && !images_->reaches(waiting->first));
+}
+
+bool SensorIntake::wants(std::string_view topic) const {
+  if (!images_) return false;
+  for (std::size_t i = 0; i < topics_.size(); ++i)
+    if (images_->uses(i) && (topic == topics_[i].images || (topic == topics_[i].info && !images_->has_info(i))))
+      return true;
+  return topic == imu_;
 }
 
 /// What odometry has reached.

@@ -57,6 +57,16 @@ class SensorIntake {
   /// The next input that is due, in the order in which a robot wants them; nothing when more must come first. An error
   /// when one is left out. Scans that are not wanted are skipped.
   Result<std::optional<Input>> next(bool wants_scan);
+  /// Where nothing may be lost: odometry waits for the scans, and for the images and IMU samples, that come with it.
+  /// For images it waits no longer than 5 s of its own time.
+  void hold_odometry(bool for_scans, bool for_images) {
+    holds_for_scans_ = for_scans;
+    holds_for_images_ = for_images;
+  }
+  /// Messages on this topic of a camera are of use: before it is known which of them are, of all.
+  [[nodiscard]] bool wants(std::string_view topic) const;
+  /// Images are taken, or may be: what their topics say allows it.
+  [[nodiscard]] bool may_see() const { return images_.has_value(); }
   /// Nothing more comes that would be worth waiting for.
   void end() { is_last_ = true; }
 
@@ -66,6 +76,10 @@ class SensorIntake {
   [[nodiscard]] const std::string& missing() const { return missing_; }
   /// How messages are read, said once after each change: points' times, places of antennas, cameras.
   std::vector<std::string> take_notes() { return std::exchange(notes_, {}); }
+  /// Adds what is to be said, unless it is empty.
+  void note(std::string text) {
+    if (!text.empty()) notes_.push_back(std::move(text));
+  }
   [[nodiscard]] RosIntake& odometry() { return ros_; }
   [[nodiscard]] const RosIntake& odometry() const { return ros_; }
 
@@ -77,9 +91,7 @@ class SensorIntake {
   void look(bool is_new);
   void choose();
   Result<std::optional<Input>> next_beside(bool wants_scan);
-  void note(std::string text) {
-    if (!text.empty()) notes_.push_back(std::move(text));
-  }
+  [[nodiscard]] bool waits_for_images() const;
 
   RosIntake ros_;
   std::optional<ImagesIntake> images_;
@@ -88,7 +100,7 @@ class SensorIntake {
   std::optional<Health> health_;
   std::optional<Timestamp> fed_;                   ///< Odometry's newest that next() returned.
   std::optional<Timestamp> first_image_, looked_;  ///< By odometry's time.
-  bool is_last_ = false;
+  bool is_last_ = false, holds_for_scans_ = false, holds_for_images_ = false;
   FeedSensors sensors_;
   std::string missing_;
   std::vector<std::string> notes_;

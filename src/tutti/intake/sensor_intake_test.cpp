@@ -152,6 +152,32 @@ TEST_F(SensorIntakeTest, AtTheEndNothingIsWaitedFor) {
   EXPECT_EQ(due(), "p");
 }
 
+/// Where nothing may be lost.
+TEST_F(SensorIntakeTest, OdometryWaitsForScansAndForCamerasForAWhile) {
+  take_images({.images = {"left/image_raw"}});
+  place();
+  EXPECT_TRUE(intake_.wants("left/image_raw"));
+  EXPECT_TRUE(intake_.wants("left/camera_info"));
+  EXPECT_FALSE(intake_.wants("right/image_raw"));
+  intake_.hold_odometry(true, true);
+  EXPECT_EQ(odometry_at(0), "");
+  EXPECT_EQ(add("points", kPoints, points(kStart, kAtOnce, "lidar")), "");
+  EXPECT_EQ(due(), "") << "no image yet";
+  EXPECT_EQ(add("left/camera_info", kCameraInfoType, bags::encode(calibration())), "");
+  EXPECT_EQ(add("left/image_raw", kImageType, bags::encode(grey_image(kStart))), "");
+  EXPECT_FALSE(intake_.wants("left/camera_info")) << "the first one counts";
+  EXPECT_EQ(due(), "ops");
+  EXPECT_EQ(odometry_at(1), "");
+  EXPECT_EQ(add("left/image_raw", kImageType, bags::encode(grey_image(kStart + kPeriod))), "");
+  EXPECT_EQ(due(), "") << "no scan yet";
+  intake_.hold_odometry(false, true);
+  EXPECT_EQ(due(), "op");
+  EXPECT_EQ(odometry_at(2), "");
+  EXPECT_EQ(due(), "") << "no image yet";
+  EXPECT_EQ(odometry_at(53), "");
+  EXPECT_EQ(due(), "o") << "images have ended";
+}
+
 TEST_F(SensorIntakeTest, OdometryThatIsSaidAgainTellsHowTheBodyMoved) {
   intake_.odometry().begin_behind(Timestamp{kStart + 10 * kPeriod});
   for (int i = 0; i <= 12; ++i) EXPECT_EQ(odometry_at(i), "");

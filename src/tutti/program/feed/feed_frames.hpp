@@ -52,6 +52,7 @@ struct FeedRos {
   std::optional<Pose3> T_body_lidar;
   std::optional<Eigen::Vector3d> p_body_antenna;
   bool scans_deskewed = false;
+  std::string odometry_frames;  ///< IntakeConfig::odometry_frames; clients in other processes cannot say it.
   std::string body_frame, odom_frame, map_frame;
   std::optional<robot::OdometryCovarianceConfig> covariance;
   double tolerance_s = 0.0;  ///< By which map -> odom is dated ahead.

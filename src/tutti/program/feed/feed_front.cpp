@@ -352,6 +352,12 @@ FeedFront::Load FeedFront::load() const {
   return {inputs_.size() - taken_, scans_left_out_, samples_joined_, images_left_out_};
 }
 
+bool FeedFront::is_filling() const {
+  const std::scoped_lock lock(mutex_);
+  return inputs_.size() > limits_.inputs / 4 || scan_bytes_ > limits_.scan_bytes / 4 ||
+         image_bytes_ > limits_.image_bytes / 4;
+}
+
 FeedFront::Figures FeedFront::figures() const {
   const std::scoped_lock lock(mutex_);
   return {images_taken_, images_refused_, imu_taken_, imu_refused_, fixes_taken_, fixes_refused_, image_bytes_};

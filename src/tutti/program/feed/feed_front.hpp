@@ -114,6 +114,9 @@ class FeedFront final : public FeedTarget {
     friend bool operator==(const Load&, const Load&) = default;
   };
   [[nodiscard]] Load load() const;
+  /// More is waiting, or not stored yet, than should be fed where nothing may be left out: less than half of the
+  /// limits.
+  [[nodiscard]] bool is_filling() const;
   /// Totals since the front was made; images are counted as moments.
   struct Figures {
     std::uint64_t images = 0, images_left_out = 0, imu = 0, imu_left_out = 0, fixes = 0, fixes_left_out = 0;

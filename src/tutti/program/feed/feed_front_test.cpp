@@ -190,6 +190,19 @@ TEST(FeedFront, WhatIsTooMuchCostsTheMapNotTheWay) {
   EXPECT_EQ(behind.robot.node().agent().newest_sample(), kOdometry[299].stamp);
 }
 
+TEST(FeedFront, FillsUpUntilAllIsStored) {
+  Behind behind({.inputs = 8});
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_FALSE(behind.front.is_filling());
+    ASSERT_TRUE(behind.front.add_odometry(sample(i)));
+  }
+  EXPECT_TRUE(behind.front.is_filling());
+  while (behind.front.take(0.0)) behind.front.note_heard();
+  EXPECT_TRUE(behind.front.is_filling()) << "it may have to be handed out again";
+  behind.front.note_stored();
+  EXPECT_FALSE(behind.front.is_filling());
+}
+
 TEST(FeedFront, OfALongTimeTheWholeWayStaysEvenly) {
   FeedFront front(test::NodeTarget().state(), {.inputs = 100});
   for (std::size_t i = 0; i < kOdometry.size() * 20; ++i)

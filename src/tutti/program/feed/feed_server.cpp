@@ -100,19 +100,31 @@ FeedServer::~FeedServer() {
 }
 
 void FeedServer::serve(int timeout_ms) {
+  Waiting waiting = begin();
+  if (wait(waiting, timeout_ms)) finish(waiting);
+}
+
+FeedServer::Waiting FeedServer::begin() {
   session_.refresh();
-  std::vector<pollfd> wanted{{.fd = listener_, .events = POLLIN, .revents = 0}};
-  std::vector<FeedSession::Client> clients;
+  Waiting out{.files = {{.fd = listener_, .events = POLLIN, .revents = 0}}, .clients = {}};
   for (const auto& [client, file] : files_) {
     const bool listens = !session_.is_over(client) && !silent_.contains(client);
     const auto events = (listens ? POLLIN : 0) | (session_.output(client).empty() ? 0 : POLLOUT);
-    wanted.push_back({.fd = file, .events = static_cast<short>(events), .revents = 0});
-    clients.push_back(client);
+    out.files.push_back({.fd = file, .events = static_cast<short>(events), .revents = 0});
+    out.clients.push_back(client);
   }
-  if (poll(wanted.data(), wanted.size(), timeout_ms) < 0) return;
+  return out;
+}
+
+bool FeedServer::wait(Waiting& waiting, int timeout_ms) {
+  return poll(waiting.files.data(), waiting.files.size(), timeout_ms) >= 0;
+}
+
+void FeedServer::finish(const Waiting& waiting) {
+  const auto& [files, clients] = waiting;
   for (std::size_t i = 0; i < clients.size(); ++i) {
-    const short ready = wanted[i + 1].revents;
-    const int file = wanted[i + 1].fd;
+    const short ready = files[i + 1].revents;
+    const int file = files[i + 1].fd;
     const bool is_gone = (ready & (POLLERR | POLLHUP | POLLNVAL)) != 0;
     if ((ready & POLLIN) != 0 ? read_from(clients[i], file) : !is_gone) continue;
     // One that has said all it has to say may still read.
@@ -121,7 +133,7 @@ void FeedServer::serve(int timeout_ms) {
     static_cast<void>(write_to(clients[i], file));
     drop(clients[i]);
   }
-  if ((wanted[0].revents & POLLIN) != 0) accept_one();
+  if ((files[0].revents & POLLIN) != 0) accept_one();
   session_.close_stalled(steady_s());
   for (const auto& [client, file] : std::map(files_))
     if (!write_to(client, file) || (silent_.contains(client) && !session_.waits_for_end(client))) drop(client);

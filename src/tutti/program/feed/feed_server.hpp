@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <poll.h>
+
 #include <map>
 #include <memory>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "tutti/program/feed/feed_session.hpp"
 
@@ -32,7 +35,22 @@ class FeedServer {
 
   /// Waits at most `timeout_ms` (0: not at all) for something to do, then does all that can be done without waiting.
   void serve(int timeout_ms);
+  /// The parts of serve(), for a program that uses the session elsewhere while this waits: what to wait for,
+  struct Waiting {
+    std::vector<pollfd> files;                 ///< The one that listens, then those of the clients.
+    std::vector<FeedSession::Client> clients;  ///< One for each file but the first.
+  };
+  [[nodiscard]] Waiting begin();
+  /// waiting for it, false when it was interrupted,
+  static bool wait(Waiting& waiting, int timeout_ms);
+  /// and doing what can be done.
+  void finish(const Waiting& waiting);
   [[nodiscard]] FeedSession& session() { return session_; }
+  /// A client of this process, which the session alone knows.
+  FeedSession::Client join() {
+    session_.connect(next_);
+    return next_++;
+  }
   [[nodiscard]] std::size_t clients() const { return files_.size(); }
 
  private:

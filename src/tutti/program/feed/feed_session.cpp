@@ -94,9 +94,10 @@ void FeedSession::take(Client client, FromClient message) {
   if (const auto* bad = std::get_if<BadSample>(&message))
     return put(connection, refused_frame(bad->stamp, bad->why, 0));  // by its own clock
   if (const auto* time = std::get_if<FeedTime>(&message)) return take_time(client, *time);
-  if (const auto* raw = std::get_if<FeedRaw>(&message)) return take_raw(client, *raw);
+  if (const auto* raw = std::get_if<FeedRaw>(&message))
+    return take_raw(client, {raw->topic, raw->type, raw->encoding, raw->bytes});
   if (!std::holds_alternative<FeedEnd>(message)) return take_fed(client, std::move(message));
-  if (ros_) ros_->end(), take_due(client);
+  if (ros_) ros_->intake().end(), take_due(client);
   if (const Status ok = target_.finish(); !ok) return put(connection, refused_frame({}, ok.error().message, 0));
   connection.ended = connection.waits_for_end = true;
   answer_end();

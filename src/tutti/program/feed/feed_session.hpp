@@ -40,6 +40,18 @@ class FeedSession {
   void disconnect(Client client);
   /// Handles every message that `bytes` complete.
   void receive(Client client, std::string_view bytes);
+  // For a client of this process (LocalClient), which says values.
+  void say(Client client, const FeedHello& hello) { greet(client, hello); }
+  void say(Client client, FeedEnd end) { take(client, end); }
+  void say(Client client, const intake::RawMessage& raw) {
+    last_.bytes += raw.bytes.size();
+    take_raw(client, raw);
+  }
+  /// What reads the raw messages of the client that feeds; null for one that feeds none. After it is told something,
+  /// take_due() is to be called.
+  [[nodiscard]] RosClient* ros() { return ros_.get(); }
+  /// Takes the inputs that are due of the raw messages so far.
+  void take_due(Client client);
   /// Ends connections in which a frame has begun, or the last words wait, and nothing goes on for kMostPause_s. To be
   /// called now and then; `wall_s` is of a clock that never goes back.
   void close_stalled(double wall_s);
@@ -103,8 +115,7 @@ class FeedSession {
   void take_odometry(Client client, const node::OdometrySample& sample);
   // For a client that feeds raw messages: feed_session_ros.cpp.
   Status begin_ros(const FeedHello& hello);
-  void take_raw(Client client, const FeedRaw& raw);
-  void take_due(Client client);
+  void take_raw(Client client, const intake::RawMessage& raw);
   void tell_ros(Client client, const FeedState& state, const SmoothMap::Answer& answer);
   void tell_ros(FeedWay way);
   [[nodiscard]] Timestamp by_client(Timestamp stamp) const;

@@ -10,9 +10,9 @@ Timestamp FeedSession::by_client(Timestamp stamp) const { return {told(stamp, la
 
 FeedState FeedSession::state() const {
   FeedState out = target_.state();
-  if (!ros_ || ros_->missing().empty()) return out;
+  if (!ros_ || ros_->intake().missing().empty()) return out;
   const Timestamp now = out.newest ? out.newest->stamp : Timestamp{};
-  out.alerts.push_back({ros_->missing(), now, now, now});
+  out.alerts.push_back({ros_->intake().missing(), now, now, now});
   return out;
 }
 
@@ -34,7 +34,7 @@ Status FeedSession::begin_ros(const FeedHello& hello) {
   return {};
 }
 
-void FeedSession::take_raw(Client client, const FeedRaw& raw) {
+void FeedSession::take_raw(Client client, const intake::RawMessage& raw) {
   Connection& connection = clients_.at(client);
   const auto refuse_raw = [&](const std::string& why) { put(connection, refused_frame({}, why, 0)); };
   if (!ros_) return refuse_raw("a raw message, of which Hello said nothing (Hello.ros)");
@@ -48,7 +48,7 @@ void FeedSession::take_raw(Client client, const FeedRaw& raw) {
 
 void FeedSession::take_due(Client client) {
   Connection& connection = clients_.at(client);
-  if (const intake::FeedSensors& known = ros_->sensors(); !known.cameras.empty()) {
+  if (const intake::FeedSensors& known = ros_->intake().sensors(); !known.cameras.empty()) {
     const bool scans = sensors_.scans;
     if (intake::FeedSensors now = known; now.scans = scans, now != sensors_)
       target_.set_sensors(sensors_ = std::move(now));
@@ -62,7 +62,7 @@ void FeedSession::take_due(Client client) {
     if (!*input) break;
     std::visit([&](auto& value) { take_fed(client, FromClient(std::move(value))); }, **input);
   }
-  for (const std::string& note : ros_->take_notes()) put(connection, note_frame(note));
+  for (const std::string& note : ros_->intake().take_notes()) put(connection, note_frame(note));
 }
 
 void FeedSession::tell_ros(Client client, const FeedState& state, const SmoothMap::Answer& answer) {

@@ -53,7 +53,7 @@ TEST_F(FeedSessionRos, OdometryIsAnsweredAsEverAndAsMessagesToPublish) {
   const auto& takes = greeting[0].welcome().takes();
   EXPECT_NE(std::ranges::find(takes, "raw"), takes.end());
   const auto answer = say(1, odometry_at(0));
-  ASSERT_EQ(kinds(answer), (std::vector{Feed::kCorrection, Feed::kRaw, Feed::kRaw}));
+  ASSERT_EQ(kinds(answer), (std::vector{Feed::kCorrection, Feed::kRaw, Feed::kRaw, Feed::kNote}));
   EXPECT_EQ(answer[0].correction().stamp_ns(), kStart);
   EXPECT_EQ(answer[1].raw().topic(), "/tf");
   const auto tf = bags::decode_tf(answer[1].raw().data()).value();
@@ -93,8 +93,8 @@ TEST_F(FeedSessionRos, EverySensorReachesTheRobot) {
   say(1, still("camera") + still("imu") + still("lidar"));
   target_.known.wants_scan = true;
   const auto missing = say(1, odometry_at(0));
-  ASSERT_EQ(missing.back().what_case(), Feed::kSituation);
-  EXPECT_EQ(missing.back().situation().alert(0).text(),
+  ASSERT_EQ(kinds(missing), (std::vector{Feed::kCorrection, Feed::kRaw, Feed::kRaw, Feed::kSituation, Feed::kNote}));
+  EXPECT_EQ(missing[3].situation().alert(0).text(),
             "no images are used: left/camera_info: no sensor_msgs/CameraInfo; no IMU is used: imu: no sample");
   say(1, raw("left/camera_info", "sensor_msgs/msg/CameraInfo", bags::encode(calibration())) +
              raw("left/image_raw", "sensor_msgs/msg/Image", bags::encode(grey_image(kStart + kPeriod))) +
@@ -131,7 +131,7 @@ TEST_F(FeedSessionRos, WhatIsNotTakenIsSaidAndTheConnectionStays) {
     ASSERT_EQ(kinds(answer), std::vector{Feed::kRefused});
     EXPECT_EQ(answer[0].refused().why().substr(0, std::string(word).size()), word);
   }
-  EXPECT_EQ(say(1, odometry_at(0)).size(), 3U);
+  EXPECT_EQ(say(1, odometry_at(0)).size(), 4U);
   EXPECT_FALSE(session_.is_over(1));
   session_.disconnect(1);
   join(2);  // which said nothing of ROS

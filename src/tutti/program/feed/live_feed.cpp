@@ -30,6 +30,7 @@ Status LiveFeed::listen() {
   auto server = FeedServer::listen(socket_, front_, {}, access_, sensors_);
   if (!server) return tl::unexpected(server.error());
   server_ = std::move(*server);
+  ++server_number_;
   return {};
 }
 
@@ -39,18 +40,46 @@ void LiveFeed::run(const std::stop_token& stop) {
 }
 
 void LiveFeed::serve(int wait_ms) {
+  std::unique_lock lock(server_mutex_);
   try {
-    if (!server_ && !listen()) return std::this_thread::sleep_for(kListensAgain);
-    server_->serve(wait_ms);
+    if (!server_ && !listen()) {
+      lock.unlock();
+      return std::this_thread::sleep_for(kListensAgain);
+    }
+    FeedServer::Waiting waiting = server_->begin();
+    const std::uint64_t number = server_number_;
+    lock.unlock();
+    const bool is_ready = FeedServer::wait(waiting, wait_ms);
+    lock.lock();
+    if (!server_ || number != server_number_) return;  // it has thrown meanwhile
+    if (is_ready) server_->finish(waiting);
     is_fed_ = server_->session().has_feeder();
-    const std::scoped_lock lock(told_mutex_);
+    const std::scoped_lock told(told_mutex_);
     feeder_ = server_->session().feeder();
   } catch (const std::exception& error) {
-    is_fed_ = false;
-    server_.reset();  // whose bytes they were is not known
-    const std::scoped_lock lock(told_mutex_);
-    thrown_ = error.what();
+    forget_server(error.what());
   }
+}
+
+bool LiveFeed::use(std::uint64_t& last, const std::function<void(FeedServer&)>& work) {
+  const std::scoped_lock lock(server_mutex_);
+  if (!server_ || (last != 0 && last != server_number_)) return false;
+  last = server_number_;
+  try {
+    work(*server_);
+    return true;
+  } catch (const std::exception& error) {
+    forget_server(error.what());
+    return false;
+  }
+}
+
+/// Whose bytes they were is not known.
+void LiveFeed::forget_server(const char* why) {
+  is_fed_ = false;
+  server_.reset();
+  const std::scoped_lock lock(told_mutex_);
+  thrown_ = why;
 }
 
 FeedSession::Feeder LiveFeed::feeder() const {

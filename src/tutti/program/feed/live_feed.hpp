@@ -2,6 +2,8 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -25,6 +27,10 @@ class LiveFeed {
   LiveFeed(const LiveFeed&) = delete;
   LiveFeed& operator=(const LiveFeed&) = delete;
 
+  /// Uses the server from another thread (LocalClient), which waits for nobody meanwhile. False when there is none just
+  /// then, or it has thrown: then it is another one than `last`, the number of the one that was used before, which is 0
+  /// for any.
+  bool use(std::uint64_t& last, const std::function<void(FeedServer&)>& work);
   [[nodiscard]] FeedFront& front() { return front_; }
   [[nodiscard]] const FeedFront& front() const { return front_; }
   /// A client that feeds is connected.
@@ -48,7 +54,11 @@ class LiveFeed {
   const FeedAccess access_;
   const intake::SensorConfig sensors_;
   FeedFront front_;
+  void forget_server(const char* why);
+
+  std::mutex server_mutex_;  // guards server_ and its number
   std::unique_ptr<FeedServer> server_;
+  std::uint64_t server_number_ = 0;
   std::atomic<bool> is_fed_ = false;
   mutable std::mutex told_mutex_;  // guards what follows
   std::string thrown_;

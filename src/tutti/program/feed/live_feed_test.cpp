@@ -6,15 +6,18 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstring>
 #include <latch>
 #include <string>
 #include <thread>
 
+#include "support/intake/messages.hpp"
 #include "support/program/feed/client.hpp"
 #include "support/program/feed/node_target.hpp"
 #include "support/robot/drifting_robot.hpp"
 #include "tutti/program/feed/feed_client.hpp"
+#include "tutti/program/feed/local_client.hpp"
 
 namespace tutti::program {
 namespace live_feed_test {
@@ -222,6 +225,90 @@ TEST(LiveFeed, SaysTheEndBeforeItGoes) {
   front.note_stored();
   feed->reset();
   EXPECT_TRUE(client.hear().has_ended());
+}
+
+FeedHello of_ros() {
+  FeedHello out{.version = kFeedVersion, .client = "ros", .sensors = intake::FeedSensors{.scans = true}};
+  out.ros = std::optional(FeedRos{});
+  return out;
+}
+intake::RawMessage odometry_at(int i, std::string& bytes) {
+  using namespace intake::test;
+  bytes = intake::test::odometry(kStart + i * kPeriod, 0.1 * i, "odom", "base_link");
+  return {"/odom", "nav_msgs/msg/Odometry", "cdr", bytes};
+}
+template <class Kind>
+int count(const std::vector<FromRobot>& said) {
+  return static_cast<int>(
+      std::ranges::count_if(said, [](const auto& one) { return std::holds_alternative<Kind>(one); }));
+}
+
+/// In the robot's process, without the socket: answered at once, while others listen at the socket.
+TEST(LocalClient, FeedsInMemoryAndOthersListen) {
+  const std::string path = testing::TempDir() + "live_feed_local_" + std::to_string(getpid());
+  test::NodeTarget robot;
+  auto feed = LiveFeed::open(path, {}, robot.state());
+  ASSERT_TRUE(feed.has_value()) << feed.error().message;
+  Client listener(path);
+  listener.say(test::hello(true));
+  EXPECT_TRUE(listener.hear().has_welcome());
+  EXPECT_TRUE(listener.hear().has_situation());
+  auto client = LocalClient::join(**feed, of_ros());
+  ASSERT_TRUE(client.has_value()) << client.error().message;
+  EXPECT_EQ(count<FeedWelcome>((*client)->hear().value()), 1);
+  std::string bytes;
+  for (int i = 0; i < 10; ++i) {
+    (*client)->say(odometry_at(i, bytes));
+    const auto said = (*client)->hear().value();
+    EXPECT_EQ(count<FeedAnswer>(said), 1);
+    EXPECT_EQ(count<FeedRaw>(said), 2);  // transform and pose
+    EXPECT_EQ(count<FeedNote>(said), i == 0 ? 1 : 0);
+  }
+  for (int i = 0; i < 10;) i += listener.hear().has_correction() ? 1 : 0;
+  (*client)->say({"/odom", "nav_msgs/msg/Odometry", "cdr", "nonsense"});
+  EXPECT_EQ(count<FeedRefusal>((*client)->hear().value()), 1);
+  while (!(*feed)->is_fed()) std::this_thread::yield();
+
+  Client second(path);
+  second.say(test::hello());
+  EXPECT_NE(second.hear().closed().why().find("feeds this robot already"), std::string::npos);
+  const auto third = LocalClient::join(**feed, of_ros());
+  EXPECT_EQ(count<FeedOver>((*third)->hear().value()), 1);
+  EXPECT_FALSE((*third)->hear().has_value());
+  (*third)->say(odometry_at(10, bytes));  // nobody hears it
+
+  client->reset();
+  Client other(path);
+  other.say(test::hello());
+  EXPECT_TRUE(other.hear().has_welcome());
+  std::size_t samples = 0;
+  while (const auto input = (*feed)->front().take(0.0))
+    samples += std::holds_alternative<node::OdometrySample>(*input) ? 1 : 0;
+  EXPECT_EQ(samples, 10U);
+}
+
+/// Odometry waits for the scan of its time; a scan that does not come is not waited for for ever.
+TEST(LocalClient, HoldsOdometryForItsScans) {
+  using namespace intake::test;
+  const std::string path = testing::TempDir() + "live_feed_held_" + std::to_string(getpid());
+  test::NodeTarget robot;
+  auto feed = LiveFeed::open(path, {}, robot.state());
+  ASSERT_TRUE(feed.has_value()) << feed.error().message;
+  auto client = LocalClient::join(**feed, of_ros());
+  ASSERT_TRUE(client.has_value()) << client.error().message;
+  const auto hold = [&](bool for_scans) {
+    (*client)->use_intake([&](intake::SensorIntake& intake) { intake.hold_odometry(for_scans, false); });
+  };
+  const auto answers = [&] { return count<FeedAnswer>((*client)->hear().value()); };
+  hold(true);
+  std::string bytes;
+  for (int i = 0; i < 3; ++i) (*client)->say(odometry_at(i, bytes));
+  EXPECT_EQ(answers(), 0);
+  bytes = points(kStart + kPeriod, kAtOnce, "base_link");
+  (*client)->say({"/points", "sensor_msgs/msg/PointCloud2", "cdr", bytes});
+  EXPECT_EQ(answers(), 2);
+  hold(false);
+  EXPECT_EQ(answers(), 1);
 }
 
 }  // namespace live_feed_test

@@ -9,7 +9,7 @@
 
 #include "tutti/bags/ros_encode.hpp"
 #include "tutti/model/trajectory.hpp"
-#include "tutti/program/feed/feed_client.hpp"
+#include "tutti/program/feed/from_robot.hpp"
 
 namespace tutti::program {
 

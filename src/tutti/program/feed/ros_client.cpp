@@ -1,19 +1,25 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/program/feed/ros_client.hpp"
 
+#include <fmt/format.h>
+
 #include <utility>
+
+#include "tutti/base/plain_text.hpp"
 
 namespace tutti::program {
 
 namespace {
 
 constexpr const char* kCdr = "cdr";
+constexpr std::size_t kLongest = 80;  // of a name, which is anybody's
 
 }  // namespace
 
 Result<std::unique_ptr<RosClient>> RosClient::make(intake::SensorConfig of_mission, FeedRos ros,
                                                    const std::optional<Timestamp>& newest) {
   auto& [odometry, images] = of_mission;
+  odometry.odometry_frames = ros.odometry_frames;
   odometry.body_frame = ros.body_frame;
   if (ros.covariance) odometry.covariance = *ros.covariance;
   if (ros.T_body_lidar) odometry.T_body_lidar = ros.T_body_lidar;
@@ -42,6 +48,9 @@ std::vector<FeedRaw> RosClient::hear(const FeedAnswer& answer, const Pose3& T_od
     const auto& frames = intake_.odometry().frames();
     const std::string odom = said_.odom_frame.empty() && frames ? frames->odom : said_.odom_frame;
     answers_.emplace(odom, said_.map_frame, said_.tolerance_s);
+    if (frames)
+      intake_.note(fmt::format("odometry comes: {} -> {}; map -> odom is {} -> {}", plain_text(frames->odom, kLongest),
+                               plain_text(frames->body, kLongest), answers_->map_frame(), odom));
     if (way_) answers_->hear(*way_);
     answers_->hear(team_mates_);
   }

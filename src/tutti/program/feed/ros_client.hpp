@@ -25,13 +25,11 @@ class RosClient {
                                                  const std::optional<Timestamp>& newest);
 
   /// Fails when the message is not taken; next() has what is due then.
-  Status add(const FeedRaw& raw) { return intake_.add({raw.topic, raw.type, raw.encoding, raw.bytes}); }
+  Status add(const intake::RawMessage& raw) { return intake_.add(raw); }
   /// SensorIntake::next(). Scans are left out while the last answer wanted none.
   Result<std::optional<intake::Input>> next() { return intake_.next(wants_scan_); }
-  void end() { intake_.end(); }
-  [[nodiscard]] const intake::FeedSensors& sensors() const { return intake_.sensors(); }
-  [[nodiscard]] const std::string& missing() const { return intake_.missing(); }
-  std::vector<std::string> take_notes() { return intake_.take_notes(); }
+  [[nodiscard]] intake::SensorIntake& intake() { return intake_; }
+  [[nodiscard]] const intake::SensorIntake& intake() const { return intake_; }
   /// Tells whether this client, which comes after `before`, has the same cameras and IMU.
   [[nodiscard]] bool has_sensors_of(const FeedRos& before) const;
   [[nodiscard]] const FeedRos& said() const { return said_; }

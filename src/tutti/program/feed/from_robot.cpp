@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/feed/from_robot.hpp"
+
+#include <algorithm>
+
+#include "tutti/v1/feed.pb.h"
+
+namespace tutti::program {
+namespace {
+
+template <class Stamps, class Numbers>
+Trajectory trajectory(const Stamps& stamps, const Numbers& numbers) {
+  Trajectory out;
+  for (int i = 0; i < stamps.size() && 7 * i + 6 < numbers.size(); ++i) {
+    const auto at = [&](int k) { return numbers.Get(7 * i + k); };
+    out.push_back({{stamps.Get(i)}, {Eigen::Quaterniond(at(6), at(3), at(4), at(5)), {at(0), at(1), at(2)}}});
+  }
+  return out;
+}
+
+Pose3 pose(const v1::Feed::Pose& said) {
+  return {Eigen::Quaterniond(said.qw(), said.qx(), said.qy(), said.qz()), {said.x(), said.y(), said.z()}};
+}
+
+FeedAnswer answer(const v1::Feed::Correction& said) {
+  FeedAnswer out{.stamp = {said.stamp_ns()},
+                 .wants_scan = said.wants_scan(),
+                 .stored = said.has_stored() ? std::optional(Timestamp{said.stored_stamp_ns()}) : std::nullopt,
+                 .T_map_body = pose(said.t_map_body()),
+                 .T_map_odom = pose(said.t_map_odom()),
+                 .map_age = {said.map_epoch(), said.map_revision()},
+                 .in_map = said.in_map()};
+  for (int i = 0; i < std::min(36, said.t_map_odom_covariance_size()); ++i)
+    out.covariance(i / 6, i % 6) = said.t_map_odom_covariance(i);
+  return out;
+}
+
+FeedSituation situation(const v1::Feed::Situation& said) {
+  FeedSituation out{.in_map = said.in_map(), .team_mates = {}, .alerts = {}, .status = {}};
+  for (const auto& mate : said.team_mate())
+    out.team_mates.push_back({RobotId{mate.robot()},
+                              mate.name(),
+                              {mate.stamp_ns()},
+                              mate.same_component() ? std::optional(pose(mate.t_map_body())) : std::nullopt});
+  for (const auto& alert : said.alert()) out.alerts.push_back(alert.text());
+  for (const auto& value : said.status()) out.status.emplace_back(value.name(), value.text());
+  return out;
+}
+
+FromRobot read(const v1::Feed& message) {
+  switch (message.what_case()) {
+    case v1::Feed::kWelcome: {
+      const auto& welcome = message.welcome();
+      return FeedWelcome{welcome.robot_name(),
+                         welcome.has_odometry() ? std::optional(Timestamp{welcome.last_stamp_ns()}) : std::nullopt,
+                         pose(welcome.t_map_odom())};
+    }
+    case v1::Feed::kCorrection:
+      return answer(message.correction());
+    case v1::Feed::kJump:
+      return FeedJump{message.jump().translation_m(), message.jump().why()};
+    case v1::Feed::kSituation:
+      return situation(message.situation());
+    case v1::Feed::kTimeAnswer: {
+      const auto& said = message.time_answer();
+      return FeedProgress{said.has_stored() ? std::optional(Timestamp{said.stored_stamp_ns()}) : std::nullopt};
+    }
+    case v1::Feed::kRefused:
+      return FeedRefusal{{message.refused().stamp_ns()}, message.refused().why()};
+    case v1::Feed::kWay: {
+      const auto& way = message.way();
+      return FeedWay{{way.map_epoch(), way.map_revision()},
+                     way.constraints(),
+                     trajectory(way.stamp_ns(), way.t_map_body()),
+                     trajectory(way.map_stamp_ns(), way.t_world_body())};
+    }
+    case v1::Feed::kEnded:
+      return FeedEnd{};
+    case v1::Feed::kRaw: {
+      const auto& raw = message.raw();
+      return FeedRaw{raw.topic(), raw.type(), raw.encoding(), raw.data()};
+    }
+    case v1::Feed::kNote:
+      return FeedNote{message.note().text()};
+    case v1::Feed::kClosed:
+      return FeedOver{message.closed().why()};
+    default:
+      return FeedOther{};
+  }
+}
+
+}  // namespace
+
+Result<FromRobot> decode_from_robot(const std::string& payload) {
+  v1::Feed message;
+  if (!message.ParseFromString(payload)) return fail(ErrorCode::parse, "the robot says what is no message");
+  return read(message);
+}
+
+}  // namespace tutti::program
