@@ -172,9 +172,8 @@ void add_robot_command(CLI::App& app, int& exit_code) {
     }
     exit_code = run_program("robot", *common, options->console, [&]() -> Status {
       if (Status told = lab::tell_robot(common->mission, *options); !told) return told;
-      if (!wants_ros(*ros)) return program::run_robot(*options, program::stop_asked());
-      const auto on_ros = start_ros(*ros, *options);
-      if (!on_ros) return tl::unexpected(on_ros.error());
+      if (wants_ros(*ros))
+        if (Status ok = feed_from_ros(*ros, *options); !ok) return ok;
       return program::run_robot(*options, program::stop_asked());
     });
   });

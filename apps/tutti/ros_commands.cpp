@@ -220,7 +220,7 @@ std::function<void(program::Level, const std::string&)> log_of(const std::string
 
 }  // namespace
 
-Result<std::shared_ptr<void>> start_ros(const RosArguments& arguments, const program::RobotOptions& options) {
+Status feed_from_ros(const RosArguments& arguments, program::RobotOptions& options) {
   const bool takes_images = arguments.has_images ? !arguments.images.empty() : options.settings.with_images;
   for (const auto& [option, topic] : {std::pair("--imu", arguments.imu), std::pair("--depth", arguments.depth)})
     if (!takes_images && !topic.empty())
@@ -232,9 +232,7 @@ Result<std::shared_ptr<void>> start_ros(const RosArguments& arguments, const pro
   const auto participant = join_domain(options.bus.allow_insecure);
   if (!participant) return tl::unexpected(participant.error());
   ros::RosRobotOptions ros = arguments.robot;
-  ros.socket = options.feed;
   ros.name_space = arguments.has_name_space ? arguments.name_space : options.name;
-  ros.intake = options.settings.sensors.odometry;
   if (takes_images) {
     ros.images = options.settings.sensors.images;
     ros.images->images = arguments.images;
@@ -242,12 +240,16 @@ Result<std::shared_ptr<void>> start_ros(const RosArguments& arguments, const pro
     ros.images->with_depth = !arguments.has_depth || !arguments.depth.empty();
     ros.images->imu = arguments.imu;
   }
-  (arguments.odometry.find("->") == std::string::npos ? ros.odometry : ros.intake.odometry_frames) = arguments.odometry;
+  (arguments.odometry.find("->") == std::string::npos ? ros.odometry : ros.odometry_frames) = arguments.odometry;
   ros.who = "tutti robot --ros " + options.version;
   ros.say = log_of(options.name + " ros", options.console);
   auto robot = ros::RosRobot::open(std::move(ros), *participant);
   if (!robot) return tl::unexpected(robot.error());
-  return std::shared_ptr<void>(std::move(*robot));
+  options.beside_feed = [robot = std::shared_ptr<ros::RosRobot>(std::move(*robot))](program::LiveFeed& feed) {
+    robot->begin(feed);
+    return std::shared_ptr<void>(robot.get(), [robot](void*) { robot->end(); });
+  };
+  return {};
 }
 
 Status show_on_ros(const RosArguments& arguments, program::ServerOptions& options) {

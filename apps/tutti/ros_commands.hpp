@@ -25,9 +25,9 @@ std::shared_ptr<RosArguments> add_ros_robot_options(CLI::App& robot);
 std::shared_ptr<RosArguments> add_ros_server_options(CLI::App& server);
 bool wants_ros(const RosArguments& arguments);
 
-/// Feeds the robot with messages from ROS's topics until the returned value is destroyed. `options` must have its feed.
-/// Fails when the topics cannot be opened.
-Result<std::shared_ptr<void>> start_ros(const RosArguments& arguments, const program::RobotOptions& options);
+/// Sets RobotOptions::beside_feed, so that the robot is fed with messages from ROS's topics. Fails when the topics
+/// cannot be opened.
+Status feed_from_ros(const RosArguments& arguments, program::RobotOptions& options);
 /// Sets ServerOptions::view, so that the server's map is published on ROS's topics.
 Status show_on_ros(const RosArguments& arguments, program::ServerOptions& options);
 

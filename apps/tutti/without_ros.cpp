@@ -33,7 +33,7 @@ std::shared_ptr<RosArguments> add_ros_robot_options(CLI::App& robot) { return ad
 std::shared_ptr<RosArguments> add_ros_server_options(CLI::App& server) { return add_ros(server); }
 bool wants_ros(const RosArguments& arguments) { return arguments.wanted; }
 
-Result<std::shared_ptr<void>> start_ros(const RosArguments&, const program::RobotOptions&) {
+Status feed_from_ros(const RosArguments&, program::RobotOptions&) {
   return fail(ErrorCode::configuration, "--ros: {}", kWithout);
 }
 Status show_on_ros(const RosArguments&, program::ServerOptions&) {

@@ -81,6 +81,7 @@ class RobotProgram {
   std::string alone_;                         // as it was told last
   std::optional<Clock> clock_;
   std::unique_ptr<LiveFeed> feed_;  // null: it replays
+  std::shared_ptr<void> feeder_;    // RobotOptions::beside_feed
   FeedFront::Load load_;            // as it was told last
   bool odometry_refused_ = false;   // as it was told last
   std::optional<Host> host_;
@@ -134,6 +135,7 @@ Status RobotProgram::open_feed(const node::RobotNode& node) {
   auto feed = LiveFeed::open(options_.feed, options_.feed_access, view().state(node), options_.settings.sensors);
   if (!feed) return tl::unexpected(feed.error());
   feed_ = std::move(*feed);
+  if (options_.beside_feed) feeder_ = options_.beside_feed(*feed_);
   return {};
 }
 

@@ -4,6 +4,8 @@
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,7 +16,7 @@
 #include "tutti/intake/sensor_intake.hpp"
 #include "tutti/perception/visual/frontend/tracking_source.hpp"
 #include "tutti/program/event_log.hpp"
-#include "tutti/program/feed/feed_server.hpp"
+#include "tutti/program/feed/live_feed.hpp"
 #include "tutti/program/robot_driver.hpp"
 #include "tutti/program/robot_store.hpp"
 #include "tutti/robot/agent.hpp"
@@ -49,6 +51,8 @@ struct RobotOptions {
   ReplayMaker replay;       ///< Makes the robot that replays the recording.
   double duration_s = 0.0;  ///< Duration of the mission; not used when the robot is fed.
   FeedAccess feed_access;
+  /// Called with the feed of a robot that is fed: starts what feeds it in this process, until the result is destroyed.
+  std::function<std::shared_ptr<void>(LiveFeed&)> beside_feed;
   double rate = 1.0;                                          ///< Mission time per wall time.
   double uplink_bytes_per_s = 0.0;                            ///< Per second of mission time, for submaps; 0: no limit.
   std::uint64_t max_archive_bytes = std::uint64_t{1} << 30U;  ///< Size of the archive of submaps that the server has.

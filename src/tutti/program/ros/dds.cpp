@@ -166,17 +166,19 @@ bool Writer::wait_for_acknowledgments(double wall_s) {
 
 Reader::~Reader() { dds_delete(entity_); }
 
-void Reader::take(const std::function<void(const Message&)>& visit) {
+void Reader::take(const std::function<void(const Message&)>& visit, std::size_t most) {
   std::array<ddsi_serdata*, kTaken> data{};
   std::array<dds_sample_info_t, kTaken> info{};
-  while (true) {
-    const dds_return_t count = dds_takecdr(entity_, data.data(), kTaken, info.data(), DDS_ANY_STATE);
+  while (most > 0) {
+    const auto wanted = static_cast<std::uint32_t>(std::min<std::size_t>(most, kTaken));
+    const dds_return_t count = dds_takecdr(entity_, data.data(), wanted, info.data(), DDS_ANY_STATE);
     for (dds_return_t i = 0; i < count; ++i) {
       const auto at = static_cast<std::size_t>(i);
       if (info[at].valid_data) visit({internal::bytes_of(data[at]), {info[at].source_timestamp}});
       ddsi_serdata_unref(data[at]);
     }
-    if (count < static_cast<dds_return_t>(kTaken)) return;
+    if (count < static_cast<dds_return_t>(wanted)) return;
+    most -= wanted;
   }
 }
 

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -70,8 +72,9 @@ class Reader {
   ~Reader();
   Reader(const Reader&) = delete;
   Reader& operator=(const Reader&) = delete;
-  /// Visits all messages that have arrived, in order. The bytes live only during the visit.
-  void take(const std::function<void(const Message&)>& visit);
+  /// Visits the messages that have arrived, in order, `most` at most. The bytes live only during the visit.
+  void take(const std::function<void(const Message&)>& visit, std::size_t most = kAll);
+  static constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
   [[nodiscard]] std::size_t writers() const;
   /// Names the writers that cannot be heard because their QoS does not offer what this reader requests; empty when
   /// there are none.

@@ -10,66 +10,45 @@ namespace tutti::ros {
 
 Status RobotTopics::open() {
   struct Topic {
-    std::unique_ptr<Writer>& out;
     const char *name, *type;
     Qos qos;
   };
-  for (const Topic& topic : {Topic{tf_, "/tf", kTfType, kTfQos},
-                             {pose_, "corrected_pose", "geometry_msgs/msg/PoseWithCovarianceStamped", {}},
-                             {path_, "corrected_path", "nav_msgs/msg/Path", kLatchedQos},
-                             {mates_, "team_mates", "visualization_msgs/msg/MarkerArray", kLatchedQos},
-                             {diagnostics_, "/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", {}}}) {
-    auto made = writer(topic.name, topic.type, topic.qos);
-    if (!made) return tl::unexpected(made.error());
-    topic.out = std::move(*made);
-  }
+  for (const auto& [name, type, qos] : {Topic{kTf, kTfType, kTfQos},
+                                        {"corrected_pose", "geometry_msgs/msg/PoseWithCovarianceStamped", {}},
+                                        {kPath, "nav_msgs/msg/Path", kLatchedQos},
+                                        {"team_mates", "visualization_msgs/msg/MarkerArray", kLatchedQos},
+                                        {kDiagnostics, "diagnostic_msgs/msg/DiagnosticArray", {}}})
+    if (Status ok = open(name, type, qos); !ok) return ok;
+  return {};
+}
+
+Status RobotTopics::open(const std::string& topic, const std::string& type, const Qos& qos) {
+  const auto name = resolve(topic, name_space_);
+  if (!name) return tl::unexpected(name.error());
+  auto made = participant_->writer(*name, type, qos, bags::ros_type_hash(type));
+  if (!made) return tl::unexpected(made.error());
+  writers_[topic] = std::move(*made);
   return {};
 }
 
 bool RobotTopics::open_own_tf() {
-  if (own_tf_) return false;
-  auto made = writer("tf", kTfType, kTfQos);
-  if (!made) {
-    complaints_.add("tf", tl::unexpected(made.error()));
-    return false;
-  }
-  own_tf_ = std::move(*made);
-  return true;
+  constexpr const char* kOwnTf = "tf";
+  if (writers_.contains(kOwnTf)) return false;
+  const Status ok = open(kOwnTf, kTfType, kTfQos);
+  complaints_.add(kOwnTf, ok);
+  if (ok) std::swap(writers_[kTf], writers_[kOwnTf]);  // the other one stays open
+  return ok.has_value();
 }
 
-Result<std::unique_ptr<Writer>> RobotTopics::writer(const std::string& topic, const std::string& type, const Qos& qos) {
-  const auto name = resolve(topic, name_space_);
-  if (!name) return tl::unexpected(name.error());
-  return participant_->writer(*name, type, qos, bags::ros_type_hash(type));
-}
-
-void RobotTopics::publish_pose(program::RosAnswers& answers) {
-  if (const auto transform = answers.transform())
-    complaints_.add("map -> odom", (own_tf_ ? own_tf_ : tf_)->write(*transform));
-  complaints_.add("corrected_pose", pose_->write(answers.pose()));
-}
-
-bool RobotTopics::publish_path(const program::RosAnswers& answers) {
-  if (path_->readers() == 0) return false;
-  complaints_.add("corrected_path", path_->write(answers.path()));
-  return true;
-}
-
-void RobotTopics::publish_team_mates(const program::RosAnswers& answers) {
-  complaints_.add("team_mates", mates_->write(answers.team_mates()));
-  for (const auto& [name, cdr] : answers.team_mate_poses()) {
-    std::unique_ptr<Writer>& out = mate_poses_[name];
-    if (!out) {
-      auto made = writer("team_mates/" + name + "/pose", "geometry_msgs/msg/PoseStamped", kLatchedQos);
-      if (!made) return complaints_.add("team_mates", tl::unexpected(made.error()));
-      out = std::move(*made);
-    }
-    complaints_.add("team_mates", out->write(cdr));
-  }
+void RobotTopics::publish(const program::FeedRaw& message) {
+  if (!writers_.contains(message.topic))  // one for each team-mate
+    if (const Status ok = open(message.topic, message.type, kLatchedQos); !ok)
+      return complaints_.add(message.topic, ok);
+  complaints_.add(message.topic, writers_.at(message.topic)->write(message.bytes));
 }
 
 void RobotTopics::publish(const bags::RosDiagnostic& diagnostic, Timestamp now) {
-  complaints_.add("/diagnostics", diagnostics_->write(bags::encode({now, ""}, std::span(&diagnostic, 1))));
+  complaints_.add(kDiagnostics, writers_.at(kDiagnostics)->write(bags::encode({now, ""}, std::span(&diagnostic, 1))));
 }
 
 }  // namespace tutti::ros

@@ -9,7 +9,7 @@
 #include "tutti/bags/ros_encode.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/base/timestamp.hpp"
-#include "tutti/program/feed/ros_answers.hpp"
+#include "tutti/program/feed/feed_frames.hpp"
 #include "tutti/program/ros/complaints.hpp"
 #include "tutti/program/ros/dds.hpp"
 
@@ -23,24 +23,23 @@ class RobotTopics {
       : name_space_(std::move(name_space)), participant_(std::move(participant)), complaints_(complaints) {}
   /// To be called before anything is published.
   Status open();
-  /// From now on map -> odom is published where the robot has a tree of transforms of its own; true the first time.
+  /// From now on transforms are published where the robot has a tree of transforms of its own; true the first time.
   bool open_own_tf();
 
-  /// map -> odom, unless its stamp was published already, and the pose on the map.
-  void publish_pose(program::RosAnswers& answers);
-  /// False when nobody would hear it.
-  bool publish_path(const program::RosAnswers& answers);
-  void publish_team_mates(const program::RosAnswers& answers);
+  /// A message of the robot's, on a topic below the namespace.
+  void publish(const program::FeedRaw& message);
+  /// Somebody would hear it.
+  [[nodiscard]] bool is_path_wanted() const { return writers_.at(kPath)->readers() > 0; }
   void publish(const bags::RosDiagnostic& diagnostic, Timestamp now);
 
  private:
-  Result<std::unique_ptr<Writer>> writer(const std::string& topic, const std::string& type, const Qos& qos);
+  static constexpr const char *kTf = "/tf", *kPath = "corrected_path", *kDiagnostics = "/diagnostics";
+  Status open(const std::string& topic, const std::string& type, const Qos& qos);
 
   std::string name_space_;
   std::shared_ptr<Participant> participant_;
   Complaints& complaints_;
-  std::unique_ptr<Writer> tf_, own_tf_, pose_, path_, mates_, diagnostics_;
-  std::map<std::string, std::unique_ptr<Writer>> mate_poses_;
+  std::map<std::string, std::unique_ptr<Writer>> writers_;  ///< By topic, as the robot calls it.
 };
 
 }  // namespace tutti::ros

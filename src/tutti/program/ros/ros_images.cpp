@@ -8,12 +8,12 @@
 
 #include "tutti/bags/ros_definitions.hpp"
 #include "tutti/program/clock.hpp"
+#include "tutti/program/ros/image_topics.hpp"
 
 namespace tutti::ros {
 namespace {
 
 constexpr double kLook_s = 0.5;  // what is published together is discovered together
-constexpr double kLongest_s = 5.0;
 
 /// "sensor_msgs/msg/Image and CompressedImage that are published: /a, /b"
 std::string images_of(const std::vector<Publication>& published) {
@@ -26,18 +26,24 @@ std::string images_of(const std::vector<Publication>& published) {
 
 }  // namespace
 
-RosImages::RosImages(Options options, std::shared_ptr<Participant> participant, const intake::RosIntake& odometry,
-                     Complaints& complaints)
+RosImages::RosImages(Options options, std::shared_ptr<Participant> participant, Complaints& complaints)
     : options_(std::move(options)),
       participant_(std::move(participant)),
-      odometry_(odometry),
       complaints_(complaints),
       begin_s_(program::Clock::steady_s()) {}
 
-/// What is chosen by type must be the same twice: of two cameras one may be discovered first.
-void RosImages::look(double now_s) {
+void RosImages::look(program::LocalClient& client) {
+  const double now_s = program::Clock::steady_s();
   if (now_s - looked_s_ < kLook_s) return;
   looked_s_ = now_s;
+  if (readers_.empty())
+    find(client, now_s);
+  else
+    give_up(client, now_s);
+}
+
+/// What is chosen by type must be the same twice: of two cameras one may be discovered first.
+void RosImages::find(program::LocalClient& client, double now_s) {
   const std::vector<Publication> published = participant_->publications();
   const auto topics = find_images(published, options_.config);
   if (!topics) return complaints_.add("no images are used", tl::unexpected(topics.error()));
@@ -46,9 +52,10 @@ void RosImages::look(double now_s) {
   const bool is_same = seen_ == *topics && seen_imu_ == imu.value_or("");
   seen_ = *topics;
   seen_imu_ = imu.value_or("");
-  if (!topics->empty() && *topics == refused_) return complaints_.add("no images are used", why_refused_);
+  if (!topics->empty() && *topics == refused_) return;
   if (!topics->empty() && is_same) {
-    if (const Status ok = subscribe(*topics, seen_imu_); !ok) complaints_.add("no images are used", ok);
+    if (const Status ok = subscribe(*topics, seen_imu_); !ok) return complaints_.add("no images are used", ok);
+    client.use_intake([&](intake::SensorIntake& robot) { robot.take_images(options_.config, *topics, seen_imu_); });
     begin_s_ = now_s;
   } else if (topics->empty() && said_.empty() && now_s - begin_s_ > options_.patience_s) {
     std::vector<std::string> named = options_.config.images;
@@ -61,107 +68,41 @@ void RosImages::look(double now_s) {
 }
 
 Status RosImages::subscribe(const std::vector<intake::CameraTopics>& topics, const std::string& imu) {
-  const auto make = [&](const std::string& topic, const char* type, int depth) {
+  std::vector<std::unique_ptr<Reader>> readers;
+  const auto add = [&](const std::string& topic, const char* type, int depth) -> Status {
     const Qos qos{.reliable = options_.lossless, .latched = false, .depth = options_.lossless ? 0 : depth};
-    return participant_->reader(topic, type, qos, bags::ros_type_hash(type));
+    auto made = participant_->reader(topic, type, qos, bags::ros_type_hash(type));
+    if (!made) return tl::unexpected(made.error());
+    readers.push_back(std::move(*made));
+    return {};
   };
   constexpr int kImagesDepth = 10, kImuDepth = 2000;  // how long this thread may be held up
-  std::vector<std::unique_ptr<Reader>> images, infos;
   for (const intake::CameraTopics& topic : topics) {
-    auto info = make(topic.info, intake::kCameraInfoType, kImagesDepth);
-    if (!info) return tl::unexpected(info.error());
-    auto image = make(topic.images, topic.is_compressed ? intake::kCompressedType : intake::kImageType, kImagesDepth);
-    if (!image) return tl::unexpected(image.error());
-    infos.push_back(std::move(*info));
-    images.push_back(std::move(*image));
+    if (Status ok = add(topic.info, intake::kCameraInfoType, kImagesDepth); !ok) return ok;
+    const char* const type = topic.is_compressed ? intake::kCompressedType : intake::kImageType;
+    if (Status ok = add(topic.images, type, kImagesDepth); !ok) return ok;
   }
-  if (!imu.empty()) {
-    auto samples = make(imu, intake::kImuType, kImuDepth);
-    if (!samples) return tl::unexpected(samples.error());
-    imu_ = std::move(*samples);
-  }
-  images_ = std::move(images);
-  infos_ = std::move(infos);
-  intake_.emplace(options_.config, topics, imu, odometry_);
-  first_image_s_ = 0.0;
+  if (!imu.empty())
+    if (Status ok = add(imu, intake::kImuType, kImuDepth); !ok) return ok;
+  readers_ = std::move(readers);
   return {};
 }
 
-/// Keeps the readers of what is used; where nothing can be chosen, none.
-void RosImages::choose(double now_s) {
-  if (first_image_s_ == 0.0 && intake_->has_any_image()) first_image_s_ = now_s;
-  const bool is_late = first_image_s_ > 0.0 && now_s - first_image_s_ > options_.patience_s;
-  const auto chosen = intake_->choose(is_late);
-  if (!chosen) {
-    refused_ = seen_;
-    why_refused_ = tl::unexpected(chosen.error());
-    complaints_.add("no images are used", why_refused_);
-    images_.clear(), infos_.clear(), imu_.reset(), intake_.reset();
-    return;
-  }
-  if (!*chosen) return;
-  for (std::size_t i = 0; i < images_.size(); ++i)
-    if (!intake_->uses(i)) images_[i].reset(), infos_[i].reset();
-  options_.say(program::Level::info,
-               fmt::format("takes images of {}, {}", intake_->in_words(), seen_imu_.empty() ? "no IMU" : seen_imu_));
-  if (!intake_->note().empty()) options_.say(program::Level::warning, intake_->note());
+/// Where no cameras can be chosen of these topics, all.
+void RosImages::give_up(program::LocalClient& client, double now_s) {
+  std::string missing;
+  client.use_intake([&](const intake::SensorIntake& robot) {
+    if (!robot.may_see()) refused_ = seen_;
+    std::erase_if(readers_, [&](const auto& reader) { return !robot.wants(reader->topic()); });
+    missing = robot.missing();
+  });
+  const bool is_final = readers_.empty();
+  if (missing.empty() || missing == said_ || (!is_final && now_s - begin_s_ < options_.patience_s)) return;
+  options_.say(program::Level::warning, said_ = std::move(missing));
 }
 
-void RosImages::take() {
-  const double now_s = program::Clock::steady_s();
-  if (!intake_) return look(now_s);
-  const auto take = [&](Reader& reader, const auto& add) {
-    reader.take([&](const Message& message) { complaints_.add(reader.topic(), add(message.cdr)); });
-  };
-  for (std::size_t i = 0; i < images_.size(); ++i) {
-    if (!images_[i]) continue;
-    if (infos_[i]) take(*infos_[i], [&](std::string_view cdr) { return intake_->add_info(i, cdr); });
-    if (intake_->has_info(i)) infos_[i].reset();  // the first counts
-    take(*images_[i], [&](std::string_view cdr) { return intake_->add_image(i, cdr); });
-  }
-  if (imu_) take(*imu_, [&](std::string_view cdr) { return intake_->add_imu(cdr); });
-  if (!intake_->is_chosen()) choose(now_s);
-  if (!intake_) return;
-  if (now_s - looked_s_ < kLook_s || now_s - begin_s_ < options_.patience_s) return;
-  looked_s_ = now_s;
-  if (std::string missing = intake_->missing(); !missing.empty() && missing != said_)
-    options_.say(program::Level::warning, said_ = std::move(missing));
-}
-
-void RosImages::describe(intake::FeedSensors& sensors) const {
-  if (intake_) intake_->describe(sensors);
-}
-
-bool RosImages::holds_odometry() const {
-  const auto waiting = odometry_.waiting();
-  if (!waiting || waiting->second - waiting->first > kLongest_s) return false;
-  intake::FeedSensors sensors;
-  describe(sensors);
-  return sensors.cameras.empty() || !intake_->reaches(waiting->first);
-}
-
-bool RosImages::feed(program::FeedClient& client, const intake::FeedSensors& sensors, Timestamp stamp,
-                     Unstored& unstored) {
-  if (!intake_ || sensors.cameras.empty()) return true;
-  const auto is_said = [&](const Status& status) {
-    if (!status) complaints_.add(intake_->in_words(), status);
-    return status || status.error().code != ErrorCode::io;
-  };
-  while (sensors.imu) {
-    const std::vector<ImuSample> samples = intake_->next_imu(stamp);
-    if (samples.empty()) break;
-    if (!is_said(client.say(samples))) return false;
-  }
-  while (true) {
-    const auto images = intake_->next_images(stamp);
-    if (!images) {
-      complaints_.add(intake_->in_words(), tl::unexpected(images.error()));
-      continue;
-    }
-    if (!*images) return true;
-    unstored.add((*images)->stamp, intake::bytes_of(**images));
-    if (!is_said(client.say(**images))) return false;
-  }
+void RosImages::take(const std::function<void(Reader&)>& take) const {
+  for (const std::unique_ptr<Reader>& reader : readers_) take(*reader);
 }
 
 }  // namespace tutti::ros

@@ -34,7 +34,6 @@ class RosRobots : public ::testing::Test {
     program::FeedState state{.chain = {RobotId{0}, 1}, .name = "alpha"};
     state.wants_scan = true;
     feed_ = program::LiveFeed::open(socket_, {}, state).value();
-    options.socket = socket_;
     options.name_space = "alpha";
     options.patience_s = 0.2;
     options.say = [this](program::Level, const std::string& text) {
@@ -42,6 +41,7 @@ class RosRobots : public ::testing::Test {
       said_ += text + "\n";
     };
     robot_ = RosRobot::open(std::move(options), test::join_loopback()).value();
+    robot_->begin(*feed_);
   }
   bool is_said(const std::string& part) {
     return ::tutti::test::within(kPatience_s, [&] {
@@ -168,7 +168,7 @@ TEST_F(RosRobots, TheBatteryIsReported) {
 
 /// Cameras are found by type; until their place is known, odometry is answered without them.
 TEST_F(RosRobots, ImagesAndImuAreFedOnceTheirPlaceIsKnown) {
-  start({.images = intake::ImagesConfig{}, .intake = {}});
+  start({.images = intake::ImagesConfig{}});
   const auto odom = publisher("/alpha/odom", kOdometry),
              camera = publisher("/alpha/front/image_raw", intake::kImageType),
              info = publisher("/alpha/front/camera_info", intake::kCameraInfoType),
@@ -213,7 +213,7 @@ TEST_F(RosRobots, ImagesAndImuAreFedOnceTheirPlaceIsKnown) {
 TEST_F(RosRobots, TransformsInTheNamespaceAreHeardAndAnsweredThere) {
   const auto all = me_->reader("/tf", kTf, test::kKeepAll, "").value(),
              own = me_->reader("/alpha/tf", kTf, test::kKeepAll, "").value();
-  start({.odometry = "", .intake = {.odometry_frames = "odom->base_link"}});
+  start({.odometry = "", .odometry_frames = "odom->base_link"});
   const auto tf = publisher("/alpha/tf", kTf, kTfQos), still = publisher("/alpha/tf_static", kTf, kStaticTfQos);
   const auto cloud = publisher("/alpha/points", kPoints);
   ASSERT_TRUE(is_heard(*tf) && is_heard(*still) && is_heard(*cloud));
@@ -293,8 +293,7 @@ TEST_F(RosRobots, WhenOdometryEndsTheRecordingHas) {
 
 TEST_F(RosRobots, NamesThatAreNoneAreRefused) {
   for (const char* name : {"a b", "7"}) {
-    const auto robot =
-        RosRobot::open({.socket = socket_, .name_space = name, .say = [](auto, auto&) {}}, test::join_loopback());
+    const auto robot = RosRobot::open({.name_space = name, .say = [](auto, auto&) {}}, test::join_loopback());
     EXPECT_EQ(robot.error().code, ErrorCode::configuration);
   }
 }
