@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/estimation/internal/selected_inverse.hpp"
 
+#include <cblas.h>
+#include <lapacke.h>
+
 #include <algorithm>
 
 #include "tutti/base/check.hpp"
+#include "tutti/base/single_thread.hpp"
 
 namespace tutti::estimation::internal {
 namespace {
@@ -38,25 +42,30 @@ SelectedInverse::SelectedInverse(const BlockCholesky::Columns& factor) {
     panels_.push_back(std::move(panel));
     j = end;
   }
+  const SingleThread single_thread;
   for (auto panel = panels_.rbegin(); panel != panels_.rend(); ++panel) invert(*panel);
 }
 
+/// With BLAS, as CHOLMOD: Eigen's products of this size take several times as long where it is compiled for any machine.
 void SelectedInverse::invert(Panel& panel) {
   const int w = panel.columns;
-  const int m = static_cast<int>(panel.rows.size()) - w;
-  Eigen::MatrixXd L_inverse = Eigen::MatrixXd::Identity(w, w);
-  panel.values.topRows(w).triangularView<Eigen::Lower>().solveInPlace(L_inverse);
-  Eigen::MatrixXd Z_JJ = L_inverse.transpose() * L_inverse;
+  const int height = static_cast<int>(panel.rows.size()), m = height - w;
+  const double* const L = panel.values.data();  // L_JJ, and L_IJ below
+  Eigen::MatrixXd Z_JJ = panel.values.topRows(w);
+  LAPACKE_dpotri_work(LAPACK_COL_MAJOR, 'L', w, Z_JJ.data(), w);  // (L_JJ L_JJ^T)^-1, of which the lower half
   if (m > 0) {
     Eigen::Map<Eigen::MatrixXd> Y = workspace(scaled_, m, w);
-    Y.noalias() = panel.values.bottomRows(m) * L_inverse;
-    panel.values.bottomRows(m).noalias() = -(gather_below(panel) * Y);
-    Z_JJ.noalias() -= Y.transpose() * panel.values.bottomRows(m);
+    Y = panel.values.bottomRows(m);
+    cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasNoTrans, CblasNonUnit, m, w, 1.0, L, height, Y.data(), m);
+    const double* const Z_II = gather_below(panel).data();
+    double* const Z_IJ = panel.values.data() + w;
+    cblas_dsymm(CblasColMajor, CblasLeft, CblasLower, m, w, -1.0, Z_II, m, Y.data(), m, 0.0, Z_IJ, height);
+    cblas_dgemm(CblasColMajor, CblasTrans, CblasNoTrans, w, w, m, -1.0, Y.data(), m, Z_IJ, height, 1.0, Z_JJ.data(), w);
   }
-  panel.values.topRows(w) = 0.5 * (Z_JJ + Z_JJ.transpose());
+  panel.values.topRows(w) = Z_JJ.selfadjointView<Eigen::Lower>();
 }
 
-/// Z_II. All its entries lie in the pattern of L (the rows of a column are a clique after filling).
+/// The lower half of Z_II. All its entries lie in the pattern of L (the rows of a column are a clique after filling).
 Eigen::Map<Eigen::MatrixXd> SelectedInverse::gather_below(const Panel& panel) {
   const auto begin = panel.rows.begin() + panel.columns;
   const int m = static_cast<int>(panel.rows.end() - begin);
@@ -76,7 +85,6 @@ Eigen::Map<Eigen::MatrixXd> SelectedInverse::gather_below(const Panel& panel) {
       for (int r = std::max(c, group); r < m; ++r) target[r] = column[index[r]];
     }
   }
-  Z.triangularView<Eigen::StrictlyUpper>() = Z.transpose();
   return Z;
 }
 
