@@ -170,7 +170,7 @@ void note_what_the_map_lacks(const server::MapEstimate& map, MissionRecord& reco
   if (map.spare_pairs > 0)
     record.notes.push_back(
         fmt::format("{} pairs of submaps have closures that the map does not need and that were not judged "
-                    "(server.map.most_closed_pairs)",
+                    "(server.map.most_closed_pairs, server.map.most_pairs_in_all)",
                     map.spare_pairs));
 }
 

@@ -126,7 +126,8 @@ JudgedGraph judge_graph(const RobotGraph& graph, const MapConfig& config) {
   check(graph);
   const Submaps submaps(graph);
   MapConfig all_judged = config;
-  all_judged.most_closed_pairs = std::numeric_limits<int>::max();  // a submap here is a whole way, not 10 s of one
+  // A submap here is a whole trajectory, not 10 s of one.
+  all_judged.most_closed_pairs = all_judged.most_pairs_in_all = std::numeric_limits<int>::max();
   JudgedGraph out{.map = estimate_map(submaps.submaps(), submaps.verdicts(), all_judged), .edges = {}};
   out.edges.resize(graph.graph.edges.size());
   for (std::size_t e = 0; e < out.edges.size(); ++e) out.edges[e].odometry = submaps.is_step(e);

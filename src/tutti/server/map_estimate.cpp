@@ -231,7 +231,9 @@ MapEstimate estimate_together(const SubmapSet& submaps, const VerdictSet& verdic
                               const WordSet& words, const std::set<SubmapPair>& refuted) {
   MapEstimate map;
   const judge::NodeIndex index = attach_submaps(submaps, map);
-  const auto spare = spare_pairs(verdicts, submaps, static_cast<std::size_t>(config.most_closed_pairs));
+  const auto spare = spare_pairs(verdicts, submaps,
+                                 {.with_one_chain = static_cast<std::size_t>(config.most_closed_pairs),
+                                  .in_all = static_cast<std::size_t>(config.most_pairs_in_all)});
   map.spare_pairs = spare.size();
   judge::Closures closures = collect_closures(verdicts, words, submaps, index, spare, refuted);
   const std::vector<LoopClosure> stated = closures.judged;

@@ -97,6 +97,7 @@ struct MapConfig {
   bool judge_closures = true;
   bool judge_odometry = true;
   int most_closed_pairs = 40;
+  int most_pairs_in_all = 12000;
   GeoreferenceConfig georeference;
   template <class V>
   void describe(V& v) {
@@ -107,6 +108,10 @@ struct MapConfig {
     v.field("most_closed_pairs", most_closed_pairs, at_least(1),
             "A submap that closures tie to more submaps of one robot than this does not have all judged "
             "(spare_pairs.hpp).");
+    v.field(
+        "most_pairs_in_all", most_pairs_in_all, at_least(1),
+        "A map with more closed pairs than this does not have all judged: of each submap fewer the more there are, at "
+        "least five, robots taking turns.");
     v.field("georeference", georeference);
   }
 };

@@ -26,33 +26,70 @@ std::array<Line, 2> lines_of(const SubmapPair& pair) {
   return {Line{pair.first, pair.second.chain}, Line{pair.second, pair.first.chain}};
 }
 
+/// A pair and its place in line.
+using Placed = std::pair<std::uint64_t, SubmapPair>;
+
+std::vector<Placed> closed_pairs(const VerdictSet& verdicts, const SubmapSet& submaps) {
+  std::vector<Placed> out;
+  for (const auto& [pair, verdict] : verdicts)
+    if (!verdict.closures.empty() && has_both(submaps, pair)) out.emplace_back(place_in_line(pair), pair);
+  std::ranges::sort(out);
+  return out;
+}
+
+/// Per pair how many earlier ones it has with the other's chain, at the end that has fewer.
+std::vector<std::size_t> earlier_with_chain(const std::vector<Placed>& in_line) {
+  std::vector<std::size_t> out;
+  std::map<Line, std::size_t> before;
+  for (const auto& [place, pair] : in_line) {
+    const auto [first, second] = lines_of(pair);
+    out.push_back(std::min(before[first]++, before[second]++));
+  }
+  return out;
+}
+
+/// Per pair how many earlier ones it has with all chains, which take turns, at the end that has fewer.
+std::vector<std::size_t> earlier_with_all(const std::vector<Placed>& in_line) {
+  std::map<Line, std::size_t> before;
+  std::map<SubmapId, std::vector<std::pair<std::size_t, std::size_t>>> turns;  // turn, number in line
+  for (std::size_t k = 0; k < in_line.size(); ++k)
+    for (const Line& line : lines_of(in_line[k].second)) turns[line.first].emplace_back(before[line]++, k);
+  std::vector<std::size_t> out(in_line.size(), in_line.size());
+  for (auto& [submap, of_submap] : turns) {
+    std::ranges::sort(of_submap);
+    for (std::size_t rank = 0; rank < of_submap.size(); ++rank) {
+      std::size_t& least = out[of_submap[rank].second];
+      least = std::min(least, rank);
+    }
+  }
+  return out;
+}
+
+/// How many pairs of a submap are left where no more than `most` are in all.
+std::size_t pairs_per_submap(const std::vector<std::size_t>& earlier, std::size_t most) {
+  std::vector<std::size_t> sorted = earlier;
+  std::ranges::sort(sorted);
+  return std::max(most < sorted.size() ? sorted[most] : sorted.size(), kLeastPairs);
+}
+
 }  // namespace
 
-std::set<SubmapPair> spare_pairs(const VerdictSet& verdicts, const SubmapSet& submaps, std::size_t most) {
-  std::vector<std::pair<SubmapPair, std::uint64_t>> closed;
-  std::map<Line, std::vector<std::uint64_t>> lines;
-  for (const auto& [pair, verdict] : verdicts) {
-    if (verdict.closures.empty() || !has_both(submaps, pair)) continue;
-    closed.emplace_back(pair, place_in_line(pair));
-    for (const Line& line : lines_of(pair)) lines[line].push_back(closed.back().second);
-  }
-  std::map<Line, std::uint64_t> last;  // that is judged, where there are too many
-  for (auto& [line, places] : lines) {
-    if (places.size() <= most) continue;
-    const auto nth = places.begin() + static_cast<std::ptrdiff_t>(most - 1);
-    std::ranges::nth_element(places, nth);
-    last[line] = *nth;
-  }
-  const auto is_behind = [&](const Line& line, std::uint64_t place) {
-    const auto end = last.find(line);
-    return end != last.end() && place > end->second;
-  };
+std::set<SubmapPair> spare_pairs(const VerdictSet& verdicts, const SubmapSet& submaps, const PairLimits& limits) {
+  std::vector<Placed> left = closed_pairs(verdicts, submaps);
   std::set<SubmapPair> spare;
-  for (const auto& [pair, place] : closed) {
-    const auto lines_of_pair = lines_of(pair);
-    if (std::ranges::all_of(lines_of_pair, [&](const Line& line) { return is_behind(line, place); }))
-      spare.insert(pair);
-  }
+  const auto leave_out = [&](const std::vector<std::size_t>& earlier, std::size_t most) {
+    std::vector<Placed> others;
+    for (std::size_t k = 0; k < left.size(); ++k)
+      if (earlier[k] < most)
+        others.push_back(left[k]);
+      else
+        spare.insert(left[k].second);
+    left = std::move(others);
+  };
+  leave_out(earlier_with_chain(left), limits.with_one_chain);
+  if (left.size() <= limits.in_all) return spare;
+  const auto earlier = earlier_with_all(left);
+  leave_out(earlier, pairs_per_submap(earlier, limits.in_all));
   return spare;
 }
 
