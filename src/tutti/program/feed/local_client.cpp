@@ -16,6 +16,7 @@ Result<std::unique_ptr<LocalClient>> LocalClient::join(LiveFeed& feed, const Fee
 }
 
 LocalClient::~LocalClient() {
+  if (server_ == 0) return;  // it never joined
   feed_.use(server_, [&](FeedServer& server) { server.session().disconnect(client_); });
 }
 
