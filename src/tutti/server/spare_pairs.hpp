@@ -11,7 +11,7 @@ namespace tutti::server {
 /// How many pairs of submaps are judged.
 struct PairLimits {
   std::size_t with_one_chain = 0;  ///< Per submap and chain.
-  std::size_t in_all = 0;          ///< Of the map, unless that leaves a submap fewer than kLeastPairs.
+  std::size_t in_all = 0;          ///< In the whole map, unless that leaves a submap fewer than kLeastPairs.
 };
 inline constexpr std::size_t kLeastPairs = 5;
 
