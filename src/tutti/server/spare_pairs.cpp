@@ -65,11 +65,11 @@ std::vector<std::size_t> earlier_with_all(const std::vector<Placed>& in_line) {
   return out;
 }
 
-/// How many pairs of a submap are left where no more than `most` are in all.
-std::size_t pairs_per_submap(const std::vector<std::size_t>& earlier, std::size_t most) {
-  std::vector<std::size_t> sorted = earlier;
-  std::ranges::sort(sorted);
-  return std::max(most < sorted.size() ? sorted[most] : sorted.size(), kLeastPairs);
+/// How many pairs of a submap are left where no more than `most` are in all, which are fewer than there are.
+std::size_t pairs_per_submap(std::vector<std::size_t> earlier, std::size_t most) {
+  const auto first_too_many = earlier.begin() + static_cast<std::ptrdiff_t>(most);
+  std::ranges::nth_element(earlier, first_too_many);
+  return std::max(*first_too_many, kLeastPairs);
 }
 
 }  // namespace
