@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cstring>
 #include <latch>
+#include <memory>
 #include <string>
 #include <thread>
 
@@ -63,6 +64,13 @@ class Client {
   std::string bytes_;
 };
 
+std::string path_of(const std::string& name) { return testing::TempDir() + name + std::to_string(getpid()); }
+std::unique_ptr<LiveFeed> opened(const std::string& path, const test::NodeTarget& robot) {
+  auto feed = LiveFeed::open(path, {}, robot.state());
+  EXPECT_TRUE(feed.has_value()) << feed.error().message;
+  return std::move(feed).value();
+}
+
 Status give(test::NodeTarget& robot, const FeedInput& input) {
   if (const auto* anew = std::get_if<FeedAnew>(&input)) return robot.begin_session(anew->why);
   if (const auto* odometry = std::get_if<node::OdometrySample>(&input)) return robot.add_odometry(*odometry);
@@ -73,11 +81,10 @@ Status give(test::NodeTarget& robot, const FeedInput& input) {
 /// The robot is stuck in its first sample until all others are answered.
 TEST(LiveFeed, AnswersWhileTheRobotIsStuck) {
   const Trajectory odometry = robot::test::drifting_odometry(kSamples);
-  const std::string path = testing::TempDir() + "live_feed_" + std::to_string(getpid());
+  const std::string path = path_of("live_feed_");
   test::NodeTarget robot;
-  auto feed = LiveFeed::open(path, {}, robot.state());
-  ASSERT_TRUE(feed.has_value()) << feed.error().message;
-  FeedFront& front = (*feed)->front();
+  std::unique_ptr<LiveFeed> feed = opened(path, robot);
+  FeedFront& front = feed->front();
   std::latch answered(1);
   std::jthread behind([&] {
     while (!front.has_ended()) {
@@ -109,8 +116,8 @@ TEST(LiveFeed, AnswersWhileTheRobotIsStuck) {
   EXPECT_EQ(robot.node().agent().newest_sample(), odometry.back().stamp);
   EXPECT_EQ(robot.node().agent().keyframes().size(), static_cast<std::size_t>(kSamples));
   EXPECT_EQ(front.state().stored, odometry.back().stamp);
-  EXPECT_EQ((*feed)->take_thrown(), "");
-  feed->reset();
+  EXPECT_EQ(feed->take_thrown(), "");
+  feed.reset();
   EXPECT_NE(access(path.c_str(), F_OK), 0);
 }
 
@@ -118,18 +125,17 @@ TEST(LiveFeed, AnswersWhileTheRobotIsStuck) {
 TEST(LiveFeed, OutlivesStampsInTheFutureAndAClockThatGoesBack) {
   for (const double rate : {1.0, 200.0}) {
     const Trajectory way = robot::test::drifting_odometry(1700);
-    const std::string path = testing::TempDir() + "live_feed_clock_" + std::to_string(getpid());
+    const std::string path = path_of("live_feed_clock_");
     test::NodeTarget robot;
-    auto feed = LiveFeed::open(path, {}, robot.state());
-    ASSERT_TRUE(feed.has_value()) << feed.error().message;
+    std::unique_ptr<LiveFeed> feed = opened(path, robot);
     std::jthread behind([&](const std::stop_token& stop) {
       while (!stop.stop_requested()) {
-        const auto input = (*feed)->front().take(0.01);
+        const auto input = feed->front().take(0.01);
         if (!input) continue;
         EXPECT_TRUE(give(robot, *input));
-        (*feed)->front().note_heard();
-        (*feed)->front().note_stored();
-        (*feed)->front().publish(robot.state());
+        feed->front().note_heard();
+        feed->front().note_stored();
+        feed->front().publish(robot.state());
       }
     });
     Client client(path);
@@ -162,20 +168,19 @@ TEST(LiveFeed, OutlivesStampsInTheFutureAndAClockThatGoesBack) {
     behind.request_stop();
     behind.join();
     EXPECT_EQ(robot.node().agent().chain().session, 8U);
-    EXPECT_EQ((*feed)->front().state().chain.session, 8U);
-    EXPECT_EQ(robot.node().agent().newest_sample(), (*feed)->front().state().newest->stamp);
-    EXPECT_EQ((*feed)->front().odometry_trouble(), "");
-    EXPECT_EQ((*feed)->front().state().alerts.size(), 1U);
-    EXPECT_NE((*feed)->front().state().alerts.at(0).text.find("session 8 has begun"), std::string::npos);
+    EXPECT_EQ(feed->front().state().chain.session, 8U);
+    EXPECT_EQ(robot.node().agent().newest_sample(), feed->front().state().newest->stamp);
+    EXPECT_EQ(feed->front().odometry_trouble(), "");
+    EXPECT_EQ(feed->front().state().alerts.size(), 1U);
+    EXPECT_NE(feed->front().state().alerts.at(0).text.find("session 8 has begun"), std::string::npos);
   }
 }
 
 /// The way that a robot corrects comes to who asked for it, to the bit.
 TEST(LiveFeed, TellsTheCorrectedWayToAFeedClient) {
-  const std::string path = testing::TempDir() + "live_feed_way_" + std::to_string(getpid());
+  const std::string path = path_of("live_feed_way_");
   test::NodeTarget robot;
-  auto feed = LiveFeed::open(path, {}, robot.state());
-  ASSERT_TRUE(feed.has_value()) << feed.error().message;
+  std::unique_ptr<LiveFeed> feed = opened(path, robot);
   Client other(path);
   other.say(test::hello(true));
   const auto client = FeedClient::connect(path, "driver", {}, true);
@@ -188,9 +193,9 @@ TEST(LiveFeed, TellsTheCorrectedWayToAFeedClient) {
     }
   };
   EXPECT_EQ(std::get<FeedWelcome>(hear()).robot, "alpha");
-  EXPECT_TRUE((*feed)->front().wants_ways());
+  EXPECT_TRUE(feed->front().wants_ways());
   const Trajectory way = robot::test::drifting_odometry(30);
-  (*feed)->front().say({{2, 7}, 5, way, {way[3], way[9]}});
+  feed->front().say({{2, 7}, 5, way, {way[3], way[9]}});
   const auto heard = std::get<FeedWay>(hear());
   EXPECT_EQ(heard.map_age, (std::pair<std::uint64_t, std::uint64_t>{2, 7}));
   EXPECT_EQ(heard.constraints, 5U);
@@ -206,16 +211,15 @@ TEST(LiveFeed, TellsTheCorrectedWayToAFeedClient) {
 /// What a robot program that ends has still to say is said.
 TEST(LiveFeed, SaysTheEndBeforeItGoes) {
   const Trajectory odometry = robot::test::drifting_odometry(3);
-  const std::string path = testing::TempDir() + "live_feed_end_" + std::to_string(getpid());
+  const std::string path = path_of("live_feed_end_");
   test::NodeTarget robot;
-  auto feed = LiveFeed::open(path, {}, robot.state());
-  ASSERT_TRUE(feed.has_value()) << feed.error().message;
+  std::unique_ptr<LiveFeed> feed = opened(path, robot);
   Client client(path);
   client.say(test::hello() + test::odometry(odometry[0], Matrix6d::Zero()) + test::end_of_recording());
   EXPECT_TRUE(client.hear().has_welcome());
   EXPECT_TRUE(client.hear().has_situation());
   EXPECT_TRUE(client.hear().has_correction());
-  FeedFront& front = (*feed)->front();
+  FeedFront& front = feed->front();
   for (int i = 0; i < 2; ++i) {
     const auto input = front.take(10.0);
     ASSERT_TRUE(input.has_value());
@@ -223,7 +227,7 @@ TEST(LiveFeed, SaysTheEndBeforeItGoes) {
     front.note_heard();
   }
   front.note_stored();
-  feed->reset();
+  feed.reset();
   EXPECT_TRUE(client.hear().has_ended());
 }
 
@@ -245,15 +249,14 @@ int count(const std::vector<FromRobot>& said) {
 
 /// In the robot's process, without the socket: answered at once, while others listen at the socket.
 TEST(LocalClient, FeedsInMemoryAndOthersListen) {
-  const std::string path = testing::TempDir() + "live_feed_local_" + std::to_string(getpid());
+  const std::string path = path_of("live_feed_local_");
   test::NodeTarget robot;
-  auto feed = LiveFeed::open(path, {}, robot.state());
-  ASSERT_TRUE(feed.has_value()) << feed.error().message;
+  std::unique_ptr<LiveFeed> feed = opened(path, robot);
   Client listener(path);
   listener.say(test::hello(true));
   EXPECT_TRUE(listener.hear().has_welcome());
   EXPECT_TRUE(listener.hear().has_situation());
-  auto client = LocalClient::join(**feed, of_ros());
+  auto client = LocalClient::join(*feed, of_ros());
   ASSERT_TRUE(client.has_value()) << client.error().message;
   EXPECT_EQ(count<FeedWelcome>((*client)->hear().value()), 1);
   std::string bytes;
@@ -267,12 +270,12 @@ TEST(LocalClient, FeedsInMemoryAndOthersListen) {
   for (int i = 0; i < 10;) i += listener.hear().has_correction() ? 1 : 0;
   (*client)->say({"/odom", "nav_msgs/msg/Odometry", "cdr", "nonsense"});
   EXPECT_EQ(count<FeedRefusal>((*client)->hear().value()), 1);
-  while (!(*feed)->is_fed()) std::this_thread::yield();
+  while (!feed->is_fed()) std::this_thread::yield();
 
   Client second(path);
   second.say(test::hello());
   EXPECT_NE(second.hear().closed().why().find("feeds this robot already"), std::string::npos);
-  const auto third = LocalClient::join(**feed, of_ros());
+  const auto third = LocalClient::join(*feed, of_ros());
   EXPECT_EQ(count<FeedOver>((*third)->hear().value()), 1);
   EXPECT_FALSE((*third)->hear().has_value());
   (*third)->say(odometry_at(10, bytes));  // nobody hears it
@@ -282,7 +285,7 @@ TEST(LocalClient, FeedsInMemoryAndOthersListen) {
   other.say(test::hello());
   EXPECT_TRUE(other.hear().has_welcome());
   std::size_t samples = 0;
-  while (const auto input = (*feed)->front().take(0.0))
+  while (const auto input = feed->front().take(0.0))
     samples += std::holds_alternative<node::OdometrySample>(*input) ? 1 : 0;
   EXPECT_EQ(samples, 10U);
 }
@@ -290,11 +293,10 @@ TEST(LocalClient, FeedsInMemoryAndOthersListen) {
 /// Odometry waits for the scan of its time; a scan that does not come is not waited for for ever.
 TEST(LocalClient, HoldsOdometryForItsScans) {
   using namespace intake::test;
-  const std::string path = testing::TempDir() + "live_feed_held_" + std::to_string(getpid());
+  const std::string path = path_of("live_feed_held_");
   test::NodeTarget robot;
-  auto feed = LiveFeed::open(path, {}, robot.state());
-  ASSERT_TRUE(feed.has_value()) << feed.error().message;
-  auto client = LocalClient::join(**feed, of_ros());
+  std::unique_ptr<LiveFeed> feed = opened(path, robot);
+  auto client = LocalClient::join(*feed, of_ros());
   ASSERT_TRUE(client.has_value()) << client.error().message;
   const auto hold = [&](bool for_scans) {
     (*client)->use_intake([&](intake::SensorIntake& intake) { intake.hold_odometry(for_scans, false); });
