@@ -135,20 +135,15 @@ Status SensorIntake::take_camera(std::string_view topic, std::string_view bytes,
   return first;
 }
 
-Result<Health> read_battery(std::string_view bytes, bags::RosEncoding encoding) {
+/// What is no number, or no share of 1, the robot's driver does not know.
+Status SensorIntake::take_battery(std::string_view bytes, bags::RosEncoding encoding) {
   const auto message = bags::decode_battery_state(bytes, encoding);
   if (!message) return tl::unexpected(message.error());
   Health health;
   if (message->voltage_v >= 0.0F) health.battery_v = static_cast<double>(message->voltage_v);
   if (message->percentage >= 0.0F && message->percentage <= 1.0F)
     health.battery_percent = 100.0 * static_cast<double>(message->percentage);
-  return health;
-}
-
-Status SensorIntake::take_battery(std::string_view bytes, bags::RosEncoding encoding) {
-  auto health = read_battery(bytes, encoding);
-  if (!health) return tl::unexpected(health.error());
-  health_ = *health;
+  health_ = health;
   return {};
 }
 

@@ -28,9 +28,6 @@ struct RawMessage {
 /// An input of a robot.
 using Input = std::variant<node::OdometrySample, Scan, FedImages, std::vector<ImuSample>, PositionFix, Health>;
 
-/// What a sensor_msgs/BatteryState says. What is no number, or no share of 1, the robot's driver does not know.
-Result<Health> read_battery(std::string_view bytes, bags::RosEncoding encoding = bags::RosEncoding::cdr);
-
 /// How a robot's messages are read.
 struct SensorConfig {
   IntakeConfig odometry;

@@ -62,8 +62,6 @@ Status FeedClient::say(const std::vector<ImuSample>& samples) { return send(inte
 
 Status FeedClient::say(const PositionFix& fix) { return send(internal::message_of(fix)); }
 
-Status FeedClient::say(const Health& health) { return send(internal::message_of(health)); }
-
 Status FeedClient::say_time() {
   v1::Feed message;
   message.mutable_time();

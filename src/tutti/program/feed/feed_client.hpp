@@ -33,7 +33,6 @@ class FeedClient {
   Status say(const intake::FedImages& images);
   Status say(const std::vector<ImuSample>& samples);
   Status say(const PositionFix& fix);
-  Status say(const Health& health);
   /// Asks which sample the robot has stored by now. The clock value in the message is a dummy, so do not use it to
   /// measure an offset.
   Status say_time();

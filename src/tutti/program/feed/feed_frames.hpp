@@ -56,9 +56,6 @@ struct FeedRos {
   std::string body_frame, odom_frame, map_frame;
   std::optional<robot::OdometryCovarianceConfig> covariance;
   double tolerance_s = 0.0;  ///< By which map -> odom is dated ahead.
-  bool operator==(const FeedRos& other) const {
-    return images == other.images && depth == other.depth && imu == other.imu;
-  }
 };
 /// A message of ROS as it came, or for the client to publish.
 struct FeedRaw {

@@ -36,12 +36,7 @@ FeedAnswer answer(const v1::Feed::Correction& said) {
 }
 
 FeedSituation situation(const v1::Feed::Situation& said) {
-  FeedSituation out{.in_map = said.in_map(), .team_mates = {}, .alerts = {}, .status = {}};
-  for (const auto& mate : said.team_mate())
-    out.team_mates.push_back({RobotId{mate.robot()},
-                              mate.name(),
-                              {mate.stamp_ns()},
-                              mate.same_component() ? std::optional(pose(mate.t_map_body())) : std::nullopt});
+  FeedSituation out;
   for (const auto& alert : said.alert()) out.alerts.push_back(alert.text());
   for (const auto& value : said.status()) out.status.emplace_back(value.name(), value.text());
   return out;

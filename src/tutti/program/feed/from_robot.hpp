@@ -33,8 +33,6 @@ struct FeedJump {
   std::string why;
 };
 struct FeedSituation {
-  bool in_map = false;
-  std::vector<TeamMate> team_mates;
   std::vector<std::string> alerts;
   std::vector<std::pair<std::string, std::string>> status;  ///< FeedState::status
 };

@@ -27,9 +27,8 @@ class LiveFeed {
   LiveFeed(const LiveFeed&) = delete;
   LiveFeed& operator=(const LiveFeed&) = delete;
 
-  /// Uses the server from another thread (LocalClient), which waits for nobody meanwhile. False when there is none just
-  /// then, or it has thrown: then it is another one than `last`, the number of the one that was used before, which is 0
-  /// for any.
+  /// Uses the server from another thread (LocalClient), while its own waits for clients. `last` is the number of the
+  /// server that was used before, 0 before the first; it is set. False when that one is gone, or throws now.
   bool use(std::uint64_t& last, const std::function<void(FeedServer&)>& work);
   [[nodiscard]] FeedFront& front() { return front_; }
   [[nodiscard]] const FeedFront& front() const { return front_; }
@@ -49,13 +48,12 @@ class LiveFeed {
   Status listen();
   void run(const std::stop_token& stop);
   void serve(int wait_ms);
+  void forget_server(const char* why);
 
   const std::string socket_;
   const FeedAccess access_;
   const intake::SensorConfig sensors_;
   FeedFront front_;
-  void forget_server(const char* why);
-
   std::mutex server_mutex_;  // guards server_ and its number
   std::unique_ptr<FeedServer> server_;
   std::uint64_t server_number_ = 0;

@@ -40,7 +40,6 @@ class RosAnswers {
   [[nodiscard]] std::vector<std::pair<std::string, std::string>> team_mate_poses() const;
 
   [[nodiscard]] const std::string& map_frame() const { return map_; }
-  [[nodiscard]] const std::optional<FeedAnswer>& last() const { return last_; }
 
  private:
   std::string odom_, map_;

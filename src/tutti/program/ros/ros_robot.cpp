@@ -239,11 +239,10 @@ void Robot::take(Reader* reader) {
 }
 
 void Robot::hold_odometry() {
+  if (!options_.lossless) return;
   const bool is_quiet = Clock::steady_s() - last_message_s_ > kSensorsFollow_s;
-  client_->use_intake([&](intake::SensorIntake& intake) {
-    if (options_.lossless) intake.hold_odometry(points_ && !is_quiet, images_ && !is_quiet);
-    counts_ = intake.odometry().counts();
-  });
+  client_->use_intake(
+      [&](intake::SensorIntake& intake) { intake.hold_odometry(points_ && !is_quiet, images_ && !is_quiet); });
 }
 
 void Robot::end_recording() {
@@ -297,6 +296,7 @@ void Robot::look_for_odometry() {
 }
 
 void Robot::publish_diagnostics() {
+  if (client_) client_->use_intake([&](const intake::SensorIntake& intake) { counts_ = intake.odometry().counts(); });
   const bags::RosDiagnostic out = diagnosis({.name = options_.name_space + ": live feed",
                                              .is_connected = client_ != nullptr,
                                              .counts = counts_,

@@ -2,7 +2,6 @@
 #include "tutti/program/feed/internal/feed_messages.hpp"
 
 #include "tutti/base/check.hpp"
-#include "tutti/wire/field_bytes.hpp"
 
 namespace tutti::program::internal {
 namespace {
@@ -100,12 +99,6 @@ v1::Feed message_of(const PositionFix& fix) {
   out.set_height_m(fix.antenna.height_m);
   for (int i = 0; i < 9; ++i) out.add_covariance_m2(fix.covariance(i / 3, i % 3));
   for (const double x : fix.p_body_antenna) out.add_p_body_antenna(x);
-  return message;
-}
-
-v1::Feed message_of(const Health& health) {
-  v1::Feed message;
-  message.mutable_health()->ParseFromString(wire::field_bytes(health));
   return message;
 }
 

@@ -19,7 +19,6 @@ v1::Feed message_of(const Scan& scan);
 v1::Feed message_of(const intake::FedImages& images);
 v1::Feed message_of(const std::vector<ImuSample>& samples);
 v1::Feed message_of(const PositionFix& fix);
-v1::Feed message_of(const Health& health);
 
 inline constexpr std::size_t kHeaderBytes = 4;
 /// As bytes on the socket: so many of the length, little endian, and the message. At most kMaxFeedBytes.
