@@ -135,9 +135,17 @@ Status ImagesIntake::push(OneTopic& topic, const bags::RosHeader& header, Waitin
   topic.newest = waiting.stamp;
   topic.bytes += waiting.image.bytes.size();
   topic.waiting.push_back(std::move(waiting));
-  const std::size_t used = is_chosen() ? cameras_.size() + (depth_ ? 1 : 0) : topics_.size();
-  while (topic.bytes > kMostBytes / used) topic.pop();
+  while (topic.bytes > most_bytes()) topic.pop();
   return {};
+}
+
+std::size_t ImagesIntake::most_bytes() const {
+  return kMostBytes / (is_chosen() ? cameras_.size() + (depth_ ? 1 : 0) : topics_.size());
+}
+
+bool ImagesIntake::is_filling() const {
+  return samples_.size() > kMostSamples / 2 ||
+         std::ranges::any_of(topics_, [this](const OneTopic& topic) { return topic.bytes > most_bytes() / 2; });
 }
 
 Status ImagesIntake::add_imu(std::string_view bytes, Encoding encoding) {

@@ -66,6 +66,8 @@ class ImagesIntake {
   [[nodiscard]] bool has_info(std::size_t topic) const { return topics_[topic].model.has_value(); }
   /// Everything up to `stamp` has been added.
   [[nodiscard]] bool reaches(Timestamp stamp) const;
+  /// What waits takes half of the room: a topic has ended, or another is far behind.
+  [[nodiscard]] bool is_filling() const;
 
   /// The next images that odometry up to `stamp` covers, of both cameras if the second's come in time; nothing when
   /// there are none; an error for images that come too late. With `is_last` nothing more comes. After describe() has
@@ -98,6 +100,7 @@ class ImagesIntake {
   };
   using Numbers = std::vector<std::size_t>;
   Status push(OneTopic& topic, const bags::RosHeader& header, Waiting waiting);
+  [[nodiscard]] std::size_t most_bytes() const;  ///< That a topic's images may take.
   Status add_depth(OneTopic& topic, const bags::ImageLook& look, const bags::RosImage& message);
   Status add_depth(OneTopic& topic, const bags::ImageLook& look, const bags::RosCompressedImage& message);
   static Status check_size(const OneTopic& topic, const Waiting& waiting);

@@ -187,10 +187,10 @@ Result<std::optional<Input>> SensorIntake::next(bool wants_scan) {
 }
 
 bool SensorIntake::waits_for_images() const {
-  constexpr double kLongest_s = 5.0;
   const auto waiting = ros_.waiting();
-  if (!holds_for_images_ || !waiting || waiting->second - waiting->first > kLongest_s) return false;
-  return sensors_.cameras.empty() || (images_ && !images_->reaches(waiting->first));
+  if (!holds_for_images_ || !waiting || waiting->second - waiting->first > kLongestHold_s) return false;
+  if (sensors_.cameras.empty()) return true;
+  return images_ && !images_->is_filling() && !images_->reaches(waiting->first);
 }
 
 bool SensorIntake::wants(std::string_view topic) const {

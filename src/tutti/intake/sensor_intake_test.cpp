@@ -174,8 +174,31 @@ TEST_F(SensorIntakeTest, OdometryWaitsForScansAndForCamerasForAWhile) {
   EXPECT_EQ(due(), "op");
   EXPECT_EQ(odometry_at(2), "");
   EXPECT_EQ(due(), "") << "no image yet";
-  EXPECT_EQ(odometry_at(53), "");
+  constexpr int kHeld = static_cast<int>(SensorIntake::kLongestHold_s) * static_cast<int>(kSecond / kPeriod);
+  EXPECT_EQ(odometry_at(2 + kHeld), "");
+  EXPECT_EQ(due(), "") << "images may come yet";
+  EXPECT_EQ(odometry_at(3 + kHeld), "");
   EXPECT_EQ(due(), "o") << "images have ended";
+}
+
+TEST_F(SensorIntakeTest, OdometryWaitsForCamerasWhileThereIsRoomForWhatComesMeanwhile) {
+  take_images({.images = {"left/image_raw"}, .imu = "imu"});
+  place();
+  intake_.hold_odometry(false, true);
+  EXPECT_EQ(odometry_at(0), "");
+  EXPECT_EQ(add("left/camera_info", kCameraInfoType, bags::encode(calibration())), "");
+  EXPECT_EQ(add("left/image_raw", kImageType, bags::encode(grey_image(kStart))), "");
+  EXPECT_EQ(add("imu", kImuType, imu(kStart)), "");
+  EXPECT_EQ(due(), "oip");
+  EXPECT_EQ(odometry_at(8), "");
+  const auto fill = [&](std::size_t from, std::size_t until) {
+    for (std::size_t i = from; i < until; ++i)
+      EXPECT_EQ(add("imu", kImuType, imu(kStart + 7 * kPeriod + static_cast<std::int64_t>(i) * 1000)), "");
+  };
+  fill(0, ImagesIntake::kMostSamples / 2);
+  EXPECT_EQ(due(), "") << "no image yet";
+  fill(ImagesIntake::kMostSamples / 2, ImagesIntake::kMostSamples / 2 + 1);
+  EXPECT_EQ(due(), "oii");
 }
 
 TEST_F(SensorIntakeTest, OdometryThatIsSaidAgainTellsHowTheBodyMoved) {

@@ -29,8 +29,9 @@ constexpr const char *kOdometryType = "nav_msgs/msg/Odometry", *kFixType = "sens
 constexpr double kWait_s = 0.02;
 constexpr double kJoinsAgain_s = 0.1;
 constexpr double kEachSecond_s = 1.0;
-constexpr double kSensorsFollow_s = 1.0;  // where nothing may be lost
-constexpr std::size_t kAtOnce = 20;       // messages of a topic, where nothing may be lost: the robot may be behind
+// Where nothing may be lost:
+constexpr int kSilentTurns = 50;     // after so many in a row without a message, a second, no sensor says more
+constexpr std::size_t kAtOnce = 20;  // messages of a topic: the robot may be behind
 
 Qos in_qos(bool lossless, int depth) { return {.reliable = lossless, .latched = false, .depth = lossless ? 0 : depth}; }
 
@@ -58,7 +59,8 @@ class Robot final : public RosRobot {
   bool join();
   void take_messages();
   void take(Reader* reader);
-  void hold_odometry();
+  void hold_odometry(bool holds);
+  void release_odometry();
   void end_recording();
   void hear();
   void each_second();
@@ -92,7 +94,9 @@ class Robot final : public RosRobot {
   program::FeedSituation situation_;
   intake::RosIntake::Counts counts_;
   bool in_map_ = false, was_fed_ = false, ended_ = false;
-  double last_odometry_s_ = 0.0, last_message_s_ = 0.0, second_s_ = 0.0;
+  double last_odometry_s_ = 0.0, second_s_ = 0.0;
+  bool is_silent_turn_ = true;
+  int silent_turns_ = 0;  ///< In a row.
   bool said_no_odometry_ = false;
   Complaints complaints_;
   RobotTopics topics_;
@@ -218,12 +222,14 @@ bool Robot::join() {
 
 /// Odometry last, so that what it covers is there.
 void Robot::take_messages() {
-  hold_odometry();
+  is_silent_turn_ = true;
+  hold_odometry(true);
   if (own_tf_ && own_tf_->writers() > 0 && topics_.open_own_tf())
     options_.say(Level::info, fmt::format("transforms come on {}: map -> odom is published there", own_tf_->topic()));
   for (const auto* reader : {&tf_static_, &own_tf_static_, &points_, &fixes_, &battery_}) take(reader->get());
   if (images_) images_->take([this](Reader& reader) { take(&reader); });
   for (const auto* reader : {&tf_, &own_tf_, &odometry_}) take(reader->get());
+  release_odometry();
 }
 
 void Robot::take(Reader* reader) {
@@ -231,18 +237,25 @@ void Robot::take(Reader* reader) {
   reader->take(
       [&](const Message& message) {
         if (!client_) return;
-        last_message_s_ = Clock::steady_s();
+        is_silent_turn_ = false;
         client_->say(intake::RawMessage{reader->topic(), reader->type(), "cdr", message.cdr});
         hear();
       },
       options_.lossless ? kAtOnce : Reader::kAll);
 }
 
-void Robot::hold_odometry() {
-  if (!options_.lossless) return;
-  const bool is_quiet = Clock::steady_s() - last_message_s_ > kSensorsFollow_s;
-  client_->use_intake(
-      [&](intake::SensorIntake& intake) { intake.hold_odometry(points_ && !is_quiet, images_ && !is_quiet); });
+void Robot::hold_odometry(bool holds) {
+  if (!options_.lossless || !client_) return;
+  client_->use_intake([&](intake::SensorIntake& intake) { intake.hold_odometry(holds && points_, holds && images_); });
+}
+
+/// What waits when nothing more comes goes without. Turns are counted and not seconds: a thread that was held up has
+/// messages before it. What comes afterwards waits as before.
+void Robot::release_odometry() {
+  silent_turns_ = is_silent_turn_ ? silent_turns_ + 1 : 0;
+  if (silent_turns_ != kSilentTurns) return;
+  hold_odometry(false);
+  hold_odometry(true);
 }
 
 void Robot::end_recording() {

@@ -5,10 +5,12 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <cmath>
 #include <functional>
 #include <map>
 #include <mutex>
+#include <thread>
 
 #include "support/bags/bag_writer.hpp"
 #include "support/bus/nats_network.hpp"
@@ -263,6 +265,35 @@ TEST_F(RosRobots, PublishersThatAreNotReliableAreSaid) {
   start({.lossless = true});
   EXPECT_TRUE(is_said("1 publishers of /alpha/odom offer another reliability (best effort) than is asked for"))
       << said();
+}
+
+/// Where nothing may be lost, what a sensor says of a moment may come after its odometry, also as the first that is
+/// heard at all. Once nothing more comes, odometry waits no longer.
+TEST_F(RosRobots, OdometryWaitsForTheScansOfItsTime) {
+  start({.lossless = true});
+  const Qos reliable{.reliable = true};
+  const auto odom = publisher("/alpha/odom", kOdometry, reliable);
+  const auto cloud = publisher("/alpha/points", kPoints, reliable);
+  ASSERT_TRUE(is_heard(*odom) && is_heard(*cloud));
+  std::this_thread::sleep_for(std::chrono::milliseconds(1500));  // longer than it waits for sensors that are silent
+  std::string order;
+  const auto has_come = [&](std::size_t inputs) {
+    return ::tutti::test::within(kPatience_s, [&] {
+      while (const auto input = feed_->front().take(0.0)) {
+        order += std::holds_alternative<Scan>(*input) ? "s" : "";
+        order += std::holds_alternative<node::OdometrySample>(*input) ? "o" : "";
+        feed_->front().note_heard();
+      }
+      return order.size() >= inputs;
+    });
+  };
+  for (std::int64_t i = 0; i < 3; ++i)
+    ASSERT_TRUE(odom->write(odometry(kStart + i * kPeriod, 0.0, "alpha/odom", "alpha/base_link")));
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  ASSERT_TRUE(cloud->write(points(kStart, kAtOnce, "alpha/base_link")));
+  ASSERT_TRUE(cloud->write(points(kStart + kPeriod, kAtOnce, "alpha/base_link")));
+  EXPECT_TRUE(has_come(5)) << order;
+  EXPECT_EQ(order, "ososo") << said();  // the last one, when it has been quiet for long enough
 }
 
 TEST_F(RosRobots, TwoPublishersAndNonsenseAreSaidAndDoNoHarm) {
