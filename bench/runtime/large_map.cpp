@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // How long a server takes to start again on a large map: until it is ready, until its first update is made, and what of
 // the map it reads for that. Usage:
-//   bench_large_map MISSION.yaml MAP SUBMAPS [POINTS PER SUBMAP]   makes such a map, then measures
-//   bench_large_map MISSION.yaml MAP                               measures on what is there
+//   bench_large_map MISSION.yaml MAP SUBMAPS [POINTS PER SUBMAP [CANDIDATES PER SUBMAP]]   makes one, then measures
+//   bench_large_map MISSION.yaml MAP                                                       measures on what is there
 // The map is of simulated robots of half an hour each, as many as it takes. Every pair of submaps has been looked at,
-// as with scans: those near each other have the closures of the mission's finder, the others were refused.
+// as with scans whose places are not known: those near each other have the closures of the mission's finder, the others
+// were refused. With candidates it is only the nearest that were, and a tenth of these have closures, as in a large
+// fleet with scans.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,11 +15,14 @@
 #include <cstdlib>
 #include <ctime>
 #include <filesystem>
+#include <map>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <set>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -30,6 +35,7 @@
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/words.hpp"
 #include "tutti/robot/submap_builder.hpp"
+#include "tutti/server/candidate_pairs.hpp"
 #include "tutti/storage/sqlite_store.hpp"
 #include "tutti/wire/codec.hpp"
 
@@ -42,13 +48,17 @@ constexpr double kFar_m = 25.0;  // submaps that begin so far apart see nothing 
 constexpr std::size_t kPairsPerRow = 256;
 constexpr std::size_t kRowsPerCommit = 2000;
 
-/// As one that compares scans: every pair is worth a look.
+/// As a LiDAR place's.
+constexpr std::size_t kPlaceBytes = 4105;
+
+/// As one that compares scans: every pair is worth a look that is a candidate.
 class EveryPair final : public server::ClosureFinder {
  public:
   static MethodId who() { return {"large_map", 1, 1}; }
   [[nodiscard]] MethodId id() const override { return who(); }
   [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return true; }
   [[nodiscard]] bool is_candidate(const Submap&, const Submap&) const override { return true; }
+  [[nodiscard]] bool can_rank(std::string_view place) const override { return place.size() == kPlaceBytes; }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap&, const Submap&,
                                               const server::PayloadStore&) const override {
     return fail(ErrorCode::unsupported, "nothing is verified here");
@@ -111,7 +121,39 @@ Eigen::Vector3d begin_of(const Submap& submap, const mission::MissionInput& inpu
   return (at == reference.end() ? reference.back() : *at).pose.translation;
 }
 
-void make_map(const lab::MissionConfig& config, const std::filesystem::path& file, std::size_t submaps, int points) {
+/// Which earlier submaps each was compared with: all, or the nearest when it came.
+class Compared {
+ public:
+  Compared(const std::vector<Submap>& all, const std::vector<Eigen::Vector3d>& begin, std::size_t candidates)
+      : all_(all), begin_(begin), candidates_(candidates) {}
+  /// Of submap `b`, increasing; writes its place where there are candidates.
+  std::vector<std::size_t> with(std::size_t b, Writer& writer) {
+    std::vector<std::size_t> out(b);
+    std::iota(out.begin(), out.end(), std::size_t{0});
+    at_.emplace(all_[b].id, b);
+    if (candidates_ == 0) return out;
+    std::vector<server::Alike> others;
+    for (const std::size_t a : out) others.push_back({all_[a].id, -(begin_[a] - begin_[b]).norm()});
+    server::Place place{std::string(kPlaceBytes, '\0'), true, pairs_.add(all_[b].id, others)};
+    for (std::size_t i = 0; i < kPlaceBytes; ++i) place.looks[i] = static_cast<char>(rng_.index(256));
+    out.clear();
+    for (const server::Alike& other : place.candidates) out.push_back(at_.at(other.submap));
+    writer.put(node::to_row(all_[b].id, place));
+    return out;
+  }
+  [[nodiscard]] bool may_close() { return candidates_ == 0 || rng_.index(10) == 0; }
+
+ private:
+  const std::vector<Submap>& all_;
+  const std::vector<Eigen::Vector3d>& begin_;
+  std::size_t candidates_;
+  server::CandidatePairs pairs_{candidates_};
+  std::map<SubmapId, std::size_t> at_;
+  Rng rng_{1};
+};
+
+void make_map(const lab::MissionConfig& config, const std::filesystem::path& file, std::size_t submaps, int points,
+              std::size_t candidates) {
   const auto input = lab::load_input(config, "", 1);
   if (!input) throw std::runtime_error(input.error().message);
   const auto finder = lab::make_closure_finder(config, input->robots, 1);
@@ -129,11 +171,12 @@ void make_map(const lab::MissionConfig& config, const std::filesystem::path& fil
     writer.put({"answers", refused.job, wire::encode(refused)});
     refused.verdicts.clear();
   };
+  Compared compared(all, begin, candidates);
   for (std::size_t b = 0; b < all.size(); ++b) {
-    for (std::size_t a = 0; a < b; ++a) {
+    for (const std::size_t a : compared.with(b, writer)) {
       ClosureVerdict verdict{
           .pair = {all[a].id, all[b].id}, .closures = {}, .refusal = Refusal{RefusalReason::unlike_from_above}};
-      if ((begin[a] - begin[b]).norm() < kFar_m && finder->is_candidate(all[a], all[b]))
+      if ((begin[a] - begin[b]).norm() < kFar_m && compared.may_close() && finder->is_candidate(all[a], all[b]))
         verdict = finder->verify(all[a], all[b], *nothing).value();
       verdict.finder = EveryPair::who();
       if (!verdict.refusal) {
@@ -190,7 +233,7 @@ void measure(const lab::MissionConfig& config, const std::filesystem::path& file
 
 int main(int argc, char** argv) {
   if (argc < 3) {
-    fmt::print("usage: bench_large_map MISSION.yaml MAP [SUBMAPS [POINTS PER SUBMAP]]\n");
+    fmt::print("usage: bench_large_map MISSION.yaml MAP [SUBMAPS [POINTS PER SUBMAP [CANDIDATES PER SUBMAP]]]\n");
     return 2;
   }
   try {
@@ -203,7 +246,8 @@ int main(int argc, char** argv) {
     const std::filesystem::path file = argv[2];
     if (submaps > 0)
       timed("the map is made", [&] {
-        make_map(*config, file, submaps, argc > 4 ? std::atoi(argv[4]) : 0);
+        make_map(*config, file, submaps, argc > 4 ? std::atoi(argv[4]) : 0,
+                 argc > 5 ? static_cast<std::size_t>(std::atoll(argv[5])) : 0);
         return 0;
       });
     measure(*config, file);

@@ -20,24 +20,34 @@ bool CandidatePairs::comes_first(const Ranked& a, const Ranked& b) {
 }
 
 /// What was dropped before needs no place here: whatever looks less alike than it and is the same robot's comes after
-/// it.
+/// it. Those of this robot that look less alike are one turn later now, and stay in their order; so do all others.
 void CandidatePairs::insert(SubmapId of, const Alike& other) {
   std::vector<Ranked>& list = most_alike_[of];
+  const RobotId robot = other.submap.chain.robot;
   Ranked added{other};
   for (const Ranked& known : list) {
     if (known.alike == other) return;
-    if (known.alike.submap.chain.robot == other.submap.chain.robot && is_more_alike(known.alike, other)) ++added.turn;
+    if (known.alike.submap.chain.robot == robot && is_more_alike(known.alike, other)) ++added.turn;
   }
   if (list.size() >= most_ && (list.empty() || !comes_first(added, list.back()))) return;
-  for (Ranked& known : list)
-    if (known.alike.submap.chain.robot == other.submap.chain.robot && known.turn >= added.turn) ++known.turn;
-  list.push_back(added);
-  std::ranges::sort(list, comes_first);
+  std::vector<Ranked> stay, later{added};
+  stay.reserve(list.size());
+  for (Ranked& known : list) {
+    const bool is_later = known.alike.submap.chain.robot == robot && known.turn >= added.turn;
+    if (is_later) ++known.turn;
+    (is_later ? later : stay).push_back(known);
+  }
+  list.resize(list.size() + 1);
+  std::ranges::merge(stay, later, list.begin(), comes_first);
   if (list.size() > most_) list.pop_back();
 }
 
 std::vector<Alike> CandidatePairs::add(SubmapId id, const std::vector<Alike>& others) {
-  restore(id, others);
+  most_alike_.try_emplace(id);
+  for (const Alike& other : others) {
+    insert(id, other);
+    insert(other.submap, {id, other.likeness});
+  }
   std::vector<Alike> candidates;
   for (const Alike& other : others)
     if (!excludes(ordered(id, other.submap))) candidates.push_back(other);
@@ -45,12 +55,34 @@ std::vector<Alike> CandidatePairs::add(SubmapId id, const std::vector<Alike>& ot
   return candidates;
 }
 
-void CandidatePairs::restore(SubmapId id, const std::vector<Alike>& candidates) {
-  most_alike_.try_emplace(id);
-  for (const Alike& other : candidates) {
-    insert(id, other);
-    insert(other.submap, {id, other.likeness});
+CandidatePairs::CandidatePairs(std::size_t most, const std::map<SubmapId, std::vector<Alike>>& candidates)
+    : most_(most) {
+  for (const auto& [id, others] : candidates) {
+    append(id, others);
+    for (const Alike& other : others) append(other.submap, {{id, other.likeness}});
   }
+  for (auto& [id, list] : most_alike_) cut(list);
+}
+
+void CandidatePairs::append(SubmapId of, const std::vector<Alike>& others) {
+  std::vector<Ranked>& list = most_alike_[of];
+  for (const Alike& other : others) list.push_back({other});
+}
+
+void CandidatePairs::cut(std::vector<Ranked>& list) const {
+  const auto by_robot = [](const Ranked& a, const Ranked& b) {
+    const RobotId of_a = a.alike.submap.chain.robot, of_b = b.alike.submap.chain.robot;
+    return of_a != of_b ? of_a < of_b : is_more_alike(a.alike, b.alike);
+  };
+  std::ranges::sort(list, by_robot);
+  const auto twice = std::ranges::unique(list, {}, &Ranked::alike);  // of two that were compared again
+  list.erase(twice.begin(), twice.end());
+  for (std::size_t i = 1; i < list.size(); ++i)
+    if (list[i].alike.submap.chain.robot == list[i - 1].alike.submap.chain.robot) list[i].turn = list[i - 1].turn + 1;
+  const std::size_t kept = std::min(list.size(), most_);
+  std::ranges::partial_sort(list, list.begin() + static_cast<std::ptrdiff_t>(kept), comes_first);
+  list.resize(kept);
+  list.shrink_to_fit();
 }
 
 bool CandidatePairs::prefers(SubmapId of, SubmapId other) const {
@@ -74,18 +106,12 @@ std::map<SubmapId, std::vector<SubmapId>> CandidatePairs::all() const {
 }
 
 CandidatePairs of_compared(const PlaceSet& places, std::size_t most) {
-  CandidatePairs out(most);
-  const auto is_there = [&](SubmapId id) {
-    const auto found = places.find(id);
-    return found != places.end() && found->second.is_ranked;
-  };
-  for (const auto& [id, place] : places) {
-    if (!place.is_ranked) continue;
-    std::vector<Alike> there = place.candidates;
-    std::erase_if(there, [&](const Alike& other) { return !is_there(other.submap); });
-    out.restore(id, there);
-  }
-  return out;
+  std::map<SubmapId, std::vector<Alike>> candidates;
+  for (const auto& [id, place] : places)
+    if (place.is_ranked) candidates.emplace_hint(candidates.end(), id, place.candidates);
+  for (auto& [id, others] : candidates)
+    std::erase_if(others, [&](const Alike& other) { return !candidates.contains(other.submap); });
+  return {most, candidates};
 }
 
 CandidatePairs restored(const PlaceSet& places, std::size_t most) {

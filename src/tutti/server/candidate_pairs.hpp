@@ -38,12 +38,11 @@ class CandidatePairs {
  public:
   CandidatePairs() = default;  ///< Excludes none.
   explicit CandidatePairs(std::size_t most) : most_(most) {}
+  /// Of submaps with what add() has returned of each; of any two, those of either may have the other.
+  CandidatePairs(std::size_t most, const std::map<SubmapId, std::vector<Alike>>& candidates);
   /// Compares a new submap with earlier ones, of which each may be in it once. Returns those with which it is a
   /// candidate now, smallest first.
   std::vector<Alike> add(SubmapId id, const std::vector<Alike>& others);
-  /// Adds a submap with what add() has returned of it. In any order; it makes no difference which of two is added with
-  /// the other.
-  void restore(SubmapId id, const std::vector<Alike>& candidates);
   /// True if the submap was added.
   [[nodiscard]] bool has(SubmapId id) const { return most_alike_.contains(id); }
   /// True if both were added and are no candidate.
@@ -58,6 +57,8 @@ class CandidatePairs {
   };
   static bool comes_first(const Ranked& a, const Ranked& b);
   void insert(SubmapId of, const Alike& other);
+  void append(SubmapId of, const std::vector<Alike>& others);
+  void cut(std::vector<Ranked>& list) const;
   [[nodiscard]] bool prefers(SubmapId of, SubmapId other) const;
 
   std::size_t most_ = 0;

@@ -143,6 +143,10 @@ TEST(CandidatePairs, ComeBackFromWhatIsStored) {
   const CandidatePairs again = restored(made.places, 5);
   for (const auto& [pair, value] : likeness) EXPECT_EQ(again.excludes(pair), made.pairs.excludes(pair));
   EXPECT_EQ(again.all(), made.pairs.all());
+  PlaceSet twice = made.places;
+  for (const auto& [id, place] : made.places)
+    for (const Alike& other : place.candidates) twice[other.submap].candidates.push_back({id, other.likeness});
+  EXPECT_EQ(restored(twice, 5).all(), made.pairs.all());
   // One that is lost is unknown, and so are its pairs.
   made.places.erase(submap(7));
   const CandidatePairs without = restored(made.places, 5);
