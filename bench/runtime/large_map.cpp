@@ -126,7 +126,7 @@ class Compared {
  public:
   Compared(const std::vector<Submap>& all, const std::vector<Eigen::Vector3d>& begin, std::size_t candidates)
       : all_(all), begin_(begin), candidates_(candidates) {}
-  /// Of submap `b`, increasing; writes its place where there are candidates.
+  /// Those that submap `b` was compared with, increasing; writes its place where there are candidates.
   std::vector<std::size_t> with(std::size_t b, Writer& writer) {
     std::vector<std::size_t> out(b);
     std::iota(out.begin(), out.end(), std::size_t{0});

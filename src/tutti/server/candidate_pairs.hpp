@@ -38,7 +38,7 @@ class CandidatePairs {
  public:
   CandidatePairs() = default;  ///< Excludes none.
   explicit CandidatePairs(std::size_t most) : most_(most) {}
-  /// Of submaps with what add() has returned of each; of any two, those of either may have the other.
+  /// Restores submaps from what add() has returned of each; of any two, either may have the other.
   CandidatePairs(std::size_t most, const std::map<SubmapId, std::vector<Alike>>& candidates);
   /// Compares a new submap with earlier ones, of which each may be in it once. Returns those with which it is a
   /// candidate now, smallest first.
