@@ -29,12 +29,10 @@ bool is_nearby(const PoseGraph& graph, const std::vector<Pose3>& poses) {
 }  // namespace
 
 OnboardSmoother::OnboardSmoother(const OnboardSmootherConfig& config, const Pose3& first)
-    : config_(config), state_{.first = first, .odometry = {}, .constraints = {}, .poses = {first}} {}
+    : config_(config), state_{.first = first, .odometry = {}, .constraints = {}, .poses = std::vector<Pose3>{first}} {}
 
 OnboardSmoother::OnboardSmoother(const OnboardSmootherConfig& config, SmootherState state)
     : OnboardSmoother(config, state.first) {
-  state_.odometry.reserve(state.odometry.size());
-  state_.poses.reserve(state.odometry.size() + 1);
   for (const RelativePose& step : state.odometry) append(step);
   set_constraints(std::move(state.constraints));
   TUTTI_CHECK(state.poses.size() <= size() && state.held <= size(), "{} poses, {} held, of {} nodes",
@@ -46,7 +44,7 @@ OnboardSmoother::OnboardSmoother(const OnboardSmootherConfig& config, SmootherSt
     return;
   }
   state_.solution = std::move(state.solution);
-  std::ranges::copy(state.poses, state_.poses.begin());
+  for (std::size_t k = 0; k < state.poses.size(); ++k) state_.poses.set(k, state.poses[k]);
   compose_from(state.poses.size() - 1);
 }
 
@@ -79,8 +77,9 @@ int OnboardSmoother::spread(const std::vector<std::size_t>& nodes, PoseGraph& gr
 }
 
 void OnboardSmoother::compose_from(std::size_t node) {
+  Pose3 pose = state_.poses[node];
   for (std::size_t k = node; k < state_.odometry.size(); ++k)
-    state_.poses[k + 1] = state_.poses[k] * state_.odometry[k].T_a_b;
+    state_.poses.set(k + 1, pose = pose * state_.odometry[k].T_a_b);
 }
 
 std::size_t OnboardSmoother::append(const RelativePose& odometry) {
@@ -106,8 +105,9 @@ void OnboardSmoother::hold() {
 void OnboardSmoother::set_first_pose(const Pose3& T_map_first) {
   const Pose3 motion = T_map_first * state_.first.inverse();
   if (size() > 1) hold();
-  for (Pose3& pose : state_.poses) pose = motion * pose;
-  state_.poses.front() = state_.first = T_map_first;
+  for (std::size_t k = 1; k < size(); ++k) state_.poses.set(k, motion * state_.poses[k]);
+  state_.first = T_map_first;
+  state_.poses.set(0, T_map_first);
 }
 
 SmootherSummary OnboardSmoother::solve() {

@@ -6,6 +6,7 @@
 
 #include "tutti/base/config.hpp"
 #include "tutti/estimation/pose_graph_solver.hpp"
+#include "tutti/model/long_list.hpp"
 #include "tutti/model/relative_pose.hpp"
 
 namespace tutti::estimation {
@@ -51,12 +52,12 @@ struct SmootherSummary {
 /// enough.
 struct SmootherState {
   Pose3 first;
-  std::vector<RelativePose> odometry;
+  LongList<RelativePose> odometry;
   std::vector<ChainConstraint> constraints;
   /// T_map_body per node, one more than odometry steps, as the last solve left them; the next solve starts there. A
   /// smoother can be restored from fewer poses: those that are missing at the end follow by odometry from the last one
   /// given, and if none are given all follow from `solution`.
-  std::vector<Pose3> poses;
+  LongList<Pose3> poses;
   /// Poses of the reduced graph of `constraints`, before polishing, if the last solve was usable. Empty if there was no
   /// such solve: then all poses but the held ones are composed from odometry.
   std::vector<Pose3> solution;
@@ -92,8 +93,8 @@ class OnboardSmoother {
   /// On failure (singular, invalid_input) the poses stay as they were.
   SmootherSummary solve();
 
-  [[nodiscard]] const Pose3& pose(std::size_t node) const { return state_.poses[node]; }
-  [[nodiscard]] const std::vector<Pose3>& poses() const { return state_.poses; }  ///< T_map_body per node.
+  [[nodiscard]] Pose3 pose(std::size_t node) const { return state_.poses[node]; }
+  [[nodiscard]] std::vector<Pose3> poses() const { return state_.poses.all(); }  ///< T_map_body per node.
   [[nodiscard]] const SmootherState& state() const { return state_; }
 
   /// Size that SmootherState::solution has for these constraints.

@@ -104,7 +104,7 @@ RC_GTEST_PROP(OnboardSmootherUpdate, ItsPosesFollowToTheBitFromTheSolution, ()) 
   if (rng.bernoulli(0.3)) smoother.set_constraints(m.constraints);
   if (rng.bernoulli(0.5)) smoother.append(m.odometry.front());
   SmootherState stored = smoother.state();
-  stored.poses.resize(stored.held);
+  stored.poses = stored.poses.part(0, stored.held);
   const OnboardSmoother restored(config, stored);
   RC_ASSERT(restored.state() == smoother.state());
 }

@@ -26,8 +26,8 @@ estimation::OnboardSmoother make_smoother(const TimeChain& chain) {
 
 /// The robot's own chain with every joint held where the server has it: between two joints the smoother spreads the
 /// end error along the odometry by its covariance.
-const std::vector<Pose3>& spread(estimation::OnboardSmoother& smoother, const TimeChain& chain,
-                                 const std::vector<std::size_t>& joints) {
+std::vector<Pose3> spread(estimation::OnboardSmoother& smoother, const TimeChain& chain,
+                          const std::vector<std::size_t>& joints) {
   constexpr double kHeld = 1e-10;  // variance, m^2 and rad^2: as good as exact
   std::vector<estimation::ChainConstraint> links;
   for (std::size_t j = 1; j < joints.size(); ++j)

@@ -96,8 +96,9 @@ bool RobotNode::goes_on_behind(const ProxyGraph& heard) {
 
 bool RobotNode::is_whole_in_map() const {
   const auto& keyframes = agent_.keyframes();
-  const auto last = std::ranges::find_if(keyframes.rbegin(), keyframes.rend(), &Keyframe::representative);
-  return last == keyframes.rend() || last->stamp <= mapped_until_;
+  std::size_t last = keyframes.size();
+  while (last > 0 && !keyframes[last - 1].representative) --last;
+  return last == 0 || keyframes[last - 1].stamp <= mapped_until_;
 }
 
 void RobotNode::note(const robot::UpdateSummary& summary) {

@@ -108,7 +108,7 @@ void RobotAgent::finish() {
 
 std::optional<Timestamp> RobotAgent::keyframe_before(Timestamp stamp) const {
   const auto at = std::ranges::lower_bound(state_.keyframes, stamp, {}, &Keyframe::stamp);
-  return at == state_.keyframes.begin() ? std::nullopt : std::optional(std::prev(at)->stamp);
+  return at == state_.keyframes.begin() ? std::nullopt : std::optional((*(at - 1)).stamp);
 }
 
 void RobotAgent::expect_sensors(bool scans, bool images) {
@@ -140,8 +140,9 @@ std::vector<SubmapMessage> RobotAgent::take_outgoing() {
 std::vector<consistency::RobotNode> RobotAgent::nodes() const {
   std::vector<consistency::RobotNode> nodes;
   for (std::size_t k = 0; k < state_.keyframes.size(); ++k) {
-    if (!state_.keyframes[k].representative) continue;
-    nodes.push_back({.stamp = state_.keyframes[k].stamp,
+    const Keyframe keyframe = state_.keyframes[k];
+    if (!keyframe.representative) continue;
+    nodes.push_back({.stamp = keyframe.stamp,
                      .T_map_body = smoother_.pose(k),
                      .chain_index = k,
                      .odometry = state_.node_odometry[nodes.size()],
@@ -193,7 +194,7 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, const StageO
     }
   }
   state_.T_map_odom =
-      state_.ledger.size() == 0 ? Pose3{} : smoother_.poses().back() * state_.keyframes.back().T_odom_body.inverse();
+      state_.ledger.size() == 0 ? Pose3{} : smoother_.pose(smoother_.size() - 1) * state_.keyframes.back().T_odom_body.inverse();
   state_.covariance = covariance_by(message.graph);
   state_.component = component_of(message.graph, chain_);
   locate_others(message.graph, own, pairs);

@@ -97,11 +97,11 @@ struct AgentState : AgentHead {
   estimation::SmootherState smoother;  ///< Its odometry only grows; the rest changes when a graph is received.
   consistency::Ledger ledger;          ///< Changes when a graph is received.
   // These only grow.
-  std::vector<Keyframe> keyframes;  ///< The nodes of the smoother's chain.
+  LongList<Keyframe> keyframes;  ///< The nodes of the smoother's chain.
   /// SubmapId::index, per keyframe, of the first submap that the keyframe is in.
   std::vector<std::uint32_t> submap_of;
   /// Raw odometry between representative keyframes; entry k ends at the k-th.
-  std::vector<RelativePose> node_odometry;
+  LongList<RelativePose> node_odometry;
 };
 
 /// One robot: takes odometry and sensor data and gives submaps; takes proxy graphs and gives a corrected trajectory. It
@@ -185,10 +185,10 @@ class RobotAgent {
   [[nodiscard]] AgentHead head() const;
   [[nodiscard]] const estimation::SmootherState& smoother() const { return smoother_.state(); }
   [[nodiscard]] const std::vector<std::uint32_t>& submap_of() const { return state_.submap_of; }
-  [[nodiscard]] const std::vector<RelativePose>& node_odometry() const { return state_.node_odometry; }
+  [[nodiscard]] const LongList<RelativePose>& node_odometry() const { return state_.node_odometry; }
   [[nodiscard]] RobotId robot() const { return chain_.robot; }
   [[nodiscard]] const ChainId& chain() const { return chain_; }
-  [[nodiscard]] const std::vector<Keyframe>& keyframes() const { return state_.keyframes; }
+  [[nodiscard]] const LongList<Keyframe>& keyframes() const { return state_.keyframes; }
   [[nodiscard]] const consistency::Ledger& ledger() const { return state_.ledger; }
   [[nodiscard]] const consistency::ConstraintPolicy& policy() const { return *policy_; }
   /// Odometry factors of the own chain: one per keyframe but the first.

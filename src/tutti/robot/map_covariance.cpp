@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 #include "tutti/consistency/chain_uncertainty.hpp"
@@ -94,8 +95,9 @@ Matrix6d map_covariance(const ProxyGraph& graph, const ChainId& chain, std::span
     last = std::max(last, to);
   }
   Matrix6d out = Matrix6d::Zero();
+  Pose3 before = smoother.poses.front();
   for (std::size_t k = 1; k < smoother.poses.size(); ++k) {
-    const Pose3 step = smoother.poses[k - 1].inverse() * smoother.poses[k];
+    const Pose3 pose = smoother.poses[k], step = std::exchange(before, pose).inverse() * pose;
     out = compound_covariance(step, out, spanned[k] ? Matrix6d(Matrix6d::Zero()) : smoother.odometry[k - 1].covariance);
     if (k == last) out += by_map(graph, chain, stamps[first], stamps[last]);
   }

@@ -15,14 +15,15 @@ namespace {
 constexpr double kCostTolerance = 1e-3;
 
 /// By how much the cost of the full graph is higher at `after` than at `before`.
-double full_cost_change(std::span<const std::size_t> nodes, std::span<const RelativePose> odometry,
+double full_cost_change(std::span<const std::size_t> nodes, const LongList<RelativePose>& odometry,
                         const PoseGraph& graph, std::span<const Pose3> before, std::span<const Pose3> after) {
   double change = 0.0;
   for (std::size_t i = 0; i < nodes.back(); ++i) {
-    const Eigen::LLT<Matrix6d> factor(odometry[i].covariance);
+    const RelativePose step = odometry[i];
+    const Eigen::LLT<Matrix6d> factor(step.covariance);
     Eigen::Matrix<double, 6, 2> r;
-    r.col(0) = between_residual(before[i], before[i + 1], odometry[i].T_a_b);
-    r.col(1) = between_residual(after[i], after[i + 1], odometry[i].T_a_b);
+    r.col(0) = between_residual(before[i], before[i + 1], step.T_a_b);
+    r.col(1) = between_residual(after[i], after[i + 1], step.T_a_b);
     factor.matrixL().solveInPlace(r);
     change += r.col(1).squaredNorm() - r.col(0).squaredNorm();
   }
@@ -49,7 +50,7 @@ std::vector<std::size_t> reduced_nodes(std::span<const ChainConstraint> constrai
   return nodes;
 }
 
-std::size_t update_runs(std::span<const std::size_t> nodes, std::span<const RelativePose> odometry,
+std::size_t update_runs(std::span<const std::size_t> nodes, const LongList<RelativePose>& odometry,
                         std::vector<PoseGraphEdge>& runs) {
   const std::vector<PoseGraphEdge> before = std::exchange(runs, {});
   std::size_t compounded = 0;
@@ -60,7 +61,7 @@ std::size_t update_runs(std::span<const std::size_t> nodes, std::span<const Rela
     if (old != before.end() && old->from == begin && old->to == end) {
       runs.push_back(*old);
     } else {
-      runs.push_back(as_edge(sum_odometry(odometry.subspan(begin, end - begin)), begin, end));
+      runs.push_back(as_edge(sum_odometry(odometry.part(begin, end)), begin, end));
       compounded += end - begin;
     }
   }
@@ -85,19 +86,22 @@ PoseGraph reduced_graph(std::span<const std::size_t> nodes, std::span<const Pose
   return graph;
 }
 
-void place(std::span<const PoseGraphEdge> runs, std::span<const Pose3> reduced, std::span<const RelativePose> odometry,
-           std::span<Pose3> poses) {
+void place(std::span<const PoseGraphEdge> runs, std::span<const Pose3> reduced, const LongList<RelativePose>& odometry,
+           LongList<Pose3>& poses) {
   for (std::size_t k = 0; k < runs.size(); ++k) {
-    const std::size_t steps = runs[k].to - runs[k].from;
-    poses[runs[k].to] = reduced[k + 1];
-    distribute_odometry(odometry.subspan(runs[k].from, steps), runs[k], poses.subspan(runs[k].from, steps + 1));
+    const auto [from, to] = std::pair(runs[k].from, runs[k].to);
+    poses.set(to, reduced[k + 1]);
+    std::vector<Pose3> placed = poses.part(from, to + 1);
+    distribute_odometry(odometry.part(from, to), runs[k], placed);
+    for (std::size_t i = from + 1; i < to; ++i) poses.set(i, placed[i - from]);
   }
 }
 
-bool polish(std::span<const std::size_t> nodes, std::span<const RelativePose> odometry, PoseGraph& graph,
-            GraphEquations& equations, std::vector<Pose3>& poses) {
-  std::vector<Pose3> polished = poses;
-  const auto steps_of = [&](std::size_t k) { return odometry.subspan(nodes[k], nodes[k + 1] - nodes[k]); };
+bool polish(std::span<const std::size_t> nodes, const LongList<RelativePose>& odometry, PoseGraph& graph,
+            GraphEquations& equations, LongList<Pose3>& poses) {
+  const std::vector<Pose3> before = poses.part(0, nodes.back() + 1);
+  std::vector<Pose3> polished = before;
+  const auto steps_of = [&](std::size_t k) { return odometry.part(nodes[k], nodes[k + 1]); };
   const auto poses_of = [&](std::size_t k) {
     return std::span(polished).subspan(nodes[k], nodes[k + 1] - nodes[k] + 1);
   };
@@ -107,18 +111,18 @@ bool polish(std::span<const std::size_t> nodes, std::span<const RelativePose> od
     graph.edges[k] = as_edge(sums[k], k, k + 1);
   }
   std::vector<Pose3> reduced;
-  for (const std::size_t node : nodes) reduced.push_back(poses[node]);
+  for (const std::size_t node : nodes) reduced.push_back(before[node]);
   if (!is_usable(minimise(equations, reduced, {}, {.max_iterations = 1}).termination)) return false;
 
   Vector6d delta = Vector6d::Zero();
   for (std::size_t k = 0; k + 1 < nodes.size(); ++k) {
-    const Vector6d next = local(poses[nodes[k + 1]], reduced[k + 1]);
+    const Vector6d next = local(before[nodes[k + 1]], reduced[k + 1]);
     distribute_about(steps_of(k), sums[k], delta, next, poses_of(k));
     delta = next;
   }
   for (std::size_t k = 0; k < nodes.size(); ++k) polished[nodes[k]] = reduced[k];
-  if (!(full_cost_change(nodes, odometry, graph, poses, polished) < kCostTolerance)) return false;
-  poses.swap(polished);
+  if (!(full_cost_change(nodes, odometry, graph, before, polished) < kCostTolerance)) return false;
+  for (std::size_t i = 0; i < polished.size(); ++i) poses.set(i, polished[i]);
   return true;
 }
 

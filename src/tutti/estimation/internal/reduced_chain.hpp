@@ -16,7 +16,7 @@ namespace tutti::estimation::internal {
 std::vector<std::size_t> reduced_nodes(std::span<const ChainConstraint> constraints);
 
 /// Makes `runs` those between `nodes`; what is in it already stays. Returns how many odometry steps were compounded.
-std::size_t update_runs(std::span<const std::size_t> nodes, std::span<const RelativePose> odometry,
+std::size_t update_runs(std::span<const std::size_t> nodes, const LongList<RelativePose>& odometry,
                         std::vector<PoseGraphEdge>& runs);
 
 /// Node k is the k-th reduced one, composed from raw odometry; edge k is run k, then come the constraints.
@@ -24,15 +24,15 @@ PoseGraph reduced_graph(std::span<const std::size_t> nodes, std::span<const Pose
                         std::span<const ChainConstraint> constraints, const Pose3& first);
 
 /// Gives the nodes their poses, `reduced`, and bends raw odometry between them to meet these.
-void place(std::span<const PoseGraphEdge> runs, std::span<const Pose3> reduced, std::span<const RelativePose> odometry,
-           std::span<Pose3> poses);
+void place(std::span<const PoseGraphEdge> runs, std::span<const Pose3> reduced, const LongList<RelativePose>& odometry,
+           LongList<Pose3>& poses);
 
 /// One Gauss-Newton step on the full graph of the chain, poses after the last node left out: every run is linearised
 /// about `poses` instead of raw odometry and put in its place in `graph` (that of `equations`), which is then the exact
 /// Schur complement. Taken only if the full graph's cost does not rise: where odometry knows little of some axes and
 /// much of others, Gauss-Newton can lead metres away from where it started. Else, or when singular, false and `poses`
 /// stay.
-bool polish(std::span<const std::size_t> nodes, std::span<const RelativePose> odometry, PoseGraph& graph,
-            GraphEquations& equations, std::vector<Pose3>& poses);
+bool polish(std::span<const std::size_t> nodes, const LongList<RelativePose>& odometry, PoseGraph& graph,
+            GraphEquations& equations, LongList<Pose3>& poses);
 
 }  // namespace tutti::estimation::internal

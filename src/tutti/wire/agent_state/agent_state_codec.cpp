@@ -93,22 +93,21 @@ std::vector<estimation::ChainConstraint> constraints_of(const consistency::Ledge
 }
 
 void put_chain(const robot::RobotAgent& agent, std::size_t from, StateRows& rows) {
-  const std::vector<Keyframe>& keyframes = agent.keyframes();
+  const LongList<Keyframe>& keyframes = agent.keyframes();
   const auto at = [](const auto& list, std::size_t index) { return list.begin() + static_cast<std::ptrdiff_t>(index); };
   const auto is_node = [](const Keyframe& keyframe) { return keyframe.representative; };
   // Nodes are counted from the end: the part that is new is short.
   std::size_t node = agent.node_odometry().size() -
-                     static_cast<std::size_t>(std::count_if(at(keyframes, from), keyframes.end(), is_node));
+                     static_cast<std::size_t>(std::ranges::count_if(at(keyframes, from), keyframes.end(), is_node));
   for (std::size_t first = from; first < keyframes.size(); first += kChainRow) {
     const std::size_t last = std::min(first + kChainRow, keyframes.size());
     ChainPart part{.first = first,
-                   .keyframes = {at(keyframes, first), at(keyframes, last)},
+                   .keyframes = keyframes.part(first, last),
                    .submap_of = {at(agent.submap_of(), first), at(agent.submap_of(), last)},
-                   .odometry = {at(agent.smoother().odometry, std::max<std::size_t>(first, 1) - 1),
-                                at(agent.smoother().odometry, last - 1)},
+                   .odometry = agent.smoother().odometry.part(std::max<std::size_t>(first, 1) - 1, last - 1),
                    .node_odometry = {}};
     const auto nodes = static_cast<std::size_t>(std::ranges::count_if(part.keyframes, is_node));
-    part.node_odometry = {at(agent.node_odometry(), node), at(agent.node_odometry(), node + nodes)};
+    part.node_odometry = agent.node_odometry().part(node, node + nodes);
     node += nodes;
     rows.emplace(chain_key(first), encode_part(part));
   }
@@ -152,7 +151,7 @@ StateChange changed_rows(const robot::RobotAgent& agent, StoredState& stored) {
   if (moved) {
     const estimation::SmootherState& smoother = agent.smoother();
     Corrections corrections{.first = smoother.first, .constraints = {}, .held = {}, .solution = smoother.solution};
-    corrections.held = {smoother.poses.begin(), smoother.poses.begin() + static_cast<std::ptrdiff_t>(smoother.held)};
+    corrections.held = smoother.poses.part(0, smoother.held);
     corrections.are_ledgers = constraints_of(agent.ledger()) == smoother.constraints;
     if (!corrections.are_ledgers) corrections.constraints = smoother.constraints;
     change.put.emplace(kCorrections, encode_part(corrections));
@@ -174,7 +173,9 @@ Result<AgentState> decode_state_rows(const StateRows& rows) {
   Corrections corrections;
   std::vector<consistency::Constraint> links;
   Status ok;
-  const auto append = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
+  const auto append = [](auto& to, const auto& from) {
+    for (const auto& element : from) to.push_back(element);
+  };
   const auto take = [&](const std::string& key, auto& value) {
     const auto found = rows.find(key);
     ok = found == rows.end() ? Status(fail(ErrorCode::invalid, "agent state: no row {}", key))
@@ -202,7 +203,7 @@ Result<AgentState> decode_state_rows(const StateRows& rows) {
   state.smoother.constraints =
       corrections.are_ledgers ? constraints_of(state.ledger) : std::move(corrections.constraints);
   state.smoother.held = corrections.held.size();
-  state.smoother.poses = std::move(corrections.held);
+  state.smoother.poses = corrections.held;
   state.smoother.solution = std::move(corrections.solution);
   if (const char* wrong = what_is_wrong(state)) return fail(ErrorCode::invalid, "agent state: {}", wrong);
   return state;

@@ -145,6 +145,12 @@ void pass(A& a, std::vector<T>& list) {
   a.length(list);
   for (T& element : list) pass(a, element);
 }
+template <class A, class T>
+void pass(A& a, LongList<T>& list) {
+  std::vector<T> elements = list.all();
+  pass(a, elements);
+  list = elements;
+}
 /// Whether there is a value, and then one in any case.
 template <class A, class T>
 void pass(A& a, std::optional<T>& optional) {

@@ -25,13 +25,12 @@ bool is_sound(const PositionFix& fix) { return check_fix(fix.antenna, fix.covari
 bool is_sound(const robot::PlacedFix& fix) {
   return check_fix(fix.antenna, fix.covariance, Eigen::Vector3d::Zero()).has_value() && fix.p_odom_antenna.allFinite();
 }
-template <class T>
-bool all_sound(const std::vector<T>& list) {
-  return std::ranges::all_of(list, [](const T& element) { return is_sound(element); });
+bool all_sound(const auto& list) {
+  return std::ranges::all_of(list, [](const auto& element) { return is_sound(element); });
 }
 
 /// Keyframes that follow each other, with the odometry between them.
-bool is_chain(const std::vector<Keyframe>& keyframes, const std::vector<RelativePose>& odometry) {
+bool is_chain(const auto& keyframes, const auto& odometry) {
   if (odometry.size() + 1 != std::max<std::size_t>(1, keyframes.size())) return false;
   for (std::size_t k = 0; k < keyframes.size(); ++k) {
     if (!is_sound(keyframes[k].T_odom_body)) return false;
