@@ -9,9 +9,20 @@
 #include "tutti/perception/lidar/candidates.hpp"
 #include "tutti/perception/lidar/place_descriptor.hpp"
 #include "tutti/perception/lidar/verify.hpp"
+#include "tutti/perception/visual/place_descriptor.hpp"
 #include "tutti/perception/visual/verify.hpp"
 
 namespace tutti::finders {
+namespace {
+
+template <class Matcher>
+std::vector<double> likeness_by(const Matcher& matcher, std::span<const std::string_view> others) {
+  std::vector<double> out;
+  for (const std::string_view other : others) out.push_back(matcher.likeness(other));
+  return out;
+}
+
+}  // namespace
 
 LidarClosureFinder::LidarClosureFinder(const lidar::LidarClosureConfig& config, int min_submap_gap,
                                        std::size_t cache_bytes)
@@ -68,10 +79,7 @@ bool LidarClosureFinder::can_rank(std::string_view place) const { return lidar::
 
 std::vector<double> LidarClosureFinder::likeness(std::string_view place,
                                                  std::span<const std::string_view> others) const {
-  const lidar::PlaceMatcher matcher(place);
-  std::vector<double> out;
-  for (const std::string_view other : others) out.push_back(matcher.likeness(other));
-  return out;
+  return likeness_by(lidar::PlaceMatcher(place), others);
 }
 
 Result<std::shared_ptr<const lidar::SubmapFeatures>> LidarClosureFinder::features_of(
@@ -102,6 +110,17 @@ Result<ClosureVerdict> VisualClosureFinder::verify(const Submap& first, const Su
   ClosureVerdict verdict = visual::verify_pair(**a, **b, config_);
   verdict.finder = id();
   return verdict;
+}
+
+std::string VisualClosureFinder::place_of(const Submap& submap) const {
+  return visual::describe_place(submap, config_);
+}
+
+bool VisualClosureFinder::can_rank(std::string_view place) const { return visual::is_descriptor(place); }
+
+std::vector<double> VisualClosureFinder::likeness(std::string_view place,
+                                                  std::span<const std::string_view> others) const {
+  return likeness_by(visual::PlaceMatcher(place, config_), others);
 }
 
 Result<VisualClosureFinder::Features> VisualClosureFinder::features_of(const Submap& submap,

@@ -62,6 +62,10 @@ class VisualClosureFinder final : public server::ClosureFinder {
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override;
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const server::PayloadStore& payloads) const override;
+  [[nodiscard]] std::string place_of(const Submap& submap) const override;
+  [[nodiscard]] bool can_rank(std::string_view place) const override;
+  [[nodiscard]] std::vector<double> likeness(std::string_view place,
+                                             std::span<const std::string_view> others) const override;
 
  private:
   using Features = FeatureCache<visual::SubmapFeatures>::Features;

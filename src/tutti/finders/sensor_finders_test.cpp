@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "support/perception/visual/textured_room.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/finders/parallel.hpp"
 
@@ -131,6 +132,29 @@ TEST(SensorFinders, SayWhatAPlaceLooksLikeWhereOneKindOfSensorAloneComparesIt) {
   EXPECT_EQ(joint.place_of(seen), "");  // cameras may find closures that do not look alike from above
   EXPECT_EQ(visual->place_of(seen), "");
   EXPECT_EQ(joint.place_of({.id = seen.id}), "");
+}
+
+TEST(SensorFinders, SayWhatCamerasSawWhereTheyAreTheOnlySensor) {
+  using visual::test::fly, visual::test::make_submap, visual::test::stereo_cameras, visual::test::textured_room;
+  const auto lidar = std::make_shared<LidarClosureFinder>(lidar::LidarClosureConfig{}, 1, kMuch);
+  const auto visual = std::make_shared<VisualClosureFinder>(visual::VisualClosureConfig{}, 1, kMuch);
+  const JointClosureFinder joint({lidar, visual});
+  const auto place_of = [&](std::uint64_t room, double yaw_rad) {
+    const Submap seen = make_submap(
+        {RobotId{0}, 0}, fly(textured_room(700, Rng(room)), stereo_cameras(), {.yaw_rad = yaw_rad}, Rng(room)),
+        stereo_cameras(), {});
+    const std::string place = visual->place_of(seen);
+    EXPECT_FALSE(place.empty());
+    EXPECT_EQ(joint.place_of(seen), place);
+    return place;
+  };
+  const std::string place = place_of(1, 1.5), again = place_of(1, 1.4), elsewhere = place_of(2, 1.5);
+  EXPECT_TRUE(joint.can_rank(place));
+  EXPECT_FALSE(lidar->can_rank(place));
+  const std::vector<std::string_view> others{again, elsewhere};
+  const std::vector<double> likeness = joint.likeness(place, others);
+  EXPECT_EQ(likeness, visual->likeness(place, others));
+  EXPECT_GT(likeness[0], 5 * likeness[1]);
 }
 
 }  // namespace sensor_finders_test

@@ -38,7 +38,7 @@ struct Packed<Pose3> {
   }
 };
 
-/// 224 bytes, where a RelativePose has 352. Of a covariance that is not symmetric the symmetric part is kept.
+/// 224 bytes, where a RelativePose has 352. A covariance's symmetric part is kept, which it is if it means something.
 template <>
 struct Packed<RelativePose> {
   Packed<Pose3> pose;
@@ -74,8 +74,8 @@ struct Packed<Keyframe> {
   [[nodiscard]] Keyframe get() const { return {index, stamp, pose.get(), representative}; }
 };
 
-/// A list that grows for a whole day. What is in it stays where it is: to add an element always takes the same time, and
-/// there is never room for a second copy. Elements are kept packed and given by value.
+/// A list that grows for a whole day. What is in it stays where it is: to add an element always takes the same time,
+/// and there is never room for a second copy. Elements are kept packed and given by value.
 template <class T>
 class LongList {
  public:

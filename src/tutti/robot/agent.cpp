@@ -193,8 +193,9 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, const StageO
       optimise();
     }
   }
-  state_.T_map_odom =
-      state_.ledger.size() == 0 ? Pose3{} : smoother_.pose(smoother_.size() - 1) * state_.keyframes.back().T_odom_body.inverse();
+  state_.T_map_odom = state_.ledger.size() == 0
+                          ? Pose3{}
+                          : smoother_.pose(smoother_.size() - 1) * state_.keyframes.back().T_odom_body.inverse();
   state_.covariance = covariance_by(message.graph);
   state_.component = component_of(message.graph, chain_);
   locate_others(message.graph, own, pairs);

@@ -61,18 +61,31 @@ DescriptorTables::DescriptorTables(std::span<const TableKeys> rows) {
   }
 }
 
-bool DescriptorTables::has_near(std::span<const std::uint64_t> query, const TableKeys& keys, const Descriptors& rows,
-                                std::uint32_t most) const {
+template <class F>
+bool DescriptorTables::any(const TableKeys& keys, const F& is_enough) const {
   for (std::size_t t = 0; t < kTables; ++t) {
     const Table& table = tables_[t];
     const std::uint32_t word = keys[t] / 64U, bit = keys[t] % 64U;
     if (table.taken.empty() || ((table.taken[word] >> bit) & 1U) == 0) continue;
-    for (std::uint32_t i = table.first[word]; i < table.first[word + 1]; ++i) {
-      const std::uint32_t entry = table.entries[i];
-      if (entry % 64 == bit && hamming_distance(query, rows.row(entry / 64)) <= most) return true;
-    }
+    for (std::uint32_t i = table.first[word]; i < table.first[word + 1]; ++i)
+      if (const std::uint32_t entry = table.entries[i]; entry % 64 == bit && is_enough(entry / 64)) return true;
   }
   return false;
+}
+
+bool DescriptorTables::has_near(std::span<const std::uint64_t> query, const TableKeys& keys, const Descriptors& rows,
+                                std::uint32_t most) const {
+  return any(keys, [&](std::uint32_t row) { return hamming_distance(query, rows.row(row)) <= most; });
+}
+
+bool DescriptorTables::mark_near(std::span<const std::uint64_t> query, const TableKeys& keys, const Descriptors& rows,
+                                 std::uint32_t most, std::vector<bool>& near) const {
+  bool found = false;
+  any(keys, [&](std::uint32_t row) {
+    if (hamming_distance(query, rows.row(row)) <= most) near[row] = found = true;
+    return false;
+  });
+  return found;
 }
 
 std::size_t DescriptorTables::bytes() const {

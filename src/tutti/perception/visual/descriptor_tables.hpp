@@ -31,6 +31,10 @@ class DescriptorTables {
   /// missed. `rows`: the descriptors that the tables were made of.
   [[nodiscard]] bool has_near(std::span<const std::uint64_t> query, const TableKeys& keys, const Descriptors& rows,
                               std::uint32_t most) const;
+  /// Marks, in `near` (one per row), the rows that share a key with the query and are within `most` bits of it; true if
+  /// there are any.
+  bool mark_near(std::span<const std::uint64_t> query, const TableKeys& keys, const Descriptors& rows,
+                 std::uint32_t most, std::vector<bool>& near) const;
   [[nodiscard]] std::size_t bytes() const;  ///< Memory held beside the object itself.
 
  private:
@@ -39,6 +43,9 @@ class DescriptorTables {
     std::vector<std::uint32_t> first;    // of each word of `taken` its first entry; and the end
     std::vector<std::uint32_t> entries;  // by key: 64 times the row, and which bit of its word the key is
   };
+  /// Calls is_enough(row) for rows that share a key with the query, some more than once, until it says so.
+  template <class F>
+  bool any(const TableKeys& keys, const F& is_enough) const;
   std::array<Table, kTables> tables_;
 };
 
