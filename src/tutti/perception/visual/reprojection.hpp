@@ -16,7 +16,7 @@ struct ReprojectionError {
 };
 
 /// Errors of a submap's landmarks in its own images, at the poses of its own odometry; zero without images. The
-/// payload's indices must be valid: check_payload() where it came from outside.
+/// payload's indices must be valid, as wire::decode_submap() checks.
 ReprojectionError reprojection_error(const Submap& submap);
 
 }  // namespace tutti::visual

@@ -56,7 +56,7 @@ struct SubmapFeatures {
 };
 
 /// Computes the features; a submap without images or with a poor payload gets a refusal. submap.visual must be loaded
-/// where there is one, and its indices valid: check_payload() where it came from outside.
+/// where there is one, and its indices valid, as wire::decode_submap() checks.
 SubmapFeatures extract_features(const Submap& submap, const VisualClosureConfig& config);
 
 /// Memory held, in bytes.
