@@ -13,6 +13,11 @@ namespace tutti::visual {
 /// processor's popcnt where it has one, which is found out when the program runs.
 std::uint32_t hamming_distance(std::span<const std::uint64_t> a, std::span<const std::uint64_t> b);
 
+/// The distance, in bits, that is this share of a row's.
+inline std::uint32_t distance_of_share(double share, const Descriptors& rows) {
+  return static_cast<std::uint32_t>(share * 64.0 * rows.words);
+}
+
 inline constexpr std::uint32_t kNoDistance = 0xFFFF;  ///< More bits than any descriptor has.
 
 /// Least distance of `query` to the rows `which` (valid indices); kNoDistance without any.

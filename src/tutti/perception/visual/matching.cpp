@@ -18,7 +18,7 @@ struct NearestObservation {
 
 /// As a number of bits.
 std::uint32_t max_distance(const Descriptors& rows, const VisualClosureConfig& config) {
-  return static_cast<std::uint32_t>(config.max_hamming * 64.0 * rows.words);
+  return distance_of_share(config.max_hamming, rows);
 }
 
 /// A row farther away than this is no match, nor a rival of one.

@@ -45,6 +45,7 @@ std::vector<SeenLandmark> landmarks_of(const VisualPayload& payload) {
 }
 
 Descriptors read_rows(std::string_view bytes) {
+  TUTTI_CHECK(is_descriptor(bytes), "{} bytes, which are no place's", bytes.size());
   Descriptors out{.kind = static_cast<DescriptorKind>(bytes[1]), .words = static_cast<std::uint8_t>(bytes[2])};
   out.bits.resize((bytes.size() - kHeadBytes) / sizeof(std::uint64_t));
   std::memcpy(out.bits.data(), bytes.data() + kHeadBytes, out.bits.size() * sizeof(std::uint64_t));
@@ -81,28 +82,26 @@ bool is_descriptor(std::string_view bytes) {
 }
 
 struct PlaceMatcher::Place {
-  explicit Place(std::string_view bytes) : rows(read_rows(bytes)), keys(table_keys(rows)), tables(keys) {}
+  Place(std::string_view bytes, double max_hamming)
+      : rows(read_rows(bytes)), tables(table_keys(rows)), most(distance_of_share(max_hamming, rows)) {}
   Descriptors rows;
-  std::vector<TableKeys> keys;
   DescriptorTables tables;
+  std::uint32_t most;  ///< Bits in which near ones differ.
 };
 
 PlaceMatcher::PlaceMatcher(std::string_view descriptor, const VisualClosureConfig& config)
-    : place_(std::make_unique<Place>(descriptor)), max_hamming_(std::min(config.max_hamming, kAlike)) {
-  TUTTI_CHECK(is_descriptor(descriptor), "{} bytes, which are no place's", descriptor.size());
-}
+    : place_(std::make_unique<Place>(descriptor, std::min(config.max_hamming, kAlike))) {}
 PlaceMatcher::~PlaceMatcher() = default;
 
 double PlaceMatcher::likeness(std::string_view other) const {
   const Descriptors& own = place_->rows;
   const Descriptors rows = read_rows(other);
   if (rows.kind != own.kind || rows.words != own.words) return 0.0;
-  const auto most = static_cast<std::uint32_t>(max_hamming_ * 64.0 * own.words);
   const std::vector<TableKeys> keys = table_keys(rows);
   std::vector<bool> marked(own.size(), false);
   std::ptrdiff_t near = 0;
   for (std::size_t i = 0; i < rows.size(); ++i)
-    near += place_->tables.mark_near(rows.row(i), keys[i], own, most, marked) ? 1 : 0;
+    near += place_->tables.mark_near(rows.row(i), keys[i], own, place_->most, marked) ? 1 : 0;
   near += std::ranges::count(marked, true);
   return static_cast<double>(near);
 }

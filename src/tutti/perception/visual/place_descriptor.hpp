@@ -31,7 +31,6 @@ class PlaceMatcher {
  private:
   struct Place;
   std::unique_ptr<const Place> place_;
-  double max_hamming_;
 };
 
 }  // namespace tutti::visual
