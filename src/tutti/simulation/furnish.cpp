@@ -58,14 +58,17 @@ double either_side(Rng& rng) { return rng.bernoulli(0.5) ? 1.0 : -1.0; }
 void furnish_tunnel(const Aisle& aisle, SpaceParts& parts, Rng rng) {
   for (const double s : places(aisle, kAlcovesPer100m, rng)) {
     const double depth = rng.uniform(0.6, 1.6);
-    parts.openings.push_back(box_at(aisle, s, rng.uniform(0.5, 1.5), either_side(rng), aisle.half_width - 0.6,
-                                    aisle.half_width + depth, rng.uniform(1.4, 2.3), kRoughness_m));
+    const double height = rng.uniform(1.4, 2.3);
+    const double side = either_side(rng);
+    parts.openings.push_back(box_at(aisle, s, rng.uniform(0.5, 1.5), side, aisle.half_width - 0.6,
+                                    aisle.half_width + depth, height, kRoughness_m));
   }
   for (const double s : places(aisle, kObstaclesPer100m, rng)) {
     const double front = std::max(kClearance, aisle.half_width - rng.uniform(0.2, 0.5)) + kRoughness_m;
     const double height = rng.bernoulli(0.3) ? kHeight_m + 1.0 : rng.uniform(0.4, 1.8);
-    parts.solids.push_back(box_at(aisle, s, rng.uniform(0.2, 0.7), either_side(rng), front,
-                                  aisle.half_width + kIntoWall, height, kRoughness_m));
+    const double side = either_side(rng);
+    parts.solids.push_back(
+        box_at(aisle, s, rng.uniform(0.2, 0.7), side, front, aisle.half_width + kIntoWall, height, kRoughness_m));
   }
 }
 
@@ -89,8 +92,10 @@ void furnish_office(const CorridorWorld& world, std::size_t corridor, const Aisl
     const double side = either_side(rng), wall = aisle.half_width;
     const bool open = rng.bernoulli(1.0 / 3.0);
     const double depth = rng.uniform(0.12, 0.3);
-    const Box room = box_at(aisle, s + rng.uniform(-0.8, 0.8), rng.uniform(1.4, 2.2), side, wall + 0.35,
-                            wall + rng.uniform(2.8, 4.5), kOfficeHeight_m - 0.1, 0.0);
+    const double room_depth = rng.uniform(2.8, 4.5);
+    const double room_width = rng.uniform(1.4, 2.2);
+    const Box room = box_at(aisle, s + rng.uniform(-0.8, 0.8), room_width, side, wall + 0.35, wall + room_depth,
+                            kOfficeHeight_m - 0.1, 0.0);
     const Box table = box_at(aisle, s + rng.uniform(-0.8, 0.8), 0.6, side, wall + 1.8, wall + 2.5, 0.75, 0.0);
     const bool has_room = open && has_space(room, world, corridor, wall);
     parts.openings.push_back(box_at(aisle, s, 0.5, side, wall - 0.5, wall + (has_room ? 0.6 : depth), 2.1, 0.0));
@@ -101,9 +106,10 @@ void furnish_office(const CorridorWorld& world, std::size_t corridor, const Aisl
   for (const double s : places(aisle, kFurniturePer100m, rng)) {
     const double front = aisle.half_width - rng.uniform(0.25, 0.45);
     const bool pillar = rng.bernoulli(0.3);
-    parts.solids.push_back(box_at(aisle, s, pillar ? 0.2 : rng.uniform(0.4, 0.8), either_side(rng), front,
-                                  aisle.half_width + kIntoWall, pillar ? kOfficeHeight_m + 1.0 : rng.uniform(0.8, 2.0),
-                                  0.0));
+    const double height = pillar ? kOfficeHeight_m + 1.0 : rng.uniform(0.8, 2.0);
+    const double side = either_side(rng);
+    const double width = pillar ? 0.2 : rng.uniform(0.4, 0.8);
+    parts.solids.push_back(box_at(aisle, s, width, side, front, aisle.half_width + kIntoWall, height, 0.0));
   }
 }
 
@@ -138,8 +144,9 @@ Box stairhouse(const Passage& corridor, const Roof& roof, bool comes_out_at_b) {
 void add_chimneys(const CorridorWorld& world, const SurfaceConfig& config, Roof& roof, Rng rng) {
   const std::size_t wanted = roof.solids.size() + static_cast<std::size_t>(config.chimneys);
   for (int tries = 0; tries < 1000 && roof.solids.size() < wanted; ++tries) {
-    const Eigen::Vector3d at(rng.uniform(roof.low.x() + 1.0, roof.high.x() - 1.0),
-                             rng.uniform(roof.low.y() + 1.0, roof.high.y() - 1.0), roof.floor + config.body_height_m);
+    const double y = rng.uniform(roof.low.y() + 1.0, roof.high.y() - 1.0);
+    const double x = rng.uniform(roof.low.x() + 1.0, roof.high.x() - 1.0);
+    const Eigen::Vector3d at(x, y, roof.floor + config.body_height_m);
     if (corridor_at(world, at, 2.5)) continue;
     const double angle = rng.uniform(0.0, 1.5), height = rng.uniform(0.8, 1.6);
     roof.solids.push_back({{at.x(), at.y(), roof.floor + 0.5 * height - 0.25},

@@ -77,8 +77,9 @@ Hall make_hall(const HallConfig& config, Rng rng) {
   Hall hall;
   add_box(hall, AlignedBox(-half, half + Eigen::Vector3d(0.0, 0.0, config.height_m)), true, 0.0, rng);
   for (int i = 0; i < config.boxes; ++i) {
-    const Eigen::Vector3d size(rng.uniform(0.3, kAlongWalls_m), rng.uniform(0.3, kAlongWalls_m), rng.uniform(0.3, 3.0));
-    Eigen::Vector3d low(rng.uniform(-half.x(), half.x() - size.x()), rng.uniform(-half.y(), half.y() - size.y()), 0.0);
+    Eigen::Vector3d size, low(0.0, 0.0, 0.0);
+    for (const int axis : {2, 1, 0}) size[axis] = rng.uniform(0.3, axis == 2 ? 3.0 : kAlongWalls_m);
+    for (const int axis : {1, 0}) low[axis] = rng.uniform(-half[axis], half[axis] - size[axis]);
     if (i % 4 == 0) {
       low.head<2>() *= kMiddle;
     } else {

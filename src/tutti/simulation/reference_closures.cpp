@@ -222,8 +222,8 @@ std::optional<Pose3> ReferenceClosures::draw_error(const SubmapPair& pair, bool 
   Pose3 error;
   error.translation = {offset * std::cos(direction), offset * std::sin(direction),
                        rng.uniform(-kWrongHeight_m, kWrongHeight_m)};
-  error.rotation = Eigen::AngleAxisd(rng.uniform(-max_turn, max_turn), Eigen::Vector3d::UnitZ()) *
-                   Eigen::AngleAxisd(rng.uniform(-tilt, tilt), Eigen::Vector3d::UnitX());
+  const Eigen::AngleAxisd turn(rng.uniform(-max_turn, max_turn), Eigen::Vector3d::UnitZ());
+  error.rotation = turn * Eigen::AngleAxisd(rng.uniform(-tilt, tilt), Eigen::Vector3d::UnitX());
   return error;
 }
 
