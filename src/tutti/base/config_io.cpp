@@ -67,7 +67,7 @@ Result<ConfigNode*> step_into(ConfigNode& node, const PathStep& step, const std:
   node.kind = ConfigNode::Kind::map;
   for (auto& [key, value] : node.map)
     if (key == name) return &value;
-  return &node.map.emplace_back(name, ConfigNode{}).second;
+  return &node.map.emplace_back(name, ConfigNode{}).value;
 }
 
 template <class Number>
@@ -89,8 +89,8 @@ std::string print_number(Number value) {
 }  // namespace
 
 const ConfigNode* ConfigNode::find(std::string_view key) const {
-  const auto found = std::ranges::find(map, key, &std::pair<std::string, ConfigNode>::first);
-  return found == map.end() ? nullptr : &found->second;
+  const auto found = std::ranges::find(map, key, &ConfigNode::Entry::key);
+  return found == map.end() ? nullptr : &found->value;
 }
 
 Status apply_override(ConfigNode& root, const std::string& assignment) {
@@ -253,11 +253,11 @@ void merge_config(ConfigNode& into, const ConfigNode& more) {
     return;
   }
   for (const auto& [key, value] : more.map) {
-    const auto found = std::ranges::find(into.map, key, &std::pair<std::string, ConfigNode>::first);
+    const auto found = std::ranges::find(into.map, key, &ConfigNode::Entry::key);
     if (found == into.map.end())
       into.map.emplace_back(key, value);
     else
-      merge_config(found->second, value);
+      merge_config(found->value, value);
   }
   for (std::size_t i = 0; i < more.list.size(); ++i)
     if (i < into.list.size())

@@ -24,14 +24,19 @@ namespace tutti {
 /// A parsed YAML document without any YAML library in the interface. Scalars keep their text.
 struct ConfigNode {
   enum class Kind { null, scalar, list, map };
+  struct Entry;
   Kind kind = Kind::null;
   std::string scalar;
   std::vector<ConfigNode> list;
-  std::vector<std::pair<std::string, ConfigNode>> map;  ///< In file order.
-  int line = 0;                                         ///< 1-based; 0 = from the command line.
+  std::vector<Entry> map;  ///< In file order.
+  int line = 0;            ///< 1-based; 0 = from the command line.
 
   /// The value of a key of a map; null when the key is missing or this node is no map.
   [[nodiscard]] const ConfigNode* find(std::string_view key) const;
+};
+struct ConfigNode::Entry {
+  std::string key;
+  ConfigNode value;
 };
 
 /// What parse_yaml() takes: ten times the metadata of a bag of a thousand files.

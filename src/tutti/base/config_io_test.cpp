@@ -263,7 +263,7 @@ bool same_content(const ConfigNode& a, const ConfigNode& b) {
   return a.kind == b.kind && a.scalar == b.scalar &&
          std::ranges::equal(a.list, b.list, [](const auto& x, const auto& y) { return same_content(x, y); }) &&
          std::ranges::equal(a.map, b.map, [](const auto& x, const auto& y) {
-           return x.first == y.first && same_content(x.second, y.second);
+           return x.key == y.key && same_content(x.value, y.value);
          });
 }
 

@@ -41,8 +41,8 @@ tl::unexpected<Error> other_settings(const MethodId& id, const MethodId& made) {
 std::string settings_of(const FinderConfig& config) {
   ConfigNode node = dump_config(FinderSettings{config});
   const std::vector<std::string_view>& used = config.kind().settings;
-  std::erase_if(node.map.front().second.map, [&](const auto& entry) {
-    return entry.first != "finder" && std::ranges::find(used, entry.first) == used.end();
+  std::erase_if(node.map.front().value.map, [&](const auto& entry) {
+    return entry.key != "finder" && std::ranges::find(used, entry.key) == used.end();
   });
   return to_yaml(node);
 }

@@ -86,7 +86,7 @@ Result<MissionConfig> finish(ConfigNode root, const std::string& name, const std
 /// Who finds closures is of the laboratory's settings where they come with the mission.
 ConfigNode without_finder(ConfigNode root) {
   for (auto& [key, value] : root.map)
-    if (key == "closures") std::erase_if(value.map, [](const auto& entry) { return entry.first == "finder"; });
+    if (key == "closures") std::erase_if(value.map, [](const auto& entry) { return entry.key == "finder"; });
   return root;
 }
 

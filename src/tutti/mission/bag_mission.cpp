@@ -12,7 +12,7 @@ namespace tutti::mission {
 namespace {
 
 ConfigNode scalar(std::string text) { return {.kind = ConfigNode::Kind::scalar, .scalar = std::move(text)}; }
-ConfigNode map(std::vector<std::pair<std::string, ConfigNode>> entries) {
+ConfigNode map(std::vector<ConfigNode::Entry> entries) {
   return {.kind = ConfigNode::Kind::map, .map = std::move(entries)};
 }
 
@@ -47,7 +47,7 @@ Result<std::string> bag_mission(const std::vector<std::string>& bags, const std:
                   "--topic {}: expected NAME.odometry=, NAME.scans=, NAME.images=, NAME.depth=, NAME.imu= or "
                   "NAME.fixes= of a robot with --bag",
                   argument);
-    at->map.back().second.map.emplace_back(kind, scalar(named->second));
+    at->map.back().value.map.emplace_back(kind, scalar(named->second));
   }
   const ConfigNode mission = map({{"mission", scalar("bags")},
                                   {"input", scalar("real: bags as they were recorded")},

@@ -125,7 +125,7 @@ Result<std::string> graph_mission(const std::string& file, const std::filesystem
   const auto scalar = [](std::string text) {
     return ConfigNode{.kind = ConfigNode::Kind::scalar, .scalar = std::move(text)};
   };
-  const auto map = [](std::vector<std::pair<std::string, ConfigNode>> entries) {
+  const auto map = [](std::vector<ConfigNode::Entry> entries) {
     return ConfigNode{.kind = ConfigNode::Kind::map, .map = std::move(entries)};
   };
   ConfigNode robots{.kind = ConfigNode::Kind::list};

@@ -148,9 +148,12 @@ std::vector<ChainUncertainty> uncertainties(const MapEstimate& map, const PoseGr
   for (Chain& chain : chains) {
     const auto first = static_cast<Eigen::Index>(6 * chain.begin);
     const auto rows = static_cast<Eigen::Index>(6 * (chain.end - chain.begin));
+    const auto of_chain = [&](const Eigen::MatrixXd& all) {  // what has no columns has no memory to point into either
+      return all.cols() == 0 ? Eigen::MatrixXd(rows, 0) : Eigen::MatrixXd(all.middleRows(first, rows));
+    };
     out.push_back(consistency::chain_uncertainty(graph, graph.nodes[chain.begin].chain,
-                                                 {.samples = samples.middleRows(first, rows),
-                                                  .shifts = shifts.middleRows(first, rows),
+                                                 {.samples = of_chain(samples),
+                                                  .shifts = of_chain(shifts),
                                                   .spread_covariance = std::move(chain.covariance),
                                                   .spread_odometry = spread_odometry(map, chain.spread, weights)},
                                                  &work.products));

@@ -180,7 +180,9 @@ class FieldReader {
   void spread_optional(int number, const char* name, std::optional<T>& value) {
     bool is_there = false;
     field(number, name, is_there);
-    if (is_there) spread(number + offset_, value.emplace());
+    if (!is_there) return;
+    value = T();  // not emplace(): for Clang, a struct within another is not constructible while that is incomplete
+    spread(number + offset_, *value);
   }
   template <class T>
   void spread(int at, T& value) {
