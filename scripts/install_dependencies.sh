@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # Installs the Debian packages that are missing, and nothing when none is.
-#   scripts/install_dependencies.sh [--tests] [--bench] [--python]
+#   scripts/install_dependencies.sh [--tests] [--sanitize] [--bench] [--python]
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
@@ -12,13 +12,15 @@ packages=(
   libexpected-dev libfmt-dev libspdlog-dev libsystemd-dev libcli11-dev libyaml-cpp-dev nlohmann-json3-dev
   libopencv-core-dev libopencv-imgproc-dev libopencv-features2d-dev libopencv-video-dev
 )
+clang=() # compiles what sanitizers look at; another Debian or Ubuntu has another one, and GCC does it too, in twice the time
 for option in "$@"; do
   case "$option" in
     --tests) packages+=(libgtest-dev libgmock-dev librapidcheck-dev clang-format python3 python3-protobuf python3-numpy pybind11-dev python3-dev python3-venv mold dpkg-dev groff-base) ;;
+    --sanitize) clang=(clang-16 libclang-rt-16-dev) ;;
     --python) packages+=(pybind11-dev python3-dev python3-numpy python3-venv) ;;
     --bench) packages+=(libbenchmark-dev) ;;
     *)
-      echo "usage: $0 [--tests] [--bench] [--python]" >&2
+      echo "usage: $0 [--tests] [--sanitize] [--bench] [--python]" >&2
       exit 2
       ;;
   esac
@@ -33,25 +35,31 @@ fi
 browser=''
 [[ " $* " != *" --tests "* ]] || ! command -v npm >/dev/null || command -v chromium >/dev/null || browser=chromium
 
+is_installed() { [ "$(dpkg-query -W -f='${db:Status-Status}' "$1" 2>/dev/null || true)" = installed ]; }
 missing=()
 for package in "${packages[@]}"; do
-  status="$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null || true)"
-  [ "$status" = installed ] || missing+=("$package")
+  is_installed "$package" || missing+=("$package")
 done
-[ "${#missing[@]}" -gt 0 ] || [ -n "$browser" ] || exit 0
+optional=(${browser:+"$browser"})
+for package in "${clang[@]}"; do
+  is_installed "$package" || optional+=("$package")
+done
+[ "$((${#missing[@]} + ${#optional[@]}))" -gt 0 ] || exit 0
 
 as_root=()
 if [ "$(id -u)" -ne 0 ]; then
   if ! command -v sudo >/dev/null; then
-    [ "${#missing[@]}" -gt 0 ] || exit 0 # the page is not driven in a browser then
+    [ "${#missing[@]}" -gt 0 ] || exit 0 # it does without the optional ones
     echo "$0: needs root or sudo to install: ${missing[*]}" >&2
     exit 1
   fi
   as_root=(sudo)
 fi
 
-say "installing ${#missing[@]} packages: ${missing[*]} $browser"
+say "installing $((${#missing[@]} + ${#optional[@]})) packages: ${missing[*]} ${optional[*]}"
 apt_get=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq -o DPkg::Lock::Timeout=300)
 quietly "${apt_get[@]}" update
 [ "${#missing[@]}" = 0 ] || quietly "${apt_get[@]}" install -y --no-install-recommends "${missing[@]}"
-[ -z "$browser" ] || "${apt_get[@]}" install -y --no-install-recommends "$browser" >/dev/null || echo "no $browser: the page is not driven in a browser"
+for package in "${optional[@]}"; do
+  "${apt_get[@]}" install -y --no-install-recommends "$package" >/dev/null || echo "no $package: tests do without it"
+done

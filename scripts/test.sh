@@ -71,7 +71,9 @@ build_and_test() {
 }
 
 stage "packages"
-"$root/scripts/install_dependencies.sh" --tests
+options=(--tests)
+[ "$sanitize" = no ] || options+=(--sanitize)
+"$root/scripts/install_dependencies.sh" "${options[@]}"
 trap finish EXIT
 build_and_test "$preset" Release "${tests[@]}"
 if [ "$sanitize" = yes ]; then
