@@ -25,7 +25,7 @@ else()
 endif()
 
 # What sanitizers look at is compiled by Clang where there is one: half the time and memory of GCC 12, and a second compiler's
-# opinion. Its warnings are off: GCC's are errors in every other build, and are not Clang's.
+# opinion. Its warnings are off: GCC's are errors in every other build, and are not Clang's. Empty: the project's compiler.
 find_program(TUTTI_SANITIZING_CXX NAMES clang++-16 clang++-17 clang++-18 clang++-19 clang++-20)
 mark_as_advanced(TUTTI_SANITIZING_CXX)
 if(TUTTI_SANITIZE AND TUTTI_SANITIZING_CXX) # its sanitizers are a package of their own
