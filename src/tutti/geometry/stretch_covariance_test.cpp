@@ -35,7 +35,7 @@ Chain any_chain(Rng& rng, std::size_t n) {
 
 TEST(StretchCovariance, CompoundsStepByStep) {
   Rng rng(3);
-  for (const std::size_t n : {1UL, 2UL, 5UL, 16UL, 37UL}) {
+  for (const std::size_t n : {1UL, 2UL, 5UL, 16UL, 17UL, 37UL, 290UL}) {
     const Chain chain = any_chain(rng, n);
     const StretchCovariance stretch(chain.poses, chain.steps);
     for (std::size_t a = 0; a < n; ++a) {

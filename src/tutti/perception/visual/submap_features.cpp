@@ -4,7 +4,6 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <map>
@@ -150,9 +149,7 @@ std::size_t bytes_of(const SubmapFeatures& features) {
     out += bytes(keyframe.frames) + bytes(keyframe.landmarks);
     for (const QueryFrame& frame : keyframe.frames) out += bytes(frame.observations);
   }
-  // StretchCovariance: one matrix of every keyframe and level.
-  const auto levels = static_cast<std::size_t>(std::bit_width(features.odometry.size()));
-  return out + features.odometry.size() * (sizeof(Pose3) + levels * sizeof(Matrix6d));
+  return out + features.odometry.bytes();
 }
 
 }  // namespace tutti::visual
