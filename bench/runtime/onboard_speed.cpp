@@ -108,7 +108,7 @@ void update_from_scratch(const TunnelChain& chain, int repetitions) {
   row("full graph, Ceres", ceres);
   poses = own;
 #endif
-  row("full graph, own Gauss-Newton on CHOLMOD", full);
+  row("full graph, own Gauss-Newton", full);
   for (const int polishing : {1, 0}) {
     OnboardSmoother smoother;
     const Times times = measure(
@@ -221,9 +221,10 @@ void parts(const TunnelChain& chain, int repetitions) {
   row("Cholesky factor", [&] { (void)equations.factorise(); });
   Eigen::VectorXd b = Eigen::VectorXd::Ones(6 * static_cast<Eigen::Index>(nodes.size() - 1));
   row("solve with it", [&] { equations.solve(b); });
-  std::vector<Pose3> poses(chain.truth.size(), chain.truth.front());
-  row("bend all inner poses", [&] { place(runs, reduced, chain.odometry, poses); });
-  row("polish", [&] { (void)polish(nodes, chain.odometry, graph, equations, poses); });
+  LongList<Pose3> poses(std::vector<Pose3>(chain.truth.size(), chain.truth.front()));
+  const LongList<RelativePose> odometry(chain.odometry);
+  row("bend all inner poses", [&] { place(runs, reduced, odometry, poses); });
+  row("polish", [&] { (void)polish(nodes, odometry, graph, equations, poses); });
 }
 
 void append_and_memory(int repetitions) {
