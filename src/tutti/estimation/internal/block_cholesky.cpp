@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/estimation/internal/block_cholesky.hpp"
 
-#include <cholmod.h>
+#include <cblas.h>
+#include <lapacke.h>
 
 #include <algorithm>
+#include <memory>
 
 #include "tutti/base/check.hpp"
 #include "tutti/base/single_thread.hpp"
@@ -14,177 +16,203 @@ namespace {
 /// A pivot below this share of its diagonal entry has no correct digit left.
 constexpr double kSmallestPivotShare = 1e-14;
 
-/// Supernodes are merged up to so many blocks with at most this share of explicit zeros. CHOLMOD's defaults are made
-/// for scalar unknowns; these are 30 % faster on parking-garage, 10 % on torus3D.
-constexpr int kRelaxedBlocks[3] = {4, 8, 20};
-constexpr double kRelaxedZeros[3] = {0.8, 0.2, 0.05};
+/// Adds B x B blocks of one block column to those at other rows.
+template <int B>
+class BlockColumn {
+ public:
+  BlockColumn(double* to, std::ptrdiff_t to_stride, const double* from, std::ptrdiff_t from_stride)
+      : to_(to), to_stride_(to_stride), from_(from), from_stride_(from_stride) {}
+  void add(std::ptrdiff_t to_row, std::ptrdiff_t from_row) const {
+    for (int c = 0; c < B; ++c) {
+      double* const to = to_ + c * to_stride_ + B * to_row;
+      const double* const from = from_ + c * from_stride_ + B * from_row;
+      for (int r = 0; r < B; ++r) to[r] += from[r];
+    }
+  }
 
-#ifdef TUTTI_SUPERNODAL
-constexpr int kFactorisation = CHOLMOD_SUPERNODAL;  // GPL part of CHOLMOD
-#else
-constexpr int kFactorisation = CHOLMOD_SIMPLICIAL;
-#endif
+ private:
+  double* to_;
+  std::ptrdiff_t to_stride_;
+  const double* from_;
+  std::ptrdiff_t from_stride_;
+};
 
 }  // namespace
 
-struct BlockCholesky::Cholmod {
-  cholmod_common common;
-  cholmod_sparse matrix{};
-  std::vector<int> column_start, row;
-  cholmod_factor* factor = nullptr;
-  cholmod_dense* solution = nullptr;
-  cholmod_dense* work_y = nullptr;
-  cholmod_dense* work_e = nullptr;
-
-  explicit Cholmod(int block_size) {
-    cholmod_start(&common);
-    common.print = 0;
-    common.nmethods = 1;
-    common.method[0].ordering = CHOLMOD_NATURAL;  // the structure is already in (postordered) elimination order
-    common.postorder = 0;
-    common.supernodal = kFactorisation;
-    for (int k = 0; k < 3; ++k) {
-      common.nrelax[k] = static_cast<std::size_t>(kRelaxedBlocks[k]) * block_size;
-      common.zrelax[k] = kRelaxedZeros[k];
-    }
-    common.final_ll = 1;
-    common.quick_return_if_not_posdef = 1;
-  }
-  ~Cholmod() {
-    cholmod_free_factor(&factor, &common);
-    cholmod_free_dense(&solution, &common);
-    cholmod_free_dense(&work_y, &common);
-    cholmod_free_dense(&work_e, &common);
-    cholmod_finish(&common);
-  }
-  Cholmod(const Cholmod&) = delete;
-  Cholmod& operator=(const Cholmod&) = delete;
-};
-
 BlockCholesky::BlockCholesky(const BlockStructure& structure, int block_size)
-    : structure_(structure), block_size_(block_size), cholmod_(std::make_unique<Cholmod>(block_size)) {
-  const int b = block_size;
-  const auto blocks = structure.block_row.size();
-  values_.assign(blocks * b * b, 0.0);
-  auto& c = *cholmod_;
-  c.column_start.reserve(structure.variables * b + 1);
-  c.row.reserve(values_.size());
-  c.column_start.push_back(0);
-  for (int column = 0; column < structure.variables; ++column) {
-    for (int k = 0; k < b; ++k) {
+    : structure_(structure), block_size_(block_size), supernodes_(find_supernodes(structure)) {
+  TUTTI_CHECK(block_size == 3 || block_size == 6, "blocks of {}", block_size);
+  values_.assign(structure.block_row.size() * static_cast<std::size_t>(block_size * block_size), 0.0);
+  int most_below = 0;
+  for (const Supernode& node : supernodes_) {
+    const Panel& panel =
+        panels_.emplace_back(Panel{factor_size_, block_size * node.rows(), block_size * node.columns});
+    factor_size_ += static_cast<std::ptrdiff_t>(panel.rows) * panel.columns;
+    most_below = std::max(most_below, panel.below());
+    for (int column = node.first; column < node.end(); ++column)
       for (int entry = structure.column_start[column]; entry < structure.column_start[column + 1]; ++entry)
-        for (int r = 0; r < b; ++r) c.row.push_back(structure.block_row[entry] * b + r);
-      c.column_start.push_back(static_cast<int>(c.row.size()));
-    }
+        position_.push_back(node.position_of(structure.block_row[entry]));
   }
-  auto& m = c.matrix;
-  m.nrow = m.ncol = static_cast<std::size_t>(structure.variables) * b;
-  m.nzmax = values_.size();
-  m.p = c.column_start.data();
-  m.i = c.row.data();
-  m.x = values_.data();
-  m.stype = -1;  // entries above the diagonal, in the diagonal blocks, are ignored
-  m.itype = CHOLMOD_INT;
-  m.xtype = CHOLMOD_REAL;
-  m.dtype = CHOLMOD_DOUBLE;
-  m.sorted = 1;
-  m.packed = 1;
-  if (m.ncol > 0) c.factor = cholmod_analyze(&m, &c.common);
+  factor_ = std::make_unique_for_overwrite<double[]>(static_cast<std::size_t>(factor_size_));
+  update_.resize(static_cast<std::size_t>(most_below) * static_cast<std::size_t>(most_below));
 }
-
-BlockCholesky::~BlockCholesky() = default;
 
 void BlockCholesky::set_zero() { std::fill(values_.begin(), values_.end(), 0.0); }
 
 bool BlockCholesky::factorise() {
-  auto& c = *cholmod_;
-  if (structure_.variables == 0) return true;
-  if (c.factor == nullptr) return false;
   const SingleThread single_thread;
-  cholmod_factorize(&c.matrix, c.factor, &c.common);
-  if (c.common.status != CHOLMOD_OK || c.factor->minor < c.factor->n) return false;
-  return pivots_are_sound();
+  is_factorised_ = block_size_ == 6 ? factorise_blocks<6>() : factorise_blocks<3>();
+  return is_factorised_;
 }
 
-bool BlockCholesky::pivots_are_sound() const {
-  const auto& c = *cholmod_;
-  const auto* L = static_cast<const double*>(c.factor->x);
-  const auto sound = [&](std::size_t column, double pivot) {
-    const double diagonal = values_[c.column_start[column] + column % block_size_];
-    return pivot * pivot > kSmallestPivotShare * diagonal;
-  };
-  if (c.factor->is_super == 0) {
-    const auto* start = static_cast<const int*>(c.factor->p);
-    for (std::size_t j = 0; j < c.factor->n; ++j)
-      if (!sound(j, L[start[j]])) return false;
-    return true;
+/// Into the panel.
+template <int B>
+void BlockCholesky::add_matrix(std::size_t supernode) {
+  const Supernode& node = supernodes_[supernode];
+  const Panel& panel = panels_[supernode];
+  double* L = factor_.get() + panel.begin;
+  for (int column = node.first; column < node.end(); ++column, L += static_cast<std::ptrdiff_t>(B) * panel.rows) {
+    const int begin = structure_.column_start[column], end = structure_.column_start[column + 1];
+    const BlockColumn<B> blocks(L, panel.rows, values_.data() + static_cast<std::ptrdiff_t>(B) * B * begin,
+                                static_cast<std::ptrdiff_t>(B) * (end - begin));
+    for (int entry = begin; entry < end; ++entry) blocks.add(position_[entry], entry - begin);
   }
-  const auto* super = static_cast<const int*>(c.factor->super);
-  const auto* row_start = static_cast<const int*>(c.factor->pi);
-  const auto* value_start = static_cast<const int*>(c.factor->px);
-  for (std::size_t k = 0; k < c.factor->nsuper; ++k) {
-    const int stride = row_start[k + 1] - row_start[k];
-    for (int j = super[k]; j < super[k + 1]; ++j)
-      if (!sound(j, L[value_start[k] + (j - super[k]) * (stride + 1)])) return false;
+}
+
+/// Subtracts L_IJ L_IJ^T from the panels of the rows I below.
+template <int B>
+void BlockCholesky::update_ancestors(std::size_t supernode) {
+  const Panel& panel = panels_[supernode];
+  const std::ptrdiff_t m = panel.below();
+  cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, panel.below(), panel.columns, -1.0,
+              factor_.get() + panel.begin + panel.columns, panel.rows, 0.0, update_.data(), panel.below());
+  for (const Supernode::Ancestor& ancestor : supernodes_[supernode].ancestors) {
+    const Panel& to = panels_[static_cast<std::size_t>(ancestor.supernode)];
+    for (std::size_t c = 0; c < ancestor.end - ancestor.begin; ++c) {
+      const auto from_block = static_cast<std::ptrdiff_t>(ancestor.begin);
+      const BlockColumn<B> blocks(factor_.get() + to.begin + static_cast<std::ptrdiff_t>(B) * ancestor.at[c] * to.rows,
+                                  to.rows, update_.data() + B * (from_block + static_cast<std::ptrdiff_t>(c)) * m, m);
+      for (std::size_t r = c; r < ancestor.at.size(); ++r)
+        blocks.add(ancestor.at[r], from_block + static_cast<std::ptrdiff_t>(r));
+    }
+  }
+}
+
+template <int B>
+bool BlockCholesky::factorise_blocks() {
+  std::fill_n(factor_.get(), factor_size_, 0.0);
+  for (std::size_t s = 0; s < supernodes_.size(); ++s) {
+    const Panel& panel = panels_[s];
+    double* const L = factor_.get() + panel.begin;
+    const int w = panel.columns, m = panel.below();
+    add_matrix<B>(s);
+    if (LAPACKE_dpotrf_work(LAPACK_COL_MAJOR, 'L', w, L, panel.rows) != 0 || !pivots_are_sound(s)) return false;
+    if (m == 0) continue;
+    cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, m, w, 1.0, L, panel.rows, L + w,
+                panel.rows);
+    update_ancestors<B>(s);
   }
   return true;
 }
 
-BlockCholesky::Columns BlockCholesky::factor() {
+bool BlockCholesky::pivots_are_sound(std::size_t supernode) const {
+  const Supernode& node = supernodes_[supernode];
+  const double* pivot = factor_.get() + panels_[supernode].begin;
+  for (int column = node.first; column < node.end(); ++column) {
+    const int begin = structure_.column_start[column];
+    const std::ptrdiff_t stride =
+        static_cast<std::ptrdiff_t>(block_size_) * (structure_.column_start[column + 1] - begin);
+    const double* diagonal = values_.data() + static_cast<std::ptrdiff_t>(block_size_) * block_size_ * begin;
+    for (int k = 0; k < block_size_; ++k, diagonal += stride + 1, pivot += panels_[supernode].rows + 1)
+      if (!(*pivot * *pivot > kSmallestPivotShare * *diagonal)) return false;
+  }
+  return true;
+}
+
+BlockCholesky::Columns BlockCholesky::factor() const {
   Columns out{.start = {0}, .row = {}, .value = {}};
-  const cholmod_factor* factor = cholmod_->factor;
-  if (factor == nullptr || factor->xtype != CHOLMOD_REAL || factor->minor < factor->n) return out;
-  const auto* value = static_cast<const double*>(factor->x);
-  if (factor->is_super == 0) {
-    const auto* start = static_cast<const int*>(factor->p);
-    const auto* row = static_cast<const int*>(factor->i);
-    const auto* count = static_cast<const int*>(factor->nz);
-    for (std::size_t j = 0; j < factor->n; ++j) {
-      out.row.insert(out.row.end(), row + start[j], row + start[j] + count[j]);
-      out.value.insert(out.value.end(), value + start[j], value + start[j] + count[j]);
+  if (!is_factorised_) return out;
+  std::size_t size = 0;
+  for (const Panel& panel : panels_)
+    size += static_cast<std::size_t>(panel.columns) * static_cast<std::size_t>(2 * panel.rows - panel.columns + 1) / 2;
+  out.row.reserve(size);
+  out.value.reserve(size);
+  for (std::size_t s = 0; s < panels_.size(); ++s) {
+    const Supernode& node = supernodes_[s];
+    const Panel& panel = panels_[s];
+    const double* column = factor_.get() + panel.begin;
+    for (int c = 0; c < panel.columns; ++c, column += panel.rows) {
+      for (int r = c; r < panel.columns; ++r) out.row.push_back(block_size_ * node.first + r);
+      for (const int row : node.below)
+        for (int r = 0; r < block_size_; ++r) out.row.push_back(block_size_ * row + r);
+      out.value.insert(out.value.end(), column + c, column + panel.rows);
       out.start.push_back(static_cast<int>(out.row.size()));
     }
-    return out;
   }
-  // A supernode is a dense panel, its rows in order, of which the first are its own columns.
-  const auto* super = static_cast<const int*>(factor->super);
-  const auto* rows = static_cast<const int*>(factor->s);
-  const auto* row_start = static_cast<const int*>(factor->pi);
-  const auto* value_start = static_cast<const int*>(factor->px);
-  const auto from_diagonal = [&](auto&& take) {
-    for (std::size_t k = 0; k < factor->nsuper; ++k) {
-      const int height = row_start[k + 1] - row_start[k];
-      for (int c = 0; c < super[k + 1] - super[k]; ++c)
-        take(rows + row_start[k] + c, value + value_start[k] + static_cast<std::ptrdiff_t>(c) * height + c, height - c);
-    }
-  };
-  from_diagonal([&](const int*, const double*, int count) { out.start.push_back(out.start.back() + count); });
-  out.row.reserve(static_cast<std::size_t>(out.start.back()));
-  out.value.reserve(static_cast<std::size_t>(out.start.back()));
-  from_diagonal([&](const int* row, const double* values, int count) {
-    out.row.insert(out.row.end(), row, row + count);
-    out.value.insert(out.value.end(), values, values + count);
-  });
   return out;
 }
 
-void BlockCholesky::solve(Eigen::Ref<Eigen::MatrixXd> b) {
-  auto& c = *cholmod_;
-  if (structure_.variables == 0) return;
-  TUTTI_CHECK(static_cast<std::size_t>(b.rows()) == c.matrix.nrow, "{} rows", b.rows());
-  cholmod_dense rhs{};
-  rhs.nrow = static_cast<std::size_t>(b.rows());
-  rhs.ncol = static_cast<std::size_t>(b.cols());
-  rhs.d = static_cast<std::size_t>(b.outerStride());
-  rhs.nzmax = rhs.d * rhs.ncol;
-  rhs.x = b.data();
-  rhs.xtype = CHOLMOD_REAL;
-  rhs.dtype = CHOLMOD_DOUBLE;
+void BlockCholesky::solve(Eigen::Ref<Eigen::MatrixXd> b) const {
+  TUTTI_CHECK(b.rows() == static_cast<Eigen::Index>(block_size_) * structure_.variables, "{} rows", b.rows());
+  if (!is_factorised_) return;
   const SingleThread single_thread;
-  cholmod_solve2(CHOLMOD_A, c.factor, &rhs, nullptr, &c.solution, nullptr, &c.work_y, &c.work_e, &c.common);
-  const auto* x = static_cast<const double*>(c.solution->x);
-  b = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>(x, b.rows(), b.cols(),
-                                                                 Eigen::OuterStride<>(c.solution->d));
+  for (std::size_t s = 0; s < supernodes_.size(); ++s) {
+    substitute(s, false, b);
+    if (panels_[s].below() > 0) take_below(s, b);
+  }
+  for (std::size_t s = supernodes_.size(); s-- > 0;) {
+    if (panels_[s].below() > 0) take_from_below(s, b);
+    substitute(s, true, b);
+  }
+}
+
+/// b_J <- L_JJ^-1 b_J, or L_JJ^-T b_J.
+void BlockCholesky::substitute(std::size_t supernode, bool is_transposed, Eigen::Ref<Eigen::MatrixXd> b) const {
+  const Panel& panel = panels_[supernode];
+  const CBLAS_TRANSPOSE how = is_transposed ? CblasTrans : CblasNoTrans;
+  const double* const L = factor_.get() + panel.begin;
+  double* const b_J = b.data() + static_cast<std::ptrdiff_t>(block_size_) * supernodes_[supernode].first;
+  if (b.cols() == 1)
+    cblas_dtrsv(CblasColMajor, CblasLower, how, CblasNonUnit, panel.columns, L, panel.rows, b_J, 1);
+  else
+    cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, how, CblasNonUnit, panel.columns, static_cast<int>(b.cols()), 1.0,
+                L, panel.rows, b_J, static_cast<int>(b.outerStride()));
+}
+
+/// b_I <- b_I - L_IJ b_J
+void BlockCholesky::take_below(std::size_t supernode, Eigen::Ref<Eigen::MatrixXd> b) const {
+  const Panel& panel = panels_[supernode];
+  const int m = panel.below(), columns = static_cast<int>(b.cols());
+  const double* const L = factor_.get() + panel.begin + panel.columns;
+  const double* const b_J = b.data() + static_cast<std::ptrdiff_t>(block_size_) * supernodes_[supernode].first;
+  Eigen::MatrixXd product(m, columns);
+  if (columns == 1)
+    cblas_dgemv(CblasColMajor, CblasNoTrans, m, panel.columns, 1.0, L, panel.rows, b_J, 1, 0.0, product.data(), 1);
+  else
+    cblas_dgemm(CblasColMajor, CblasNoTrans, CblasNoTrans, m, columns, panel.columns, 1.0, L, panel.rows, b_J,
+                static_cast<int>(b.outerStride()), 0.0, product.data(), m);
+  Eigen::Index k = 0;
+  for (const int row : supernodes_[supernode].below)
+    b.middleRows(static_cast<Eigen::Index>(block_size_) * row, block_size_) -=
+        product.middleRows(block_size_ * k++, block_size_);
+}
+
+/// b_J <- b_J - L_IJ^T b_I
+void BlockCholesky::take_from_below(std::size_t supernode, Eigen::Ref<Eigen::MatrixXd> b) const {
+  const Panel& panel = panels_[supernode];
+  const int m = panel.below(), columns = static_cast<int>(b.cols());
+  const double* const L = factor_.get() + panel.begin + panel.columns;
+  double* const b_J = b.data() + static_cast<std::ptrdiff_t>(block_size_) * supernodes_[supernode].first;
+  Eigen::MatrixXd b_I(m, columns);
+  Eigen::Index k = 0;
+  for (const int row : supernodes_[supernode].below)
+    b_I.middleRows(block_size_ * k++, block_size_) =
+        b.middleRows(static_cast<Eigen::Index>(block_size_) * row, block_size_);
+  if (columns == 1)
+    cblas_dgemv(CblasColMajor, CblasTrans, m, panel.columns, -1.0, L, panel.rows, b_I.data(), 1, 1.0, b_J, 1);
+  else
+    cblas_dgemm(CblasColMajor, CblasTrans, CblasNoTrans, panel.columns, columns, m, -1.0, L, panel.rows, b_I.data(), m,
+                1.0, b_J, static_cast<int>(b.outerStride()));
 }
 
 }  // namespace tutti::estimation::internal

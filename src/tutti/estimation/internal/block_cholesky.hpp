@@ -2,22 +2,22 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <memory>
 #include <vector>
 
 #include "tutti/estimation/internal/block_structure.hpp"
+#include "tutti/estimation/internal/supernodes.hpp"
 
 namespace tutti::estimation::internal {
 
-/// Sparse symmetric positive definite matrix of B x B blocks with its Cholesky factor (CHOLMOD). The pattern is
-/// analysed once; values are written straight into their final place and refactorised in place.
+/// Sparse symmetric positive definite matrix of B x B blocks, B = 3 or 6, with its Cholesky factor. The pattern is
+/// analysed once; values are written straight into their final place and refactorised in place. Right-looking over
+/// supernodes (Rothberg, Gupta 1993), with BLAS on one thread.
 class BlockCholesky {
  public:
   /// `structure` must outlive this.
   BlockCholesky(const BlockStructure& structure, int block_size);
-  ~BlockCholesky();
-  BlockCholesky(const BlockCholesky&) = delete;
-  BlockCholesky& operator=(const BlockCholesky&) = delete;
 
   void set_zero();
   /// Adds to the diagonal block of a variable. Only its lower triangle is read by the factorisation.
@@ -38,14 +38,14 @@ class BlockCholesky {
   /// False when the matrix is not numerically positive definite: a pivot lost all digits against its diagonal entry.
   [[nodiscard]] bool factorise();
   /// Overwrites b (rows: block_size x variables in elimination order) by H^-1 b. After a successful factorise() only.
-  void solve(Eigen::Ref<Eigen::MatrixXd> b);
+  void solve(Eigen::Ref<Eigen::MatrixXd> b) const;
 
   /// The factor L (L L^T = H, no permutation) by columns, rows sorted; empty on failure.
   struct Columns {
     std::vector<int> start, row;
     std::vector<double> value;
   };
-  [[nodiscard]] Columns factor();
+  [[nodiscard]] Columns factor() const;
 
  private:
   /// Columns of a block column are stored as one dense panel, blocks below each other, the diagonal block first.
@@ -59,13 +59,33 @@ class BlockCholesky {
         Eigen::OuterStride<>(stride));
   }
 
-  [[nodiscard]] bool pivots_are_sound() const;
+  template <int B>
+  [[nodiscard]] bool factorise_blocks();
+  template <int B>
+  void add_matrix(std::size_t supernode);
+  template <int B>
+  void update_ancestors(std::size_t supernode);
+  [[nodiscard]] bool pivots_are_sound(std::size_t supernode) const;
+  void substitute(std::size_t supernode, bool is_transposed, Eigen::Ref<Eigen::MatrixXd> b) const;
+  void take_below(std::size_t supernode, Eigen::Ref<Eigen::MatrixXd> b) const;
+  void take_from_below(std::size_t supernode, Eigen::Ref<Eigen::MatrixXd> b) const;
 
-  struct Cholmod;
+  /// Where a supernode's panel of L is in factor_, column by column.
+  struct Panel {
+    std::ptrdiff_t begin = 0;
+    int rows = 0, columns = 0;
+    [[nodiscard]] int below() const { return rows - columns; }
+  };
   const BlockStructure& structure_;
   int block_size_;
   std::vector<double> values_;
-  std::unique_ptr<Cholmod> cholmod_;
+  std::vector<Supernode> supernodes_;
+  std::vector<Panel> panels_;  ///< Per supernode.
+  std::vector<int> position_;  ///< Per block of the matrix its row in its supernode, in blocks.
+  std::ptrdiff_t factor_size_ = 0;
+  std::unique_ptr<double[]> factor_;  ///< Not initialised before factorise().
+  std::vector<double> update_;        ///< Of the rows below, by the rows below.
+  bool is_factorised_ = false;
 };
 
 }  // namespace tutti::estimation::internal
