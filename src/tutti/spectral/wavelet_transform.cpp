@@ -198,28 +198,30 @@ using internal::ColumnSlabs;
 using Slab = ColumnSlabs::Slab;
 using Slabs = std::vector<Slab>;
 
-/// Signals of the nodes, at most as many as there are lanes.
-Slab slab_of(const ColumnSlabs& slabs, const Eigen::Ref<const Eigen::MatrixXd>& signals) {
+/// Every third column from `first` on, as many as there are lanes, or are left.
+Slab slab_of(const ColumnSlabs& slabs, const Eigen::Ref<const Eigen::MatrixXd>& samples, Index first) {
   Slab out(slabs.size(), 0.0F);
-  for (Index lane = 0; lane < signals.cols(); ++lane)
+  for (std::size_t lane = 0; lane < ColumnSlabs::kLanes; ++lane) {
+    const Index column = first + 3 * static_cast<Index>(lane);
+    if (column >= samples.cols()) break;
     for (std::size_t place = 0; place < slabs.nodes().size(); ++place)
-      out[place * ColumnSlabs::kLanes + static_cast<std::size_t>(lane)] =
-          static_cast<float>(signals(slabs.nodes()[place], lane));
+      out[place * ColumnSlabs::kLanes + lane] = static_cast<float>(samples(slabs.nodes()[place], column));
+  }
   return out;
 }
 
 /// g_s(0) f.
-void add_unfiltered(const MeyerFilterBank& bank, const ColumnSlabs& slabs, const Eigen::MatrixXd& signals, Slabs& out) {
-  const Slab slab = slab_of(slabs, signals);
+void add_unfiltered(const MeyerFilterBank& bank, const Slab& signals, Slabs& out) {
   for (std::size_t s = 0; s < out.size(); ++s)
     if (const auto gain = static_cast<float>(bank.kernel(static_cast<int>(s), 0.0)); gain != 0.0F)
-      for (std::size_t k = 0; k < slab.size(); ++k) out[s][k] += gain * slab[k];
+      for (std::size_t k = 0; k < signals.size(); ++k) out[s][k] += gain * signals[k];
 }
 
 /// As the function of this name above, of all lanes at once.
 void add_filtered(const ColumnSlabs& slabs, double domain, const Expansion& expansion, std::span<const Index> degrees,
-                  const Eigen::MatrixXd& smoothed, Slabs& out) {
-  Slab current = slab_of(slabs, smoothed), previous(slabs.size(), 0.0F);
+                  const Slab& signals, Slabs& out) {
+  Slab current(slabs.size(), 0.0F), previous(slabs.size(), 0.0F);
+  slabs.step(static_cast<float>(1.0 / domain), 0.0F, signals, current, {}, out);
   for (std::size_t s = 0; s < out.size(); ++s) {
     const auto weight = static_cast<float>(expansion.coefficient(0, static_cast<Index>(s)));
     for (std::size_t k = 0; k < current.size(); ++k) out[s][k] += weight * current[k];
@@ -299,14 +301,12 @@ std::vector<Eigen::MatrixXd> WaveletFilter::scatter(const Eigen::Ref<const Eigen
   constexpr auto kLanes = static_cast<Index>(internal::ColumnSlabs::kLanes);
   std::array<Slabs, 3> of_axis;
   for (Index first = 0; first < samples.cols() / 3; first += kLanes) {
-    const Index lanes = std::min(kLanes, samples.cols() / 3 - first);
     for (Index axis = 0; axis < 3; ++axis) {
-      const Eigen::MatrixXd signals = samples(Eigen::all, Eigen::seqN(3 * first + axis, lanes, 3));
+      const Slab signals = slab_of(slabs, samples, 3 * first + axis);
       Slabs& filtered = of_axis[static_cast<std::size_t>(axis)];
       filtered.assign(static_cast<std::size_t>(bank.scales()), Slab(slabs.size(), 0.0F));
-      add_unfiltered(bank, slabs, signals, filtered);
-      if (!degrees.empty())
-        add_filtered(slabs, layout.domain, *expansion, degrees, laplacian * signals / layout.domain, filtered);
+      add_unfiltered(bank, signals, filtered);
+      if (!degrees.empty()) add_filtered(slabs, layout.domain, *expansion, degrees, signals, filtered);
     }
     for (std::size_t s = 0; s < out.size(); ++s)
       add_products(slabs.nodes(), of_axis[0][s], of_axis[1][s], of_axis[2][s], out[s]);
