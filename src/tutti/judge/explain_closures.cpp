@@ -125,7 +125,7 @@ class Search {
 
 }  // namespace
 
-Judgement explain_closures(const PoseGraph& graph, const OdometryWays& odometry, std::size_t odometry_edges,
+Judgement explain_closures(PoseGraph graph, const OdometryWays& odometry, std::size_t odometry_edges,
                            std::span<const std::vector<std::size_t>> groups, const WhoIsWrongConfig& config,
                            const estimation::GncConfig& gnc, const std::vector<bool>& certain) {
   TUTTI_CHECK(odometry_edges <= graph.edges.size(), "{} of {} edges", odometry_edges, graph.edges.size());
@@ -139,27 +139,27 @@ Judgement explain_closures(const PoseGraph& graph, const OdometryWays& odometry,
     if (is_certain(c)) supported[c] = true;
     if (supported[c]) considered_certain.push_back(is_certain(c));
   }
-  PoseGraph considered{
-      .poses = graph.poses,
-      .edges = {graph.edges.begin(), graph.edges.begin() + static_cast<std::ptrdiff_t>(odometry_edges)}};
   std::vector<std::size_t> closure_of;  // of each one considered
   std::vector<std::size_t> position(closures.size(), 0);
   for (std::size_t c = 0; c < closures.size(); ++c) {
     if (!supported[c]) continue;
     position[c] = closure_of.size();
     closure_of.push_back(c);
-    considered.edges.push_back(closures[c]);
   }
+  const std::size_t all_closures = closures.size();
+  for (std::size_t k = 0; k < closure_of.size(); ++k)
+    graph.edges[odometry_edges + k] = graph.edges[odometry_edges + closure_of[k]];
+  graph.edges.resize(odometry_edges + closure_of.size());
   std::vector<std::vector<std::size_t>> considered_groups;
   for (const auto& group : groups) {
     auto& own = considered_groups.emplace_back();
     for (const std::size_t c : group)
       if (supported[c] && !is_certain(c)) own.push_back(position[c]);
   }
-  const HypothesisSolver solver(considered, odometry, odometry_edges, config, gnc, std::move(considered_certain));
+  const HypothesisSolver solver(graph, odometry, odometry_edges, config, gnc, std::move(considered_certain));
   const Solution best = Search(solver, config).run(std::move(considered_groups));
 
-  Judgement out{.accepted = std::vector<bool>(closures.size(), false),
+  Judgement out{.accepted = std::vector<bool>(all_closures, false),
                 .failed = {},
                 .solved = best.solved,
                 .work = solver.work()};

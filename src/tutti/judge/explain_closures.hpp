@@ -48,7 +48,7 @@ struct Judgement {
 /// `odometry_edges` edges are odometry, all others closures, and `groups` are positions among these. `certain`: per
 /// closure whether an operator vouches for it (empty: none); such a closure is never truncated and never tried as
 /// wrong. The result does not depend on the order of the closures, but for rounding.
-Judgement explain_closures(const PoseGraph& graph, const OdometryWays& odometry, std::size_t odometry_edges,
+Judgement explain_closures(PoseGraph graph, const OdometryWays& odometry, std::size_t odometry_edges,
                            std::span<const std::vector<std::size_t>> groups, const WhoIsWrongConfig& config,
                            const estimation::GncConfig& gnc, const std::vector<bool>& certain = {});
 

@@ -52,10 +52,18 @@ class Optimiser {
   }
 
  private:
+  /// A graph of odometry, to which closures will be added: edges are large, and are copied once.
+  [[nodiscard]] PoseGraph with_room(const PoseGraph& odometry) const {
+    PoseGraph out{.poses = odometry.poses, .edges = {}};
+    out.edges.reserve(odometry.edges.size() + closure_edges_.size());
+    out.edges.assign(odometry.edges.begin(), odometry.edges.end());
+    return out;
+  }
+
   /// Objections to each closure, and the odometry that failed, without a map. What it takes is gone when the map is
   /// optimised.
   [[nodiscard]] Optimum explain() const {
-    PoseGraph graph = map_.searched;
+    PoseGraph graph = with_room(map_.searched);
     graph.edges.insert(graph.edges.end(), closure_edges_.begin(), closure_edges_.end());
     std::vector<double> seconds;
     for (const MapNode& node : map_.nodes) seconds.push_back(node.stamp - map_.nodes.front().stamp);
@@ -64,7 +72,7 @@ class Optimiser {
     std::iota(all.begin(), all.end(), std::size_t{0});
     const auto groups = closure_groups(map_.nodes, closure_edges_, all,
                                        {kNeighbours_s, std::numeric_limits<double>::infinity(), closures_.size()});
-    auto found = explain_closures(graph, odometry, map_.odometry_edges, groups, config_, gnc_, certain_);
+    auto found = explain_closures(std::move(graph), odometry, map_.odometry_edges, groups, config_, gnc_, certain_);
     std::vector<Objection> objections;
     for (const bool accepted : found.accepted)
       objections.push_back(accepted ? Objection::none : Objection::contradicted);
@@ -105,13 +113,13 @@ class Optimiser {
   /// work of `out`. Closures that are not asked keep the price that they were refused for. Its poses are those of the
   /// graph of the closures' ends, with odometry bent to meet them.
   [[nodiscard]] Optimum settle(const PoseGraph& odometry, Optimum out) const {
-    out.graph = odometry;
+    out.graph = with_room(odometry);
     out.closure_of_edge.clear();
     out.solution = {};
     for (const FailedStretch& stretch : out.failed)
       weaken(out.graph, map_.odometry_edges, stretch.from, stretch.to, kDoubt * stretch.missed.head<3>().norm(),
              kDoubt * stretch.missed.tail<3>().norm());
-    PoseGraph all = out.graph;
+    PoseGraph all = with_room(out.graph);
     std::vector<std::size_t> asked;
     std::vector<char> in;
     std::vector<bool> certain;

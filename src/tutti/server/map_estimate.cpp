@@ -40,6 +40,9 @@ SubmapSet without_contradictions(const SubmapSet& submaps, std::vector<SubmapId>
 /// Nodes and odometry edges of all submaps. Neighbouring submaps share a keyframe, so they attach by its id; a missing
 /// submap leaves a gap, and what follows it hangs on by closures alone until the submap comes.
 judge::NodeIndex attach_submaps(const SubmapSet& submaps, MapEstimate& map) {
+  std::size_t keyframes = 0;
+  for (const auto& [id, submap] : submaps) keyframes += submap->keyframes.size();
+  map.nodes.reserve(keyframes);
   for (const auto& [id, submap] : submaps)
     for (const Keyframe& k : submap->keyframes) {
       const KeyframeId node{id.chain, k.index};
@@ -47,6 +50,9 @@ judge::NodeIndex attach_submaps(const SubmapSet& submaps, MapEstimate& map) {
         map.nodes.push_back({node, k.stamp, k.representative, k.T_odom_body, k.T_odom_body, 0});
     }
   judge::NodeIndex index;
+  index.reserve(map.nodes.size());
+  map.graph.poses.reserve(map.nodes.size());
+  map.graph.edges.reserve(map.nodes.size());
   for (std::size_t i = 0; i < map.nodes.size(); ++i) index.emplace(map.nodes[i].id, i);
   for (const MapNode& node : map.nodes) map.graph.poses.push_back(node.T_odom_body);
   for (const auto& [id, submap] : submaps)
