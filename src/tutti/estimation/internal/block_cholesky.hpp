@@ -84,7 +84,7 @@ class BlockCholesky {
   std::vector<int> position_;  ///< Per block of the matrix its row in its supernode, in blocks.
   std::ptrdiff_t factor_size_ = 0;
   std::unique_ptr<double[]> factor_;  ///< Not initialised before factorise().
-  std::vector<double> update_;        ///< Of the rows below, by the rows below.
+  std::vector<double> update_;        ///< Rows below by rows below: what a supernode takes from its ancestors.
   bool is_factorised_ = false;
 };
 
