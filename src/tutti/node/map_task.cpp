@@ -4,7 +4,6 @@
 #include <memory>
 #include <utility>
 
-#include "tutti/consistency/proxy_graph_builder.hpp"
 #include "tutti/server/change_support.hpp"
 
 namespace tutti::node {
@@ -22,7 +21,6 @@ MapOfTask make_map(MapTask task) {
   };
   ProxyGraphMessage message = std::move(out.made.message);
   message.graph.incarnation = task.incarnation;
-  for (const ChainId& owner : task.owners) consistency::see_last_in(message.graph, owner);
   out.broadcast.send(std::move(message), std::make_shared<const server::Beliefs>(server::beliefs_of(made.map)),
                      task.robots, task.follow ? nullptr : ChangeWatch::LoneClosures(lone), task.begun, out.step);
   return out;

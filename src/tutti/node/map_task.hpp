@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <set>
-#include <vector>
 
 #include "tutti/base/timestamp.hpp"
 #include "tutti/node/broadcast.hpp"
@@ -20,8 +19,7 @@ struct MapTask {
   Timestamp begun;
   std::uint32_t incarnation = 0;
   std::set<RobotId> robots;
-  std::vector<ChainId> owners;  ///< The sessions that own robots' numbers.
-  bool follow = false;          ///< A change of mind does not wait.
+  bool follow = false;  ///< A change of mind does not wait.
   Broadcast broadcast;
 };
 

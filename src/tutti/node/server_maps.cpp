@@ -54,11 +54,10 @@ std::optional<MapTask> ServerNode::begin_map(Timestamp now) {
                .begun = now,
                .incarnation = config_.incarnation,
                .robots = robots_,
-               .owners = {},
                .follow = config_.server.change_of_mind != "wait" || std::exchange(operator_spoke_, false),
                .broadcast = std::move(broadcast_)};
   for (const RobotId robot : robots_)
-    if (const auto owner = registry_.owner(robot)) task.owners.push_back(*owner);
+    if (const auto owner = registry_.owner(robot)) task.job.owners.push_back(*owner);
   return task;
 }
 

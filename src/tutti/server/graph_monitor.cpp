@@ -110,35 +110,39 @@ std::vector<Matrix6d> spread_odometry(const MapEstimate& map, std::span<const st
   return out;
 }
 
-/// How sure the map is of every chain in the graph. The random numbers are always the same: the result is a function of
-/// the map. The posterior goes when it is not needed any more: it is as large as what the closures' influence takes.
+/// How sure the map is of the chains that robots were last seen in: nobody reads it of earlier sessions, of which there
+/// are many after a day. The random numbers are always the same: the result is a function of the map. The posterior
+/// goes when it is not needed any more: it is as large as what the closures' influence takes.
 std::vector<ChainUncertainty> uncertainties(const MapEstimate& map, const PoseGraph& on_earth, const ProxyGraph& graph,
                                             const std::map<ChainId, std::vector<std::size_t>>& chosen,
                                             std::unique_ptr<const estimation::JointPosterior> posterior,
                                             std::span<const double> weights,
                                             const consistency::ProxyGraphConfig& config, MonitorWork& work) {
-  std::vector<std::size_t> kept;  // indices into map.nodes of graph.nodes
-  for (const auto& [chain, nodes] : chosen)
-    for (const std::size_t i : nodes)
-      if (kept.size() < graph.nodes.size() && graph.nodes[kept.size()].chain == chain &&
-          graph.nodes[kept.size()].stamp == map.nodes[i].stamp)
-        kept.push_back(i);
-  TUTTI_CHECK(kept.size() == graph.nodes.size(), "{} of {} nodes found", kept.size(), graph.nodes.size());
-  const Eigen::MatrixXd samples =
-      posterior->samples(kept, static_cast<std::size_t>(config.shape_samples), Rng(0).fork("uncertainty"));
-  std::vector<ChainUncertainty> out;
-  if (!samples.allFinite()) return out;
   struct Chain {
     std::size_t begin = 0, end = 0;  // in `kept`
     std::vector<std::size_t> spread;
     Eigen::MatrixXd covariance;
   };
+  std::vector<std::size_t> kept;  // indices into map.nodes of the chains' nodes in the graph
   std::vector<Chain> chains;
-  for (std::size_t begin = 0; begin < kept.size(); begin = chains.back().end) {
-    Chain& chain = chains.emplace_back(Chain{.begin = begin, .end = begin});
-    while (chain.end < kept.size() && graph.nodes[chain.end].chain == graph.nodes[begin].chain) ++chain.end;
-    for (const std::size_t node : ChainUncertainty::spread(chain.end - begin))
-      chain.spread.push_back(kept[begin + node]);
+  for (const LastSeen& seen : graph.last_seen) {
+    const std::span<const ProxyNode> nodes = nodes_of(graph, seen.chain);
+    Chain& chain = chains.emplace_back(Chain{.begin = kept.size(), .end = kept.size() + nodes.size()});
+    auto node = nodes.begin();
+    for (const std::size_t i : chosen.at(seen.chain)) {
+      if (node == nodes.end() || node->stamp != map.nodes[i].stamp) continue;
+      kept.push_back(i);
+      ++node;
+    }
+    TUTTI_CHECK(kept.size() == chain.end, "{} of {} nodes found", kept.size() - chain.begin, nodes.size());
+  }
+  const Eigen::MatrixXd samples =
+      posterior->samples(kept, static_cast<std::size_t>(config.shape_samples), Rng(0).fork("uncertainty"));
+  std::vector<ChainUncertainty> out;
+  if (!samples.allFinite()) return out;
+  for (Chain& chain : chains) {
+    for (const std::size_t node : ChainUncertainty::spread(chain.end - chain.begin))
+      chain.spread.push_back(kept[chain.begin + node]);
     chain.covariance = posterior->covariance(chain.spread);
   }
   posterior.reset();
@@ -151,7 +155,7 @@ std::vector<ChainUncertainty> uncertainties(const MapEstimate& map, const PoseGr
     const auto of_chain = [&](const Eigen::MatrixXd& all) {  // what has no columns has no memory to point into either
       return all.cols() == 0 ? Eigen::MatrixXd(rows, 0) : Eigen::MatrixXd(all.middleRows(first, rows));
     };
-    out.push_back(consistency::chain_uncertainty(graph, graph.nodes[chain.begin].chain,
+    out.push_back(consistency::chain_uncertainty(graph, map.nodes[kept[chain.begin]].id.chain,
                                                  {.samples = of_chain(samples),
                                                   .shifts = of_chain(shifts),
                                                   .spread_covariance = std::move(chain.covariance),
@@ -180,7 +184,7 @@ std::unique_ptr<const estimation::JointPosterior> posterior_of(
 }
 
 ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const consistency::ProxyGraphConfig& config,
-                         MonitorWork* work) {
+                         std::span<const ChainId> owners, MonitorWork* work) {
   MonitorWork unasked;
   MonitorWork& counted = work != nullptr ? *work : unasked;
   auto chosen = choose_nodes(map);
@@ -232,6 +236,7 @@ ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const c
     }
   }
   ProxyGraph graph = consistency::build_proxy_graph(revision, std::move(nodes), std::move(components), config);
+  for (const ChainId& owner : owners) consistency::see_last_in(graph, owner);
   if (config.shape_samples > 0)
     graph.uncertainties = uncertainties(map, on_earth, graph, chosen, std::move(posterior), weights, config, counted);
   return graph;

@@ -165,6 +165,51 @@ TEST(MonitorGraph, UncertaintiesAreThoseOfTheNodesSent) {
 }
 
 // Once around a circle, closures say where the ends lie relative to each other; without them odometry is all there is.
+// A robot starts a session at every change of its battery: earlier ones stay in the map, and cost no samples.
+TEST(MonitorGraph, OnlyTheSessionsThatHearItAreSampled) {
+  const test::TestFinder finder(1);
+  const auto map_of = [&](const std::vector<ChainId>& chains) {
+    SubmapSet submaps;
+    for (std::uint32_t r = 0; r < chains.size(); ++r)
+      for (Submap& submap : test::make_submaps(RobotId{r}, {}, Rng(1).fork(r)))
+        submaps[submap.id] = std::make_shared<const Submap>(std::move(submap));
+    VerdictSet verdicts = verdicts_of(submaps, finder);
+    const auto named = [&](KeyframeId& id) { id.chain = chains[id.chain.robot.value]; };
+    SubmapSet renamed;
+    for (const auto& [id, submap] : submaps) {
+      auto copy = std::make_shared<Submap>(*submap);
+      copy->id.chain = chains[id.chain.robot.value];
+      renamed[copy->id] = copy;
+    }
+    VerdictSet of_renamed;
+    for (auto& [pair, verdict] : verdicts) {
+      for (LoopClosure& closure : verdict.closures) {
+        named(closure.from);
+        named(closure.to);
+      }
+      of_renamed[{{chains[pair.first.chain.robot.value], pair.first.index},
+                  {chains[pair.second.chain.robot.value], pair.second.index}}] = verdict;
+    }
+    return estimate_map(renamed, of_renamed, {});
+  };
+  const ChainId first{RobotId{0}, 1}, second{RobotId{0}, 2}, other{RobotId{1}, 1};
+  MonitorWork of_robots, of_sessions;
+  const ProxyGraph robots = monitor_graph(map_of({first, other}), 1, {}, {}, &of_robots);
+  const MapEstimate map = map_of({first, second});
+  const ProxyGraph sessions = monitor_graph(map, 1, {}, {}, &of_sessions);
+  ASSERT_EQ(sessions.nodes.size(), robots.nodes.size());
+  EXPECT_EQ(robots.uncertainties.size(), 2U);
+  ASSERT_EQ(sessions.uncertainties.size(), 1U);
+  EXPECT_EQ(sessions.uncertainties[0].chain, second);
+  EXPECT_EQ(sessions.uncertainties[0].scales, robots.uncertainties[1].scales);  // nothing else changes
+  EXPECT_EQ(2 * of_sessions.products, of_robots.products);
+  const ProxyGraph owned = monitor_graph(map, 1, {}, std::vector{first});  // its robot goes on in the first session
+  ASSERT_EQ(owned.uncertainties.size(), 1U);
+  EXPECT_EQ(owned.uncertainties[0].chain, first);
+  ASSERT_EQ(owned.last_seen.size(), 1U);
+  EXPECT_EQ(owned.last_seen[0].chain, first);
+}
+
 TEST(MonitorGraph, DirectionsAreWhatClosuresKnow) {
   for (const ChainUncertainty& u : monitor_graph(circle_map(1), 1, {}).uncertainties) {
     EXPECT_FALSE(u.directions.empty()) << to_string(u.chain);

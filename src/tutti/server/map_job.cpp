@@ -19,7 +19,7 @@ MadeMap make_map(MapJob job) {
                           job.map.gnc);
   if (!job.keeps_estimate) out.estimate.reset();
   out.message = {.header = {.robot = {}, .session = job.epoch, .sequence = job.revision},
-                 .graph = monitor_graph(out.map, job.revision, job.proxy_graph, &out.monitor)};
+                 .graph = monitor_graph(out.map, job.revision, job.proxy_graph, job.owners, &out.monitor)};
   out.message.graph.epoch = job.epoch;
   out.job = std::move(job);
   return out;

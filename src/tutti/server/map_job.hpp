@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <vector>
 
 #include "tutti/consistency/proxy_graph_builder.hpp"
 #include "tutti/model/messages.hpp"
@@ -29,6 +30,7 @@ struct MapJob {
   /// The map of the pose graph alone, when nothing has come that changes it; else null.
   std::shared_ptr<const MapEstimate> estimate;
   bool keeps_estimate = false;  ///< It is asked for again, to refine the map.
+  std::vector<ChainId> owners;  ///< The sessions that own robots' numbers: these hear of the map.
 };
 
 /// The map of a job.
