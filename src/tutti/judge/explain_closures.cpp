@@ -159,10 +159,8 @@ Judgement explain_closures(PoseGraph graph, const OdometryWays& odometry, std::s
   const HypothesisSolver solver(graph, odometry, odometry_edges, config, gnc, std::move(considered_certain));
   const Solution best = Search(solver, config).run(std::move(considered_groups));
 
-  Judgement out{.accepted = std::vector<bool>(all_closures, false),
-                .failed = {},
-                .solved = best.solved,
-                .work = solver.work()};
+  Judgement out{
+      .accepted = std::vector<bool>(all_closures, false), .failed = {}, .solved = best.solved, .work = solver.work()};
   if (!best.solved) return out;
   for (std::size_t k = 0; k < closure_of.size(); ++k) out.accepted[closure_of[k]] = best.accepted[k] != 0;
   for (const FailedStretch& failed : best.failed) out.failed.push_back(narrowed(odometry, failed));

@@ -39,22 +39,24 @@ class BlockColumn {
 
 }  // namespace
 
-BlockCholesky::BlockCholesky(const BlockStructure& structure, int block_size)
-    : structure_(structure), block_size_(block_size), supernodes_(find_supernodes(structure)) {
+BlockCholesky::BlockCholesky(const BlockStructure& structure, int block_size, std::size_t workspace)
+    : structure_(structure), block_size_(block_size), supernodes_(find_supernodes(structure)), workspace_(workspace) {
   TUTTI_CHECK(block_size == 3 || block_size == 6, "blocks of {}", block_size);
   values_.assign(structure.block_row.size() * static_cast<std::size_t>(block_size * block_size), 0.0);
-  int most_below = 0;
+  std::size_t most_blocks = 0;  // of an update
   for (const Supernode& node : supernodes_) {
-    const Panel& panel =
-        panels_.emplace_back(Panel{factor_size_, block_size * node.rows(), block_size * node.columns});
+    const Panel& panel = panels_.emplace_back(Panel{factor_size_, block_size * node.rows(), block_size * node.columns});
     factor_size_ += static_cast<std::ptrdiff_t>(panel.rows) * panel.columns;
-    most_below = std::max(most_below, panel.below());
+    for (Group group; group.end < node.ancestors.size();) {
+      group = group_from(node, group.end);
+      most_blocks = std::max(most_blocks, group.rows * group.columns);
+    }
     for (int column = node.first; column < node.end(); ++column)
       for (int entry = structure.column_start[column]; entry < structure.column_start[column + 1]; ++entry)
         position_.push_back(node.position_of(structure.block_row[entry]));
   }
   factor_ = std::make_unique_for_overwrite<double[]>(static_cast<std::size_t>(factor_size_));
-  update_.resize(static_cast<std::size_t>(most_below) * static_cast<std::size_t>(most_below));
+  update_.resize(most_blocks * static_cast<std::size_t>(block_size * block_size));
 }
 
 void BlockCholesky::set_zero() { std::fill(values_.begin(), values_.end(), 0.0); }
@@ -79,21 +81,52 @@ void BlockCholesky::add_matrix(std::size_t supernode) {
   }
 }
 
+/// As many ancestors as fit into the workspace, at least one.
+BlockCholesky::Group BlockCholesky::group_from(const Supernode& node, std::size_t first) const {
+  Group out{.first = first, .end = first, .row = node.ancestors[first].begin, .columns = 0, .rows = 0};
+  out.rows = node.below.size() - out.row;
+  const std::size_t most_blocks = workspace_ / static_cast<std::size_t>(block_size_ * block_size_);
+  for (; out.end < node.ancestors.size(); ++out.end) {
+    const std::size_t columns = node.ancestors[out.end].end - out.row;
+    if (out.end > first && out.rows * columns > most_blocks) break;
+    out.columns = columns;
+  }
+  return out;
+}
+
 /// Subtracts L_IJ L_IJ^T from the panels of the rows I below.
 template <int B>
 void BlockCholesky::update_ancestors(std::size_t supernode) {
+  const Supernode& node = supernodes_[supernode];
   const Panel& panel = panels_[supernode];
-  const std::ptrdiff_t m = panel.below();
-  cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, panel.below(), panel.columns, -1.0,
-              factor_.get() + panel.begin + panel.columns, panel.rows, 0.0, update_.data(), panel.below());
-  for (const Supernode::Ancestor& ancestor : supernodes_[supernode].ancestors) {
+  for (Group group; group.end < node.ancestors.size();) {
+    group = group_from(node, group.end);
+    const double* const L = factor_.get() + panel.begin + panel.columns + B * static_cast<std::ptrdiff_t>(group.row);
+    const int rows = B * static_cast<int>(group.rows), columns = B * static_cast<int>(group.columns);
+    if (columns == rows)
+      cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, rows, panel.columns, -1.0, L, panel.rows, 0.0,
+                  update_.data(), rows);
+    else
+      cblas_dgemm(CblasColMajor, CblasNoTrans, CblasTrans, rows, columns, panel.columns, -1.0, L, panel.rows, L,
+                  panel.rows, 0.0, update_.data(), rows);
+    update<B>(node, group);
+  }
+}
+
+/// Adds what is in the workspace to where it belongs.
+template <int B>
+void BlockCholesky::update(const Supernode& node, const Group& group) {
+  const std::ptrdiff_t stride = B * static_cast<std::ptrdiff_t>(group.rows);
+  for (std::size_t k = group.first; k < group.end; ++k) {
+    const Supernode::Ancestor& ancestor = node.ancestors[k];
     const Panel& to = panels_[static_cast<std::size_t>(ancestor.supernode)];
+    const auto first = static_cast<std::ptrdiff_t>(ancestor.begin - group.row);
     for (std::size_t c = 0; c < ancestor.end - ancestor.begin; ++c) {
-      const auto from_block = static_cast<std::ptrdiff_t>(ancestor.begin);
       const BlockColumn<B> blocks(factor_.get() + to.begin + static_cast<std::ptrdiff_t>(B) * ancestor.at[c] * to.rows,
-                                  to.rows, update_.data() + B * (from_block + static_cast<std::ptrdiff_t>(c)) * m, m);
+                                  to.rows, update_.data() + B * (first + static_cast<std::ptrdiff_t>(c)) * stride,
+                                  stride);
       for (std::size_t r = c; r < ancestor.at.size(); ++r)
-        blocks.add(ancestor.at[r], from_block + static_cast<std::ptrdiff_t>(r));
+        blocks.add(ancestor.at[r], first + static_cast<std::ptrdiff_t>(r));
     }
   }
 }

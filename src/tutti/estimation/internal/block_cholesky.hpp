@@ -16,8 +16,10 @@ namespace tutti::estimation::internal {
 /// supernodes (Rothberg, Gupta 1993), with BLAS on one thread.
 class BlockCholesky {
  public:
-  /// `structure` must outlive this.
-  BlockCholesky(const BlockStructure& structure, int block_size);
+  static constexpr std::size_t kWorkspace = 1U << 18U;  ///< 2 MB
+  /// `structure` must outlive this. `workspace`: so many numbers are kept for what a supernode takes from others, or as
+  /// many as one of these needs.
+  BlockCholesky(const BlockStructure& structure, int block_size, std::size_t workspace = kWorkspace);
 
   void set_zero();
   /// Adds to the diagonal block of a variable. Only its lower triangle is read by the factorisation.
@@ -63,8 +65,17 @@ class BlockCholesky {
   [[nodiscard]] bool factorise_blocks();
   template <int B>
   void add_matrix(std::size_t supernode);
+  /// Ancestors of a supernode that are updated together.
+  struct Group {
+    std::size_t first = 0, end = 0;     ///< Positions in Supernode::ancestors.
+    std::size_t row = 0;                ///< The first row below that is theirs.
+    std::size_t columns = 0, rows = 0;  ///< The rows below that are theirs, and all from the first on, in blocks.
+  };
+  [[nodiscard]] Group group_from(const Supernode& node, std::size_t first) const;
   template <int B>
   void update_ancestors(std::size_t supernode);
+  template <int B>
+  void update(const Supernode& node, const Group& group);
   [[nodiscard]] bool pivots_are_sound(std::size_t supernode) const;
   void substitute(std::size_t supernode, bool is_transposed, Eigen::Ref<Eigen::MatrixXd> b) const;
   void take_below(std::size_t supernode, Eigen::Ref<Eigen::MatrixXd> b) const;
@@ -84,7 +95,8 @@ class BlockCholesky {
   std::vector<int> position_;  ///< Per block of the matrix its row in its supernode, in blocks.
   std::ptrdiff_t factor_size_ = 0;
   std::unique_ptr<double[]> factor_;  ///< Not initialised before factorise().
-  std::vector<double> update_;        ///< Rows below by rows below: what a supernode takes from its ancestors.
+  std::size_t workspace_;
+  std::vector<double> update_;  ///< What a supernode takes from a group: rows by columns.
   bool is_factorised_ = false;
 };
 

@@ -30,19 +30,19 @@ Pairs chain(std::size_t first, std::size_t last) {
 
 std::vector<Case> cases() {
   std::vector<Case> out{{"one", 2, {{0, 1}}}, {"chain", 120, chain(0, 119)}};
-  Pairs star, dense, forest = chain(0, 20), loops = chain(0, 299);
+  Pairs star, dense, forest = chain(0, 20), loops = chain(0, 149);
   for (std::size_t k = 1; k < 60; ++k) star.emplace_back(0, k);
   for (std::size_t a = 0; a < 25; ++a)
     for (std::size_t b = a + 1; b < 25; ++b) dense.emplace_back(a, b);
   for (const auto& [a, b] : chain(21, 60)) forest.emplace_back(a, b);
   forest.emplace_back(25, 50);
   Rng rng(5);
-  for (int k = 0; k < 200; ++k) loops.emplace_back(rng.index(300), rng.index(300));
+  for (int k = 0; k < 100; ++k) loops.emplace_back(rng.index(150), rng.index(150));
   std::erase_if(loops, [](const auto& pair) { return pair.first == pair.second; });
   out.push_back({"star", 60, star});
   out.push_back({"dense", 25, dense});
   out.push_back({"forest", 62, forest});  // and a node without edges
-  out.push_back({"loops", 300, loops});
+  out.push_back({"loops", 150, loops});
   return out;
 }
 
@@ -85,9 +85,9 @@ Eigen::MatrixXd fill(const BlockStructure& structure, BlockCholesky& matrix, Rng
 }
 
 template <int B>
-void expect_factor(const Case& given) {
+void expect_factor(const Case& given, std::size_t workspace) {
   const BlockStructure structure = analyse_blocks(graph_of(given));
-  BlockCholesky matrix(structure, B);
+  BlockCholesky matrix(structure, B, workspace);
   Rng rng(1);
   for (const double scale : {1.0, 1e4, 1e-4}) {  // the second and third time in the place of the first
     const Eigen::MatrixXd dense = fill<B>(structure, matrix, rng, scale);
@@ -114,8 +114,8 @@ void expect_factor(const Case& given) {
 
 TEST(BlockCholesky, IsThatOfTheDenseMatrix) {
   for (const Case& given : cases()) {
-    expect_factor<6>(given);
-    expect_factor<3>(given);
+    for (const std::size_t workspace : {BlockCholesky::kWorkspace, 400UL, 0UL}) expect_factor<6>(given, workspace);
+    expect_factor<3>(given, BlockCholesky::kWorkspace);
   }
 }
 

@@ -26,8 +26,8 @@ struct EdgeCosts {
   [[nodiscard]] double curvature(std::size_t e, double s) const { return is_robust(e) ? loss.curvature(s) : 1.0; }
 };
 
-/// Gauss-Newton's linear system over a pose graph, with the loss's own curvature as far as it is positive. On CHOLMOD;
-/// the symbolic factorisation is shared by all calls.
+/// Gauss-Newton's linear system over a pose graph, with the loss's own curvature as far as it is positive. The pattern
+/// is analysed once for all calls.
 class GraphEquations {
  public:
   /// Both must outlive this; measurements and information of `graph` may change between calls.

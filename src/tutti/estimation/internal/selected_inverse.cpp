@@ -46,7 +46,7 @@ SelectedInverse::SelectedInverse(const BlockCholesky::Columns& factor) {
   for (auto panel = panels_.rbegin(); panel != panels_.rend(); ++panel) invert(*panel);
 }
 
-/// With BLAS, as CHOLMOD: Eigen's products of this size take several times as long where it is compiled for any
+/// With BLAS: Eigen's products of this size take several times as long where it is compiled for any
 /// machine.
 void SelectedInverse::invert(Panel& panel) {
   const int w = panel.columns;

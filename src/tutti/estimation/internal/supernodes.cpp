@@ -39,7 +39,9 @@ std::vector<Supernode> fundamental(const BlockStructure& s) {
 }
 
 /// Block entries of a panel's lower half.
-std::int64_t entries_of(std::int64_t columns, std::int64_t below) { return columns * (columns + 1) / 2 + columns * below; }
+std::int64_t entries_of(std::int64_t columns, std::int64_t below) {
+  return columns * (columns + 1) / 2 + columns * below;
+}
 
 /// Measured on torus3D, parking-garage and chains with few closures: larger panels take more memory and no less time.
 bool is_worth_it(std::int64_t columns, std::int64_t zeros, std::int64_t entries) {
@@ -57,8 +59,8 @@ std::vector<Supernode> merged(std::vector<Supernode> fine) {
       Supernode& last = out.back();
       const Supernode& before = out[out.size() - 2];
       if (before.below.empty() || before.below.front() >= last.end()) break;  // not its child
-      const auto new_zeros = static_cast<std::int64_t>(before.columns) *
-                             (last.rows() - static_cast<std::int64_t>(before.below.size()));
+      const auto new_zeros =
+          static_cast<std::int64_t>(before.columns) * (last.rows() - static_cast<std::int64_t>(before.below.size()));
       const int columns = before.columns + last.columns;
       const std::int64_t all_zeros = zeros[out.size() - 2] + zeros.back() + new_zeros;
       if (!is_worth_it(columns, all_zeros, entries_of(columns, static_cast<std::int64_t>(last.below.size())))) break;
