@@ -30,19 +30,19 @@ Pairs chain(std::size_t first, std::size_t last) {
 
 std::vector<Case> cases() {
   std::vector<Case> out{{"one", 2, {{0, 1}}}, {"chain", 120, chain(0, 119)}};
-  Pairs star, dense, forest = chain(0, 20), loops = chain(0, 149);
+  Pairs star, dense, forest = chain(0, 20), loops = chain(0, 99);
   for (std::size_t k = 1; k < 60; ++k) star.emplace_back(0, k);
   for (std::size_t a = 0; a < 25; ++a)
     for (std::size_t b = a + 1; b < 25; ++b) dense.emplace_back(a, b);
   for (const auto& [a, b] : chain(21, 60)) forest.emplace_back(a, b);
   forest.emplace_back(25, 50);
   Rng rng(5);
-  for (int k = 0; k < 100; ++k) loops.emplace_back(rng.index(150), rng.index(150));
+  for (int k = 0; k < 70; ++k) loops.emplace_back(rng.index(100), rng.index(100));
   std::erase_if(loops, [](const auto& pair) { return pair.first == pair.second; });
   out.push_back({"star", 60, star});
   out.push_back({"dense", 25, dense});
   out.push_back({"forest", 62, forest});  // and a node without edges
-  out.push_back({"loops", 150, loops});
+  out.push_back({"loops", 100, loops});
   return out;
 }
 
