@@ -144,11 +144,9 @@ Judgement explain_closures(PoseGraph graph, const OdometryWays& odometry, std::s
   for (std::size_t c = 0; c < closures.size(); ++c) {
     if (!supported[c]) continue;
     position[c] = closure_of.size();
+    graph.edges[odometry_edges + closure_of.size()] = graph.edges[odometry_edges + c];
     closure_of.push_back(c);
   }
-  const std::size_t all_closures = closures.size();
-  for (std::size_t k = 0; k < closure_of.size(); ++k)
-    graph.edges[odometry_edges + k] = graph.edges[odometry_edges + closure_of[k]];
   graph.edges.resize(odometry_edges + closure_of.size());
   std::vector<std::vector<std::size_t>> considered_groups;
   for (const auto& group : groups) {
@@ -159,8 +157,10 @@ Judgement explain_closures(PoseGraph graph, const OdometryWays& odometry, std::s
   const HypothesisSolver solver(graph, odometry, odometry_edges, config, gnc, std::move(considered_certain));
   const Solution best = Search(solver, config).run(std::move(considered_groups));
 
-  Judgement out{
-      .accepted = std::vector<bool>(all_closures, false), .failed = {}, .solved = best.solved, .work = solver.work()};
+  Judgement out{.accepted = std::vector<bool>(supported.size(), false),
+                .failed = {},
+                .solved = best.solved,
+                .work = solver.work()};
   if (!best.solved) return out;
   for (std::size_t k = 0; k < closure_of.size(); ++k) out.accepted[closure_of[k]] = best.accepted[k] != 0;
   for (const FailedStretch& failed : best.failed) out.failed.push_back(narrowed(odometry, failed));
