@@ -167,35 +167,13 @@ TEST(MonitorGraph, UncertaintiesAreThoseOfTheNodesSent) {
 // Once around a circle, closures say where the ends lie relative to each other; without them odometry is all there is.
 // A robot starts a session at every change of its battery: earlier ones stay in the map, and cost no samples.
 TEST(MonitorGraph, OnlyTheSessionsThatHearItAreSampled) {
-  const test::TestFinder finder(1);
-  const auto map_of = [&](const std::vector<ChainId>& chains) {
-    SubmapSet submaps;
-    for (std::uint32_t r = 0; r < chains.size(); ++r)
-      for (Submap& submap : test::make_submaps(RobotId{r}, {}, Rng(1).fork(r)))
-        submaps[submap.id] = std::make_shared<const Submap>(std::move(submap));
-    VerdictSet verdicts = verdicts_of(submaps, finder);
-    const auto named = [&](KeyframeId& id) { id.chain = chains[id.chain.robot.value]; };
-    SubmapSet renamed;
-    for (const auto& [id, submap] : submaps) {
-      auto copy = std::make_shared<Submap>(*submap);
-      copy->id.chain = chains[id.chain.robot.value];
-      renamed[copy->id] = copy;
-    }
-    VerdictSet of_renamed;
-    for (auto& [pair, verdict] : verdicts) {
-      for (LoopClosure& closure : verdict.closures) {
-        named(closure.from);
-        named(closure.to);
-      }
-      of_renamed[{{chains[pair.first.chain.robot.value], pair.first.index},
-                  {chains[pair.second.chain.robot.value], pair.second.index}}] = verdict;
-    }
-    return estimate_map(renamed, of_renamed, {});
-  };
-  const ChainId first{RobotId{0}, 1}, second{RobotId{0}, 2}, other{RobotId{1}, 1};
+  const ChainId first(RobotId{0}), second{RobotId{0}, 1}, other(RobotId{1});
+  MapEstimate map = circle_map(1);
+  map.overstated.clear();  // by chain
   MonitorWork of_robots, of_sessions;
-  const ProxyGraph robots = monitor_graph(map_of({first, other}), 1, {}, {}, &of_robots);
-  const MapEstimate map = map_of({first, second});
+  const ProxyGraph robots = monitor_graph(map, 1, {}, {}, &of_robots);
+  for (MapNode& node : map.nodes)
+    if (node.id.chain == other) node.id.chain = second;
   const ProxyGraph sessions = monitor_graph(map, 1, {}, {}, &of_sessions);
   ASSERT_EQ(sessions.nodes.size(), robots.nodes.size());
   EXPECT_EQ(robots.uncertainties.size(), 2U);

@@ -29,8 +29,8 @@ struct MapJob {
   std::uint64_t revision = 0;
   /// The map of the pose graph alone, when nothing has come that changes it; else null.
   std::shared_ptr<const MapEstimate> estimate;
-  bool keeps_estimate = false;  ///< It is asked for again, to refine the map.
-  std::vector<ChainId> owners;  ///< The sessions that own robots' numbers: these hear of the map.
+  bool keeps_estimate = false;       ///< It is asked for again, to refine the map.
+  std::vector<ChainId> owners = {};  ///< The sessions that own robots' numbers: these hear of the map.
 };
 
 /// The map of a job.

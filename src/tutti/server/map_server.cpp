@@ -363,8 +363,7 @@ MapJob MapServer::begin(std::uint64_t revision) {
              .epoch = state_.epoch,
              .revision = revision,
              .estimate = estimate_,
-             .keeps_estimate = refiner_ != nullptr,
-             .owners = {}};
+             .keeps_estimate = refiner_ != nullptr};
   if (job.keeps_estimate) job.payload_sizes = state_.payload_sizes;
   return job;
 }
