@@ -67,7 +67,8 @@ void Host::close() {
   port_.reset();
   said_ = {};
   said_bytes_ = 0;
-  waiting_.clear();  // what was never sent follows from what is stored
+  received_.clear();  // the port brings them again
+  waiting_.clear();   // what was never sent follows from what is stored
   reopen_s_ = clock_.wall_s() + kReopen_s;
 }
 
@@ -153,6 +154,19 @@ bool Host::report() {
   return false;
 }
 
+bool Host::take_messages() {
+  if (received_.empty()) std::ranges::move(port_->receive(), std::back_inserter(received_));
+  for (const double begin_s = clock_.wall_s(); !received_.empty();) {
+    const bus::Received message = std::move(received_.front());
+    received_.pop_front();
+    count(false, message.envelope);
+    if (!hand_in(message)) return false;
+    if (said_bytes_ > kMostUncommitted && !carry_out()) return false;
+    if (clock_.wall_s() - begin_s > kLongestTaking_s) break;
+  }
+  return true;
+}
+
 double Host::turn() {
   const double wall_s = clock_.wall_s();
   if (wall_s >= second_s_) {
@@ -167,14 +181,11 @@ double Host::turn() {
     return kLongestSleep_s;
   }
   send_waiting();
-  for (const bus::Received& message : port_->receive()) {
-    count(false, message.envelope);
-    if (!hand_in(message)) return kLongestSleep_s;
-    if (said_bytes_ > kMostUncommitted && !carry_out()) return kLongestSleep_s;
-  }
+  if (!take_messages()) return kLongestSleep_s;
   if (!carry_out()) return kLongestSleep_s;  // receipts do not wait for long work
   if (!work() || !report() || !carry_out()) return kLongestSleep_s;
   tell_status();
+  if (!received_.empty()) return 0.0;
   const auto next = clock_.wall_s() < work_again_s_ ? std::nullopt : node_->next_work();
   return next ? std::min(kLongestSleep_s, clock_.wall_s_until(*next)) : kLongestSleep_s;
 }

@@ -77,6 +77,8 @@ class Host {
   static constexpr double kReopen_s = 3.0;
   static constexpr double kLongestPause_s = 600.0;  ///< Longest pause between two tries of work that throws.
   static constexpr double kLongestSleep_s = 0.05;
+  /// When messages have taken so long, what they gave is carried out, and the node's work and status get their turn.
+  static constexpr double kLongestTaking_s = 0.25;
   static constexpr std::size_t kMostUncommitted = 8U << 20U;  ///< Bytes.
 
   /// What a host is made of.
@@ -131,6 +133,7 @@ class Host {
   Status open_parts();
   void add(Answer answer);
   /// False when the node is gone.
+  bool take_messages();
   bool hand_in(const bus::Received& message);
   bool work();
   bool report();
@@ -152,7 +155,8 @@ class Host {
   std::unique_ptr<Hosted> node_;
   Answer said_;  // not carried out yet
   std::size_t said_bytes_ = 0;
-  std::deque<bus::Envelope> waiting_;  // refused by the port
+  std::deque<bus::Received> received_;  // not handed in yet
+  std::deque<bus::Envelope> waiting_;   // refused by the port
   double reopen_s_ = 0.0;
   double report_s_ = 0.0, status_s_ = 0.0, second_s_ = 0.0;
   std::string trouble_;

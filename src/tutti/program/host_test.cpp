@@ -79,6 +79,7 @@ class Postman final : public Hosted {
   Answer start(Timestamp) override { return {{.messages = {letter(MessageKind::job, "hello")}}, {}}; }
   Answer receive(const bus::Received& message, Timestamp) override {
     if (*message.envelope.bytes == "poison") throw std::out_of_range("poisoned");
+    takes();
     return {{.writes = {{"rows", std::to_string(message.ticket), *message.envelope.bytes}},
              .messages = {letter(MessageKind::job, *message.envelope.bytes)}},
             {message.ticket}};
@@ -99,6 +100,7 @@ class Postman final : public Hosted {
   }
   [[nodiscard]] Json status(Timestamp) const override { return {{"line", "fine"}}; }
   static inline bool work_throws = false, report_throws = false;
+  static inline std::function<void()> takes;
 
  private:
   const std::function<void()>& waits_;
@@ -109,6 +111,7 @@ class HostTest : public testing::Test {
  protected:
   HostTest() {
     Postman::work_throws = Postman::report_throws = false;
+    Postman::takes = [] {};
     host_ = host("1");
   }
   std::unique_ptr<Host> host(const std::string& version) {
@@ -167,6 +170,43 @@ TEST_F(HostTest, WorksWhenItIsTimeAndNotBefore) {
   EXPECT_EQ(std::ranges::count(said(), "send work"), 1);
   host_->turn();
   EXPECT_EQ(std::ranges::count(said(), "send work"), 0);
+}
+
+TEST_F(HostTest, ManySlowMessagesDoNotKeepItFromItsWork) {
+  Postman::takes = [this] { wall_s_ += 0.1; };
+  for (std::uint64_t ticket = 1; ticket <= 30; ++ticket) mail_.owed[ticket] = letter(MessageKind::job, "slow");
+  host_ = host("1");
+  ASSERT_TRUE(host_->open().has_value());
+  wall_s_ = 100.0;
+  said();
+  EXPECT_EQ(host_->turn(), 0.0);  // there is more to take
+  const Diary first = said();
+  EXPECT_EQ(std::ranges::count(first, "send work"), 1);
+  EXPECT_EQ(std::ranges::count(first, "acknowledge 3"), 1);
+  EXPECT_EQ(std::ranges::count(first, "acknowledge 4"), 0);
+  for (int i = 0; i < 20 && host_->turn() == 0.0; ++i) {
+  }
+  EXPECT_TRUE(mail_.owed.empty());
+  const Diary rest = said();
+  EXPECT_EQ(std::ranges::count(rest, "acknowledge 3"), 0);
+  EXPECT_EQ(std::ranges::count(rest, "acknowledge 30"), 1);
+}
+
+TEST_F(HostTest, MessagesThatWaitComeAgainWhenTheNodeIsMadeAnew) {
+  Postman::takes = [this] { wall_s_ += 0.3; };
+  for (std::uint64_t ticket = 1; ticket <= 5; ++ticket) mail_.owed[ticket] = letter(MessageKind::job, "slow");
+  host_ = host("1");
+  ASSERT_TRUE(host_->open().has_value());
+  host_->turn();
+  store_.full = true;
+  host_->turn();
+  store_.full = false;
+  said();
+  turns(8);
+  EXPECT_TRUE(mail_.owed.empty());
+  std::size_t rows = 0;
+  EXPECT_TRUE(store_.scan("rows", "", [&](auto, auto) { return ++rows > 0; }).has_value());
+  EXPECT_EQ(rows, 5U);
 }
 
 TEST_F(HostTest, WhatCannotBeCommittedIsNeitherSentNorAcknowledgedAndComesAgain) {
