@@ -7,6 +7,7 @@
 #include <mutex>
 #include <numbers>
 #include <string>
+#include <unordered_map>
 #include <utility>
 
 #include "tutti/base/check.hpp"
@@ -74,7 +75,7 @@ struct ReferenceClosures::PlacedSubmap {
 /// Submaps that were placed, for the pairs that they are in again.
 struct ReferenceClosures::Known {
   std::mutex mutex;  // guards what follows
-  std::map<SubmapId, std::shared_ptr<const PlacedSubmap>> placed;
+  std::unordered_map<SubmapId, std::shared_ptr<const PlacedSubmap>> placed;
   std::size_t times = 0;
 };
 
@@ -208,6 +209,7 @@ void ReferenceClosures::set_wrong_probabilities() {
 
 std::optional<Pose3> ReferenceClosures::draw_error(const SubmapPair& pair, bool overlap) const {
   const double wrong = overlap ? overlap_wrong_probability_ : distant_wrong_probability_;
+  if (wrong <= 0.0) return std::nullopt;  // most pairs of a mission without wrong closures get here
   const double in_block = wrong * config_.agreeing_share;
   const double alone = (wrong - in_block) / (1.0 - in_block);  // together: exactly `wrong`
   Rng rng = pair_rng(seed_, "look-alike", block_of(pair.first), block_of(pair.second));
