@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/finders/sensor_finders.hpp"
 
+#include <fmt/ranges.h>
+
 #include <algorithm>
+#include <charconv>
+#include <functional>
 #include <iterator>
+#include <system_error>
 #include <utility>
 
 #include "tutti/base/check.hpp"
@@ -16,11 +21,14 @@ namespace tutti::finders {
 namespace {
 
 template <class Matcher>
-std::vector<double> likeness_by(const Matcher& matcher, std::span<const std::string_view> others) {
-  std::vector<double> out;
-  for (const std::string_view other : others) out.push_back(matcher.likeness(other));
+std::vector<server::ClosureFinder::Likeness> likeness_by(const Matcher& matcher,
+                                                         std::span<const std::string_view> others) {
+  std::vector<server::ClosureFinder::Likeness> out;
+  for (std::size_t i = 0; i < others.size(); ++i) out.push_back({.other = i, .value = matcher.likeness(others[i])});
   return out;
 }
+
+constexpr std::string_view kJoined = "places ";  // no finder's own begins so
 
 }  // namespace
 
@@ -77,8 +85,8 @@ std::string LidarClosureFinder::place_of(const Submap& submap) const { return li
 
 bool LidarClosureFinder::can_rank(std::string_view place) const { return lidar::is_descriptor(place, config_); }
 
-std::vector<double> LidarClosureFinder::likeness(std::string_view place,
-                                                 std::span<const std::string_view> others) const {
+std::vector<LidarClosureFinder::Likeness> LidarClosureFinder::likeness(std::string_view place,
+                                                                       std::span<const std::string_view> others) const {
   return likeness_by(lidar::PlaceMatcher(place), others);
 }
 
@@ -118,8 +126,8 @@ std::string VisualClosureFinder::place_of(const Submap& submap) const {
 
 bool VisualClosureFinder::can_rank(std::string_view place) const { return visual::is_descriptor(place); }
 
-std::vector<double> VisualClosureFinder::likeness(std::string_view place,
-                                                  std::span<const std::string_view> others) const {
+std::vector<VisualClosureFinder::Likeness> VisualClosureFinder::likeness(
+    std::string_view place, std::span<const std::string_view> others) const {
   return likeness_by(visual::PlaceMatcher(place, config_), others);
 }
 
@@ -173,27 +181,65 @@ Result<JointClosureFinder::Look> JointClosureFinder::look(const Submap& first, c
   return out;
 }
 
+/// What one finder alone says as that finder says it; several parts after kJoined, and the length of each, as text.
 std::string JointClosureFinder::place_of(const Submap& submap) const {
   const PayloadSize size = payload_size(submap);
-  const server::ClosureFinder* only = nullptr;
+  std::vector<std::string> parts;
   for (const auto& finder : finders_) {
-    if (!finder->can_compare(size, size)) continue;
-    if (only != nullptr) return {};
-    only = finder.get();
+    const bool is_seen = finder->can_compare(size, size);
+    parts.push_back(is_seen ? finder->place_of(submap) : std::string());
+    if (is_seen && parts.back().empty()) return {};  // else another one's ranking would rule out what this one closes
   }
-  return only == nullptr ? std::string() : only->place_of(submap);
+  const std::string all = fmt::format("{}", fmt::join(parts, ""));
+  if (std::ranges::count_if(parts, std::not_fn(&std::string::empty)) <= 1) return all;
+  std::string head(kJoined);
+  for (const std::string& part : parts) head += fmt::format("{} ", part.size());
+  return head + all;
 }
 
-const server::ClosureFinder* JointClosureFinder::ranking(std::string_view place) const {
-  const auto found = std::ranges::find_if(finders_, [&](const auto& finder) { return finder->can_rank(place); });
-  return found == finders_.end() ? nullptr : found->get();
+std::vector<std::string_view> JointClosureFinder::parts_of(std::string_view place) const {
+  std::vector<std::string_view> parts(finders_.size());
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (!finders_[i]->can_rank(place)) continue;
+    parts[i] = place;
+    return parts;
+  }
+  if (!place.starts_with(kJoined)) return {};
+  place.remove_prefix(kJoined.size());
+  std::vector<std::size_t> sizes(parts.size());
+  for (std::size_t& size : sizes) {
+    const auto [end, error] = std::from_chars(place.data(), place.data() + place.size(), size);
+    if (error != std::errc() || end == place.data() + place.size()) return {};
+    place.remove_prefix(static_cast<std::size_t>(end - place.data()) + 1);
+  }
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (sizes[i] > place.size()) return {};
+    parts[i] = place.substr(0, sizes[i]);
+    if (!parts[i].empty() && !finders_[i]->can_rank(parts[i])) return {};
+    place.remove_prefix(sizes[i]);
+  }
+  return place.empty() ? parts : std::vector<std::string_view>();
 }
 
-std::vector<double> JointClosureFinder::likeness(std::string_view place,
-                                                 std::span<const std::string_view> others) const {
-  const server::ClosureFinder* const finder = ranking(place);
-  TUTTI_CHECK(finder != nullptr, "a place that nobody ranks");
-  return finder->likeness(place, others);
+std::vector<JointClosureFinder::Likeness> JointClosureFinder::likeness(std::string_view place,
+                                                                       std::span<const std::string_view> others) const {
+  const std::vector<std::string_view> own = parts_of(place);
+  std::vector<std::vector<std::string_view>> parts;
+  for (const std::string_view other : others) parts.push_back(parts_of(other));
+  std::vector<Likeness> out;
+  for (std::size_t sensor = 0; sensor < own.size(); ++sensor) {
+    std::vector<std::size_t> which;
+    std::vector<std::string_view> seen;
+    for (std::size_t i = 0; i < others.size() && !own[sensor].empty(); ++i) {
+      if (parts[i].empty() || parts[i][sensor].empty()) continue;
+      which.push_back(i);
+      seen.push_back(parts[i][sensor]);
+    }
+    if (seen.empty()) continue;
+    for (const auto& [other, value, _] : finders_[sensor]->likeness(own[sensor], seen))
+      out.push_back({which[other], value, static_cast<std::uint32_t>(sensor)});
+  }
+  return out;
 }
 
 namespace {

@@ -37,8 +37,8 @@ class LidarClosureFinder final : public server::ClosureFinder {
                                   const std::optional<Pose3>& T_first_second) const override;
   [[nodiscard]] std::string place_of(const Submap& submap) const override;
   [[nodiscard]] bool can_rank(std::string_view place) const override;
-  [[nodiscard]] std::vector<double> likeness(std::string_view place,
-                                             std::span<const std::string_view> others) const override;
+  [[nodiscard]] std::vector<Likeness> likeness(std::string_view place,
+                                               std::span<const std::string_view> others) const override;
   [[nodiscard]] const FeatureCache<lidar::SubmapFeatures>& cache() const { return cache_; }
 
  private:
@@ -64,8 +64,8 @@ class VisualClosureFinder final : public server::ClosureFinder {
                                               const server::PayloadStore& payloads) const override;
   [[nodiscard]] std::string place_of(const Submap& submap) const override;
   [[nodiscard]] bool can_rank(std::string_view place) const override;
-  [[nodiscard]] std::vector<double> likeness(std::string_view place,
-                                             std::span<const std::string_view> others) const override;
+  [[nodiscard]] std::vector<Likeness> likeness(std::string_view place,
+                                               std::span<const std::string_view> others) const override;
 
  private:
   using Features = FeatureCache<visual::SubmapFeatures>::Features;
@@ -77,8 +77,9 @@ class VisualClosureFinder final : public server::ClosureFinder {
 };
 
 /// Combines several finders, one per kind of payload: each pair is compared by every finder that can. Robots with
-/// different sensors are joined through robots that carry both kinds. Only places of submaps that a single finder can
-/// compare are known: what another one finds of a pair does not depend on how alike the first says that it looks.
+/// different sensors are joined through robots that carry both kinds. A place is what every finder that can compare its
+/// submap says of it; each ranks by its own part, as the sensor of its number. A place that one of them cannot describe
+/// is unknown.
 class JointClosureFinder final : public server::ClosureFinder {
  public:
   explicit JointClosureFinder(std::vector<std::shared_ptr<const server::ClosureFinder>> finders);
@@ -92,13 +93,13 @@ class JointClosureFinder final : public server::ClosureFinder {
   [[nodiscard]] Result<Look> look(const Submap& first, const Submap& second, const server::PayloadStore& payloads,
                                   const std::optional<Pose3>& T_first_second) const override;
   [[nodiscard]] std::string place_of(const Submap& submap) const override;
-  [[nodiscard]] bool can_rank(std::string_view place) const override { return ranking(place) != nullptr; }
-  [[nodiscard]] std::vector<double> likeness(std::string_view place,
-                                             std::span<const std::string_view> others) const override;
+  [[nodiscard]] bool can_rank(std::string_view place) const override { return !parts_of(place).empty(); }
+  [[nodiscard]] std::vector<Likeness> likeness(std::string_view place,
+                                               std::span<const std::string_view> others) const override;
 
  private:
-  /// The finder that ranks this place; null: none.
-  [[nodiscard]] const server::ClosureFinder* ranking(std::string_view place) const;
+  /// Each finder's part of a place, empty where it has none. Nothing when it is no such place.
+  [[nodiscard]] std::vector<std::string_view> parts_of(std::string_view place) const;
   std::vector<std::shared_ptr<const server::ClosureFinder>> finders_;
 };
 

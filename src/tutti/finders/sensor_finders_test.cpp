@@ -105,7 +105,7 @@ TEST(LidarClosureFinder, FindsTheSameWhateverItKeeps) {
   }
 }
 
-TEST(SensorFinders, SayWhatAPlaceLooksLikeWhereOneKindOfSensorAloneComparesIt) {
+TEST(SensorFinders, SayWhatAPlaceLooksLikeFromAbove) {
   Rooms rooms(2);
   Submap seen = rooms.submaps[0];
   seen.cloud = rooms.store.cloud(seen.id).value();
@@ -122,14 +122,15 @@ TEST(SensorFinders, SayWhatAPlaceLooksLikeWhereOneKindOfSensorAloneComparesIt) {
   other.cloud = rooms.store.cloud(other.id).value();
   const std::string elsewhere = lidar->place_of(other);
   const std::vector<std::string_view> both{place, elsewhere};
-  const std::vector<double> likeness = joint.likeness(place, both);
+  const auto likeness = joint.likeness(place, both);
   EXPECT_EQ(likeness, lidar->likeness(place, both));
-  EXPECT_GT(likeness[0], likeness[1]);
+  ASSERT_EQ(likeness.size(), 2U);
+  EXPECT_GT(likeness[0].value, likeness[1].value);
   auto images = std::make_shared<VisualPayload>();
   images->frames.emplace_back();
   images->frames.back().observations.emplace_back();
   seen.visual = images;
-  EXPECT_EQ(joint.place_of(seen), "");  // cameras may find closures that do not look alike from above
+  EXPECT_EQ(joint.place_of(seen), "");  // cameras may find closures, and too few landmarks say where
   EXPECT_EQ(visual->place_of(seen), "");
   EXPECT_EQ(joint.place_of({.id = seen.id}), "");
 }
@@ -152,9 +153,56 @@ TEST(SensorFinders, SayWhatCamerasSawWhereTheyAreTheOnlySensor) {
   EXPECT_TRUE(joint.can_rank(place));
   EXPECT_FALSE(lidar->can_rank(place));
   const std::vector<std::string_view> others{again, elsewhere};
-  const std::vector<double> likeness = joint.likeness(place, others);
-  EXPECT_EQ(likeness, visual->likeness(place, others));
-  EXPECT_GT(likeness[0], 5 * likeness[1]);
+  const auto likeness = joint.likeness(place, others), to_cameras = visual->likeness(place, others);
+  ASSERT_EQ(likeness.size(), 2U);
+  for (std::size_t i = 0; i < 2; ++i)
+    EXPECT_EQ(likeness[i], (server::ClosureFinder::Likeness{i, to_cameras[i].value, 1}));
+  EXPECT_GT(likeness[0].value, 5 * likeness[1].value);
+}
+
+TEST(SensorFinders, SayHowAlikePlacesLookToEachSensorThatShowsBoth) {
+  using visual::test::fly, visual::test::make_submap, visual::test::stereo_cameras, visual::test::textured_room;
+  using Likeness = server::ClosureFinder::Likeness;
+  const auto lidar = std::make_shared<LidarClosureFinder>(lidar::LidarClosureConfig{}, 1, kMuch);
+  const auto visual = std::make_shared<VisualClosureFinder>(visual::VisualClosureConfig{}, 1, kMuch);
+  const JointClosureFinder joint({lidar, visual});
+  Rooms rooms(2);
+  Submap scans = rooms.submaps[0], elsewhere = rooms.submaps[1];
+  scans.cloud = rooms.store.cloud(scans.id).value();
+  elsewhere.cloud = rooms.store.cloud(elsewhere.id).value();
+  const Submap images =
+      make_submap({RobotId{0}, 0}, fly(textured_room(700, Rng(1)), stereo_cameras(), {.yaw_rad = 1.5}, Rng(1)),
+                  stereo_cameras(), {});
+  Submap both = scans;
+  both.visual = images.visual;
+  Submap both_elsewhere = elsewhere;
+  both_elsewhere.visual = images.visual;
+
+  const std::string place = joint.place_of(both);
+  EXPECT_EQ(place.size(),
+            joint.place_of(scans).size() + joint.place_of(images).size() +
+                fmt::format("places {} {} ", joint.place_of(scans).size(), joint.place_of(images).size()).size());
+  EXPECT_TRUE(joint.can_rank(place));
+  EXPECT_FALSE(lidar->can_rank(place) || visual->can_rank(place));
+  const std::vector<std::string> kept{joint.place_of(scans), joint.place_of(images), joint.place_of(both_elsewhere),
+                                      joint.place_of(both)};
+  const std::vector<std::string_view> others(kept.begin(), kept.end());
+  const auto from_above =
+      lidar->likeness(others[0], std::vector{others[0], std::string_view(joint.place_of(elsewhere))});
+  const double same_images = visual->likeness(others[1], std::vector{others[1]}).front().value;
+  EXPECT_EQ(joint.likeness(place, others), (std::vector<Likeness>{{0, from_above[0].value, 0},
+                                                                  {2, from_above[1].value, 0},
+                                                                  {3, from_above[0].value, 0},
+                                                                  {1, same_images, 1},
+                                                                  {2, same_images, 1},
+                                                                  {3, same_images, 1}}));
+  EXPECT_TRUE(joint.likeness(others[0], std::vector{others[1]}).empty());  // no sensor shows both
+
+  for (std::size_t size = 0; size < place.size(); size += size < 30 ? 1 : 499)
+    EXPECT_FALSE(joint.can_rank(place.substr(0, size))) << size;
+  EXPECT_FALSE(joint.can_rank(place + " "));
+  for (const char* text : {"places ", "places 1", "places -1 0 ", "places 99999999999999999999 0 ", "places 4 0 some"})
+    EXPECT_FALSE(joint.can_rank(text)) << text;
 }
 
 }  // namespace sensor_finders_test

@@ -82,6 +82,17 @@ TEST_F(MapOfPlaces, ADamagedRowIsASubmapWhosePairsAreAllVerified) {
   ASSERT_FALSE(place.candidates.empty());
   const Write row = node::to_row(id, place);
   EXPECT_EQ(node::place_of_row(row.key, *row.bytes), std::pair(id, place));
+  for (const std::uint32_t sensor : {0U, 1U, server::ClosureFinder::kMostSensors}) {
+    const auto with = [&, at = place]() mutable {
+      at.candidates.front().sensor = sensor;
+      return at;
+    }();
+    const auto back = node::place_of_row(row.key, *node::to_row(id, with).bytes);
+    if (sensor < server::ClosureFinder::kMostSensors)
+      EXPECT_EQ(back, std::pair(id, with));
+    else
+      EXPECT_FALSE(back.has_value());
+  }
   for (std::size_t length = 0; length < row.bytes->size(); length += 7)  // however short
     node::place_of_row(row.key, row.bytes->substr(0, length));
   const auto tables = store_.tables();

@@ -80,9 +80,9 @@ std::string place_key(SubmapId id) { return std::string(kPlacePrefix) + key_of(i
 
 storage::Write to_row(SubmapId id, const server::Place& place) {
   std::string bytes = storage::key_of({place.is_ranked ? 1U : 0U, place.candidates.size()});
-  for (const auto& [other, likeness] : place.candidates)
-    bytes += storage::key_of(
-        {other.chain.robot.value, other.chain.session, other.index, std::bit_cast<std::uint64_t>(likeness)});
+  for (const auto& [other, likeness, sensor] : place.candidates)
+    bytes += storage::key_of({other.chain.robot.value, other.chain.session,
+                              other.index + (std::uint64_t{sensor} << 32U), std::bit_cast<std::uint64_t>(likeness)});
   return {map_tables::kMeta, place_key(id), bytes + place.looks};
 }
 
@@ -95,11 +95,15 @@ std::optional<std::pair<SubmapId, server::Place>> place_of_row(std::string_view 
   bytes.remove_prefix(kHead);
   server::Place place{.looks = {}, .is_ranked = (*head)[0] != 0, .candidates = {}};
   for (std::uint64_t i = 0; i < (*head)[1]; ++i) {
-    const auto other = bytes.size() < kCandidate ? std::nullopt : submap_of_key(bytes.substr(0, 24));
-    if (!other) return std::nullopt;
-    const double likeness = std::bit_cast<double>(storage::numbers_of(bytes.substr(24, 8), 1)->front());
-    if (!std::isfinite(likeness)) return std::nullopt;
-    place.candidates.push_back({*other, likeness});
+    const auto numbers = storage::numbers_of(bytes.substr(0, kCandidate), 4);
+    if (!numbers) return std::nullopt;
+    const std::uint64_t robot = (*numbers)[0], index = (*numbers)[2], sensor = index >> 32U;
+    const auto likeness = std::bit_cast<double>((*numbers)[3]);
+    if (robot >> 32U != 0 || sensor >= server::ClosureFinder::kMostSensors || !std::isfinite(likeness))
+      return std::nullopt;
+    const SubmapId other{{RobotId{static_cast<std::uint32_t>(robot)}, (*numbers)[1]},
+                         static_cast<std::uint32_t>(index)};
+    place.candidates.push_back({other, likeness, static_cast<std::uint32_t>(sensor)});
     bytes.remove_prefix(kCandidate);
   }
   place.looks = bytes;

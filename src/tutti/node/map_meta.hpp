@@ -51,8 +51,9 @@ std::string refinement_key(std::uint64_t revision);
 Result<server::Refinements> read_refinements(const storage::TableStore& map);
 
 /// Rows `place/SUBMAP`: what the places of submaps look like, and their candidates. Encoded as numbers of 8 bytes
-/// (whether it was compared, how many candidates; for each its robot, session, index and the bits of its likeness),
-/// followed by what it looks like. Rows that cannot be read are skipped: the pairs of these submaps are all verified.
+/// (whether it was compared, how many candidates; for each its robot, session, index plus 2^32 times the sensor, and
+/// the bits of its likeness), followed by what it looks like. Rows that cannot be read are skipped: the pairs of these
+/// submaps are all verified.
 storage::Write to_row(SubmapId id, const server::Place& place);
 /// The key of a submap's row.
 std::string place_key(SubmapId id);

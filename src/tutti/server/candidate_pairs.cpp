@@ -19,10 +19,15 @@ bool CandidatePairs::comes_first(const Ranked& a, const Ranked& b) {
   return a.turn != b.turn ? a.turn < b.turn : is_more_alike(a.alike, b.alike);
 }
 
+CandidatePairs::List& CandidatePairs::by_sensor(std::vector<List>& lists, std::uint32_t sensor) {
+  if (lists.size() <= sensor) lists.resize(sensor + std::size_t{1});
+  return lists[sensor];
+}
+
 /// What was dropped before needs no place here: whatever looks less alike than it and is the same robot's comes after
 /// it. Those of this robot that look less alike are one turn later now, and stay in their order; so do all others.
 void CandidatePairs::insert(SubmapId of, const Alike& other) {
-  std::vector<Ranked>& list = most_alike_[of];
+  List& list = by_sensor(most_alike_[of], other.sensor);
   const RobotId robot = other.submap.chain.robot;
   Ranked added{other};
   for (const Ranked& known : list) {
@@ -30,7 +35,7 @@ void CandidatePairs::insert(SubmapId of, const Alike& other) {
     if (known.alike.submap.chain.robot == robot && is_more_alike(known.alike, other)) ++added.turn;
   }
   if (list.size() >= most_ && (list.empty() || !comes_first(added, list.back()))) return;
-  std::vector<Ranked> stay, later{added};
+  List stay, later{added};
   stay.reserve(list.size());
   for (Ranked& known : list) {
     const bool is_later = known.alike.submap.chain.robot == robot && known.turn >= added.turn;
@@ -46,12 +51,12 @@ std::vector<Alike> CandidatePairs::add(SubmapId id, const std::vector<Alike>& ot
   most_alike_.try_emplace(id);
   for (const Alike& other : others) {
     insert(id, other);
-    insert(other.submap, {id, other.likeness});
+    insert(other.submap, {id, other.likeness, other.sensor});
   }
   std::vector<Alike> candidates;
   for (const Alike& other : others)
     if (!excludes(ordered(id, other.submap))) candidates.push_back(other);
-  std::ranges::sort(candidates, {}, &Alike::submap);
+  std::ranges::stable_sort(candidates, {}, &Alike::submap);
   return candidates;
 }
 
@@ -59,17 +64,18 @@ CandidatePairs::CandidatePairs(std::size_t most, const std::map<SubmapId, std::v
     : most_(most) {
   for (const auto& [id, others] : candidates) {
     append(id, others);
-    for (const Alike& other : others) append(other.submap, {{id, other.likeness}});
+    for (const Alike& other : others) append(other.submap, {{id, other.likeness, other.sensor}});
   }
-  for (auto& [id, list] : most_alike_) cut(list);
+  for (auto& [id, lists] : most_alike_)
+    for (List& list : lists) cut(list);
 }
 
 void CandidatePairs::append(SubmapId of, const std::vector<Alike>& others) {
-  std::vector<Ranked>& list = most_alike_[of];
-  for (const Alike& other : others) list.push_back({other});
+  std::vector<List>& lists = most_alike_[of];
+  for (const Alike& other : others) by_sensor(lists, other.sensor).push_back({other});
 }
 
-void CandidatePairs::cut(std::vector<Ranked>& list) const {
+void CandidatePairs::cut(List& list) const {
   const auto by_robot = [](const Ranked& a, const Ranked& b) {
     const RobotId of_a = a.alike.submap.chain.robot, of_b = b.alike.submap.chain.robot;
     return of_a != of_b ? of_a < of_b : is_more_alike(a.alike, b.alike);
@@ -86,7 +92,9 @@ void CandidatePairs::cut(std::vector<Ranked>& list) const {
 }
 
 bool CandidatePairs::prefers(SubmapId of, SubmapId other) const {
-  return std::ranges::any_of(most_alike_.at(of), [&](const Ranked& ranked) { return ranked.alike.submap == other; });
+  return std::ranges::any_of(most_alike_.at(of), [&](const List& list) {
+    return std::ranges::any_of(list, [&](const Ranked& ranked) { return ranked.alike.submap == other; });
+  });
 }
 
 bool CandidatePairs::excludes(const SubmapPair& pair) const {
@@ -95,12 +103,13 @@ bool CandidatePairs::excludes(const SubmapPair& pair) const {
 
 std::map<SubmapId, std::vector<SubmapId>> CandidatePairs::all() const {
   std::map<SubmapId, std::vector<SubmapId>> out;
-  for (const auto& [id, list] : most_alike_) {
+  for (const auto& [id, lists] : most_alike_) {
     std::vector<SubmapId>& own = out[id];
-    for (const Ranked& other : list) {
-      own.push_back(other.alike.submap);
-      out[other.alike.submap].push_back(id);
-    }
+    for (const List& list : lists)
+      for (const Ranked& other : list) {
+        own.push_back(other.alike.submap);
+        out[other.alike.submap].push_back(id);
+      }
   }
   return out;
 }

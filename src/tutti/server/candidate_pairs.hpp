@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <map>
 #include <string>
 #include <vector>
@@ -10,10 +11,11 @@
 
 namespace tutti::server {
 
-/// Another submap, and how alike it looks (ClosureFinder::likeness()).
+/// Another submap, and how alike it looks (ClosureFinder::Likeness).
 struct Alike {
   SubmapId submap;
   double likeness = 0.0;
+  std::uint32_t sensor = 0;
   friend bool operator==(const Alike&, const Alike&) = default;
 };
 
@@ -27,9 +29,10 @@ struct Place {
 using PlaceSet = std::map<SubmapId, Place>;
 
 /// Which pairs of submaps are worth verifying, where every submap says what its place looks like: those of which either
-/// is among the `most` that look most alike to the other. Their number thus grows with the submaps and not with their
-/// square. Robots take turns: first comes the one of each robot that looks most alike, then the second of each. So a
-/// robot that stands in one place for hours, or makes up submaps, does not keep others from being compared there.
+/// is among the `most` that look most alike to the other, to some sensor that shows both. Their number thus grows with
+/// the submaps and not with their square. Robots take turns: first comes the one of each robot that looks most alike,
+/// then the second of each. So a robot that stands in one place for hours, or makes up submaps, does not keep others
+/// from being compared there.
 ///
 /// What is a candidate is a function of the set of submaps and their likeness. A further submap takes candidates away
 /// from others and never gives them any but itself, so whatever is a candidate in the end was one as soon as both were
@@ -40,8 +43,8 @@ class CandidatePairs {
   explicit CandidatePairs(std::size_t most) : most_(most) {}
   /// Restores submaps from what add() has returned of each; of any two, either may have the other.
   CandidatePairs(std::size_t most, const std::map<SubmapId, std::vector<Alike>>& candidates);
-  /// Compares a new submap with earlier ones, of which each may be in it once. Returns those with which it is a
-  /// candidate now, smallest first.
+  /// Compares a new submap with earlier ones, of which each may be in it once for every sensor. Returns those with
+  /// which it is a candidate now, smallest first.
   std::vector<Alike> add(SubmapId id, const std::vector<Alike>& others);
   /// True if the submap was added.
   [[nodiscard]] bool has(SubmapId id) const { return most_alike_.contains(id); }
@@ -56,13 +59,15 @@ class CandidatePairs {
     std::size_t turn = 0;  ///< How many of the same robot look more alike.
   };
   static bool comes_first(const Ranked& a, const Ranked& b);
+  using List = std::vector<Ranked>;  // best first, at most most_
+  static List& by_sensor(std::vector<List>& lists, std::uint32_t sensor);
   void insert(SubmapId of, const Alike& other);
   void append(SubmapId of, const std::vector<Alike>& others);
-  void cut(std::vector<Ranked>& list) const;
+  void cut(List& list) const;
   [[nodiscard]] bool prefers(SubmapId of, SubmapId other) const;
 
   std::size_t most_ = 0;
-  std::map<SubmapId, std::vector<Ranked>> most_alike_;  // best first, at most most_
+  std::map<SubmapId, std::vector<List>> most_alike_;  // by sensor
 };
 
 /// The candidates of the places that were compared; others are unknown.

@@ -137,6 +137,49 @@ TEST(CandidatePairs, AreAllWithFewSubmapsAndGrowNoFasterThanTheSubmaps) {
   EXPECT_LE(count(60), 60 * 6);
 }
 
+/// Sensor 0 shows two of three submaps, sensor 1 three of four.
+bool shows(std::uint32_t sensor, std::size_t i) { return sensor == 0 ? i % 3 != 0 : i % 4 != 0; }
+
+TEST(CandidatePairs, AreThoseThatAnySensorFindsMostAlike) {
+  constexpr std::size_t kCount = 36, kMost = 4;
+  std::vector<std::map<SubmapPair, double>> likeness{any_likeness(kCount), {}};
+  for (const auto& [pair, value] : likeness[0])  // to the other sensor, what looks alike looks different
+    likeness[1][pair] = 1.0 - value;
+  const auto pairs_of = [&](const std::vector<std::size_t>& order, const std::vector<std::uint32_t>& sensors,
+                            PlaceSet* places) {
+    CandidatePairs pairs(kMost);
+    std::vector<std::size_t> there;
+    for (const std::size_t i : order) {
+      std::vector<Alike> others;
+      for (const std::uint32_t sensor : sensors)
+        for (const std::size_t j : there)
+          if (shows(sensor, i) && shows(sensor, j))
+            others.push_back({submap(j), likeness[sensor].at(ordered(submap(i), submap(j))), sensor});
+      auto candidates = pairs.add(submap(i), others);
+      if (places != nullptr) (*places)[submap(i)] = {.looks = "x", .is_ranked = true, .candidates = candidates};
+      there.push_back(i);
+    }
+    return pairs;
+  };
+  PlaceSet places;
+  const CandidatePairs both = pairs_of(numbers(kCount), {0, 1}, &places);
+  const CandidatePairs first = pairs_of(numbers(kCount), {0}, nullptr),
+                       second = pairs_of(numbers(kCount), {1}, nullptr);
+  std::vector<std::size_t> order = numbers(kCount);
+  std::ranges::reverse(order);
+  const CandidatePairs reversed = pairs_of(order, {0, 1}, nullptr), again = restored(places, kMost);
+  std::size_t only_first = 0, only_second = 0;
+  for (const auto& [pair, value] : likeness[0]) {
+    EXPECT_EQ(both.excludes(pair), first.excludes(pair) && second.excludes(pair));
+    EXPECT_EQ(reversed.excludes(pair), both.excludes(pair));
+    EXPECT_EQ(again.excludes(pair), both.excludes(pair));
+    only_first += !first.excludes(pair) && second.excludes(pair) ? 1 : 0;
+    only_second += first.excludes(pair) && !second.excludes(pair) ? 1 : 0;
+  }
+  EXPECT_GT(only_first, 20U);
+  EXPECT_GT(only_second, 20U);
+}
+
 TEST(CandidatePairs, ComeBackFromWhatIsStored) {
   const auto likeness = any_likeness(40);
   Filled made = filled(numbers(40), 5, likeness);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
@@ -40,11 +42,19 @@ class ClosureFinder {
   [[nodiscard]] virtual std::string place_of(const Submap& /*submap*/) const { return {}; }
   /// True if likeness() can compare this place, which another version may have made, or other settings.
   [[nodiscard]] virtual bool can_rank(std::string_view /*place*/) const { return false; }
-  /// How alike the place and each of the others look, the larger the more: of those that look most alike to a submap,
-  /// verify() finds closures most often. Takes far less time than verify(), and all places can_rank() allows.
-  [[nodiscard]] virtual std::vector<double> likeness(std::string_view /*place*/,
-                                                     std::span<const std::string_view> others) const {
-    return std::vector<double>(others.size(), 0.0);
+  /// How alike a place and one of the others look to one kind of sensor.
+  struct Likeness {
+    std::size_t other = 0;     ///< Which of the others.
+    double value = 0.0;        ///< The larger the more; comparable for one sensor only.
+    std::uint32_t sensor = 0;  ///< Below kMostSensors.
+    friend bool operator==(const Likeness&, const Likeness&) = default;
+  };
+  static constexpr std::uint32_t kMostSensors = 8;
+  /// How alike the place and each of the others look, to every sensor that shows both: of those that look most alike to
+  /// a submap, verify() finds closures most often. Takes far less time than verify(), and all places can_rank() allows.
+  [[nodiscard]] virtual std::vector<Likeness> likeness(std::string_view /*place*/,
+                                                       std::span<const std::string_view> /*others*/) const {
+    return {};
   }
   /// Verifies the pair; expensive, so it runs in a worker. Payloads are loaded from `payloads` when they are needed. An
   /// error means that one could not be read: there is no verdict, and the pair may be verified another time.
@@ -88,8 +98,8 @@ class WrappedFinder : public ClosureFinder {
   }
   [[nodiscard]] std::string place_of(const Submap& submap) const override { return wrapped_->place_of(submap); }
   [[nodiscard]] bool can_rank(std::string_view place) const override { return wrapped_->can_rank(place); }
-  [[nodiscard]] std::vector<double> likeness(std::string_view place,
-                                             std::span<const std::string_view> others) const override {
+  [[nodiscard]] std::vector<Likeness> likeness(std::string_view place,
+                                               std::span<const std::string_view> others) const override {
     return wrapped_->likeness(place, others);
   }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,

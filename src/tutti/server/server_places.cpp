@@ -11,18 +11,21 @@ namespace tutti::server {
 
 void MapServer::compare_place(SubmapId id) {
   Place& place = state_.places.at(id);
-  std::vector<Alike> others;
+  std::vector<SubmapId> others;
   std::vector<std::string_view> looks;
   for (const auto& [other, known] : state_.places)
     if (candidates_.has(other) && is_asked(ordered(id, other))) {
-      others.push_back({other});
+      others.push_back(other);
       looks.push_back(known.looks);
     }
-  const std::vector<double> likeness = finder_->likeness(place.looks, looks);
-  TUTTI_CHECK(likeness.size() == others.size(), "{} of {} places compared", likeness.size(), others.size());
-  for (std::size_t i = 0; i < others.size(); ++i) others[i].likeness = likeness[i];
-  work_.places_compared += others.size();
-  place.candidates = candidates_.add(id, others);
+  std::vector<Alike> alike;
+  for (const auto& [other, value, sensor] : finder_->likeness(place.looks, looks)) {
+    TUTTI_CHECK(other < others.size() && sensor < ClosureFinder::kMostSensors, "place {} of {} compared by sensor {}",
+                other, others.size(), sensor);
+    alike.push_back({others[other], value, sensor});
+  }
+  work_.places_compared += alike.size();
+  place.candidates = candidates_.add(id, alike);
   place.is_ranked = true;
   new_places_.push_back(id);
 }

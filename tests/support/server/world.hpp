@@ -116,10 +116,11 @@ class RankingFinder final : public WrappedFinder {
     return fmt::format("{:.6f} {:.6f}", at.x(), at.y());
   }
   [[nodiscard]] bool can_rank(std::string_view place) const override { return place.find(' ') != place.npos; }
-  [[nodiscard]] std::vector<double> likeness(std::string_view place,
-                                             std::span<const std::string_view> others) const override {
-    std::vector<double> out;
-    for (const std::string_view other : others) out.push_back(-(at(place) - at(other)).norm());
+  [[nodiscard]] std::vector<Likeness> likeness(std::string_view place,
+                                               std::span<const std::string_view> others) const override {
+    std::vector<Likeness> out;
+    for (std::size_t i = 0; i < others.size(); ++i)
+      out.push_back({.other = i, .value = -(at(place) - at(others[i])).norm()});
     return out;
   }
 
