@@ -163,12 +163,13 @@ def latencies(mission, names):
     return sorted(out), max(late)
 
 
-def load(tutti, folder, counts, rate, minutes):
+def load(tutti, folder, counts, rate, minutes, more):
     head(*COLUMNS)
     for count in counts:
         settings = {"copies": count, "walk.duration_s": 60.0 * minutes}
+        settings = [f"simulation.robots.0.{key}={value}" for key, value in settings.items()] + more
         mission = Mission(tutti, folder / f"run{count}", [SOURCE / "missions/fleet.yaml", *(
-            word for key, value in settings.items() for word in ("--set", f"simulation.robots.0.{key}={value}"))], rate)
+            word for setting in settings for word in ("--set", setting))], rate)
         names = [*NAMES, *(f"robot{i}" for i in range(len(NAMES), count))][:count]
         mission.start_server()
         for name in names:
@@ -220,10 +221,11 @@ def main():
     parser.add_argument("--rate", type=float, default=20.0)
     parser.add_argument("--minutes", type=float, default=30.0)
     parser.add_argument("--workers", default="1,2,4")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="a setting of the mission")
     options = parser.parse_args()
     numbers = lambda text: [int(word) for word in text.split(",")]
     with tempfile.TemporaryDirectory() as folder:
-        load(options.tutti, pathlib.Path(folder), numbers(options.robots), options.rate, options.minutes)
+        load(options.tutti, pathlib.Path(folder), numbers(options.robots), options.rate, options.minutes, options.set)
         if options.data:
             workers(options.tutti, pathlib.Path(folder), options.data, numbers(options.workers))
 

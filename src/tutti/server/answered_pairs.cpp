@@ -9,7 +9,9 @@
 namespace tutti::server {
 
 void AnsweredPairs::add_submap(SubmapId id) {
-  if (number_.try_emplace(id, static_cast<std::uint32_t>(answered_.size())).second) answered_.emplace_back();
+  if (!number_.try_emplace(id, static_cast<std::uint32_t>(ids_.size())).second) return;
+  ids_.push_back(id);
+  answered_.emplace_back();
 }
 
 AnsweredPairs::Place AnsweredPairs::place_of(const SubmapPair& pair) const {
@@ -53,25 +55,21 @@ bool AnsweredPairs::contains(const SubmapPair& pair) const {
   return answered_[later].contains(earlier);
 }
 
-std::vector<SubmapPair> AnsweredPairs::open() const {
-  std::vector<SubmapId> ids(number_.size());
-  for (const auto& [id, number] : number_) ids[number] = id;
+std::vector<SubmapPair> AnsweredPairs::open(SubmapId id) const {
+  const std::uint32_t later = number_.at(id);
   std::vector<SubmapPair> open;
-  for (std::size_t later = 0; later < ids.size(); ++later) {
-    std::uint64_t next = 0;
-    const auto take_until = [&](std::uint64_t end) {
-      for (; next < end; ++next) {
-        const auto [first, second] = std::minmax(ids[next], ids[later]);
-        open.push_back({first, second});
-      }
-    };
-    for (const auto& [begin, end] : answered_[later].stretches()) {
-      take_until(begin);
-      next = end;
+  std::uint64_t next = 0;
+  const auto take_until = [&](std::uint64_t end) {
+    for (; next < end; ++next) {
+      const auto [first, second] = std::minmax(ids_[next], id);
+      open.push_back({first, second});
     }
-    take_until(later);
+  };
+  for (const auto& [begin, end] : answered_[later].stretches()) {
+    take_until(begin);
+    next = end;
   }
-  std::ranges::sort(open);
+  take_until(later);
   return open;
 }
 

@@ -28,9 +28,9 @@ class AnsweredPairs {
   /// as they are.
   void insert_all_but(SubmapId id, std::span<const SubmapId> open);
   [[nodiscard]] bool contains(const SubmapPair& pair) const;
-  /// The pairs that are not in the set, smaller submap first, sorted. Takes time in proportion to these pairs and the
-  /// submaps, not to all pairs.
-  [[nodiscard]] std::vector<SubmapPair> open() const;
+  /// The pairs of this submap with those that came before it that are not in the set, smaller submap first, in order of
+  /// their arrival. Takes time in proportion to these pairs.
+  [[nodiscard]] std::vector<SubmapPair> open(SubmapId id) const;
   /// Removes all pairs; the submaps stay.
   void forget_answers();
 
@@ -48,6 +48,7 @@ class AnsweredPairs {
   [[nodiscard]] Place place_of(const SubmapPair& pair) const;
 
   std::unordered_map<SubmapId, std::uint32_t> number_;
+  std::vector<SubmapId> ids_;        ///< By number.
   std::vector<NumberSet> answered_;  ///< Per submap, by its number: the earlier ones that it was compared with.
 };
 

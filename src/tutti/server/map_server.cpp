@@ -130,7 +130,7 @@ MapServer::MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFind
   }
   for (const auto& [id, submap] : state_.submaps) state_.answered.add_submap(id);
   restore_candidates();
-  for (const SubmapPair& pair : state_.answered.open()) plan_verification(pair);
+  plan_open_verifications();
   news_ = !state_.submaps.empty();
 }
 
@@ -205,13 +205,6 @@ bool MapServer::is_answered(const SubmapPair& pair) const {
   if (const auto found = state_.verdicts.find(pair); found != state_.verdicts.end())
     return found->second.finder == state_.finder || says(state_.words, pair, Wish::accept);
   return state_.answered.contains(pair);
-}
-
-void MapServer::plan_verification(const SubmapPair& pair) {
-  ++work_.pairs_looked_at;
-  if (!is_answered(pair) && is_asked(pair))
-    return jobs_.push_back({pair, state_.submaps.at(pair.first), state_.submaps.at(pair.second)});
-  state_.answered.insert(pair);  // what an earlier finder has found there stays
 }
 
 std::vector<VerificationJob> MapServer::take_jobs() { return std::exchange(jobs_, {}); }

@@ -194,6 +194,8 @@ class MapServer {
   /// True if the server's finder has answered the pair, or an operator's word stands instead.
   [[nodiscard]] bool is_answered(const SubmapPair& pair) const;
   void plan_verification(const SubmapPair& pair);
+  /// Asks for all pairs that are not answered, in order.
+  void plan_open_verifications();
   /// Plans the pairs of a new submap with those that are there.
   void plan_verifications(SubmapId id);
   /// Goes on from the places of the state.

@@ -30,6 +30,19 @@ void MapServer::compare_place(SubmapId id) {
   new_places_.push_back(id);
 }
 
+void MapServer::plan_verification(const SubmapPair& pair) {
+  ++work_.pairs_looked_at;
+  if (!is_answered(pair) && is_asked(pair))
+    return jobs_.push_back({pair, state_.submaps.at(pair.first), state_.submaps.at(pair.second)});
+  state_.answered.insert(pair);  // what an earlier finder has found there stays
+}
+
+void MapServer::plan_open_verifications() {
+  for (const auto& [id, submap] : state_.submaps)
+    for (const SubmapPair& pair : state_.answered.open(id)) plan_verification(pair);
+  std::ranges::sort(jobs_, {}, &VerificationJob::pair);
+}
+
 void MapServer::plan_verifications(SubmapId id) {
   std::vector<SubmapId> open;
   for (const auto& [other, there] : state_.submaps) {

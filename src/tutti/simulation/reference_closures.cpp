@@ -69,7 +69,10 @@ struct ReferenceClosures::PlacedSubmap {
   Pose3 anchor;               ///< The keyframe shared by the submaps 2 n and 2 n + 1: one for the whole block.
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double radius_m = 0.0;
-  std::vector<Keyframe> of;  ///< The submap's keyframes: another one may come under its id.
+  std::vector<Timestamp> of;  ///< Stamps of the submap's keyframes: another one may come under its id.
+  [[nodiscard]] bool is_of(const Submap& submap) const {
+    return std::ranges::equal(of, submap.keyframes, {}, {}, &Keyframe::stamp);
+  }
 };
 
 /// Submaps that were placed, for the pairs that they are in again.
@@ -125,10 +128,10 @@ std::shared_ptr<const ReferenceClosures::PlacedSubmap> ReferenceClosures::placed
   {
     const std::scoped_lock lock(known_->mutex);
     const auto found = known_->placed.find(submap.id);
-    if (found != known_->placed.end() && found->second->of == submap.keyframes) return found->second;
+    if (found != known_->placed.end() && found->second->is_of(submap)) return found->second;
   }
   auto made = std::make_shared<PlacedSubmap>(place(submap));
-  made->of = submap.keyframes;
+  for (const Keyframe& keyframe : submap.keyframes) made->of.push_back(keyframe.stamp);
   const std::scoped_lock lock(known_->mutex);
   ++known_->times;
   return known_->placed[submap.id] = std::move(made);
@@ -229,7 +232,12 @@ std::optional<Pose3> ReferenceClosures::draw_error(const SubmapPair& pair, bool 
   return error;
 }
 
-bool ReferenceClosures::is_candidate(const Submap& a, const Submap& b) const { return !verify(a, b).refusal; }
+bool ReferenceClosures::is_candidate(const Submap& a, const Submap& b) const {
+  if (a.id == b.id) return false;
+  const auto first = placed(a.id < b.id ? a : b), second = placed(a.id < b.id ? b : a);
+  const Assessment assessment = assess(*first, *second);
+  return !assessment.refusal && (!assessment.distant || draw_error({first->id, second->id}, false));
+}
 
 ClosureVerdict ReferenceClosures::verify(const Submap& a, const Submap& b) const {
   const bool in_order = a.id < b.id;
