@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <memory>
 #include <string>
 #include <string_view>
 
 #include "tutti/model/submap.hpp"
 #include "tutti/perception/lidar/closure_config.hpp"
+#include "tutti/perception/lidar/place_correlation.hpp"
 
 namespace tutti::lidar {
 
@@ -23,14 +23,12 @@ class PlaceMatcher {
  public:
   /// `descriptor`: is_descriptor(), as of every other one.
   explicit PlaceMatcher(std::string_view descriptor);
-  ~PlaceMatcher();
   /// The highest correlation of the two views from above over all shifts and the yaws that lay wall directions on each
   /// other, at most 1. The best rough alignments (propose_alignments()) have the same, at half the resolution.
   [[nodiscard]] double likeness(std::string_view other) const;
 
  private:
-  struct Place;
-  std::unique_ptr<const Place> place_;
+  PlaceViews views_;
 };
 
 }  // namespace tutti::lidar
