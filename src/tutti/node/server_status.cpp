@@ -118,7 +118,7 @@ std::set<RobotId> ServerNode::strangers_there(Timestamp now) const {
 
 MissionStatus ServerNode::mission_status(Timestamp now) const {
   const server::MapServerState& state = server_.state();
-  const MapCounts made = counts();
+  const MapCounts made = stored_counts_ ? *stored_counts_ : counts();
   const std::uint64_t waiting = waiting_.size() + (refinements_.waiting() ? 1 : 0);
   MissionStatus out{.time = now,
                     .epoch = state.epoch,
@@ -131,8 +131,7 @@ MissionStatus ServerNode::mission_status(Timestamp now) const {
                                     (settle_at_ ? 1 : 0) + waiting,
                     .has_news = server_.has_news()};
   out.finder = to_string(state.finder);
-  out.former_pairs = static_cast<std::uint64_t>(
-      std::ranges::count_if(state.verdicts, [&](const auto& entry) { return entry.second.finder != state.finder; }));
+  out.former_pairs = server_.former_pairs();
   out.waiting = waiting;
   if (waiting > 0) out.why_waiting = why_waiting_;
   std::set<RobotId> robots = robots_;

@@ -128,6 +128,8 @@ MapServer::MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFind
     state_.answered.forget_answers();
     state_.refused.clear();
   }
+  former_pairs_ = static_cast<std::size_t>(
+      std::ranges::count_if(state_.verdicts, [&](const auto& entry) { return entry.second.finder != who; }));
   for (const auto& [id, submap] : state_.submaps) state_.answered.add_submap(id);
   restore_candidates();
   plan_open_verifications();
@@ -268,6 +270,7 @@ void MapServer::take(const ClosureVerdict& verdict) {
   if (!verdict.closures.empty() || is_kept) note_news();
   state_.answered.insert(pair);
   ++work_.pairs_verified;
+  if (is_kept && kept->second.finder != state_.finder) --former_pairs_;
   if (verdict.refusal) {
     count_refusal(*verdict.refusal, pair.first.chain.robot, pair.second.chain.robot, state_.refused);
     state_.verdicts.erase(pair);

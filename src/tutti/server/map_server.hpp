@@ -160,6 +160,8 @@ class MapServer {
   /// The job that is out will never be answered.
   void give_up_refinement() { refining_.reset(); }
 
+  /// How many pairs have the closures of an earlier finder, until this one has answered.
+  [[nodiscard]] std::size_t former_pairs() const { return former_pairs_; }
   /// True when something has come that map() was made without.
   [[nodiscard]] bool has_news() const { return news_ || makes_news_; }
   /// What the map of the next revision is to be made of. The server takes whatever comes until finish(), which is to
@@ -225,6 +227,7 @@ class MapServer {
   std::vector<VerificationJob> jobs_;
   std::vector<ClosureVerdict> waiting_;  // not in the state: their pairs are verified again when the submaps come
   std::vector<Error> late_errors_;
+  std::size_t former_pairs_ = 0;
   std::shared_ptr<const MapEstimate> estimate_;  // of the pose graph alone; null when it must be made, or not kept
   MapEstimate map_;                              // with refinements
   std::shared_ptr<const MapRefiner> refiner_;    // null: nothing is refined
