@@ -60,19 +60,22 @@ std::vector<Alike> CandidatePairs::add(SubmapId id, const std::vector<Alike>& ot
   return candidates;
 }
 
-CandidatePairs::CandidatePairs(std::size_t most, const std::map<SubmapId, std::vector<Alike>>& candidates)
-    : most_(most) {
-  for (const auto& [id, others] : candidates) {
-    append(id, others);
-    for (const Alike& other : others) append(other.submap, {{id, other.likeness, other.sensor}});
+CandidatePairs::CandidatePairs(std::size_t most, const PlaceSet& places) : most_(most) {
+  most_alike_.reserve(places.size());
+  for (const auto& [id, place] : places)
+    if (place.is_ranked) most_alike_.try_emplace(id);
+  for (const auto& [id, place] : places) {
+    if (!place.is_ranked) continue;
+    std::vector<List>& own = most_alike_.at(id);
+    for (const Alike& other : place.candidates) {
+      const auto others = most_alike_.find(other.submap);
+      if (others == most_alike_.end()) continue;
+      by_sensor(own, other.sensor).push_back({other});
+      by_sensor(others->second, other.sensor).push_back({{id, other.likeness, other.sensor}});
+    }
   }
   for (auto& [id, lists] : most_alike_)
     for (List& list : lists) cut(list);
-}
-
-void CandidatePairs::append(SubmapId of, const std::vector<Alike>& others) {
-  std::vector<List>& lists = most_alike_[of];
-  for (const Alike& other : others) by_sensor(lists, other.sensor).push_back({other});
 }
 
 void CandidatePairs::cut(List& list) const {
@@ -114,18 +117,9 @@ std::map<SubmapId, std::vector<SubmapId>> CandidatePairs::all() const {
   return out;
 }
 
-CandidatePairs of_compared(const PlaceSet& places, std::size_t most) {
-  std::map<SubmapId, std::vector<Alike>> candidates;
-  for (const auto& [id, place] : places)
-    if (place.is_ranked) candidates.emplace_hint(candidates.end(), id, place.candidates);
-  for (auto& [id, others] : candidates)
-    std::erase_if(others, [&](const Alike& other) { return !candidates.contains(other.submap); });
-  return {most, candidates};
-}
-
 CandidatePairs restored(const PlaceSet& places, std::size_t most) {
   const bool is_whole = std::ranges::all_of(places, [](const auto& entry) { return entry.second.is_ranked; });
-  return most > 0 && is_whole ? of_compared(places, most) : CandidatePairs();
+  return most > 0 && is_whole ? CandidatePairs(most, places) : CandidatePairs();
 }
 
 VerdictSet of_candidates(const VerdictSet& verdicts, const CandidatePairs& candidates, const WordSet& words) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "tutti/server/map_estimate.hpp"
@@ -41,8 +42,9 @@ class CandidatePairs {
  public:
   CandidatePairs() = default;  ///< Excludes none.
   explicit CandidatePairs(std::size_t most) : most_(most) {}
-  /// Restores submaps from what add() has returned of each; of any two, either may have the other.
-  CandidatePairs(std::size_t most, const std::map<SubmapId, std::vector<Alike>>& candidates);
+  /// Restores the submaps whose places were compared from what add() has returned of each; of any two, either may have
+  /// the other.
+  CandidatePairs(std::size_t most, const PlaceSet& places);
   /// Compares a new submap with earlier ones, of which each may be in it once for every sensor. Returns those with
   /// which it is a candidate now, smallest first.
   std::vector<Alike> add(SubmapId id, const std::vector<Alike>& others);
@@ -62,16 +64,13 @@ class CandidatePairs {
   using List = std::vector<Ranked>;  // best first, at most most_
   static List& by_sensor(std::vector<List>& lists, std::uint32_t sensor);
   void insert(SubmapId of, const Alike& other);
-  void append(SubmapId of, const std::vector<Alike>& others);
   void cut(List& list) const;
   [[nodiscard]] bool prefers(SubmapId of, SubmapId other) const;
 
   std::size_t most_ = 0;
-  std::map<SubmapId, std::vector<List>> most_alike_;  // by sensor
+  std::unordered_map<SubmapId, std::vector<List>> most_alike_;  // by sensor
 };
 
-/// The candidates of the places that were compared; others are unknown.
-CandidatePairs of_compared(const PlaceSet& places, std::size_t most);
 /// The candidates that a map's store tells of; none are excluded when some place was not compared yet.
 CandidatePairs restored(const PlaceSet& places, std::size_t most);
 

@@ -61,7 +61,7 @@ void MapServer::restore_candidates() {
       new_places_.push_back(entry.first);  // who reads the map's file is not to believe its candidates either
     return !is_read || !state_.submaps.contains(entry.first);
   });
-  candidates_ = of_compared(state_.places, static_cast<std::size_t>(config_.candidates_per_submap));
+  candidates_ = CandidatePairs(static_cast<std::size_t>(config_.candidates_per_submap), state_.places);
   for (const auto& [id, place] : state_.places)
     if (!place.is_ranked) compare_place(id);
   std::vector<SubmapId> unknown;
