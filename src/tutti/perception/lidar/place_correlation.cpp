@@ -24,24 +24,26 @@ struct LaneOf;
 template <>
 struct LaneOf<4> {
   using Type = float __attribute__((vector_size(16)));
+  using InMemory = float __attribute__((vector_size(16), aligned(4), may_alias));
 };
 template <>
 struct LaneOf<8> {
   using Type = float __attribute__((vector_size(32)));
+  using InMemory = float __attribute__((vector_size(32), aligned(4), may_alias));
 };
 /// So many numbers at once.
 template <int lanes>
 using Lane = typename LaneOf<lanes>::Type;
 
 /// Not returned: vectors of another processor's are not passed between functions.
-template <class AnyLane>
-[[gnu::always_inline]] inline void load(const float* from, AnyLane& lane) {
-  std::memcpy(&lane, from, sizeof lane);
+template <int lanes>
+[[gnu::always_inline]] inline void load(const float* from, Lane<lanes>& lane) {
+  lane = *reinterpret_cast<const typename LaneOf<lanes>::InMemory*>(from);
 }
 
-template <class AnyLane>
-[[gnu::always_inline]] inline void store(const AnyLane& lane, float* to) {
-  std::memcpy(to, &lane, sizeof lane);
+template <int lanes>
+[[gnu::always_inline]] inline void store(const Lane<lanes>& lane, float* to) {
+  *reinterpret_cast<typename LaneOf<lanes>::InMemory*>(to) = lane;
 }
 
 /// Scaled to the sum of squares 1.
@@ -111,19 +113,25 @@ constexpr int reversed(int k) {
 template <int lanes>
 [[gnu::always_inline]] inline void join_four(float* re, float* im) {
   for (int k = 0; k < kSide; k += lanes, re += lanes, im += lanes) {
-    std::array<Lane<lanes>, 4> x, y;
-    for (int row = 0; row < 4; ++row) {
-      load(re + kSide * row, x[row]);
-      load(im + kSide * row, y[row]);
-    }
-    const Lane<lanes> a_re = x[0] + x[1], a_im = y[0] + y[1], b_re = x[0] - x[1], b_im = y[0] - y[1];
-    const Lane<lanes> c_re = x[2] + x[3], c_im = y[2] + y[3], d_re = x[2] - x[3], d_im = y[2] - y[3];
-    x = {a_re + c_re, b_re - d_im, a_re - c_re, b_re + d_im};
-    y = {a_im + c_im, b_im + d_re, a_im - c_im, b_im - d_re};
-    for (int row = 0; row < 4; ++row) {
-      store(x[row], re + kSide * row);
-      store(y[row], im + kSide * row);
-    }
+    Lane<lanes> x0, x1, x2, x3, y0, y1, y2, y3;
+    load<lanes>(re, x0);
+    load<lanes>(re + kSide, x1);
+    load<lanes>(re + 2 * kSide, x2);
+    load<lanes>(re + 3 * kSide, x3);
+    load<lanes>(im, y0);
+    load<lanes>(im + kSide, y1);
+    load<lanes>(im + 2 * kSide, y2);
+    load<lanes>(im + 3 * kSide, y3);
+    const Lane<lanes> a_re = x0 + x1, a_im = y0 + y1, b_re = x0 - x1, b_im = y0 - y1;
+    const Lane<lanes> c_re = x2 + x3, c_im = y2 + y3, d_re = x2 - x3, d_im = y2 - y3;
+    store<lanes>(a_re + c_re, re);
+    store<lanes>(b_re - d_im, re + kSide);
+    store<lanes>(a_re - c_re, re + 2 * kSide);
+    store<lanes>(b_re + d_im, re + 3 * kSide);
+    store<lanes>(a_im + c_im, im);
+    store<lanes>(b_im + d_re, im + kSide);
+    store<lanes>(a_im - c_im, im + 2 * kSide);
+    store<lanes>(b_im - d_re, im + 3 * kSide);
   }
 }
 
@@ -134,15 +142,15 @@ template <int lanes>
     float *first_re = re + k, *first_im = im + k, *second_re = first_re + kSide * half,
           *second_im = first_im + kSide * half;
     Lane<lanes> a_re, a_im, b_re, b_im;
-    load(first_re, a_re);
-    load(first_im, a_im);
-    load(second_re, b_re);
-    load(second_im, b_im);
+    load<lanes>(first_re, a_re);
+    load<lanes>(first_im, a_im);
+    load<lanes>(second_re, b_re);
+    load<lanes>(second_im, b_im);
     const Lane<lanes> turned_re = turn.re * b_re - turn.im * b_im, turned_im = turn.re * b_im + turn.im * b_re;
-    store(a_re + turned_re, first_re);
-    store(a_im + turned_im, first_im);
-    store(a_re - turned_re, second_re);
-    store(a_im - turned_im, second_im);
+    store<lanes>(a_re + turned_re, first_re);
+    store<lanes>(a_im + turned_im, first_im);
+    store<lanes>(a_re - turned_re, second_re);
+    store<lanes>(a_im - turned_im, second_im);
   }
 }
 
@@ -162,7 +170,7 @@ template <int lanes>
 template <int lanes>
 [[gnu::always_inline]] inline void transpose_block(const float* in, const std::array<float*, lanes>& out) {
   std::array<Lane<lanes>, lanes> r, t;
-  for (int i = 0; i < lanes; ++i) load(in + kSide * i, r[i]);
+  for (int i = 0; i < lanes; ++i) load<lanes>(in + kSide * i, r[i]);
   if constexpr (lanes == 8) {
     for (int i = 0; i < 8; i += 2) {
       t[i] = __builtin_shufflevector(r[i], r[i + 1], 0, 8, 2, 10, 4, 12, 6, 14);
@@ -188,7 +196,7 @@ template <int lanes>
     }
     t = r;
   }
-  for (int i = 0; i < lanes; ++i) store(t[i], out[i]);
+  for (int i = 0; i < lanes; ++i) store<lanes>(t[i], out[i]);
 }
 
 /// With its rows in reversed() order, as transform() wants them.
@@ -205,10 +213,10 @@ template <int lanes>
 template <int lanes>
 [[gnu::always_inline]] inline float largest(const Spectrum& s) {
   Lane<lanes> best, next;
-  load(s.re.data(), best);
+  load<lanes>(s.re.data(), best);
   for (const Part* part : {&s.re, &s.im})
     for (int k = 0; k < kCells; k += lanes) {
-      load(part->data() + k, next);
+      load<lanes>(part->data() + k, next);
       best = best > next ? best : next;
     }
   float out = best[0];
@@ -232,14 +240,14 @@ struct alignas(64) PlaceViews::View {
       float *re = s.re.data() + kSide * reversed(row), *im = s.im.data() + kSide * reversed(row);
       for (int k = kSide * row; k < kSide * (row + 1); k += lanes, re += lanes, im += lanes) {
         Lane<lanes> a, b, u_re, u_im;
-        load(u.re.data() + k, u_re);
-        load(u.im.data() + k, u_im);
-        load(sum_re.data() + k, a);
-        load(sum_im.data() + k, b);
-        store(a * u_re - b * u_im, re);
-        load(difference_re.data() + k, a);
-        load(difference_im.data() + k, b);
-        store(a * u_im + b * u_re, im);
+        load<lanes>(u.re.data() + k, u_re);
+        load<lanes>(u.im.data() + k, u_im);
+        load<lanes>(sum_re.data() + k, a);
+        load<lanes>(sum_im.data() + k, b);
+        store<lanes>(a * u_re - b * u_im, re);
+        load<lanes>(difference_re.data() + k, a);
+        load<lanes>(difference_im.data() + k, b);
+        store<lanes>(a * u_im + b * u_re, im);
       }
     }
     transform<lanes>(s);
