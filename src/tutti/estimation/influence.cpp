@@ -132,7 +132,7 @@ std::vector<Influence> largest_influences(const PoseGraph& graph, std::span<cons
   if (structure.variables == 0 || !equations.hessian().factorise()) return {};
   std::vector<Pull> pulls;
   {  // the inverse is as large as the factor, and goes before the shifts come
-    const SelectedInverse inverse(equations.hessian().factor());
+    const SelectedInverse inverse(equations.hessian().factor().copy());
     for (const std::size_t e : candidates) {
       const EdgeSlot& slot = structure.edges[*reduced.edge[e]];
       Pull pull = pull_of(e, graph.edges[e], poses, covariance_of_ends(inverse, slot));
@@ -186,7 +186,7 @@ std::vector<double> group_misfits(const PoseGraph& graph, std::span<const Pose3>
   internal::GraphEquations equations(reduced.graph, structure);
   equations.linearise(at, {}, true);
   if (structure.variables == 0 || !equations.hessian().factorise()) return out;
-  const SelectedInverse inverse(equations.hessian().factor());
+  const SelectedInverse inverse(equations.hessian().take_factor());
   for (std::size_t g = 0; g < groups.size(); ++g) {
     std::vector<Whitened> group;
     for (const std::size_t e : groups[g]) {

@@ -17,15 +17,13 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// L; nothing where the graph does not determine its poses.
-std::optional<internal::BlockCholesky::Columns> factor_of(const PoseGraph& graph, std::span<const Pose3> poses,
-                                                          const internal::BlockStructure& structure,
-                                                          std::span<const double> weights) {
+std::optional<internal::CholeskyFactor> factor_of(const PoseGraph& graph, std::span<const Pose3> poses,
+                                                  const internal::BlockStructure& structure,
+                                                  std::span<const double> weights) {
   internal::GraphEquations equations(graph, structure);
   equations.linearise(poses, {.loss = {}, .roles = {}, .scale = weights}, true);
   if (!equations.hessian().factorise()) return std::nullopt;
-  auto factor = equations.hessian().factor();
-  if (factor.start.size() != static_cast<std::size_t>(6 * structure.variables + 1)) return std::nullopt;
-  return factor;
+  return equations.hessian().take_factor();
 }
 
 /// The edges of some components, over all nodes (those of the others are then alone), and their weights.
@@ -46,7 +44,7 @@ std::pair<PoseGraph, std::vector<double>> edges_of(const PoseGraph& graph, std::
 struct Sound {
   std::vector<bool> components;  ///< The others' poses are open.
   internal::BlockStructure structure;
-  internal::BlockCholesky::Columns factor;
+  internal::CholeskyFactor factor;
 };
 
 /// Components are taken in turn as long as all together have a factor: what one lacks is not the others' fault.
@@ -76,8 +74,8 @@ struct JointPosterior::Factorised {
   internal::BlockStructure structure;
   std::vector<Pose3> poses;
   std::vector<Pair> pairs;
-  std::vector<bool> determined;             ///< Per node.
-  internal::BlockCholesky::Columns factor;  ///< L, in elimination order.
+  std::vector<bool> determined;     ///< Per node.
+  internal::CholeskyFactor factor;  ///< In elimination order.
 };
 
 JointPosterior::JointPosterior(const PoseGraph& graph, std::span<const Pose3> poses, std::span<const Pair> pairs,
@@ -107,7 +105,7 @@ JointPosterior::~JointPosterior() = default;
 std::vector<Matrix6d> JointPosterior::relative_covariances() const {
   const auto& [structure, poses, pairs, determined, factor] = *factorised_;
   std::vector<Matrix6d> out(pairs.size(), Matrix6d(Vector6d::Constant(kInfinity).asDiagonal()));
-  const internal::SelectedInverse inverse(factor);
+  const internal::SelectedInverse inverse(factor.copy());
   for (std::size_t k = 0; k < pairs.size(); ++k) {
     const auto [a, b] = pairs[k];
     if (!determined[a] || structure.component[a] != structure.component[b]) continue;

@@ -116,7 +116,7 @@ std::vector<double> SwitchedGraph::prices() {
   s.equations->linearise(s.poses, {.loss = {}, .roles = {}, .scale = s.scale}, true);
   ++s.factorisations;
   if (s.structure.variables == 0 || !s.equations->factorise()) return out;
-  const SelectedInverse inverse(s.equations->hessian().factor());
+  const SelectedInverse inverse(s.equations->hessian().take_factor());
   for (std::size_t e = 0; e < out.size(); ++e) {
     if (s.roles[e] != EdgeRole::robust) continue;
     const std::size_t at = *s.reduced.edge[e];

@@ -239,9 +239,7 @@ std::optional<Posterior> Posterior::of(const BundleProblem& problem, const Bundl
 std::optional<std::vector<Matrix6d>> Posterior::steps() const {
   const SingleThread single_thread;
   const BlockStructure& slots = state_->slots;
-  const auto factor = state_->hessian.factor();
-  if (factor.start.size() != static_cast<std::size_t>(6 * slots.variables + 1)) return std::nullopt;
-  const estimation::internal::SelectedInverse inverse(factor);
+  const estimation::internal::SelectedInverse inverse(state_->hessian.factor().copy());
   std::vector<Matrix6d> out;
   for (const auto& [from, to] : state_->steps)
     out.push_back(inverse.relative(slots.variable[from], slots.variable[to],

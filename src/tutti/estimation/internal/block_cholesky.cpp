@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <utility>
 
 #include "tutti/base/check.hpp"
 #include "tutti/base/single_thread.hpp"
@@ -40,13 +41,12 @@ class BlockColumn {
 }  // namespace
 
 BlockCholesky::BlockCholesky(const BlockStructure& structure, int block_size, std::size_t workspace)
-    : structure_(structure), block_size_(block_size), supernodes_(find_supernodes(structure)), workspace_(workspace) {
+    : structure_(structure), block_size_(block_size), workspace_(workspace) {
   TUTTI_CHECK(block_size == 3 || block_size == 6, "blocks of {}", block_size);
   values_.assign(structure.block_row.size() * static_cast<std::size_t>(block_size * block_size), 0.0);
+  factor_.layout = std::make_shared<const CholeskyFactor::Layout>(find_supernodes(structure), block_size);
   std::size_t most_blocks = 0;  // of an update
-  for (const Supernode& node : supernodes_) {
-    const Panel& panel = panels_.emplace_back(Panel{factor_size_, block_size * node.rows(), block_size * node.columns});
-    factor_size_ += static_cast<std::ptrdiff_t>(panel.rows) * panel.columns;
+  for (const Supernode& node : supernodes()) {
     for (Group group; group.end < node.ancestors.size();) {
       group = group_from(node, group.end);
       most_blocks = std::max(most_blocks, group.rows * group.columns);
@@ -55,7 +55,6 @@ BlockCholesky::BlockCholesky(const BlockStructure& structure, int block_size, st
       for (int entry = structure.column_start[column]; entry < structure.column_start[column + 1]; ++entry)
         position_.push_back(node.position_of(structure.block_row[entry]));
   }
-  factor_ = std::make_unique_for_overwrite<double[]>(static_cast<std::size_t>(factor_size_));
   update_.resize(most_blocks * static_cast<std::size_t>(block_size * block_size));
 }
 
@@ -70,9 +69,9 @@ bool BlockCholesky::factorise() {
 /// Into the panel.
 template <int B>
 void BlockCholesky::add_matrix(std::size_t supernode) {
-  const Supernode& node = supernodes_[supernode];
-  const Panel& panel = panels_[supernode];
-  double* L = factor_.get() + panel.begin;
+  const Supernode& node = supernodes()[supernode];
+  const Panel& panel = panels()[supernode];
+  double* L = factor_.panel(supernode);
   for (int column = node.first; column < node.end(); ++column, L += static_cast<std::ptrdiff_t>(B) * panel.rows) {
     const int begin = structure_.column_start[column], end = structure_.column_start[column + 1];
     const BlockColumn<B> blocks(L, panel.rows, values_.data() + static_cast<std::ptrdiff_t>(B) * B * begin,
@@ -97,11 +96,11 @@ BlockCholesky::Group BlockCholesky::group_from(const Supernode& node, std::size_
 /// Subtracts L_IJ L_IJ^T from the panels of the rows I below.
 template <int B>
 void BlockCholesky::update_ancestors(std::size_t supernode) {
-  const Supernode& node = supernodes_[supernode];
-  const Panel& panel = panels_[supernode];
+  const Supernode& node = supernodes()[supernode];
+  const Panel& panel = panels()[supernode];
   for (Group group; group.end < node.ancestors.size();) {
     group = group_from(node, group.end);
-    const double* const L = factor_.get() + panel.begin + panel.columns + B * static_cast<std::ptrdiff_t>(group.row);
+    const double* const L = factor_.panel(supernode) + panel.columns + B * static_cast<std::ptrdiff_t>(group.row);
     const int rows = B * static_cast<int>(group.rows), columns = B * static_cast<int>(group.columns);
     if (columns == rows)
       cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, rows, panel.columns, -1.0, L, panel.rows, 0.0,
@@ -119,12 +118,12 @@ void BlockCholesky::update(const Supernode& node, const Group& group) {
   const std::ptrdiff_t stride = B * static_cast<std::ptrdiff_t>(group.rows);
   for (std::size_t k = group.first; k < group.end; ++k) {
     const Supernode::Ancestor& ancestor = node.ancestors[k];
-    const Panel& to = panels_[static_cast<std::size_t>(ancestor.supernode)];
+    const auto to = static_cast<std::size_t>(ancestor.supernode);
+    const int height = panels()[to].rows;
     const auto first = static_cast<std::ptrdiff_t>(ancestor.begin - group.row);
     for (std::size_t c = 0; c < ancestor.end - ancestor.begin; ++c) {
-      const BlockColumn<B> blocks(factor_.get() + to.begin + static_cast<std::ptrdiff_t>(B) * ancestor.at[c] * to.rows,
-                                  to.rows, update_.data() + B * (first + static_cast<std::ptrdiff_t>(c)) * stride,
-                                  stride);
+      const BlockColumn<B> blocks(factor_.panel(to) + static_cast<std::ptrdiff_t>(B) * ancestor.at[c] * height, height,
+                                  update_.data() + B * (first + static_cast<std::ptrdiff_t>(c)) * stride, stride);
       for (std::size_t r = c; r < ancestor.at.size(); ++r)
         blocks.add(ancestor.at[r], first + static_cast<std::ptrdiff_t>(r));
     }
@@ -133,10 +132,12 @@ void BlockCholesky::update(const Supernode& node, const Group& group) {
 
 template <int B>
 bool BlockCholesky::factorise_blocks() {
-  std::fill_n(factor_.get(), factor_size_, 0.0);
-  for (std::size_t s = 0; s < supernodes_.size(); ++s) {
-    const Panel& panel = panels_[s];
-    double* const L = factor_.get() + panel.begin;
+  if (!factor_)
+    factor_.values = std::make_unique_for_overwrite<double[]>(static_cast<std::size_t>(factor_.layout->size));
+  std::fill_n(factor_.values.get(), factor_.layout->size, 0.0);
+  for (std::size_t s = 0; s < supernodes().size(); ++s) {
+    const Panel& panel = panels()[s];
+    double* const L = factor_.panel(s);
     const int w = panel.columns, m = panel.below();
     add_matrix<B>(s);
     if (LAPACKE_dpotrf_work(LAPACK_COL_MAJOR, 'L', w, L, panel.rows) != 0 || !pivots_are_sound(s)) return false;
@@ -149,62 +150,45 @@ bool BlockCholesky::factorise_blocks() {
 }
 
 bool BlockCholesky::pivots_are_sound(std::size_t supernode) const {
-  const Supernode& node = supernodes_[supernode];
-  const double* pivot = factor_.get() + panels_[supernode].begin;
+  const Supernode& node = supernodes()[supernode];
+  const double* pivot = factor_.panel(supernode);
   for (int column = node.first; column < node.end(); ++column) {
     const int begin = structure_.column_start[column];
     const std::ptrdiff_t stride =
         static_cast<std::ptrdiff_t>(block_size_) * (structure_.column_start[column + 1] - begin);
     const double* diagonal = values_.data() + static_cast<std::ptrdiff_t>(block_size_) * block_size_ * begin;
-    for (int k = 0; k < block_size_; ++k, diagonal += stride + 1, pivot += panels_[supernode].rows + 1)
+    for (int k = 0; k < block_size_; ++k, diagonal += stride + 1, pivot += panels()[supernode].rows + 1)
       if (!(*pivot * *pivot > kSmallestPivotShare * *diagonal)) return false;
   }
   return true;
 }
 
-BlockCholesky::Columns BlockCholesky::factor() const {
-  Columns out{.start = {0}, .row = {}, .value = {}};
-  if (!is_factorised_) return out;
-  std::size_t size = 0;
-  for (const Panel& panel : panels_)
-    size += static_cast<std::size_t>(panel.columns) * static_cast<std::size_t>(2 * panel.rows - panel.columns + 1) / 2;
-  out.row.reserve(size);
-  out.value.reserve(size);
-  for (std::size_t s = 0; s < panels_.size(); ++s) {
-    const Supernode& node = supernodes_[s];
-    const Panel& panel = panels_[s];
-    const double* column = factor_.get() + panel.begin;
-    for (int c = 0; c < panel.columns; ++c, column += panel.rows) {
-      for (int r = c; r < panel.columns; ++r) out.row.push_back(block_size_ * node.first + r);
-      for (const int row : node.below)
-        for (int r = 0; r < block_size_; ++r) out.row.push_back(block_size_ * row + r);
-      out.value.insert(out.value.end(), column + c, column + panel.rows);
-      out.start.push_back(static_cast<int>(out.row.size()));
-    }
-  }
-  return out;
+CholeskyFactor BlockCholesky::take_factor() {
+  TUTTI_CHECK(is_factorised_, "no factor to take");
+  is_factorised_ = false;
+  return {factor_.layout, std::move(factor_.values)};
 }
 
 void BlockCholesky::solve(Eigen::Ref<Eigen::MatrixXd> b) const {
   TUTTI_CHECK(b.rows() == static_cast<Eigen::Index>(block_size_) * structure_.variables, "{} rows", b.rows());
   if (!is_factorised_) return;
   const SingleThread single_thread;
-  for (std::size_t s = 0; s < supernodes_.size(); ++s) {
+  for (std::size_t s = 0; s < supernodes().size(); ++s) {
     substitute(s, false, b);
-    if (panels_[s].below() > 0) take_below(s, b);
+    if (panels()[s].below() > 0) take_below(s, b);
   }
-  for (std::size_t s = supernodes_.size(); s-- > 0;) {
-    if (panels_[s].below() > 0) take_from_below(s, b);
+  for (std::size_t s = supernodes().size(); s-- > 0;) {
+    if (panels()[s].below() > 0) take_from_below(s, b);
     substitute(s, true, b);
   }
 }
 
 /// b_J <- L_JJ^-1 b_J, or L_JJ^-T b_J.
 void BlockCholesky::substitute(std::size_t supernode, bool is_transposed, Eigen::Ref<Eigen::MatrixXd> b) const {
-  const Panel& panel = panels_[supernode];
+  const Panel& panel = panels()[supernode];
   const CBLAS_TRANSPOSE how = is_transposed ? CblasTrans : CblasNoTrans;
-  const double* const L = factor_.get() + panel.begin;
-  double* const b_J = b.data() + static_cast<std::ptrdiff_t>(block_size_) * supernodes_[supernode].first;
+  const double* const L = factor_.panel(supernode);
+  double* const b_J = b.data() + static_cast<std::ptrdiff_t>(block_size_) * supernodes()[supernode].first;
   if (b.cols() == 1)
     cblas_dtrsv(CblasColMajor, CblasLower, how, CblasNonUnit, panel.columns, L, panel.rows, b_J, 1);
   else
@@ -214,10 +198,10 @@ void BlockCholesky::substitute(std::size_t supernode, bool is_transposed, Eigen:
 
 /// b_I <- b_I - L_IJ b_J
 void BlockCholesky::take_below(std::size_t supernode, Eigen::Ref<Eigen::MatrixXd> b) const {
-  const Panel& panel = panels_[supernode];
+  const Panel& panel = panels()[supernode];
   const int m = panel.below(), columns = static_cast<int>(b.cols());
-  const double* const L = factor_.get() + panel.begin + panel.columns;
-  const double* const b_J = b.data() + static_cast<std::ptrdiff_t>(block_size_) * supernodes_[supernode].first;
+  const double* const L = factor_.panel(supernode) + panel.columns;
+  const double* const b_J = b.data() + static_cast<std::ptrdiff_t>(block_size_) * supernodes()[supernode].first;
   Eigen::MatrixXd product(m, columns);
   if (columns == 1)
     cblas_dgemv(CblasColMajor, CblasNoTrans, m, panel.columns, 1.0, L, panel.rows, b_J, 1, 0.0, product.data(), 1);
@@ -225,20 +209,20 @@ void BlockCholesky::take_below(std::size_t supernode, Eigen::Ref<Eigen::MatrixXd
     cblas_dgemm(CblasColMajor, CblasNoTrans, CblasNoTrans, m, columns, panel.columns, 1.0, L, panel.rows, b_J,
                 static_cast<int>(b.outerStride()), 0.0, product.data(), m);
   Eigen::Index k = 0;
-  for (const int row : supernodes_[supernode].below)
+  for (const int row : supernodes()[supernode].below)
     b.middleRows(static_cast<Eigen::Index>(block_size_) * row, block_size_) -=
         product.middleRows(block_size_ * k++, block_size_);
 }
 
 /// b_J <- b_J - L_IJ^T b_I
 void BlockCholesky::take_from_below(std::size_t supernode, Eigen::Ref<Eigen::MatrixXd> b) const {
-  const Panel& panel = panels_[supernode];
+  const Panel& panel = panels()[supernode];
   const int m = panel.below(), columns = static_cast<int>(b.cols());
-  const double* const L = factor_.get() + panel.begin + panel.columns;
-  double* const b_J = b.data() + static_cast<std::ptrdiff_t>(block_size_) * supernodes_[supernode].first;
+  const double* const L = factor_.panel(supernode) + panel.columns;
+  double* const b_J = b.data() + static_cast<std::ptrdiff_t>(block_size_) * supernodes()[supernode].first;
   Eigen::MatrixXd b_I(m, columns);
   Eigen::Index k = 0;
-  for (const int row : supernodes_[supernode].below)
+  for (const int row : supernodes()[supernode].below)
     b_I.middleRows(block_size_ * k++, block_size_) =
         b.middleRows(static_cast<Eigen::Index>(block_size_) * row, block_size_);
   if (columns == 1)

@@ -3,11 +3,10 @@
 
 #include <Eigen/Core>
 #include <cstddef>
-#include <memory>
 #include <vector>
 
 #include "tutti/estimation/internal/block_structure.hpp"
-#include "tutti/estimation/internal/supernodes.hpp"
+#include "tutti/estimation/internal/cholesky_factor.hpp"
 
 namespace tutti::estimation::internal {
 
@@ -42,12 +41,10 @@ class BlockCholesky {
   /// Overwrites b (rows: block_size x variables in elimination order) by H^-1 b. After a successful factorise() only.
   void solve(Eigen::Ref<Eigen::MatrixXd> b) const;
 
-  /// The factor L (L L^T = H, no permutation) by columns, rows sorted; empty on failure.
-  struct Columns {
-    std::vector<int> start, row;
-    std::vector<double> value;
-  };
-  [[nodiscard]] Columns factor() const;
+  /// The factor, L L^T = H; means nothing unless factorise() was successful.
+  [[nodiscard]] const CholeskyFactor& factor() const { return factor_; }
+  /// The same for keeps: nothing can be solved until it is factorised again.
+  [[nodiscard]] CholeskyFactor take_factor();
 
  private:
   /// Columns of a block column are stored as one dense panel, blocks below each other, the diagonal block first.
@@ -81,20 +78,14 @@ class BlockCholesky {
   void take_below(std::size_t supernode, Eigen::Ref<Eigen::MatrixXd> b) const;
   void take_from_below(std::size_t supernode, Eigen::Ref<Eigen::MatrixXd> b) const;
 
-  /// Where a supernode's panel of L is in factor_, column by column.
-  struct Panel {
-    std::ptrdiff_t begin = 0;
-    int rows = 0, columns = 0;
-    [[nodiscard]] int below() const { return rows - columns; }
-  };
+  using Panel = CholeskyFactor::Panel;
+  [[nodiscard]] const std::vector<Supernode>& supernodes() const { return factor_.layout->supernodes; }
+  [[nodiscard]] const std::vector<Panel>& panels() const { return factor_.layout->panels; }
   const BlockStructure& structure_;
   int block_size_;
   std::vector<double> values_;
-  std::vector<Supernode> supernodes_;
-  std::vector<Panel> panels_;  ///< Per supernode.
+  CholeskyFactor factor_;      ///< Without values before factorise().
   std::vector<int> position_;  ///< Per block of the matrix its row in its supernode, in blocks.
-  std::ptrdiff_t factor_size_ = 0;
-  std::unique_ptr<double[]> factor_;  ///< Not initialised before factorise().
   std::size_t workspace_;
   std::vector<double> update_;  ///< What a supernode takes from a group: rows by columns.
   bool is_factorised_ = false;

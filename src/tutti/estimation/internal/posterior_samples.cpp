@@ -20,21 +20,15 @@ constexpr std::size_t kBatch = kSlabs * kSlab;
 using Slab = Eigen::Matrix<double, 6, kSlab, Eigen::RowMajor>;
 using Batch = std::array<Slab, kSlabs>;
 
-/// The block variable above this one in the elimination tree; none above the root.
-std::optional<std::size_t> parent_of(const BlockCholesky::Columns& factor, std::size_t j) {
-  const int below = factor.start[6 * j + 5] + 1;
-  if (below >= factor.start[6 * j + 6]) return std::nullopt;
-  return static_cast<std::size_t>(factor.row[below] / 6);
-}
-
 /// The block variables that the asked ones depend on: their ancestors in the elimination tree.
-std::vector<bool> with_ancestors(const BlockCholesky::Columns& factor, std::span<const int> variables) {
-  const std::size_t n = factor.start.size() / 6;
+std::vector<bool> with_ancestors(const CholeskyFactor& factor, std::span<const int> variables) {
+  const std::size_t n = factor.block_columns();
   std::vector<bool> needed(n, false);
   for (const int variable : variables)
     if (variable >= 0) needed[static_cast<std::size_t>(variable)] = true;
   for (std::size_t j = 0; j < n; ++j)
-    if (const auto parent = parent_of(factor, j); parent && needed[j]) needed[*parent] = true;
+    if (needed[j])
+      if (const auto parent = CholeskyFactor::Column(factor, j).parent()) needed[*parent] = true;
   return needed;
 }
 
@@ -47,31 +41,27 @@ void fill_at_random(std::uint64_t stream, std::size_t j, Batch& batch) {
     for (double& value : slab.reshaped()) value = nearly_normal(++number);
 }
 
-/// Y_j <- L_jj^-T (Y_j - sum over the blocks i below of L_ij^T Y_i). The six columns of a block have the same rows.
-void solve_block(const BlockCholesky::Columns& factor, std::size_t j, std::vector<Batch>& Y) {
-  const int* start = factor.start.data() + 6 * j;
-  const int below = (start[6] - start[5] - 1) / 6;
-  for (int b = 0; b < below; ++b) {
-    Matrix6d L_ij_transposed;
-    for (int c = 0; c < 6; ++c)
-      L_ij_transposed.row(c) = Eigen::Map<const Vector6d>(factor.value.data() + start[c] + (6 - c) + 6 * b);
-    const Batch& Y_i = Y[static_cast<std::size_t>(factor.row[start[5] + 1 + 6 * b] / 6)];
+/// Y_j <- L_jj^-T (Y_j - sum over the blocks i below of L_ij^T Y_i).
+void solve_block(const CholeskyFactor& factor, std::size_t j, std::vector<Batch>& Y) {
+  const CholeskyFactor::Column column(factor, j);
+  for (int b = 0; b < column.below(); ++b) {
+    const Matrix6d L_ij_transposed = column.block(b).transpose();
+    const Batch& Y_i = Y[column.row(b)];
     for (std::size_t k = 0; k < kSlabs; ++k) Y[j][k].noalias() -= L_ij_transposed.lazyProduct(Y_i[k]);
   }
-  for (int c = 5; c >= 0; --c) {
-    const double* column = factor.value.data() + start[c];  // from the diagonal down
+  const auto L_jj = column.diagonal();
+  for (int c = 5; c >= 0; --c)
     for (Slab& slab : Y[j]) {
-      for (int d = c + 1; d < 6; ++d) slab.row(c) -= column[d - c] * slab.row(d);
-      slab.row(c) /= column[0];
+      for (int d = c + 1; d < 6; ++d) slab.row(c) -= L_jj(d, c) * slab.row(d);
+      slab.row(c) /= L_jj(c, c);
     }
-  }
 }
 
 }  // namespace
 
-Eigen::MatrixXd posterior_samples(const BlockCholesky::Columns& factor, std::span<const int> variables,
-                                  std::size_t count, Rng rng) {
-  const std::size_t n = factor.start.size() / 6;
+Eigen::MatrixXd posterior_samples(const CholeskyFactor& factor, std::span<const int> variables, std::size_t count,
+                                  Rng rng) {
+  const std::size_t n = factor.block_columns();
   const std::vector<bool> needed = with_ancestors(factor, variables);
   std::vector<Batch> Y(n);
   Eigen::MatrixXd out =
@@ -92,8 +82,8 @@ Eigen::MatrixXd posterior_samples(const BlockCholesky::Columns& factor, std::spa
   return out;
 }
 
-Eigen::MatrixXd posterior_covariance(const BlockCholesky::Columns& factor, std::span<const int> variables) {
-  std::vector<Matrix6d> y(factor.start.size() / 6, Matrix6d::Zero());
+Eigen::MatrixXd posterior_covariance(const CholeskyFactor& factor, std::span<const int> variables) {
+  std::vector<Matrix6d> y(factor.block_columns(), Matrix6d::Zero());
   struct Way {
     std::vector<std::size_t> block;  // ascending
     std::vector<Matrix6d> y;
@@ -103,22 +93,22 @@ Eigen::MatrixXd posterior_covariance(const BlockCholesky::Columns& factor, std::
     if (variables[v] < 0) continue;
     Way& way = ways[v];
     y[static_cast<std::size_t>(variables[v])].setIdentity();
-    for (std::optional<std::size_t> j = static_cast<std::size_t>(variables[v]); j; j = parent_of(factor, *j)) {
-      const int* start = factor.start.data() + 6 * *j;
+    for (std::optional<std::size_t> j = static_cast<std::size_t>(variables[v]); j;) {
+      const CholeskyFactor::Column column(factor, *j);
+      const auto L_jj = column.diagonal();
       Matrix6d& y_j = y[*j];
       for (int c = 0; c < 6; ++c) {
-        const double* column = factor.value.data() + start[c];  // from the diagonal down
-        y_j.row(c) /= column[0];
-        for (int d = c + 1; d < 6; ++d) y_j.row(d) -= column[d - c] * y_j.row(c);
+        y_j.row(c) /= L_jj(c, c);
+        for (int d = c + 1; d < 6; ++d) y_j.row(d) -= L_jj(d, c) * y_j.row(c);
       }
-      const int below = (start[6] - start[5] - 1) / 6;
-      for (int b = 0; b < below; ++b) {
-        Matrix6d& y_i = y[static_cast<std::size_t>(factor.row[start[5] + 1 + 6 * b] / 6)];
-        for (int c = 0; c < 6; ++c)
-          y_i.noalias() -= Eigen::Map<const Vector6d>(factor.value.data() + start[c] + (6 - c) + 6 * b) * y_j.row(c);
+      for (int b = 0; b < column.below(); ++b) {
+        const auto L_ij = column.block(b);
+        Matrix6d& y_i = y[column.row(b)];
+        for (int c = 0; c < 6; ++c) y_i.noalias() -= L_ij.col(c) * y_j.row(c);
       }
       way.block.push_back(*j);
       way.y.push_back(y_j);
+      j = column.parent();
     }
     for (const std::size_t j : way.block) y[j].setZero();
   }

@@ -6,7 +6,7 @@
 #include <span>
 
 #include "tutti/base/random.hpp"
-#include "tutti/estimation/internal/block_cholesky.hpp"
+#include "tutti/estimation/internal/cholesky_factor.hpp"
 
 namespace tutti::estimation::internal {
 
@@ -14,12 +14,12 @@ namespace tutti::estimation::internal {
 /// and covariance (L L^T)^-1. Only the rows of the asked block variables (6 each; < 0: anchored, zero) are returned,
 /// and only what they depend on is solved for. What comes out for a variable does not depend on which others are asked
 /// for.
-Eigen::MatrixXd posterior_samples(const BlockCholesky::Columns& factor, std::span<const int> variables,
-                                  std::size_t count, Rng rng);
+Eigen::MatrixXd posterior_samples(const CholeskyFactor& factor, std::span<const int> variables, std::size_t count,
+                                  Rng rng);
 
 /// The rows and columns of (L L^T)^-1 that belong to these block variables (6 each; < 0: anchored, zero), exactly: Y^T
 /// Y with Y = L^-1 E, every column of which is zero but on the way from its variable to the root of the elimination
 /// tree.
-Eigen::MatrixXd posterior_covariance(const BlockCholesky::Columns& factor, std::span<const int> variables);
+Eigen::MatrixXd posterior_covariance(const CholeskyFactor& factor, std::span<const int> variables);
 
 }  // namespace tutti::estimation::internal

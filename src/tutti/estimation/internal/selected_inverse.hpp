@@ -4,34 +4,28 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "tutti/estimation/internal/block_cholesky.hpp"
+#include "tutti/estimation/internal/cholesky_factor.hpp"
 #include "tutti/geometry/pose3.hpp"
 
 namespace tutti::estimation::internal {
 
-/// Entries of (L L^T)^-1 on the pattern of L (Takahashi, Fagan, Chin 1973), by panels of columns of equal structure,
-/// last panel first: with J a panel's columns, I its rows below, Y = L_IJ L_JJ^-1,
+/// Entries of (L L^T)^-1 on the pattern of L (Takahashi, Fagan, Chin 1973), by supernodes in the place of the factor,
+/// last one first: with J a panel's columns, I its rows below, Y = L_IJ L_JJ^-1,
 ///   Z_IJ = -Z_II Y,   Z_JJ = (L_JJ L_JJ^T)^-1 - Y^T Z_IJ.
 class SelectedInverse {
  public:
-  explicit SelectedInverse(const BlockCholesky::Columns& factor);
+  /// A factor of 6 x 6 blocks.
+  explicit SelectedInverse(CholeskyFactor factor);
   /// 6 x 6 block of two block variables; it must be in the pattern of L.
   [[nodiscard]] Matrix6d block(int row_variable, int column_variable) const;
   /// Covariance of T_a_b, right tangent, of two poses whose block variables are `a` and `b`; -1: that pose is anchored.
   [[nodiscard]] Matrix6d relative(int a, int b, const Pose3& T_b_a) const;
 
  private:
-  struct Panel {
-    int first = 0;           ///< First column.
-    int columns = 0;         ///< |J|
-    std::vector<int> rows;   ///< J, then I, increasing.
-    Eigen::MatrixXd values;  ///< rows x columns: first L, then Z (Z_JJ complete).
-  };
-  void invert(Panel& panel);
-  [[nodiscard]] Eigen::Map<Eigen::MatrixXd> gather_below(const Panel& panel);
+  void invert(std::size_t supernode);
+  [[nodiscard]] Eigen::Map<Eigen::MatrixXd> gather_below(const Supernode& node);
 
-  std::vector<Panel> panels_;
-  std::vector<int> panel_of_column_;
+  CholeskyFactor inverse_;        ///< First L, then Z (Z_JJ complete).
   std::vector<double> gathered_;  ///< Workspace, so that large panels do not map fresh memory each.
   std::vector<double> scaled_;    ///< Y
 };
