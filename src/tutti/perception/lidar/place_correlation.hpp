@@ -21,7 +21,7 @@ class PlaceViews {
   /// The highest point of the correlation of any view with any of the others, as they are or turned by half a turn,
   /// over all shifts; at most 1. 0 when one of both has none.
   [[nodiscard]] float highest(std::span<const char> others) const;
-  /// The same to the bit, for any processor; highest() is two to three times as fast where there is AVX2.
+  /// The same to the bit without AVX2, with which highest() is two to three times as fast.
   [[nodiscard]] float highest_anywhere(std::span<const char> others) const;
 
  private:
