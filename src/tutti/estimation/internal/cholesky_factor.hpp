@@ -28,7 +28,7 @@ struct CholeskyFactor {
     std::vector<Supernode> supernodes;
     std::vector<Panel> panels;      ///< Per supernode.
     std::vector<int> supernode_of;  ///< Per block column.
-    std::ptrdiff_t size = 0;        ///< Of all panels.
+    std::ptrdiff_t size = 0;        ///< All panels together.
     Layout(std::vector<Supernode> nodes, int block_size);
   };
 
