@@ -41,7 +41,7 @@ class BlockColumn {
 }  // namespace
 
 BlockCholesky::BlockCholesky(const BlockStructure& structure, int block_size, std::size_t workspace)
-    : structure_(structure), block_size_(block_size), workspace_(workspace) {
+    : structure_(structure), workspace_(workspace) {
   TUTTI_CHECK(block_size == 3 || block_size == 6, "blocks of {}", block_size);
   values_.assign(structure.block_row.size() * static_cast<std::size_t>(block_size * block_size), 0.0);
   factor_.layout = std::make_shared<const CholeskyFactor::Layout>(find_supernodes(structure), block_size);
@@ -62,7 +62,7 @@ void BlockCholesky::set_zero() { std::fill(values_.begin(), values_.end(), 0.0);
 
 bool BlockCholesky::factorise() {
   const SingleThread single_thread;
-  is_factorised_ = block_size_ == 6 ? factorise_blocks<6>() : factorise_blocks<3>();
+  is_factorised_ = block_size() == 6 ? factorise_blocks<6>() : factorise_blocks<3>();
   return is_factorised_;
 }
 
@@ -84,7 +84,7 @@ void BlockCholesky::add_matrix(std::size_t supernode) {
 BlockCholesky::Group BlockCholesky::group_from(const Supernode& node, std::size_t first) const {
   Group out{.first = first, .end = first, .row = node.ancestors[first].begin, .columns = 0, .rows = 0};
   out.rows = node.below.size() - out.row;
-  const std::size_t most_blocks = workspace_ / static_cast<std::size_t>(block_size_ * block_size_);
+  const std::size_t most_blocks = workspace_ / static_cast<std::size_t>(block_size() * block_size());
   for (; out.end < node.ancestors.size(); ++out.end) {
     const std::size_t columns = node.ancestors[out.end].end - out.row;
     if (out.end > first && out.rows * columns > most_blocks) break;
@@ -155,12 +155,17 @@ bool BlockCholesky::pivots_are_sound(std::size_t supernode) const {
   for (int column = node.first; column < node.end(); ++column) {
     const int begin = structure_.column_start[column];
     const std::ptrdiff_t stride =
-        static_cast<std::ptrdiff_t>(block_size_) * (structure_.column_start[column + 1] - begin);
-    const double* diagonal = values_.data() + static_cast<std::ptrdiff_t>(block_size_) * block_size_ * begin;
-    for (int k = 0; k < block_size_; ++k, diagonal += stride + 1, pivot += panels()[supernode].rows + 1)
+        static_cast<std::ptrdiff_t>(block_size()) * (structure_.column_start[column + 1] - begin);
+    const double* diagonal = values_.data() + static_cast<std::ptrdiff_t>(block_size()) * block_size() * begin;
+    for (int k = 0; k < block_size(); ++k, diagonal += stride + 1, pivot += panels()[supernode].rows + 1)
       if (!(*pivot * *pivot > kSmallestPivotShare * *diagonal)) return false;
   }
   return true;
+}
+
+const CholeskyFactor& BlockCholesky::factor() const {
+  TUTTI_CHECK(is_factorised_, "no factor");
+  return factor_;
 }
 
 CholeskyFactor BlockCholesky::take_factor() {
@@ -170,7 +175,7 @@ CholeskyFactor BlockCholesky::take_factor() {
 }
 
 void BlockCholesky::solve(Eigen::Ref<Eigen::MatrixXd> b) const {
-  TUTTI_CHECK(b.rows() == static_cast<Eigen::Index>(block_size_) * structure_.variables, "{} rows", b.rows());
+  TUTTI_CHECK(b.rows() == static_cast<Eigen::Index>(block_size()) * structure_.variables, "{} rows", b.rows());
   if (!is_factorised_) return;
   const SingleThread single_thread;
   for (std::size_t s = 0; s < supernodes().size(); ++s) {
@@ -188,7 +193,7 @@ void BlockCholesky::substitute(std::size_t supernode, bool is_transposed, Eigen:
   const Panel& panel = panels()[supernode];
   const CBLAS_TRANSPOSE how = is_transposed ? CblasTrans : CblasNoTrans;
   const double* const L = factor_.panel(supernode);
-  double* const b_J = b.data() + static_cast<std::ptrdiff_t>(block_size_) * supernodes()[supernode].first;
+  double* const b_J = b.data() + static_cast<std::ptrdiff_t>(block_size()) * supernodes()[supernode].first;
   if (b.cols() == 1)
     cblas_dtrsv(CblasColMajor, CblasLower, how, CblasNonUnit, panel.columns, L, panel.rows, b_J, 1);
   else
@@ -201,7 +206,7 @@ void BlockCholesky::take_below(std::size_t supernode, Eigen::Ref<Eigen::MatrixXd
   const Panel& panel = panels()[supernode];
   const int m = panel.below(), columns = static_cast<int>(b.cols());
   const double* const L = factor_.panel(supernode) + panel.columns;
-  const double* const b_J = b.data() + static_cast<std::ptrdiff_t>(block_size_) * supernodes()[supernode].first;
+  const double* const b_J = b.data() + static_cast<std::ptrdiff_t>(block_size()) * supernodes()[supernode].first;
   Eigen::MatrixXd product(m, columns);
   if (columns == 1)
     cblas_dgemv(CblasColMajor, CblasNoTrans, m, panel.columns, 1.0, L, panel.rows, b_J, 1, 0.0, product.data(), 1);
@@ -210,8 +215,8 @@ void BlockCholesky::take_below(std::size_t supernode, Eigen::Ref<Eigen::MatrixXd
                 static_cast<int>(b.outerStride()), 0.0, product.data(), m);
   Eigen::Index k = 0;
   for (const int row : supernodes()[supernode].below)
-    b.middleRows(static_cast<Eigen::Index>(block_size_) * row, block_size_) -=
-        product.middleRows(block_size_ * k++, block_size_);
+    b.middleRows(static_cast<Eigen::Index>(block_size()) * row, block_size()) -=
+        product.middleRows(block_size() * k++, block_size());
 }
 
 /// b_J <- b_J - L_IJ^T b_I
@@ -219,12 +224,12 @@ void BlockCholesky::take_from_below(std::size_t supernode, Eigen::Ref<Eigen::Mat
   const Panel& panel = panels()[supernode];
   const int m = panel.below(), columns = static_cast<int>(b.cols());
   const double* const L = factor_.panel(supernode) + panel.columns;
-  double* const b_J = b.data() + static_cast<std::ptrdiff_t>(block_size_) * supernodes()[supernode].first;
+  double* const b_J = b.data() + static_cast<std::ptrdiff_t>(block_size()) * supernodes()[supernode].first;
   Eigen::MatrixXd b_I(m, columns);
   Eigen::Index k = 0;
   for (const int row : supernodes()[supernode].below)
-    b_I.middleRows(block_size_ * k++, block_size_) =
-        b.middleRows(static_cast<Eigen::Index>(block_size_) * row, block_size_);
+    b_I.middleRows(block_size() * k++, block_size()) =
+        b.middleRows(static_cast<Eigen::Index>(block_size()) * row, block_size());
   if (columns == 1)
     cblas_dgemv(CblasColMajor, CblasTrans, m, panel.columns, -1.0, L, panel.rows, b_I.data(), 1, 1.0, b_J, 1);
   else

@@ -41,8 +41,8 @@ class BlockCholesky {
   /// Overwrites b (rows: block_size x variables in elimination order) by H^-1 b. After a successful factorise() only.
   void solve(Eigen::Ref<Eigen::MatrixXd> b) const;
 
-  /// The factor, L L^T = H; means nothing unless factorise() was successful.
-  [[nodiscard]] const CholeskyFactor& factor() const { return factor_; }
+  /// The factor, L L^T = H. After a successful factorise() only.
+  [[nodiscard]] const CholeskyFactor& factor() const;
   /// The same for keeps: nothing can be solved until it is factorised again.
   [[nodiscard]] CholeskyFactor take_factor();
 
@@ -81,8 +81,8 @@ class BlockCholesky {
   using Panel = CholeskyFactor::Panel;
   [[nodiscard]] const std::vector<Supernode>& supernodes() const { return factor_.layout->supernodes; }
   [[nodiscard]] const std::vector<Panel>& panels() const { return factor_.layout->panels; }
+  [[nodiscard]] int block_size() const { return factor_.layout->block_size; }
   const BlockStructure& structure_;
-  int block_size_;
   std::vector<double> values_;
   CholeskyFactor factor_;      ///< Without values before factorise().
   std::vector<int> position_;  ///< Per block of the matrix its row in its supernode, in blocks.

@@ -5,6 +5,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -94,8 +95,7 @@ Eigen::MatrixXd dense_of(const CholeskyFactor& factor) {
     const Eigen::Map<const Eigen::MatrixXd> panel(factor.panel(s), factor.layout->panels[s].rows,
                                                   factor.layout->panels[s].columns);
     for (int p = 0; p < node.rows(); ++p) {
-      const int row = p < node.columns ? node.first + p : node.below[p - node.columns];
-      L.block(B * row, B * node.first, B, panel.cols()) = panel.middleRows(B * p, B);
+      L.block(B * node.row_at(p), B * node.first, B, panel.cols()) = panel.middleRows(B * p, B);
     }
   }
   return L.triangularView<Eigen::Lower>();
@@ -137,8 +137,15 @@ TEST(BlockCholesky, RefusesWhatIsNotPositiveDefiniteAndGoesOnWithWhatIs) {
   fill<6>(structure, matrix, rng, 1.0);
   matrix.add_diagonal(structure.variables / 2, Matrix6d(-1e6 * Matrix6d::Identity()));
   EXPECT_FALSE(matrix.factorise());
+  EXPECT_THROW(static_cast<void>(matrix.factor()), std::logic_error);
+  EXPECT_THROW(static_cast<void>(matrix.take_factor()), std::logic_error);
   fill<6>(structure, matrix, rng, 1.0);
   EXPECT_TRUE(matrix.factorise());
+  const Eigen::MatrixXd L = dense_of<6>(matrix.factor());
+  EXPECT_EQ(dense_of<6>(matrix.take_factor()), L);
+  EXPECT_THROW(static_cast<void>(matrix.factor()), std::logic_error);  // until it is factorised again
+  EXPECT_TRUE(matrix.factorise());
+  EXPECT_EQ(dense_of<6>(matrix.factor()), L);
   matrix.set_zero();
   EXPECT_FALSE(matrix.factorise());
 }

@@ -24,19 +24,16 @@ CholeskyFactor CholeskyFactor::copy() const {
   return out;
 }
 
-CholeskyFactor::Column::Column(const CholeskyFactor& factor, std::size_t column)
-    : node_(factor.layout->supernodes[static_cast<std::size_t>(factor.layout->supernode_of[column])]),
-      first_(static_cast<int>(column) - node_.first),
-      stride_(6 * node_.rows()),
-      begin_(factor.panel(static_cast<std::size_t>(factor.layout->supernode_of[column])) +
-             static_cast<std::ptrdiff_t>(6 * first_) * stride_) {}
-
-std::size_t CholeskyFactor::Column::row(int below) const {
-  const int position = first_ + 1 + below;
-  return static_cast<std::size_t>(position < node_.columns
-                                      ? node_.first + position
-                                      : node_.below[static_cast<std::size_t>(position - node_.columns)]);
+CholeskyFactor::Block CholeskyFactor::block(std::size_t supernode, int row, int column) const {
+  const std::ptrdiff_t height = layout->panels[supernode].rows;
+  return Block(panel(supernode) + 6 * column * height + 6 * row, Eigen::OuterStride<>(height));
 }
+
+CholeskyFactor::Column::Column(const CholeskyFactor& factor, std::size_t column)
+    : factor_(factor),
+      supernode_(static_cast<std::size_t>(factor.layout->supernode_of[column])),
+      node_(factor.layout->supernodes[supernode_]),
+      column_(static_cast<int>(column) - node_.first) {}
 
 std::optional<std::size_t> CholeskyFactor::Column::parent() const {
   return below() > 0 ? std::optional(row(0)) : std::nullopt;

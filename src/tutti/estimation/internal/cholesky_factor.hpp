@@ -45,26 +45,30 @@ struct CholeskyFactor {
     return values.get() + layout->panels[supernode].begin;
   }
 
+  /// The block at these positions among the supernode's rows and columns, in a factor of 6 x 6 blocks.
+  using Block = Eigen::Map<const Matrix6d, 0, Eigen::OuterStride<>>;
+  [[nodiscard]] Block block(std::size_t supernode, int row, int column) const;
+
   /// Block column `column` of a factor of 6 x 6 blocks.
   class Column {
    public:
-    using Block = Eigen::Map<const Matrix6d, 0, Eigen::OuterStride<>>;
     Column(const CholeskyFactor& factor, std::size_t column);
     /// Its lower triangle is L's.
-    [[nodiscard]] Block diagonal() const { return at(first_); }
+    [[nodiscard]] Block diagonal() const { return factor_.block(supernode_, column_, column_); }
     /// How many blocks are below it, and which is in which block row; they increase.
-    [[nodiscard]] int below() const { return node_.rows() - first_ - 1; }
-    [[nodiscard]] std::size_t row(int below) const;
-    [[nodiscard]] Block block(int below) const { return at(first_ + 1 + below); }
+    [[nodiscard]] int below() const { return node_.rows() - column_ - 1; }
+    [[nodiscard]] std::size_t row(int below) const {
+      return static_cast<std::size_t>(node_.row_at(column_ + 1 + below));
+    }
+    [[nodiscard]] Block block(int below) const { return factor_.block(supernode_, column_ + 1 + below, column_); }
     /// The block column above this one in the elimination tree; none above the root.
     [[nodiscard]] std::optional<std::size_t> parent() const;
 
    private:
-    [[nodiscard]] Block at(int position) const { return Block(begin_ + 6 * position, Eigen::OuterStride<>(stride_)); }
+    const CholeskyFactor& factor_;
+    std::size_t supernode_;
     const Supernode& node_;
-    int first_;  // its position among the supernode's rows
-    int stride_;
-    const double* begin_;
+    int column_;  // its position in the supernode
   };
 };
 

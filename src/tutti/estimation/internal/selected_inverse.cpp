@@ -73,13 +73,9 @@ Matrix6d SelectedInverse::block(int row_variable, int column_variable) const {
   const auto s = static_cast<std::size_t>(inverse_.layout->supernode_of[static_cast<std::size_t>(column_variable)]);
   const Supernode& node = inverse_.layout->supernodes[s];
   const int position = node.position_of(row_variable);
-  TUTTI_CHECK(
-      position < node.columns || (position < node.rows() && node.below[position - node.columns] == row_variable),
-      "block {}, {} is not in the pattern", row_variable, column_variable);
-  const int height = inverse_.layout->panels[s].rows;
-  return Eigen::Map<const Matrix6d, 0, Eigen::OuterStride<>>(
-      inverse_.panel(s) + 6 * static_cast<std::ptrdiff_t>(column_variable - node.first) * height + 6 * position,
-      Eigen::OuterStride<>(height));
+  TUTTI_CHECK(position < node.rows() && node.row_at(position) == row_variable, "block {}, {} is not in the pattern",
+              row_variable, column_variable);
+  return inverse_.block(s, position, column_variable - node.first);
 }
 
 // delta_a_b = delta_b - Ad(T_a_b^-1) delta_a; anchored poses do not move.

@@ -24,6 +24,10 @@ struct Supernode {
   [[nodiscard]] int end() const { return first + columns; }
   /// Among the columns, then the rows below; `row` must be one of them.
   [[nodiscard]] int position_of(int row) const;
+  /// The row at this position, below rows().
+  [[nodiscard]] int row_at(int position) const {
+    return position < columns ? first + position : below[static_cast<std::size_t>(position - columns)];
+  }
 };
 
 /// The supernodes of the factor, in elimination order: columns of one structure (Liu, Ng, Peyton 1993), and neighbours
