@@ -87,27 +87,24 @@ storage::Write to_row(SubmapId id, const server::Place& place) {
 }
 
 std::optional<std::pair<SubmapId, server::Place>> place_of_row(std::string_view key, std::string_view bytes) {
-  constexpr std::size_t kHead = 16, kCandidate = 32;
-  const auto take = [&bytes] {  // a start reads millions
-    std::uint64_t number = 0;
-    for (const char byte : bytes.substr(0, 8)) number = number << 8U | static_cast<unsigned char>(byte);
-    bytes.remove_prefix(8);
-    return number;
-  };
+  constexpr std::size_t kHead = 16, kNumbers = 4, kCandidate = 8 * kNumbers;
   if (!key.starts_with(kPlacePrefix)) return std::nullopt;
   const auto id = submap_of_key(key.substr(kPlacePrefix.size()));
   const auto head = storage::numbers_of(bytes.substr(0, kHead), 2);
   if (!id || !head) return std::nullopt;
   bytes.remove_prefix(kHead);
-  if ((*head)[1] > bytes.size() / kCandidate) return std::nullopt;
+  const std::uint64_t candidates = (*head)[1];
+  if (candidates > bytes.size() / kCandidate) return std::nullopt;
+  const auto numbers = storage::numbers_of(bytes.substr(0, kCandidate * candidates), kNumbers * candidates);
+  bytes.remove_prefix(kCandidate * candidates);
   server::Place place{.looks = {}, .is_ranked = (*head)[0] != 0, .candidates = {}};
-  place.candidates.reserve((*head)[1]);
-  for (std::uint64_t i = 0; i < (*head)[1]; ++i) {
-    const std::uint64_t robot = take(), session = take(), index = take(), sensor = index >> 32U;
-    const auto likeness = std::bit_cast<double>(take());
+  place.candidates.reserve(candidates);
+  for (auto at = numbers->begin(); at != numbers->end(); at += kNumbers) {
+    const std::uint64_t robot = at[0], index = at[2], sensor = index >> 32U;
+    const auto likeness = std::bit_cast<double>(at[3]);
     if (robot >> 32U != 0 || sensor >= server::ClosureFinder::kMostSensors || !std::isfinite(likeness))
       return std::nullopt;
-    const SubmapId other{{RobotId{static_cast<std::uint32_t>(robot)}, session}, static_cast<std::uint32_t>(index)};
+    const SubmapId other{{RobotId{static_cast<std::uint32_t>(robot)}, at[1]}, static_cast<std::uint32_t>(index)};
     place.candidates.push_back({other, likeness, static_cast<std::uint32_t>(sensor)});
   }
   place.looks = bytes;
