@@ -15,13 +15,6 @@ Timestamp ServerNode::next_update(Timestamp now) const {
   return Timestamp{} + std::ceil((now - Timestamp{}) / period_s - 1e-9) * period_s;
 }
 
-MapCounts ServerNode::counts() const {
-  if (!has_map_ && stored_counts_) return *stored_counts_;
-  const server::MapEstimate& map = server_.map();
-  const auto accepted = std::ranges::count_if(map.closures, &server::JudgedClosure::accepted);
-  return {server_.state().revision, map.nodes.size(), static_cast<std::uint64_t>(accepted), map.components};
-}
-
 /// At the next update, whether or not there is news by then.
 void ServerNode::look_again_at_what_waits(Timestamp now) {
   if (broadcast_.anything_waits()) timer_ = now + config_.server.update_period_s;
@@ -75,15 +68,19 @@ Step ServerNode::end_map(MapOfTask made, Timestamp now) {
     timer_ = next_update(now);
   else
     look_again_at_what_waits(now);
-  if (const MapCounts now_there = counts(); stored_counts_ != now_there) {
-    stored_counts_ = now_there;
-    step.writes.push_back(to_row(now_there));
+  const server::MapEstimate& map = server_.map();
+  const auto accepted = std::ranges::count_if(map.closures, &server::JudgedClosure::accepted);
+  const MapCounts counts{server_.state().revision, map.nodes.size(), static_cast<std::uint64_t>(accepted),
+                         map.components};
+  if (stored_counts_ != counts) {
+    stored_counts_ = counts;
+    step.writes.push_back(to_row(counts));
   }
   send_refinement_job(now, step);
   note_settling(now);
   if (!made.is_update) return step;
   step.writes.push_back(meta());
-  step.tell(now, MapUpdated{server_.state().revision, submaps, static_cast<std::size_t>(counts().closures)});
+  step.tell(now, MapUpdated{server_.state().revision, submaps, static_cast<std::size_t>(counts.closures)});
   return step;
 }
 

@@ -176,7 +176,6 @@ class ServerNode {
   /// False when one of the submaps is not in the map.
   bool give_back(const SubmapPair& pair);
   void send_receipt(RobotId robot, Step& step) const;
-  [[nodiscard]] MapCounts counts() const;
   [[nodiscard]] bool is_due(const std::optional<Timestamp>& timer, Timestamp now) const;
   void look_again_at_what_waits(Timestamp now);
   [[nodiscard]] Timestamp next_update(Timestamp now) const;

@@ -118,7 +118,7 @@ std::set<RobotId> ServerNode::strangers_there(Timestamp now) const {
 
 MissionStatus ServerNode::mission_status(Timestamp now) const {
   const server::MapServerState& state = server_.state();
-  const MapCounts made = stored_counts_ ? *stored_counts_ : counts();
+  const MapCounts made = stored_counts_.value_or(MapCounts());
   const std::uint64_t waiting = waiting_.size() + (refinements_.waiting() ? 1 : 0);
   MissionStatus out{.time = now,
                     .epoch = state.epoch,
