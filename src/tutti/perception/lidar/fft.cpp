@@ -19,6 +19,16 @@ ComplexImage of_rows_and_columns(ComplexImage image, const Transform& transform)
 
 }  // namespace
 
+ComplexImage mirrored(const ComplexImage& f) {
+  const Eigen::Index rest = f.rows() - 1;
+  ComplexImage out(f.rows(), f.cols());
+  out(0, 0) = f(0, 0);
+  out.row(0).tail(rest) = f.row(0).tail(rest).reverse();
+  out.col(0).tail(rest) = f.col(0).tail(rest).reverse();
+  out.bottomRightCorner(rest, rest) = f.bottomRightCorner(rest, rest).reverse();
+  return out;
+}
+
 ComplexImage forward_fft(const ComplexImage& image) {
   Eigen::FFT<float> fft;
   return of_rows_and_columns(image, [&](auto* out, const auto* in) { fft.fwd(out, in, kImageSize); });

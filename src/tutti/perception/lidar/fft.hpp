@@ -12,16 +12,7 @@ inline constexpr int kImageSize = 64;
 using ComplexImage = Eigen::Array<std::complex<float>, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 /// f(-x) from f(x) of a square image, periodic as these: of a spectrum as well.
-template <class Image>
-Image mirrored(const Image& f) {
-  const Eigen::Index rest = f.rows() - 1;
-  Image out(f.rows(), f.cols());
-  out(0, 0) = f(0, 0);
-  out.row(0).tail(rest) = f.row(0).tail(rest).reverse();
-  out.col(0).tail(rest) = f.col(0).tail(rest).reverse();
-  out.bottomRightCorner(rest, rest) = f.bottomRightCorner(rest, rest).reverse();
-  return out;
-}
+ComplexImage mirrored(const ComplexImage& f);
 
 /// X(k) = sum_x f(x) exp(-2 pi i k.x / N), not normalised.
 ComplexImage forward_fft(const ComplexImage& image);
