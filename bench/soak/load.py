@@ -166,8 +166,7 @@ def latencies(mission, names):
 def load(tutti, folder, counts, rate, minutes, more):
     head(*COLUMNS)
     for count in counts:
-        settings = {"copies": count, "walk.duration_s": 60.0 * minutes}
-        settings = [f"simulation.robots.0.{key}={value}" for key, value in settings.items()] + more
+        settings = [f"simulation.robots.0.copies={count}", f"simulation.robots.0.walk.duration_s={60.0 * minutes}", *more]
         mission = Mission(tutti, folder / f"run{count}", [SOURCE / "missions/fleet.yaml", *(
             word for setting in settings for word in ("--set", setting))], rate)
         names = [*NAMES, *(f"robot{i}" for i in range(len(NAMES), count))][:count]

@@ -228,14 +228,14 @@ std::vector<JointClosureFinder::Likeness> JointClosureFinder::likeness(std::stri
   for (const std::string_view other : others) parts.push_back(parts_of(other));
   std::vector<Likeness> out;
   for (std::size_t sensor = 0; sensor < own.size(); ++sensor) {
+    if (own[sensor].empty()) continue;
     std::vector<std::size_t> which;
     std::vector<std::string_view> seen;
-    for (std::size_t i = 0; i < others.size() && !own[sensor].empty(); ++i) {
+    for (std::size_t i = 0; i < others.size(); ++i) {
       if (parts[i].empty() || parts[i][sensor].empty()) continue;
       which.push_back(i);
       seen.push_back(parts[i][sensor]);
     }
-    if (seen.empty()) continue;
     for (const auto& [other, value, _] : finders_[sensor]->likeness(own[sensor], seen))
       out.push_back({which[other], value, static_cast<std::uint32_t>(sensor)});
   }
