@@ -9,10 +9,11 @@
 
 namespace tutti::node {
 
-/// The first multiple of the period that is not before `now`.
+/// The first multiple of the period that is not before `now`, nor in the pause after the last update.
 Timestamp ServerNode::next_update(Timestamp now) const {
   const double period_s = config_.server.update_period_s;
-  return Timestamp{} + std::ceil((now - Timestamp{}) / period_s - 1e-9) * period_s;
+  const Timestamp earliest = operator_spoke_ ? now : std::max(now, pause_until_);
+  return Timestamp{} + std::ceil((earliest - Timestamp{}) / period_s - 1e-9) * period_s;
 }
 
 /// At the next update, whether or not there is news by then.
@@ -42,13 +43,16 @@ std::optional<MapTask> ServerNode::begin_map(Timestamp now) {
   timer_.reset();
   compute_at_.reset();
   is_making_map_ = true;
+  const bool operator_spoke = std::exchange(operator_spoke_, false);
   MapTask task{.job = is_update ? server_.begin_update() : server_.begin_rebuild(),
                .is_update = is_update,
                .begun = now,
                .incarnation = config_.incarnation,
                .robots = robots_,
-               .follow = config_.server.change_of_mind != "wait" || std::exchange(operator_spoke_, false),
+               .follow = config_.server.change_of_mind != "wait" || operator_spoke,
                .broadcast = std::move(broadcast_)};
+  if (is_update)
+    pause_until_ = now + config_.server.update_pause_per_submap_s * static_cast<double>(task.job.submaps.size());
   for (const RobotId robot : robots_)
     if (const auto owner = registry_.owner(robot)) task.job.owners.push_back(*owner);
   return task;

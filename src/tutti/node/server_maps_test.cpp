@@ -110,6 +110,33 @@ TEST_F(MapBeingMade, HasNewsUntilItIsThere) {
   EXPECT_FALSE(read_map_meta(*store_).value()->news);
 }
 
+TEST_F(MapBeingMade, ALargeMapIsMadeLessOften) {
+  constexpr double kPeriod_s = 10.0;  // 10 s per submap instead of 0.01: 8 are as 8,000
+  ServerNodeConfig config;
+  config.server.update_pause_per_submap_s = 10.0;
+  start({RobotId{0}, RobotId{1}}, config);
+  now_ = node_->next_timer().value();
+  const Timestamp first = now_;
+  EXPECT_EQ(updates(done(node_->on_timer(now_))), std::vector<std::size_t>{8});
+  now_ = now_ + 3.0;
+  take_both(4);
+  EXPECT_EQ(*node_->next_timer(), first + 80.0);
+  now_ = *node_->next_timer();
+  const Timestamp second = now_;
+  EXPECT_EQ(updates(done(node_->on_timer(now_))), std::vector<std::size_t>{10});
+  now_ = now_ + 200.0;  // nothing has come for longer than the pause
+  take_both(5);
+  EXPECT_EQ(*node_->next_timer(), second + 200.0);
+  now_ = *node_->next_timer();
+  const Timestamp third = now_;
+  EXPECT_EQ(updates(done(node_->on_timer(now_))), std::vector<std::size_t>{12});
+  now_ = now_ + 1.0;
+  take_both(6);
+  EXPECT_EQ(*node_->next_timer(), third + 120.0);
+  receive(test::envelope(ClosureWord{"0/0-1/2", Wish::reject, "ada", 5}));
+  EXPECT_EQ(*node_->next_timer(), third + kPeriod_s);  // an operator does not wait
+}
+
 TEST_F(MapBeingMade, ARobotThatJoinsMeanwhileHearsOfTheNext) {
   done(node_->end_map(make_map(std::move(*task_)), now_));
   start({}, {.accepts_others = true});

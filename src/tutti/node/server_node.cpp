@@ -132,6 +132,7 @@ Step ServerNode::put_aside(const bus::Envelope& envelope, const std::string& why
 }
 
 void ServerNode::note_news(Timestamp now, bool before, Step& step) {
+  if (server_.has_news() && operator_spoke_) timer_ = next_update(now);  // the pause, if any, is over
   if (before == server_.has_news()) return;
   compute_at_.reset();  // the map with the news takes its place
   timer_ = next_update(now);

@@ -203,6 +203,7 @@ class ServerNode {
   std::uint64_t changes_ = 0;
   bool had_news_ = false;  // when the store was opened
   std::optional<Timestamp> timer_;
+  Timestamp pause_until_;                // by ServerConfig::update_pause_per_submap_s
   std::optional<Timestamp> compute_at_;  // when to compute the map that the store had when it was opened
   std::optional<MapCounts> stored_counts_;
   bool has_map_ = false;

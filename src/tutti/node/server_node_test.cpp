@@ -285,11 +285,6 @@ TEST_F(ServerNodeTest, AJobThatWaitsBehindOthersIsNotAskedAgain) {
   EXPECT_EQ(pairs_of(done(node_->on_timer(now_ + 100.0))), pairs_of(asked[2]));
 }
 
-bus::Envelope envelope(const ClosureWord& word) {
-  return {Endpoint::viewer(7), Endpoint::server(), MessageKind::word, fmt::format("{}/{}", word.closure, word.given_ns),
-          std::make_shared<const std::string>(wire::encode(word))};
-}
-
 TEST_F(ServerNodeTest, AnOperatorsWordIsStoredAndSurvivesEveryRestart) {
   fill();
   now_ = Timestamp{} + 20.0;
@@ -299,7 +294,7 @@ TEST_F(ServerNodeTest, AnOperatorsWordIsStoredAndSurvivesEveryRestart) {
   };
   const auto all = accepted();
   const SubmapPair pair{{kAlpha, 0}, {kBravo, 2}};
-  const Step step = receive(envelope({"0/0-1/2", Wish::reject, "ada", 5}));
+  const Step step = receive(test::envelope(ClosureWord{"0/0-1/2", Wish::reject, "ada", 5}));
   EXPECT_EQ(told<WordTaken>(step), 1U);
   ASSERT_EQ(node_->next_timer(), Timestamp{} + 20.0);
   for (int start = 0; start < 2; ++start) {
@@ -315,10 +310,10 @@ TEST_F(ServerNodeTest, AnOperatorsWordIsStoredAndSurvivesEveryRestart) {
   EXPECT_EQ(accepted(), all - 1);
 
   const auto before = store_->tables();  // late, and once more
-  EXPECT_EQ(told<WordTaken>(receive(envelope({"0/0-1/2", Wish::accept, "eve", 4}))), 0U);
-  EXPECT_EQ(told<WordTaken>(receive(envelope({"0/0-1/2", Wish::reject, "ada", 5}))), 0U);
+  EXPECT_EQ(told<WordTaken>(receive(test::envelope(ClosureWord{"0/0-1/2", Wish::accept, "eve", 4}))), 0U);
+  EXPECT_EQ(told<WordTaken>(receive(test::envelope(ClosureWord{"0/0-1/2", Wish::reject, "ada", 5}))), 0U);
   EXPECT_EQ(store_->tables(), before);
-  receive(envelope({"1/2-0/0", Wish::withdraw, "ada", 6}));
+  receive(test::envelope(ClosureWord{"1/2-0/0", Wish::withdraw, "ada", 6}));
   restart();
   done(node_->on_timer(now_));
   EXPECT_EQ(accepted(), all);
@@ -329,16 +324,18 @@ TEST_F(ServerNodeTest, NobodyElseHasAWordAndNotOnWhatIsNotThere) {
   const auto before = store_->tables();
   const ClosureWord word{"0/0-1/2", Wish::reject, "ada", 5};
   for (const Endpoint from : {Endpoint::of(RobotId{0}), Endpoint::worker(0)}) {
-    bus::Envelope forged = envelope(word);
+    bus::Envelope forged = test::envelope(word);
     forged.from = from;
     EXPECT_EQ(told<MessageRefused>(receive(forged)), 1U);
   }
-  bus::Envelope garbage = envelope(word);
+  bus::Envelope garbage = test::envelope(word);
   garbage.bytes = std::make_shared<const std::string>("garbage");
   EXPECT_EQ(told<MessageRefused>(receive(garbage)), 1U);
   for (const char* closure : {"nobody/0-1/2", "0/0-1/99", "0/0", "0/0-0/0"})
-    EXPECT_EQ(told<MessageRefused>(receive(envelope({closure, Wish::reject, "ada", 5}))), 1U) << closure;
-  EXPECT_EQ(told<MessageRefused>(receive(envelope({"0/0-1/1", Wish::accept, "ada", 5}))), 1U);  // no closure there
+    EXPECT_EQ(told<MessageRefused>(receive(test::envelope(ClosureWord{closure, Wish::reject, "ada", 5}))), 1U)
+        << closure;
+  EXPECT_EQ(told<MessageRefused>(receive(test::envelope(ClosureWord{"0/0-1/1", Wish::accept, "ada", 5}))),
+            1U);  // no closure there
   EXPECT_EQ(store_->tables(), before);
 }
 
@@ -433,7 +430,7 @@ TEST_F(ServerNodeTest, WhatComesBeforeTheMapIsComputedIsInTheFirstOne) {
 
 TEST_F(ServerNodeTest, AStoreThatIsDamagedIsNoMap) {
   fill();
-  receive(envelope({"0/0-1/2", Wish::reject, "ada", 5}));
+  receive(test::envelope(ClosureWord{"0/0-1/2", Wish::reject, "ada", 5}));
   for (const auto& [table, rows] : store_->tables()) {
     if (rows.empty()) continue;
     auto tables = store_->tables();
@@ -519,7 +516,7 @@ TEST_F(ChangedMap, IsSentAtOnceAfterAnOperatorsWord) {
   const auto& verdicts = node_->map_server().state().verdicts;
   ASSERT_FALSE(verdicts.empty());
   const std::string name = server::ClosureNames({}, {kAlpha}).of(verdicts.begin()->first);
-  const Step heard = receive(envelope({name, Wish::accept, "ada", 5}));
+  const Step heard = receive(test::envelope(ClosureWord{name, Wish::accept, "ada", 5}));
   EXPECT_EQ(told<WordTaken>(heard), 1U);
   const Step changed = done(node_->on_timer(now_));
   EXPECT_EQ(of_kind(changed, MessageKind::proxy_graph).size(), 1U);

@@ -32,6 +32,7 @@ struct ServerConfig {
   consistency::ProxyGraphConfig proxy_graph;
   int refine_every = 5;
   double update_period_s = 10.0;
+  double update_pause_per_submap_s = 0.01;
   std::string broadcast = "own";
   std::string change_of_mind = "wait";
   int candidates_per_submap = 100;
@@ -45,6 +46,9 @@ struct ServerConfig {
         "When nothing has come for so many update periods, one of the whole follows. 0: none at all.");
     v.field("update_period_s", update_period_s, greater_than(0.0),
             "Mission time between two optimisations when there is something new.");
+    v.field("update_pause_per_submap_s", update_pause_per_submap_s, at_least(0.0),
+            "A large map takes longer to make, so it is made less often: so many seconds per submap after the last was "
+            "begun (0.01: every 100 s with 10,000 submaps), unless an operator has spoken. 0: always after a period.");
     v.field("broadcast", broadcast, one_of({"own", "all"}),
             "What a robot is sent of the map: 'own' = the proxy nodes of its newest session, how sure the map is of "
             "them, and where the others were last seen; 'all' = everybody's (the paper). It does the same with both.");

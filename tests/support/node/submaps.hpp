@@ -37,6 +37,12 @@ inline bus::Envelope envelope(const SubmapMessage& message) {
           message_id(message.submap.id), std::make_shared<const std::string>(wire::encode(message))};
 }
 
+/// Of an operator.
+inline bus::Envelope envelope(const ClosureWord& word) {
+  return {bus::Endpoint::viewer(7), bus::Endpoint::server(), bus::MessageKind::word,
+          word.closure + "/" + std::to_string(word.given_ns), std::make_shared<const std::string>(wire::encode(word))};
+}
+
 /// Asks for every pair; those of even numbers are in one place, the others refused. Needs both clouds.
 class EvenFinder final : public server::ClosureFinder {
  public:
