@@ -21,6 +21,7 @@ import unittest
 
 TUTTI, SOURCE = sys.argv[1], pathlib.Path(sys.argv[2])
 MISSION = SOURCE / "tests/system/small_mission.yaml"
+SHARED = SOURCE.parent / "shared/data"
 HAS_NATS = shutil.which("nats-server") or (os.path.exists("/usr/sbin/nats-server") and "/usr/sbin/nats-server")
 RATE = ["--rate", "40"]  # 150 s in about 4
 PATIENCE_S = 120.0  # a busy machine
@@ -220,6 +221,18 @@ class Programs(ProgramsTest):
         told = json.loads((out / "state/robots/alpha/status.json").read_text())["feed"]
         self.assertGreater(told["fixes"], 200)
         self.assertEqual(told["fixes_left_out"], 0)
+
+    @unittest.skipUnless((SHARED / "euroc/V1_01/maplab_submaps").is_dir(), "no recordings in ../shared/data")
+    def test_robots_whose_keypoints_no_driver_feeds_replay_them(self):
+        mission, expected, out = SOURCE / "missions/euroc_v101_rovio.yaml", self.path / "run", self.path / "up"
+        for words in (("run", mission, "--out", expected), ("mission", "up", mission, "--out", out, "--rate", "20")):
+            done = run(*words, "--data", SHARED)
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        self.expect_same_map(out, expected)
+        for key in ("closures_accepted", "rejections", "components"):
+            self.assertEqual(report(out)["server"][key], report(expected)["server"][key])
+        robots = report(out)["robots"]
+        self.assertTrue(all(robot["course"][-1]["server_rmse_m"] < 0.15 for robot in robots), robots[0]["course"][-1:])
 
     def test_a_fleet_hears_of_closures_when_they_arrived(self):
         (self.path / "fleet.pyfg").write_text(fleet())

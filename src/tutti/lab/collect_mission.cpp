@@ -163,11 +163,12 @@ Result<Robot> read_robot(const MissionConfig& config, const mission::MissionReco
   });
   if (!read || !taken) return in_context(folder.string(), read ? taken.error() : read.error());
   robot.finished.troubles = robot.troubles.lines(name);
-  const auto scored = program::read_events(scores, [&](const Json& event) {
+  const bool was_fed = fs::exists(scores);  // else the robot has scored itself
+  const auto scored = program::read_events(was_fed ? scores : folder, [&](const Json& event) {
     if (taken) taken = take_score(event, robot);
   });
   if (!scored || !taken) return in_context(scores.string(), scored ? taken.error() : scored.error());
-  for (const auto& [whose, gone] : {std::pair(name, *read), std::pair(name + "'s player", *scored)})
+  for (const auto& [whose, gone] : {std::pair(name, *read), std::pair(name + "'s player", was_fed ? *scored : 0)})
     if (gone > 0) robot.finished.troubles.push_back(cut_short(whose, gone));
   robot.finished.outcome = robot.actor->outcome();
   return robot;

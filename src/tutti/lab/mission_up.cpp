@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <chrono>
 #include <optional>
+#include <set>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -60,7 +61,10 @@ struct SocketFolder {
 class MissionUp {
  public:
   MissionUp(const MissionUpOptions& options, MissionConfig config)
-      : options_(options), config_(std::move(config)), names_(robot_names(config_)), state_(options.out / "state") {}
+      : options_(options), config_(std::move(config)), names_(robot_names(config_)), state_(options.out / "state") {
+    for (const mission::RobotConfig& robot : config_.robots)
+      if (!robot.images.maplab_submaps.empty()) replays_.insert(robot.name);
+  }
   Status start(const std::atomic<bool>& stop);
   Status watch(const std::atomic<bool>& stop);
   void end();
@@ -77,7 +81,8 @@ class MissionUp {
   const MissionUpOptions& options_;
   MissionConfig config_;
   std::vector<std::string> names_;
-  std::string name_;  // on the bus
+  std::set<std::string> replays_;  // robots that read their own recording: keypoints of maplab, which no driver feeds
+  std::string name_;               // on the bus
   fs::path state_;
   SocketFolder sockets_;
   Children children_;
@@ -94,7 +99,8 @@ std::vector<std::string> MissionUp::words(const std::string& command, const std:
   std::vector<std::string> out{options_.program.string(), command, mission.file, "--seed",
                                std::to_string(mission.seed)};
   const auto add = [&](std::initializer_list<std::string> more) { out.insert(out.end(), more); };
-  if (!mission.data.empty() && command != "robot") add({"--data", mission.data.string()});
+  if (!mission.data.empty() && (command != "robot" || replays_.contains(member)))
+    add({"--data", mission.data.string()});
   for (const std::string& assignment : mission.assignments) add({"--set", assignment});
   if (!folder.empty()) add({"--state", folder.string()});
   if (replays) add({"--rate", fmt::format("{}", options_.rate)});
@@ -164,8 +170,10 @@ Status MissionUp::start(const std::atomic<bool>& stop) {
   for (const std::string& name : names_) {
     const std::string feed = (sockets_.path / name).string();
     auto robot = words("robot", name, state_ / "robots" / name, true);
-    robot.insert(robot.end(), {"--name", name, "--stay", "--session", "0", "--feed", feed});
+    robot.insert(robot.end(), {"--name", name, "--stay", "--session", "0"});
+    if (!replays_.contains(name)) robot.insert(robot.end(), {"--feed", feed});
     if (Status started = children_.start("robot " + name, robot, state_ / (name + ".out")); !started) return started;
+    if (replays_.contains(name)) continue;
     auto player = words("mission", "", {}, true);
     player.insert(player.begin() + 2, "play");
     player.insert(player.end(), {"--name", name, "--feed", feed, "--scores", (state_ / "players" / name).string()});
@@ -215,7 +223,8 @@ void MissionUp::tell(const MissionStatus& status) const {
 void MissionUp::end() {
   wall_s_ = std::chrono::duration<double>(SteadyClock::now() - begin_).count();
   std::vector<std::string> others, players;
-  for (const std::string& name : names_) players.push_back("player " + name);
+  for (const std::string& name : names_)
+    if (!replays_.contains(name)) players.push_back("player " + name);
   children_.stop(players);
   for (const std::string& name : names_) others.push_back("robot " + name);
   for (int i = 0; i < options_.workers; ++i) others.push_back(worker_name(i));

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "tutti/mission/robot_actor.hpp"
 #include "tutti/program/robot_driver.hpp"
@@ -22,9 +24,12 @@ class ReplayedRobot final : public program::RobotDriver {
   node::Step take_step() override { return actor_->take_step(); }
   [[nodiscard]] double next_time() const override { return actor_->next_time(); }
   void replay_next(Timestamp now) override { actor_->replay_next(now); }
+  /// How each update went, by the reference, and how long it took: for the report of whoever collects the mission.
+  std::vector<program::Json> take_notes() override;
 
  private:
   std::unique_ptr<mission::RobotActor> actor_;
+  std::size_t scored_ = 0, timed_ = 0;  // updates that are told
 };
 
 }  // namespace tutti::lab
