@@ -11,6 +11,7 @@
 #include "tutti/bags/point_cloud.hpp"
 #include "tutti/bags/ros_definitions.hpp"
 #include "tutti/bags/ros_encode.hpp"
+#include "tutti/bags/ros_types.hpp"
 
 namespace tutti::python {
 namespace {
@@ -151,7 +152,7 @@ void bind_reading(py::module_& m) {
           "decode", [](const Message& x) { return decode(x.channel, x.data); },
           R"(A dict with the names of ROS's own fields.
 
-Of Odometry, TFMessage, PointCloud2, Livox's CustomMsg, Imu, Image, CompressedImage, CameraInfo, NavSatFix and PoseStamped. Headers are
+Of Odometry, TFMessage, PointCloud2, Livox's CustomMsg, Imu, Image, CompressedImage, CameraInfo, NavSatFix, BatteryState and PoseStamped. Headers are
 'stamp', seconds, and 'frame_id'; positions (3,), orientations (4,) in the order x y z w; poses are 'T' (4, 4) where they
 are rigid, else None; PointCloud2's finite points (n, 3) float32, and its 'times' (n,), if it has any, as they stand there.
 ValueError: another type, or bytes that are none of it.)")
@@ -209,7 +210,7 @@ with tutti.BagWriter("bag") as bag: bag.write_odometry(...). A file that was not
           "write_odometry",
           [](Writer& w, const std::string& topic, double stamp, const ArrayLike& T_odom_body,
              const std::string& frame_id, const std::string& child_frame_id) {
-            w.write(topic, "nav_msgs/msg/Odometry", stamp,
+            w.write(topic, bags::kOdometryType, stamp,
                     bags::encode(bags::RosOdometry{.header = {to_stamp(stamp, "stamp"), frame_id},
                                                    .child_frame_id = child_frame_id,
                                                    .pose = bags::to_ros(to_pose(T_odom_body, "T_odom_body"))}),
@@ -223,8 +224,8 @@ with tutti.BagWriter("bag") as bag: bag.write_odometry(...). A file that was not
              const std::string& child, bool is_static) {
             const Pose3 T = to_pose(T_parent_child, "T_parent_child");
             const bags::RosTransform transform{{to_stamp(stamp, "stamp"), parent}, child, T.translation, T.rotation};
-            w.write(is_static ? "/tf_static" : "/tf", "tf2_msgs/msg/TFMessage", stamp,
-                    bags::encode(std::span(&transform, 1)), is_static);
+            w.write(is_static ? "/tf_static" : "/tf", bags::kTfType, stamp, bags::encode(std::span(&transform, 1)),
+                    is_static);
           },
           "stamp"_a, "T_parent_child"_a, "parent"_a, "child"_a, "is_static"_a = false,
           "T_parent_child (4, 4), which maps child to parent, to /tf or /tf_static.")

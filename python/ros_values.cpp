@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ros_values.hpp"
 
+#include <variant>
+
 #include "tutti/bags/point_cloud.hpp"
+#include "tutti/bags/ros_types.hpp"
 #include "tutti/bags/transform_tree.hpp"
 
 namespace tutti::python {
@@ -113,6 +116,13 @@ py::dict dict_of(const RosNavSatFix& m) {
   return out;
 }
 
+py::dict dict_of(const RosBatteryState& m) {
+  py::dict out = begin(m.header);
+  out["voltage_v"] = m.voltage_v;
+  out["percentage"] = m.percentage;
+  return out;
+}
+
 py::dict dict_of(const RosPoseStamped& m) {
   py::dict out = begin(m.header);
   put_pose(out, m.pose.position, m.pose.orientation);
@@ -123,29 +133,21 @@ py::dict dict_of(const RosPoseStamped& m) {
 
 py::dict decode(const BagChannel& channel, std::string_view data) {
   const RosEncoding encoding = value_of(to_encoding(channel.message_encoding));
-  const std::string& type = channel.type;
-  if (type == "nav_msgs/msg/Odometry") return dict_of(value_of(decode_odometry(data, encoding)));
-  if (type == "tf2_msgs/msg/TFMessage" || type == "tf/msg/tfMessage")
-    return dict_of(value_of(decode_tf(data, encoding)));
-  if (is_scan_type(type)) return dict_of(value_of(decode_scan(type, data, encoding)));
-  if (type == "sensor_msgs/msg/Imu") return dict_of(value_of(decode_imu(data, encoding)));
-  if (type == "sensor_msgs/msg/Image") return dict_of(value_of(decode_image(data, encoding)));
-  if (type == "sensor_msgs/msg/CompressedImage") return dict_of(value_of(decode_compressed_image(data, encoding)));
-  if (type == "sensor_msgs/msg/CameraInfo") return dict_of(value_of(decode_camera_info(data, encoding)));
-  if (type == "sensor_msgs/msg/NavSatFix") return dict_of(value_of(decode_nav_sat_fix(data, encoding)));
-  if (type == "geometry_msgs/msg/PoseStamped") return dict_of(value_of(decode_pose_stamped(data, encoding)));
-  refuse("{}: is of type '{}', which is not decoded", channel.topic, type);
+  if (use_of(channel.type) == Use::nothing)
+    refuse("{}: is of type '{}', which is not decoded", channel.topic, channel.type);
+  return std::visit([](const auto& message) { return dict_of(message); },
+                    value_of(decode_message(channel.type, data, encoding)));
 }
 
 StampedPose stamped_pose(const BagChannel& channel, std::string_view data) {
   const RosEncoding encoding = value_of(to_encoding(channel.message_encoding));
   RosHeader header;
   RosPose pose;
-  if (channel.type == "nav_msgs/msg/Odometry") {
+  if (channel.type == kOdometryType) {
     const auto message = value_of(decode_odometry(data, encoding));
     header = message.header;
     pose = message.pose;
-  } else if (channel.type == "geometry_msgs/msg/PoseStamped") {
+  } else if (channel.type == kPoseType) {
     const auto message = value_of(decode_pose_stamped(data, encoding));
     header = message.header;
     pose = message.pose;

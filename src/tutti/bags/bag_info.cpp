@@ -14,80 +14,38 @@
 namespace tutti::bags {
 namespace {
 
-constexpr std::string_view kImageType = "sensor_msgs/msg/Image";
 constexpr std::size_t kMostSaid = 10;
 constexpr std::size_t kMostFrames = 4;
 
-constexpr std::array<std::pair<std::string_view, Use>, 8> kTypes{{
-    {"nav_msgs/msg/Odometry", Use::odometry},
-    {kImageType, Use::images},
-    {"sensor_msgs/msg/CompressedImage", Use::images},
-    {"sensor_msgs/msg/CameraInfo", Use::calibration},
-    {"sensor_msgs/msg/Imu", Use::imu},
-    {"sensor_msgs/msg/NavSatFix", Use::fixes},
-    {"geometry_msgs/msg/PoseStamped", Use::poses},
-    {"tf2_msgs/msg/TFMessage", Use::transforms},
-}};
-
-template <class Message>
-Result<std::string> frame_of(const Result<Message>& message) {
-  if (!message) return tl::unexpected(message.error());
-  return message->header.frame_id;
-}
-
-Result<std::string> frames_of_tf(std::string_view bytes, RosEncoding encoding) {
-  const auto transforms = decode_tf(bytes, encoding);
-  if (!transforms) return tl::unexpected(transforms.error());
+std::string frames_of(const std::vector<RosTransform>& transforms) {
   std::string out;
-  for (std::size_t i = 0; i < std::min(transforms->size(), kMostFrames); ++i)
-    out +=
-        fmt::format("{}{} -> {}", i > 0 ? ", " : "", (*transforms)[i].header.frame_id, (*transforms)[i].child_frame_id);
-  if (transforms->size() > kMostFrames) out += fmt::format(" and {} more", transforms->size() - kMostFrames);
+  for (std::size_t i = 0; i < std::min(transforms.size(), kMostFrames); ++i)
+    out += fmt::format("{}{} -> {}", i > 0 ? ", " : "", transforms[i].header.frame_id, transforms[i].child_frame_id);
+  if (transforms.size() > kMostFrames) out += fmt::format(" and {} more", transforms.size() - kMostFrames);
   return out;
 }
+std::string frames_of(const RosOdometry& message) {
+  return fmt::format("{} -> {}", message.header.frame_id, message.child_frame_id);
+}
+std::string frames_of(const auto& message) { return message.header.frame_id; }
 
-Result<std::string> frames_of(TopicInfo& topic, std::string_view bytes, RosEncoding encoding) {
-  const auto image_frame = [&](const auto& message) {
-    if (message) topic.image = look_of(*message);
-    return frame_of(message);
-  };
-  switch (topic.use) {
-    case Use::odometry: {
-      const auto message = decode_odometry(bytes, encoding);
-      if (!message) return tl::unexpected(message.error());
-      return fmt::format("{} -> {}", message->header.frame_id, message->child_frame_id);
-    }
-    case Use::scans:
-      return frame_of(decode_scan(topic.type, bytes, encoding));
-    case Use::images:
-      return topic.type == kImageType ? image_frame(decode_image(bytes, encoding))
-                                      : image_frame(decode_compressed_image(bytes, encoding));
-    case Use::calibration: {
-      const auto message = decode_camera_info(bytes, encoding);
-      if (message) topic.calibration = *message;
-      return frame_of(message);
-    }
-    case Use::imu:
-      return frame_of(decode_imu(bytes, encoding));
-    case Use::fixes:
-      return frame_of(decode_nav_sat_fix(bytes, encoding));
-    case Use::poses:
-      return frame_of(decode_pose_stamped(bytes, encoding));
-    case Use::transforms:
-      return frames_of_tf(bytes, encoding);
-    case Use::nothing:
-      break;
+/// What the first message of a topic shows.
+void look_at_first(TopicInfo& topic, const BagMessage& message) {
+  const auto encoding = to_encoding(message.channel->message_encoding);
+  const auto decoded = encoding ? decode_message(topic.type, message.data, *encoding)
+                                : Result<RosMessage>(tl::unexpected(encoding.error()));
+  if (!decoded) {
+    topic.problem = decoded.error().message;
+    return;
   }
-  return std::string();
+  topic.frames = std::visit([](const auto& of) { return frames_of(of); }, *decoded);
+  if (const auto* const image = std::get_if<RosImage>(&*decoded)) topic.image = look_of(*image);
+  if (const auto* const image = std::get_if<RosCompressedImage>(&*decoded)) topic.image = look_of(*image);
+  if (const auto* const info = std::get_if<RosCameraInfo>(&*decoded)) topic.calibration = *info;
 }
 
 void look_at(TopicInfo& topic, const BagMessage& message) {
-  if (topic.count++ == 0 && topic.use != Use::nothing) {
-    const auto encoding = to_encoding(message.channel->message_encoding);
-    const auto frames =
-        encoding ? frames_of(topic, message.data, *encoding) : Result<std::string>(tl::unexpected(encoding.error()));
-    (frames ? topic.frames : topic.problem) = frames ? *frames : frames.error().message;
-  }
+  if (topic.count++ == 0 && topic.use != Use::nothing) look_at_first(topic, message);
   topic.first = std::min(topic.first, message.log_time);
   topic.last = std::max(topic.last, message.log_time);
 }
@@ -117,27 +75,27 @@ void take_trees(const std::map<std::string, TransformTree>& trees, BagInfo& out)
   }
 }
 
-bool shows_depth(const TopicInfo& topic) { return topic.image && is_depth(topic.topic, topic.image->encoding); }
 bool is_understood(const TopicInfo& topic, Use use) {
   return topic.use == use && topic.count > 0 && topic.problem.empty();
+}
+
+/// As it is so far: without messages, it shows nothing.
+ImageTopic image_topic(const BagInfo& info, const TopicInfo& topic) {
+  ImageTopic out{topic.topic, topic.type == kCompressedType, topic.image, {}};
+  const std::string beside = camera_info_topic(topic.topic, out.is_compressed);
+  const auto at = std::ranges::find_if(
+      info.topics, [&](const TopicInfo& other) { return other.topic == beside && other.calibration.has_value(); });
+  if (at != info.topics.end()) out.info = at->calibration;
+  return out;
 }
 
 /// Without those that show depth.
 std::string list_of(const BagInfo& info, Use use) {
   std::string out;
   for (const TopicInfo& topic : info.topics)
-    if (is_understood(topic, use) && !shows_depth(topic))
+    if (is_understood(topic, use) && !image_topic(info, topic).shows_depth())
       out += fmt::format("{}{}{}", out.empty() ? "" : "; ", topic.topic,
                          topic.frames.empty() ? "" : " (" + topic.frames + ")");
-  return out;
-}
-
-ImageTopic image_topic(const BagInfo& info, const TopicInfo& topic) {
-  ImageTopic out{topic.topic, topic.image->frame, topic.image->width_px, topic.image->height_px, {}};
-  const std::string beside = camera_info_topic(topic.topic, topic.type != kImageType);
-  const auto at = std::ranges::find_if(
-      info.topics, [&](const TopicInfo& other) { return other.topic == beside && other.calibration.has_value(); });
-  if (at != info.topics.end()) out.info = at->calibration;
   return out;
 }
 
@@ -148,14 +106,11 @@ std::string depth_in_words(const BagInfo& info) {
   for (const TopicInfo& topic : info.topics) {
     if (!is_understood(topic, Use::images)) continue;
     ImageTopic it = image_topic(info, topic);
-    const ImageLook& look = *topic.image;
-    if (shows_depth(topic)) {
-      out += fmt::format("{}{} ({}, {}, {} x {}{})", out.empty() ? "" : "; ", it.topic, it.frame, look.encoding,
-                         it.width_px, it.height_px, it.info ? "" : ", no CameraInfo");
+    if (it.shows_depth()) {
+      out += fmt::format("{}{} ({}, {}, {} x {}{})", out.empty() ? "" : "; ", it.topic, it.first->frame,
+                         it.first->encoding, it.width_px(), it.height_px(), it.info ? "" : ", no CameraInfo");
       if (it.info) depths.push_back(std::move(it));
-    } else if (it.info && (topic.type != kImageType || is_picture(look.encoding))) {
-      it.width_px = it.info->width;
-      it.height_px = it.info->height;
+    } else if (it.info && it.shows_picture()) {
       cameras.push_back(std::move(it));
     }
   }
@@ -172,12 +127,6 @@ std::string depth_in_words(const BagInfo& info) {
 }
 
 }  // namespace
-
-Use use_of(std::string_view type) {
-  if (is_scan_type(type)) return Use::scans;
-  const auto at = std::ranges::find(kTypes, type, [](const auto& entry) { return entry.first; });
-  return at == kTypes.end() ? Use::nothing : at->second;
-}
 
 double TopicInfo::rate_hz() const {
   const double seconds = count < 2 ? 0.0 : last - first;

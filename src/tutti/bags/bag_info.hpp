@@ -5,19 +5,14 @@
 #include <optional>
 #include <set>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "tutti/bags/bag_reader.hpp"
 #include "tutti/bags/depth.hpp"
+#include "tutti/bags/ros_types.hpp"
 #include "tutti/bags/transform_tree.hpp"
 
 namespace tutti::bags {
-
-/// What Tutti can use a topic for, by its message type alone.
-enum class Use { nothing, odometry, scans, images, calibration, imu, fixes, poses, transforms };
-
-Use use_of(std::string_view type);
 
 struct TopicInfo {
   std::string topic, type;

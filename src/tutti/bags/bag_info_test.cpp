@@ -195,7 +195,7 @@ TEST(BagInfo, ABagOfAllTypesIsDecoded) {
     EXPECT_EQ(topic.problem, "") << topic.topic;
     known += topic.use != Use::nothing ? 1 : 0;
   }
-  EXPECT_EQ(known, 9U);
+  EXPECT_EQ(known, 10U);
 }
 
 }  // namespace bag_info_test

@@ -29,19 +29,19 @@ Status check_matrix(const RosCameraInfo& depth, const ImageTopic& camera) {
 }
 
 Status check_place(const ImageTopic& depth, const ImageTopic& camera, const FindTransform& find) {
-  if (depth.frame == camera.frame) return {};
-  const auto T_camera_depth = find(camera.frame, depth.frame);
+  if (depth.first->frame == camera.first->frame) return {};
+  const auto T_camera_depth = find(camera.first->frame, depth.first->frame);
   if (!T_camera_depth)
     return fail(ErrorCode::invalid,
                 "frame '{:.80}', expected '{:.80}' as of {}, or one at the same place (no transform joins them)",
-                depth.frame, camera.frame, camera.topic);
+                depth.first->frame, camera.first->frame, camera.topic);
   const double away_m = T_camera_depth->translation.norm(),
                turn_rad = T_camera_depth->rotation.angularDistance(Eigen::Quaterniond::Identity());
   if (away_m <= kSamePlace_m && turn_rad <= kSameTurn_rad) return {};
   return fail(ErrorCode::invalid,
               "frame '{:.80}', {:.3f} m and {:.4f} rad from '{:.80}' of {}, expected the same place within {} m and {} "
               "rad",
-              depth.frame, away_m, turn_rad, camera.frame, camera.topic, kSamePlace_m, kSameTurn_rad);
+              depth.first->frame, away_m, turn_rad, camera.first->frame, camera.topic, kSamePlace_m, kSameTurn_rad);
 }
 
 std::string list_of(std::span<const ImageTopic> topics, std::span<const std::size_t> some, const char* between) {
@@ -122,9 +122,9 @@ class Chooser {
 }  // namespace
 
 Status check_registered(const ImageTopic& depth, const ImageTopic& camera, const FindTransform& find) {
-  if (depth.width_px != camera.width_px || depth.height_px != camera.height_px)
-    return fail(ErrorCode::invalid, "{} x {} pixels, expected {} x {} as of {}", depth.width_px, depth.height_px,
-                camera.width_px, camera.height_px, camera.topic);
+  if (depth.width_px() != camera.width_px() || depth.height_px() != camera.height_px())
+    return fail(ErrorCode::invalid, "{} x {} pixels, expected {} x {} as of {}", depth.width_px(), depth.height_px(),
+                camera.width_px(), camera.height_px(), camera.topic);
   if (depth.info)
     if (auto ok = check_matrix(*depth.info, camera); !ok) return ok;
   return check_place(depth, camera, find);

@@ -9,20 +9,13 @@
 #include <string>
 #include <vector>
 
-#include "tutti/bags/ros_messages.hpp"
+#include "tutti/bags/image_topic.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/geometry/pose3.hpp"
 
 /// Which of a robot's topics of images are its camera, its two cameras, or its camera with depth: one rule for bags and
 /// for what is live.
 namespace tutti::bags {
-
-/// A topic of pictures or of depth, by its first messages.
-struct ImageTopic {
-  std::string topic, frame;
-  std::uint32_t width_px = 0, height_px = 0;  ///< 0: of a file other than PNG.
-  std::optional<RosCameraInfo> info;          ///< Nothing: there is none beside it.
-};
 
 /// T_a_b of two frames that do not move against each other, by what is known of transforms.
 using FindTransform = std::function<std::optional<Pose3>(const std::string& a, const std::string& b)>;
@@ -46,9 +39,10 @@ struct CameraChoice {
   std::string note;                  ///< Why no depth is used although there is some; else empty.
 };
 
-/// Uses one or two cameras. Where they were not named and a topic of depth is registered to one of them alone, this one
-/// is used, with its depth; where to several, or where there are more than two cameras, the error says which there are
-/// and the flag that decides. Depth is used with one camera, if exactly one topic is registered to it.
+/// Uses one or two cameras; of all topics a first message has been seen. Where they were not named and a topic of depth
+/// is registered to one of them alone, this one is used, with its depth; where to several, or where there are more than
+/// two cameras, the error says which there are and the flag that decides. Depth is used with one camera, if exactly one
+/// topic is registered to it.
 Result<CameraChoice> choose_cameras(std::span<const ImageTopic> cameras, std::span<const ImageTopic> depths,
                                     const CameraWishes& wishes, const FindTransform& find);
 

@@ -9,18 +9,20 @@
 namespace tutti::bags {
 namespace rgbd_test {
 
-RosCameraInfo info(double focal_px, double x_px = 320.0) {
+RosCameraInfo info(double focal_px, double x_px = 320.0, std::uint32_t width_px = 640) {
   RosCameraInfo out;
+  out.width = width_px;
+  out.height = 480;
   out.k = {focal_px, 0, x_px, 0, focal_px, 240, 0, 0, 1};
   return out;
 }
 
 /// What a RealSense publishes: depth as its left infrared camera sees it, and aligned to the colour camera.
-const ImageTopic kColour{"/color/image_raw", "color_optical", 640, 480, info(610)},
-    kInfra1{"/infra1/image_rect_raw", "infra1_optical", 848, 480, info(420)},
-    kInfra2{"/infra2/image_rect_raw", "infra2_optical", 848, 480, info(420)},
-    kAligned{"/aligned_depth_to_color/image_raw", "color_optical", 640, 480, info(610)},
-    kDepth{"/depth/image_rect_raw", "depth_optical", 848, 480, info(420)};
+const ImageTopic kColour{"/color/image_raw", false, ImageLook{"rgb8", "color_optical", 640, 480}, info(610)},
+    kInfra1{"/infra1/image_rect_raw", false, ImageLook{"mono8", "infra1_optical", 848, 480}, info(420, 320, 848)},
+    kInfra2{"/infra2/image_rect_raw", false, ImageLook{"mono8", "infra2_optical", 848, 480}, info(420, 320, 848)},
+    kAligned{"/aligned_depth_to_color/image_raw", false, ImageLook{"16UC1", "color_optical", 640, 480}, info(610)},
+    kDepth{"/depth/image_rect_raw", false, ImageLook{"16UC1", "depth_optical", 848, 480}, info(420, 320, 848)};
 
 std::optional<Pose3> find(const std::string& a, const std::string& b) {
   const std::map<std::string, Eigen::Vector3d> places{{"color_optical", {0.015, 0, 0}},
@@ -61,7 +63,7 @@ TEST(Rgbd, DepthIsRegisteredBySizeMatrixAndPlace) {
   EXPECT_NE(why(depth, kColour), "");
   depth.info.reset();
   EXPECT_EQ(why(depth, kColour), "");
-  depth.frame = "elsewhere";
+  depth.first->frame = "elsewhere";
   EXPECT_EQ(
       why(depth, kColour),
       "frame 'elsewhere', expected 'color_optical' as of /color/image_raw, or one at the same place (no transform "

@@ -12,6 +12,7 @@
 #include "tutti/bags/bag_writer.hpp"
 #include "tutti/bags/point_cloud.hpp"
 #include "tutti/bags/ros_encode.hpp"
+#include "tutti/bags/ros_types.hpp"
 
 namespace tutti::exports {
 namespace {
@@ -72,11 +73,11 @@ class Messages {
       still.push_back({{begin_, parent}, child, T.translation, T.rotation});
     if (const auto& earth = scene_.earth)
       still.push_back({{begin_, "enu"}, earth->frame, earth->T_enu_frame.translation, earth->T_enu_frame.rotation});
-    if (!still.empty()) add_for_ever("tf_static", "tf2_msgs/msg/TFMessage", encode(still));
+    if (!still.empty()) add_for_ever("tf_static", bags::kTfType, encode(still));
     for (const Scene::Motion& motion : scene_.motions)
       for (const auto& [stamp, T] : motion.poses) {
         const bags::RosTransform moved{{shifted(stamp), motion.parent}, motion.child, T.translation, T.rotation};
-        add(shifted(stamp), "tf", "tf2_msgs/msg/TFMessage", encode(std::span(&moved, 1)));
+        add(shifted(stamp), "tf", bags::kTfType, encode(std::span(&moved, 1)));
       }
   }
 
@@ -84,12 +85,12 @@ class Messages {
   void add_earth() {
     if (!scene_.earth) return;
     const Scene::Earth& earth = *scene_.earth;
-    add_for_ever("origin", "sensor_msgs/msg/NavSatFix", encode(bags::to_ros({begin_, "enu"}, earth.origin)));
+    add_for_ever("origin", bags::kFixType, encode(bags::to_ros({begin_, "enu"}, earth.origin)));
     const Pose3 T_ecef_frame = enu_in_ecef(earth.origin) * earth.T_enu_frame;
     for (const Scene::Track& track : scene_.tracks)
       for (const StampedPose& pose : track.poses)
         if (track.frame == earth.frame)
-          add(shifted(pose.stamp), track.topic + "/fix", "sensor_msgs/msg/NavSatFix",
+          add(shifted(pose.stamp), track.topic + "/fix", bags::kFixType,
               encode(bags::to_ros({shifted(pose.stamp), "enu"}, geodetic_of(T_ecef_frame * pose.pose.translation))));
   }
 

@@ -8,9 +8,6 @@
 
 namespace tutti::intake {
 
-inline constexpr const char *kImageType = "sensor_msgs/msg/Image", *kCompressedType = "sensor_msgs/msg/CompressedImage",
-                            *kCameraInfoType = "sensor_msgs/msg/CameraInfo", *kImuType = "sensor_msgs/msg/Imu";
-
 /// Which cameras and which IMU a robot on ROS's topics has.
 struct ImagesConfig {
   std::vector<std::string> images;        ///< Topics; empty: found by type, within the namespace.

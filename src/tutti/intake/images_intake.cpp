@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "tutti/bags/camera.hpp"
+#include "tutti/bags/rgbd.hpp"
 #include "tutti/bags/transform_tree.hpp"
 #include "tutti/model/nearest_stamp.hpp"
 
@@ -31,11 +32,8 @@ std::string to_bytes(const DepthImage& depth) {
 ImagesIntake::ImagesIntake(ImagesConfig config, std::vector<CameraTopics> topics, std::string imu,
                            const RosIntake& odometry)
     : config_(std::move(config)), imu_(std::move(imu)), odometry_(odometry) {
-  for (CameraTopics& one : topics) topics_.push_back({.topics = std::move(one)});
-}
-
-bool ImagesIntake::OneTopic::shows_picture() const {
-  return first && !is_depth() && (topics.is_compressed || bags::is_picture(first->encoding));
+  for (CameraTopics& one : topics)
+    topics_.push_back({.topics = one, .seen = {.topic = one.images, .is_compressed = one.is_compressed}});
 }
 
 ImagesIntake::Waiting ImagesIntake::OneTopic::pop() {
@@ -50,7 +48,7 @@ void ImagesIntake::OneTopic::drop_before(Timestamp stamp) {
 }
 
 Status ImagesIntake::check_size(const OneTopic& topic, const Waiting& waiting) {
-  if (!topic.model || waiting.width == 0 || topic.is_depth()) return {};
+  if (!topic.model || waiting.width == 0 || topic.seen.shows_depth()) return {};
   const auto width = static_cast<std::uint32_t>(topic.model->width_px),
              height = static_cast<std::uint32_t>(topic.model->height_px);
   if (waiting.width == width && waiting.height == height) return {};
@@ -64,7 +62,7 @@ Status ImagesIntake::add_info(std::size_t topic, std::string_view bytes, Encodin
   if (!message) return tl::unexpected(message.error());
   if (of.model) return {};
   const auto model = bags::to_camera(*message);
-  of.info = std::move(*message);
+  of.seen.info = std::move(*message);
   if (!model) return tl::unexpected(model.error());
   of.model = *model;
   Status first;
@@ -85,16 +83,16 @@ Status ImagesIntake::add_image(std::size_t topic, std::string_view bytes, Encodi
     if (!message) return tl::unexpected(message.error());
     if (message->data.empty()) return fail(ErrorCode::invalid, "an image of no bytes, expected a PNG or JPEG file");
     const bags::ImageLook look = bags::look_of(*message);
-    if (bags::is_depth(of.topics.images, of.first.value_or(look).encoding)) return add_depth(of, look, *message);
-    if (!of.first) of.first = look;
+    if (bags::is_depth(of.topics.images, of.seen.first.value_or(look).encoding)) return add_depth(of, look, *message);
+    if (!of.seen.first) of.seen.first = look;
     return push(of, message->header, {{}, {0, false, std::string(message->data)}});
   }
   const auto message = bags::decode_image(bytes, encoding);
   if (!message) return tl::unexpected(message.error());
   const bags::ImageLook look = bags::look_of(*message);
-  if (bags::is_depth(of.topics.images, of.first.value_or(look).encoding)) return add_depth(of, look, *message);
+  if (bags::is_depth(of.topics.images, of.seen.first.value_or(look).encoding)) return add_depth(of, look, *message);
   const auto image = bags::to_image(*message);
-  if (!of.first && (image || !bags::is_picture(look.encoding))) of.first = look;
+  if (!of.seen.first && (image || !bags::is_picture(look.encoding))) of.seen.first = look;
   if (!image) return tl::unexpected(image.error());
   return push(of, message->header,
               {{}, {0, true, std::string(image->grey.begin(), image->grey.end())}, message->width, message->height});
@@ -104,10 +102,10 @@ Status ImagesIntake::add_depth(OneTopic& topic, const bags::ImageLook& look, con
   const auto named = [&](const Error& error) {
     return in_context(fmt::format("depth at {} ns", message.header.stamp.ns), error);
   };
-  if (auto ok = bags::check_like_first(look, topic.first.value_or(look)); !ok) return named(ok.error());
+  if (auto ok = bags::check_like_first(look, topic.seen.first.value_or(look)); !ok) return named(ok.error());
   const auto depth = bags::to_depth(message);
   if (!depth) return named(depth.error());
-  if (!topic.first) topic.first = look;
+  if (!topic.seen.first) topic.seen.first = look;
   return push(topic, message.header, {{}, {0, true, to_bytes(*depth)}, look.width_px, look.height_px});
 }
 
@@ -116,11 +114,11 @@ Status ImagesIntake::add_depth(OneTopic& topic, const bags::ImageLook& look, con
   const auto named = [&](const Error& error) {
     return in_context(fmt::format("depth at {} ns", message.header.stamp.ns), error);
   };
-  if (auto ok = bags::check_like_first(look, topic.first.value_or(look)); !ok) return named(ok.error());
+  if (auto ok = bags::check_like_first(look, topic.seen.first.value_or(look)); !ok) return named(ok.error());
   if (bags::png_of(message.data).empty())
     return named({ErrorCode::unsupported,
                   fmt::format("format '{:.60}', expected a PNG image as compressedDepth has", message.format)});
-  if (!topic.first) topic.first = look;
+  if (!topic.seen.first) topic.seen.first = look;
   return push(topic, message.header, {{}, {0, false, std::string(message.data)}, look.width_px, look.height_px});
 }
 
@@ -164,8 +162,8 @@ Status ImagesIntake::add_imu(std::string_view bytes, Encoding encoding) {
 
 Result<Camera> ImagesIntake::place(const OneTopic& camera) const {
   if (!camera.model) return fail(ErrorCode::invalid, "{}: no sensor_msgs/CameraInfo", camera.topics.info);
-  if (!camera.first) return fail(ErrorCode::invalid, "{}: no image", camera.topics.images);
-  const auto T_body_camera = odometry_.pose_on_body(camera.first->frame);
+  if (!camera.seen.first) return fail(ErrorCode::invalid, "{}: no image", camera.topics.images);
+  const auto T_body_camera = odometry_.pose_on_body(camera.seen.first->frame);
   if (!T_body_camera) return in_context(camera.topics.images, T_body_camera.error());
   return Camera{*camera.model, *T_body_camera};
 }
@@ -179,7 +177,7 @@ Result<Pose3> ImagesIntake::imu_place() const {
 }
 
 bool ImagesIntake::has_any_image() const {
-  return std::ranges::any_of(topics_, [](const OneTopic& topic) { return topic.first.has_value(); });
+  return std::ranges::any_of(topics_, [](const OneTopic& topic) { return topic.seen.first.has_value(); });
 }
 
 bool ImagesIntake::uses(std::size_t topic) const {
@@ -192,15 +190,6 @@ std::string ImagesIntake::in_words() const {
   return depth_ ? fmt::format("{} with depth of {}", out, topics_[*depth_].topics.images) : out;
 }
 
-bags::ImageTopic ImagesIntake::to_topic(const OneTopic& topic) {
-  bags::ImageTopic out{topic.topics.images, topic.first->frame, topic.first->width_px, topic.first->height_px,
-                       topic.info};
-  if (topic.is_depth()) return out;
-  out.width_px = static_cast<std::uint32_t>(topic.model->width_px);
-  out.height_px = static_cast<std::uint32_t>(topic.model->height_px);
-  return out;
-}
-
 Result<std::optional<std::pair<ImagesIntake::Numbers, ImagesIntake::Numbers>>> ImagesIntake::cameras_and_depths(
     bool is_late) const {
   constexpr std::nullopt_t kWait = std::nullopt;
@@ -208,19 +197,19 @@ Result<std::optional<std::pair<ImagesIntake::Numbers, ImagesIntake::Numbers>>> I
   for (std::size_t i = 0; i < topics_.size(); ++i) {
     const OneTopic& topic = topics_[i];
     const Wish wish = topic.topics.wish;
-    if (!topic.first) {
+    if (!topic.seen.first) {
       if (!is_late || wish == Wish::camera) return kWait;
       continue;
     }
-    if (wish == Wish::camera && !topic.shows_picture())
-      return fail(ErrorCode::invalid, "{}: encoding '{:.40}' is no picture{}", topic.topics.images,
-                  topic.first->encoding, topic.is_depth() ? ", but depth: --depth" : "");
-    if (topic.is_depth()) {
+    if (const Status ok = topic.seen.check_picture(); wish == Wish::camera && !ok)
+      return fail(ErrorCode::invalid, "{}{}", ok.error().message, topic.seen.shows_depth() ? ": --depth" : "");
+    if (topic.seen.shows_depth()) {
       if (!config_.with_depth || (wish != Wish::depth && !config_.depth.empty())) continue;
-      const bool is_known = (topic.info || !topic.topics.has_info) && odometry_.pose_on_body(topic.first->frame);
+      const bool is_known =
+          (topic.seen.info || !topic.topics.has_info) && odometry_.pose_on_body(topic.seen.first->frame);
       if (!is_known && !is_late) return kWait;
       depths.push_back(i);
-    } else if (topic.shows_picture() && (wish == Wish::camera || config_.images.empty())) {
+    } else if (topic.seen.shows_picture() && (wish == Wish::camera || config_.images.empty())) {
       if (!place(topic)) return kWait;
       cameras.push_back(i);
     }
@@ -238,14 +227,14 @@ Result<bool> ImagesIntake::choose(bool is_late) {
   std::vector<bags::ImageTopic> of_cameras, of_depths;
   std::set<std::string> infos;
   for (const std::size_t i : cameras) {
-    of_cameras.push_back(to_topic(topics_[i]));
+    of_cameras.push_back(topics_[i].seen);
     if (!infos.insert(topics_[i].topics.info).second)
       return fail(ErrorCode::invalid,
                   "{} shows what {} calibrates, and another does too, expected one; say which: "
                   "--images {}",
                   topics_[i].topics.images, topics_[i].topics.info, topics_[i].topics.images);
   }
-  for (const std::size_t i : depths) of_depths.push_back(to_topic(topics_[i]));
+  for (const std::size_t i : depths) of_depths.push_back(topics_[i].seen);
   const bags::CameraWishes wishes{.are_named = !config_.images.empty(),
                                   .most_cameras = config_.most_cameras,
                                   .images_flag = "--images ",
@@ -288,10 +277,11 @@ std::string ImagesIntake::missing() const {
   std::vector<std::string> names;
   for (const OneTopic& topic : topics_) {
     names.push_back(topic.topics.images);
-    if (is_chosen() || topic.is_depth()) continue;
+    if (is_chosen() || topic.seen.shows_depth()) continue;
     if (const auto placed = place(topic); !placed) add("no images are used: " + placed.error().message);
   }
-  if (!is_chosen() && out.empty() && std::ranges::none_of(topics_, &OneTopic::shows_picture))
+  if (!is_chosen() && out.empty() &&
+      std::ranges::none_of(topics_, [](const OneTopic& topic) { return topic.seen.shows_picture(); }))
     add(fmt::format("no images are used: none of the topics with a CameraInfo shows pictures: {}",
                     fmt::join(names, ", ")));
   if (depth_)
@@ -334,11 +324,11 @@ Result<std::optional<EncodedImage>> ImagesIntake::depth_of(Timestamp moment) {
   const auto at = nearest_in_time(of.waiting, moment, config_.most_depth_difference_s, &Waiting::stamp);
   if (at == of.waiting.end()) return none;
   if (at->image.is_raw) return std::optional(at->image);
-  if (of.first->encoding != "32FC1")
+  if (of.seen.first->encoding != "32FC1")
     return std::optional(EncodedImage{0, false, std::string(bags::png_of(at->image.bytes))});
   const CameraModel& camera = *topics_[cameras_.front()].model;
   bags::RosCompressedImage image;  // a temporary is uninitialised for GCC 12
-  image.format = of.first->encoding + ";";
+  image.format = of.seen.first->encoding + ";";
   image.data = at->image.bytes;
   const auto depth = bags::to_depth(image, {camera.width_px, camera.height_px});
   if (depth) return std::optional(EncodedImage{0, true, to_bytes(*depth)});

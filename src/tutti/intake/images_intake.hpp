@@ -10,8 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "tutti/bags/depth.hpp"
-#include "tutti/bags/rgbd.hpp"
+#include "tutti/bags/image_topic.hpp"
 #include "tutti/bags/ros_messages.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/intake/camera_topics.hpp"
@@ -87,14 +86,11 @@ class ImagesIntake {
   };
   struct OneTopic {
     CameraTopics topics;
-    std::optional<bags::ImageLook> first;  ///< The first message's.
-    std::optional<bags::RosCameraInfo> info;
-    std::optional<CameraModel> model;
+    bags::ImageTopic seen;
+    std::optional<CameraModel> model;  ///< By a valid CameraInfo.
     std::optional<Timestamp> newest;
     std::deque<Waiting> waiting;
     std::size_t bytes = 0;
-    [[nodiscard]] bool is_depth() const { return first && bags::is_depth(topics.images, first->encoding); }
-    [[nodiscard]] bool shows_picture() const;
     Waiting pop();
     void drop_before(Timestamp stamp);
   };
@@ -106,7 +102,6 @@ class ImagesIntake {
   static Status check_size(const OneTopic& topic, const Waiting& waiting);
   /// Nothing while a topic must be waited for.
   Result<std::optional<std::pair<Numbers, Numbers>>> cameras_and_depths(bool is_late) const;
-  [[nodiscard]] static bags::ImageTopic to_topic(const OneTopic& topic);
   [[nodiscard]] Result<Camera> place(const OneTopic& camera) const;
   [[nodiscard]] Result<Pose3> imu_place() const;
   std::optional<EncodedImage> second_of(Timestamp moment);

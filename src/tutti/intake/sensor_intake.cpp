@@ -5,7 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <functional>
+#include <array>
 #include <set>
 
 #include "tutti/bags/camera.hpp"
@@ -49,53 +49,49 @@ Result<std::vector<CameraTopics>> named_topics(const ImagesConfig& config) {
   return out;
 }
 
-/// What a type of message is for.
+/// What becomes of messages that are for something.
 struct SensorIntake::Row {
-  std::string_view type;
-  std::function<Status(SensorIntake&, const RawMessage&, bags::RosEncoding)> take;
+  bags::Use use;
+  Status (*take)(SensorIntake&, const RawMessage&, bags::RosEncoding);
   bool is_of_sensors = false;  ///< After it more may be known of cameras and IMU.
 };
 
-const std::vector<SensorIntake::Row>& SensorIntake::rows() {
+std::span<const SensorIntake::Row> SensorIntake::rows() {
   using Self = SensorIntake;
-  using bags::RosEncoding;
-  static const std::vector<Row> kRows = [] {
-    const auto image = [](Self& to, const RawMessage& in, RosEncoding encoding) {
-      return to.take_camera(in.topic, in.bytes, encoding, false);
-    };
-    std::vector<Row> out{
-        {"nav_msgs/msg/Odometry",
-         [](Self& to, const RawMessage& in, RosEncoding encoding) { return to.ros_.add_odometry(in.bytes, encoding); }},
-        {"tf2_msgs/msg/TFMessage",
-         [](Self& to, const RawMessage& in, RosEncoding encoding) {
-           const bool is_of_all = in.topic == "/tf" || in.topic == "/tf_static";
-           return to.ros_.add_tf(in.bytes, bags::is_static_tf(in.topic),
-                                 is_of_all ? RosIntake::TfOf::all : RosIntake::TfOf::robot, encoding);
-         },
-         true},
-        {"sensor_msgs/msg/NavSatFix",
-         [](Self& to, const RawMessage& in, RosEncoding encoding) { return to.ros_.add_fix(in.bytes, encoding); }},
-        {"sensor_msgs/msg/BatteryState",
-         [](Self& to, const RawMessage& in, RosEncoding encoding) { return to.take_battery(in.bytes, encoding); }},
-        {kImuType,
-         [](Self& to, const RawMessage& in, RosEncoding encoding) {
-           return to.images_ && in.topic == to.imu_ ? to.images_->add_imu(in.bytes, encoding) : Status();
-         },
-         true},
-        {kCameraInfoType,
-         [](Self& to, const RawMessage& in, RosEncoding encoding) {
-           return to.take_camera(in.topic, in.bytes, encoding, true);
-         },
-         true},
-        {kImageType, image, true},
-        {kCompressedType, image, true}};
-    for (const bags::ScanType& scan : bags::kScanTypes)
-      out.push_back({scan.name, [](Self& to, const RawMessage& in, RosEncoding encoding) {
-                       to.points_ = in.topic;
-                       return to.ros_.add_points(in.bytes, in.type, encoding);
-                     }});
-    return out;
-  }();
+  using bags::RosEncoding, bags::Use;
+  static constexpr std::array kRows{
+      Row{Use::odometry, [](Self& to, const RawMessage& in,
+                            RosEncoding encoding) { return to.ros_.add_odometry(in.bytes, encoding); }},
+      Row{Use::transforms,
+          [](Self& to, const RawMessage& in, RosEncoding encoding) {
+            const bool is_of_all = in.topic == "/tf" || in.topic == "/tf_static";
+            return to.ros_.add_tf(in.bytes, bags::is_static_tf(in.topic),
+                                  is_of_all ? RosIntake::TfOf::all : RosIntake::TfOf::robot, encoding);
+          },
+          true},
+      Row{Use::fixes,
+          [](Self& to, const RawMessage& in, RosEncoding encoding) { return to.ros_.add_fix(in.bytes, encoding); }},
+      Row{Use::battery,
+          [](Self& to, const RawMessage& in, RosEncoding encoding) { return to.take_battery(in.bytes, encoding); }},
+      Row{Use::imu,
+          [](Self& to, const RawMessage& in, RosEncoding encoding) {
+            return to.images_ && in.topic == to.imu_ ? to.images_->add_imu(in.bytes, encoding) : Status();
+          },
+          true},
+      Row{Use::calibration,
+          [](Self& to, const RawMessage& in, RosEncoding encoding) {
+            return to.take_camera(in.topic, in.bytes, encoding, true);
+          },
+          true},
+      Row{Use::images,
+          [](Self& to, const RawMessage& in, RosEncoding encoding) {
+            return to.take_camera(in.topic, in.bytes, encoding, false);
+          },
+          true},
+      Row{Use::scans, [](Self& to, const RawMessage& in, RosEncoding encoding) {
+            to.points_ = in.topic;
+            return to.ros_.add_points(in.bytes, in.type, encoding);
+          }}};
   return kRows;
 }
 
@@ -111,14 +107,14 @@ Status SensorIntake::add(const RawMessage& message) {
   const std::string topic = plain_text(message.topic, 80);
   const auto encoding = bags::to_encoding(message.encoding);
   if (!encoding) return in_context(topic, encoding.error());
-  const auto row = std::ranges::find(rows(), message.type, &Row::type);
-  if (row == rows().end())
+  const auto row = std::ranges::find(rows(), bags::use_of(message.type), &Row::use);
+  if (row == rows().end()) {
+    std::vector<std::string_view> types;
+    for (const bags::RosType& type : bags::ros_types())
+      if (std::ranges::find(rows(), type.use, &Row::use) != rows().end()) types.push_back(type.name);
     return fail(ErrorCode::unsupported, "{}: messages of type '{}', expected one of {}", topic,
-                plain_text(message.type, 80), [] {
-                  std::vector<std::string_view> types;
-                  for (const Row& one : rows()) types.push_back(one.type);
-                  return fmt::format("{}", fmt::join(types, ", "));
-                }());
+                plain_text(message.type, 80), fmt::join(types, ", "));
+  }
   const Status taken = row->take(*this, message, *encoding);
   look(row->is_of_sensors);
   return taken ? taken : in_context(topic, taken.error());

@@ -2,12 +2,14 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
 
+#include "tutti/bags/ros_types.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/intake/camera_topics.hpp"
 #include "tutti/intake/feed_sensors.hpp"
@@ -83,7 +85,7 @@ class SensorIntake {
 
  private:
   struct Row;
-  static const std::vector<Row>& rows();
+  static std::span<const Row> rows();
   Status take_camera(std::string_view topic, std::string_view bytes, bags::RosEncoding encoding, bool is_info);
   Status take_battery(std::string_view bytes, bags::RosEncoding encoding);
   void look(bool is_new);

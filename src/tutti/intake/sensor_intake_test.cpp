@@ -70,9 +70,9 @@ TEST_F(SensorIntakeTest, EveryTypeOfMessageMakesItsInputInTheOrderThatARobotWant
   take_images({.images = {"left/image_raw"}, .imu = "imu"});
   place();
   EXPECT_EQ(add("points", kPoints, points(kStart, kAtOnce, "lidar")), "");
-  EXPECT_EQ(add("left/camera_info", kCameraInfoType, bags::encode(calibration())), "");
-  EXPECT_EQ(add("left/image_raw", kImageType, bags::encode(grey_image(kStart))), "");
-  EXPECT_EQ(add("imu", kImuType, imu(kStart)), "");
+  EXPECT_EQ(add("left/camera_info", bags::kCameraInfoType, bags::encode(calibration())), "");
+  EXPECT_EQ(add("left/image_raw", bags::kImageType, bags::encode(grey_image(kStart))), "");
+  EXPECT_EQ(add("imu", bags::kImuType, imu(kStart)), "");
   EXPECT_EQ(add("battery_state", kBattery, bags::test::battery_state(24.5F, 0.5F)), "");
   EXPECT_EQ(due(), "h");
   EXPECT_EQ(add("fix", kFix, fix(kStart)), "");
@@ -98,7 +98,7 @@ TEST_F(SensorIntakeTest, WhatIsNoSuchMessageIsAnErrorThatSaysWhere) {
   expect(add("odom", kOdometry, "abc"), "odom: ");
   expect(add("points", kPoints, ""), "points: ");
   EXPECT_EQ(due(), "");
-  EXPECT_EQ(add("left/image_raw", kImageType, "of nobody's camera"), "");  // is not looked at
+  EXPECT_EQ(add("left/image_raw", bags::kImageType, "of nobody's camera"), "");  // is not looked at
 }
 
 TEST_F(SensorIntakeTest, MessagesOfRos1AreTheSame) {
@@ -124,10 +124,10 @@ TEST_F(SensorIntakeTest, ScansAndImagesOfWhichSomethingIsNotKnownAreSaid) {
 
 TEST_F(SensorIntakeTest, ImagesOfBeforeTheirCameraWasKnownAreLeftOutWithoutAWord) {
   take_images({.images = {"left/image_raw"}});
-  EXPECT_EQ(add("left/camera_info", kCameraInfoType, bags::encode(calibration())), "");
+  EXPECT_EQ(add("left/camera_info", bags::kCameraInfoType, bags::encode(calibration())), "");
   for (int i = 0; i < 20; ++i) {
     EXPECT_EQ(odometry_at(i), "");
-    EXPECT_EQ(add("left/image_raw", kImageType, bags::encode(grey_image(kStart + i * kPeriod))), "");
+    EXPECT_EQ(add("left/image_raw", bags::kImageType, bags::encode(grey_image(kStart + i * kPeriod))), "");
     EXPECT_EQ(due(), "o");
   }
   place();
@@ -140,13 +140,13 @@ TEST_F(SensorIntakeTest, AtTheEndNothingIsWaitedFor) {
   place();
   EXPECT_EQ(odometry_at(0), "");
   for (const char* side : {"left", "right"}) {
-    EXPECT_EQ(add(fmt::format("{}/camera_info", side).c_str(), kCameraInfoType, bags::encode(calibration())), "");
-    EXPECT_EQ(add(fmt::format("{}/image_raw", side).c_str(), kImageType, bags::encode(grey_image(kStart))), "");
+    EXPECT_EQ(add(fmt::format("{}/camera_info", side).c_str(), bags::kCameraInfoType, bags::encode(calibration())), "");
+    EXPECT_EQ(add(fmt::format("{}/image_raw", side).c_str(), bags::kImageType, bags::encode(grey_image(kStart))), "");
   }
   EXPECT_EQ(due(), "op");
   EXPECT_EQ(last_.images[0].images.size(), 2U);
   EXPECT_EQ(odometry_at(1), "");
-  EXPECT_EQ(add("left/image_raw", kImageType, bags::encode(grey_image(kStart + kPeriod))), "");
+  EXPECT_EQ(add("left/image_raw", bags::kImageType, bags::encode(grey_image(kStart + kPeriod))), "");
   EXPECT_EQ(due(), "o");  // the other may come
   intake_.end();
   EXPECT_EQ(due(), "p");
@@ -163,12 +163,12 @@ TEST_F(SensorIntakeTest, OdometryWaitsForScansAndForCamerasForAWhile) {
   EXPECT_EQ(odometry_at(0), "");
   EXPECT_EQ(add("points", kPoints, points(kStart, kAtOnce, "lidar")), "");
   EXPECT_EQ(due(), "") << "no image yet";
-  EXPECT_EQ(add("left/camera_info", kCameraInfoType, bags::encode(calibration())), "");
-  EXPECT_EQ(add("left/image_raw", kImageType, bags::encode(grey_image(kStart))), "");
+  EXPECT_EQ(add("left/camera_info", bags::kCameraInfoType, bags::encode(calibration())), "");
+  EXPECT_EQ(add("left/image_raw", bags::kImageType, bags::encode(grey_image(kStart))), "");
   EXPECT_FALSE(intake_.wants("left/camera_info")) << "the first one counts";
   EXPECT_EQ(due(), "ops");
   EXPECT_EQ(odometry_at(1), "");
-  EXPECT_EQ(add("left/image_raw", kImageType, bags::encode(grey_image(kStart + kPeriod))), "");
+  EXPECT_EQ(add("left/image_raw", bags::kImageType, bags::encode(grey_image(kStart + kPeriod))), "");
   EXPECT_EQ(due(), "") << "no scan yet";
   intake_.hold_odometry(false, true);
   EXPECT_EQ(due(), "op");
@@ -186,14 +186,14 @@ TEST_F(SensorIntakeTest, OdometryWaitsForCamerasWhileThereIsRoomForWhatComesMean
   place();
   intake_.hold_odometry(false, true);
   EXPECT_EQ(odometry_at(0), "");
-  EXPECT_EQ(add("left/camera_info", kCameraInfoType, bags::encode(calibration())), "");
-  EXPECT_EQ(add("left/image_raw", kImageType, bags::encode(grey_image(kStart))), "");
-  EXPECT_EQ(add("imu", kImuType, imu(kStart)), "");
+  EXPECT_EQ(add("left/camera_info", bags::kCameraInfoType, bags::encode(calibration())), "");
+  EXPECT_EQ(add("left/image_raw", bags::kImageType, bags::encode(grey_image(kStart))), "");
+  EXPECT_EQ(add("imu", bags::kImuType, imu(kStart)), "");
   EXPECT_EQ(due(), "oip");
   EXPECT_EQ(odometry_at(8), "");
   const auto fill = [&](std::size_t from, std::size_t until) {
     for (std::size_t i = from; i < until; ++i)
-      EXPECT_EQ(add("imu", kImuType, imu(kStart + 7 * kPeriod + static_cast<std::int64_t>(i) * 1000)), "");
+      EXPECT_EQ(add("imu", bags::kImuType, imu(kStart + 7 * kPeriod + static_cast<std::int64_t>(i) * 1000)), "");
   };
   fill(0, ImagesIntake::kMostSamples / 2);
   EXPECT_EQ(due(), "") << "no image yet";

@@ -13,6 +13,7 @@
 #include "tutti/bags/bag_writer.hpp"
 #include "tutti/bags/point_cloud.hpp"
 #include "tutti/bags/ros_encode.hpp"
+#include "tutti/bags/ros_types.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/lab/mission_input.hpp"
 #include "tutti/mission/resample.hpp"
@@ -112,7 +113,7 @@ class RobotWriter {
       still.push_back(transform(stamp, "base_link", "gnss",
                                 {Eigen::Quaterniond::Identity(), recording_.fixes.front().p_body_antenna}));
     if (still.empty()) return {};
-    return bag_.write("/tf_static", "tf2_msgs/msg/TFMessage", shifted(stamp), encode(still), Durability::latched);
+    return bag_.write("/tf_static", bags::kTfType, shifted(stamp), encode(still), Durability::latched);
   }
 
   Status odometry(std::size_t i) {
@@ -131,9 +132,9 @@ class RobotWriter {
       covariance_ = compound_covariance(T_before_now, covariance_, increment);
     }
     out.pose_covariance = bags::pose_covariance(covariance_, sample.pose.rotation);
-    if (auto ok = put("odom", "nav_msgs/msg/Odometry", sample.stamp, encode(out)); !ok) return ok;
+    if (auto ok = put("odom", bags::kOdometryType, sample.stamp, encode(out)); !ok) return ok;
     const bags::RosTransform moved = transform(sample.stamp, "odom", "base_link", sample.pose);
-    return bag_.write("/tf", "tf2_msgs/msg/TFMessage", shifted(sample.stamp), encode(std::span(&moved, 1)));
+    return bag_.write("/tf", bags::kTfType, shifted(sample.stamp), encode(std::span(&moved, 1)));
   }
 
   Status scan(std::size_t i) {
@@ -167,7 +168,7 @@ class RobotWriter {
     out.angular_velocity_covariance = isotropic(std::pow(noise.gyro_noise_density, 2) * rate_hz);
     out.linear_acceleration = sample.accelerometer;
     out.linear_acceleration_covariance = isotropic(std::pow(noise.accelerometer_noise_density, 2) * rate_hz);
-    return put("imu", "sensor_msgs/msg/Imu", sample.stamp, encode(out));
+    return put("imu", bags::kImuType, sample.stamp, encode(out));
   }
 
   Status fix(std::size_t i) {
@@ -176,7 +177,7 @@ class RobotWriter {
     out.service = 1;  // GPS
     for (int k = 0; k < 9; ++k) out.position_covariance[static_cast<std::size_t>(k)] = fix.covariance(k / 3, k % 3);
     out.position_covariance_type = 3;  // known
-    return put("fix", "sensor_msgs/msg/NavSatFix", fix.stamp, encode(out));
+    return put("fix", bags::kFixType, fix.stamp, encode(out));
   }
 
   Status images(std::size_t i) {
@@ -207,10 +208,10 @@ class RobotWriter {
     out.encoding = encoding;
     out.step = pixel_bytes * out.width;
     out.data = data;
-    if (auto ok = put(name + "/image_raw", "sensor_msgs/msg/Image", stamp, encode(out)); !ok) return ok;
+    if (auto ok = put(name + "/image_raw", bags::kImageType, stamp, encode(out)); !ok) return ok;
     bags::RosCameraInfo info = camera_info(model);
     info.header = head;
-    return put(name + "/camera_info", "sensor_msgs/msg/CameraInfo", stamp, encode(info));
+    return put(name + "/camera_info", bags::kCameraInfoType, stamp, encode(info));
   }
 
   Status truth(std::size_t i) {

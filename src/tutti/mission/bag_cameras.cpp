@@ -3,13 +3,12 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <mutex>
 #include <utility>
 
 #include "tutti/bags/camera.hpp"
-#include "tutti/bags/depth.hpp"
 #include "tutti/bags/rgbd.hpp"
 #include "tutti/formats/image_file.hpp"
+#include "tutti/mission/bag_messages.hpp"
 #include "tutti/mission/bag_recording.hpp"
 #include "tutti/model/nearest_stamp.hpp"
 
@@ -18,33 +17,16 @@ namespace {
 
 constexpr const char* kNoDepth = "none";
 
-const bags::RosCameraInfo* info_of(const BagIndex& index, const std::string& topic, bool is_compressed) {
-  const auto at = index.cameras.find(bags::camera_info_topic(topic, is_compressed));
-  return at == index.cameras.end() ? nullptr : &at->second;
-}
-
-Result<BagCamera> camera_of(const BagIndex& index, const std::string& topic, const ImageTrack& track,
-                            const std::string& body) {
-  const std::string& encoding = track.first.encoding;
-  const bool is_picture = track.is_compressed || bags::is_picture(encoding);
-  if (track.is_depth || (!is_picture && !track.images.empty()))
-    return fail(ErrorCode::unsupported, "{}: encoding '{:.40}' is no picture{}", topic, encoding,
-                track.is_depth ? ", but depth" : "");
-  if (track.images.empty()) return fail(ErrorCode::invalid, "{}: no images", topic);
-  const bags::RosCameraInfo* const info = info_of(index, topic, track.is_compressed);
-  if (info == nullptr) return fail(ErrorCode::invalid, "{}: no sensor_msgs/CameraInfo beside it", topic);
-  const auto model = bags::to_camera(*info);
-  if (!model) return in_context(topic, model.error());
-  const auto T_body_camera = index.tree.find(body, track.first.frame);
+Result<BagCamera> camera_of(const BagIndex& index, const ImageTrack& track, const std::string& body) {
+  const bags::ImageTopic& seen = track.seen;
+  if (const Status ok = seen.check_picture(); !ok) return tl::unexpected(ok.error());
+  if (!seen.info) return fail(ErrorCode::invalid, "{}: no sensor_msgs/CameraInfo beside it", seen.topic);
+  const auto model = bags::to_camera(*seen.info);
+  if (!model) return in_context(seen.topic, model.error());
+  const auto T_body_camera = index.tree.find(body, seen.first->frame);
   if (!T_body_camera)
-    return fail(ErrorCode::invalid, "{}: no transform from '{}' to '{}'", topic, track.first.frame, body);
-  return BagCamera{topic, {*model, *T_body_camera}, track.images, track.is_compressed};
-}
-
-bags::ImageTopic image_topic(const BagIndex& index, const std::string& topic, const ImageTrack& track) {
-  const bags::RosCameraInfo* const info = info_of(index, topic, track.is_compressed);
-  return {topic, track.first.frame, track.first.width_px, track.first.height_px,
-          info == nullptr ? std::nullopt : std::optional(*info)};
+    return fail(ErrorCode::invalid, "{}: no transform from '{}' to '{}'", seen.topic, seen.first->frame, body);
+  return BagCamera{seen.topic, {*model, *T_body_camera}, track.images, seen.is_compressed};
 }
 
 bool is_wanted(const std::string& topic, const std::string& list) {
@@ -82,17 +64,16 @@ std::vector<bags::ImageTopic> depths_of(const BagIndex& index, const RobotConfig
   if (wanted == kNoDepth) return out;
   const auto because = [&](const std::string& why) { why_not = "no depth is used: " + why; };
   for (const auto& [topic, track] : index.images) {
-    if (!track.is_depth) continue;
+    if (!track.seen.shows_depth()) continue;
     names += (names.empty() ? "" : ", ") + topic;
     if (!wanted.empty() && topic != wanted) continue;
-    bags::ImageTopic depth = image_topic(index, topic, track);
     if (track.images.empty())
       because(note_of(topic, track.refused, track.messages));
-    else if (!depth.info && wanted.empty())
+    else if (!track.seen.info && wanted.empty())
       because(fmt::format("{}: no sensor_msgs/CameraInfo beside it; if its frame and size are the camera's: {}{}",
                           topic, flag_of(robot, "depth"), topic));
     else
-      out.push_back(std::move(depth));
+      out.push_back(track.seen);
   }
   if (out.empty() && why_not.empty() && !wanted.empty())
     because(fmt::format("'{}' is no topic of 16UC1 or 32FC1 in the bag, expected one of: {}", wanted,
@@ -119,68 +100,42 @@ void take_choice(const BagIndex& index, const bags::CameraChoice& choice, std::v
   if (choice.depth) {
     const std::string& topic = depths[*choice.depth].topic;
     const ImageTrack& track = take(topic);
-    used += fmt::format(", depth of {} ({})", topic, track.first.encoding);
-    out.depth = BagDepth{topic, track.images, track.is_compressed};
+    used += fmt::format(", depth of {} ({})", topic, track.seen.first->encoding);
+    out.depth = BagDepth{topic, track.images, track.seen.is_compressed};
   }
   out.notes.push_back("images of " + used);
   out.notes.insert(out.notes.end(), refused.begin(), refused.end());
 }
 
-/// Reads and decodes; one chunk of the bag in memory.
-class ImageReader {
- public:
-  ImageReader(std::unique_ptr<bags::BagReader> reader, std::string file)
-      : reader_(std::move(reader)), file_(std::move(file)) {}
+/// Decodes a message as what it is, and converts it.
+template <class Message, class Convert>
+auto converted(const Result<Message>& message, const Convert& convert) -> decltype(convert(*message)) {
+  if (!message) return tl::unexpected(message.error());
+  return convert(*message);
+}
 
-  Result<Image> image(const BagCamera& camera, const ScanPlace& place) {
-    return read<Image>(camera.topic, place, [&](const bags::BagMessage& message, bags::RosEncoding encoding) {
-      if (!camera.is_compressed) return decode(bags::decode_image(message.data, encoding), bags::to_image);
-      return decode(bags::decode_compressed_image(message.data, encoding), [](const bags::RosCompressedImage& packed) {
-        return formats::decode_image(packed.data, "the image");
-      });
+Result<Image> read_image(BagMessages& messages, const BagCamera& camera, const ScanPlace& place) {
+  return messages.read(camera.topic, place, [&](const bags::BagMessage& message, bags::RosEncoding encoding) {
+    if (!camera.is_compressed) return converted(bags::decode_image(message.data, encoding), bags::to_image);
+    return converted(bags::decode_compressed_image(message.data, encoding), [](const bags::RosCompressedImage& packed) {
+      return formats::decode_image(packed.data, "the image");
     });
-  }
-  Result<DepthImage> depth(const BagDepth& depth, const ScanPlace& place, formats::ExpectedSize expected) {
-    return read<DepthImage>(depth.topic, place, [&](const bags::BagMessage& message, bags::RosEncoding encoding) {
-      if (!depth.is_compressed)
-        return decode(bags::decode_image(message.data, encoding),
-                      [](const bags::RosImage& raw) { return bags::to_depth(raw); });
-      return decode(bags::decode_compressed_image(message.data, encoding),
-                    [&](const bags::RosCompressedImage& packed) { return bags::to_depth(packed, expected); });
-    });
-  }
+  });
+}
 
- private:
-  template <class Message, class Convert>
-  static auto decode(const Result<Message>& message, const Convert& convert) -> decltype(convert(*message)) {
-    if (!message) return tl::unexpected(message.error());
-    return convert(*message);
-  }
-
-  /// `make` decodes a message, whose bytes live as long as this reads no other.
-  template <class Out, class Make>
-  Result<Out> read(const std::string& topic, const ScanPlace& place, const Make& make) {
-    const std::scoped_lock lock(mutex_);
-    const std::string name = fmt::format("{}: {}: message {}", file_, topic, place.message);
-    if (auto ok = reader_->seek(place.position); !ok) return in_context(name, ok.error());
-    const auto message = reader_->next();
-    if (!message) return in_context(name, message.error());
-    if (!*message || (*message)->channel->topic != topic)
-      return fail(ErrorCode::io, "{}: is not there any more: has the bag changed?", name);
-    const auto encoding = bags::to_encoding((*message)->channel->message_encoding);
-    if (!encoding) return in_context(name, encoding.error());
-    Result<Out> out = make(**message, *encoding);
-    if (!out) return in_context(name, out.error());
-    return out;
-  }
-
-  std::mutex mutex_;
-  std::unique_ptr<bags::BagReader> reader_;
-  std::string file_;
-};
+Result<DepthImage> read_depth(BagMessages& messages, const BagDepth& depth, const ScanPlace& place,
+                              formats::ExpectedSize expected) {
+  return messages.read(depth.topic, place, [&](const bags::BagMessage& message, bags::RosEncoding encoding) {
+    if (!depth.is_compressed)
+      return converted(bags::decode_image(message.data, encoding),
+                       [](const bags::RosImage& raw) { return bags::to_depth(raw); });
+    return converted(bags::decode_compressed_image(message.data, encoding),
+                     [&](const bags::RosCompressedImage& packed) { return bags::to_depth(packed, expected); });
+  });
+}
 
 /// What to say of it. Depth by another clock is not used.
-Result<std::string> add_depth(const BagDepth& depth, const std::shared_ptr<ImageReader>& images,
+Result<std::string> add_depth(const BagDepth& depth, const std::shared_ptr<BagMessages>& messages,
                               const ImagesConfig& config, ImageStream& stream) {
   const auto sensor = depth_sensor(config.depth, bags::kDepthUnit_m);
   if (!sensor) return tl::unexpected(sensor.error());
@@ -188,8 +143,8 @@ Result<std::string> add_depth(const BagDepth& depth, const std::shared_ptr<Image
   for (const ScanPlace& place : depth.images) stamps.push_back(place.stamp + config.time_offset_s);
   const CameraModel& camera = stream.cameras.front().model;
   const formats::ExpectedSize size{camera.width_px, camera.height_px};
-  const auto load = [images, depth, size](std::size_t number) {
-    return images->depth(depth, depth.images.at(number), size);
+  const auto load = [messages, depth, size](std::size_t number) {
+    return read_depth(*messages, depth, depth.images.at(number), size);
   };
   const std::size_t found = formats::add_depth(stream, stamps, load, *sensor, config.depth.max_difference_s);
   if (const auto ok = check_depth_stamps(stream.stamps, stamps, found, config.depth.max_difference_s); !ok) {
@@ -212,14 +167,12 @@ void take_cameras(const BagIndex& index, const std::string& body, const RobotCon
   std::vector<bags::ImageTopic> topics;
   for (const auto& [topic, track] : index.images) {
     if (!wanted.empty() && !is_wanted(topic, wanted)) continue;
-    auto camera = camera_of(index, topic, track, body);
+    auto camera = camera_of(index, track, body);
     if (!camera) {
       why += (why.empty() ? "" : "; ") + camera.error().message;
       continue;
     }
-    topics.push_back(image_topic(index, topic, track));
-    topics.back().width_px = static_cast<std::uint32_t>(camera->camera.model.width_px);
-    topics.back().height_px = static_cast<std::uint32_t>(camera->camera.model.height_px);
+    topics.push_back(track.seen);
     cameras.push_back(std::move(*camera));
   }
   std::string no_depth;
@@ -243,24 +196,24 @@ void take_cameras(const BagIndex& index, const std::string& body, const RobotCon
 
 Result<RobotImages> open_images(const BagRecording& bag, const Trajectory& odometry, const RobotConfig& robot,
                                 const visual::TrackingConfig& tracking) {
-  auto reader = bags::open_bag(bag.file);
-  if (!reader) return tl::unexpected(reader.error());
+  auto opened = BagMessages::open(bag.file);
+  if (!opened) return tl::unexpected(opened.error());
+  const std::shared_ptr<BagMessages> messages = std::move(*opened);
   ImageStream stream;
   for (const BagCamera& camera : bag.cameras) stream.cameras.push_back(camera.camera);
   const double offset_s = robot.images.time_offset_s;
   for (const ScanPlace& place : bag.cameras.front().images) stream.stamps.push_back(place.stamp + offset_s);
-  const auto images = std::make_shared<ImageReader>(std::move(*reader), bag.file);
-  stream.load = [images, cameras = bag.cameras, most_s = tracking.max_stamp_difference_s](
+  stream.load = [messages, cameras = bag.cameras, most_s = tracking.max_stamp_difference_s](
                     std::size_t moment, std::size_t camera) -> Result<Image> {
     const Timestamp stamp = cameras.front().images.at(moment).stamp;
     const std::vector<ScanPlace>& places = cameras.at(camera).images;
     const auto place = nearest_in_time(places, stamp, most_s, &ScanPlace::stamp);
     if (place == places.end()) return Image();
-    return images->image(cameras[camera], *place);
+    return read_image(*messages, cameras[camera], *place);
   };
   std::string note;
   if (bag.depth) {
-    auto said = add_depth(*bag.depth, images, robot.images, stream);
+    auto said = add_depth(*bag.depth, messages, robot.images, stream);
     if (!said) return tl::unexpected(said.error());
     note = std::move(*said);
   }

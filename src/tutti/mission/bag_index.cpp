@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <utility>
 
-#include "tutti/bags/bag_info.hpp"
 #include "tutti/bags/camera.hpp"
 #include "tutti/bags/robot_namespace.hpp"
 #include "tutti/bags/ros_fix.hpp"
 #include "tutti/bags/ros_messages.hpp"
+#include "tutti/bags/ros_types.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -72,6 +72,13 @@ class Indexer {
         if (with_images_) take_sight(message);
         return;
     }
+  }
+
+  /// Gives topics of images what is beside them.
+  void end() {
+    for (auto& [topic, track] : index.images)
+      if (const auto at = infos_.find(bags::camera_info_topic(topic, track.seen.is_compressed)); at != infos_.end())
+        track.seen.info = at->second;
   }
 
   BagIndex index;
@@ -149,14 +156,15 @@ class Indexer {
     const std::string& topic = message.channel->topic;
     const bags::RosEncoding encoding = encoding_of(message);
     const bags::Use use = bags::use_of(message.channel->type);
-    if (use == bags::Use::calibration && !index.cameras.contains(topic)) {
-      if (auto info = bags::decode_camera_info(message.data, encoding)) index.cameras.emplace(topic, std::move(*info));
+    if (use == bags::Use::calibration && !infos_.contains(topic)) {
+      if (auto info = bags::decode_camera_info(message.data, encoding)) infos_.emplace(topic, std::move(*info));
     } else if (use == bags::Use::imu) {
       take_imu(index.imu[topic], message);
     } else if (use == bags::Use::images) {
       ImageTrack& track = index.images[topic];
-      track.is_compressed = message.channel->type != "sensor_msgs/msg/Image";
-      if (track.is_compressed)
+      track.seen.topic = topic;
+      track.seen.is_compressed = message.channel->type == bags::kCompressedType;
+      if (track.seen.is_compressed)
         take_image(track, message, bags::decode_compressed_image(message.data, encoding));
       else
         take_image(track, message, bags::decode_image(message.data, encoding));
@@ -168,11 +176,8 @@ class Indexer {
     ++track.messages;
     if (!image) return track.refused.add(track.messages, image.error().message);
     const Timestamp stamp = image->header.stamp;
-    if (track.images.empty()) {
-      track.first = bags::look_of(*image);
-      track.is_depth = bags::is_depth(message.channel->topic, track.first.encoding);
-    }
-    if (track.is_depth)
+    if (track.images.empty()) track.seen.first = bags::look_of(*image);
+    if (track.seen.shows_depth())
       if (auto ok = check_depth(track, *image); !ok) return track.refused.add(track.messages, ok.error().message);
     track.images.push_back({stamp, message.position, track.messages});
     track.arrivals.push_back({stamp, message.log_time, track.messages});
@@ -180,11 +185,11 @@ class Indexer {
 
   /// What can be told without decoding it.
   static Status check_depth(const ImageTrack& track, const bags::RosImage& image) {
-    if (auto ok = bags::check_like_first(bags::look_of(image), track.first); !ok) return ok;
+    if (auto ok = bags::check_like_first(bags::look_of(image), *track.seen.first); !ok) return ok;
     return bags::check_rows(image, bags::depth_bytes(image.encoding));
   }
   static Status check_depth(const ImageTrack& track, const bags::RosCompressedImage& image) {
-    return bags::check_like_first(bags::look_of(image), track.first);
+    return bags::check_like_first(bags::look_of(image), *track.seen.first);
   }
 
   static void take_imu(ImuTrack& track, const BagMessage& message) {
@@ -200,6 +205,7 @@ class Indexer {
 
   const std::string& pair_;
   bool with_images_;
+  std::map<std::string, bags::RosCameraInfo> infos_;  // the first message of each topic
 };
 
 }  // namespace
@@ -283,6 +289,7 @@ BagIndex index_bag(bags::BagReader& bag, const std::string& pair, bool with_imag
     if (!*message) break;
     indexer.take(**message);
   }
+  indexer.end();
   for (const bags::BagChannel* const channel : bag.channels()) {  // those without messages, too
     const bags::Use use = bags::use_of(channel->type);
     if (use == bags::Use::odometry) index.odometry[channel->topic];

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "tutti/bags/bag_reader.hpp"
-#include "tutti/bags/depth.hpp"
+#include "tutti/bags/image_topic.hpp"
 #include "tutti/bags/stamp_order.hpp"
 #include "tutti/bags/transform_tree.hpp"
 #include "tutti/base/result.hpp"
@@ -59,9 +59,7 @@ struct ScanTrack {
 struct ImageTrack {
   std::vector<ScanPlace> images;
   std::vector<bags::Arrival> arrivals;
-  bags::ImageLook first;
-  bool is_depth = false;  ///< By the first one's encoding; then all have this one's, its frame and its size.
-  bool is_compressed = false;
+  bags::ImageTopic seen;  ///< If it shows depth, all messages are like the first.
   std::uint64_t messages = 0;
   Refusals refused;
 };
@@ -94,7 +92,6 @@ struct BagIndex {
   std::map<std::string, OdometryTrack> transforms;
   std::map<std::string, ScanTrack> scans;
   std::map<std::string, ImageTrack> images;
-  std::map<std::string, bags::RosCameraInfo> cameras;  ///< The first message of each topic.
   std::map<std::string, ImuTrack> imu;
   std::map<std::string, FixTrack> fixes;
   std::map<std::string, bags::TransformTree> trees;  ///< By namespace: of "/alpha/tf" and "/alpha/tf_static".

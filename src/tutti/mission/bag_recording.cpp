@@ -7,7 +7,6 @@
 #include <cmath>
 #include <utility>
 
-#include "tutti/bags/bag_info.hpp"
 #include "tutti/bags/sensor_clock.hpp"
 
 namespace tutti::mission {

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Scans of a bag, read when they are asked for.
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <memory>
-#include <mutex>
 #include <utility>
 
 #include "tutti/bags/point_cloud.hpp"
+#include "tutti/mission/bag_messages.hpp"
 #include "tutti/mission/bag_recording.hpp"
 #include "tutti/perception/lidar/deskewed_scan.hpp"
 
@@ -18,10 +16,8 @@ constexpr std::size_t kTriedScans = 5;  // scans that may be no good before the 
 
 class BagScans final : public ScanSource {
  public:
-  BagScans(std::unique_ptr<bags::BagReader> reader, const BagRecording& bag, const Trajectory& odometry,
-           double offset_s)
-      : reader_(std::move(reader)),
-        file_(bag.file),
+  BagScans(std::shared_ptr<BagMessages> messages, const BagRecording& bag, const Trajectory& odometry, double offset_s)
+      : messages_(std::move(messages)),
         topic_(bag.scan_topic),
         places_(bag.scans),
         T_body_lidar_(bag.T_body_lidar),
@@ -60,25 +56,17 @@ class BagScans final : public ScanSource {
  private:
   [[nodiscard]] Timestamp sensor_stamp(std::size_t sample) const { return places_[sample].stamp - offset_s_; }
 
-  [[nodiscard]] std::string name_of(const ScanPlace& place) const {
-    return fmt::format("{}: {}: message {}", file_, topic_, place.message);
-  }
+  [[nodiscard]] std::string name_of(const ScanPlace& place) const { return messages_->name_of(topic_, place); }
 
   [[nodiscard]] Result<formats::TimedCloud> read(const ScanPlace& place) const {
-    const std::scoped_lock lock(mutex_);
-    if (auto ok = reader_->seek(place.position); !ok) return in_context(name_of(place), ok.error());
-    const auto message = reader_->next();
-    if (!message) return in_context(name_of(place), message.error());
-    if (!*message || (*message)->channel->topic != topic_)
-      return fail(ErrorCode::io, "{}: is not there any more: has the bag changed?", name_of(place));
-    const auto encoding = bags::to_encoding((*message)->channel->message_encoding);
-    if (!encoding) return in_context(name_of(place), encoding.error());
-    const auto decoded = bags::decode_scan((*message)->channel->type, (*message)->data, *encoding);
-    if (!decoded) return in_context(name_of(place), decoded.error());
-    auto cloud = bags::to_timed_cloud(*decoded);
-    if (!cloud) return in_context(name_of(place), cloud.error());
-    if (cloud->cloud.points.empty()) return fail(ErrorCode::invalid, "{}: holds no points", name_of(place));
-    return cloud;
+    return messages_->read(
+        topic_, place, [](const bags::BagMessage& message, bags::RosEncoding encoding) -> Result<formats::TimedCloud> {
+          const auto decoded = bags::decode_scan(message.channel->type, message.data, encoding);
+          if (!decoded) return tl::unexpected(decoded.error());
+          auto cloud = bags::to_timed_cloud(*decoded);
+          if (cloud && cloud->cloud.points.empty()) return fail(ErrorCode::invalid, "holds no points");
+          return cloud;
+        });
   }
 
   [[nodiscard]] Result<std::optional<lidar::PointTimes>> times_of(std::size_t sample, const RobotConfig& robot) const {
@@ -89,9 +77,8 @@ class BagScans final : public ScanSource {
     return times;
   }
 
-  mutable std::mutex mutex_;  // the reader stands somewhere
-  std::unique_ptr<bags::BagReader> reader_;
-  std::string file_, topic_;
+  std::shared_ptr<BagMessages> messages_;
+  std::string topic_;
   std::vector<ScanPlace> places_;
   Pose3 T_body_lidar_;
   double offset_s_ = 0.0;  // added to the sensor's stamps gives the odometry's time
@@ -103,9 +90,9 @@ class BagScans final : public ScanSource {
 
 Result<std::shared_ptr<const ScanSource>> open_scans(const BagRecording& bag, const Trajectory& odometry,
                                                      const RobotConfig& robot, std::string& note) {
-  auto reader = bags::open_bag(bag.file);
-  if (!reader) return tl::unexpected(reader.error());
-  auto scans = std::make_shared<BagScans>(std::move(*reader), bag, odometry, robot.scan_time_offset_s);
+  auto messages = BagMessages::open(bag.file);
+  if (!messages) return tl::unexpected(messages.error());
+  auto scans = std::make_shared<BagScans>(std::move(*messages), bag, odometry, robot.scan_time_offset_s);
   auto words = scans->look_into(robot, odometry);
   if (!words) return tl::unexpected(words.error());
   note = std::move(*words);

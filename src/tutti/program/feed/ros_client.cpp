@@ -5,6 +5,7 @@
 
 #include <utility>
 
+#include "tutti/bags/ros_types.hpp"
 #include "tutti/base/plain_text.hpp"
 
 namespace tutti::program {
@@ -56,8 +57,7 @@ std::vector<FeedRaw> RosClient::hear(const FeedAnswer& answer, const Pose3& T_od
   }
   answers_->hear(answer, T_odom_body);
   std::vector<FeedRaw> out;
-  if (auto transform = answers_->transform())
-    out.push_back({"/tf", "tf2_msgs/msg/TFMessage", kCdr, std::move(*transform)});
+  if (auto transform = answers_->transform()) out.push_back({"/tf", bags::kTfType, kCdr, std::move(*transform)});
   out.push_back({"corrected_pose", "geometry_msgs/msg/PoseWithCovarianceStamped", kCdr, answers_->pose()});
   return out;
 }

@@ -26,7 +26,6 @@ struct Qos {
   bool latched = false;  ///< Transient local: late subscribers are given the last messages.
   int depth = 10;  ///< Messages kept per topic; 0: all, so that a reliable writer waits for its readers (30 s at most).
 };
-inline constexpr const char* kTfType = "tf2_msgs/msg/TFMessage";
 inline constexpr Qos kSensorQos{.reliable = false, .latched = false, .depth = 5};
 inline constexpr Qos kTfQos{.reliable = true, .latched = false, .depth = 100};
 inline constexpr Qos kStaticTfQos{.reliable = true, .latched = true, .depth = 100};

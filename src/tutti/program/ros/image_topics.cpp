@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "tutti/bags/camera.hpp"
+#include "tutti/bags/ros_types.hpp"
 
 namespace tutti::ros {
 
@@ -50,9 +51,9 @@ Result<std::vector<intake::CameraTopics>> find_images(std::span<const Publicatio
   std::set<std::string> infos, raw;  // raw: CameraInfo topics of images that are there uncompressed
   std::map<std::string, intake::CameraTopics> found;
   for (const Publication& topic : published) {
-    if (topic.type == intake::kCameraInfoType) infos.insert(topic.topic);
-    const bool is_compressed = topic.type == intake::kCompressedType;
-    if (!is_compressed && topic.type != intake::kImageType) continue;
+    if (topic.type == bags::kCameraInfoType) infos.insert(topic.topic);
+    const bool is_compressed = topic.type == bags::kCompressedType;
+    if (!is_compressed && topic.type != bags::kImageType) continue;
     const intake::Wish wish = wish_of(topic.topic, config);
     if (wish == intake::Wish::nothing && !may_be_found(topic.topic, config)) continue;
     const std::string info = bags::camera_info_topic(topic.topic, is_compressed);
@@ -79,7 +80,7 @@ Result<std::vector<intake::CameraTopics>> find_images(std::span<const Publicatio
 Result<std::string> choose_imu(std::span<const Publication> published, const intake::ImagesConfig& config) {
   std::set<std::string> found;
   for (const Publication& topic : published)
-    if (topic.type == intake::kImuType &&
+    if (topic.type == bags::kImuType &&
         (config.imu.empty() ? topic.topic.starts_with(config.within) : topic.topic == config.imu))
       found.insert(topic.topic);
   if (found.size() > 1)

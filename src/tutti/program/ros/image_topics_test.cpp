@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "support/intake/camera_robot.hpp"
+#include "tutti/bags/ros_types.hpp"
 
 namespace tutti::ros {
 namespace image_topics_test {
@@ -24,21 +25,21 @@ std::vector<std::string> names(const Result<std::vector<intake::CameraTopics>>& 
 TEST(ImageTopics, TopicsAreFoundByType) {
   intake::ImagesConfig config;
   ASSERT_TRUE(resolve(config, "r"));
-  auto published = publications({{"/r/right/image_raw", intake::kImageType},
-                                 {"/r/right/camera_info", intake::kCameraInfoType},
-                                 {"/r/left/image_raw", intake::kImageType},
-                                 {"/r/left/image_raw/compressed", intake::kCompressedType},
-                                 {"/r/left/image_raw/compressedDepth", intake::kCompressedType},
-                                 {"/r/left/camera_info", intake::kCameraInfoType},
-                                 {"/r/rviz", intake::kImageType},
-                                 {"/s/image_raw", intake::kImageType},
-                                 {"/s/camera_info", intake::kCameraInfoType},
-                                 {"/s/imu", intake::kImuType},
-                                 {"/r/imu", intake::kImuType}});
+  auto published = publications({{"/r/right/image_raw", bags::kImageType},
+                                 {"/r/right/camera_info", bags::kCameraInfoType},
+                                 {"/r/left/image_raw", bags::kImageType},
+                                 {"/r/left/image_raw/compressed", bags::kCompressedType},
+                                 {"/r/left/image_raw/compressedDepth", bags::kCompressedType},
+                                 {"/r/left/camera_info", bags::kCameraInfoType},
+                                 {"/r/rviz", bags::kImageType},
+                                 {"/s/image_raw", bags::kImageType},
+                                 {"/s/camera_info", bags::kCameraInfoType},
+                                 {"/s/imu", bags::kImuType},
+                                 {"/r/imu", bags::kImuType}});
   EXPECT_EQ(find_images(published, config).value(), (std::vector{kLeft, kRight}));
   EXPECT_EQ(choose_imu(published, config).value(), "/r/imu");
   EXPECT_TRUE(find_images(publications({}), config)->empty());
-  published.push_back({.topic = "/r/imu2", .type = intake::kImuType, .user_data = {}});
+  published.push_back({.topic = "/r/imu2", .type = bags::kImuType, .user_data = {}});
   expect(choose_imu(published, config).error().message, "2 topics have one; say which: --imu /r/imu ");
 
   intake::ImagesConfig named{.images = {"left/image_raw/compressed"}, .with_depth = false, .imu = "imu2"};
@@ -54,11 +55,11 @@ TEST(ImageTopics, TopicsAreFoundByType) {
 
 /// One camera that is named may have depth that is not; what both are named nothing else is looked at.
 TEST(ImageTopics, DepthIsFoundAmongTheOthersOrNamed) {
-  const auto published = publications({{"/r/color/image_raw", intake::kImageType},
-                                       {"/r/color/camera_info", intake::kCameraInfoType},
-                                       {"/r/depth/image_raw", intake::kImageType},
-                                       {"/r/depth/camera_info", intake::kCameraInfoType},
-                                       {"/r/registered", intake::kImageType}});
+  const auto published = publications({{"/r/color/image_raw", bags::kImageType},
+                                       {"/r/color/camera_info", bags::kCameraInfoType},
+                                       {"/r/depth/image_raw", bags::kImageType},
+                                       {"/r/depth/camera_info", bags::kCameraInfoType},
+                                       {"/r/registered", bags::kImageType}});
   const std::vector<std::string> both{"/r/color/image_raw", "/r/depth/image_raw"};
   intake::ImagesConfig config{.images = {"color/image_raw"}};
   ASSERT_TRUE(resolve(config, "r"));

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "tutti/bags/ros_definitions.hpp"
+#include "tutti/bags/ros_types.hpp"
 
 namespace tutti::ros {
 
@@ -13,7 +14,7 @@ Status RobotTopics::open() {
     const char *name, *type;
     Qos qos;
   };
-  for (const auto& [name, type, qos] : {Topic{kTf, kTfType, kTfQos},
+  for (const auto& [name, type, qos] : {Topic{kTf, bags::kTfType, kTfQos},
                                         {"corrected_pose", "geometry_msgs/msg/PoseWithCovarianceStamped", {}},
                                         {kPath, "nav_msgs/msg/Path", kLatchedQos},
                                         {"team_mates", "visualization_msgs/msg/MarkerArray", kLatchedQos},
@@ -34,7 +35,7 @@ Status RobotTopics::open(const std::string& topic, const std::string& type, cons
 bool RobotTopics::open_own_tf() {
   constexpr const char* kOwnTf = "tf";
   if (writers_.contains(kOwnTf)) return false;
-  const Status ok = open(kOwnTf, kTfType, kTfQos);
+  const Status ok = open(kOwnTf, bags::kTfType, kTfQos);
   complaints_.add(kOwnTf, ok);
   if (ok) std::swap(writers_[kTf], writers_[kOwnTf]);  // the other one stays open
   return ok.has_value();

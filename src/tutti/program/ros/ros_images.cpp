@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "tutti/bags/ros_definitions.hpp"
+#include "tutti/bags/ros_types.hpp"
 #include "tutti/program/clock.hpp"
 #include "tutti/program/ros/image_topics.hpp"
 
@@ -19,7 +20,7 @@ constexpr double kLook_s = 0.5;  // what is published together is discovered tog
 std::string images_of(const std::vector<Publication>& published) {
   std::vector<std::string> names;
   for (const Publication& topic : published)
-    if (topic.type == intake::kImageType || topic.type == intake::kCompressedType) names.push_back(topic.topic);
+    if (topic.type == bags::kImageType || topic.type == bags::kCompressedType) names.push_back(topic.topic);
   return fmt::format("topics of sensor_msgs/Image and CompressedImage here are: {}",
                      names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", ")));
 }
@@ -78,12 +79,12 @@ Status RosImages::subscribe(const std::vector<intake::CameraTopics>& topics, con
   };
   constexpr int kImagesDepth = 10, kImuDepth = 2000;  // how long this thread may be held up
   for (const intake::CameraTopics& topic : topics) {
-    if (Status ok = add(topic.info, intake::kCameraInfoType, kImagesDepth); !ok) return ok;
-    const char* const type = topic.is_compressed ? intake::kCompressedType : intake::kImageType;
+    if (Status ok = add(topic.info, bags::kCameraInfoType, kImagesDepth); !ok) return ok;
+    const char* const type = topic.is_compressed ? bags::kCompressedType : bags::kImageType;
     if (Status ok = add(topic.images, type, kImagesDepth); !ok) return ok;
   }
   if (!imu.empty())
-    if (Status ok = add(imu, intake::kImuType, kImuDepth); !ok) return ok;
+    if (Status ok = add(imu, bags::kImuType, kImuDepth); !ok) return ok;
   readers_ = std::move(readers);
   return {};
 }

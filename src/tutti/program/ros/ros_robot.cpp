@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "tutti/bags/ros_definitions.hpp"
+#include "tutti/bags/ros_types.hpp"
 #include "tutti/program/clock.hpp"
 #include "tutti/program/feed/local_client.hpp"
 #include "tutti/program/ros/complaints.hpp"
@@ -24,8 +25,6 @@ namespace {
 
 using program::Clock, program::Level, program::LocalClient;
 
-constexpr const char *kOdometryType = "nav_msgs/msg/Odometry", *kFixType = "sensor_msgs/msg/NavSatFix",
-                     *kBatteryType = "sensor_msgs/msg/BatteryState";
 constexpr double kWait_s = 0.02;
 constexpr double kJoinsAgain_s = 0.1;
 constexpr double kEachSecond_s = 1.0;
@@ -141,18 +140,19 @@ Status Robot::subscribe() {
   };
   constexpr int kOdometryDepth = 1000, kFixesDepth = 100;  // how long this thread may be held up
   const Qos tf = by_tf() && options_.lossless ? in_qos(true, 0) : kTfQos;
-  if (Status ok = make(tf_static_, "/tf_static", kTfType, kStaticTfQos); !ok) return ok;
-  if (Status ok = make(tf_, "/tf", kTfType, tf); !ok) return ok;
+  if (Status ok = make(tf_static_, "/tf_static", bags::kTfType, kStaticTfQos); !ok) return ok;
+  if (Status ok = make(tf_, "/tf", bags::kTfType, tf); !ok) return ok;
   if (resolve("tf", options_.name_space).value() != "/tf") {
-    if (Status ok = make(own_tf_static_, "tf_static", kTfType, kStaticTfQos); !ok) return ok;
-    if (Status ok = make(own_tf_, "tf", kTfType, tf); !ok) return ok;
+    if (Status ok = make(own_tf_static_, "tf_static", bags::kTfType, kStaticTfQos); !ok) return ok;
+    if (Status ok = make(own_tf_, "tf", bags::kTfType, tf); !ok) return ok;
   }
   if (!by_tf())
-    if (Status ok = make(odometry_, options_.odometry, kOdometryType, in_qos(options_.lossless, kOdometryDepth)); !ok)
+    if (Status ok = make(odometry_, options_.odometry, bags::kOdometryType, in_qos(options_.lossless, kOdometryDepth));
+        !ok)
       return ok;
   if (Status ok = subscribe_points(); !ok) return ok;
-  if (Status ok = make(battery_, options_.battery, kBatteryType, in_qos(false, 1)); !ok) return ok;
-  return make(fixes_, options_.fixes, kFixType, in_qos(options_.lossless, kFixesDepth));
+  if (Status ok = make(battery_, options_.battery, bags::kBatteryType, in_qos(false, 1)); !ok) return ok;
+  return make(fixes_, options_.fixes, bags::kFixType, in_qos(options_.lossless, kFixesDepth));
 }
 
 /// A reader hears messages of one type only, and scans come in several: while nobody publishes what this one hears, it

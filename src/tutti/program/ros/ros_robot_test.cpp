@@ -17,6 +17,7 @@
 #include "support/intake/messages.hpp"
 #include "support/program/ros/loopback.hpp"
 #include "tutti/bags/ros_messages.hpp"
+#include "tutti/bags/ros_types.hpp"
 #include "tutti/program/feed/live_feed.hpp"
 
 namespace tutti::ros {
@@ -84,8 +85,8 @@ TEST_F(RosRobots, IsFedByTopicsAndAnswersOnTopics) {
   const auto cloud = publisher("/alpha/points", kPoints);
   const auto receiver = publisher("/alpha/fix", kFix);
   ASSERT_TRUE(is_heard(*odom) && is_heard(*cloud) && is_heard(*receiver));
-  const auto camera = publisher("/alpha/image_raw", intake::kImageType),
-             info = publisher("/alpha/camera_info", intake::kCameraInfoType);
+  const auto camera = publisher("/alpha/image_raw", bags::kImageType),
+             info = publisher("/alpha/camera_info", bags::kCameraInfoType);
   std::size_t scans = 0, samples = 0, fixes = 0, transforms = 0, poses = 0;
   const auto look = [&] {
     while (const auto input = feed_->front().take(0.0)) {
@@ -171,10 +172,9 @@ TEST_F(RosRobots, TheBatteryIsReported) {
 /// Cameras are found by type; until their place is known, odometry is answered without them.
 TEST_F(RosRobots, ImagesAndImuAreFedOnceTheirPlaceIsKnown) {
   start({.images = intake::ImagesConfig{}});
-  const auto odom = publisher("/alpha/odom", kOdometry),
-             camera = publisher("/alpha/front/image_raw", intake::kImageType),
-             info = publisher("/alpha/front/camera_info", intake::kCameraInfoType),
-             imu = publisher("/alpha/imu", intake::kImuType);
+  const auto odom = publisher("/alpha/odom", kOdometry), camera = publisher("/alpha/front/image_raw", bags::kImageType),
+             info = publisher("/alpha/front/camera_info", bags::kCameraInfoType),
+             imu = publisher("/alpha/imu", bags::kImuType);
   const auto still = publisher("/tf_static", kTf, kStaticTfQos);
   ASSERT_TRUE(is_heard(*odom) && is_heard(*camera) && is_heard(*info) && is_heard(*imu)) << said();
   std::size_t samples = 0, images = 0, sensors = 0;
