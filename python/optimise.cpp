@@ -55,7 +55,7 @@ Optimised optimise(const Graph& graph, const std::string& loss, const std::strin
   return out;
 }
 
-struct FailedStretch {
+struct FailedSegment {
   std::int64_t from_id = 0, to_id = 0;
   double jump_m = 0.0, jump_rad = 0.0;
 };
@@ -66,7 +66,7 @@ struct Judged {
   std::vector<std::string> reasons;
   std::vector<std::int64_t> components, robots;
   std::vector<std::string> robot_names;
-  std::vector<FailedStretch> failed;
+  std::vector<FailedSegment> failed;
 };
 
 /// Its vertices are in the order of the robots; `graph` has them in that of their ids.
@@ -132,11 +132,11 @@ void bind_optimised(py::module_& m) {
         return fmt::format("<tutti.OptimiseResult {} after {} iterations, chi2 {:.6g} to {:.6g}>",
                            to_string(o.summary.termination), o.summary.iterations, o.chi2_before, o.chi2_after);
       });
-  py::class_<FailedStretch>(m, "FailedOdometry", "Odometry that the closures show to have failed.")
-      .def_readonly("from_id", &FailedStretch::from_id, "Id of the pose before it,")
-      .def_readonly("to_id", &FailedStretch::to_id, "and of the pose behind it.")
-      .def_readonly("jump_m", &FailedStretch::jump_m, "By how much the map differs from it, metres,")
-      .def_readonly("jump_rad", &FailedStretch::jump_rad, "and radians.");
+  py::class_<FailedSegment>(m, "FailedOdometry", "Odometry that the closures show to have failed.")
+      .def_readonly("from_id", &FailedSegment::from_id, "Id of the pose before it,")
+      .def_readonly("to_id", &FailedSegment::to_id, "and of the pose behind it.")
+      .def_readonly("jump_m", &FailedSegment::jump_m, "By how much the map differs from it, metres,")
+      .def_readonly("jump_rad", &FailedSegment::jump_rad, "and radians.");
   py::class_<Judged>(m, "RobustResult",
                      "What optimise_robust() returns. Edges, m, are in the order of the graph that was given.")
       .def_readonly(

@@ -190,7 +190,7 @@ TEST(Mission, ALoneRobotIsAMissionToo) {
   EXPECT_LT(*robot.policies[0].accuracy.rmse_m, 0.6 * *robot.onboard.rmse_m);
 }
 
-TEST(Mission, TheReportNamesTheStretchWhereOdometryFailed) {
+TEST(Mission, TheReportNamesTheSegmentWhereOdometryFailed) {
   const auto config = lab::load_mission(test::source_path("missions/terrace.yaml"),
                                         {"simulation.sensors=none", "closures.finder=reference"});
   ASSERT_TRUE(config.has_value()) << config.error().message;

@@ -161,7 +161,7 @@ TEST(RealMissions, EurocFlightsAgreeWithTheJointMap) {
 TEST(RealMissions, PartsThatJoinLateAreNeverFarOff) {
   TUTTI_REQUIRE_SHARED("data/euroc/V1_01");
   lab::MissionConfig config = mission_file("euroc_v101_rovio");
-  config.server.map.who_is_wrong.min_joining_closures = 12;
+  config.server.map.outlier_rejection.min_joining_closures = 12;
   config.duration_s = 45.0;
   const MissionRecord record = run(config, 1);
   EXPECT_EQ(record.server.components, 1U);

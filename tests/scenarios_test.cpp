@@ -56,7 +56,7 @@ std::vector<FromStart> from_start(const Recording& recording) {
   return out;
 }
 
-/// What odometry makes of a stretch, seen at its end: right tangent.
+/// What odometry makes of a segment, seen at its end: right tangent.
 Vector6d error_over(const Recording& recording, std::size_t from, std::size_t until) {
   const auto increment = [&](const Trajectory& t) { return t[from].pose.inverse() * t[until].pose; };
   return local(increment(recording.reference), increment(recording.odometry));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// tutti map closure: why closures are in a map or not, and the operator's word on them.
+// tutti map closure: why closures are in a map or not, and the operator's decision on them.
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <unistd.h>
@@ -21,7 +21,7 @@
 #include "options.hpp"
 #include "tutti/bus/mission_lease.hpp"
 #include "tutti/mapfile/closures.hpp"
-#include "tutti/node/word_sender.hpp"
+#include "tutti/node/decision_sender.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::app {
@@ -80,9 +80,9 @@ void print(const mapfile::ClosureFit& fit) {
 
 /// Who says what of it, and what was measured.
 void print_origin(const mapfile::ClosureInfo& info) {
-  if (info.word)
-    fmt::print("decision     {}{} at {}\n", to_string(info.word->wish),
-               info.word->by.empty() ? "" : " by " + info.word->by, time_of(info.word->given_ns));
+  if (info.decision)
+    fmt::print("decision     {}{} at {}\n", to_string(info.decision->wish),
+               info.decision->by.empty() ? "" : " by " + info.decision->by, time_of(info.decision->given_ns));
   if (info.verdict) {
     const ClosureVerdict& verdict = *info.verdict;
     fmt::print("verified     by {}{}, finder {}\n",
@@ -114,7 +114,7 @@ int show(const ClosureOptions& options) {
 }
 
 /// What the server answers, of those messages that have come.
-std::optional<std::string> heard_answer(bus::Port& port, const node::WordSender& sender) {
+std::optional<std::string> heard_answer(bus::Port& port, const node::DecisionSender& sender) {
   for (const bus::Received& received : port.receive())
     if (const auto status = wire::decode_mission_status(*received.envelope.bytes))
       if (auto answer = sender.answer(*status)) return answer;
@@ -137,7 +137,7 @@ std::string waits_for(const bus::LinkState& state) {
 }
 
 /// To the server that has the map open, until it has answered.
-Status send(const ClosureOptions& options, const ClosureWord& word) {
+Status send(const ClosureOptions& options, const ClosureDecision& decision) {
   const auto self = bus::Endpoint::viewer(static_cast<std::uint32_t>(getpid()));
   bus::BusOptions where = options.bus;
   auto mission = bus::served_mission(where, std::min(bus::kLookForServer_s, options.wait_s), say_waiting);
@@ -145,7 +145,7 @@ Status send(const ClosureOptions& options, const ClosureWord& word) {
   where.mission = std::move(*mission);
   auto port = bus::open_port(self, where);
   if (!port) return tl::unexpected(port.error());
-  node::WordSender sender(self, word);
+  node::DecisionSender sender(self, decision);
   const auto begin = std::chrono::steady_clock::now();
   std::string said;
   for (;; std::this_thread::sleep_for(std::chrono::milliseconds(20))) {
@@ -174,36 +174,36 @@ int say(const ClosureOptions& options, Wish wish) {
     return complain(kCommand, "expected a map's file, or --bus URL of the server that has it open", 2);
   const auto now = std::chrono::system_clock::now().time_since_epoch();
   const auto& known = options.bus.credentials.known;
-  const ClosureWord word{options.closure, wish, known ? known->name : options.by,
-                         std::chrono::duration_cast<std::chrono::nanoseconds>(now).count()};
-  if (auto ok = wire::validate(word); !ok) return complain(kCommand, ok.error().message, 2);
+  const ClosureDecision decision{options.closure, wish, known ? known->name : options.by,
+                                 std::chrono::duration_cast<std::chrono::nanoseconds>(now).count()};
+  if (auto ok = wire::validate(decision); !ok) return complain(kCommand, ok.error().message, 2);
   if (!options.bus.url.empty()) {
-    if (auto sent = send(options, word); !sent) return complain(kCommand, sent.error().message);
+    if (auto sent = send(options, decision); !sent) return complain(kCommand, sent.error().message);
     fmt::print("{} {}: stored by the server; the map follows at its next update\n", to_string(wish), options.closure);
     return 0;
   }
   const auto map = mapfile::open(options.map);
   if (!map) return complain(kCommand, map.error().message);
-  if (auto stored = mapfile::put_word(**map, word); !stored) return complain(kCommand, stored.error().message);
+  if (auto stored = mapfile::put_decision(**map, decision); !stored) return complain(kCommand, stored.error().message);
   fmt::print("{} {}: stored; the server follows when it opens the map\n", to_string(wish), options.closure);
   return 0;
 }
 
-void add_word(CLI::App& command, Wish wish, const std::string& help, int& exit_code) {
+void add_decision(CLI::App& command, Wish wish, const std::string& help, int& exit_code) {
   const auto options = std::make_shared<ClosureOptions>();
   const char* user = std::getenv("USER");
   if (user != nullptr) options->by = user;
-  CLI::App* word = command.add_subcommand(to_string(wish), help);
-  word->add_option("closure", options->closure, "As `closure list` names it, e.g. alpha/12-bravo/7.")
+  CLI::App* decision = command.add_subcommand(to_string(wish), help);
+  decision->add_option("closure", options->closure, "As `closure list` names it, e.g. alpha/12-bravo/7.")
       ->type_name("ID")
       ->required();
-  word->add_option("map", options->map, "The map's file (a server's STATE/map.tutti), when no server has it open.")
+  decision->add_option("map", options->map, "The map's file (a server's STATE/map.tutti), when no server has it open.")
       ->type_name("MAP");
-  add_bus_options(*word, options->bus, "The bus of the server that has the map open, instead of a file");
-  add_mission_name(*word, options->bus.mission, kServedMission);
-  add_number(*word, "--wait", options->wait_s, "How long to say it again until the server has answered", "S");
-  word->add_option("--by", options->by, "Who says so, for the record.")->type_name("NAME")->capture_default_str();
-  word->callback([options, wish, &exit_code] { exit_code = say(*options, wish); });
+  add_bus_options(*decision, options->bus, "The bus of the server that has the map open, instead of a file");
+  add_mission_name(*decision, options->bus.mission, kServedMission);
+  add_number(*decision, "--wait", options->wait_s, "How long to say it again until the server has answered", "S");
+  decision->add_option("--by", options->by, "Who says so, for the record.")->type_name("NAME")->capture_default_str();
+  decision->callback([options, wish, &exit_code] { exit_code = say(*options, wish); });
 }
 
 }  // namespace
@@ -226,9 +226,10 @@ void add_map_closure_command(CLI::App& map, int& exit_code) {
   one->add_option("closure", showing->closure, "As `closure list` names it.")->type_name("ID")->required();
   one->add_option("map", showing->map, "The map's file.")->type_name("MAP")->required();
   one->callback([showing, &exit_code] { exit_code = show(*showing); });
-  add_word(*closure, Wish::accept, "It is right: in the map, with its covariance, whatever contradicts it.", exit_code);
-  add_word(*closure, Wish::reject, "It is wrong: never in the map.", exit_code);
-  add_word(*closure, Wish::withdraw, "Take your decision back: the server judges again.", exit_code);
+  add_decision(*closure, Wish::accept, "It is right: in the map, with its covariance, whatever contradicts it.",
+               exit_code);
+  add_decision(*closure, Wish::reject, "It is wrong: never in the map.", exit_code);
+  add_decision(*closure, Wish::withdraw, "Take your decision back: the server judges again.", exit_code);
 }
 
 }  // namespace tutti::app

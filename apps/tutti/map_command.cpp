@@ -182,7 +182,7 @@ int show_map(const fs::path& file) {
   std::size_t by_operator = 0;
   for (const mapfile::ClosureInfo& info : mapfile::closures(*content, estimate)) {
     ++states[to_string(info.state)];
-    if (info.word && info.word->wish != Wish::withdraw) ++by_operator;
+    if (info.decision && info.decision->wish != Wish::withdraw) ++by_operator;
   }
   fmt::print("\nclosures     {} accepted, {} rejected, {} candidates; {} by an operator's decision\n",
              states["accepted"], states["rejected"], states["candidate"], by_operator);

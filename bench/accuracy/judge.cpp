@@ -34,7 +34,7 @@ const std::vector<Place> kPlaces = {{"room", 2.5, 0.7, 150.0, 1.0},
                                     {"tunnel", 60.0, 2.0, 900.0, 1.0},
                                     {"street", 120.0, 12.0, 600.0, 0.5}};
 
-/// Wrong closures: strewn about, and how long the stretches are that look alike (0: none do).
+/// Wrong closures: strewn about, and how long the segments are that look alike (0: none do).
 struct Wrong {
   double share;
   double alike_s;
@@ -80,12 +80,12 @@ CorridorRunConfig config_of(const Case& of) {
 
 /// The map of a judge who is told which closures are wrong.
 server::MapEstimate perfect_map(CorridorRun run, const server::MapConfig& config) {
-  WordSet words;
+  DecisionSet decisions;
   for (auto& [pair, verdict] : run.verdicts) {
     std::erase_if(verdict.closures, [&](const LoopClosure& c) { return server::test::is_wrong(run, c); });
-    if (!verdict.closures.empty()) words[pair] = {.closure = {}, .wish = Wish::accept, .by = "truth"};
+    if (!verdict.closures.empty()) decisions[pair] = {.closure = {}, .wish = Wish::accept, .by = "truth"};
   }
-  return server::estimate_map(run.submaps, run.verdicts, config, words);
+  return server::estimate_map(run.submaps, run.verdicts, config, decisions);
 }
 
 nlohmann::json judged(const Case& of, const server::MapConfig& config) {

@@ -128,8 +128,8 @@ std::vector<Part> parts_of(const server::MapServer& server, const ProxyGraph& gr
   const auto vector_bytes = [](const auto& v) { return static_cast<double>(v.capacity() * sizeof(v[0])); };
   return {{"submaps (keyframes)", keyframes, submaps},
           {"verdicts with closures", server.state().verdicts.size(), verdicts},
-          {"answered pairs (stretches)", server.state().answered.stretches_beyond(),
-           24.0 * static_cast<double>(server.state().answered.stretches_beyond() + server.state().submaps.size())},
+          {"answered pairs (stretches)", server.state().answered.intervals_beyond(),
+           24.0 * static_cast<double>(server.state().answered.intervals_beyond() + server.state().submaps.size())},
           {"estimate: nodes", map.nodes.size(), vector_bytes(map.nodes) + vector_bytes(map.graph.poses)},
           {"estimate: edges", map.graph.edges.size(), vector_bytes(map.graph.edges)},
           {"estimate: closures", map.closures.size(), vector_bytes(map.closures)},

@@ -74,7 +74,7 @@ void submap(std::string_view bytes) { frame(MessageKind::submap, bytes, wire::de
 void proxy_graph(std::string_view bytes) { frame(MessageKind::proxy_graph, bytes, wire::decode_proxy_graph); }
 void verdict(std::string_view bytes) { frame(MessageKind::verdict, bytes, wire::decode_verdict); }
 void verdicts(std::string_view bytes) { frame(MessageKind::verdicts, bytes, wire::decode_verdicts); }
-void word(std::string_view bytes) { frame(MessageKind::word, bytes, wire::decode_word); }
+void word(std::string_view bytes) { frame(MessageKind::decision, bytes, wire::decode_decision); }
 void receipt(std::string_view bytes) { frame(MessageKind::receipt, bytes, wire::decode_receipt); }
 void job(std::string_view bytes) { frame(MessageKind::job, bytes, wire::decode_job); }
 void status(std::string_view bytes) { frame(MessageKind::status, bytes, wire::decode_status); }

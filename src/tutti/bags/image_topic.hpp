@@ -23,7 +23,7 @@ struct ImageTopic {
   [[nodiscard]] bool shows_picture() const;
   /// Fails, naming topic and encoding, unless it shows pictures.
   [[nodiscard]] Status check_picture() const;
-  /// Of the first message, which there must be: the size of pictures is that of the calibration, if there is one; 0: of
+  /// The size in the first message, which there must be, or of pictures the calibration's, if there is one; 0: of
   /// a file other than PNG.
   [[nodiscard]] std::uint32_t width_px() const;
   [[nodiscard]] std::uint32_t height_px() const;

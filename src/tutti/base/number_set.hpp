@@ -11,10 +11,10 @@ namespace tutti {
 /// gaps, not with the numbers.
 class NumberSet {
  public:
-  struct Stretch {  ///< Numbers begin ... end - 1.
+  struct Interval {  ///< Numbers begin ... end - 1.
     std::uint64_t begin = 0;
     std::uint64_t end = 0;
-    friend bool operator==(const Stretch&, const Stretch&) = default;
+    friend bool operator==(const Interval&, const Interval&) = default;
   };
 
   /// A number that is in the set already changes nothing. The largest number of 64 bits cannot be stored.
@@ -24,16 +24,16 @@ class NumberSet {
   [[nodiscard]] bool contains(std::uint64_t number) const;
   /// The smallest number that is not in the set.
   [[nodiscard]] std::uint64_t watermark() const;
-  /// The set as stretches, ascending, none empty, none overlapping or touching another.
-  [[nodiscard]] const std::vector<Stretch>& stretches() const { return stretches_; }
-  /// Adds a stretch that is not empty and begins at least one number behind the last one; otherwise returns false and
+  /// The set as intervals, ascending, none empty, none overlapping or touching another.
+  [[nodiscard]] const std::vector<Interval>& intervals() const { return intervals_; }
+  /// Adds an interval that is not empty and begins at least one number behind the last one; otherwise returns false and
   /// changes nothing.
-  bool append(Stretch stretch);
-  void clear() { stretches_.clear(); }
+  bool append(Interval interval);
+  void clear() { intervals_.clear(); }
   friend bool operator==(const NumberSet&, const NumberSet&) = default;
 
  private:
-  std::vector<Stretch> stretches_;
+  std::vector<Interval> intervals_;
 };
 
 }  // namespace tutti

@@ -9,7 +9,7 @@
 namespace tutti {
 namespace number_set_test {
 
-RC_GTEST_PROP(NumberSet, IsASetInAsFewStretchesAsThereAre, ()) {
+RC_GTEST_PROP(NumberSet, IsASetInAsFewIntervalsAsThereAre, ()) {
   NumberSet set;
   std::set<std::uint64_t> model;
   for (const int number : *rc::gen::container<std::vector<int>>(rc::gen::inRange(0, 40))) {
@@ -21,15 +21,15 @@ RC_GTEST_PROP(NumberSet, IsASetInAsFewStretchesAsThereAre, ()) {
     RC_ASSERT(set.contains(number) == model.contains(number));
     if (model.contains(number) && !model.contains(number - 1)) ++begins;
   }
-  RC_ASSERT(set.stretches().size() == begins);
+  RC_ASSERT(set.intervals().size() == begins);
   std::uint64_t first_missing = 0;
   while (model.contains(first_missing)) ++first_missing;
   RC_ASSERT(set.watermark() == first_missing);
   NumberSet again;
-  for (const NumberSet::Stretch& stretch : set.stretches()) {
-    RC_ASSERT(again.append(stretch));
-    RC_ASSERT(!again.append(stretch));
-    RC_ASSERT(!again.append({stretch.end, stretch.end + 1}));  // touches
+  for (const NumberSet::Interval& interval : set.intervals()) {
+    RC_ASSERT(again.append(interval));
+    RC_ASSERT(!again.append(interval));
+    RC_ASSERT(!again.append({interval.end, interval.end + 1}));  // touches
   }
   RC_ASSERT(again == set);
 }

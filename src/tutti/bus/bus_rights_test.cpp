@@ -36,7 +36,7 @@ TEST(BusRightsTest, ARobotWritesAsItselfAndReadsWhatIsItsOwn) {
 }
 
 TEST(BusRightsTest, AnOperatorDecidesUnderOneName) {
-  const Envelope word{Endpoint::viewer(1), Endpoint::server(), MessageKind::word, "id", {}, "anna"};
+  const Envelope word{Endpoint::viewer(1), Endpoint::server(), MessageKind::decision, "id", {}, "anna"};
   EXPECT_TRUE(may(kAnna, BusRight::To::publish, subject_of("cave", word)));
   EXPECT_EQ(address_of(subject_of("cave", word))->user, "anna");
   for (const BusRight& right : bus_rights()) {

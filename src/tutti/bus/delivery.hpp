@@ -30,7 +30,7 @@ constexpr Delivery delivery_of(wire::MessageKind kind) {
     case wire::MessageKind::submap:      // robot -> server
     case wire::MessageKind::verdicts:    // worker -> server
     case wire::MessageKind::refinement:  // worker -> server
-    case wire::MessageKind::word:        // viewer -> server
+    case wire::MessageKind::decision:    // viewer -> server
     case wire::MessageKind::verdict:     // these four are stored, not sent
     case wire::MessageKind::cloud:
     case wire::MessageKind::agent_state:

@@ -249,7 +249,7 @@ void JetStreamPort::make_stream_anew(const NatsConnection& connection) {
     for (const std::string& stream : lost) {
       if (stream == submap_stream(mission)) inbox_.forget_stream(MessageKind::submap);
       if (stream == verdict_stream(mission))
-        for (const MessageKind kind : {MessageKind::verdicts, MessageKind::refinement, MessageKind::word})
+        for (const MessageKind kind : {MessageKind::verdicts, MessageKind::refinement, MessageKind::decision})
           inbox_.forget_stream(kind);
     }
   }

@@ -106,14 +106,14 @@ TEST_P(PortConformance, AMessageArrivesAsItWasSent) {
 TEST_P(PortConformance, AnOperatorsWordWaitsForTheServer) {
   const Endpoint viewer = Endpoint::viewer(7);
   const auto port = network->connect(viewer);
-  send(*port, viewer, server, MessageKind::word, "accept/5/1", "word");
+  send(*port, viewer, server, MessageKind::decision, "accept/5/1", "word");
   network->settle();
   for (int start = 0; start < 2; ++start) {
     const auto hub = network->connect(server);
     const auto received = receive(*hub);
     ASSERT_EQ(received.size(), 1U) << "start " << start;
     EXPECT_EQ(received[0].envelope.from.role, Endpoint::Role::viewer);
-    EXPECT_EQ(received[0].envelope.kind, MessageKind::word);
+    EXPECT_EQ(received[0].envelope.kind, MessageKind::decision);
     EXPECT_EQ(*received[0].envelope.bytes, "word");
     if (start == 1) hub->acknowledge(received[0].ticket);
   }

@@ -10,7 +10,7 @@
 
 namespace tutti::consistency {
 
-/// The stretches that one update of a robot suspects, of odometry that left the map.
+/// The segments that one update of a robot suspects, of odometry that left the map.
 struct Suspicion {
   double time_s = 0.0;  ///< Mission time.
   std::uint64_t revision = 0;
@@ -27,8 +27,8 @@ struct Alert {
 };
 
 /// Follows the alerts (origins with SuspectedOrigin::alert) through one robot's updates, which are in time order. Two
-/// alerts of different updates are the same when their stretches overlap; the alert is then known since the earlier
-/// update. An alert that no origin of a later update overlaps is withdrawn. Sorted by the start of the stretch.
+/// alerts of different updates are the same when their segments overlap; the alert is then known since the earlier
+/// update. An alert that no origin of a later update overlaps is withdrawn. Sorted by the start of the segment.
 std::vector<Alert> follow_alerts(std::span<const Suspicion> updates);
 
 }  // namespace tutti::consistency

@@ -45,7 +45,7 @@ RC_GTEST_PROP(Compare, EqualMapsAgreeWhereverTheyAre, (std::uint64_t seed)) {
   RC_ASSERT(largest(comparison) < 1e-8);
 }
 
-TEST(Compare, AKinkIsFoundByTheSmallScales) {
+TEST(Compare, ADiscontinuityIsFoundByTheSmallScales) {
   const auto poses = test::corridor(200);
   auto bent = poses;
   bent[90].translation += bent[90].rotation * Eigen::Vector3d(0.3, 0.0, 0.0);  // along the path: visible in a distance
@@ -61,11 +61,11 @@ TEST(Compare, AKinkIsFoundByTheSmallScales) {
   }
 }
 
-TEST(Compare, ASlowStretchIsSeenInTheLargeScales) {
+TEST(Compare, ASlowSegmentIsSeenInTheLargeScales) {
   const auto poses = test::corridor(200);
-  auto stretched = poses;
-  for (Pose3& pose : stretched) pose.translation *= 1.01;
-  const auto comparison = compare(test::proxy_graph(poses), kAlpha, test::robot_nodes(stretched), {});
+  auto segmented = poses;
+  for (Pose3& pose : segmented) pose.translation *= 1.01;
+  const auto comparison = compare(test::proxy_graph(poses), kAlpha, test::robot_nodes(segmented), {});
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (Eigen::Index n = 0; n < 200; ++n) sum += groups(comparison, n);
   EXPECT_GT(sum(0), 3.0 * sum(1));
@@ -167,11 +167,11 @@ TEST(Disagreement, SortsDifferencesByScale) {
   const auto L = spectral::laplacian(spectral::proximity_adjacency(positions, 7.0, 1.0));
   const double lambda_max = spectral::largest_eigenvalue(L);
   const Eigen::MatrixXd f = Eigen::VectorXd::LinSpaced(200, 0.0, 199.0);
-  Eigen::MatrixXd kink = f, drift = f;
-  kink(90, 0) += 0.3;
+  Eigen::MatrixXd discontinuity = f, drift = f;
+  discontinuity(90, 0) += 0.3;
   for (Eigen::Index n = 0; n < 200; ++n) drift(n, 0) += 0.3 * std::sin(static_cast<double>(n) / 40.0);
   Comparison comparison;
-  comparison.disagreement = disagreement({L, f, lambda_max}, {L, kink, lambda_max}, {}, comparison.order);
+  comparison.disagreement = disagreement({L, f, lambda_max}, {L, discontinuity, lambda_max}, {}, comparison.order);
   EXPECT_GT(groups(comparison, 90)(2), 5.0 * groups(comparison, 90)(0));
   EXPECT_GT(groups(comparison, 90)(2), 10.0 * groups(comparison, 80)(2));
   comparison.disagreement = disagreement({L, f, lambda_max}, {L, drift, lambda_max}, {}, comparison.order);

@@ -74,7 +74,7 @@ TEST(ConstraintMaker, CovarianceStaysPositiveFarFromTheOrigin) {
   }
 }
 
-TEST(ConstraintMaker, CountsStretchesOverNodesTheRobotLacks) {
+TEST(ConstraintMaker, CountsSegmentsOverNodesTheRobotLacks) {
   const auto server = test::server_nodes(kAlpha, test::corridor(10));
   auto nodes = test::robot_nodes(test::corridor(10));
   nodes.erase(nodes.begin() + 4, nodes.begin() + 7);

@@ -108,12 +108,12 @@ TEST(DisagreementTest, DirectionsFindWhatOnlyClosuresKnow) {
   const test::WalkWithClosures map(kNodes, kNodes - 1, {0.02, 1e-4}, {0.005, 1e-4});
   const Scene scene(map);
   ASSERT_FALSE(scene.graph.uncertainties[0].directions.empty());
-  std::vector<Pose3> stretched = scene.server;
+  std::vector<Pose3> segmented = scene.server;
   for (std::size_t n = 0; n < kNodes; ++n)
-    stretched[n].translation.z() += 0.15 * static_cast<double>(n) / static_cast<double>(kNodes);
-  const Disagreement found = scene.test_with()(stretched);
+    segmented[n].translation.z() += 0.15 * static_cast<double>(n) / static_cast<double>(kNodes);
+  const Disagreement found = scene.test_with()(segmented);
   EXPECT_GT(found.direction_significance, 1.0);
-  EXPECT_EQ(scene.test_with({.without = "directions"})(stretched).direction_significance, 0.0);
+  EXPECT_EQ(scene.test_with({.without = "directions"})(segmented).direction_significance, 0.0);
 }
 
 TEST(DisagreementTest, LooksShareTheRate) {

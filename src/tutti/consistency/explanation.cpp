@@ -39,23 +39,23 @@ Explanation explain(const ProxyGraph& graph, const ChainId& id, std::span<const 
   out.aligned_rmse_m = aligned_rmse(chain.server, odometry);
   if (uncertainty != nullptr) out.expected_rmse_m = uncertainty->whole.position_m;
   if (!out.disagrees()) return out;  // nothing was born anywhere
-  for (const internal::DriftStretch& stretch :
-       internal::drift_stretches(chain, out.scale_length_m, uncertainty, false_alarm_rate)) {
+  for (const internal::DriftSegment& segment :
+       internal::drift_segments(chain, out.scale_length_m, uncertainty, false_alarm_rate)) {
     const auto relative = [&](const std::vector<Pose3>& poses) {
-      return poses[stretch.first].inverse() * poses[stretch.last];
+      return poses[segment.first].inverse() * poses[segment.last];
     };
     const Vector6d missed = local(relative(chain.server), relative(odometry));
-    const double length_m = out.distance_m[stretch.last] - out.distance_m[stretch.first];
-    const NodePair& middle = pairs[(stretch.first + stretch.last) / 2];
-    out.origins.push_back({.from = out.stamps[stretch.first],
-                           .until = out.stamps[stretch.last],
+    const double length_m = out.distance_m[segment.last] - out.distance_m[segment.first];
+    const NodePair& middle = pairs[(segment.first + segment.last) / 2];
+    out.origins.push_back({.from = out.stamps[segment.first],
+                           .until = out.stamps[segment.last],
                            .place_m = graph.nodes[middle.proxy].T_world_body.translation,
                            .scale = scale_of(out.scale_length_m, length_m),
                            .length_m = length_m,
                            .translation_m = missed.head<3>().norm(),
                            .rotation_rad = missed.tail<3>().norm(),
-                           .significance = stretch.significance,
-                           .alert = stretch.alert});
+                           .significance = segment.significance,
+                           .alert = segment.alert});
   }
   return out;
 }

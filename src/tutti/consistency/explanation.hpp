@@ -15,13 +15,13 @@
 
 namespace tutti::consistency {
 
-/// A stretch of a robot's run over which its odometry leaves the server's map by more than both allow for.
+/// A segment of a robot's run over which its odometry leaves the server's map by more than both allow for.
 struct SuspectedOrigin {
   Timestamp from;
   Timestamp until;
-  Eigen::Vector3d place_m = Eigen::Vector3d::Zero();  ///< Middle of the stretch in the server's estimate, in `world`.
-  int scale = 0;                                      ///< The scale whose length is nearest to the stretch's.
-  double length_m = 0.0;                              ///< Length of the stretch along the server's estimate.
+  Eigen::Vector3d place_m = Eigen::Vector3d::Zero();  ///< Middle of the segment in the server's estimate, in `world`.
+  int scale = 0;                                      ///< The scale whose length is nearest to the segment's.
+  double length_m = 0.0;                              ///< Length of the segment along the server's estimate.
   double translation_m = 0.0;  ///< Odometry against the map: difference of the relative poses from -> until.
   double rotation_rad = 0.0;
   double significance = 0.0;  ///< The difference over its threshold; at least 1.
@@ -62,7 +62,7 @@ struct Explanation {
   }
 };
 
-/// Explains `found`, the result of `test` on raw odometry (odometry_at()), and looks for the stretches where the
+/// Explains `found`, the result of `test` on raw odometry (odometry_at()), and looks for the segments where the
 /// difference was born, with the given false-alarm rate. `pairs` are those of the test. There are no origins when
 /// `found` does not disagree.
 Explanation explain(const ProxyGraph& graph, const ChainId& chain, std::span<const RobotNode> nodes,

@@ -85,7 +85,7 @@ RC_GTEST_PROP(PoseDifference, IsUnchangedWhenTheRobotsFrameIsMoved, (std::uint64
   RC_ASSERT((f - pose_difference(server, elsewhere)).cwiseAbs().maxCoeff() < 1e-9);
 }
 
-// The axes are those of the server's world: turning that turns the field along, and stretches nothing.
+// The axes are those of the server's world: turning that turns the field along, and segments nothing.
 RC_GTEST_PROP(PoseDifference, TurnsWithTheServersFrame, (std::uint64_t seed)) {
   Rng rng(seed);
   const auto server = test::corridor(80);

@@ -107,7 +107,7 @@ void GridBuilder::around(const Eigen::Vector3d& point, const Visit& visit) const
       if (is_inside(at)) visit(at);
 }
 
-void GridBuilder::mark_way(const Trajectory& way) {
+void GridBuilder::mark_trajectory(const Trajectory& way) {
   const int reach = static_cast<int>(config_.robot_m / config_.resolution_m);
   for (std::size_t i = 0; i < way.size(); ++i) {
     const Eigen::Vector3d& from = way[i > 0 ? i - 1 : 0].pose.translation;
@@ -180,7 +180,7 @@ void GridBuilder::add(const LevelSubmap& submap) {
     for (const double side : {-1.0, 0.0, 1.0})  // the voxel's edges: many rays became this one point
       mark_ray(from, to + side * Eigen::Vector3d(-way.y(), way.x(), 0.0));
   }
-  mark_way(submap.keyframes);
+  mark_trajectory(submap.keyframes);
 }
 
 OccupancyGrid GridBuilder::grid() const {

@@ -63,7 +63,7 @@ class GridBuilder {
   [[nodiscard]] bool is_in_slab(Index at, double z) const;
   template <class Visit>
   void around(const Eigen::Vector3d& point, const Visit& visit) const;
-  void mark_way(const Trajectory& way);
+  void mark_trajectory(const Trajectory& way);
   void mark_ray(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
   void mark(std::vector<std::uint32_t>& said, std::vector<std::uint16_t>& votes, Index at);
 

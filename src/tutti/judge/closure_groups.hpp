@@ -10,7 +10,7 @@
 
 namespace tutti::judge {
 
-/// What makes a group. Neighbours are as near in time as one submap is long; stretches longer than three submaps do not
+/// What makes a group. Neighbours are as near in time as one submap is long; segments longer than three submaps do not
 /// look alike; larger groups cost more to test than they are worth.
 struct GroupLimits {
   double near_s = 10.0;

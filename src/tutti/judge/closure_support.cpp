@@ -23,7 +23,7 @@ struct Directed {
 
 class Agreement {
  public:
-  Agreement(const OdometryWays& odometry, const WhoIsWrongConfig& config)
+  Agreement(const OdometryTrajectories& odometry, const OutlierRejectionConfig& config)
       : odometry_(odometry), limit_(chi_square_quantile(config.confidence, 6)) {}
 
   [[nodiscard]] Directed directed(const PoseGraphEdge& closure) const {
@@ -55,14 +55,14 @@ class Agreement {
   }
 
  private:
-  const OdometryWays& odometry_;
+  const OdometryTrajectories& odometry_;
   double limit_;
 };
 
 }  // namespace
 
-std::vector<bool> supported_closures(const OdometryWays& odometry, std::span<const PoseGraphEdge> closures,
-                                     const WhoIsWrongConfig& config) {
+std::vector<bool> supported_closures(const OdometryTrajectories& odometry, std::span<const PoseGraphEdge> closures,
+                                     const OutlierRejectionConfig& config) {
   const Agreement agreement(odometry, config);
   std::vector<Directed> all;
   std::vector<int> support(closures.size(), 0);

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "tutti/judge/odometry_ways.hpp"
+#include "tutti/judge/odometry_trajectories.hpp"
 #include "tutti/judge/settings.hpp"
 
 namespace tutti::judge {
@@ -16,7 +16,7 @@ namespace tutti::judge {
 /// chi-square quantile config.confidence of its covariance (Mangelson, Dominic, Eustice, Vasudevan, ICRA 2018, eqs. 7
 /// to 9); nothing before or after them enters. Fewer than config.min_joining_closures between two pieces are not
 /// supported.
-std::vector<bool> supported_closures(const OdometryWays& odometry, std::span<const PoseGraphEdge> closures,
-                                     const WhoIsWrongConfig& config);
+std::vector<bool> supported_closures(const OdometryTrajectories& odometry, std::span<const PoseGraphEdge> closures,
+                                     const OutlierRejectionConfig& config);
 
 }  // namespace tutti::judge

@@ -20,7 +20,7 @@ constexpr std::size_t kLeastGroup = 2;
 class Search {
  public:
   /// All must outlive this.
-  Search(const HypothesisSolver& solver, const WhoIsWrongConfig& config) : solver_(solver), config_(config) {}
+  Search(const HypothesisSolver& solver, const OutlierRejectionConfig& config) : solver_(solver), config_(config) {}
 
   Solution run(std::vector<std::vector<std::size_t>> groups) const {
     Solution best = solver_.solve({});
@@ -120,13 +120,13 @@ class Search {
   }
 
   const HypothesisSolver& solver_;
-  const WhoIsWrongConfig& config_;
+  const OutlierRejectionConfig& config_;
 };
 
 }  // namespace
 
-Judgement explain_closures(PoseGraph graph, const OdometryWays& odometry, std::size_t odometry_edges,
-                           std::span<const std::vector<std::size_t>> groups, const WhoIsWrongConfig& config,
+Judgement explain_closures(PoseGraph graph, const OdometryTrajectories& odometry, std::size_t odometry_edges,
+                           std::span<const std::vector<std::size_t>> groups, const OutlierRejectionConfig& config,
                            const estimation::GncConfig& gnc, const std::vector<bool>& certain) {
   TUTTI_CHECK(odometry_edges <= graph.edges.size(), "{} of {} edges", odometry_edges, graph.edges.size());
   const std::span<const PoseGraphEdge> closures = std::span(graph.edges).subspan(odometry_edges);
@@ -163,7 +163,7 @@ Judgement explain_closures(PoseGraph graph, const OdometryWays& odometry, std::s
                 .work = solver.work()};
   if (!best.solved) return out;
   for (std::size_t k = 0; k < closure_of.size(); ++k) out.accepted[closure_of[k]] = best.accepted[k] != 0;
-  for (const FailedStretch& failed : best.failed) out.failed.push_back(narrowed(odometry, failed));
+  for (const FailedSegment& failed : best.failed) out.failed.push_back(narrowed(odometry, failed));
   return out;
 }
 

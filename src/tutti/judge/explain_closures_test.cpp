@@ -13,7 +13,7 @@
 #include "tutti/judge/hypothesis.hpp"
 
 namespace tutti::judge {
-namespace who_is_wrong_test {
+namespace outlier_rejection_test {
 
 constexpr std::size_t kLap = 100, kNodes = 2 * kLap + 1;
 constexpr double kStep_m = 2.0;
@@ -55,14 +55,14 @@ struct Laps {
   void close_laps(std::size_t every) {
     for (std::size_t k = 1; k < kLap; k += every) close(k, k + kLap);
   }
-  [[nodiscard]] OdometryWays ways() const { return {seconds(), std::span(graph.edges).first(odometry_edges)}; }
+  [[nodiscard]] OdometryTrajectories ways() const { return {seconds(), std::span(graph.edges).first(odometry_edges)}; }
   static std::vector<double> seconds() {  // a step takes two
     std::vector<double> out;
     for (std::size_t k = 0; k < kNodes; ++k) out.push_back(2.0 * static_cast<double>(k));
     return out;
   }
   [[nodiscard]] Judgement explain(const std::vector<std::vector<std::size_t>>& groups = {},
-                                  const WhoIsWrongConfig& config = {}) const {
+                                  const OutlierRejectionConfig& config = {}) const {
     return explain_closures(graph, ways(), odometry_edges, groups, config, {});
   }
 };
@@ -73,18 +73,18 @@ struct Solver {
       : ways(laps.ways()),
         solver(laps.graph, ways, laps.odometry_edges, config, gnc,
                std::vector<bool>(laps.graph.edges.size() - laps.odometry_edges, false)) {}
-  OdometryWays ways;
-  WhoIsWrongConfig config;
+  OdometryTrajectories ways;
+  OutlierRejectionConfig config;
   estimation::GncConfig gnc;
   HypothesisSolver solver;
 };
 
 Pose3 off(Rng& rng) { return retract(Pose3{}, noise(rng, 5.0, 0.5)); }
 
-TEST(OdometryWays, KnowsThePiecesAndWhatLiesBetween) {
+TEST(OdometryTrajectories, KnowsThePiecesAndWhatLiesBetween) {
   Laps laps;
   laps.graph.edges.erase(laps.graph.edges.begin() + 60);  // a gap after node 60
-  const OdometryWays ways(Laps::seconds(), laps.graph.edges);
+  const OdometryTrajectories ways(Laps::seconds(), laps.graph.edges);
   EXPECT_EQ(ways.piece(60), 0U);
   EXPECT_EQ(ways.piece(200), 61U);
   EXPECT_DOUBLE_EQ(ways.seconds(30), 60.0);
@@ -108,7 +108,7 @@ TEST(ClosureSupport, RightClosuresHaveItAndWrongOnesDoNot) {
   EXPECT_LE(std::count(supported.begin() + 20, supported.end(), true), 1);
 }
 
-TEST(WhoIsWrong, WrongClosuresAreWrongAndHonestOdometryIsNot) {
+TEST(OutlierRejection, WrongClosuresAreWrongAndHonestOdometryIsNot) {
   Laps laps;
   laps.close_laps(5);
   for (std::size_t k = 0; k < 20; ++k) laps.close(k, k + 120, off(laps.rng));
@@ -119,7 +119,7 @@ TEST(WhoIsWrong, WrongClosuresAreWrongAndHonestOdometryIsNot) {
   EXPECT_TRUE(found.failed.empty());
 }
 
-TEST(WhoIsWrong, ALoneClosureIsWrongItselfAndManyBlameTheOdometry) {
+TEST(OutlierRejection, ALoneClosureIsWrongItselfAndManyBlameTheOdometry) {
   Laps lone;
   lone.close(20, 120, Pose3{so3_exp({0.0, 0.0, 0.3}), Eigen::Vector3d::Zero()});
   EXPECT_FALSE(lone.explain().accepted[0]);
@@ -139,7 +139,7 @@ TEST(WhoIsWrong, ALoneClosureIsWrongItselfAndManyBlameTheOdometry) {
   EXPECT_TRUE(laps.explain({}, {.let_odometry_fail = false}).failed.empty());
 }
 
-TEST(WhoIsWrong, PlacesThatLookAlikeBlameNothing) {
+TEST(OutlierRejection, PlacesThatLookAlikeBlameNothing) {
   Laps laps;
   laps.close_laps(10);
   const std::size_t right = laps.graph.edges.size() - laps.odometry_edges;
@@ -159,7 +159,7 @@ TEST(WhoIsWrong, PlacesThatLookAlikeBlameNothing) {
 // Twenty closures that agree say that a robot at 1 m/s was aside by so much between nodes 40 and 60. Closures before
 // and after leave it at most 10 s to get there: what it can have moved is believed, and the same from farther away is
 // not.
-TEST(WhoIsWrong, OdometryMissesNoMoreThanTheRobotCanHaveMoved) {
+TEST(OutlierRejection, OdometryMissesNoMoreThanTheRobotCanHaveMoved) {
   const auto accepted = [](double aside_m) {
     Laps laps;
     for (std::size_t k = 1; k < kLap; k += 5)
@@ -177,7 +177,7 @@ TEST(WhoIsWrong, OdometryMissesNoMoreThanTheRobotCanHaveMoved) {
   EXPECT_EQ(accepted(14.0), 0);
 }
 
-TEST(WhoIsWrong, DoesNotDependOnTheOrderOfTheClosures) {
+TEST(OutlierRejection, DoesNotDependOnTheOrderOfTheClosures) {
   Laps laps(130, 0.3);
   laps.close_laps(5);
   for (std::size_t k = 0; k < 6; ++k) laps.close(k, k + 120, off(laps.rng));
@@ -193,7 +193,7 @@ TEST(WhoIsWrong, DoesNotDependOnTheOrderOfTheClosures) {
 
 // Nothing in the judgement is a length: a place twenty times as large, with errors twenty times as large, is judged
 // alike.
-TEST(WhoIsWrong, ScalingLengthsAndTheirErrorsChangesNothing) {
+TEST(OutlierRejection, ScalingLengthsAndTheirErrorsChangesNothing) {
   Laps laps(130, 0.3);
   laps.close_laps(5);
   for (std::size_t k = 0; k < 6; ++k) laps.close(k, k + 120, off(laps.rng));
@@ -217,7 +217,7 @@ TEST(WhoIsWrong, ScalingLengthsAndTheirErrorsChangesNothing) {
 }
 
 // Two failures in one window cost about twice what one does.
-TEST(HypothesisSolver, EveryStretchOfAWindowPaysForHowFarItIsFromItsErrors) {
+TEST(HypothesisSolver, EverySegmentOfAWindowPaysForHowFarItIsFromItsErrors) {
   Laps one(50, 0.1), two(50, 0.1);
   for (Laps* laps : {&one, &two}) {
     if (laps == &two)
@@ -255,5 +255,5 @@ TEST(HypothesisSolver, AnOptimumHoldsUnderLessThatMayBeLetGo) {
   }
 }
 
-}  // namespace who_is_wrong_test
+}  // namespace outlier_rejection_test
 }  // namespace tutti::judge

@@ -24,7 +24,7 @@ constexpr double kNothing = 1e-9;
 /// refused by this share of all votes. Otherwise refused closures are strewn about, as wrong ones are.
 constexpr double kStrained = 1.0;
 constexpr double kManyRefused = 0.1;
-/// Closures do not tell exactly where in a stretch odometry failed. Each place is possible where the failure would be
+/// Closures do not tell exactly where in a segment odometry failed. Each place is possible where the failure would be
 /// at most this many times as large as at the place where it would be smallest, plus the usual motion of so many
 /// seconds. A radian counts as much as so many seconds of motion.
 constexpr double kAboutLeast = 1.5;
@@ -37,14 +37,14 @@ constexpr double kReach_s = 2.0;
 /// steps, and says nothing.
 constexpr double kBeginning = 1e-3;
 
-/// What a stretch missed, seen from one of its nodes: a wrong turn shifts everything the more the farther away it was.
-Pose3 seen_from(const OdometryWays& odometry, const FailedStretch& failed, std::size_t node) {
+/// What a segment missed, seen from one of its nodes: a wrong turn shifts everything the more the farther away it was.
+Pose3 seen_from(const OdometryTrajectories& odometry, const FailedSegment& failed, std::size_t node) {
   const Pose3 T_to_node = odometry.T(failed.to, node);
   return T_to_node.inverse() * (retract(Pose3{}, failed.missed) * T_to_node);
 }
 
 /// How large a failure was, seen from there, in seconds of usual motion.
-double size_at(const OdometryWays& odometry, const FailedStretch& failed, std::size_t node) {
+double size_at(const OdometryTrajectories& odometry, const FailedSegment& failed, std::size_t node) {
   const Pose3 seen = seen_from(odometry, failed, node);
   return seen.translation.norm() / odometry.usual_speed() + kRadian_s * rotation_angle(seen);
 }
@@ -57,7 +57,7 @@ estimation::PoseGraphSolution beginning(const PoseGraph& graph, estimation::GncC
 
 }  // namespace
 
-FailedStretch narrowed(const OdometryWays& odometry, FailedStretch failed) {
+FailedSegment narrowed(const OdometryTrajectories& odometry, FailedSegment failed) {
   std::vector<double> sizes;
   for (std::size_t k = failed.from; k <= failed.to; ++k) sizes.push_back(size_at(odometry, failed, k));
   const auto least = std::ranges::min_element(sizes);
@@ -70,9 +70,9 @@ FailedStretch narrowed(const OdometryWays& odometry, FailedStretch failed) {
   return failed;
 }
 
-HypothesisSolver::HypothesisSolver(const PoseGraph& graph, const OdometryWays& odometry, std::size_t odometry_edges,
-                                   const WhoIsWrongConfig& config, const estimation::GncConfig& gnc,
-                                   std::vector<bool> certain)
+HypothesisSolver::HypothesisSolver(const PoseGraph& graph, const OdometryTrajectories& odometry,
+                                   std::size_t odometry_edges, const OutlierRejectionConfig& config,
+                                   const estimation::GncConfig& gnc, std::vector<bool> certain)
     : odometry_(odometry),
       config_(config),
       gnc_(gnc),
@@ -195,12 +195,12 @@ Solution HypothesisSolver::judge(Hypothesis hypothesis, estimation::GncResult op
   return out;
 }
 
-/// What a stretch pays for how far it failed, in truncations: the logarithm of the density of its error over that of
+/// What a segment pays for how far it failed, in truncations: the logarithm of the density of its error over that of
 /// odometry's own errors. Along each of its six axes the density falls with the power 1.25 of the error's size, up to
 /// what a body can do, so that large failures are rarer than small ones. With the power 1, errors of any size are as
 /// likely, to a factor, and two failures that cancel each other explain a group of look-alikes too cheaply.
-double HypothesisSolver::votes_for(const FailedStretch& failed) const {
-  const FailedStretch about = narrowed(odometry_, failed);
+double HypothesisSolver::votes_for(const FailedSegment& failed) const {
+  const FailedSegment about = narrowed(odometry_, failed);
   double least_m = kInfinite;
   for (std::size_t node = about.from; node <= about.to; ++node)
     least_m = std::min(least_m, seen_from(odometry_, failed, node).translation.norm());
@@ -220,7 +220,7 @@ void HypothesisSolver::find_failed(const std::vector<Pose3>& poses, Solution& ou
       if (!out.let_go[run]) continue;
       const bool continues = out.failed.size() > known && out.failed.back().to == begin_of(run);
       if (!continues) out.failed.push_back({.from = begin_of(run)});
-      FailedStretch& failed = out.failed.back();
+      FailedSegment& failed = out.failed.back();
       failed.to = end_of(run);
       const auto at = [&](std::size_t node) {
         return poses[std::ranges::lower_bound(reduced_.nodes, node) - reduced_.nodes.begin()];

@@ -30,7 +30,7 @@ struct Solution {
   std::vector<char> let_go;    ///< Per run.
   std::vector<char> accepted;  ///< Per closure.
   /// Runs that were let go, neighbours joined; `from` and `to` are nodes of the graph.
-  std::vector<FailedStretch> failed;
+  std::vector<FailedSegment> failed;
   estimation::GncResult optimum;  ///< On the graph of the closures' ends.
   double misfit = 0.0;            ///< With the prices of windows and of wrong groups.
   double fit = 0.0;               ///< The misfit without the prices of windows.
@@ -42,16 +42,16 @@ struct Solution {
   double unexplained = 0.0;
 };
 
-/// Where a stretch failed: far from where odometry turned wrongly, the failure would have to be larger.
-FailedStretch narrowed(const OdometryWays& odometry, FailedStretch failed);
+/// Where a segment failed: far from where odometry turned wrongly, the failure would have to be larger.
+FailedSegment narrowed(const OdometryTrajectories& odometry, FailedSegment failed);
 
 /// Solves a pose graph under hypotheses, on the graph of the closures' ends.
 class HypothesisSolver {
  public:
   /// `odometry`, `config` and `gnc` must outlive the solver. `graph`, `odometry_edges`: as in explain_closures().
   /// `certain`: per closure whether it is right whatever it strains.
-  HypothesisSolver(const PoseGraph& graph, const OdometryWays& odometry, std::size_t odometry_edges,
-                   const WhoIsWrongConfig& config, const estimation::GncConfig& gnc, std::vector<bool> certain);
+  HypothesisSolver(const PoseGraph& graph, const OdometryTrajectories& odometry, std::size_t odometry_edges,
+                   const OutlierRejectionConfig& config, const estimation::GncConfig& gnc, std::vector<bool> certain);
 
   [[nodiscard]] Solution solve(Hypothesis hypothesis) const;
   /// Prices a hypothesis at an optimum that was found for another one, without solving again. This is exact where both
@@ -70,10 +70,10 @@ class HypothesisSolver {
   [[nodiscard]] std::size_t end_of(std::size_t run) const;
   void count_votes();
   void find_failed(const std::vector<Pose3>& poses, Solution& out) const;
-  [[nodiscard]] double votes_for(const FailedStretch& failed) const;
+  [[nodiscard]] double votes_for(const FailedSegment& failed) const;
 
-  const OdometryWays& odometry_;
-  const WhoIsWrongConfig& config_;
+  const OdometryTrajectories& odometry_;
+  const OutlierRejectionConfig& config_;
   const estimation::GncConfig& gnc_;
   double limit_;
   estimation::ReducedGraph reduced_;

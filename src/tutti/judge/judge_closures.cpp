@@ -35,8 +35,8 @@ constexpr double kUnknown = std::numeric_limits<double>::infinity();
 class Optimiser {
  public:
   /// All must outlive this.
-  Optimiser(const OdometryGraph& map, const NodeIndex& index, const Closures& closures, const WhoIsWrongConfig& config,
-            const estimation::GncConfig& gnc)
+  Optimiser(const OdometryGraph& map, const NodeIndex& index, const Closures& closures,
+            const OutlierRejectionConfig& config, const estimation::GncConfig& gnc)
       : map_(map), closures_(closures.judged), certain_(closures.certain), config_(config), gnc_(gnc) {
     for (const LoopClosure& closure : closures.judged)
       closure_edges_.push_back({.from = index.at(closure.from),
@@ -67,7 +67,7 @@ class Optimiser {
     graph.edges.insert(graph.edges.end(), closure_edges_.begin(), closure_edges_.end());
     std::vector<double> seconds;
     for (const MapNode& node : map_.nodes) seconds.push_back(node.stamp - map_.nodes.front().stamp);
-    const OdometryWays odometry(seconds, map_.searched.edges);
+    const OdometryTrajectories odometry(seconds, map_.searched.edges);
     std::vector<std::size_t> all(closures_.size());
     std::iota(all.begin(), all.end(), std::size_t{0});
     const auto groups = closure_groups(map_.nodes, closure_edges_, all,
@@ -87,7 +87,7 @@ class Optimiser {
   }
 
   /// Too few closures do not join two pieces of odometry, unless an operator says so.
-  void leave_unjoined(const OdometryWays& odometry, std::vector<Objection>& objections) const {
+  void leave_unjoined(const OdometryTrajectories& odometry, std::vector<Objection>& objections) const {
     std::map<std::pair<std::size_t, std::size_t>, std::vector<std::size_t>> between;
     for (std::size_t c = 0; c < closures_.size(); ++c)
       between[std::minmax({odometry.piece(closure_edges_[c].from), odometry.piece(closure_edges_[c].to)})].push_back(c);
@@ -116,9 +116,9 @@ class Optimiser {
     out.graph = with_room(odometry);
     out.closure_of_edge.clear();
     out.solution = {};
-    for (const FailedStretch& stretch : out.failed)
-      weaken(out.graph, map_.odometry_edges, stretch.from, stretch.to, kDoubt * stretch.missed.head<3>().norm(),
-             kDoubt * stretch.missed.tail<3>().norm());
+    for (const FailedSegment& segment : out.failed)
+      weaken(out.graph, map_.odometry_edges, segment.from, segment.to, kDoubt * segment.missed.head<3>().norm(),
+             kDoubt * segment.missed.tail<3>().norm());
     PoseGraph all = with_room(out.graph);
     std::vector<std::size_t> asked;
     std::vector<char> in;
@@ -187,7 +187,7 @@ class Optimiser {
   const OdometryGraph& map_;
   const std::vector<LoopClosure>& closures_;
   const std::vector<bool>& certain_;
-  const WhoIsWrongConfig& config_;
+  const OutlierRejectionConfig& config_;
   const estimation::GncConfig& gnc_;
   std::vector<PoseGraphEdge> closure_edges_;
 };
@@ -216,7 +216,7 @@ void weaken(PoseGraph& graph, std::size_t odometry_edges, std::size_t from, std:
 }
 
 Optimum judge_closures(const OdometryGraph& map, const NodeIndex& index, const Closures& closures,
-                       const WhoIsWrongConfig& config, const estimation::GncConfig& gnc) {
+                       const OutlierRejectionConfig& config, const estimation::GncConfig& gnc) {
   return Optimiser(map, index, closures, config, gnc).decide();
 }
 
@@ -226,7 +226,7 @@ std::string reason_of(Objection objection, double price) {
     return fmt::format("{}: {:.0f} (at most {:.0f})", to_string(objection), price, most);
   if (objection == Objection::lone && std::isfinite(price))
     return fmt::format("{}: by {:.0f} (at most {:.0f})", to_string(objection), price,
-                       chi_square_quantile(WhoIsWrongConfig{}.confidence, 6));
+                       chi_square_quantile(OutlierRejectionConfig{}.confidence, 6));
   return to_string(objection);
 }
 

@@ -43,7 +43,7 @@ struct Closures {
 
 /// The map that follows from a judgement of the closures.
 struct Optimum {
-  std::vector<FailedStretch> failed;
+  std::vector<FailedSegment> failed;
   PoseGraph graph;                           ///< Odometry, weakened where it failed, and the closures of the map.
   std::vector<std::size_t> closure_of_edge;  ///< Per edge beyond odometry its position in Closures::judged.
   estimation::PoseGraphSolution solution;
@@ -67,14 +67,14 @@ struct OdometryGraph {
 /// `index`: of each keyframe its position among the nodes. Closures that are certain are never refused. Numerical
 /// failures are in Optimum::solution.
 Optimum judge_closures(const OdometryGraph& map, const NodeIndex& index, const Closures& closures,
-                       const WhoIsWrongConfig& config, const estimation::GncConfig& gnc);
+                       const OutlierRejectionConfig& config, const estimation::GncConfig& gnc);
 
 /// The inverse of a covariance to which the variances of kLeastTranslation_m and kLeastRotation_rad were added: tighter
 /// measurements would only make the normal equations stiff.
 Matrix6d information_of(const Matrix6d& covariance);
 
 /// Adds the variances sigma_m^2 and sigma_rad^2 to failed odometry between the nodes `from` and `to`, in equal shares
-/// to the steps of the stretch.
+/// to the steps of the segment.
 void weaken(PoseGraph& graph, std::size_t odometry_edges, std::size_t from, std::size_t to, double sigma_m,
             double sigma_rad);
 

@@ -6,7 +6,7 @@
 namespace tutti::judge {
 
 /// Settings of judge_closures() and explain_closures().
-struct WhoIsWrongConfig {
+struct OutlierRejectionConfig {
   bool let_odometry_fail = true;
   double confidence = 0.999;    ///< Share of pairs of right closures that agree.
   double right_refused = 1e-5;  ///< Share of right closures for which the map would pay too much, by chance.

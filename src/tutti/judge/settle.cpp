@@ -19,10 +19,10 @@ constexpr int kRounds = 30;
 
 }  // namespace
 
-double most_paid(const WhoIsWrongConfig& config) { return chi_square_exceeded_with(config.right_refused, 6); }
+double most_paid(const OutlierRejectionConfig& config) { return chi_square_exceeded_with(config.right_refused, 6); }
 
 Settled settle_closures(const PoseGraph& graph, std::size_t odometry_edges, std::vector<char> in,
-                        const std::vector<bool>& certain, const WhoIsWrongConfig& config,
+                        const std::vector<bool>& certain, const OutlierRejectionConfig& config,
                         const estimation::SolverConfig& solver) {
   const std::size_t closures = in.size();
   std::vector<estimation::EdgeRole> roles(graph.edges.size(), estimation::EdgeRole::robust);

@@ -13,7 +13,7 @@ namespace tutti::judge {
 
 /// The most that the map pays for a closure: chi-square of 6 degrees of freedom exceeds it for the share
 /// config.right_refused.
-double most_paid(const WhoIsWrongConfig& config);
+double most_paid(const OutlierRejectionConfig& config);
 
 /// What settle_closures() ends with.
 struct Settled {
@@ -31,7 +31,7 @@ struct Settled {
 /// right closures is farther off than it says. `certain`: per closure whether it is in whatever it costs. A closure
 /// between two parts that no others join has no price and stays outside.
 Settled settle_closures(const PoseGraph& graph, std::size_t odometry_edges, std::vector<char> in,
-                        const std::vector<bool>& certain, const WhoIsWrongConfig& config,
+                        const std::vector<bool>& certain, const OutlierRejectionConfig& config,
                         const estimation::SolverConfig& solver);
 
 }  // namespace tutti::judge

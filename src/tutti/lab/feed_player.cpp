@@ -56,7 +56,7 @@ class Player {
   void note_stored(const std::optional<Timestamp>& stored);
   Status wait_for_robot(const std::atomic<bool>& stop);
   [[nodiscard]] std::optional<intake::FedImages> images(std::size_t moment, Timestamp stamp) const;
-  void score(const program::FeedWay& way);
+  void score(const program::FeedTrajectory& way);
 
   const FeedPlayerOptions& options_;
   const MissionConfig& config_;
@@ -95,7 +95,7 @@ Status Player::hear_until(const std::atomic<bool>& stop, const IsIt& is_it) {
     const auto said = client_->hear(kWait_ms);
     if (!said) return tl::unexpected(said.error());
     if (!*said) continue;
-    if (const auto* way = std::get_if<program::FeedWay>(&**said)) score(*way);
+    if (const auto* way = std::get_if<program::FeedTrajectory>(&**said)) score(*way);
     if (const auto* over = std::get_if<program::FeedOver>(&**said))
       return fail(ErrorCode::io, "the robot has ended the connection: {}", over->why);
     if (is_it(**said)) return {};
@@ -220,7 +220,7 @@ std::optional<intake::FedImages> Player::images(std::size_t moment, Timestamp st
 }
 
 /// As RobotActor does: how far every estimate is from the reference at the map's nodes.
-void Player::score(const program::FeedWay& way) {
+void Player::score(const program::FeedTrajectory& way) {
   if (!scores_) return;
   const Recording& recording = robot_.recording;
   Trajectory truth, odometry;
@@ -271,7 +271,7 @@ Status Player::play(const std::atomic<bool>& stop) {
       stop, [&](const program::FromRobot& said) { return !stays && std::holds_alternative<program::FeedEnd>(said); });
   if (!stop) return heard;
   for (auto said = client_->hear(kWait_ms); said && *said; said = client_->hear(kWait_ms))  // the last map's
-    if (const auto* way = std::get_if<program::FeedWay>(&**said)) score(*way);
+    if (const auto* way = std::get_if<program::FeedTrajectory>(&**said)) score(*way);
   return {};
 }
 

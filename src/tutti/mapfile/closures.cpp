@@ -21,8 +21,9 @@ std::optional<ClosureFit::Misfit> misfit_of(const server::MapEstimate& map, cons
 }
 
 std::string reason_of(const ClosureInfo& info) {
-  if (info.word && info.word->wish != Wish::withdraw && info.state != ClosureState::candidate)
-    return fmt::format("{}ed by {}", to_string(info.word->wish), info.word->by.empty() ? "an operator" : info.word->by);
+  if (info.decision && info.decision->wish != Wish::withdraw && info.state != ClosureState::candidate)
+    return fmt::format("{}ed by {}", to_string(info.decision->wish),
+                       info.decision->by.empty() ? "an operator" : info.decision->by);
   if (info.state == ClosureState::candidate) return "not judged";
   if (info.state == ClosureState::accepted) return {};
   return info.closures.front().reason;
@@ -37,7 +38,7 @@ const char* to_string(ClosureState state) {
 std::vector<ClosureInfo> closures(const Content& content, const server::MapEstimate& map) {
   const server::ClosureNames names = content.closure_names();
   std::map<SubmapPair, ClosureInfo> infos;
-  for (const auto& [pair, word] : content.words) infos[pair].word = word;
+  for (const auto& [pair, decision] : content.decisions) infos[pair].decision = decision;
   for (const auto& [pair, verdict] : content.verdicts)
     if (!verdict.closures.empty()) infos[pair].verdict = verdict;
   std::multimap<Ends, const server::JudgedClosure*> judged;
@@ -47,8 +48,8 @@ std::vector<ClosureInfo> closures(const Content& content, const server::MapEstim
     info.pair = pair;
     info.name = names.of(pair);
     std::vector<LoopClosure> all = info.verdict ? info.verdict->closures : std::vector<LoopClosure>{};
-    if (info.word && info.word->wish == Wish::accept)
-      all.insert(all.end(), info.word->by_hand.begin(), info.word->by_hand.end());
+    if (info.decision && info.decision->wish == Wish::accept)
+      all.insert(all.end(), info.decision->by_hand.begin(), info.decision->by_hand.end());
     for (const LoopClosure& closure : all) {
       ClosureFit& fit = info.closures.emplace_back(ClosureFit{.closure = closure, .misfit = misfit_of(map, closure)});
       const auto [first, last] = judged.equal_range({closure.from, closure.to});
@@ -62,7 +63,7 @@ std::vector<ClosureInfo> closures(const Content& content, const server::MapEstim
     const auto is = [&](ClosureState state) {
       return std::ranges::any_of(info.closures, [&](const ClosureFit& fit) { return fit.state == state; });
     };
-    if (info.closures.empty() && info.word->wish == Wish::withdraw) continue;
+    if (info.closures.empty() && info.decision->wish == Wish::withdraw) continue;
     info.state = is(ClosureState::accepted)                            ? ClosureState::accepted
                  : is(ClosureState::rejected) || info.closures.empty() ? ClosureState::rejected
                                                                        : ClosureState::candidate;

@@ -38,13 +38,13 @@ struct ClosureInfo {
   SubmapPair pair;
   std::string name;
   ClosureState state = ClosureState::candidate;  ///< Accepted when any of the closures is.
-  std::string reason;                     ///< For people: why the state is not accepted, or which operator decided.
-  std::vector<ClosureFit> closures;       ///< Empty when an operator has rejected in advance what may be found.
-  std::optional<ClosureVerdict> verdict;  ///< With the evidence, the finder's version, the worker and the time.
-  std::optional<ClosureWord> word;        ///< The operator's word, also one that was withdrawn.
+  std::string reason;                       ///< For people: why the state is not accepted, or which operator decided.
+  std::vector<ClosureFit> closures;         ///< Empty when an operator has rejected in advance what may be found.
+  std::optional<ClosureVerdict> verdict;    ///< With the evidence, the finder's version, the worker and the time.
+  std::optional<ClosureDecision> decision;  ///< The operator's decision, also one that was withdrawn.
 };
 
-/// All pairs with closures or with a word that was not withdrawn, by their submaps.
+/// All pairs with closures or with a decision that was not withdrawn, by their submaps.
 std::vector<ClosureInfo> closures(const Content& content, const server::MapEstimate& map);
 
 }  // namespace tutti::mapfile

@@ -73,8 +73,8 @@ TEST_F(ClosuresOfAMap, AreExplainedAsTheServerJudgedThem) {
 TEST_F(ClosuresOfAMap, AWordIntoTheFileIsWhatTheNextServerFollows) {
   const auto before = infos();
   const ClosureInfo right = *first(before, ClosureState::accepted), wrong = *first(before, ClosureState::rejected);
-  ASSERT_TRUE(put_word(store_, {right.name, Wish::reject, "ada", 5}).has_value());
-  ASSERT_TRUE(put_word(store_, {wrong.name, Wish::accept, "ada", 5}).has_value());
+  ASSERT_TRUE(put_decision(store_, {right.name, Wish::reject, "ada", 5}).has_value());
+  ASSERT_TRUE(put_decision(store_, {wrong.name, Wish::accept, "ada", 5}).has_value());
   EXPECT_EQ(named(right.name).state, ClosureState::rejected);
   EXPECT_EQ(named(right.name).reason, "rejected by ada");
   EXPECT_EQ(named(wrong.name).state, ClosureState::accepted);
@@ -89,20 +89,20 @@ TEST_F(ClosuresOfAMap, AWordIntoTheFileIsWhatTheNextServerFollows) {
       EXPECT_TRUE(judged.accepted || judged.closure != wrong.closures.front().closure);
     }
   }
-  EXPECT_FALSE(put_word(store_, {right.name, Wish::accept, "eve", 4}).has_value());  // earlier
-  ASSERT_TRUE(put_word(store_, {right.name, Wish::withdraw, "ada", 6}).has_value());
-  ASSERT_TRUE(put_word(store_, {wrong.name, Wish::withdraw, "ada", 6}).has_value());
+  EXPECT_FALSE(put_decision(store_, {right.name, Wish::accept, "eve", 4}).has_value());  // earlier
+  ASSERT_TRUE(put_decision(store_, {right.name, Wish::withdraw, "ada", 6}).has_value());
+  ASSERT_TRUE(put_decision(store_, {wrong.name, Wish::withdraw, "ada", 6}).has_value());
   EXPECT_EQ(named(right.name).state, ClosureState::accepted);
   EXPECT_EQ(named(wrong.name).state, ClosureState::rejected);
-  EXPECT_EQ(named(wrong.name).word->wish, Wish::withdraw);
+  EXPECT_EQ(named(wrong.name).decision->wish, Wish::withdraw);
 }
 
 TEST_F(ClosuresOfAMap, WhatIsNotThereCannotBeAccepted) {
   const auto before = store_.tables();
   for (const char* name : {"alpha/0-bravo/999", "alpha/0-charlie/1", "nonsense", "alpha/0-alpha/1"})
-    EXPECT_FALSE(put_word(store_, {name, Wish::accept, "ada", 5}).has_value()) << name;
+    EXPECT_FALSE(put_decision(store_, {name, Wish::accept, "ada", 5}).has_value()) << name;
   EXPECT_EQ(store_.tables(), before);
-  ASSERT_TRUE(put_word(store_, {"alpha/0-alpha/1", Wish::reject, "ada", 5}).has_value());  // in advance
+  ASSERT_TRUE(put_decision(store_, {"alpha/0-alpha/1", Wish::reject, "ada", 5}).has_value());  // in advance
   EXPECT_EQ(named("alpha/0-alpha/1").state, ClosureState::rejected);
 }
 

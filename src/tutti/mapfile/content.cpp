@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "tutti/node/decisions.hpp"
 #include "tutti/node/submap_frames.hpp"
-#include "tutti/node/words.hpp"
 #include "tutti/server/georeference.hpp"
 #include "tutti/server/refuted_closures.hpp"
 #include "tutti/storage/map_tables.hpp"
@@ -70,12 +70,12 @@ Status read_verdicts(const storage::TableStore& map, Content& content) {
   return read_table(map, map_tables::kAnswers, wire::decode_verdicts, count, content);
 }
 
-Status read_words(const storage::TableStore& map, Content& content) {
-  auto words = node::read_words(map, [](const std::string&) {});
-  if (!words) return tl::unexpected(words.error());
-  content.words = std::move(*words);
+Status read_decisions(const storage::TableStore& map, Content& content) {
+  auto decisions = node::read_decisions(map, [](const std::string&) {});
+  if (!decisions) return tl::unexpected(decisions.error());
+  content.decisions = std::move(*decisions);
   return read_table(
-      map, map_tables::kWords, wire::decode_word, [](auto&&...) {}, content);
+      map, map_tables::kDecisions, wire::decode_decision, [](auto&&...) {}, content);
 }
 
 Status read_meta(const storage::TableStore& map, Content& content) {
@@ -114,16 +114,16 @@ server::ClosureNames Content::closure_names() const {
 
 Result<Content> read(const storage::TableStore& map) {
   Content content;
-  for (const auto& part : {read_meta, read_submaps, read_verdicts, read_words})
+  for (const auto& part : {read_meta, read_submaps, read_verdicts, read_decisions})
     if (auto ok = part(map, content); !ok) return tl::unexpected(ok.error());
   return content;
 }
 
 server::MapEstimate estimate(const Content& content) {
   const server::MapConfig& config = content.settings.map;
-  const server::VerdictSet verdicts = server::of_candidates(content.verdicts, content.candidates, content.words);
+  const server::VerdictSet verdicts = server::of_candidates(content.verdicts, content.candidates, content.decisions);
   return server::georeferenced(
-      server::refined(server::estimate_map_with_fixes(content.submaps, verdicts, config, content.words),
+      server::refined(server::estimate_map_with_fixes(content.submaps, verdicts, config, content.decisions),
                       content.submaps, content.refinements),
       content.submaps, config.georeference, config.gnc);
 }
@@ -148,25 +148,26 @@ Result<std::unique_ptr<storage::TableStore>> open_copy(const std::filesystem::pa
   return map;
 }
 
-Status put_word(storage::TableStore& map, const ClosureWord& word) {
+Status put_decision(storage::TableStore& map, const ClosureDecision& decision) {
   const auto content = read(map);
   if (!content) return tl::unexpected(content.error());
-  const auto pair = content->closure_names().find(word.closure);
+  const auto pair = content->closure_names().find(decision.closure);
   if (!pair) return tl::unexpected(pair.error());
   for (const SubmapId& id : {pair->first, pair->second})
     if (!content->submaps.contains(id))
-      return fail(ErrorCode::invalid, "{}: submap {} is not in the map", word.closure, content->closure_names().of(id));
+      return fail(ErrorCode::invalid, "{}: submap {} is not in the map", decision.closure,
+                  content->closure_names().of(id));
   const auto verdict = content->verdicts.find(*pair);
   const bool has_closures = verdict != content->verdicts.end() && !verdict->second.closures.empty();
-  if (word.wish == Wish::accept && !has_closures && word.by_hand.empty())
-    return fail(ErrorCode::invalid, "{}: no closure was found there that could be accepted", word.closure);
-  const auto known = content->words.find(*pair);
-  if (known != content->words.end() && !holds_over(word, known->second))
-    return fail(ErrorCode::invalid, "{}: a later decision holds: {} of {} ns", word.closure,
+  if (decision.wish == Wish::accept && !has_closures && decision.by_hand.empty())
+    return fail(ErrorCode::invalid, "{}: no closure was found there that could be accepted", decision.closure);
+  const auto known = content->decisions.find(*pair);
+  if (known != content->decisions.end() && !holds_over(decision, known->second))
+    return fail(ErrorCode::invalid, "{}: a later decision holds: {} of {} ns", decision.closure,
                 to_string(known->second.wish), known->second.given_ns);
   node::MapMeta meta = content->meta;
   meta.news = true;  // whoever opens it makes the next revision
-  const std::vector<storage::Write> writes{{map_tables::kWords, node::key_of(*pair), wire::encode(word)},
+  const std::vector<storage::Write> writes{{map_tables::kDecisions, node::key_of(*pair), wire::encode(decision)},
                                            node::to_row(meta)};
   return map.commit(writes);
 }

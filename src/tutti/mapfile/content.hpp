@@ -13,7 +13,7 @@
 #include "tutti/server/closure_names.hpp"
 #include "tutti/storage/table_store.hpp"
 
-/// Reads a map's file that no server has open, recomputes its estimate, and stores operators' words in it.
+/// Reads a map's file that no server has open, recomputes its estimate, and stores operators' decisions in it.
 namespace tutti::mapfile {
 
 /// What a map's store holds, except for the submaps' payloads.
@@ -24,7 +24,7 @@ struct Content {
   server::SubmapSet submaps;
   std::map<SubmapId, PayloadSize> payload_sizes;  ///< Only submaps that carry a payload are in it.
   server::VerdictSet verdicts;                    ///< With their evidence.
-  WordSet words;
+  DecisionSet decisions;
   server::Refinements refinements;
   server::CandidatePairs candidates;  ///< Verdicts of other pairs are not in the map.
   std::map<RobotId, std::string> names;
@@ -59,8 +59,8 @@ Result<std::unique_ptr<storage::TableStore>> open(const std::filesystem::path& f
 /// file, it is no map, or it cannot be copied.
 Result<std::unique_ptr<storage::TableStore>> open_copy(const std::filesystem::path& file);
 
-/// Stores an operator's word, which the server that opens the map next follows. On an error nothing is stored: the
-/// closure's name or submaps are unknown, there is no closure to accept, or a word that was given later holds.
-Status put_word(storage::TableStore& map, const ClosureWord& word);
+/// Stores an operator's decision, which the server that opens the map next follows. On an error nothing is stored: the
+/// closure's name or submaps are unknown, there is no closure to accept, or a decision that was given later holds.
+Status put_decision(storage::TableStore& map, const ClosureDecision& decision);
 
 }  // namespace tutti::mapfile

@@ -55,7 +55,7 @@ TEST_F(Marks, AreWhatWasStored) {
   EXPECT_EQ(marks.at(8), door);
   EXPECT_EQ(read_photo(store_, 7).value(), std::nullopt);
   EXPECT_EQ(read_photo(store_, 8).value(), kJpeg);
-  EXPECT_EQ(read(store_)->words, WordSet()) << "the map is read as before";
+  EXPECT_EQ(read(store_)->decisions, DecisionSet()) << "the map is read as before";
   ASSERT_TRUE(remove_mark(store_, 8));
   EXPECT_EQ(read_marks(store_)->size(), 1U);
   EXPECT_EQ(read_photo(store_, 8).value(), std::nullopt);

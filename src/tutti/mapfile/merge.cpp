@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "tutti/mapfile/make_map.hpp"
+#include "tutti/node/decisions.hpp"
 #include "tutti/node/meta_keys.hpp"
 #include "tutti/node/robot_registry.hpp"
-#include "tutti/node/words.hpp"
 #include "tutti/storage/map_tables.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/limits.hpp"
@@ -94,22 +94,22 @@ Result<std::string> newer_verdict(std::string_view, std::string a, std::string b
   return other->refusal && !one->refusal ? b : a;
 }
 
-Result<std::string> later_word(std::string_view, std::string a, std::string b) {
-  const auto one = wire::decode_word(a), other = wire::decode_word(b);
+Result<std::string> later_decision(std::string_view, std::string a, std::string b) {
+  const auto one = wire::decode_decision(a), other = wire::decode_decision(b);
   if (!one) return tl::unexpected(one.error());
   if (!other) return tl::unexpected(other.error());
   return holds_over(*other, *one) ? b : a;
 }
 
 NumberSet both(const NumberSet& a, const NumberSet& b) {
-  std::vector<NumberSet::Stretch> stretches = a.stretches();
-  stretches.insert(stretches.end(), b.stretches().begin(), b.stretches().end());
-  std::ranges::sort(stretches, {}, &NumberSet::Stretch::begin);
+  std::vector<NumberSet::Interval> intervals = a.intervals();
+  intervals.insert(intervals.end(), b.intervals().begin(), b.intervals().end());
+  std::ranges::sort(intervals, {}, &NumberSet::Interval::begin);
   NumberSet out;
-  for (std::size_t i = 0; i < stretches.size();) {
-    NumberSet::Stretch joined = stretches[i];
-    for (++i; i < stretches.size() && stretches[i].begin <= joined.end; ++i)
-      joined.end = std::max(joined.end, stretches[i].end);
+  for (std::size_t i = 0; i < intervals.size();) {
+    NumberSet::Interval joined = intervals[i];
+    for (++i; i < intervals.size() && intervals[i].begin <= joined.end; ++i)
+      joined.end = std::max(joined.end, intervals[i].end);
     out.append(joined);
   }
   return out;
@@ -211,7 +211,7 @@ Result<Merged> merge(const TableStore& a, const TableStore& b, TableStore& out) 
   const auto shared = join(a, b, map_tables::kSubmaps, no_two_submaps, writer);
   if (!shared) return tl::unexpected(shared.error());
   for (const auto& [table, choose] : {std::pair<const char*, Choose>{map_tables::kVerdicts, newer_verdict},
-                                      {map_tables::kWords, later_word},
+                                      {map_tables::kDecisions, later_decision},
                                       {map_tables::kMeta, joined_meta}})
     if (const auto done = join(a, b, table, choose, writer); !done) return tl::unexpected(done.error());
   if (auto done = join_answers(a, b, writer); !done) return tl::unexpected(done.error());

@@ -88,8 +88,8 @@ TEST(Merge, OneNumberForTwoRobotsIsRefusedWithBothNames) {
   MemoryStore both(storage::map_schema());
   const auto merged = merge(*a, *b, both);
   ASSERT_FALSE(merged.has_value());
-  for (const char* word : {"alpha", "zulu", "number 0"})
-    EXPECT_NE(merged.error().message.find(word), std::string::npos) << merged.error().message;
+  for (const char* decision : {"alpha", "zulu", "number 0"})
+    EXPECT_NE(merged.error().message.find(decision), std::string::npos) << merged.error().message;
   call(*b, kAlpha, "bravo");
   call(*a, kBravo, "bravo");
   EXPECT_FALSE(merge(*a, *b, both).has_value());
@@ -128,14 +128,14 @@ TEST(Merge, TheLaterWordHoldsWhicheverMapItIsIn) {
   const auto a = map_of({{kAlpha, 5}}), b = map_of({{kAlpha, 5}});
   const Content content = read(*a).value();
   const std::string name = closures(content, estimate(content)).front().name;
-  ASSERT_TRUE(put_word(*a, {name, Wish::reject, "ada", 5}).has_value());
-  ASSERT_TRUE(put_word(*b, {name, Wish::accept, "bob", 6}).has_value());
+  ASSERT_TRUE(put_decision(*a, {name, Wish::reject, "ada", 5}).has_value());
+  ASSERT_TRUE(put_decision(*b, {name, Wish::accept, "bob", 6}).has_value());
   for (const auto& [one, other] : {std::pair(a.get(), b.get()), std::pair(b.get(), a.get())}) {
     MemoryStore both(storage::map_schema());
     ASSERT_TRUE(merge(*one, *other, both).has_value());
-    const auto words = read(both).value().words;
-    ASSERT_EQ(words.size(), 1U);
-    EXPECT_EQ(words.begin()->second.by, "bob");
+    const auto decisions = read(both).value().decisions;
+    ASSERT_EQ(decisions.size(), 1U);
+    EXPECT_EQ(decisions.begin()->second.by, "bob");
   }
 }
 

@@ -10,10 +10,10 @@
 #include <system_error>
 
 #include "tutti/mapfile/make_map.hpp"
+#include "tutti/node/decisions.hpp"
 #include "tutti/node/map_meta.hpp"
 #include "tutti/node/robot_tables.hpp"
 #include "tutti/node/submap_frames.hpp"
-#include "tutti/node/words.hpp"
 #include "tutti/storage/sqlite_salvage.hpp"
 
 namespace tutti::mapfile {

@@ -4,7 +4,7 @@
 #include <optional>
 #include <utility>
 
-#include "tutti/node/words.hpp"
+#include "tutti/node/decisions.hpp"
 #include "tutti/storage/map_tables.hpp"
 #include "tutti/wire/codec.hpp"
 
@@ -40,7 +40,7 @@ ShownMap ShownMaps::of(const node::ServerNode& server, Timestamp now) {
     known.insert(known.end(), std::move(row));
   }
   known_ = std::move(known);
-  shown.content.words = state.words;
+  shown.content.decisions = state.decisions;
   shown.content.names = server.robot_names();
   return shown;
 }

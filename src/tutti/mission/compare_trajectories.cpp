@@ -149,7 +149,7 @@ void fix(const std::vector<consistency::RobotNode>& nodes, const CompareTrajecto
     out.constraints = std::move(links);
     out.corrected = judged;
     if (!out.constraints.empty()) correct(nodes, out);
-    out.kink = evaluation::kink(judged, out.corrected).value_or(evaluation::Kink{});
+    out.discontinuity = evaluation::discontinuity(judged, out.corrected).value_or(evaluation::Discontinuity{});
     out.after = lay_on(out.judge, out.corrected);
     return out.after.rmse_m <= kMargin * config.tolerance_m;
   };

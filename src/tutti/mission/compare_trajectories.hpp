@@ -11,7 +11,7 @@
 #include "tutti/consistency/explanation.hpp"
 #include "tutti/evaluation/association.hpp"
 #include "tutti/evaluation/ate.hpp"
-#include "tutti/evaluation/kink.hpp"
+#include "tutti/evaluation/discontinuity.hpp"
 #include "tutti/model/trajectory.hpp"
 
 /// Compares two trajectories of one body in the way in which a robot compares itself with the server's map: A takes the
@@ -30,7 +30,7 @@ struct NamedTrajectory {
 /// How two trajectories are compared; A judges, B is judged.
 struct CompareTrajectoriesConfig {
   evaluation::AssociationConfig association;  ///< B's poses are the estimates, A's the references.
-  double tolerance_m = 0.05;                  ///< Standard deviation of A's positions, over stretches of any length.
+  double tolerance_m = 0.05;                  ///< Standard deviation of A's positions, over segments of any length.
   double tolerance_deg = 0.5;                 ///< Standard deviation of A's rotations.
   /// Distance between nodes along A; they are closer where B departs from A by more than twice as much. 0: a 500th of
   /// the way, at least 0.1 m.
@@ -53,9 +53,9 @@ struct TrajectoryComparison {
   consistency::Explanation explanation;
   /// Relative poses of A that would correct B, chosen by the policy `adaptive`.
   std::vector<consistency::Constraint> constraints;
-  evaluation::AteResult before;  ///< ATE of B's nodes against A's.
-  evaluation::AteResult after;   ///< ATE of `corrected` against A's nodes.
-  evaluation::Kink kink;         ///< How much the correction changes B's short motions.
+  evaluation::AteResult before;             ///< ATE of B's nodes against A's.
+  evaluation::AteResult after;              ///< ATE of `corrected` against A's nodes.
+  evaluation::Discontinuity discontinuity;  ///< How much the correction changes B's short motions.
 };
 
 /// Fails when fewer than two poses of B have one of A at their time, or a covariance is not positive definite.

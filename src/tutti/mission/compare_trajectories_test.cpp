@@ -49,7 +49,7 @@ TEST(CompareTrajectories, RigidMotionsAndNoiseWithinTheToleranceAgree) {
   EXPECT_FALSE(c->explanation.disagrees());
   EXPECT_TRUE(c->explanation.origins.empty());
   EXPECT_TRUE(c->constraints.empty());
-  EXPECT_EQ(c->kink.translation_m, 0.0);
+  EXPECT_EQ(c->discontinuity.translation_m, 0.0);
 }
 
 TEST(CompareTrajectories, FindsAFailureWhereItIsAndFixesIt) {

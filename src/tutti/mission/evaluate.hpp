@@ -30,9 +30,9 @@ struct RobotOutcome {
 /// These functions fill in what is measured at the end, in this order: the accuracy of every estimate; the final map,
 /// its closures and the transforms between robots; the clouds. Accuracy is the ATE after one rigid alignment (SE(3), no
 /// scale) and the RPE over 1 s and over 10 m, at keyframes, each with the share of the way on which it was scored; the
-/// kink of every correction; and the server's joint accuracy over all robots of its largest component, with one
-/// alignment. Agreement is the ATE of a robot's estimate with the server's as the reference. Robots whose reference is
-/// not for scoring get no accuracy. `perfect` is the map of perfect_judge.hpp, or null.
+/// discontinuity of every correction; and the server's joint accuracy over all robots of its largest component, with
+/// one alignment. Agreement is the ATE of a robot's estimate with the server's as the reference. Robots whose reference
+/// is not for scoring get no accuracy. `perfect` is the map of perfect_judge.hpp, or null.
 void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapEstimate& map,
                      const server::MapEstimate* perfect, const evaluation::AssociationConfig& association,
                      MissionRecord& record);

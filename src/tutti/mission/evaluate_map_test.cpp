@@ -30,7 +30,7 @@ class EvaluateMap : public ::testing::Test {
   }
 
   /// Submaps into the server, whose map is off by nothing; the robot's own estimates into the record. The odometry
-  /// stretches 2 %, the corrected estimate 0.2 %.
+  /// segments 2 %, the corrected estimate 0.2 %.
   void walk(RobotId id) {
     RobotRecord& robot = record_.robots.emplace_back(RobotRecord{.id = id, .name = "robot"});
     robot.policies.push_back({.name = "skeleton"});
@@ -39,8 +39,8 @@ class EvaluateMap : public ::testing::Test {
       const Pose3 truth = server::test::true_pose(id, k);
       const Timestamp stamp{1'000'000'000LL * (k + 1)};
       robot.reference.push_back({stamp, truth});
-      robot.odometry.push_back({stamp, T_odom_reference_ * stretched(truth, 1.02)});
-      robot.policies[0].corrected.push_back({stamp, T_odom_reference_ * stretched(truth, 1.002)});
+      robot.odometry.push_back({stamp, T_odom_reference_ * segmented(truth, 1.02)});
+      robot.policies[0].corrected.push_back({stamp, T_odom_reference_ * segmented(truth, 1.002)});
       robot.server_estimate.push_back({stamp, T_reference_world_.inverse() * truth});
       const Pose3& T_odom_body = robot.odometry.back().pose;
       if (!open.keyframes.empty())
@@ -49,7 +49,7 @@ class EvaluateMap : public ::testing::Test {
       if (open.keyframes.size() == 6 || k + 1 == kKeyframes) send(open);
     }
   }
-  static Pose3 stretched(Pose3 pose, double by) {
+  static Pose3 segmented(Pose3 pose, double by) {
     pose.translation *= by;
     return pose;
   }

@@ -5,8 +5,8 @@
 
 #include "tutti/evaluation/agreement.hpp"
 #include "tutti/evaluation/ate.hpp"
-#include "tutti/evaluation/keyframe_way.hpp"
-#include "tutti/evaluation/kink.hpp"
+#include "tutti/evaluation/discontinuity.hpp"
+#include "tutti/evaluation/keyframe_trajectory.hpp"
 #include "tutti/evaluation/rpe.hpp"
 #include "tutti/mission/evaluate.hpp"
 #include "tutti/server/map_components.hpp"
@@ -18,12 +18,12 @@ namespace {
 struct Scoring {
   const MissionRecording& robot;
   const evaluation::AssociationConfig& association;
-  evaluation::KeyframeWay way;
+  evaluation::KeyframeTrajectory way;
 };
 
 /// The share of the robot's whole way that some of its keyframes stand for; of a robot that never moved, all.
 template <class Poses>
-double share_of(const evaluation::KeyframeWay& way, const Poses& poses) {
+double share_of(const evaluation::KeyframeTrajectory& way, const Poses& poses) {
   return way.whole_m() > 0.0 ? way.part_m(poses) / way.whole_m() : 1.0;
 }
 
@@ -75,7 +75,7 @@ PolicyRecord policy_record(const std::string& name, const robot::RobotAgent& age
   PolicyRecord out{.name = name, .corrected = agent.corrected()};
   out.accuracy = accuracy_of(out.corrected, scoring);
   if (const auto agreement = evaluation::agreement(out.corrected, server)) out.agreement_rmse_m = agreement->rmse_m;
-  out.kink = evaluation::kink(raw, out.corrected);
+  out.discontinuity = evaluation::discontinuity(raw, out.corrected);
   out.constraints_added = agent.ledger().size();
   for (const consistency::Constraint& c : agent.ledger().constraints())
     out.constraints.push_back({c.from_stamp, c.to_stamp, c.kind});
@@ -111,7 +111,7 @@ void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapE
     out.odometry_factors = agent->second->odometry_factors();
     out.keyframes = agent->second->keyframes().size();
     for (const Keyframe& k : agent->second->keyframes()) out.odometry.push_back({k.stamp, k.T_odom_body});
-    const Scoring scoring{recording, association, evaluation::KeyframeWay(robot.way(), out.odometry)};
+    const Scoring scoring{recording, association, evaluation::KeyframeTrajectory(robot.way(), out.odometry)};
     out.distance_m = scoring.way.whole_m();
     auto [component, server_estimate, left_out] = read_server_estimate(map, components, out.id);
     out.component = component;

@@ -3,7 +3,7 @@
 #include <map>
 
 #include "tutti/evaluation/ate.hpp"
-#include "tutti/evaluation/keyframe_way.hpp"
+#include "tutti/evaluation/keyframe_trajectory.hpp"
 #include "tutti/evaluation/transform_error.hpp"
 #include "tutti/geometry/alignment.hpp"
 #include "tutti/geometry/so3.hpp"
@@ -25,7 +25,7 @@ void measure_joint_map(const std::vector<RobotOutcome>& robots, const server::Ma
   double scored_m = 0.0, whole_m = 0.0;
   for (std::size_t i = 0; i < robots.size(); ++i) {
     const MissionRecording& robot = *robots[i].recording;
-    const evaluation::KeyframeWay way(robots[i].way(), record.robots[i].odometry);
+    const evaluation::KeyframeTrajectory way(robots[i].way(), record.robots[i].odometry);
     whole_m += way.whole_m();
     if (!robot.score_against_reference || record.robots[i].component != components.largest) continue;
     const auto pairs = evaluation::associate(record.robots[i].server_estimate, robot.recording.reference, association);
@@ -53,7 +53,7 @@ void judge_closures(const server::MapServer& server, MissionRecord& record) {
     record.server.rejections.push_back({reason, count.intra, count.inter, count.nearest});
 }
 
-/// Stretches of odometry that the server convicted, with the times the report wants.
+/// Segments of odometry that the server convicted, with the times the report wants.
 void name_failures(const server::MapEstimate& map, ServerRecord& out) {
   std::map<KeyframeId, Timestamp> stamp;
   for (const MapNode& node : map.nodes) stamp[node.id] = node.stamp;

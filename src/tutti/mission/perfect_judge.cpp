@@ -18,7 +18,7 @@ std::optional<server::MapEstimate> judge_perfectly(const server::MapServer& serv
     all.insert(all.end(), verdict.closures.begin(), verdict.closures.end());
   const std::map<KeyframeId, Pose3> truth = true_ends(all, server.map(), robots, association);
   server::VerdictSet verdicts = state.verdicts;
-  WordSet words = state.words;
+  DecisionSet decisions = state.decisions;
   bool checked = false;
   for (auto& [pair, verdict] : verdicts) {
     bool known = true;
@@ -28,10 +28,10 @@ std::optional<server::MapEstimate> judge_perfectly(const server::MapServer& serv
       return error && is_wrong(*error, check);
     });
     checked = checked || known;
-    if (known && !verdict.closures.empty()) words[pair] = {.closure = {}, .wish = Wish::accept, .by = "reference"};
+    if (known && !verdict.closures.empty()) decisions[pair] = {.closure = {}, .wish = Wish::accept, .by = "reference"};
   }
   if (!checked) return std::nullopt;
-  return server::estimate_map(state.submaps, verdicts, config, words);
+  return server::estimate_map(state.submaps, verdicts, config, decisions);
 }
 
 }  // namespace tutti::mission

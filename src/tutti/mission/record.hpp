@@ -17,7 +17,7 @@
 #include "tutti/consistency/explanation.hpp"
 #include "tutti/evaluation/association.hpp"
 #include "tutti/evaluation/cloud_distance.hpp"
-#include "tutti/evaluation/kink.hpp"
+#include "tutti/evaluation/discontinuity.hpp"
 #include "tutti/model/point_cloud.hpp"
 #include "tutti/model/pose_graph.hpp"
 #include "tutti/model/proxy_graph.hpp"
@@ -63,9 +63,9 @@ struct PolicyRecord {
   Accuracy accuracy;
   /// ATE of the corrected estimate with the server's as the reference, scored on RobotRecord::mapped_share of the way.
   std::optional<double> agreement_rmse_m;
-  std::optional<evaluation::Kink> kink;  ///< How much it changes short motions of the raw odometry.
-  std::size_t constraints_added = 0;     ///< Constraints held at the end of the mission.
-  Trajectory corrected;                  ///< T_map_body at keyframes.
+  std::optional<evaluation::Discontinuity> discontinuity;  ///< How much it changes short motions of the raw odometry.
+  std::size_t constraints_added = 0;                       ///< Constraints held at the end of the mission.
+  Trajectory corrected;                                    ///< T_map_body at keyframes.
   std::vector<ConstraintRecord> constraints;
 };
 
@@ -217,12 +217,12 @@ struct CloudRecord {
   std::vector<float> distance_m;  ///< Distance of each point to the survey; empty when not measured.
 };
 
-/// A stretch of odometry that failed, as the server decided: several closures agree with each other against it.
+/// A segment of odometry that failed, as the server decided: several closures agree with each other against it.
 struct FailedOdometryRecord {
   RobotId robot;
   Timestamp from;
   Timestamp until;
-  double error_m = 0.0;  ///< Difference between closures and odometry over the stretch.
+  double error_m = 0.0;  ///< Difference between closures and odometry over the segment.
   double error_rad = 0.0;
 };
 

@@ -41,7 +41,7 @@ void Receipt::remove_refused(std::uint64_t session, std::uint32_t index) {
   const auto numbers = refused.find(session);
   if (numbers == refused.end()) return;
   numbers->second.erase(index);
-  if (numbers->second.stretches().empty()) refused.erase(numbers);
+  if (numbers->second.intervals().empty()) refused.erase(numbers);
 }
 
 Status MissionStatus::check() const {

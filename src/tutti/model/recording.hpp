@@ -39,7 +39,7 @@ class VisualSource {
   virtual std::vector<Error> take_errors() { return {}; }
 };
 
-/// A stretch where simulated odometry really went wrong. Only the evaluation may use it.
+/// A segment where simulated odometry really went wrong. Only the evaluation may use it.
 struct DriftOrigin {
   enum class Kind { slip, degeneracy, failure };
   Kind kind = Kind::slip;

@@ -129,7 +129,7 @@ struct MissionStatus {
   };
 
   /// The server's answer to an operator's ClosureWord: the word is stored, unless a later one replaces it.
-  struct Word {
+  struct Decision {
     std::uint64_t content = 0;  ///< content_hash() of its frame.
     std::string why;            ///< Why the word is not stored; empty: it is.
     template <class V>
@@ -137,7 +137,7 @@ struct MissionStatus {
       v.field(1, "content", content, {.fixed = true});
       v.field(2, "why", why);
     }
-    friend bool operator==(const Word&, const Word&) = default;
+    friend bool operator==(const Decision&, const Decision&) = default;
   };
 
   static constexpr std::size_t kMostRobots = 10'000;  ///< Likewise workers.
@@ -160,9 +160,9 @@ struct MissionStatus {
   std::string finder;              ///< to_string(MethodId) of the finder that verifies closures.
   /// Pairs with closures of other finders, which stay in the map until the present finder has answered.
   std::uint64_t former_pairs = 0;
-  std::uint64_t waiting = 0;  ///< Pairs and refinements that no present worker can compute,
-  std::string why_waiting;    ///< and what the last worker that tried said.
-  std::vector<Word> words;    ///< The latest words.
+  std::uint64_t waiting = 0;        ///< Pairs and refinements that no present worker can compute,
+  std::string why_waiting;          ///< and what the last worker that tried said.
+  std::vector<Decision> decisions;  ///< The latest words.
   template <class V>
   void describe(V& v) {
     v.field(1, "time", time);
@@ -184,7 +184,7 @@ struct MissionStatus {
     v.field(21, "former_pairs", former_pairs);
     v.field(22, "waiting", waiting);
     v.field(23, "why_waiting", why_waiting);
-    v.field(24, "words", words);
+    v.field(24, "words", decisions);
   }
   [[nodiscard]] Status check() const;  ///< Lists have the order that is promised above.
   friend bool operator==(const MissionStatus&, const MissionStatus&) = default;

@@ -9,7 +9,7 @@
 #include "tutti/base/ids.hpp"
 #include "tutti/base/timestamp.hpp"
 #include "tutti/bus/envelope.hpp"
-#include "tutti/model/closure_word.hpp"
+#include "tutti/model/closure_decision.hpp"
 #include "tutti/model/loop_closure.hpp"
 #include "tutti/model/refinement.hpp"
 #include "tutti/node/change_watch.hpp"
@@ -28,8 +28,8 @@ struct VerdictsTaken {
   std::string job;
   std::size_t pairs = 0;
 };
-/// Told by the server: an operator's word.
-struct WordTaken {
+/// Told by the server: an operator's decision.
+struct DecisionTaken {
   SubmapPair pair;
   Wish wish = Wish::withdraw;
 };
@@ -137,7 +137,7 @@ struct SensorMissing {
 /// One event, at mission time `time`.
 struct Event {
   Timestamp time;
-  std::variant<SubmapStored, VerdictsTaken, WordTaken, VerificationFailed, RefinementTaken, RefinementFailed,
+  std::variant<SubmapStored, VerdictsTaken, DecisionTaken, VerificationFailed, RefinementTaken, RefinementFailed,
                MapUpdated, ChangeOfMind, RobotUpdated, MessageRefused, RobotJoined, RobotRefused, StateLost,
                SessionBegun, SubmapsForgotten, SampleRefused, OdometryJumped, ScanRefused, ImagesRefused, SensorMissing,
                FixRefused>

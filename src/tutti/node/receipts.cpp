@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kReceiptAgain_s = 60.0;
 constexpr std::size_t kMostUnreadSessions = 100;
-constexpr std::size_t kMostUnreadStretches = 500;  // in each of these
+constexpr std::size_t kMostUnreadIntervals = 500;  // in each of these
 constexpr std::size_t kMostRefused = 256;          // of a robot; the last ones
 constexpr std::size_t kMostStrangers = 1000;       // who are told something
 
@@ -66,7 +66,7 @@ bool Receipts::waits_too_long(RobotId robot, const NodeStatus& status, Timestamp
 
 void note_unread(SubmapId id, Receipt& receipt) {
   const bool is_bounded = receipt.unread.size() < kMostUnreadSessions || receipt.unread.contains(id.chain.session);
-  if (!receipt.contains(id) && is_bounded && receipt.unread[id.chain.session].stretches().size() < kMostUnreadStretches)
+  if (!receipt.contains(id) && is_bounded && receipt.unread[id.chain.session].intervals().size() < kMostUnreadIntervals)
     receipt.unread[id.chain.session].insert(id.index);
 }
 
@@ -74,7 +74,7 @@ void forget_unread(SubmapId id, Receipt& receipt) {
   if (!receipt.leaves_unread(id)) return;
   NumberSet& numbers = receipt.unread.at(id.chain.session);
   numbers.erase(id.index);
-  if (numbers.stretches().empty()) receipt.unread.erase(id.chain.session);
+  if (numbers.intervals().empty()) receipt.unread.erase(id.chain.session);
 }
 
 bool note_refused(SubmapId id, const std::string& bytes, const std::string& why, Receipt& receipt) {

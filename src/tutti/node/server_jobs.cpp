@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "tutti/base/plain_text.hpp"
+#include "tutti/node/decisions.hpp"
 #include "tutti/node/server_node.hpp"
-#include "tutti/node/words.hpp"
 #include "tutti/storage/map_tables.hpp"
 #include "tutti/wire/codec.hpp"
 

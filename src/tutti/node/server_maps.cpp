@@ -12,7 +12,7 @@ namespace tutti::node {
 /// The first multiple of the period that is not before `now`, nor in the pause after the last update.
 Timestamp ServerNode::next_update(Timestamp now) const {
   const double period_s = config_.server.update_period_s;
-  const Timestamp earliest = operator_spoke_ ? now : std::max(now, pause_until_);
+  const Timestamp earliest = operator_decided_ ? now : std::max(now, pause_until_);
   return Timestamp{} + std::ceil((earliest - Timestamp{}) / period_s - 1e-9) * period_s;
 }
 
@@ -43,13 +43,13 @@ std::optional<MapTask> ServerNode::begin_map(Timestamp now) {
   timer_.reset();
   compute_at_.reset();
   is_making_map_ = true;
-  const bool operator_spoke = std::exchange(operator_spoke_, false);
+  const bool operator_decided = std::exchange(operator_decided_, false);
   MapTask task{.job = is_update ? server_.begin_update() : server_.begin_rebuild(),
                .is_update = is_update,
                .begun = now,
                .incarnation = config_.incarnation,
                .robots = robots_,
-               .follow = config_.server.change_of_mind != "wait" || operator_spoke,
+               .follow = config_.server.change_of_mind != "wait" || operator_decided,
                .broadcast = std::move(broadcast_)};
   if (is_update)
     pause_until_ = now + config_.server.update_pause_per_submap_s * static_cast<double>(task.job.submaps.size());

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "support/node/stored_server.hpp"
-#include "tutti/node/words.hpp"
+#include "tutti/node/decisions.hpp"
 #include "tutti/node/worker_node.hpp"
 #include "tutti/storage/memory_store.hpp"
 
@@ -133,7 +133,7 @@ TEST_F(MapBeingMade, ALargeMapIsMadeLessOften) {
   now_ = now_ + 1.0;
   take_both(6);
   EXPECT_EQ(*node_->next_timer(), third + 120.0);
-  receive(test::envelope(ClosureWord{"0/0-1/2", Wish::reject, "ada", 5}));
+  receive(test::envelope(ClosureDecision{"0/0-1/2", Wish::reject, "ada", 5}));
   EXPECT_EQ(*node_->next_timer(), third + kPeriod_s);  // an operator does not wait
 }
 

@@ -27,7 +27,7 @@ std::string names_of_jobs(std::uint64_t epoch, std::uint64_t start, std::uint32_
 
 bus::MessageKind kind_of(std::string_view table) {
   if (table == map_tables::kSubmaps) return bus::MessageKind::submap;
-  if (table == map_tables::kWords) return bus::MessageKind::word;
+  if (table == map_tables::kDecisions) return bus::MessageKind::decision;
   if (table == map_tables::kMeta) return bus::MessageKind::receipt;
   return table == map_tables::kVerdicts ? bus::MessageKind::verdict : bus::MessageKind::verdicts;
 }
@@ -91,7 +91,7 @@ Step ServerNode::resume(Timestamp now) {
   step.writes.push_back(to_row(config_.server));
   keep_places(step);
   tell_unread_rows(now, step);
-  recall_words();
+  recall_decisions();
   for (const auto& [robot, receipt] : receipts_.members()) send_receipt(robot, step);
   send_jobs(std::nullopt, now, 0, config_.pairs_per_job, step);
   note_settling(now);
@@ -111,8 +111,8 @@ Step ServerNode::receive(const bus::Envelope& envelope, Timestamp now) {
     send_copies(envelope, now, step);
   else if (envelope.kind == bus::MessageKind::status)
     receive_status(envelope, now, step);
-  else if (envelope.kind == bus::MessageKind::word)
-    receive_word(envelope, now, step);
+  else if (envelope.kind == bus::MessageKind::decision)
+    receive_decision(envelope, now, step);
   else if (envelope.kind == bus::MessageKind::job && envelope.from == bus::Endpoint::any_worker())
     receive_returned_job(envelope, now, step);
   else if (envelope.kind == bus::MessageKind::refinement_job && envelope.from == bus::Endpoint::any_worker())
@@ -132,7 +132,7 @@ Step ServerNode::put_aside(const bus::Envelope& envelope, const std::string& why
 }
 
 void ServerNode::note_news(Timestamp now, bool before, Step& step) {
-  if (server_.has_news() && operator_spoke_) timer_ = next_update(now);  // the pause, if any, is over
+  if (server_.has_news() && operator_decided_) timer_ = next_update(now);  // the pause, if any, is over
   if (before == server_.has_news()) return;
   compute_at_.reset();  // the map with the news takes its place
   timer_ = next_update(now);

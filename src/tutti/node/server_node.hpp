@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "tutti/node/answered_words.hpp"
+#include "tutti/node/answered_decisions.hpp"
 #include "tutti/node/broadcast.hpp"
 #include "tutti/node/job_book.hpp"
 #include "tutti/node/map_meta.hpp"
@@ -53,10 +53,10 @@ struct ServerNodeConfig {
   std::function<std::string(RobotId, const std::string&)> name_objection = {};
 };
 
-/// The server as a node: MapServer with its store and messages. It takes submaps, verdicts and operators' words, and
-/// gives receipts, jobs and proxy graphs. The store is the map (storage::map_schema()): submaps, verdicts and words as
-/// they came, and the outcome for all other pairs; everything else is computed from these. What was sent is never newer
-/// than what is stored, so a server that starts again on its own store keeps its epoch.
+/// The server as a node: MapServer with its store and messages. It takes submaps, verdicts and operators' decisions,
+/// and gives receipts, jobs and proxy graphs. The store is the map (storage::map_schema()): submaps, verdicts and words
+/// as they came, and the outcome for all other pairs; everything else is computed from these. What was sent is never
+/// newer than what is stored, so a server that starts again on its own store keeps its epoch.
 class ServerNode {
  public:
   /// On an empty store, begins a new map of this epoch, which must be larger than any before (server::MapServer);
@@ -140,12 +140,12 @@ class ServerNode {
   void receive_returned_job(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_refinement(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_returned_refinement(const bus::Envelope& envelope, Timestamp now, Step& step);
-  void receive_word(const bus::Envelope& envelope, Timestamp now, Step& step);
-  /// True when a word on this pair that was given later counts instead.
-  Result<bool> take_word(const bus::Envelope& envelope, const ClosureWord& word, Timestamp now, Step& step);
-  void note_word(const std::string& frame, const std::string& why);
+  void receive_decision(const bus::Envelope& envelope, Timestamp now, Step& step);
+  /// True when a decision on this pair that was given later counts instead.
+  Result<bool> take_decision(const bus::Envelope& envelope, const ClosureDecision& decision, Timestamp now, Step& step);
+  void note_decision(const std::string& frame, const std::string& why);
   /// Answers the words that are stored.
-  void recall_words();
+  void recall_decisions();
   [[nodiscard]] server::ClosureNames closure_names() const;
   void send_copies(const bus::Envelope& envelope, Timestamp now, Step& step);
   /// Takes one verdict; a refusal that counts now is added to `refused`.
@@ -188,7 +188,7 @@ class ServerNode {
   std::shared_ptr<const SubmapFrames> frames_;
   server::MapServer server_;
   Receipts receipts_;
-  AnsweredWords words_;
+  AnsweredDecisions decisions_;
   RobotRegistry registry_;
   std::map<std::string, UnreadRows> unread_rows_;  // by table, until they are told
   WorkerRoster workers_;
@@ -210,7 +210,7 @@ class ServerNode {
   bool is_making_map_ = false;
   Broadcast broadcast_{config_.server.broadcast == "all"};  // the task has it while a map is made
   std::shared_ptr<const ProxyGraph> last_broadcast_ = broadcast_.last();
-  bool operator_spoke_ = false;  // since the last map
+  bool operator_decided_ = false;  // since the last map
 };
 
 }  // namespace tutti::node

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "support/node/stored_server.hpp"
-#include "tutti/node/words.hpp"
+#include "tutti/node/decisions.hpp"
 #include "tutti/node/worker_node.hpp"
 #include "tutti/storage/memory_store.hpp"
 #include "tutti/wire/submap_copy_codec.hpp"
@@ -294,13 +294,13 @@ TEST_F(ServerNodeTest, AnOperatorsWordIsStoredAndSurvivesEveryRestart) {
   };
   const auto all = accepted();
   const SubmapPair pair{{kAlpha, 0}, {kBravo, 2}};
-  const Step step = receive(test::envelope(ClosureWord{"0/0-1/2", Wish::reject, "ada", 5}));
-  EXPECT_EQ(told<WordTaken>(step), 1U);
+  const Step step = receive(test::envelope(ClosureDecision{"0/0-1/2", Wish::reject, "ada", 5}));
+  EXPECT_EQ(told<DecisionTaken>(step), 1U);
   ASSERT_EQ(node_->next_timer(), Timestamp{} + 20.0);
   for (int start = 0; start < 2; ++start) {
     restart();
-    ASSERT_EQ(node_->map_server().state().words.size(), 1U);
-    EXPECT_EQ(node_->map_server().state().words.at(pair), (ClosureWord{"0/0-1/2", Wish::reject, "ada", 5}));
+    ASSERT_EQ(node_->map_server().state().decisions.size(), 1U);
+    EXPECT_EQ(node_->map_server().state().decisions.at(pair), (ClosureDecision{"0/0-1/2", Wish::reject, "ada", 5}));
     ASSERT_EQ(node_->next_timer(), Timestamp{} + 20.0);  // the map has not followed yet
   }
   done(node_->on_timer(now_));
@@ -310,10 +310,10 @@ TEST_F(ServerNodeTest, AnOperatorsWordIsStoredAndSurvivesEveryRestart) {
   EXPECT_EQ(accepted(), all - 1);
 
   const auto before = store_->tables();  // late, and once more
-  EXPECT_EQ(told<WordTaken>(receive(test::envelope(ClosureWord{"0/0-1/2", Wish::accept, "eve", 4}))), 0U);
-  EXPECT_EQ(told<WordTaken>(receive(test::envelope(ClosureWord{"0/0-1/2", Wish::reject, "ada", 5}))), 0U);
+  EXPECT_EQ(told<DecisionTaken>(receive(test::envelope(ClosureDecision{"0/0-1/2", Wish::accept, "eve", 4}))), 0U);
+  EXPECT_EQ(told<DecisionTaken>(receive(test::envelope(ClosureDecision{"0/0-1/2", Wish::reject, "ada", 5}))), 0U);
   EXPECT_EQ(store_->tables(), before);
-  receive(test::envelope(ClosureWord{"1/2-0/0", Wish::withdraw, "ada", 6}));
+  receive(test::envelope(ClosureDecision{"1/2-0/0", Wish::withdraw, "ada", 6}));
   restart();
   done(node_->on_timer(now_));
   EXPECT_EQ(accepted(), all);
@@ -322,19 +322,19 @@ TEST_F(ServerNodeTest, AnOperatorsWordIsStoredAndSurvivesEveryRestart) {
 TEST_F(ServerNodeTest, NobodyElseHasAWordAndNotOnWhatIsNotThere) {
   fill();
   const auto before = store_->tables();
-  const ClosureWord word{"0/0-1/2", Wish::reject, "ada", 5};
+  const ClosureDecision decision{"0/0-1/2", Wish::reject, "ada", 5};
   for (const Endpoint from : {Endpoint::of(RobotId{0}), Endpoint::worker(0)}) {
-    bus::Envelope forged = test::envelope(word);
+    bus::Envelope forged = test::envelope(decision);
     forged.from = from;
     EXPECT_EQ(told<MessageRefused>(receive(forged)), 1U);
   }
-  bus::Envelope garbage = test::envelope(word);
+  bus::Envelope garbage = test::envelope(decision);
   garbage.bytes = std::make_shared<const std::string>("garbage");
   EXPECT_EQ(told<MessageRefused>(receive(garbage)), 1U);
   for (const char* closure : {"nobody/0-1/2", "0/0-1/99", "0/0", "0/0-0/0"})
-    EXPECT_EQ(told<MessageRefused>(receive(test::envelope(ClosureWord{closure, Wish::reject, "ada", 5}))), 1U)
+    EXPECT_EQ(told<MessageRefused>(receive(test::envelope(ClosureDecision{closure, Wish::reject, "ada", 5}))), 1U)
         << closure;
-  EXPECT_EQ(told<MessageRefused>(receive(test::envelope(ClosureWord{"0/0-1/1", Wish::accept, "ada", 5}))),
+  EXPECT_EQ(told<MessageRefused>(receive(test::envelope(ClosureDecision{"0/0-1/1", Wish::accept, "ada", 5}))),
             1U);  // no closure there
   EXPECT_EQ(store_->tables(), before);
 }
@@ -430,7 +430,7 @@ TEST_F(ServerNodeTest, WhatComesBeforeTheMapIsComputedIsInTheFirstOne) {
 
 TEST_F(ServerNodeTest, AStoreThatIsDamagedIsNoMap) {
   fill();
-  receive(test::envelope(ClosureWord{"0/0-1/2", Wish::reject, "ada", 5}));
+  receive(test::envelope(ClosureDecision{"0/0-1/2", Wish::reject, "ada", 5}));
   for (const auto& [table, rows] : store_->tables()) {
     if (rows.empty()) continue;
     auto tables = store_->tables();
@@ -516,8 +516,8 @@ TEST_F(ChangedMap, IsSentAtOnceAfterAnOperatorsWord) {
   const auto& verdicts = node_->map_server().state().verdicts;
   ASSERT_FALSE(verdicts.empty());
   const std::string name = server::ClosureNames({}, {kAlpha}).of(verdicts.begin()->first);
-  const Step heard = receive(test::envelope(ClosureWord{name, Wish::accept, "ada", 5}));
-  EXPECT_EQ(told<WordTaken>(heard), 1U);
+  const Step heard = receive(test::envelope(ClosureDecision{name, Wish::accept, "ada", 5}));
+  EXPECT_EQ(told<DecisionTaken>(heard), 1U);
   const Step changed = done(node_->on_timer(now_));
   EXPECT_EQ(of_kind(changed, MessageKind::proxy_graph).size(), 1U);
   EXPECT_EQ(outcomes(changed), std::vector<ChangeOutcome>{});

@@ -18,7 +18,7 @@ constexpr std::size_t kMostStrangersTold = 50;  // to viewers: the last heard
 std::uint64_t count(const std::map<std::uint64_t, NumberSet>& sessions) {
   std::uint64_t all = 0;
   for (const auto& [session, numbers] : sessions)
-    for (const auto& [begin, end] : numbers.stretches()) all += end - begin;
+    for (const auto& [begin, end] : numbers.intervals()) all += end - begin;
   return all;
 }
 
@@ -29,11 +29,11 @@ std::uint64_t count_refused(const Receipt& receipt, const NodeStatus& status) {
   for (const auto& [session, numbers] : receipt.refused) {
     std::uint64_t used = 0;
     if (const auto stored = receipt.stored.find(session); stored != receipt.stored.end())
-      for (const NumberSet::Stretch& stretch : stored->second.stretches()) used = stretch.end;
+      for (const NumberSet::Interval& interval : stored->second.intervals()) used = interval.end;
     if (session == status.session && !status.name.empty())  // older robots do not say it
       used = std::max(used, status.submaps.value_or(std::numeric_limits<std::uint64_t>::max()));
-    for (const NumberSet::Stretch& stretch : numbers.stretches())
-      all += std::min(stretch.end, used) - std::min(stretch.begin, used);
+    for (const NumberSet::Interval& interval : numbers.intervals())
+      all += std::min(interval.end, used) - std::min(interval.begin, used);
   }
   return all;
 }
@@ -158,7 +158,7 @@ MissionStatus ServerNode::mission_status(Timestamp now) const {
   }
   for (const auto& [number, worker] : workers_.all()) out.workers.push_back(worker);
   for (const auto& [from, refusals] : refusals_) out.refusals.push_back(refusals);
-  out.words = words_.all();
+  out.decisions = decisions_.all();
   return out;
 }
 

@@ -312,7 +312,7 @@ TEST_F(ServerStatus, NobodysGarbageFillsTheReceipt) {
     receive(garbage);
   }
   EXPECT_EQ(receipt(kAlpha).refusals.size(), 256U);
-  EXPECT_EQ(receipt(kAlpha).refused.at(3).stretches().size(), 256U);
+  EXPECT_EQ(receipt(kAlpha).refused.at(3).intervals().size(), 256U);
   EXPECT_EQ(node_->mission_status(now_).refusals.at(0).count, 1800U);
 }
 

@@ -11,7 +11,7 @@
 #include "support/node/site.hpp"
 #include "support/paths.hpp"
 #include "tutti/base/file.hpp"
-#include "tutti/node/words.hpp"
+#include "tutti/node/decisions.hpp"
 #include "tutti/node/worker_node.hpp"
 #include "tutti/storage/sqlite_store.hpp"
 #include "tutti/wire/submap_copy_codec.hpp"
@@ -137,7 +137,7 @@ TEST(Upgrade, RowsOfANewerVersionAreLeftAloneAndTold) {
   }
   const SubmapPair pair{{chain, 0}, {chain, 2}};
   ASSERT_TRUE(store.commit(std::vector<storage::Write>{
-      {"words", key_of(pair), raised(wire::encode(ClosureWord{.closure = "robot_0/0-robot_0/2"}))},
+      {"words", key_of(pair), raised(wire::encode(ClosureDecision{.closure = "robot_0/0-robot_0/2"}))},
       {"meta", "refused/0", raised(wire::encode(Receipt{.robot = chain.robot}))}}));
   std::vector<storage::Write> newer;
   for (const char* table : {"submaps", "verdicts", "answers"}) {
@@ -176,10 +176,11 @@ TEST(Upgrade, AServerCountsWhatItCannotReadOfAnybodyAndGoesOn) {
         {from, Endpoint::server(), kind, "1/2", std::make_shared<const std::string>(raised(bytes))}, site.now());
   };
   const Endpoint worker = Endpoint::worker(4), robot = Endpoint::of(Site::kRobot);
-  for (const Step& step : {hear(robot, MessageKind::status, wire::encode(NodeStatus{.name = "gamma"})),
-                           hear(worker, MessageKind::status, wire::encode(NodeStatus{.name = "worker_4"})),
-                           hear(worker, MessageKind::verdicts, wire::encode(Verdicts{.job = "1"})),
-                           hear(Endpoint::viewer(0), MessageKind::word, wire::encode(ClosureWord{.closure = "a"}))}) {
+  for (const Step& step :
+       {hear(robot, MessageKind::status, wire::encode(NodeStatus{.name = "gamma"})),
+        hear(worker, MessageKind::status, wire::encode(NodeStatus{.name = "worker_4"})),
+        hear(worker, MessageKind::verdicts, wire::encode(Verdicts{.job = "1"})),
+        hear(Endpoint::viewer(0), MessageKind::decision, wire::encode(ClosureDecision{.closure = "a"}))}) {
     ASSERT_EQ(step.events.size(), 1U);
     EXPECT_TRUE(std::holds_alternative<MessageRefused>(step.events[0].what));
     EXPECT_TRUE(step.writes.empty());

@@ -181,7 +181,7 @@ TEST_F(Intruders, AViewerDoesNotDecideAndAnOperatorOnlyUnderOneName) {
   expect_refused(vera_, "publish", {"mission.cave.operator.vera.word", "mission.cave.operator.anna.word"});
   const auto desk = open(Endpoint::viewer(1), anna_);
   ASSERT_TRUE(
-      desk->send({Endpoint::viewer(1), Endpoint::server(), MessageKind::word, "w", bytes("by berta"), "berta"}));
+      desk->send({Endpoint::viewer(1), Endpoint::server(), MessageKind::decision, "w", bytes("by berta"), "berta"}));
   const auto came = heard(*hub_, 1);
   ASSERT_EQ(came.size(), 1U);
   EXPECT_EQ(came.front().user, "anna");

@@ -43,9 +43,9 @@ TEST_F(PkiTest, EverybodyDoesWhatTheyAreFor) {
   const auto own = open(Endpoint::worker(0), credentials("server"));
   const auto desk = open(Endpoint::viewer(17), anna), screen = open(Endpoint::viewer(18), vera);
   ASSERT_TRUE(robot->send({Endpoint::of(RobotId{3}), Endpoint::server(), MessageKind::submap, "s", bytes("submap")}));
-  ASSERT_TRUE(desk->send({Endpoint::viewer(17), Endpoint::server(), MessageKind::word, "w", bytes("word")}));
+  ASSERT_TRUE(desk->send({Endpoint::viewer(17), Endpoint::server(), MessageKind::decision, "w", bytes("word")}));
   for (const bus::Envelope& message : heard(*hub, 2))
-    EXPECT_EQ(message.user, message.kind == MessageKind::word ? "anna" : "");
+    EXPECT_EQ(message.user, message.kind == MessageKind::decision ? "anna" : "");
   ASSERT_TRUE(hub->send({Endpoint::server(), Endpoint::any_worker(), MessageKind::job, "j1", bytes("job")}));
   ASSERT_TRUE(hub->send({Endpoint::server(), Endpoint::any_worker(), MessageKind::job, "j2", bytes("job")}));
   std::size_t jobs = 0;  // either worker may take both

@@ -85,7 +85,7 @@ Told tell(const node::VerdictsTaken& taken) {
           fmt::format("job {}: {} pairs verified", taken.job, taken.pairs),
           Level::debug};
 }
-Told tell(const node::WordTaken& taken) {
+Told tell(const node::DecisionTaken& taken) {
   return {{{"event", "word_taken"},
            {"first", to_string(taken.pair.first)},
            {"second", to_string(taken.pair.second)},

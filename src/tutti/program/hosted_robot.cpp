@@ -21,7 +21,7 @@ constexpr double kStarts_s = 15.0;       // so long a second program of this rob
 
 Answer HostedRobot::receive(const bus::Received& message, Timestamp now) {
   std::optional<Trajectory> map;
-  if (feed_ && feed_->front().wants_ways())
+  if (feed_ && feed_->front().wants_trajectory())
     if (const auto graph = driver_->node().graph_in(message.envelope); graph && *graph)
       map = trajectory_of((*graph)->graph, driver_->node().agent().chain());
   driver_->receive(message.envelope, now);

@@ -33,7 +33,7 @@ std::optional<Timestamp> HostedServer::next_work() const {
 
 Answer HostedServer::work(Timestamp now) {
   Answer answer;
-  for (AskedWord& word : std::exchange(asked_, {})) take(word, now, answer.step);
+  for (AskedDecision& decision : std::exchange(asked_, {})) take(decision, now, answer.step);
   answer.step.add(node_->tend(now));
   if (is_made()) {
     answer.step.add(node_->end_map(making_.get(), now));
@@ -75,19 +75,19 @@ void HostedServer::tend_viewers(Timestamp now) {
   for (auto& [promise, why] : std::exchange(answers_, {})) promise.set_value(why);
   std::shared_ptr<const mapfile::ShownMap> shown;
   for (const auto& viewer : viewers_) {
-    for (AskedWord& word : viewer->take_words()) asked_.push_back(std::move(word));
+    for (AskedDecision& decision : viewer->take_decisions()) asked_.push_back(std::move(decision));
     if (!node_->has_map() || !viewer->wants(node_->map_server().state().revision)) continue;
     if (!shown) shown = std::make_shared<const mapfile::ShownMap>(shown_maps_.of(*node_, now));
     viewer->show(shown);
   }
 }
 
-void HostedServer::take(AskedWord& asked, Timestamp now, node::Step& step) {
+void HostedServer::take(AskedDecision& asked, Timestamp now, node::Step& step) {
   const bus::Envelope envelope{bus::Endpoint::viewer(0),
                                bus::Endpoint::server(),
-                               bus::MessageKind::word,
-                               fmt::format("page/{}/{}", asked.word.given_ns, ++asked_words_),
-                               std::make_shared<const std::string>(wire::encode(asked.word)),
+                               bus::MessageKind::decision,
+                               fmt::format("page/{}/{}", asked.decision.given_ns, ++asked_decisions_),
+                               std::make_shared<const std::string>(wire::encode(asked.decision)),
                                asked.proved_name};
   node::Step taken = node_->receive(envelope, now);
   std::string why;

@@ -56,7 +56,7 @@ class HostedServer final : public Hosted {
   }
   void tend_viewers(Timestamp now);
   /// As if it had come by the bus.
-  void take(AskedWord& asked, Timestamp now, node::Step& step);
+  void take(AskedDecision& asked, Timestamp now, node::Step& step);
   [[nodiscard]] bool is_made() const;
 
   std::unique_ptr<node::ServerNode> node_;
@@ -68,11 +68,11 @@ class HostedServer final : public Hosted {
   const Clock& clock_;
   MakeMap make_map_;
   RadioCount radio_;
-  std::vector<AskedWord> asked_;
+  std::vector<AskedDecision> asked_;
   /// Answers to words whose step is being carried out.
   std::vector<std::pair<std::promise<std::string>, std::string>> answers_;
   std::uint64_t told_changes_ = 0;
-  std::uint64_t asked_words_ = 0;        // so many so far
+  std::uint64_t asked_decisions_ = 0;    // so many so far
   std::future<node::MapOfTask> making_;  // valid while a map is made; its destructor waits
 };
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "tutti/mapfile/shown_map.hpp"
-#include "tutti/model/closure_word.hpp"
+#include "tutti/model/closure_decision.hpp"
 #include "tutti/model/status.hpp"
 #include "tutti/program/event_log.hpp"
 #include "tutti/program/radio_count.hpp"
@@ -21,8 +21,8 @@ namespace tutti::program {
 
 /// An operator's decision, and the promise of an answer: why it is not stored, or empty when it is. The promise is
 /// broken when it could not be stored.
-struct AskedWord {
-  ClosureWord word;
+struct AskedDecision {
+  ClosureDecision decision;
   std::string proved_name;  ///< As a credential proves; empty: nobody has proved anything.
   std::promise<std::string> answer;
 };
@@ -49,7 +49,7 @@ class MapViewer {
   /// Every two seconds, and when something has changed.
   virtual void tell(const MissionStatus& /*status*/, const RadioCount::Sums& /*radio*/) {}
   /// What operators have decided at this viewer since the last call.
-  [[nodiscard]] virtual std::vector<AskedWord> take_words() { return {}; }
+  [[nodiscard]] virtual std::vector<AskedDecision> take_decisions() { return {}; }
 
  protected:
   MapViewer() = default;

@@ -65,7 +65,7 @@ std::vector<SubmapPair> AnsweredPairs::open(SubmapId id) const {
       open.push_back({first, second});
     }
   };
-  for (const auto& [begin, end] : answered_[later].stretches()) {
+  for (const auto& [begin, end] : answered_[later].intervals()) {
     take_until(begin);
     next = end;
   }
@@ -79,9 +79,9 @@ void AnsweredPairs::forget_answers() {
 
 std::size_t AnsweredPairs::watermark(SubmapId id) const { return answered_[number_.at(id)].watermark(); }
 
-std::size_t AnsweredPairs::stretches_beyond() const {
+std::size_t AnsweredPairs::intervals_beyond() const {
   std::size_t count = 0;
-  for (const NumberSet& answered : answered_) count += answered.stretches().size() - (answered.watermark() > 0 ? 1 : 0);
+  for (const NumberSet& answered : answered_) count += answered.intervals().size() - (answered.watermark() > 0 ? 1 : 0);
   return count;
 }
 

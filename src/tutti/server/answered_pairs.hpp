@@ -14,7 +14,7 @@ namespace tutti::server {
 
 /// The pairs of submaps that need not be verified any more, in memory that grows with the submaps and not with their
 /// pairs. Submaps are numbered in order of arrival. For each one the set keeps up to which number it was compared with
-/// all others (its watermark), and the stretches of numbers beyond that were answered out of turn. A pair belongs to
+/// all others (its watermark), and the intervals of numbers beyond that were answered out of turn. A pair belongs to
 /// the submap that came later, so that submap's watermark ends at its own number.
 class AnsweredPairs {
  public:
@@ -36,8 +36,8 @@ class AnsweredPairs {
 
   /// With how many submaps, counted in order of arrival, this one was compared without a gap.
   [[nodiscard]] std::size_t watermark(SubmapId id) const;
-  /// Number of stretches beyond the watermarks, over all submaps.
-  [[nodiscard]] std::size_t stretches_beyond() const;
+  /// Number of intervals beyond the watermarks, over all submaps.
+  [[nodiscard]] std::size_t intervals_beyond() const;
   friend bool operator==(const AnsweredPairs&, const AnsweredPairs&) = default;
 
  private:

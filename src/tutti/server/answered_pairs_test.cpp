@@ -65,7 +65,7 @@ TEST(AnsweredPairs, KnowsExactlyWhatWasAnsweredWhateverTheOrder) {
         ASSERT_EQ(answered.watermark(ids[b]), a);
       }
     }
-    EXPECT_EQ(answered.stretches_beyond(), 0U);
+    EXPECT_EQ(answered.intervals_beyond(), 0U);
     AnsweredPairs in_order;
     for (const SubmapId id : ids) in_order.add_submap(id);
     for (const SubmapPair& pair : pairs_of(ids)) in_order.insert(pair);
@@ -75,14 +75,14 @@ TEST(AnsweredPairs, KnowsExactlyWhatWasAnsweredWhateverTheOrder) {
   }
 }
 
-TEST(AnsweredPairs, ASubmapThatIsNeverAnsweredCostsOneStretchOfEveryLaterOne) {
+TEST(AnsweredPairs, ASubmapThatIsNeverAnsweredCostsOneIntervalOfEveryLaterOne) {
   Rng rng(1);
   const std::vector<SubmapId> ids = arrivals(50, rng);
   AnsweredPairs answered;
   for (const SubmapId id : ids) answered.add_submap(id);
   for (const SubmapPair& pair : pairs_of(ids))
     if (pair.first != ids[20] && pair.second != ids[20]) answered.insert(pair);
-  EXPECT_EQ(answered.stretches_beyond(), ids.size() - 22);  // the next one has nothing beyond
+  EXPECT_EQ(answered.intervals_beyond(), ids.size() - 22);  // the next one has nothing beyond
   EXPECT_EQ(answered.watermark(ids.back()), 20U);
 }
 

@@ -17,7 +17,7 @@ bool overlap(const FailedOdometry& a, const FailedOdometry& b) {
   return a.chain == b.chain && a.from < b.to && b.from < a.to;
 }
 
-/// Stretches of the chain in `these` with which none of `others` overlaps.
+/// Segments of the chain in `these` with which none of `others` overlaps.
 std::size_t only_in(const std::vector<FailedOdometry>& these, const std::vector<FailedOdometry>& others,
                     const ChainId& chain) {
   return static_cast<std::size_t>(std::ranges::count_if(these, [&](const FailedOdometry& failed) {

@@ -25,8 +25,8 @@ struct ChangeReason {
   std::size_t found = 0;      ///< Closures of the chain that are accepted now and were unknown.
   std::size_t taken_up = 0;   ///< Closures that are accepted now and were refused.
   std::size_t dropped = 0;    ///< Closures that were accepted and are refused now, or gone.
-  std::size_t failed = 0;     ///< Stretches of the chain's odometry that count as failed now and did not before,
-  std::size_t recovered = 0;  ///< and the reverse. A stretch that only changes its ends counts as neither.
+  std::size_t failed = 0;     ///< Segments of the chain's odometry that count as failed now and did not before,
+  std::size_t recovered = 0;  ///< and the reverse. A segment that only changes its ends counts as neither.
   std::size_t elsewhere = 0;  ///< Closures of other chains that were found, taken up or dropped.
   std::size_t lone = 0;       ///< Closures of the one pair of places on which all of it rests (change_support.hpp).
   friend bool operator==(const ChangeReason&, const ChangeReason&) = default;

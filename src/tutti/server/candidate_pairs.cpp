@@ -122,10 +122,10 @@ CandidatePairs restored(const PlaceSet& places, std::size_t most) {
   return most > 0 && is_whole ? CandidatePairs(most, places) : CandidatePairs();
 }
 
-VerdictSet of_candidates(const VerdictSet& verdicts, const CandidatePairs& candidates, const WordSet& words) {
+VerdictSet of_candidates(const VerdictSet& verdicts, const CandidatePairs& candidates, const DecisionSet& decisions) {
   VerdictSet out;
   for (const auto& [pair, verdict] : verdicts)
-    if (words.contains(pair) || !candidates.excludes(pair)) out.emplace_hint(out.end(), pair, verdict);
+    if (decisions.contains(pair) || !candidates.excludes(pair)) out.emplace_hint(out.end(), pair, verdict);
   return out;
 }
 

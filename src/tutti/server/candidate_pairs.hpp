@@ -75,6 +75,6 @@ class CandidatePairs {
 CandidatePairs restored(const PlaceSet& places, std::size_t most);
 
 /// The verdicts that the map is made with: of candidates, and those that an operator has spoken of.
-VerdictSet of_candidates(const VerdictSet& verdicts, const CandidatePairs& candidates, const WordSet& words);
+VerdictSet of_candidates(const VerdictSet& verdicts, const CandidatePairs& candidates, const DecisionSet& decisions);
 
 }  // namespace tutti::server

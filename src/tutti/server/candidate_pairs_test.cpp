@@ -217,9 +217,9 @@ TEST(CandidatePairs, KeepTheVerdictsThatAnOperatorHasSpokenOf) {
     if (made.pairs.excludes(pair)) excluded.push_back(pair);
   }
   ASSERT_GT(excluded.size(), 10U);
-  WordSet words;
-  words[excluded.front()] = {.wish = Wish::accept};
-  const VerdictSet left = of_candidates(verdicts, made.pairs, words);
+  DecisionSet decisions;
+  decisions[excluded.front()] = {.wish = Wish::accept};
+  const VerdictSet left = of_candidates(verdicts, made.pairs, decisions);
   EXPECT_EQ(left.size(), verdicts.size() - excluded.size() + 1);
   EXPECT_TRUE(left.contains(excluded.front()));
   EXPECT_FALSE(left.contains(excluded.back()));

@@ -34,7 +34,7 @@ struct JudgedGraph {
   std::vector<JudgedEdge> edges;  ///< One per edge of the graph, in the same order.
 };
 
-/// Makes a map from any pose graph as the server does: decides which closures and which stretches of odometry are wrong
+/// Makes a map from any pose graph as the server does: decides which closures and which segments of odometry are wrong
 /// (docs/math.md, "Who is wrong?"), and optimises with the others. The frame of each component is its first robot's
 /// odometry frame.
 JudgedGraph judge_graph(const RobotGraph& graph, const MapConfig& config);

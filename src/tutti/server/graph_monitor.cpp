@@ -188,30 +188,30 @@ ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const c
   MonitorWork unasked;
   MonitorWork& counted = work != nullptr ? *work : unasked;
   auto chosen = choose_nodes(map);
-  std::vector<std::pair<std::size_t, std::size_t>> stretches;
+  std::vector<std::pair<std::size_t, std::size_t>> segments;
   for (const auto& [chain, nodes] : chosen) {
-    for (std::size_t k = 1; k < nodes.size(); ++k) stretches.emplace_back(nodes[k - 1], nodes[k]);
-    for (const auto& [first, last] : repairs(map, chain, nodes)) stretches.emplace_back(nodes[first], nodes[last]);
+    for (std::size_t k = 1; k < nodes.size(); ++k) segments.emplace_back(nodes[k - 1], nodes[k]);
+    for (const auto& [first, last] : repairs(map, chain, nodes)) segments.emplace_back(nodes[first], nodes[last]);
   }
   std::optional<PoseGraph> with_fixes;
   if (!map.fixes.edges.empty()) with_fixes = graph_on_earth(map);
   const PoseGraph& on_earth = with_fixes ? *with_fixes : map.graph;
   const std::vector<double> weights = honest_weights(map, on_earth.edges.size());
-  auto posterior = posterior_of(map, on_earth, stretches);
+  auto posterior = posterior_of(map, on_earth, segments);
   ++counted.factorisations;
   const std::vector<Matrix6d> covariances = posterior->relative_covariances();
 
   std::vector<consistency::ServerNode> nodes;
   std::vector<ChainComponent> components;
-  std::size_t stretch = 0;
+  std::size_t segment = 0;
   for (auto& [chain, indices] : chosen) {
     bool determined = true;
-    std::size_t next = stretch;  // after this chain's
-    for (; next < stretches.size() && map.nodes[stretches[next].first].id.chain == chain; ++next)
+    std::size_t next = segment;  // after this chain's
+    for (; next < segments.size() && map.nodes[segments[next].first].id.chain == chain; ++next)
       determined = determined && check_covariance(covariances[next]);
     if (!determined) {  // its own edges leave its poses open, or nearly: it gets nothing, and the others do
       indices.clear();
-      stretch = next;
+      segment = next;
     }
     if (indices.empty()) continue;
     components.push_back({chain, map.nodes[indices.front()].component});
@@ -221,12 +221,12 @@ ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const c
       nodes.push_back({.chain = chain,
                        .stamp = node.stamp,
                        .T_world_body = node.T_world_body,
-                       .covariance = k == 0 ? Matrix6d::Zero() : covariances[stretch++]});
+                       .covariance = k == 0 ? Matrix6d::Zero() : covariances[segment++]});
     }
     // Where odometry failed, the steps' errors are large but must add up to what the closures say, so they undo each
-    // other, which a covariance per step cannot express. Equal shares of the whole stretch's add up to the right sum.
+    // other, which a covariance per step cannot express. Equal shares of the whole segment's add up to the right sum.
     for (const auto& [first, last] : repairs(map, chain, indices)) {
-      const Matrix6d share = covariances[stretch++] / static_cast<double>(last - first);
+      const Matrix6d share = covariances[segment++] / static_cast<double>(last - first);
       const Pose3& T_world_last = nodes[first_node + last].T_world_body;
       for (std::size_t k = first + 1; k <= last; ++k) {
         const Matrix6d to_node = adjoint(nodes[first_node + k].T_world_body.inverse() * T_world_last);

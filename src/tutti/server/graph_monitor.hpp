@@ -25,7 +25,7 @@ struct MonitorWork {
 /// The graph monitor: makes a proxy graph of the latest estimates of the representative nodes, with the covariance of
 /// each node relative to its chain's previous one. It takes the nodes of each chain's chosen component
 /// (map_components.hpp) and leaves the others out, which missing submaps separate from them, until closures join them.
-/// Over failed odometry the covariances are equal shares of what the closures make of the whole stretch. A robot was
+/// Over failed odometry the covariances are equal shares of what the closures make of the whole segment. A robot was
 /// last seen in its newest session, or in that of `owners`; of these sessions, which robots hear about, the graph says
 /// how sure the server is of the trajectory's shape (ChainUncertainty), unless the map does not determine its poses.
 /// `work`, unless null, is increased.

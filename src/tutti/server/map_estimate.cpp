@@ -75,15 +75,15 @@ std::vector<std::optional<Matrix6d>> stated_steps(const SubmapSet& submaps, cons
   return out;
 }
 
-judge::Closures collect_closures(const VerdictSet& verdicts, const WordSet& words, const SubmapSet& submaps,
+judge::Closures collect_closures(const VerdictSet& verdicts, const DecisionSet& decisions, const SubmapSet& submaps,
                                  const judge::NodeIndex& index, const std::set<SubmapPair>& spare,
                                  const std::set<SubmapPair>& refuted) {
   judge::Closures out;
   std::vector<std::pair<LoopClosure, std::optional<Wish>>> all;
   for (const auto& [pair, verdict] : verdicts) {
     if (!has_both(submaps, pair)) continue;
-    const auto word = words.find(pair);
-    const auto wish = word == words.end() ? std::nullopt : std::optional(word->second.wish);
+    const auto decision = decisions.find(pair);
+    const auto wish = decision == decisions.end() ? std::nullopt : std::optional(decision->second.wish);
     if (spare.contains(pair) && wish != Wish::accept && wish != Wish::reject) continue;
     for (const LoopClosure& closure : verdict.closures)
       if (index.contains(closure.from) && index.contains(closure.to)) {
@@ -95,11 +95,11 @@ judge::Closures collect_closures(const VerdictSet& verdicts, const WordSet& word
         all.pop_back();
       }
   }
-  for (const auto& [pair, word] : words) {
-    if (word.wish != Wish::accept || !has_both(submaps, pair)) continue;
-    for (const LoopClosure& closure : word.by_hand)
+  for (const auto& [pair, decision] : decisions) {
+    if (decision.wish != Wish::accept || !has_both(submaps, pair)) continue;
+    for (const LoopClosure& closure : decision.by_hand)
       if (index.contains(closure.from) && index.contains(closure.to)) {
-        all.emplace_back(closure, word.wish);
+        all.emplace_back(closure, decision.wish);
         LoopClosure& added = all.back().first;
         added.measurement.covariance = bounded_covariance(closure.measurement.covariance);
       }
@@ -144,12 +144,12 @@ PoseGraph seen_through(const MapEstimate& map, double most = 1.0) {
 /// Odometry whose loops are so many times their stated variance, at least, says much too little of its errors.
 constexpr double kUnderstated = 4.0;
 
-/// Probability with which the odometry of a stretch agrees with the map after all.
+/// Probability with which the odometry of a segment agrees with the map after all.
 constexpr double kRightAfterAll = 0.999;
 
-/// Says by how much failed odometry missed, and leaves the graph as sure of it as it then deserves. A stretch that
+/// Says by how much failed odometry missed, and leaves the graph as sure of it as it then deserves. A segment that
 /// turns out to have been right, nearly or within its own doubt, is no failure.
-void record_failure(const judge::FailedStretch& failed, MapEstimate& map) {
+void record_failure(const judge::FailedSegment& failed, MapEstimate& map) {
   const MapNode &a = map.nodes[failed.from], &b = map.nodes[failed.to];
   Matrix6d covariance = Matrix6d::Zero();
   for (std::size_t e = 0; e < map.odometry_edges; ++e) {
@@ -184,7 +184,7 @@ void adopt(const judge::Optimum& optimum, MapEstimate& map) {
   }
   map.graph.poses = optimum.solution.poses;
   for (std::size_t i = 0; i < map.nodes.size(); ++i) map.nodes[i].T_world_body = map.graph.poses[i];
-  for (const judge::FailedStretch& failed : optimum.failed) record_failure(failed, map);
+  for (const judge::FailedSegment& failed : optimum.failed) record_failure(failed, map);
 }
 
 }  // namespace
@@ -210,7 +210,7 @@ std::map<ChainId, judge::OdometryHonesty> honesty_after(const MapEstimate& map, 
   std::vector<std::optional<Matrix6d>> step_to(map.nodes.size());
   for (std::size_t e = 0; e < map.odometry_edges; ++e) {
     const PoseGraphEdge& edge = map.graph.edges[e];
-    const auto holds = [&](const judge::FailedStretch& f) { return f.from < edge.to && edge.from < f.to; };
+    const auto holds = [&](const judge::FailedSegment& f) { return f.from < edge.to && edge.from < f.to; };
     if (std::ranges::none_of(optimum.failed, holds))
       step_to[edge.to] = edge.information.ldlt().solve(Matrix6d::Identity());
   }
@@ -234,14 +234,14 @@ bool raise_understated(const std::map<ChainId, judge::OdometryHonesty>& honesty,
 
 /// The map of submaps that do not contradict each other.
 MapEstimate estimate_together(const SubmapSet& submaps, const VerdictSet& verdicts, const MapConfig& config,
-                              const WordSet& words, const std::set<SubmapPair>& refuted) {
+                              const DecisionSet& decisions, const std::set<SubmapPair>& refuted) {
   MapEstimate map;
   const judge::NodeIndex index = attach_submaps(submaps, map);
   const auto spare = spare_pairs(verdicts, submaps,
                                  {.with_one_chain = static_cast<std::size_t>(config.most_closed_pairs),
                                   .in_all = static_cast<std::size_t>(config.most_pairs_in_all)});
   map.spare_pairs = spare.size();
-  judge::Closures closures = collect_closures(verdicts, words, submaps, index, spare, refuted);
+  judge::Closures closures = collect_closures(verdicts, decisions, submaps, index, spare, refuted);
   const std::vector<LoopClosure> stated = closures.judged;
   const std::vector<judge::OdometryPiece> pieces = odometry_pieces(map.nodes, stated_steps(submaps, index));
   if (config.judge_closures) raise_understated(pieces, closures, map);
@@ -252,7 +252,7 @@ MapEstimate estimate_together(const SubmapSet& submaps, const VerdictSet& verdic
   map.graph = seen_through(map, kOverstatedRotation);
   const auto decide = [&] {
     return judge::judge_closures({map.nodes, map.graph, searched, map.odometry_edges}, index, closures,
-                                 config.who_is_wrong, config.gnc);
+                                 config.outlier_rejection, config.gnc);
   };
   judge::Optimum optimum = decide();
   auto honesty = honesty_after(map, optimum, closures.judged);
@@ -286,17 +286,17 @@ const MapNode* find_node(const MapEstimate& map, const KeyframeId& id) {
 }
 
 MapEstimate estimate_map(const SubmapSet& all_submaps, const VerdictSet& verdicts, const MapConfig& config,
-                         const WordSet& words, const std::set<SubmapPair>& refuted) {
+                         const DecisionSet& decisions, const std::set<SubmapPair>& refuted) {
   std::vector<SubmapId> left_out;
   const SubmapSet submaps = without_contradictions(all_submaps, left_out);
-  MapEstimate best = estimate_together(submaps, verdicts, config, words, refuted);
+  MapEstimate best = estimate_together(submaps, verdicts, config, decisions, refuted);
   // One chain's numbers may be what cannot be solved; the others keep their map. The largest counts, then the first.
   std::vector<SubmapId> unsolvable;
   for (auto chain = best.converged ? submaps.end() : submaps.begin(); chain != submaps.end();) {
     const auto next = submaps.upper_bound({chain->first.chain, std::numeric_limits<std::uint32_t>::max()});
     SubmapSet others(submaps.begin(), chain);
     others.insert(next, submaps.end());
-    MapEstimate without = estimate_together(others, verdicts, config, words, refuted);
+    MapEstimate without = estimate_together(others, verdicts, config, decisions, refuted);
     if (without.converged && (!best.converged || without.nodes.size() > best.nodes.size())) {
       best = std::move(without);
       unsolvable.clear();

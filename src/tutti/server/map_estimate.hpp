@@ -16,7 +16,7 @@
 #include "tutti/judge/judge_closures.hpp"
 #include "tutti/judge/odometry_loops.hpp"
 #include "tutti/judge/settings.hpp"
-#include "tutti/model/closure_word.hpp"
+#include "tutti/model/closure_decision.hpp"
 #include "tutti/model/loop_closure.hpp"
 #include "tutti/model/map_node.hpp"
 #include "tutti/model/pose_graph.hpp"
@@ -42,7 +42,7 @@ using VerdictSet = std::map<SubmapPair, ClosureVerdict>;
 struct JudgedClosure {
   LoopClosure closure;
   bool accepted = false;
-  bool by_operator = false;                             ///< An operator's word decided, whatever the map says.
+  bool by_operator = false;                             ///< An operator's decision decided, whatever the map says.
   judge::Objection objection = judge::Objection::none;  ///< Why it is not accepted.
   /// What the map pays for it, or would (judge/settle.hpp); infinite: unknown.
   double price = std::numeric_limits<double>::infinity();
@@ -53,7 +53,7 @@ struct FailedOdometry {
   ChainId chain;
   std::uint32_t from = 0;  ///< KeyframeId::index
   std::uint32_t to = 0;
-  double jump_m = 0.0;  ///< Difference between the map's and the odometry's relative pose over the stretch.
+  double jump_m = 0.0;  ///< Difference between the map's and the odometry's relative pose over the segment.
   double jump_rad = 0.0;
   friend bool operator==(const FailedOdometry&, const FailedOdometry&) = default;
 };
@@ -91,7 +91,7 @@ struct MapEstimate {
 
 /// How the joint map is made.
 struct MapConfig {
-  judge::WhoIsWrongConfig who_is_wrong;
+  judge::OutlierRejectionConfig outlier_rejection;
   estimation::GncConfig gnc;
   /// Factors for closures that err by more than they say (closure_honesty.hpp); off: they count as they say.
   bool judge_closures = true;
@@ -101,7 +101,7 @@ struct MapConfig {
   GeoreferenceConfig georeference;
   template <class V>
   void describe(V& v) {
-    v.field("who_is_wrong", who_is_wrong);
+    v.field("who_is_wrong", outlier_rejection);
     v.field("gnc", gnc);
     v.field("judge_odometry", judge_odometry, any(),
             "Odometry that turns better than it says, or is far worse, counts as the closures show (off: as it says).");
@@ -124,10 +124,10 @@ std::vector<judge::OdometryPiece> odometry_pieces(const std::vector<MapNode>& no
 /// The node with this id, null when the map does not have it; logarithmic.
 const MapNode* find_node(const MapEstimate& map, const KeyframeId& id);
 
-/// The map of a set of submaps, verdicts and operators' words: attaches submaps by their shared keyframes, judges
+/// The map of a set of submaps, verdicts and operators' decisions: attaches submaps by their shared keyframes, judges
 /// closures and odometry, and optimises. A pure function, so the order in which the inputs arrived does not matter.
 /// `refuted` are pairs whose closures fixes have shown to be wrong (refuted_closures.hpp).
 MapEstimate estimate_map(const SubmapSet& submaps, const VerdictSet& verdicts, const MapConfig& config,
-                         const WordSet& words = {}, const std::set<SubmapPair>& refuted = {});
+                         const DecisionSet& decisions = {}, const std::set<SubmapPair>& refuted = {});
 
 }  // namespace tutti::server

@@ -114,7 +114,7 @@ TEST(MapEstimate, ALoneClosureDoesNotJoinTwoRobots) {
   ASSERT_NE(inter, in.verdicts.end());
   const VerdictSet one{*inter};
   EXPECT_EQ(estimate_map(in.submaps, one, {}).components, 2U);
-  EXPECT_EQ(estimate_map(in.submaps, one, {.who_is_wrong = {.min_joining_closures = 1}}).components, 1U);
+  EXPECT_EQ(estimate_map(in.submaps, one, {.outlier_rejection = {.min_joining_closures = 1}}).components, 1U);
 }
 
 TEST(MapEstimate, AMissingSubmapLeavesAGapAndNothingElse) {

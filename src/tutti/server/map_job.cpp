@@ -12,7 +12,7 @@ MadeMap make_map(MapJob job) {
   MadeMap out{.job = {}, .estimate = job.estimate, .map = {}, .message = {}, .search = {}, .monitor = {}};
   if (out.estimate == nullptr) {
     out.estimate =
-        std::make_shared<const MapEstimate>(estimate_map_with_fixes(job.submaps, job.verdicts, job.map, job.words));
+        std::make_shared<const MapEstimate>(estimate_map_with_fixes(job.submaps, job.verdicts, job.map, job.decisions));
     out.search = out.estimate->work;
   }
   out.map = georeferenced(refined(*out.estimate, job.submaps, job.refinements), job.submaps, job.map.georeference,

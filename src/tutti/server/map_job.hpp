@@ -21,7 +21,7 @@ struct MapJob {
   SubmapSet submaps;
   std::map<SubmapId, PayloadSize> payload_sizes;  ///< For a server that has its map refined.
   VerdictSet verdicts;
-  WordSet words;
+  DecisionSet decisions;
   Refinements refinements;
   MapConfig map;
   consistency::ProxyGraphConfig proxy_graph;

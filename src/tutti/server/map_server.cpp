@@ -205,7 +205,7 @@ bool MapServer::is_asked(const SubmapPair& pair) const {
 
 bool MapServer::is_answered(const SubmapPair& pair) const {
   if (const auto found = state_.verdicts.find(pair); found != state_.verdicts.end())
-    return found->second.finder == state_.finder || says(state_.words, pair, Wish::accept);
+    return found->second.finder == state_.finder || says(state_.decisions, pair, Wish::accept);
   return state_.answered.contains(pair);
 }
 
@@ -265,7 +265,7 @@ void MapServer::take(const ClosureVerdict& verdict) {
   const auto& pair = verdict.pair;
   const auto kept = state_.verdicts.find(pair);
   const bool is_kept = kept != state_.verdicts.end();
-  if (is_kept && says(state_.words, pair, Wish::accept)) return;
+  if (is_kept && says(state_.decisions, pair, Wish::accept)) return;
   if (is_answered(pair) && !(is_kept && holds_over(verdict, kept->second))) return;
   if (!verdict.closures.empty() || is_kept) note_news();
   state_.answered.insert(pair);
@@ -279,8 +279,8 @@ void MapServer::take(const ClosureVerdict& verdict) {
   }
 }
 
-Status MapServer::receive(const SubmapPair& pair, const ClosureWord& given) {
-  const ClosureWord word = with_sessions(given, pair);
+Status MapServer::receive(const SubmapPair& pair, const ClosureDecision& given) {
+  const ClosureDecision decision = with_sessions(given, pair);
   const auto where = [&] {
     return fmt::format("decision on submaps {} and {}", to_string(pair.first), to_string(pair.second));
   };
@@ -288,22 +288,23 @@ Status MapServer::receive(const SubmapPair& pair, const ClosureWord& given) {
   for (const SubmapId& id : {pair.first, pair.second})
     if (!state_.submaps.contains(id))
       return fail(ErrorCode::invalid, "{}: submap {} is not in the map", where(), to_string(id));
-  const auto known = state_.words.find(pair);
-  if (known != state_.words.end() && !holds_over(word, known->second)) return {};
+  const auto known = state_.decisions.find(pair);
+  if (known != state_.decisions.end() && !holds_over(decision, known->second)) return {};
   const auto verdict = state_.verdicts.find(pair);
   const bool has_closures = verdict != state_.verdicts.end() && !verdict->second.closures.empty();
-  if (word.wish == Wish::accept && !has_closures && word.by_hand.empty())
+  if (decision.wish == Wish::accept && !has_closures && decision.by_hand.empty())
     return fail(ErrorCode::invalid, "{}: no closure was found there that could be accepted", where());
-  for (const LoopClosure& closure : word.by_hand)
+  for (const LoopClosure& closure : decision.by_hand)
     if (!has_keyframe(*state_.submaps.at(pair.first), closure.from) ||
         !has_keyframe(*state_.submaps.at(pair.second), closure.to))
       return fail(ErrorCode::invalid, "{}: its closure is between keyframes {} and {}, which these do not have",
                   where(), closure.from.index, closure.to.index);
-  const bool was_accepted = known != state_.words.end() && known->second.wish == Wish::accept;
-  const bool changes = known == state_.words.end() ? word.wish != Wish::withdraw : known->second.wish != word.wish;
-  const bool adds = !word.by_hand.empty() || (known != state_.words.end() && !known->second.by_hand.empty());
-  state_.words.insert_or_assign(pair, word);
-  if (was_accepted && word.wish != Wish::accept) plan_verification(pair);  // other finders were not asked
+  const bool was_accepted = known != state_.decisions.end() && known->second.wish == Wish::accept;
+  const bool changes =
+      known == state_.decisions.end() ? decision.wish != Wish::withdraw : known->second.wish != decision.wish;
+  const bool adds = !decision.by_hand.empty() || (known != state_.decisions.end() && !known->second.by_hand.empty());
+  state_.decisions.insert_or_assign(pair, decision);
+  if (was_accepted && decision.wish != Wish::accept) plan_verification(pair);  // other finders were not asked
   if ((changes && has_closures) || adds) note_news();
   return {};
 }
@@ -351,8 +352,8 @@ MapJob MapServer::begin(std::uint64_t revision) {
   graph_is_new_ = false;
   MapJob job{.submaps = state_.submaps,
              .payload_sizes = {},
-             .verdicts = of_candidates(state_.verdicts, candidates_, state_.words),
-             .words = state_.words,
+             .verdicts = of_candidates(state_.verdicts, candidates_, state_.decisions),
+             .decisions = state_.decisions,
              .refinements = state_.refinements,
              .map = config_.map,
              .proxy_graph = config_.proxy_graph,

@@ -81,7 +81,7 @@ struct MapServerState {
   /// verified.
   VerdictSet verdicts;
   MethodId finder;
-  WordSet words;           ///< Words of operators.
+  DecisionSet decisions;   ///< Words of operators.
   AnsweredPairs answered;  ///< Pairs that `finder` has answered, or that are not to be verified.
   PlaceSet places;         ///< Each tells which candidates its submap has.
   RefusalCounts refused;   ///< Refusals by `finder`.
@@ -137,10 +137,10 @@ class MapServer {
   /// again.
   Status receive(const ClosureVerdict& verdict);
   static constexpr std::size_t kMostWaiting = 1000;
-  /// Takes an operator's word on the closures of a pair, any number of times; the next optimise() follows it. The
+  /// Takes an operator's decision on the closures of a pair, any number of times; the next optimise() follows it. The
   /// later of two words on one pair counts. When an operator accepts closures, their verdict stays, whatever other
   /// finders say. On an error nothing changes: the map lacks one of the submaps, or there are no closures to accept.
-  Status receive(const SubmapPair& pair, const ClosureWord& word);
+  Status receive(const SubmapPair& pair, const ClosureDecision& decision);
   /// Takes the answer to a refinement job, in any order, any number of times, however late; the next optimise() follows
   /// it. Where two refinements have one step, the one of the newer map counts (Refinements). On an error the map stays
   /// as it was: the refinement failed, is of a later revision than the server's, or has invalid poses.
@@ -197,7 +197,7 @@ class MapServer {
   [[nodiscard]] PayloadSize size_of(SubmapId id) const;
   /// True if both submaps are there and the finder wants the pair.
   [[nodiscard]] bool is_asked(const SubmapPair& pair) const;
-  /// True if the server's finder has answered the pair, or an operator's word stands instead.
+  /// True if the server's finder has answered the pair, or an operator's decision stands instead.
   [[nodiscard]] bool is_answered(const SubmapPair& pair) const;
   void plan_verification(const SubmapPair& pair);
   /// Asks for all pairs that are not answered, in order.

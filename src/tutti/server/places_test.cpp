@@ -158,7 +158,7 @@ TEST_F(Places, WhatAnOperatorAcceptedStaysInTheMap) {
   ASSERT_TRUE(few.receive(left->second).has_value());  // somebody had asked before
   EXPECT_FALSE(is_there());
   ASSERT_TRUE(
-      few.receive(left->first, ClosureWord{.wish = Wish::accept, .by_hand = left->second.closures}).has_value());
+      few.receive(left->first, ClosureDecision{.wish = Wish::accept, .by_hand = left->second.closures}).has_value());
   EXPECT_TRUE(is_there());
 }
 

@@ -34,7 +34,7 @@ std::map<ChainId, FixAlignment> sessions_on_earth(const MapEstimate& map, const 
 }  // namespace
 
 std::set<SubmapPair> refuted_by_fixes(const MapEstimate& map, const SubmapSet& submaps, const VerdictSet& verdicts,
-                                      const GeoreferenceConfig& config, const WordSet& words) {
+                                      const GeoreferenceConfig& config, const DecisionSet& decisions) {
   std::set<SubmapPair> out;
   if (config.mode == "off" || !map.converged) return out;
   std::set<std::pair<KeyframeId, KeyframeId>> accepted;
@@ -54,20 +54,20 @@ std::set<SubmapPair> refuted_by_fixes(const MapEstimate& map, const SubmapSet& s
     return (said - found).norm() > kRefuted * std::hypot(sigma_m(a->second, said), sigma_m(b->second, found));
   };
   for (const auto& [pair, verdict] : verdicts)
-    if (!says(words, pair, Wish::accept) && std::ranges::any_of(verdict.closures, is_refuted)) out.insert(pair);
+    if (!says(decisions, pair, Wish::accept) && std::ranges::any_of(verdict.closures, is_refuted)) out.insert(pair);
   return out;
 }
 
 MapEstimate estimate_map_with_fixes(const SubmapSet& submaps, const VerdictSet& verdicts, const MapConfig& config,
-                                    const WordSet& words) {
-  MapEstimate map = estimate_map(submaps, verdicts, config, words);
+                                    const DecisionSet& decisions) {
+  MapEstimate map = estimate_map(submaps, verdicts, config, decisions);
   std::set<SubmapPair> refuted;
   for (int round = 0; round < kRounds; ++round) {
-    const std::set<SubmapPair> more = refuted_by_fixes(map, submaps, verdicts, config.georeference, words);
+    const std::set<SubmapPair> more = refuted_by_fixes(map, submaps, verdicts, config.georeference, decisions);
     if (more.empty()) break;
     refuted.insert(more.begin(), more.end());
     const judge::SearchWork before = map.work;
-    map = estimate_map(submaps, verdicts, config, words, refuted);
+    map = estimate_map(submaps, verdicts, config, decisions, refuted);
     map.work += before;
   }
   return map;

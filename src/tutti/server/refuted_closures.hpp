@@ -12,10 +12,10 @@ namespace tutti::server {
 /// few wrong closures that agree can join two robots anywhere, but the fixes of a whole run do not err so. Closures
 /// that an operator has accepted are exempt.
 std::set<SubmapPair> refuted_by_fixes(const MapEstimate& map, const SubmapSet& submaps, const VerdictSet& verdicts,
-                                      const GeoreferenceConfig& config, const WordSet& words);
+                                      const GeoreferenceConfig& config, const DecisionSet& decisions);
 
 /// As estimate_map(), without the closures that fixes refute.
 MapEstimate estimate_map_with_fixes(const SubmapSet& submaps, const VerdictSet& verdicts, const MapConfig& config,
-                                    const WordSet& words = {});
+                                    const DecisionSet& decisions = {});
 
 }  // namespace tutti::server

@@ -234,7 +234,7 @@ TEST(VerdictState, AnHoursRefusalsAreAFewNumbersPerSubmap) {
   EXPECT_EQ(answered, 700U * 699U / 2U - 2U * 349U);  // 243,952
   const MapServerState& state = server.state();
   EXPECT_EQ(state.verdicts.size(), 0U);
-  EXPECT_EQ(state.answered.stretches_beyond(), 0U);
+  EXPECT_EQ(state.answered.intervals_beyond(), 0U);
   EXPECT_EQ(state.answered.watermark({RobotId{1}, 349}), 699U);
   EXPECT_EQ(state.refused.at(RefusalReason::overlap).intra, 2U * (350U * 349U / 2U - 349U));
   EXPECT_EQ(total(server.refusals()), answered);

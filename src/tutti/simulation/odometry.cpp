@@ -87,7 +87,7 @@ struct Visit {
   double variance_per_m = 0.0;  // that is honest for the whole visit
 };
 
-double way_along(const Trajectory& truth, const Surroundings& at, std::size_t k) {
+double trajectory_along(const Trajectory& truth, const Surroundings& at, std::size_t k) {
   return (truth[k + 1].pose.translation - truth[k].pose.translation).dot(at.axis);
 }
 
@@ -98,7 +98,7 @@ std::vector<Visit> draw_visits(const Trajectory& truth, std::span<const Surround
     Visit visit{.from = k};
     double way = 0.0;
     for (; k + 1 < surroundings.size() && surroundings[k].corridor == surroundings[visit.from].corridor; ++k)
-      way += std::abs(way_along(truth, surroundings[k], k));
+      way += std::abs(trajectory_along(truth, surroundings[k], k));
     visit.until = k;
     if (surroundings[visit.from].kind != CorridorKind::featureless) continue;
     const double drawn = rng.normal(0.01 * config.slide_percent);
@@ -267,7 +267,7 @@ class RunErrors {
  private:
   void slide(const Visit& visit, std::size_t k, IncrementError& out) {
     const Eigen::Vector3d axis = truth_[k].pose.rotation.conjugate() * surroundings_[k].axis;
-    const double way = way_along(truth_, surroundings_[k], k);
+    const double way = trajectory_along(truth_, surroundings_[k], k);
     const double walk = slide_rng_.normal(config_.degeneracy.along_m_per_sqrt_m * std::sqrt(std::abs(way)));
     out.error.head<3>() += (visit.slide * way + walk) * axis;
     out.covariance.topLeftCorner<3, 3>() += visit.variance_per_m * std::abs(way) * axis * axis.transpose();

@@ -136,10 +136,10 @@ struct OdometrySimulation {
 /// Odometry of a true trajectory: its steps, measured with noise. `surroundings` has one entry per pose, or is empty:
 /// rough everywhere.
 ///
-/// Covariances are stated as if steps were independent, so correlated errors are inflated until long stretches are
+/// Covariances are stated as if steps were independent, so correlated errors are inflated until long segments are
 /// stated correctly. A Gauss-Markov bias with standard deviation s per metre and length L adds a variance of 2 s^2 L
 /// per metre; a constant error c adds c^2 times `consistent_length_m` per metre; the slide along a featureless corridor
-/// adds its square times the length of the visit. Shorter stretches are thereby overestimated, never underestimated.
+/// adds its square times the length of the visit. Shorter segments are thereby overestimated, never underestimated.
 OdometrySimulation simulate_odometry(const Trajectory& truth, std::span<const Surroundings> surroundings,
                                      const OdometryNoiseConfig& config, Rng rng);
 

@@ -46,18 +46,18 @@ std::size_t after_distance(const Trajectory& truth, std::size_t from, double met
   return from;
 }
 
-/// Mean normalised error of stretches of the given length over many runs (0 = single increments).
-double mean_normalised_error(const OdometryNoiseConfig& config, double stretch_m, std::uint64_t runs) {
+/// Mean normalised error of segments of the given length over many runs (0 = single increments).
+double mean_normalised_error(const OdometryNoiseConfig& config, double segment_m, std::uint64_t runs) {
   const Trajectory truth = walk(1, 95.0);  // 50 m and a little, however slowly
   double sum = 0.0;
   double count = 0.0;
   for (std::uint64_t seed = 0; seed < runs; ++seed) {
     const OdometrySimulation simulated = simulate_odometry(truth, {}, config, Rng(seed));
-    if (stretch_m <= 0.0) {
+    if (segment_m <= 0.0) {
       for (std::size_t k = 0; k + 1 < truth.size(); k += 50, count += 1.0)
         sum += normalised_error(truth, simulated, k, k + 1);
     } else {
-      sum += normalised_error(truth, simulated, 40, after_distance(truth, 40, stretch_m));
+      sum += normalised_error(truth, simulated, 40, after_distance(truth, 40, segment_m));
       count += 1.0;
     }
   }
@@ -77,13 +77,13 @@ TEST(SimulateOdometry, WhiteNoiseIsExactlyHonestAtEveryLength) {
   EXPECT_NEAR(mean_normalised_error(white_noise(), 50.0, 300), 1.0, 0.15);
 }
 
-TEST(SimulateOdometry, SlowErrorsMakeShortStretchesCautiousAndLongOnesHonest) {
+TEST(SimulateOdometry, SlowErrorsMakeShortSegmentsCautiousAndLongOnesHonest) {
   const double increments = mean_normalised_error({}, 0.0, 100);
   EXPECT_LT(increments, 1.05);
   EXPECT_GT(increments, 0.3);
-  const double stretches = mean_normalised_error({}, 50.0, 300);
-  EXPECT_LT(stretches, 1.2);
-  EXPECT_GT(stretches, 0.5);
+  const double segments = mean_normalised_error({}, 50.0, 300);
+  EXPECT_LT(segments, 1.2);
+  EXPECT_GT(segments, 0.5);
 }
 
 TEST(SimulateOdometry, InflationIsWhatKeepsStrongConstantErrorsHonest) {
@@ -91,13 +91,13 @@ TEST(SimulateOdometry, InflationIsWhatKeepsStrongConstantErrorsHonest) {
   config.yaw_drift_deg_per_m = 0.1;
   config.scale_percent = 1.0;
   config.yaw_bias_deg_per_m = 0.02;
-  const double stretches = mean_normalised_error(config, 50.0, 300);
-  EXPECT_LT(stretches, 1.3);
-  EXPECT_GT(stretches, 0.3);
+  const double segments = mean_normalised_error(config, 50.0, 300);
+  EXPECT_LT(segments, 1.3);
+  EXPECT_GT(segments, 0.3);
   // The same errors, were each increment judged alone, would be far outside.
   OdometryNoiseConfig blind = config;
   blind.consistent_length_m = 1e-3;
-  EXPECT_GT(mean_normalised_error(blind, 50.0, 100), 2.0 * stretches);
+  EXPECT_GT(mean_normalised_error(blind, 50.0, 100), 2.0 * segments);
 }
 
 TEST(SimulateOdometry, SlipsAreNotInTheCovariance) {
@@ -158,15 +158,15 @@ TEST(SimulateOdometry, CovariancesStayHonestOnWalksThroughFeaturelessCorridors) 
   for (std::size_t i = 0; i < world.corridors.size(); i += 3) world.corridors[i].kind = CorridorKind::featureless;
   const Trajectory truth = walk(1, 400.0);
   const auto around = surroundings_along(world, truth);
-  for (const double stretch_m : {1.0, 10.0, 30.0, 100.0}) {
+  for (const double segment_m : {1.0, 10.0, 30.0, 100.0}) {
     double sum = 0.0, count = 0.0;
     for (std::uint64_t seed = 0; seed < 30; ++seed) {
       const auto simulated = simulate_odometry(truth, around, {}, Rng(seed));
       for (std::size_t from = 0; from + 1 < truth.size(); from += 401, count += 1.0)
-        sum += normalised_error(truth, simulated, from, after_distance(truth, from, stretch_m));
+        sum += normalised_error(truth, simulated, from, after_distance(truth, from, segment_m));
     }
-    EXPECT_LT(sum / count, 1.5) << stretch_m;
-    EXPECT_GT(sum / count, 0.3) << stretch_m;
+    EXPECT_LT(sum / count, 1.5) << segment_m;
+    EXPECT_GT(sum / count, 0.3) << segment_m;
   }
 }
 

@@ -164,7 +164,7 @@ std::vector<int> select_largest_eigenvector(const SparseMatrix& laplacian, std::
 }
 
 /// Farthest-point sampling: the node with the widest gap to all chosen ones comes next, gap = distance in space times
-/// degree, so that dense stretches (revisited corridors) keep as large a share of their nodes as sparse ones. RMS
+/// degree, so that dense segments (revisited corridors) keep as large a share of their nodes as sparse ones. RMS
 /// relative error of the 40 lowest eigenvalues up to scale, 1600-node tunnel to 800 / 400 / 200 nodes: 3.0 / 6.5 / 14.6
 /// %; plain distance 4.7 / 8.9 / 17.0 %, random nodes 3.4 / 7.3 / 15.1 %, largest degrees 13 / 14 / 24 %. Nodes of a
 /// component without any chosen node are infinitely far, so every component gets one before any gets two.

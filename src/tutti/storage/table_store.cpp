@@ -8,7 +8,7 @@ namespace tutti::storage {
 const Schema& map_schema() {
   static const Schema schema{.kind = "map",
                              .tables = {map_tables::kSubmaps, map_tables::kVerdicts, map_tables::kAnswers,
-                                        map_tables::kWords, map_tables::kMeta}};
+                                        map_tables::kDecisions, map_tables::kMeta}};
   return schema;
 }
 

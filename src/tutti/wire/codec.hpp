@@ -8,7 +8,7 @@
 
 #include "tutti/base/config.hpp"
 #include "tutti/base/result.hpp"
-#include "tutti/model/closure_word.hpp"
+#include "tutti/model/closure_decision.hpp"
 #include "tutti/model/loop_closure.hpp"
 #include "tutti/model/messages.hpp"
 #include "tutti/model/point_cloud.hpp"
@@ -75,8 +75,8 @@ std::string encode(const MissionStatus& status);
 Result<MissionStatus> decode_mission_status(std::string_view bytes);
 
 /// Exact. The closure's name has 1 to 200 bytes.
-std::string encode(const ClosureWord& word);
-Result<ClosureWord> decode_word(std::string_view bytes);
+std::string encode(const ClosureDecision& decision);
+Result<ClosureDecision> decode_decision(std::string_view bytes);
 
 /// A cloud alone, with points within kMaxCloudRange_m along each axis; an empty one stays empty.
 std::string encode(const PointCloud& cloud, const CloudCodec& codec = {});
@@ -96,6 +96,6 @@ Status validate(const Job& job);
 Status validate(const Verdicts& verdicts);
 Status validate(const NodeStatus& status);
 Status validate(const MissionStatus& status);
-Status validate(const ClosureWord& word);
+Status validate(const ClosureDecision& decision);
 
 }  // namespace tutti::wire

@@ -451,10 +451,10 @@ RC_GTEST_PROP(VerdictCodec, IsExact, ()) {
   RC_ASSERT(*decoded == verdict);
 }
 
-RC_GTEST_PROP(WordCodec, IsExact, ()) {
+RC_GTEST_PROP(DecisionCodec, IsExact, ()) {
   Rng rng = any_rng();
-  const ClosureWord word = test::any_word(rng);
-  const auto decoded = decode_word(encode(word));
+  const ClosureDecision word = test::any_decision(rng);
+  const auto decoded = decode_decision(encode(word));
   RC_ASSERT(decoded.has_value());
   RC_ASSERT(*decoded == word);
 }
@@ -665,12 +665,12 @@ TEST(Validate, Verdict) {
 
 TEST(Validate, Word) {
   Rng rng(8);
-  using M = ClosureWord;
-  expect_refused<M>(test::any_word(rng), {{"wish: 0", [](M& m) { m.wish = Wish{0}; }},
-                                          {"wish: 4", [](M& m) { m.wish = Wish{4}; }},
-                                          {"closure: a text of 0 bytes", [](M& m) { m.closure.clear(); }},
-                                          {"closure: a text of 201", [](M& m) { m.closure.assign(201, 'a'); }},
-                                          {"by: a text of 201", [](M& m) { m.by.assign(201, 'a'); }}});
+  using M = ClosureDecision;
+  expect_refused<M>(test::any_decision(rng), {{"wish: 0", [](M& m) { m.wish = Wish{0}; }},
+                                              {"wish: 4", [](M& m) { m.wish = Wish{4}; }},
+                                              {"closure: a text of 0 bytes", [](M& m) { m.closure.clear(); }},
+                                              {"closure: a text of 201", [](M& m) { m.closure.assign(201, 'a'); }},
+                                              {"by: a text of 201", [](M& m) { m.by.assign(201, 'a'); }}});
 }
 
 }  // namespace codec_test

@@ -127,7 +127,7 @@ void append_bytes(std::string& out, int number, std::string_view bytes) {
 std::string set_bytes(std::uint64_t session, const NumberSet& numbers) {
   std::string out, bounds;
   std::uint64_t last = 0;
-  for (const auto& [begin, end] : numbers.stretches()) {
+  for (const auto& [begin, end] : numbers.intervals()) {
     append_varint(bounds, begin - last);
     append_varint(bounds, end - begin);
     last = end;
@@ -185,7 +185,7 @@ std::vector<std::uint64_t> FieldReader::numbers(int at, const char* name, bool a
 Status FieldReader::read_set(std::string_view bytes, NumberSets& sets) {
   const auto fields = split_fields(bytes);
   if (!fields) return tl::unexpected(fields.error());
-  const auto bounds = repeated_numbers(*fields, kBound, false, 2 * kMaxStretches);
+  const auto bounds = repeated_numbers(*fields, kBound, false, 2 * kMaxIntervals);
   if (!bounds) return tl::unexpected(bounds.error());
   std::uint64_t session = 0, last = 0;
   for (const WireField& field : *fields)
@@ -254,15 +254,15 @@ Status FieldChecker::check_value(const Matrix6d& covariance, const FieldRule& /*
 }
 
 Status FieldChecker::check_value(const NumberSets& sets, const FieldRule& rule) {
-  std::size_t stretches = 0;
+  std::size_t intervals = 0;
   for (const auto& [session, numbers] : sets) {
-    stretches += numbers.stretches().size();
-    if (!numbers.stretches().empty() && numbers.stretches().back().end > std::uint64_t{1} << 32U)
+    intervals += numbers.intervals().size();
+    if (!numbers.intervals().empty() && numbers.intervals().back().end > std::uint64_t{1} << 32U)
       return fail(ErrorCode::invalid, "a submap with a number of more than 32 bits");
   }
-  if (sets.size() <= rule.at_most && stretches <= kMaxStretches) return {};
-  return fail(ErrorCode::invalid, "{} sessions and {} segments, at most {} and {} are accepted", sets.size(), stretches,
-              rule.at_most, kMaxStretches);
+  if (sets.size() <= rule.at_most && intervals <= kMaxIntervals) return {};
+  return fail(ErrorCode::invalid, "{} sessions and {} segments, at most {} and {} are accepted", sets.size(), intervals,
+              rule.at_most, kMaxIntervals);
 }
 
 Status FieldChecker::too_many(std::size_t count, std::size_t at_most) {

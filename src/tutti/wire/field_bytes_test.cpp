@@ -109,8 +109,8 @@ TEST(FieldBytes, TheFilesForOtherLanguagesHaveTheSameFields) {
   expect_in_proto<MissionStatus::Robot>("status.proto", "RobotInMission");
   expect_in_proto<MissionStatus::Worker>("status.proto", "WorkerInMission");
   expect_in_proto<MissionStatus::Refusals>("status.proto", "RefusedMessages");
-  expect_in_proto<MissionStatus::Word>("status.proto", "AnsweredWord");
-  expect_in_proto<ClosureWord>("status.proto", "Word");
+  expect_in_proto<MissionStatus::Decision>("status.proto", "AnsweredWord");
+  expect_in_proto<ClosureDecision>("status.proto", "Word");
   expect_in_proto<MapMark>("status.proto", "Mark");
   expect_in_proto<SubmapId>("status.proto", "SubmapId");
   expect_in_proto<Health>("status.proto", "Health");

@@ -17,9 +17,11 @@ Result<MissionStatus> decode_mission_status(std::string_view bytes) {
   return decode_fields<MissionStatus>(MessageKind::mission_status, bytes);
 }
 
-Status validate(const ClosureWord& word) { return check_message(MessageKind::word, word); }
-std::string encode(const ClosureWord& word) { return encode_fields(MessageKind::word, word); }
-Result<ClosureWord> decode_word(std::string_view bytes) { return decode_fields<ClosureWord>(MessageKind::word, bytes); }
+Status validate(const ClosureDecision& decision) { return check_message(MessageKind::decision, decision); }
+std::string encode(const ClosureDecision& decision) { return encode_fields(MessageKind::decision, decision); }
+Result<ClosureDecision> decode_decision(std::string_view bytes) {
+  return decode_fields<ClosureDecision>(MessageKind::decision, bytes);
+}
 
 Status validate(const ClosureVerdict& verdict) { return check_message(MessageKind::verdict, verdict); }
 std::string encode(const ClosureVerdict& verdict) { return encode_fields(MessageKind::verdict, verdict); }

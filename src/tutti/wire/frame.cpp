@@ -51,7 +51,7 @@ const char* name(MessageKind kind) {
       return "submap copy";
     case MessageKind::mission_status:
       return "mission status";
-    case MessageKind::word:
+    case MessageKind::decision:
       return "word";
     case MessageKind::proxy_graph_delta:
       return "proxy graph delta";
@@ -90,7 +90,7 @@ Versions versions(MessageKind kind) {
       return {.oldest = 1, .current = 2};
     case MessageKind::job:
     case MessageKind::status:
-    case MessageKind::word:
+    case MessageKind::decision:
     case MessageKind::submap_request:
     case MessageKind::submap_copy:
     case MessageKind::proxy_graph_delta:

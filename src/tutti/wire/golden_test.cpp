@@ -307,10 +307,10 @@ TEST(Golden, MissionStatus) {
                     [&](const MissionStatus& decoded, unsigned) { EXPECT_EQ(decoded, status); });
 }
 
-TEST(Golden, Word) {
-  const ClosureWord word{"alpha/12-beta/7", Wish::reject, "ada", 1'700'000'000'000'000'000};
-  for_every_version(MessageKind::word, encode(word), decode_word,
-                    [&](const ClosureWord& decoded, unsigned) { EXPECT_EQ(decoded, word); });
+TEST(Golden, Decision) {
+  const ClosureDecision decision{"alpha/12-beta/7", Wish::reject, "ada", 1'700'000'000'000'000'000};
+  for_every_version(MessageKind::decision, encode(decision), decode_decision,
+                    [&](const ClosureDecision& decoded, unsigned) { EXPECT_EQ(decoded, decision); });
 }
 
 // A cloud alone came with version 2; no bytes of 2 and 3 were kept, but only the number differs from 4.

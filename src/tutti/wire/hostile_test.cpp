@@ -21,14 +21,11 @@
 namespace tutti::wire {
 namespace hostile_test {
 
-constexpr std::array kKinds = {MessageKind::submap,      MessageKind::proxy_graph,
-                               MessageKind::verdict,     MessageKind::cloud,
-                               MessageKind::receipt,     MessageKind::job,
-                               MessageKind::verdicts,    MessageKind::proxy_graph_delta,
-                               MessageKind::status,      MessageKind::mission_status,
-                               MessageKind::word,        MessageKind::submap_request,
-                               MessageKind::submap_copy, MessageKind::refinement_job,
-                               MessageKind::refinement};
+constexpr std::array kKinds = {MessageKind::submap,         MessageKind::proxy_graph,       MessageKind::verdict,
+                               MessageKind::cloud,          MessageKind::receipt,           MessageKind::job,
+                               MessageKind::verdicts,       MessageKind::proxy_graph_delta, MessageKind::status,
+                               MessageKind::mission_status, MessageKind::decision,          MessageKind::submap_request,
+                               MessageKind::submap_copy,    MessageKind::refinement_job,    MessageKind::refinement};
 
 /// What deltas are against.
 const ProxyGraph& base() {
@@ -62,7 +59,7 @@ std::string sample(MessageKind kind, Rng rng) {
   if (kind == MessageKind::submap_copy) return encode(test::any_submap_copy(rng));
   if (kind == MessageKind::status) return encode(test::any_status(rng));
   if (kind == MessageKind::mission_status) return encode(test::any_mission_status(rng));
-  if (kind == MessageKind::word) return encode(test::any_word(rng));
+  if (kind == MessageKind::decision) return encode(test::any_decision(rng));
   return encode(test::any_verdict(rng, 2));
 }
 
@@ -96,7 +93,7 @@ std::optional<Error> decode(MessageKind kind, std::string_view bytes) {
   if (kind == MessageKind::submap_copy) return outcome(decode_submap_copy(bytes));
   if (kind == MessageKind::status) return outcome(decode_status(bytes));
   if (kind == MessageKind::mission_status) return outcome(decode_mission_status(bytes));
-  if (kind == MessageKind::word) return outcome(decode_word(bytes));
+  if (kind == MessageKind::decision) return outcome(decode_decision(bytes));
   const auto cloud = decode_cloud(bytes);
   return outcome(cloud ? Result<PointCloud>(**cloud) : tl::unexpected(cloud.error()));
 }

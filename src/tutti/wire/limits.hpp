@@ -26,7 +26,7 @@ inline constexpr std::size_t kMaxRefinedSubmaps = 10'000;    ///< This and the n
 inline constexpr std::size_t kMaxRefinedKeyframes = 40'000;  ///< What one message has room for.
 inline constexpr std::size_t kMaxReasonBytes = kPlainTextBytes;
 inline constexpr std::size_t kMaxNameBytes = 64;       ///< A robot's or a worker's.
-inline constexpr std::size_t kMaxStretches = 100'000;  ///< Per receipt.
+inline constexpr std::size_t kMaxIntervals = 100'000;  ///< Per receipt.
 
 inline constexpr double kMaxCloudRange_m = 1500.0;  ///< From a submap's origin to a point, per axis.
 inline constexpr double kMaxLandmarkRange_m = 10'000.0;

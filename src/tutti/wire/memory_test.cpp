@@ -167,9 +167,9 @@ TEST(Memory, CountsUpToTheLimitsAreAcceptedAndNoMore) {
     EXPECT_NE(decode_job(job).error().message.find("pairs: first_robot: " + many), std::string::npos)
         << decode_job(job).error().message;
   }
-  const auto stretches = decode_receipt(pack_frame(MessageKind::receipt, field(2, field(2, zeros(200'001)))));
-  EXPECT_NE(stretches.error().message.find("stored: 200001 or more, at most 200000"), std::string::npos)
-      << stretches.error().message;
+  const auto intervals = decode_receipt(pack_frame(MessageKind::receipt, field(2, field(2, zeros(200'001)))));
+  EXPECT_NE(intervals.error().message.find("stored: 200001 or more, at most 200000"), std::string::npos)
+      << intervals.error().message;
 }
 
 TEST(Memory, LargeMessagesPass) {

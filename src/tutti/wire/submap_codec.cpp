@@ -133,7 +133,7 @@ Status read_fixes(const v1::Fixes& in, Submap& submap) {
 
 /// All but the payloads.
 template <class In>
-Result<SubmapMessage> read_way(const In& in, std::uint16_t version) {
+Result<SubmapMessage> read_trajectory_message(const In& in, std::uint16_t version) {
   SubmapMessage message;
   // Up to version 4 the session said nothing of the chain: each robot had one.
   const ChainId chain{RobotId{in.header().robot()}, version < 5 ? 0 : in.header().session()};
@@ -177,7 +177,7 @@ Result<SubmapMessage> decode_submap(std::string_view bytes) {
   const auto parsed = parse_frame<v1::Submap>(MessageKind::submap, bytes);
   if (!parsed) return tl::unexpected(parsed.error());
   const v1::Submap& in = parsed->message;
-  auto way = read_way(in, parsed->version);
+  auto way = read_trajectory_message(in, parsed->version);
   if (!way) return way;
   SubmapMessage message = std::move(*way);
   const std::string where = "submap " + to_string(message.submap.id);
@@ -199,7 +199,7 @@ Result<SubmapOutline> decode_outline(std::string_view bytes) {
   const auto parsed = parse_frame<v1::SubmapOutline>(MessageKind::submap, bytes);
   if (!parsed) return tl::unexpected(parsed.error());
   const v1::SubmapOutline& in = parsed->message;
-  auto way = read_way(in, parsed->version);
+  auto way = read_trajectory_message(in, parsed->version);
   if (!way) return tl::unexpected(way.error());
   if (auto ok = validate(*way); !ok) return tl::unexpected(ok.error());
   SubmapOutline outline{std::move(way->submap), {}};

@@ -37,10 +37,11 @@ inline bus::Envelope envelope(const SubmapMessage& message) {
           message_id(message.submap.id), std::make_shared<const std::string>(wire::encode(message))};
 }
 
-/// Of an operator.
-inline bus::Envelope envelope(const ClosureWord& word) {
-  return {bus::Endpoint::viewer(7), bus::Endpoint::server(), bus::MessageKind::word,
-          word.closure + "/" + std::to_string(word.given_ns), std::make_shared<const std::string>(wire::encode(word))};
+/// What an operator sends.
+inline bus::Envelope envelope(const ClosureDecision& decision) {
+  return {bus::Endpoint::viewer(7), bus::Endpoint::server(), bus::MessageKind::decision,
+          decision.closure + "/" + std::to_string(decision.given_ns),
+          std::make_shared<const std::string>(wire::encode(decision))};
 }
 
 /// Asks for every pair; those of even numbers are in one place, the others refused. Needs both clouds.

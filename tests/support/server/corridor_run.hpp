@@ -34,7 +34,7 @@ inline Failure failure(std::uint32_t robot, double from_s, double until_s, doubl
   return out;
 }
 
-/// Two stretches of way that look alike: every pair of submaps there gives a closure that puts the second stretch onto
+/// Two segments of way that look alike: every pair of submaps there gives a closure that puts the second segment onto
 /// the first, all agreeing with each other, all wrong.
 struct LookAlike {
   RobotId first;
@@ -51,7 +51,7 @@ struct CorridorRunConfig {
   simulation::OdometryNoiseConfig odometry;
   simulation::ReferenceClosureConfig closures{.radius_m = 2.0, .wrong_share = 0.0};
   std::vector<Failure> failures;
-  std::vector<Failure> blind;  ///< Stretches (robot, from, until) without closures.
+  std::vector<Failure> blind;  ///< Segments (robot, from, until) without closures.
   std::vector<LookAlike> look_alikes;
   double keyframe_m = 0.8;
 };

@@ -9,7 +9,7 @@
 #include "tutti/base/fields.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/geometry/so3.hpp"
-#include "tutti/model/closure_word.hpp"
+#include "tutti/model/closure_decision.hpp"
 #include "tutti/model/loop_closure.hpp"
 #include "tutti/model/messages.hpp"
 #include "tutti/model/refinement.hpp"
@@ -241,7 +241,7 @@ inline MissionStatus any_mission_status(Rng& rng) {
   return status;
 }
 
-inline ClosureWord any_word(Rng& rng) { return any_fields<ClosureWord>(rng); }
+inline ClosureDecision any_decision(Rng& rng) { return any_fields<ClosureDecision>(rng); }
 inline Receipt any_receipt(Rng& rng) { return any_fields<Receipt>(rng); }
 inline SubmapRequest any_submap_request(Rng& rng) { return any_fields<SubmapRequest>(rng); }
 inline SubmapCopy any_submap_copy(Rng& rng) { return any_fields<SubmapCopy>(rng); }

@@ -25,7 +25,7 @@ constexpr std::array kSent{MessageKind::submap,
                            MessageKind::verdicts,
                            MessageKind::status,
                            MessageKind::mission_status,
-                           MessageKind::word,
+                           MessageKind::decision,
                            MessageKind::refinement_job,
                            MessageKind::refinement,
                            MessageKind::submap_request,
@@ -99,7 +99,7 @@ std::optional<Address> address_of(std::string_view subject) {
   const auto kind = kind_of(words.back());
   if (role == "operator") {
     const std::string_view user = words[words.size() - 2];
-    if (kind != MessageKind::word || user.empty()) return std::nullopt;
+    if (kind != MessageKind::decision || user.empty()) return std::nullopt;
     return Address{Endpoint::all_viewers(), *kind, std::string(user)};
   }
   const auto number = number_of(words[words.size() - 2]);

@@ -9,15 +9,15 @@
 
 #include "tutti/base/chi_square.hpp"
 #include "tutti/consistency/internal/odometry_drift.hpp"
-#include "tutti/geometry/stretch_covariance.hpp"
+#include "tutti/geometry/segment_covariance.hpp"
 
 namespace tutti::consistency::internal {
 namespace {
 
 constexpr double kDegrees = 6.0;
-/// Stretches within this share of the largest statistic stand out "nearly alike".
+/// Segments within this share of the largest statistic stand out "nearly alike".
 constexpr double kAlike = 0.98;
-constexpr std::size_t kMostStretches = 20;
+constexpr std::size_t kMostSegments = 20;
 
 double quantile(std::vector<double> values, double share) {
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
@@ -62,8 +62,8 @@ std::vector<RelativePose> usual_odometry(const TimeChain& chain) {
 }
 
 /// The server's variance of a relative pose over so many nodes where it knows its map well (lower quartile over the
-/// blocks), by length: scales shorter than the stretch move both ends, of longer ones only the slope counts. Not as it
-/// knows it there: where odometry failed the server is unsure of what lies inside the stretch, but not of how its ends
+/// blocks), by length: scales shorter than the segment move both ends, of longer ones only the slope counts. Not as it
+/// knows it there: where odometry failed the server is unsure of what lies inside the segment, but not of how its ends
 /// lie to each other.
 std::vector<PoseSigma> server_variances(std::span<const double> scale_lengths_m, const ChainUncertainty* uncertainty,
                                         std::size_t nodes) {
@@ -89,7 +89,7 @@ std::vector<PoseSigma> server_variances(std::span<const double> scale_lengths_m,
 }
 
 /// By covariance of the steps.
-StretchCovariance stretches(std::span<const Pose3> poses, std::span<const RelativePose> steps) {
+SegmentCovariance segments(std::span<const Pose3> poses, std::span<const RelativePose> steps) {
   std::vector<Matrix6d> covariances;
   for (const RelativePose& step : steps) covariances.push_back(step.covariance);
   return {poses, covariances};
@@ -101,13 +101,13 @@ class Scan {
       : poses_(chain.server),
         odometry_(chain.odometry),
         drift_(chain.server, chain.odometry),
-        usual_(stretches(chain.server, usual_odometry(chain))),
+        usual_(segments(chain.server, usual_odometry(chain))),
         server_(std::move(server)) {}
 
   [[nodiscard]] double statistic(std::size_t a, std::size_t b) const { return statistic(usual_(a, b), a, b); }
   [[nodiscard]] double stated_statistic(std::size_t a, std::size_t b) const {
-    const std::size_t nodes = b - a + 1;  // few stretches are asked for: the table is of this one only
-    return statistic(stretches(poses_.subspan(a, nodes), odometry_.subspan(a, nodes))(0, b - a), a, b);
+    const std::size_t nodes = b - a + 1;  // few segments are asked for: the table is of this one only
+    return statistic(segments(poses_.subspan(a, nodes), odometry_.subspan(a, nodes))(0, b - a), a, b);
   }
 
  private:
@@ -122,18 +122,18 @@ class Scan {
   std::span<const Pose3> poses_;
   std::span<const RelativePose> odometry_;
   OdometryDrift drift_;
-  StretchCovariance usual_;
+  SegmentCovariance usual_;
   std::vector<PoseSigma> server_;  // variances by length
 };
 
-struct Stretch {
+struct Segment {
   std::size_t a = 0, b = 0;
   double statistic = 0.0;
 };
 
 /// All places, lengths in steps of half an octave.
-std::vector<Stretch> candidates(const Scan& scan, std::size_t nodes, double threshold) {
-  std::vector<Stretch> out;
+std::vector<Segment> candidates(const Scan& scan, std::size_t nodes, double threshold) {
+  std::vector<Segment> out;
   for (double length = 2.0; length < static_cast<double>(nodes); length *= std::sqrt(2.0)) {
     const auto l = static_cast<std::size_t>(std::lround(length));
     const std::size_t stride = std::max<std::size_t>(1, l / 8);
@@ -144,7 +144,7 @@ std::vector<Stretch> candidates(const Scan& scan, std::size_t nodes, double thre
 }
 
 /// Moves the ends where the statistic grows, then inwards as long as it stays nearly as large.
-void settle(const Scan& scan, Stretch& s, std::size_t low, std::size_t high) {
+void settle(const Scan& scan, Segment& s, std::size_t low, std::size_t high) {
   for (std::size_t step = std::max<std::size_t>(1, (s.b - s.a) / 4); step > 0; step /= 2)
     for (bool moved = true; moved;) {
       moved = false;
@@ -171,28 +171,28 @@ void settle(const Scan& scan, Stretch& s, std::size_t low, std::size_t high) {
 
 }  // namespace
 
-std::vector<DriftStretch> drift_stretches(const TimeChain& chain, std::span<const double> scale_lengths_m,
-                                          const ChainUncertainty* uncertainty, double probability) {
+std::vector<DriftSegment> drift_segments(const TimeChain& chain, std::span<const double> scale_lengths_m,
+                                         const ChainUncertainty* uncertainty, double probability) {
   const std::size_t nodes = chain.server.size();
-  std::vector<DriftStretch> out;
+  std::vector<DriftSegment> out;
   if (nodes < 4) return out;
   const Scan scan(chain, server_variances(scale_lengths_m, uncertainty, nodes));
-  // Stretches that overlap tell much the same: about as many independent ones as nodes.
+  // Segments that overlap tell much the same: about as many independent ones as nodes.
   const double threshold = chi_square_exceeded_with(probability / static_cast<double>(nodes), kDegrees);
-  std::vector<Stretch> found = candidates(scan, nodes, threshold);
-  while (!found.empty() && out.size() < kMostStretches) {
-    Stretch best = *std::ranges::max_element(found, {}, &Stretch::statistic);
+  std::vector<Segment> found = candidates(scan, nodes, threshold);
+  while (!found.empty() && out.size() < kMostSegments) {
+    Segment best = *std::ranges::max_element(found, {}, &Segment::statistic);
     std::size_t low = 0, high = nodes - 1;
-    for (const DriftStretch& other : out) {
+    for (const DriftSegment& other : out) {
       if (other.last <= best.a) low = std::max(low, other.last);
       if (other.first >= best.b) high = std::min(high, other.first);
     }
     settle(scan, best, low, high);
     out.push_back(
         {best.a, best.b, std::sqrt(best.statistic / threshold), scan.stated_statistic(best.a, best.b) > threshold});
-    std::erase_if(found, [&](const Stretch& s) { return s.a < best.b && best.a < s.b; });
+    std::erase_if(found, [&](const Segment& s) { return s.a < best.b && best.a < s.b; });
   }
-  std::ranges::sort(out, {}, &DriftStretch::first);
+  std::ranges::sort(out, {}, &DriftSegment::first);
   return out;
 }
 

@@ -14,7 +14,7 @@ constexpr std::size_t kNodes = 150;
 constexpr int kSeeds = 40;
 constexpr double kRate = 0.01;
 
-/// A stretch of odometry that slides: every step in (first, last] is `slide` short or long, seen from the body.
+/// A segment of odometry that slides: every step in (first, last] is `slide` short or long, seen from the body.
 struct Failure {
   std::size_t first = 0, last = 0;
   Pose3 slide;
@@ -50,17 +50,17 @@ Scene scene(std::uint64_t seed, const std::vector<Failure>& failures) {
   return out;
 }
 
-std::vector<DriftStretch> stretches(const Scene& s) {
+std::vector<DriftSegment> segments(const Scene& s) {
   std::vector<NodePair> pairs;
   for (std::size_t n = 0; n < kNodes; ++n) pairs.push_back({n, n});
   const DisagreementTest test(s.graph, test::kAlpha, pairs, 1, {});
   std::vector<double> lengths_m;
   for (int scale = 0; scale < test.scales(); ++scale) lengths_m.push_back(test.scale_length_m(scale));
-  return drift_stretches(s.chain, lengths_m, &s.graph.uncertainties[0], kRate);
+  return drift_segments(s.chain, lengths_m, &s.graph.uncertainties[0], kRate);
 }
 
 /// Sorted, apart from each other (they may touch), within the run, above their threshold.
-void expect_in_order(const std::vector<DriftStretch>& found) {
+void expect_in_order(const std::vector<DriftSegment>& found) {
   for (std::size_t i = 0; i < found.size(); ++i) {
     EXPECT_LT(found[i].first, found[i].last);
     EXPECT_LT(found[i].last, kNodes);
@@ -69,15 +69,15 @@ void expect_in_order(const std::vector<DriftStretch>& found) {
   }
 }
 
-/// In how many of the runs a stretch found overlaps the failure, starts within `nodes` of it and is (not) an alert.
+/// In how many of the runs a segment found overlaps the failure, starts within `nodes` of it and is (not) an alert.
 struct Hits {
   int overlap = 0, start = 0, alert = 0, others = 0;
 };
-Hits count(const std::vector<std::vector<DriftStretch>>& runs, const Failure& failure, std::size_t nodes) {
+Hits count(const std::vector<std::vector<DriftSegment>>& runs, const Failure& failure, std::size_t nodes) {
   Hits out;
   for (const auto& found : runs) {
     bool overlap = false, start = false, alert = false;
-    for (const DriftStretch& s : found) {
+    for (const DriftSegment& s : found) {
       const bool meets = s.first < failure.last && failure.first < s.last;
       out.others += meets ? 0 : 1;
       overlap |= meets;
@@ -91,22 +91,22 @@ Hits count(const std::vector<std::vector<DriftStretch>>& runs, const Failure& fa
   return out;
 }
 
-std::vector<std::vector<DriftStretch>> runs_with(const std::vector<Failure>& failures) {
-  std::vector<std::vector<DriftStretch>> out;
+std::vector<std::vector<DriftSegment>> runs_with(const std::vector<Failure>& failures) {
+  std::vector<std::vector<DriftSegment>> out;
   for (std::uint64_t seed = 0; seed < kSeeds; ++seed) {
-    out.push_back(stretches(scene(seed, failures)));
+    out.push_back(segments(scene(seed, failures)));
     expect_in_order(out.back());
   }
   return out;
 }
 
-TEST(DriftStretches, NoneWhereOdometryIsAsGoodAsItSays) {
+TEST(DriftSegments, NoneWhereOdometryIsAsGoodAsItSays) {
   int found = 0;
   for (const auto& run : runs_with({})) found += run.empty() ? 0 : 1;
   EXPECT_LE(found, 2);  // 0.4 asked for
 }
 
-TEST(DriftStretches, FindsAnUnflaggedSlideAndRaisesAnAlert) {
+TEST(DriftSegments, FindsAnUnflaggedSlideAndRaisesAnAlert) {
   const Failure slide{.first = 60, .last = 75, .slide = test::at(-0.15, 0, 0)};
   const Hits hits = count(runs_with({slide}), slide, 3);
   EXPECT_EQ(hits.overlap, kSeeds);
@@ -115,7 +115,7 @@ TEST(DriftStretches, FindsAnUnflaggedSlideAndRaisesAnAlert) {
   EXPECT_LE(hits.others, 2);
 }
 
-TEST(DriftStretches, FindsAFlaggedSlideAndRaisesNone) {
+TEST(DriftSegments, FindsAFlaggedSlideAndRaisesNone) {
   const Failure slide{.first = 60, .last = 75, .slide = test::at(-0.15, 0, 0), .stated = 100.0};
   const Hits hits = count(runs_with({slide}), slide, 3);
   EXPECT_EQ(hits.overlap, kSeeds);
@@ -124,11 +124,11 @@ TEST(DriftStretches, FindsAFlaggedSlideAndRaisesNone) {
   EXPECT_LE(hits.others, 2);
 }
 
-TEST(DriftStretches, FindsASingleJumpToTheNode) {
+TEST(DriftSegments, FindsASingleJumpToTheNode) {
   const Failure jump{.first = 89, .last = 90, .slide = {so3_exp(Eigen::Vector3d(0, 0, 0.1)), {0.5, 0.3, 0}}};
   std::size_t others = 0;
   for (const auto& found : runs_with({jump})) {
-    EXPECT_TRUE(std::ranges::any_of(found, [](const DriftStretch& s) {
+    EXPECT_TRUE(std::ranges::any_of(found, [](const DriftSegment& s) {
       return s.first == 89 && s.last == 90 && s.alert && s.significance > 10.0;
     }));
     others += found.empty() ? 0 : found.size() - 1;
@@ -136,7 +136,7 @@ TEST(DriftStretches, FindsASingleJumpToTheNode) {
   EXPECT_LE(others, 2U);  // 0.4 asked for
 }
 
-TEST(DriftStretches, FindsTwoFailuresApart) {
+TEST(DriftSegments, FindsTwoFailuresApart) {
   const Failure first{.first = 20, .last = 30, .slide = test::at(0, 0, 0.2)};
   const Failure second{.first = 110, .last = 125, .slide = test::at(-0.15, 0, 0)};
   const auto runs = runs_with({first, second});
@@ -145,21 +145,21 @@ TEST(DriftStretches, FindsTwoFailuresApart) {
 }
 
 // What stands out does so less the better the odometry said it would not be.
-TEST(DriftStretches, AStrongerSlideStandsOutMore) {
+TEST(DriftSegments, AStrongerSlideStandsOutMore) {
   double before = 1.0;
   for (const double slide : {0.1, 0.2, 0.4}) {
-    const auto found = stretches(scene(1, {{.first = 60, .last = 75, .slide = test::at(-slide, 0, 0)}}));
+    const auto found = segments(scene(1, {{.first = 60, .last = 75, .slide = test::at(-slide, 0, 0)}}));
     ASSERT_FALSE(found.empty());
     EXPECT_GT(found[0].significance, 1.5 * before);
     before = found[0].significance;
   }
 }
 
-TEST(DriftStretches, TooShortRunsHaveNone) {
+TEST(DriftSegments, TooShortRunsHaveNone) {
   Scene s = scene(1, {{.first = 0, .last = 2, .slide = test::at(5, 0, 0)}});
   s.chain.server.resize(3);
   s.chain.odometry.resize(3);
-  EXPECT_TRUE(stretches(s).empty());
+  EXPECT_TRUE(segments(s).empty());
 }
 
 }  // namespace drift_origins_test

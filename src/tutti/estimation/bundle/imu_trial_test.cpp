@@ -18,14 +18,14 @@ RefinementConfig with_imu() {
 }
 
 /// What a room's flight of so many keyframes makes of its IMU.
-RefinedMap refined(int keyframes, const RefinementConfig& config, double stretch = 1.0) {
+RefinedMap refined(int keyframes, const RefinementConfig& config, double segment = 1.0) {
   Scene scene = make_scene({.keyframes = keyframes, .points = 60, .imu = true}, 3);
   for (PosedSubmap& posed : scene.input.submaps) {
     auto submap = std::make_shared<Submap>(*posed.submap);
     auto visual = std::make_shared<VisualPayload>(*submap->visual);
     for (ImuPreintegration& imu : visual->imu) {
-      imu.delta_position *= stretch;
-      imu.delta_velocity *= stretch;
+      imu.delta_position *= segment;
+      imu.delta_velocity *= segment;
     }
     submap->visual = visual;
     posed.submap = submap;

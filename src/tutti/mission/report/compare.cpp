@@ -89,7 +89,7 @@ std::string robot_text(const CompareReport& report, const TrajectoryComparison& 
                           format_metres(c.after.max_m)),
               "  ");
   return out += wrap(fmt::format("No motion over 1 s or between nodes changes by more than {} and {:.3f} deg.",
-                                 format_metres(c.kink.translation_m), c.kink.rotation_deg),
+                                 format_metres(c.discontinuity.translation_m), c.discontinuity.rotation_deg),
                      "  ");
 }
 

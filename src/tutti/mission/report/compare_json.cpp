@@ -92,8 +92,8 @@ Json robot_json(const TrajectoryComparison& c) {
           {"origins", origins_json(c)},
           {"constraints", constraints_json(c)},
           {"fixed", mended ? ate_json(c.after) : Json(nullptr)},
-          {"kink_m", mended ? number(c.kink.translation_m) : Json(nullptr)},
-          {"kink_deg", mended ? number(c.kink.rotation_deg) : Json(nullptr)},
+          {"kink_m", mended ? number(c.discontinuity.translation_m) : Json(nullptr)},
+          {"kink_deg", mended ? number(c.discontinuity.rotation_deg) : Json(nullptr)},
           {"map", map_json(c)}};
 }
 

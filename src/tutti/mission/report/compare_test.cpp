@@ -47,7 +47,7 @@ TrajectoryComparison example(bool disagrees) {
   c.explanation = test::example_explanation(c.judge, origins);
   c.before = {.pairs = 100, .rmse_m = 1.234, .max_m = 3.0, .rmse_deg = 0.5};
   c.after = {.pairs = 100, .rmse_m = 0.012, .max_m = 0.03, .rmse_deg = 0.1};
-  c.kink = {0.11, 2.9, {}, {}};
+  c.discontinuity = {0.11, 2.9, {}, {}};
   return c;
 }
 

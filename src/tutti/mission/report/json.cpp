@@ -23,16 +23,16 @@ Json map_error_json(const std::optional<evaluation::CloudDistance>& distance) {
 }
 
 /// Something that lasts from `from` to `until`: both in mission time, and then its own keys.
-template <typename Stretch>
-Json stretch_json(const RobotRecord& robot, const Stretch& stretch, const Json& its_own) {
+template <typename Segment>
+Json segment_json(const RobotRecord& robot, const Segment& segment, const Json& its_own) {
   const PictureClock clock = mission_clock(robot);
-  Json out = {{"from_s", number(clock(stretch.from))}, {"until_s", number(clock(stretch.until))}};
+  Json out = {{"from_s", number(clock(segment.from))}, {"until_s", number(clock(segment.until))}};
   out.update(its_own);
   return out;
 }
 
 Json change_of_mind_json(const RobotRecord& robot, const ChangeOfMindRecord& change) {
-  return stretch_json(robot, change.change,
+  return segment_json(robot, change.change,
                       {{"robot", robot.name},
                        {"since_s", number(change.since_s)},
                        {"settled_s", number(change.settled_s)},
@@ -46,7 +46,7 @@ Json change_of_mind_json(const RobotRecord& robot, const ChangeOfMindRecord& cha
 Json drift_json(const RobotRecord& robot) {
   Json out = Json::array();
   for (const DriftOrigin& drift : robot.drift_origins)
-    out.push_back(stretch_json(robot, drift,
+    out.push_back(segment_json(robot, drift,
                                {{"kind", drift_name(drift.kind)},
                                 {"translation_m", number(drift.translation_m)},
                                 {"rotation_rad", number(drift.rotation_rad)}}));
@@ -73,8 +73,8 @@ void add_accuracy(Json& out, const std::string& prefix, const Accuracy& accuracy
 Json policy_json(const RobotRecord& robot, const PolicyRecord& policy) {
   Json out = Json::object();
   add_accuracy(out, "", policy.accuracy);
-  out["kink_m"] = policy.kink ? number(policy.kink->translation_m) : Json(nullptr);
-  out["kink_deg"] = policy.kink ? number(policy.kink->rotation_deg) : Json(nullptr);
+  out["kink_m"] = policy.discontinuity ? number(policy.discontinuity->translation_m) : Json(nullptr);
+  out["kink_deg"] = policy.discontinuity ? number(policy.discontinuity->rotation_deg) : Json(nullptr);
   out["agreement_rmse_m"] = number(policy.agreement_rmse_m);
   add_scored(out, "agreement_", policy.agreement_rmse_m ? std::optional(robot.mapped_share) : std::nullopt);
   out["constraints"] = policy.constraints_added;
@@ -84,7 +84,7 @@ Json policy_json(const RobotRecord& robot, const PolicyRecord& policy) {
 Json origin_json(const RobotRecord& robot, const consistency::SuspectedOrigin& origin) {
   const auto& lengths_m = robot.explanation ? robot.explanation->scale_length_m : std::vector<double>{};
   const auto scale = static_cast<std::size_t>(std::max(origin.scale, 0));
-  return stretch_json(robot, origin,
+  return segment_json(robot, origin,
                       {{"place_m", vector_json(origin.place_m)},
                        {"scale", origin.scale},
                        {"scale_length_m", scale < lengths_m.size() ? number(lengths_m[scale]) : Json(nullptr)},
@@ -249,12 +249,12 @@ Json server_json(const MissionRecord& record) {
              {"max_error_m", number(server.closure_check->max_error_m)},
              {"max_error_deg", number(server.closure_check->max_error_deg)}};
   Json failed = Json::array();
-  for (const FailedOdometryRecord& stretch : server.failed_odometry)
+  for (const FailedOdometryRecord& segment : server.failed_odometry)
     for (const RobotRecord& robot : record.robots)
-      if (robot.id == stretch.robot)
-        failed.push_back(stretch_json(
-            robot, stretch,
-            {{"robot", robot.name}, {"error_m", number(stretch.error_m)}, {"error_rad", number(stretch.error_rad)}}));
+      if (robot.id == segment.robot)
+        failed.push_back(segment_json(
+            robot, segment,
+            {{"robot", robot.name}, {"error_m", number(segment.error_m)}, {"error_rad", number(segment.error_rad)}}));
   Json changes = Json::array();
   for (const ChangeOfMindRecord& change : server.changes_of_mind)
     for (const RobotRecord& robot : record.robots)

@@ -145,9 +145,9 @@ std::string server_lines(const MissionRecord& record) {
 
 /// How gently the correction bent odometry.
 std::string correction_lines(const RobotRecord& robot, const PolicyRecord& policy) {
-  if (!policy.kink || policy.constraints_added == 0) return "";
+  if (!policy.discontinuity || policy.constraints_added == 0) return "";
   return wrap(fmt::format("{}: correcting changed no motion over 1 s by more than {} and {:.3f} deg.", robot.name,
-                          format_metres(policy.kink->translation_m), policy.kink->rotation_deg),
+                          format_metres(policy.discontinuity->translation_m), policy.discontinuity->rotation_deg),
               "  change   ");
 }
 

@@ -6,9 +6,9 @@
 #include <memory>
 #include <utility>
 
+#include "tutti/node/decisions.hpp"
 #include "tutti/node/meta_keys.hpp"
 #include "tutti/node/submap_frames.hpp"
-#include "tutti/node/words.hpp"
 #include "tutti/storage/map_tables.hpp"
 #include "tutti/wire/codec.hpp"
 
@@ -79,7 +79,7 @@ void OpenedMap::add_answer(ClosureVerdict verdict) {
   const SubmapPair pair = verdict.pair;
   if (!state.answered.has_both(pair)) return;
   if (verdict.finder != state.finder) return;
-  if (says(state.words, pair, Wish::accept) && state.verdicts.contains(pair)) return;
+  if (says(state.decisions, pair, Wish::accept) && state.verdicts.contains(pair)) return;
   if (!state.answered.insert(pair)) return;
   if (verdict.refusal) {
     count_refusal(*verdict.refusal, pair.first.chain.robot, pair.second.chain.robot, state.refused);
@@ -104,10 +104,10 @@ Result<OpenedMap> OpenedMap::from(const storage::TableStore& store, MethodId fin
     for (ClosureVerdict& verdict : answer.verdicts) opened.add_answer(std::move(verdict));
   };
   if (auto ok = opened.read_meta(store); !ok) return tl::unexpected(ok.error());
-  const auto leave_word = [&](const std::string& why) { opened.leave(map_tables::kWords, why); };
-  auto words = read_words(store, leave_word);
-  if (!words) return tl::unexpected(words.error());
-  opened.state.words = std::move(*words);
+  const auto leave_decision = [&](const std::string& why) { opened.leave(map_tables::kDecisions, why); };
+  auto decisions = read_decisions(store, leave_decision);
+  if (!decisions) return tl::unexpected(decisions.error());
+  opened.state.decisions = std::move(*decisions);
   auto counts = read_map_counts(store);
   if (!counts) return tl::unexpected(counts.error());
   opened.counts = *counts;

@@ -85,7 +85,7 @@ TEST(VerifyPair, refusesTheMirrorImage) {
 
 TEST(VerifyPair, refusesACorridorAsFreeToSlide) {
   const Side a = see({RobotId{0}, 0}, corridor(), {.from = {20, 1.3, 1.2}, .to = {24, 1.3, 1.2}}, 1);
-  for (const double x : {22.0, 50.0}) {  // the same stretch, and another one that looks the same
+  for (const double x : {22.0, 50.0}) {  // the same segment, and another one that looks the same
     const Side b = see({RobotId{1}, 0}, corridor(), {.from = {x, 1.3, 1.2}, .to = {x + 4, 1.3, 1.2}}, 2);
     const auto v = verify_pair(a.features, b.features, kConfig);
     EXPECT_FALSE(v.accepted);

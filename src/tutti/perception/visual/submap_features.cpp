@@ -28,7 +28,7 @@ Places places_of(const Submap& submap) {
   return out;
 }
 
-StretchCovariance odometry_of(const Submap& submap) {
+SegmentCovariance odometry_of(const Submap& submap) {
   std::vector<Pose3> poses;
   for (const Keyframe& keyframe : submap.keyframes) poses.push_back(keyframe.T_odom_body);
   std::vector<Matrix6d> steps{Matrix6d::Zero()};

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "tutti/base/ids.hpp"
-#include "tutti/geometry/stretch_covariance.hpp"
+#include "tutti/geometry/segment_covariance.hpp"
 #include "tutti/model/refusal.hpp"
 #include "tutti/model/submap.hpp"
 #include "tutti/perception/visual/closure_config.hpp"
@@ -51,7 +51,7 @@ struct SubmapFeatures {
   std::vector<std::vector<std::uint32_t>> rows_of_landmark;  ///< The inverse.
   DescriptorTables tables;                                   ///< Over landmark_descriptors.
   std::vector<QueryKeyframe> keyframes;
-  StretchCovariance odometry;  ///< Odometry between Submap::keyframes.
+  SegmentCovariance odometry;  ///< Odometry between Submap::keyframes.
   double residual_px = 0.0;    ///< RMS of the landmarks in the submap's own images.
 };
 

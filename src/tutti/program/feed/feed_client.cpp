@@ -16,7 +16,7 @@
 namespace tutti::program {
 
 Result<std::unique_ptr<FeedClient>> FeedClient::connect(const std::string& socket, const std::string& name,
-                                                        const intake::FeedSensors& sensors, bool wants_way) {
+                                                        const intake::FeedSensors& sensors, bool wants_trajectory) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   if (socket.empty() || socket.size() >= sizeof address.sun_path)
@@ -28,7 +28,7 @@ Result<std::unique_ptr<FeedClient>> FeedClient::connect(const std::string& socke
   v1::Feed hello;
   hello.mutable_hello()->set_protocol_version(kFeedVersion);
   hello.mutable_hello()->set_client_name(name);
-  hello.mutable_hello()->set_wants_way(wants_way);
+  hello.mutable_hello()->set_wants_way(wants_trajectory);
   internal::write(sensors, *hello.mutable_hello()->mutable_sensors());
   if (auto ok = out->send(hello); !ok) return tl::unexpected(ok.error());
   return out;

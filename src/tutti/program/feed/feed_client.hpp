@@ -23,7 +23,7 @@ class FeedClient {
   /// Connects and sends Hello; the robot's FeedWelcome is what hear() returns first. Fails when nobody listens on
   /// `socket`.
   static Result<std::unique_ptr<FeedClient>> connect(const std::string& socket, const std::string& name,
-                                                     const intake::FeedSensors& sensors, bool wants_way);
+                                                     const intake::FeedSensors& sensors, bool wants_trajectory);
   ~FeedClient();
   FeedClient(const FeedClient&) = delete;
   FeedClient& operator=(const FeedClient&) = delete;

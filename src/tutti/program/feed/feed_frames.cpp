@@ -135,7 +135,7 @@ std::string time_answer_frame(std::int64_t client_now_ns, Timestamp robot_now, s
   return framed(message);
 }
 
-std::optional<std::string> way_frame(const FeedWay& way, std::int64_t offset_ns) {
+std::optional<std::string> trajectory_frame(const FeedTrajectory& way, std::int64_t offset_ns) {
   constexpr std::size_t kMostBytesPerPose = 70;
   if ((way.corrected.size() + way.map.size() + 1) * kMostBytesPerPose > kMaxFeedBytes) return std::nullopt;
   v1::Feed message;

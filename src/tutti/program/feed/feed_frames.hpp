@@ -69,7 +69,7 @@ struct FeedHello {
   /// Nanoseconds, to be added to the client's stamps; or the client's time now.
   std::optional<std::int64_t> clock_offset_ns = {}, clock_now_ns = {};
   Result<std::optional<FeedRos>> ros = std::nullopt;  ///< An error says why these cannot be.
-  bool wants_way = false;                             ///< Asks for a FeedWay after every update of the map.
+  bool wants_trajectory = false;                      ///< Asks for a FeedWay after every update of the map.
 };
 struct FeedEnd {};
 struct FeedTime {
@@ -106,7 +106,7 @@ std::string refused_frame(Timestamp stamp, const std::string& why, std::int64_t 
 std::string time_answer_frame(std::int64_t client_now_ns, Timestamp robot_now, std::int64_t offset_ns,
                               std::int64_t measured_ns, const std::optional<Timestamp>& stored);
 /// Nothing when the way is too long for one message.
-std::optional<std::string> way_frame(const FeedWay& way, std::int64_t offset_ns);
+std::optional<std::string> trajectory_frame(const FeedTrajectory& way, std::int64_t offset_ns);
 std::string raw_frame(const FeedRaw& raw);
 std::string note_frame(const std::string& text);
 std::string ended_frame();

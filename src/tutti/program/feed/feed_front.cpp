@@ -212,25 +212,25 @@ std::vector<FeedRefusal> FeedFront::take_refusals() {
   return std::exchange(refusals_, {});
 }
 
-void FeedFront::want_ways() {
+void FeedFront::want_trajectory() {
   const std::scoped_lock lock(mutex_);
-  wants_ways_ = true;
+  wants_trajectory_ = true;
 }
 
-bool FeedFront::wants_ways() const {
+bool FeedFront::wants_trajectory() const {
   const std::scoped_lock lock(mutex_);
-  return wants_ways_;
+  return wants_trajectory_;
 }
 
-void FeedFront::say(FeedWay way) {
+void FeedFront::say(FeedTrajectory way) {
   const std::scoped_lock lock(mutex_);
   ways_.push_back(std::move(way));
   if (ways_.size() > kWays) ways_.pop_front();
 }
 
-std::vector<FeedWay> FeedFront::take_ways() {
+std::vector<FeedTrajectory> FeedFront::take_trajectories() {
   const std::scoped_lock lock(mutex_);
-  std::vector<FeedWay> out(std::make_move_iterator(ways_.begin()), std::make_move_iterator(ways_.end()));
+  std::vector<FeedTrajectory> out(std::make_move_iterator(ways_.begin()), std::make_move_iterator(ways_.end()));
   ways_.clear();
   return out;
 }

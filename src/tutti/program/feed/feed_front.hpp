@@ -66,8 +66,8 @@ class FeedFront final : public FeedTarget {
   Status finish() override;
   [[nodiscard]] FeedState state() const override;
   std::vector<FeedRefusal> take_refusals() override;
-  void want_ways() override;
-  std::vector<FeedWay> take_ways() override;
+  void want_trajectory() override;
+  std::vector<FeedTrajectory> take_trajectories() override;
 
   // For the robot.
   /// The next input, or nothing when none came within `wall_s` of wall time. Until note_heard() it counts as being
@@ -89,9 +89,9 @@ class FeedFront final : public FeedTarget {
   void refuse(Timestamp stamp, std::string why);
   /// Sets what the robot knows now; ignored while a robot made again has not caught up with what it knew before.
   void publish(FeedState robot);
-  [[nodiscard]] bool wants_ways() const;
+  [[nodiscard]] bool wants_trajectory() const;
   /// Queues a way for the client; only the newest kWays wait.
-  void say(FeedWay way);
+  void say(FeedTrajectory way);
   static constexpr std::size_t kWays = 4;
   /// What the robot's body reported last, unless that is older than kHealthLasts.
   [[nodiscard]] Health health() const;
@@ -171,8 +171,8 @@ class FeedFront final : public FeedTarget {
   double finest_s_ = 0.0;                                                      // samples that are closer are one
   std::set<Timestamp> jumps_;  // samples before which odometry has jumped
   Timestamp behind_since_;
-  bool wants_ways_ = false;
-  std::deque<FeedWay> ways_;
+  bool wants_trajectory_ = false;
+  std::deque<FeedTrajectory> ways_;
   Health health_;
   std::chrono::steady_clock::time_point health_came_;
   decltype(FeedState::status) status_;

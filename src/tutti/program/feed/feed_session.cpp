@@ -161,8 +161,8 @@ void FeedSession::greet(Client client, const FeedHello& hello) {
     return close(client, fmt::format("{} clients listen, no more may: one place is for who feeds", listeners));
   connection.listens_only = hello.listens_only;
   connection.greeted = true;
-  connection.wants_way = hello.wants_way;
-  if (hello.wants_way || (feeder_ == client && ros_)) target_.want_ways();
+  connection.wants_trajectory = hello.wants_trajectory;
+  if (hello.wants_trajectory || (feeder_ == client && ros_)) target_.want_trajectory();
   const FeedState state = this->state();
   put(connection, welcome_frame(state, map_.T_map_odom(), offset_ns(client)));
   put(connection, situation_frame(state, offset_ns(client)));
@@ -201,11 +201,11 @@ void FeedSession::refresh() {
   for (const FeedRefusal& refusal : target_.take_refusals())
     if (feeder_) refuse(*feeder_, refusal.stamp, refusal.why);
   answer_end();
-  for (const FeedWay& way : target_.take_ways()) {
+  for (const FeedTrajectory& way : target_.take_trajectories()) {
     if (ros_) tell_ros(way);
     for (auto& [number, listener] : clients_)
-      if (listener.wants_way)
-        if (auto frame = way_frame(way, offset_ns(number))) put(listener, std::move(*frame), true);
+      if (listener.wants_trajectory)
+        if (auto frame = trajectory_frame(way, offset_ns(number))) put(listener, std::move(*frame), true);
   }
   const FeedState state = this->state();
   if (ros_)

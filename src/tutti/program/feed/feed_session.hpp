@@ -96,7 +96,7 @@ class FeedSession {
     bool ended = false;          ///< It has ended the recording,
     bool waits_for_end = false;  ///< and that is not answered yet.
     bool listens_only = false;
-    bool wants_way = false;
+    bool wants_trajectory = false;
   };
 
   void close(Client client, const std::string& why);
@@ -117,7 +117,7 @@ class FeedSession {
   Status begin_ros(const FeedHello& hello);
   void take_raw(Client client, const intake::RawMessage& raw);
   void tell_ros(Client client, const FeedState& state, const SmoothMap::Answer& answer);
-  void tell_ros(FeedWay way);
+  void tell_ros(FeedTrajectory way);
   [[nodiscard]] Timestamp by_client(Timestamp stamp) const;
   /// The target's, with what this session knows itself.
   [[nodiscard]] FeedState state() const;

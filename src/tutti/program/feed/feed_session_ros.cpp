@@ -76,7 +76,7 @@ void FeedSession::tell_ros(Client client, const FeedState& state, const SmoothMa
   for (const FeedRaw& raw : ros_->hear(told, state.newest->pose)) put(clients_.at(client), raw_frame(raw), true);
 }
 
-void FeedSession::tell_ros(FeedWay way) {
+void FeedSession::tell_ros(FeedTrajectory way) {
   for (StampedPose& at : way.corrected) at.stamp = by_client(at.stamp);
   ros_->hear(way);
 }

@@ -29,11 +29,11 @@ struct TeamMate {
   friend bool operator==(const TeamMate&, const TeamMate&) = default;
 };
 
-/// Tells of a stretch of odometry where localisation failed or the map is wrong, or of a sensor that is not heard.
+/// Tells of a segment of odometry where localisation failed or the map is wrong, or of a sensor that is not heard.
 struct FeedAlert {
   std::string text;
   Timestamp since;        ///< The newest sample when the alert was first raised.
-  Timestamp from, until;  ///< The stretch that the alert is about.
+  Timestamp from, until;  ///< The segment that the alert is about.
   friend bool operator==(const FeedAlert&, const FeedAlert&) = default;
 };
 
@@ -62,7 +62,7 @@ struct FeedState {
 };
 
 /// The robot's way and what the map says of it, as of one update of the map.
-struct FeedWay {
+struct FeedTrajectory {
   std::pair<std::uint64_t, std::uint64_t> map_age;  ///< ProxyGraph::age()
   std::size_t constraints = 0;                      ///< RobotAgent::ledger()
   Trajectory corrected;                             ///< RobotAgent::corrected()
@@ -100,9 +100,9 @@ class FeedTarget {
   /// Ends the recording; FeedState::ended tells when that is done.
   virtual Status finish() = 0;
   /// From now on take_ways() has something to return.
-  virtual void want_ways() {}
+  virtual void want_trajectory() {}
   /// The ways since the last call, as far as they were kept.
-  virtual std::vector<FeedWay> take_ways() { return {}; }
+  virtual std::vector<FeedTrajectory> take_trajectories() { return {}; }
   /// The refusals since the last call.
   virtual std::vector<FeedRefusal> take_refusals() { return {}; }
   [[nodiscard]] virtual FeedState state() const = 0;

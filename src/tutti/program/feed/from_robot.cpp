@@ -64,10 +64,10 @@ FromRobot read(const v1::Feed& message) {
       return FeedRefusal{{message.refused().stamp_ns()}, message.refused().why()};
     case v1::Feed::kWay: {
       const auto& way = message.way();
-      return FeedWay{{way.map_epoch(), way.map_revision()},
-                     way.constraints(),
-                     trajectory(way.stamp_ns(), way.t_map_body()),
-                     trajectory(way.map_stamp_ns(), way.t_world_body())};
+      return FeedTrajectory{{way.map_epoch(), way.map_revision()},
+                            way.constraints(),
+                            trajectory(way.stamp_ns(), way.t_map_body()),
+                            trajectory(way.map_stamp_ns(), way.t_world_body())};
     }
     case v1::Feed::kEnded:
       return FeedEnd{};

@@ -50,8 +50,8 @@ struct FeedNote {
 };
 /// A message that drivers here do not need.
 struct FeedOther {};
-using FromRobot = std::variant<FeedWelcome, FeedAnswer, FeedProgress, FeedJump, FeedSituation, FeedRefusal, FeedWay,
-                               FeedEnd, FeedOver, FeedRaw, FeedNote, FeedOther>;
+using FromRobot = std::variant<FeedWelcome, FeedAnswer, FeedProgress, FeedJump, FeedSituation, FeedRefusal,
+                               FeedTrajectory, FeedEnd, FeedOver, FeedRaw, FeedNote, FeedOther>;
 /// Decodes a message of the robot; an error when it is none.
 Result<FromRobot> decode_from_robot(const std::string& payload);
 

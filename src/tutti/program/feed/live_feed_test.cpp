@@ -193,10 +193,10 @@ TEST(LiveFeed, TellsTheCorrectedWayToAFeedClient) {
     }
   };
   EXPECT_EQ(std::get<FeedWelcome>(hear()).robot, "alpha");
-  EXPECT_TRUE(feed->front().wants_ways());
+  EXPECT_TRUE(feed->front().wants_trajectory());
   const Trajectory way = robot::test::drifting_odometry(30);
   feed->front().say({{2, 7}, 5, way, {way[3], way[9]}});
-  const auto heard = std::get<FeedWay>(hear());
+  const auto heard = std::get<FeedTrajectory>(hear());
   EXPECT_EQ(heard.map_age, (std::pair<std::uint64_t, std::uint64_t>{2, 7}));
   EXPECT_EQ(heard.constraints, 5U);
   EXPECT_EQ(heard.corrected, way);

@@ -46,7 +46,7 @@ void RosAnswers::hear(const FeedAnswer& answer, const Pose3& T_odom_body) {
   if (tail_.size() > kLongestTail) tail_.pop_front();
 }
 
-void RosAnswers::hear(const FeedWay& way) {
+void RosAnswers::hear(const FeedTrajectory& way) {
   way_ = way.corrected;
   if (way_.empty()) return;
   while (!tail_.empty() && tail_.front().stamp <= way_.back().stamp) tail_.pop_front();

@@ -24,7 +24,7 @@ class RosAnswers {
   RosAnswers(const std::string& odom, const std::string& map, double tolerance_s);
 
   void hear(const FeedAnswer& answer, const Pose3& T_odom_body);
-  void hear(const FeedWay& way);
+  void hear(const FeedTrajectory& way);
   void hear(std::vector<TeamMate> team_mates) { team_mates_ = std::move(team_mates); }
 
   /// TFMessage with map -> odom as of the last answer; nothing when that stamp was published already, because tf2 warns

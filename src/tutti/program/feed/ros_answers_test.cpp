@@ -61,7 +61,8 @@ TEST(RosAnswers, ThePathIsTheCorrectedWayAndOdometrySince) {
   RosAnswers answers("odom", "", 0.0);
   const auto at = [](double x) { return Pose3{Eigen::Quaterniond::Identity(), {x, 0, 0}}; };
   for (int i = 0; i < 10; ++i) answers.hear(answer(i, at(i)), at(i));
-  answers.hear(FeedWay{.map_age = {1, 1}, .constraints = 1, .corrected = {{{0}, at(50)}, {{4}, at(54)}}, .map = {}});
+  answers.hear(
+      FeedTrajectory{.map_age = {1, 1}, .constraints = 1, .corrected = {{{0}, at(50)}, {{4}, at(54)}}, .map = {}});
   const std::string path = answers.path();
   // header (8, "map"), count, then of each a header, seven numbers: 2 of the way, 5 to 9 of odometry
   constexpr std::size_t kHead = 4 + 8 + 4 + 4 + 4, kPose = 8 + 4 + 4 + 56;

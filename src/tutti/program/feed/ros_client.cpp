@@ -62,7 +62,7 @@ std::vector<FeedRaw> RosClient::hear(const FeedAnswer& answer, const Pose3& T_od
   return out;
 }
 
-void RosClient::hear(const FeedWay& way) {
+void RosClient::hear(const FeedTrajectory& way) {
   way_ = way;
   if (answers_) answers_->hear(way);
 }

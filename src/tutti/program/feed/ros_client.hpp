@@ -36,7 +36,7 @@ class RosClient {
 
   /// What the client is to publish: where the robot is, as transform and pose.
   std::vector<FeedRaw> hear(const FeedAnswer& answer, const Pose3& T_odom_body);
-  void hear(const FeedWay& way);
+  void hear(const FeedTrajectory& way);
   /// The team-mates, if they are others than before.
   std::vector<FeedRaw> hear(const std::vector<TeamMate>& team_mates);
   /// The whole trajectory; nothing before there is any, and when it is too long for a message.
@@ -48,7 +48,7 @@ class RosClient {
   FeedRos said_;
   intake::SensorIntake intake_;
   std::optional<RosAnswers> answers_;
-  std::optional<FeedWay> way_;  ///< Heard before there was any odometry.
+  std::optional<FeedTrajectory> way_;  ///< Heard before there was any odometry.
   std::vector<TeamMate> team_mates_;
   bool wants_scan_ = false;
 };

@@ -29,10 +29,10 @@ Result<mapfile::ShownMap> map_with(const mapfile::ShownMap& map, const storage::
   mapfile::ShownMap out{.revision = map.revision, .time = map.time, .content = map.content, .map = {}, .broadcast = {}};
   out.content.settings = *settings;
   out.content.refinements = std::move(*refinements);
-  out.content.words[pair] = {.closure = map.content.closure_names().of(pair),
-                             .wish = Wish::accept,
-                             .given_ns = std::numeric_limits<std::int64_t>::max(),
-                             .by_hand = {closure}};
+  out.content.decisions[pair] = {.closure = map.content.closure_names().of(pair),
+                                 .wish = Wish::accept,
+                                 .given_ns = std::numeric_limits<std::int64_t>::max(),
+                                 .by_hand = {closure}};
   out.map = mapfile::estimate(out.content);
   return out;
 }

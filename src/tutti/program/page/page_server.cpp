@@ -159,7 +159,7 @@ class PageViewer final : public program::MapViewer {
       board.put(alerts_message(alerts, time_s));
     });
   }
-  std::vector<program::AskedWord> take_words() override { return site_.words.take(); }
+  std::vector<program::AskedDecision> take_decisions() override { return site_.decisions.take(); }
 
  private:
   Status open_marks() {

@@ -62,11 +62,11 @@ TEST_F(PageServer, ADecisionIsTheServersToTakeOrNot) {
   EXPECT_EQ(http.Post("/api/decide", ours(), R"({"wish":7})", "application/json")->status, 400);
   EXPECT_EQ(http.Post("/api/decide", ours(), std::string(9U << 20U, ' '), "application/json")->status, 413);
   const std::scoped_lock lock(mutex_);
-  ASSERT_EQ(words_.size(), 1U);
-  EXPECT_EQ(words_.front().first.closure, "alpha/0-bravo/1");
-  EXPECT_EQ(words_.front().first.wish, Wish::reject);
-  EXPECT_EQ(words_.front().first.by, "mallory") << "nobody has proved anything";
-  EXPECT_EQ(words_.front().second, "");
+  ASSERT_EQ(decisions_.size(), 1U);
+  EXPECT_EQ(decisions_.front().first.closure, "alpha/0-bravo/1");
+  EXPECT_EQ(decisions_.front().first.wish, Wish::reject);
+  EXPECT_EQ(decisions_.front().first.by, "mallory") << "nobody has proved anything";
+  EXPECT_EQ(decisions_.front().second, "");
 }
 
 TEST_F(PageServer, TwoSubmapsAreLookedAtAndAClosureIsAddedByHand) {
@@ -89,11 +89,11 @@ TEST_F(PageServer, TwoSubmapsAreLookedAtAndAClosureIsAddedByHand) {
       ask(client(), "/api/closure", {{"from", closure.at("from")}, {"to", closure.at("to")}, {"by", "anna"}});
   EXPECT_EQ(kept, 200) << name;
   const std::scoped_lock lock(mutex_);
-  ASSERT_EQ(words_.size(), 1U);
-  EXPECT_EQ(words_.front().first.closure, closure.at("name"));
-  EXPECT_EQ(words_.front().first.wish, Wish::accept);
-  EXPECT_EQ(words_.front().first.by, "anna");
-  ASSERT_EQ(words_.front().first.by_hand.size(), 1U);
+  ASSERT_EQ(decisions_.size(), 1U);
+  EXPECT_EQ(decisions_.front().first.closure, closure.at("name"));
+  EXPECT_EQ(decisions_.front().first.wish, Wish::accept);
+  EXPECT_EQ(decisions_.front().first.by, "anna");
+  ASSERT_EQ(decisions_.front().first.by_hand.size(), 1U);
 }
 
 TEST_F(PageServer, TheMapWithAClosureIsShownAndNothingIsStored) {
@@ -118,9 +118,9 @@ TEST_F(PageServer, TheMapWithAClosureIsShownAndNothingIsStored) {
   ASSERT_TRUE(ask(client(), "/api/closure", {{"from", rejected.at("from")}, {"to", rejected.at("to")}}).first == 200);
   {
     const std::scoped_lock lock(mutex_);
-    ASSERT_EQ(words_.size(), 1U);
-    const SubmapPair pair = kept.closure_names().find(words_.front().first.closure).value();
-    kept.words[pair] = with_sessions(words_.front().first, pair);
+    ASSERT_EQ(decisions_.size(), 1U);
+    const SubmapPair pair = kept.closure_names().find(decisions_.front().first.closure).value();
+    kept.decisions[pair] = with_sessions(decisions_.front().first, pair);
   }
   mapfile::ShownMap with{
       .revision = map_->revision, .time = {}, .content = kept, .map = mapfile::estimate(kept), .broadcast = {}};
@@ -152,7 +152,7 @@ TEST_F(PageServer, WhatCannotBeLookedAtIsSaid) {
               400)
         << bad;
   const std::scoped_lock lock(mutex_);
-  EXPECT_TRUE(words_.empty());
+  EXPECT_TRUE(decisions_.empty());
 }
 
 TEST_F(PageServer, SaysWhyTwoRobotsAreJoinedOrNot) {
@@ -173,7 +173,7 @@ TEST_F(PageServer, OtherSitesReachNothing) {
   for (const char* path : {"/", "/api/me", "/api/events", "/metrics"})
     EXPECT_EQ(http.Get(path, httplib::Headers{{"Host", "evil.example"}})->status, 421) << path;
   const std::scoped_lock lock(mutex_);
-  EXPECT_TRUE(words_.empty());
+  EXPECT_TRUE(decisions_.empty());
 }
 
 TEST_F(PageServer, WithCredentialsShowsNothingToStrangersAndLetsOperatorsDecide) {
@@ -192,8 +192,8 @@ TEST_F(PageServer, WithCredentialsShowsNothingToStrangersAndLetsOperatorsDecide)
   EXPECT_EQ(decide("alpha/0-bravo/1", "reject", ours(anna)), "200");
   {
     const std::scoped_lock lock(mutex_);
-    ASSERT_EQ(words_.size(), 1U);
-    EXPECT_EQ(words_.front().second, "anna") << "whatever the page says";
+    ASSERT_EQ(decisions_.size(), 1U);
+    EXPECT_EQ(decisions_.front().second, "anna") << "whatever the page says";
   }
   EXPECT_EQ(http.Post("/api/logout", ours(anna), "{}", "application/json")->status, 200);
   EXPECT_EQ(decide("alpha/0-bravo/1", "accept", ours(anna)), "401");
@@ -283,7 +283,7 @@ TEST_F(PageServer, ConnectionsThatSayNothingTakeNothingFromTheMission) {
   std::this_thread::sleep_for(std::chrono::milliseconds(200));
   EXPECT_LE(open_files() - before, 400 + 70) << "the page itself holds as many as it serves";
   viewer_->tell({.time = Timestamp{} + 6.0, .revision = 4}, {});
-  EXPECT_TRUE(viewer_->take_words().empty());
+  EXPECT_TRUE(viewer_->take_decisions().empty());
   for (const int one : sockets) close(one);
   EXPECT_EQ(events_with_map().at("status").at("revision"), 4) << "and it is there again when they have gone";
 }

@@ -140,9 +140,10 @@ class Routes {
     const auto* const found = std::ranges::find(kWishes, wish, [](Wish one) { return std::string(to_string(one)); });
     if (found == kWishes.end())
       return say(response, 400, fmt::format("wish '{}': expected accept, reject or withdraw", plain_text(wish)));
-    ClosureWord word{.closure = body.value("closure", ""), .wish = *found};
-    if (word.closure.empty() || word.closure.size() > 200) return say(response, 400, "closure: expected a name");
-    if (give(visitor, body, std::move(word), response)) say(response, Json::object());
+    ClosureDecision decision{.closure = body.value("closure", ""), .wish = *found};
+    if (decision.closure.empty() || decision.closure.size() > 200)
+      return say(response, 400, "closure: expected a name");
+    if (give(visitor, body, std::move(decision), response)) say(response, Json::object());
   }
 
   /// Keeps what ByHand::look() shows as the operator's own closure.
@@ -153,8 +154,8 @@ class Routes {
       return say(response, 409,
                  "there is no alignment to keep: " +
                      (seen->look.refusal ? to_string(*seen->look.refusal) : std::string("none")));
-    ClosureWord word{.closure = seen->name, .wish = Wish::accept, .by_hand = {*seen->look.best}};
-    if (give(visitor, body, std::move(word), response)) say(response, Json{{"name", seen->name}});
+    ClosureDecision decision{.closure = seen->name, .wish = Wish::accept, .by_hand = {*seen->look.best}};
+    if (give(visitor, body, std::move(decision), response)) say(response, Json{{"name", seen->name}});
   }
 
   /// Who looks at what; nothing waits for it.
@@ -188,11 +189,11 @@ class Routes {
     say(response, out);
   }
 
-  /// Hands the operator's word to the server; false: the answer says why it is not stored.
-  bool give(const Visitor& visitor, const Json& body, ClosureWord word, Response& response) {
-    word.by = plain_text(body.value("by", ""));
-    word.given_ns = static_cast<std::int64_t>(program::wall_clock_ns());
-    auto answer = site_.words.ask(std::move(word), visitor.name);
+  /// Hands the operator's decision to the server; false: the answer says why it is not stored.
+  bool give(const Visitor& visitor, const Json& body, ClosureDecision decision, Response& response) {
+    decision.by = plain_text(body.value("by", ""));
+    decision.given_ns = static_cast<std::int64_t>(program::wall_clock_ns());
+    auto answer = site_.decisions.ask(std::move(decision), visitor.name);
     const auto refuse = [&](int status, const std::string& why) {
       say(response, status, why);
       return false;

@@ -107,13 +107,13 @@ std::string closure_json(const ShownMap& map, const mapfile::ClosureInfo& info) 
                 {"to", to_string(info.pair.second)},
                 {"state", to_string(info.state)},
                 {"reason", info.reason}};
-  out["word"] =
-      info.word
-          ? FieldJson{{"wish", to_string(info.word->wish)}, {"by", info.word->by}, {"wall_ns", info.word->given_ns}}
-          : FieldJson(nullptr);
+  out["word"] = info.decision ? FieldJson{{"wish", to_string(info.decision->wish)},
+                                          {"by", info.decision->by},
+                                          {"wall_ns", info.decision->given_ns}}
+                              : FieldJson(nullptr);
   out["links"] = FieldJson::array();
   for (const mapfile::ClosureFit& fit : info.closures) out["links"].push_back(link_json(map, info, fit));
-  out["by_hand"] = info.word && !info.word->by_hand.empty();
+  out["by_hand"] = info.decision && !info.decision->by_hand.empty();
   out["evidence"] = FieldJson::array();
   if (info.verdict) {
     out["finder"] = to_string(info.verdict->finder);

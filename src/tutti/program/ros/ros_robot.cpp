@@ -78,7 +78,7 @@ class Robot final : public RosRobot {
   }
   void note(const program::FeedWelcome&) {}
   void note(const program::FeedProgress&) {}
-  void note(const program::FeedWay&) {}
+  void note(const program::FeedTrajectory&) {}
   void note(const program::FeedEnd&) {}
   void note(const program::FeedOther&) {}
   void complain(const std::string& what, ErrorCode code, const std::string& why) {

@@ -128,7 +128,7 @@ inline RobotRecord example_robot(std::size_t index, const ExampleOptions& option
     policy.constraints_added = p == 0 ? options.keyframes - 1 : p == 1 ? 2 * options.keyframes - 3 : 24;
     if (options.reference)
       policy.accuracy = {quality[p] * 1.7, quality[p] * 4.0, quality[p] * 0.8, 0.11, quality[p] * 1.1, 0.3, 1.0};
-    policy.kink = evaluation::Kink{0.5 * quality[p], 20.0 * quality[p], {}, {}};
+    policy.discontinuity = evaluation::Discontinuity{0.5 * quality[p], 20.0 * quality[p], {}, {}};
     policy.agreement_rmse_m = quality[p];
     if (p == 2)
       for (std::size_t k = 0; k + 12 < options.keyframes; k += 6)

@@ -33,7 +33,7 @@ inline std::vector<Camera> stereo_cameras() {
   return {{model, {q, {0.05, 0.055, 0.0}}}, {model, {q, {0.05, -0.055, 0.0}}}};
 }
 
-inline constexpr std::uint32_t kWords = 6;
+inline constexpr std::uint32_t kDecisions = 6;
 using Bits = std::vector<std::uint64_t>;
 
 struct RoomPoint {
@@ -43,7 +43,7 @@ struct RoomPoint {
 
 inline Bits random_bits(Rng& rng) {
   Bits out;
-  for (std::uint32_t w = 0; w < kWords; ++w) out.push_back(rng.index(~std::uint64_t{0}));
+  for (std::uint32_t w = 0; w < kDecisions; ++w) out.push_back(rng.index(~std::uint64_t{0}));
   return out;
 }
 
@@ -94,7 +94,7 @@ inline Pose3 true_pose(const Flight& f, std::uint32_t k) {  // T_world_body
 
 inline TrackedImage look(const std::vector<RoomPoint>& room, const Camera& camera, std::uint32_t index,
                          const Pose3& T_world_body, const Flight& f, Rng& rng) {
-  TrackedImage out{.camera = index, .descriptors = {.kind = DescriptorKind::maplab, .words = kWords}};
+  TrackedImage out{.camera = index, .descriptors = {.kind = DescriptorKind::maplab, .words = kDecisions}};
   const Pose3 T_camera_world = (T_world_body * camera.T_body_camera).inverse();
   for (std::size_t i = 0; i < room.size(); ++i) {
     const auto pixel = project(camera.model, T_camera_world * room[i].position);

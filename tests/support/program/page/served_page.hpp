@@ -68,11 +68,11 @@ class ServedPage : public ::testing::Test {
     viewer_->tell({.time = Timestamp{} + 5.0, .revision = 3}, {});
     takes_ = std::thread([this] {
       while (!stop_) {
-        for (program::AskedWord& asked : viewer_->take_words()) {
-          const bool is_known = asked.word.closure != "alpha/0-bravo/999";
+        for (program::AskedDecision& asked : viewer_->take_decisions()) {
+          const bool is_known = asked.decision.closure != "alpha/0-bravo/999";
           if (is_known) {
             const std::scoped_lock lock(mutex_);
-            words_.emplace_back(asked.word, asked.proved_name);
+            decisions_.emplace_back(asked.decision, asked.proved_name);
           }
           asked.answer.set_value(is_known ? "" : "no such closure");
         }
@@ -163,7 +163,7 @@ class ServedPage : public ::testing::Test {
   std::string url_;
   std::atomic<bool> stop_ = false;
   std::mutex mutex_;
-  std::vector<std::pair<ClosureWord, std::string>> words_;
+  std::vector<std::pair<ClosureDecision, std::string>> decisions_;
   std::thread takes_;
 };
 

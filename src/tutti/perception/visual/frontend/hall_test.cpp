@@ -111,7 +111,7 @@ TEST_F(Hall, StereoHasDepthWhereNothingTranslates) {
 
 TEST_F(Hall, RevisitsAreKnownByTheirDescriptors) {
   const std::vector<Camera> cameras = {stereo()[0]};
-  // Two flights over the same stretch, and one elsewhere.
+  // Two flights over the same segment, and one elsewhere.
   const auto first = fly(cameras, 0.0, 1.0), again = fly(cameras, 4.0, 1.0), elsewhere = fly(cameras, 180.0, 1.0);
   const auto matches = [](const TrackedImage& a, const TrackedImage& b) {
     constexpr double kRatio = 0.8;

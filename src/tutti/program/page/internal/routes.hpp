@@ -25,16 +25,16 @@ class Server;
 namespace tutti::page {
 
 /// Decisions on their way from the page's threads to the server's.
-class WordInbox {
+class DecisionInbox {
  public:
   /// The server's answer will be in the future: why the word is not stored, or empty. Nothing when too many wait.
-  std::optional<std::future<std::string>> ask(ClosureWord word, std::string proved_name) {
+  std::optional<std::future<std::string>> ask(ClosureDecision decision, std::string proved_name) {
     const std::scoped_lock lock(mutex_);
     if (asked_.size() >= kMost) return std::nullopt;
-    asked_.push_back({std::move(word), std::move(proved_name), {}});
+    asked_.push_back({std::move(decision), std::move(proved_name), {}});
     return asked_.back().answer.get_future();
   }
-  std::vector<program::AskedWord> take() {
+  std::vector<program::AskedDecision> take() {
     const std::scoped_lock lock(mutex_);
     return std::exchange(asked_, {});
   }
@@ -42,7 +42,7 @@ class WordInbox {
  private:
   static constexpr std::size_t kMost = 100;
   std::mutex mutex_;
-  std::vector<program::AskedWord> asked_;
+  std::vector<program::AskedDecision> asked_;
 };
 
 /// The last map that the server has shown.
@@ -94,7 +94,7 @@ struct Site {
   const std::uint32_t incarnation = program::any_incarnation();
   SignIn sign_in;
   LiveBoard board;
-  WordInbox words;
+  DecisionInbox decisions;
   Metrics metrics;
   std::shared_ptr<const node::SubmapFrames> clouds;
   LastMap last_map;

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "tutti/geometry/stretch_covariance.hpp"
+#include "tutti/geometry/segment_covariance.hpp"
 #include "tutti/model/pose_graph.hpp"
 #include "tutti/model/relative_pose.hpp"
 
@@ -13,11 +13,11 @@ namespace tutti::judge {
 
 /// The odometry of a pose graph, for relative poses between any two of its nodes. Odometry consists of pieces without a
 /// gap, each a chain of edges that lead from a node to a later one.
-class OdometryWays {
+class OdometryTrajectories {
  public:
   /// `seconds`: time of each node, from any origin. `odometry`: at most one edge begins and one ends at a node, and
   /// from < to.
-  OdometryWays(std::span<const double> seconds, std::span<const PoseGraphEdge> odometry);
+  OdometryTrajectories(std::span<const double> seconds, std::span<const PoseGraphEdge> odometry);
 
   /// The first node of the piece that holds this one.
   [[nodiscard]] std::size_t piece(std::size_t node) const { return at_[node].piece; }
@@ -42,7 +42,7 @@ class OdometryWays {
     Pose3 pose;
   };
   std::vector<At> at_;
-  std::vector<StretchCovariance> covariance_;  // per piece, by its first node
+  std::vector<SegmentCovariance> covariance_;  // per piece, by its first node
   double usual_speed_ = 0.0;
 };
 

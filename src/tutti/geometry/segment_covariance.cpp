@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/geometry/stretch_covariance.hpp"
+#include "tutti/geometry/segment_covariance.hpp"
 
 #include <utility>
 
@@ -18,7 +18,7 @@ Matrix6d moved(const Pose3& T_a_b, const Matrix6d& covariance_b) {
 
 }  // namespace
 
-StretchCovariance::Level::Level(std::vector<Matrix6d> steps) : step(std::move(steps)), upto(step), after(step) {
+SegmentCovariance::Level::Level(std::vector<Matrix6d> steps) : step(std::move(steps)), upto(step), after(step) {
   const std::size_t n = step.size();
   for (std::size_t k = 0; k < n; ++k)
     if (k % kBlock == 0)
@@ -32,7 +32,7 @@ StretchCovariance::Level::Level(std::vector<Matrix6d> steps) : step(std::move(st
   }
 }
 
-StretchCovariance::StretchCovariance(std::span<const Pose3> poses, std::span<const Matrix6d> steps) {
+SegmentCovariance::SegmentCovariance(std::span<const Pose3> poses, std::span<const Matrix6d> steps) {
   TUTTI_CHECK(poses.size() == steps.size(), "{} poses, {} steps", poses.size(), steps.size());
   if (poses.empty()) return;
   const Pose3 T_first_w = poses.front().inverse();
@@ -52,7 +52,7 @@ StretchCovariance::StretchCovariance(std::span<const Pose3> poses, std::span<con
   }
 }
 
-Matrix6d StretchCovariance::operator()(std::size_t a, std::size_t b) const {
+Matrix6d SegmentCovariance::operator()(std::size_t a, std::size_t b) const {
   TUTTI_CHECK(a <= b && b < size(), "a = {}, b = {}, {} poses", a, b, size());
   Matrix6d sum = Matrix6d::Zero();
   if (a == b) return sum;
@@ -67,7 +67,7 @@ Matrix6d StretchCovariance::operator()(std::size_t a, std::size_t b) const {
   return moved(T_b_first, sum);
 }
 
-std::size_t StretchCovariance::bytes() const {
+std::size_t SegmentCovariance::bytes() const {
   std::size_t out = poses_.size() * sizeof(Pose3);
   for (const Level& level : levels_) out += 3 * level.step.size() * sizeof(Matrix6d);
   return out;

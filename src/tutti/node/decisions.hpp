@@ -6,15 +6,16 @@
 #include <string>
 #include <string_view>
 
-#include "tutti/model/closure_word.hpp"
+#include "tutti/model/closure_decision.hpp"
 #include "tutti/model/loop_closure.hpp"
 #include "tutti/storage/table_store.hpp"
 
 namespace tutti::node {
 
-/// The operators' words in a map's store. `leave` is told why a word of a version that this program cannot read was
-/// left out. Fails when the table is damaged.
-Result<WordSet> read_words(const storage::TableStore& map, const std::function<void(const std::string&)>& leave);
+/// The operators' decisions in a map's store. `leave` is told why a decision of a version that this program cannot read
+/// was left out. Fails when the table is damaged.
+Result<DecisionSet> read_decisions(const storage::TableStore& map,
+                                   const std::function<void(const std::string&)>& leave);
 
 /// Key of the rows about a pair of submaps.
 std::string key_of(const SubmapPair& pair);

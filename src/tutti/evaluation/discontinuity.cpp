@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/evaluation/kink.hpp"
+#include "tutti/evaluation/discontinuity.hpp"
 
 #include "tutti/base/check.hpp"
 #include "tutti/evaluation/association.hpp"
@@ -9,7 +9,7 @@
 namespace tutti::evaluation {
 namespace {
 
-void include(const PosePair& i, const PosePair& j, Kink& largest) {
+void include(const PosePair& i, const PosePair& j, Discontinuity& largest) {
   const Pose3 raw = i.reference.inverse() * j.reference;
   const Pose3 corrected = i.estimate.inverse() * j.estimate;
   const double translation_m = (corrected.translation - raw.translation).norm();
@@ -26,11 +26,11 @@ void include(const PosePair& i, const PosePair& j, Kink& largest) {
 
 }  // namespace
 
-std::optional<Kink> kink(const Trajectory& raw, const Trajectory& corrected, double delta_s) {
+std::optional<Discontinuity> discontinuity(const Trajectory& raw, const Trajectory& corrected, double delta_s) {
   TUTTI_CHECK(delta_s > 0.0, "delta_s = {}", delta_s);
   const auto pairs = associate(corrected, raw, {.interpolate = false, .max_difference_s = 0.0});
   if (pairs.size() < 2) return std::nullopt;
-  Kink largest{.translation_at = pairs.front().stamp, .rotation_at = pairs.front().stamp};
+  Discontinuity largest{.translation_at = pairs.front().stamp, .rotation_at = pairs.front().stamp};
   std::size_t later = 0;
   for (std::size_t i = 0; i + 1 < pairs.size(); ++i) {
     include(pairs[i], pairs[i + 1], largest);

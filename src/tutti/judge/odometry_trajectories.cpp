@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/judge/odometry_ways.hpp"
+#include "tutti/judge/odometry_trajectories.hpp"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -21,7 +21,7 @@ double median(std::vector<double> values) {
 
 }  // namespace
 
-OdometryWays::OdometryWays(std::span<const double> seconds, std::span<const PoseGraphEdge> odometry)
+OdometryTrajectories::OdometryTrajectories(std::span<const double> seconds, std::span<const PoseGraphEdge> odometry)
     : at_(seconds.size()) {
   const std::size_t nodes = seconds.size();
   std::vector<std::vector<Pose3>> poses(nodes, {Pose3{}});
@@ -44,16 +44,16 @@ OdometryWays::OdometryWays(std::span<const double> seconds, std::span<const Pose
   }
   usual_speed_ = median(std::move(speeds));
   for (std::size_t i = 0; i < nodes; ++i)
-    covariance_.push_back(at_[i].piece == i ? StretchCovariance(poses[i], steps[i]) : StretchCovariance());
+    covariance_.push_back(at_[i].piece == i ? SegmentCovariance(poses[i], steps[i]) : SegmentCovariance());
 }
 
-RelativePose OdometryWays::between(std::size_t a, std::size_t b) const {
+RelativePose OdometryTrajectories::between(std::size_t a, std::size_t b) const {
   const auto [first, last] = std::minmax(at_[a].position, at_[b].position);
   const RelativePose forth{first == at_[a].position ? T(a, b) : T(b, a), covariance_[at_[a].piece](first, last)};
   return first == at_[a].position ? forth : inverse(forth);
 }
 
-double OdometryWays::turn_variance(std::size_t a, std::size_t b) const {
+double OdometryTrajectories::turn_variance(std::size_t a, std::size_t b) const {
   return std::abs(at_[a].turn_variance - at_[b].turn_variance);
 }
 

@@ -25,8 +25,8 @@ constexpr const char* to_string(Wish wish) {
   return wish == Wish::accept ? "accept" : wish == Wish::reject ? "reject" : "withdraw";
 }
 
-/// An operator's word on the closures between two submaps.
-struct ClosureWord {
+/// An operator's decision on the closures between two submaps.
+struct ClosureDecision {
   std::string closure;  ///< Name of the pair (server/closure_names.hpp) at the time the word was given.
   Wish wish = Wish::withdraw;
   std::string by;             ///< Who said it, for people; may be empty.
@@ -42,32 +42,32 @@ struct ClosureWord {
     v.field(4, "given_ns", given_ns);
     v.field(5, "by_hand", by_hand, {.at_most = 1});
   }
-  friend bool operator==(const ClosureWord&, const ClosureWord&) = default;
+  friend bool operator==(const ClosureDecision&, const ClosureDecision&) = default;
 };
 
 /// Its closure's sessions, which are not sent, are those of the pair.
-inline ClosureWord with_sessions(ClosureWord word, const SubmapPair& pair) {
-  for (LoopClosure& closure : word.by_hand) {
+inline ClosureDecision with_sessions(ClosureDecision decision, const SubmapPair& pair) {
+  for (LoopClosure& closure : decision.by_hand) {
     closure.from.chain = pair.first.chain;
     closure.to.chain = pair.second.chain;
   }
-  return word;
+  return decision;
 }
 
 /// True if word `a` counts and not `b`, both being on one pair: the later one counts. Words given at the same time are
 /// ordered by their other fields, so that the outcome does not depend on the order of arrival.
-inline bool holds_over(const ClosureWord& a, const ClosureWord& b) {
+inline bool holds_over(const ClosureDecision& a, const ClosureDecision& b) {
   return std::tie(a.given_ns, a.wish, a.by, a.closure) > std::tie(b.given_ns, b.wish, b.by, b.closure);
 }
 
 /// The word that counts for each pair. Withdrawals are kept too, so that an older word which arrives late cannot come
 /// into force again.
-using WordSet = std::map<SubmapPair, ClosureWord>;
+using DecisionSet = std::map<SubmapPair, ClosureDecision>;
 
 /// True if the word that counts for `pair` is `wish`.
-inline bool says(const WordSet& words, const SubmapPair& pair, Wish wish) {
-  const auto found = words.find(pair);
-  return found != words.end() && found->second.wish == wish;
+inline bool says(const DecisionSet& decisions, const SubmapPair& pair, Wish wish) {
+  const auto found = decisions.find(pair);
+  return found != decisions.end() && found->second.wish == wish;
 }
 
 }  // namespace tutti

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/evaluation/keyframe_way.hpp"
+#include "tutti/evaluation/keyframe_trajectory.hpp"
 
 #include <algorithm>
 
 namespace tutti::evaluation {
 
-KeyframeWay::KeyframeWay(std::span<const StampedPose> way, const Trajectory& keyframes) {
+KeyframeTrajectory::KeyframeTrajectory(std::span<const StampedPose> way, const Trajectory& keyframes) {
   std::vector<double> length_m{0.0};  // up to each pose
   for (std::size_t i = 1; i < way.size(); ++i)
     length_m.push_back(length_m.back() + (way[i].pose.translation - way[i - 1].pose.translation).norm());

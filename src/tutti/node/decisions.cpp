@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/node/words.hpp"
+#include "tutti/node/decisions.hpp"
 
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/storage/map_tables.hpp"
@@ -20,25 +20,26 @@ std::optional<SubmapPair> pair_of(std::string_view key) {
   return key == key_of(pair) ? std::optional(pair) : std::nullopt;  // numbers of 32 bits
 }
 
-Result<WordSet> read_words(const storage::TableStore& map, const std::function<void(const std::string&)>& leave) {
-  WordSet words;
+Result<DecisionSet> read_decisions(const storage::TableStore& map,
+                                   const std::function<void(const std::string&)>& leave) {
+  DecisionSet decisions;
   Status ok;
-  const auto scanned = map.scan(map_tables::kWords, {}, [&](std::string_view key, std::string_view bytes) {
+  const auto scanned = map.scan(map_tables::kDecisions, {}, [&](std::string_view key, std::string_view bytes) {
     const auto pair = pair_of(key);
-    auto word = wire::decode_word(bytes);
+    auto decision = wire::decode_decision(bytes);
     if (!pair)
       ok = fail(ErrorCode::parse, "the map's table 'words': a key that is no pair of submaps");
-    else if (!word && word.error().code == ErrorCode::unsupported)
-      leave(word.error().message);
-    else if (!word)
-      ok = in_context("the map's table 'words'", word.error());
+    else if (!decision && decision.error().code == ErrorCode::unsupported)
+      leave(decision.error().message);
+    else if (!decision)
+      ok = in_context("the map's table 'words'", decision.error());
     else
-      words.insert_or_assign(*pair, with_sessions(std::move(*word), *pair));
+      decisions.insert_or_assign(*pair, with_sessions(std::move(*decision), *pair));
     return ok.has_value();
   });
   if (!scanned) return tl::unexpected(scanned.error());
   if (!ok) return tl::unexpected(ok.error());
-  return words;
+  return decisions;
 }
 
 ClosureVerdict without_evidence(ClosureVerdict verdict) {

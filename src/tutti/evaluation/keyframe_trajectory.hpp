@@ -11,10 +11,10 @@ namespace tutti::evaluation {
 /// The length of a trajectory, divided among keyframes on it, so that one can say for what share of the way something
 /// holds. A keyframe stands for the way from half way to the keyframe before it until half way to the one after it; the
 /// first and the last one also stand for all that lies before and after.
-class KeyframeWay {
+class KeyframeTrajectory {
  public:
   /// `way`: all poses of the trajectory; `keyframes`: poses at some of its stamps. Both by increasing stamps.
-  KeyframeWay(std::span<const StampedPose> way, const Trajectory& keyframes);
+  KeyframeTrajectory(std::span<const StampedPose> way, const Trajectory& keyframes);
 
   /// Length of the trajectory, also when there are no keyframes.
   [[nodiscard]] double whole_m() const { return whole_m_; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/node/word_sender.hpp"
+#include "tutti/node/decision_sender.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,14 +13,14 @@
 #include "tutti/storage/memory_store.hpp"
 
 namespace tutti::node {
-namespace word_sender_test {
+namespace decision_sender_test {
 
 using bus::Endpoint;
 
 /// A server with one closure, and whoever says words to it over a bus that loses some.
-class Words : public testing::Test {
+class Decisions : public testing::Test {
  protected:
-  Words() {
+  Decisions() {
     start();
     for (std::uint32_t i = 0; i < 3; ++i)
       for (const bus::Envelope& message :
@@ -42,7 +42,7 @@ class Words : public testing::Test {
   [[nodiscard]] MissionStatus status() const {
     return wire::decode_mission_status(wire::encode(server_->mission_status({}))).value();
   }
-  [[nodiscard]] std::size_t words() const { return server_->map_server().state().words.size(); }
+  [[nodiscard]] std::size_t decisions() const { return server_->map_server().state().decisions.size(); }
 
   const Endpoint kSelf = Endpoint::viewer(9);
   storage::MemoryStore store_{storage::map_schema()};
@@ -50,14 +50,14 @@ class Words : public testing::Test {
   std::unique_ptr<ServerNode> server_;
 };
 
-TEST_F(Words, IsSaidUntilItIsAnswered) {
-  const ClosureWord word{"0/0-0/2", Wish::reject, "ada", 5};
-  WordSender sender(kSelf, word);
+TEST_F(Decisions, IsSaidUntilItIsAnswered) {
+  const ClosureDecision decision{"0/0-0/2", Wish::reject, "ada", 5};
+  DecisionSender sender(kSelf, decision);
   std::set<std::string> ids;
   for (double now_s = 100.0; now_s < 112.0; now_s += 0.5)  // the bus loses each
     if (const auto envelope = sender.due(now_s)) {
       EXPECT_TRUE(ids.insert(envelope->id).second) << envelope->id;
-      EXPECT_EQ(wire::decode_word(*envelope->bytes), word);
+      EXPECT_EQ(wire::decode_decision(*envelope->bytes), decision);
     }
   EXPECT_EQ(ids.size(), 3U);
   EXPECT_EQ(sender.answer(status()), std::nullopt);
@@ -67,16 +67,16 @@ TEST_F(Words, IsSaidUntilItIsAnswered) {
   for (int i = 0; i < 2; ++i) {  // it comes twice
     does(server_->receive(*again, {}));
     EXPECT_EQ(sender.answer(status()), "");
-    EXPECT_EQ(words(), 1U);
+    EXPECT_EQ(decisions(), 1U);
   }
   EXPECT_GT(server_->changes(), changes);  // the status comes at once
   start();                                 // before the answer was heard
   EXPECT_EQ(sender.answer(status()), "");
 }
 
-TEST_F(Words, WhatIsNotTakenIsAnsweredWithTheReason) {
-  const auto answer = [&](const ClosureWord& word) {
-    WordSender sender(kSelf, word);
+TEST_F(Decisions, WhatIsNotTakenIsAnsweredWithTheReason) {
+  const auto answer = [&](const ClosureDecision& decision) {
+    DecisionSender sender(kSelf, decision);
     does(server_->receive(*sender.due(0.0), {}));
     return sender.answer(status()).value_or("not answered");
   };
@@ -84,16 +84,16 @@ TEST_F(Words, WhatIsNotTakenIsAnsweredWithTheReason) {
   EXPECT_EQ(answer({"0/0-0/2", Wish::reject, "ada", 5}), "");
   EXPECT_EQ(answer({"0/0-0/2", Wish::accept, "eve", 4}), "a later decision on it holds");
   EXPECT_EQ(answer({"0/0-0/2", Wish::accept, "eve", 6}), "");
-  EXPECT_EQ(words(), 1U);
+  EXPECT_EQ(decisions(), 1U);
 }
 
-TEST_F(Words, OnlyTheLastAreTold) {
+TEST_F(Decisions, OnlyTheLastAreTold) {
   for (int i = 0; i < 100; ++i)
-    does(server_->receive(*WordSender(kSelf, {"0/0-0/2", Wish::reject, "ada", i}).due(0.0), {}));
-  EXPECT_EQ(status().words.size(), 32U);
-  EXPECT_EQ(WordSender(kSelf, {"0/0-0/2", Wish::reject, "ada", 99}).answer(status()), "");
-  EXPECT_EQ(WordSender(kSelf, {"0/0-0/2", Wish::reject, "ada", 50}).answer(status()), std::nullopt);
+    does(server_->receive(*DecisionSender(kSelf, {"0/0-0/2", Wish::reject, "ada", i}).due(0.0), {}));
+  EXPECT_EQ(status().decisions.size(), 32U);
+  EXPECT_EQ(DecisionSender(kSelf, {"0/0-0/2", Wish::reject, "ada", 99}).answer(status()), "");
+  EXPECT_EQ(DecisionSender(kSelf, {"0/0-0/2", Wish::reject, "ada", 50}).answer(status()), std::nullopt);
 }
 
-}  // namespace word_sender_test
+}  // namespace decision_sender_test
 }  // namespace tutti::node

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/geometry/stretch_covariance.hpp"
+#include "tutti/geometry/segment_covariance.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include "tutti/base/random.hpp"
 
 namespace tutti {
-namespace stretch_covariance_test {
+namespace segment_covariance_test {
 
 struct Chain {
   std::vector<Pose3> poses;
@@ -33,33 +33,33 @@ Chain any_chain(Rng& rng, std::size_t n) {
   return out;
 }
 
-TEST(StretchCovariance, CompoundsStepByStep) {
+TEST(SegmentCovariance, CompoundsStepByStep) {
   Rng rng(3);
   for (const std::size_t n : {1UL, 2UL, 5UL, 16UL, 17UL, 37UL, 290UL}) {
     const Chain chain = any_chain(rng, n);
-    const StretchCovariance stretch(chain.poses, chain.steps);
+    const SegmentCovariance segment(chain.poses, chain.steps);
     for (std::size_t a = 0; a < n; ++a) {
       Matrix6d expected = Matrix6d::Zero();
       for (std::size_t b = a; b < n; ++b) {
         if (b > a)
           expected = compound_covariance(chain.poses[b - 1].inverse() * chain.poses[b], expected, chain.steps[b]);
-        EXPECT_LT((stretch(a, b) - expected).norm(), 1e-9 * (1.0 + expected.norm())) << a << " " << b << " of " << n;
+        EXPECT_LT((segment(a, b) - expected).norm(), 1e-9 * (1.0 + expected.norm())) << a << " " << b << " of " << n;
       }
     }
   }
 }
 
 // Differences of prefix sums are not: a step of 10 m and 0.3 rad kilometres away drowns the millimetres of this one.
-TEST(StretchCovariance, IsPositiveDefiniteBesideStepsThatAreUnknown) {
+TEST(SegmentCovariance, IsPositiveDefiniteBesideStepsThatAreUnknown) {
   Rng rng(4);
   Chain chain = any_chain(rng, 300);
   for (std::size_t k = 0; k < chain.poses.size(); ++k) {
     chain.poses[k].translation.x() += 1000.0 * static_cast<double>(k % 7);
     chain.steps[k] = k % 50 == 0 ? Matrix6d(any_covariance(rng, 10.0)) : Matrix6d(any_covariance(rng, 1e-5));
   }
-  const StretchCovariance stretch(chain.poses, chain.steps);
+  const SegmentCovariance segment(chain.poses, chain.steps);
   for (std::size_t a = 0; a + 1 < chain.poses.size(); ++a) {
-    const Matrix6d C = stretch(a, a + 1);
+    const Matrix6d C = segment(a, a + 1);
     EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix6d>(C).eigenvalues().minCoeff(), 0.0) << a;
     if ((a + 1) % 50 != 0) {
       EXPECT_LT(C.norm(), 1e-7) << a;
@@ -67,5 +67,5 @@ TEST(StretchCovariance, IsPositiveDefiniteBesideStepsThatAreUnknown) {
   }
 }
 
-}  // namespace stretch_covariance_test
+}  // namespace segment_covariance_test
 }  // namespace tutti

@@ -7,22 +7,22 @@
 #include <string>
 
 #include "tutti/bus/envelope.hpp"
-#include "tutti/model/closure_word.hpp"
+#include "tutti/model/closure_decision.hpp"
 #include "tutti/model/status.hpp"
 
 namespace tutti::node {
 
-/// Sends an operator's word to the server until it answers, because a bus whose stream had to be made anew loses what
-/// it had accepted. The server takes repetitions for one word.
-class WordSender {
+/// Sends an operator's decision to the server until it answers, because a bus whose stream had to be made anew loses
+/// what it had accepted. The server takes repetitions for one decision.
+class DecisionSender {
  public:
   static constexpr double kAgain_s = 5.0;
 
-  WordSender(bus::Endpoint self, const ClosureWord& word);
+  DecisionSender(bus::Endpoint self, const ClosureDecision& decision);
   /// The message to be sent at this time, in seconds of any clock: at once, and then every kAgain_s. Each has an id of
   /// its own, because the bus does not pass on an id twice.
   std::optional<bus::Envelope> due(double now_s);
-  /// The server's answer: why the word is not stored, or empty when it is. Nothing while there is no answer.
+  /// The server's answer: why the decision is not stored, or empty when it is. Nothing while there is no answer.
   [[nodiscard]] std::optional<std::string> answer(const MissionStatus& status) const;
 
  private:

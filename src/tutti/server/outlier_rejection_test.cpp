@@ -12,7 +12,7 @@
 #include "tutti/server/map_estimate.hpp"
 
 namespace tutti::server {
-namespace who_is_wrong_test {
+namespace outlier_rejection_test {
 
 using test::corridor_run;
 using test::CorridorRun;
@@ -33,7 +33,7 @@ double seconds_of(const MapEstimate& map, RobotId robot, std::uint32_t index) {
   return at->stamp - Timestamp{1'000'000'000};
 }
 
-TEST(WhoIsWrong, ThirtyPercentWrongClosuresCostLittle) {
+TEST(OutlierRejection, ThirtyPercentWrongClosuresCostLittle) {
   for (std::uint64_t seed = 1; seed <= tutti::seeds(4U); ++seed) {
     CorridorRunConfig config;
     const CorridorRun right = corridor_run(config, seed);
@@ -46,7 +46,7 @@ TEST(WhoIsWrong, ThirtyPercentWrongClosuresCostLittle) {
   }
 }
 
-TEST(WhoIsWrong, FailedOdometryIsRepairedAmongWrongClosures) {
+TEST(OutlierRejection, FailedOdometryIsRepairedAmongWrongClosures) {
   for (const double wrong_share : {0.0, 0.1, 0.3})
     for (std::uint64_t seed = 1; seed <= tutti::seeds(2U); ++seed) {
       CorridorRunConfig config;
@@ -67,7 +67,7 @@ TEST(WhoIsWrong, FailedOdometryIsRepairedAmongWrongClosures) {
     }
 }
 
-TEST(WhoIsWrong, FailedOdometryWithoutClosuresAroundIsRepaired) {
+TEST(OutlierRejection, FailedOdometryWithoutClosuresAroundIsRepaired) {
   for (std::uint64_t seed = 1; seed <= tutti::seeds(3U); ++seed) {
     CorridorRunConfig config;
     config.closures.wrong_share = 0.1;
@@ -78,7 +78,7 @@ TEST(WhoIsWrong, FailedOdometryWithoutClosuresAroundIsRepaired) {
   }
 }
 
-TEST(WhoIsWrong, SeveralFailuresAreRepaired) {
+TEST(OutlierRejection, SeveralFailuresAreRepaired) {
   for (std::uint64_t seed = 1; seed <= tutti::seeds(2U); ++seed) {
     CorridorRunConfig config;
     config.closures.wrong_share = 0.1;
@@ -94,7 +94,7 @@ TEST(WhoIsWrong, SeveralFailuresAreRepaired) {
   }
 }
 
-TEST(WhoIsWrong, ASlipIsFoundNearItsStep) {
+TEST(OutlierRejection, ASlipIsFoundNearItsStep) {
   for (std::uint64_t seed = 1; seed <= tutti::seeds(3U); ++seed) {
     CorridorRunConfig config;
     config.keyframe_m = 0.2;
@@ -114,7 +114,7 @@ TEST(WhoIsWrong, ASlipIsFoundNearItsStep) {
 
 // Odometry that turns 0.02 degrees a metre wrongly and says a sixth of that: by its word nearly all right closures are
 // inconsistent with it and with each other.
-TEST(WhoIsWrong, OdometryThatSaysTooLittleOfItsErrorsCostsNoClosures) {
+TEST(OutlierRejection, OdometryThatSaysTooLittleOfItsErrorsCostsNoClosures) {
   for (std::uint64_t seed = 1; seed <= tutti::seeds(3U); ++seed) {
     CorridorRunConfig config;
     config.odometry.yaw_drift_deg_per_m = 0.02;
@@ -137,7 +137,7 @@ Failure climb(double from_s, double until_s) {
   return out;
 }
 
-TEST(WhoIsWrong, AFailureLittleByLittleIsFoundWhereItHappened) {
+TEST(OutlierRejection, AFailureLittleByLittleIsFoundWhereItHappened) {
   for (std::uint64_t seed = 1; seed <= tutti::seeds(3U); ++seed) {
     CorridorRunConfig config;
     config.closures.wrong_share = 0.1;
@@ -158,7 +158,7 @@ TEST(WhoIsWrong, AFailureLittleByLittleIsFoundWhereItHappened) {
   }
 }
 
-TEST(WhoIsWrong, AFailureWhereNoClosureWasIsFoundWhereItMustHaveBeen) {
+TEST(OutlierRejection, AFailureWhereNoClosureWasIsFoundWhereItMustHaveBeen) {
   std::vector<double> off_s;
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     CorridorRunConfig config;
@@ -179,7 +179,7 @@ TEST(WhoIsWrong, AFailureWhereNoClosureWasIsFoundWhereItMustHaveBeen) {
   EXPECT_LT(off_s.back(), 16.0);
 }
 
-TEST(WhoIsWrong, AFailureThatNothingContradictsDoesNoHarm) {
+TEST(OutlierRejection, AFailureThatNothingContradictsDoesNoHarm) {
   CorridorRunConfig config;
   config.closures.wrong_share = 0.1;
   const CorridorRun intact = corridor_run(config, 2);
@@ -191,7 +191,7 @@ TEST(WhoIsWrong, AFailureThatNothingContradictsDoesNoHarm) {
   EXPECT_LT(rmse(run, map, RobotId{1}), 1.1 * rmse(intact, judge(intact), RobotId{1}));
 }
 
-TEST(WhoIsWrong, CorridorsThatLookAlikeBlameNothing) {
+TEST(OutlierRejection, CorridorsThatLookAlikeBlameNothing) {
   for (const double length_s : {30.0, 60.0})
     for (const double second_from_s : {230.0, 400.0 - length_s})
       for (const std::uint32_t robots : {1U, 2U}) {
@@ -209,7 +209,7 @@ TEST(WhoIsWrong, CorridorsThatLookAlikeBlameNothing) {
       }
 }
 
-TEST(WhoIsWrong, BothSidesOfAMissingSubmapAreJudged) {
+TEST(OutlierRejection, BothSidesOfAMissingSubmapAreJudged) {
   CorridorRunConfig config;
   config.closures.wrong_share = 0.3;
   CorridorRun run = corridor_run(config, 3);
@@ -230,7 +230,7 @@ TEST(WhoIsWrong, BothSidesOfAMissingSubmapAreJudged) {
   EXPECT_EQ(accepted_wrong(run, map), 0U);
 }
 
-TEST(WhoIsWrong, TheProxyGraphIsAsSureOfARepairAsTheClosures) {
+TEST(OutlierRejection, TheProxyGraphIsAsSureOfARepairAsTheClosures) {
   CorridorRunConfig config;
   config.failures = {failure(0, 165, 195, -1.5, 1.0, -15)};
   config.blind = {failure(0, 150, 210, 0, 0, 0)};
@@ -252,5 +252,5 @@ TEST(WhoIsWrong, TheProxyGraphIsAsSureOfARepairAsTheClosures) {
   EXPECT_GT(std::sqrt(sum(5, 5)), 0.01 * kRadPerDeg);
 }
 
-}  // namespace who_is_wrong_test
+}  // namespace outlier_rejection_test
 }  // namespace tutti::server

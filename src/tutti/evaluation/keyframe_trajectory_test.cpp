@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/evaluation/keyframe_way.hpp"
+#include "tutti/evaluation/keyframe_trajectory.hpp"
 
 #include <gtest/gtest.h>
 
 namespace tutti::evaluation {
-namespace keyframe_way_test {
+namespace keyframe_trajectory_test {
 
 /// A pose a second, each a metre on.
 Trajectory line(int first, int last, int step = 1) {
@@ -14,14 +14,14 @@ Trajectory line(int first, int last, int step = 1) {
   return out;
 }
 
-TEST(KeyframeWay, KeyframesTogetherStandForTheWholeWay) {
+TEST(KeyframeTrajectory, KeyframesTogetherStandForTheWholeWay) {
   const Trajectory way = line(0, 100);
   for (const Trajectory& keyframes : {way, line(3, 93, 10), line(40, 40)})
-    EXPECT_DOUBLE_EQ(KeyframeWay(way, keyframes).part_m(keyframes), 100.0);
+    EXPECT_DOUBLE_EQ(KeyframeTrajectory(way, keyframes).part_m(keyframes), 100.0);
 }
 
-TEST(KeyframeWay, APieceStandsForItsWayToHalfWayBeyond) {
-  const KeyframeWay way(line(0, 100), line(0, 100, 10));
+TEST(KeyframeTrajectory, APieceStandsForItsWayToHalfWayBeyond) {
+  const KeyframeTrajectory way(line(0, 100), line(0, 100, 10));
   EXPECT_DOUBLE_EQ(way.part_m(line(30, 50, 10)), 30.0);
   EXPECT_DOUBLE_EQ(way.part_m(line(90, 100, 10)), 15.0);
   EXPECT_DOUBLE_EQ(way.part_m(line(0, 20, 20)), 15.0);    // without the one between them
@@ -29,19 +29,19 @@ TEST(KeyframeWay, APieceStandsForItsWayToHalfWayBeyond) {
   EXPECT_DOUBLE_EQ(way.part_m(line(30, 140, 10)), 75.0);  // and more than there are
 }
 
-TEST(KeyframeWay, StandingStillCountsNothing) {
+TEST(KeyframeTrajectory, StandingStillCountsNothing) {
   Trajectory way = line(0, 50);
   for (int i = 0; i < 50; ++i) way.push_back({Timestamp{} + 51.0 + i, way.back().pose});
-  const KeyframeWay shared(way, way);
+  const KeyframeTrajectory shared(way, way);
   EXPECT_DOUBLE_EQ(shared.part_m(line(0, 50)), 50.0);
   EXPECT_DOUBLE_EQ(shared.part_m(line(51, 100)), 0.0);
 }
 
-TEST(KeyframeWay, NothingToShareOut) {
-  EXPECT_EQ(KeyframeWay({}, line(0, 5)).part_m(line(0, 5)), 0.0);
-  EXPECT_EQ(KeyframeWay(line(0, 5), {}).part_m(line(0, 5)), 0.0);
-  EXPECT_EQ(KeyframeWay(line(0, 5), {}).whole_m(), 5.0);
+TEST(KeyframeTrajectory, NothingToShareOut) {
+  EXPECT_EQ(KeyframeTrajectory({}, line(0, 5)).part_m(line(0, 5)), 0.0);
+  EXPECT_EQ(KeyframeTrajectory(line(0, 5), {}).part_m(line(0, 5)), 0.0);
+  EXPECT_EQ(KeyframeTrajectory(line(0, 5), {}).whole_m(), 5.0);
 }
 
-}  // namespace keyframe_way_test
+}  // namespace keyframe_trajectory_test
 }  // namespace tutti::evaluation

@@ -12,7 +12,7 @@ namespace tutti::evaluation {
 /// least `delta_s` later (left out where it is later than (1 + kMaxOvershoot) delta_s, a gap): with R the raw and C the
 /// corrected estimate, R_ij = R_i^-1 R_j and C_ij likewise, the largest |t(C_ij) - t(R_ij)| and the largest angle of
 /// rot(R_ij)^T rot(C_ij).
-struct Kink {
+struct Discontinuity {
   double translation_m = 0.0;
   double rotation_deg = 0.0;
   Timestamp translation_at;  ///< Stamp of pose i of the pair with the largest change.
@@ -20,6 +20,6 @@ struct Kink {
 };
 
 /// Compares the poses of equal stamps; delta_s > 0. No value with fewer than two stamps in common.
-std::optional<Kink> kink(const Trajectory& raw, const Trajectory& corrected, double delta_s = 1.0);
+std::optional<Discontinuity> discontinuity(const Trajectory& raw, const Trajectory& corrected, double delta_s = 1.0);
 
 }  // namespace tutti::evaluation

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// An operator's word on closures stands above what the server finds.
+// An operator's decision on closures stands above what the server finds.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 #include "tutti/server/map_server.hpp"
 
 namespace tutti::server {
-namespace closure_words_test {
+namespace closure_decisions_test {
 
 using test::TestFinder;
 
@@ -30,7 +30,7 @@ Inputs make_inputs(const TestFinder& finder, std::uint64_t seed) {
   return in;
 }
 
-ClosureWord word(Wish wish, std::int64_t given_ns = 1) { return {"a/1-b/2", wish, "ada", given_ns}; }
+ClosureDecision decision(Wish wish, std::int64_t given_ns = 1) { return {"a/1-b/2", wish, "ada", given_ns}; }
 
 const JudgedClosure& judged(const MapEstimate& map, const LoopClosure& closure) {
   return *std::ranges::find_if(map.closures, [&](const JudgedClosure& j) {
@@ -51,7 +51,7 @@ std::size_t accepted(const MapEstimate& map) {
   return static_cast<std::size_t>(std::ranges::count_if(map.closures, &JudgedClosure::accepted));
 }
 
-TEST(ClosureWords, ARejectedClosureIsAsIfItHadNotBeenFound) {
+TEST(ClosureDecisions, ARejectedClosureIsAsIfItHadNotBeenFound) {
   const Inputs in = make_inputs(TestFinder(2), 2);
   const MapEstimate plain = estimate_map(in.submaps, in.verdicts, {});
   for (const auto& [pair, verdict] : in.verdicts) {
@@ -60,20 +60,20 @@ TEST(ClosureWords, ARejectedClosureIsAsIfItHadNotBeenFound) {
     VerdictSet without = in.verdicts;
     without.erase(pair);
     const MapEstimate expected = estimate_map(in.submaps, without, {});
-    const MapEstimate map = estimate_map(in.submaps, in.verdicts, {}, {{pair, word(Wish::reject)}});
+    const MapEstimate map = estimate_map(in.submaps, in.verdicts, {}, {{pair, decision(Wish::reject)}});
     EXPECT_EQ(map.graph.poses, expected.graph.poses);
     EXPECT_EQ(map.graph.edges.size(), expected.graph.edges.size());
     EXPECT_EQ(map.closures.size(), plain.closures.size());
     EXPECT_FALSE(judged(map, closure).accepted);
     EXPECT_TRUE(judged(map, closure).by_operator);
     EXPECT_EQ(judged(map, closure).objection, judge::Objection::operators);
-    const MapEstimate again = estimate_map(in.submaps, in.verdicts, {}, {{pair, word(Wish::withdraw)}});
+    const MapEstimate again = estimate_map(in.submaps, in.verdicts, {}, {{pair, decision(Wish::withdraw)}});
     EXPECT_EQ(again.graph.poses, plain.graph.poses);
     EXPECT_FALSE(judged(again, closure).by_operator);
   }
 }
 
-TEST(ClosureWords, AnAcceptedClosureIsInTheMapWhateverItContradicts) {
+TEST(ClosureDecisions, AnAcceptedClosureIsInTheMapWhateverItContradicts) {
   std::size_t wrong = 0;
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     const Inputs in = make_inputs(TestFinder(seed, 4), seed);
@@ -85,7 +85,7 @@ TEST(ClosureWords, AnAcceptedClosureIsInTheMapWhateverItContradicts) {
       EXPECT_FALSE(judged(plain, closure).accepted);
       EXPECT_NE(judged(plain, closure).objection, judge::Objection::none);
       EXPECT_STRNE(to_string(judged(plain, closure).objection), "");
-      const MapEstimate map = estimate_map(in.submaps, in.verdicts, {}, {{pair, word(Wish::accept)}});
+      const MapEstimate map = estimate_map(in.submaps, in.verdicts, {}, {{pair, decision(Wish::accept)}});
       EXPECT_TRUE(map.converged);
       EXPECT_TRUE(judged(map, closure).accepted && judged(map, closure).by_operator);
       EXPECT_EQ(judged(map, closure).objection, judge::Objection::none);
@@ -95,12 +95,12 @@ TEST(ClosureWords, AnAcceptedClosureIsInTheMapWhateverItContradicts) {
   EXPECT_GT(wrong, 5U);
 }
 
-TEST(ClosureWords, AnAcceptedClosureKeepsItsCovarianceAndNothingElseOfTheMapChanges) {
+TEST(ClosureDecisions, AnAcceptedClosureKeepsItsCovarianceAndNothingElseOfTheMapChanges) {
   const Inputs in = make_inputs(TestFinder(4), 4);
   const MapEstimate plain = estimate_map(in.submaps, in.verdicts, {});
-  WordSet words;
-  for (const auto& [pair, verdict] : in.verdicts) words[pair] = word(Wish::accept);
-  const MapEstimate map = estimate_map(in.submaps, in.verdicts, {}, words);
+  DecisionSet decisions;
+  for (const auto& [pair, verdict] : in.verdicts) decisions[pair] = decision(Wish::accept);
+  const MapEstimate map = estimate_map(in.submaps, in.verdicts, {}, decisions);
   EXPECT_EQ(accepted(map), map.closures.size());
   std::size_t compared = 0;
   for (const JudgedClosure& closure : plain.closures) {
@@ -115,7 +115,7 @@ TEST(ClosureWords, AnAcceptedClosureKeepsItsCovarianceAndNothingElseOfTheMapChan
     EXPECT_LT(local(plain.nodes[i].T_world_body, map.nodes[i].T_world_body).norm(), 0.05) << i;
 }
 
-TEST(ClosureWords, OneAcceptedClosureJoinsTwoRobots) {
+TEST(ClosureDecisions, OneAcceptedClosureJoinsTwoRobots) {
   const Inputs in = make_inputs(TestFinder(3), 3);
   const auto inter = std::ranges::find_if(
       in.verdicts, [](const auto& entry) { return entry.first.first.chain != entry.first.second.chain; });
@@ -123,21 +123,21 @@ TEST(ClosureWords, OneAcceptedClosureJoinsTwoRobots) {
   const MapEstimate apart = estimate_map(in.submaps, one, {});
   EXPECT_EQ(apart.components, 2U);
   EXPECT_EQ(apart.closures.front().objection, judge::Objection::too_few);
-  EXPECT_EQ(estimate_map(in.submaps, one, {}, {{inter->first, word(Wish::accept)}}).components, 1U);
+  EXPECT_EQ(estimate_map(in.submaps, one, {}, {{inter->first, decision(Wish::accept)}}).components, 1U);
 }
 
-TEST(ClosureWords, AClosureAddedByHandJoinsTwoRobotsAndIsGoneWhenItIsWithdrawn) {
+TEST(ClosureDecisions, AClosureAddedByHandJoinsTwoRobotsAndIsGoneWhenItIsWithdrawn) {
   const Inputs in = make_inputs(TestFinder(3), 3);
   const auto inter = std::ranges::find_if(
       in.verdicts, [](const auto& entry) { return entry.first.first.chain != entry.first.second.chain; });
-  ClosureWord added = word(Wish::accept);
+  ClosureDecision added = decision(Wish::accept);
   added.by_hand = inter->second.closures;
   const MapEstimate joined = estimate_map(in.submaps, {}, {}, {{inter->first, added}});
   EXPECT_EQ(joined.components, 1U);
   ASSERT_EQ(joined.closures.size(), 1U);
   EXPECT_TRUE(joined.closures.front().accepted && joined.closures.front().by_operator);
   EXPECT_EQ(joined.graph.poses,
-            estimate_map(in.submaps, VerdictSet{*inter}, {}, {{inter->first, word(Wish::accept)}}).graph.poses)
+            estimate_map(in.submaps, VerdictSet{*inter}, {}, {{inter->first, decision(Wish::accept)}}).graph.poses)
       << "as one that was found";
   for (const Wish wish : {Wish::reject, Wish::withdraw}) {
     added.wish = wish;
@@ -186,32 +186,33 @@ class WordsToAServer : public testing::Test {
 
 TEST_F(WordsToAServer, TheMapFollowsAtTheNextUpdate) {
   EXPECT_FALSE(server_.has_news());
-  ASSERT_TRUE(server_.receive(pair_, word(Wish::accept)).has_value());
+  ASSERT_TRUE(server_.receive(pair_, decision(Wish::accept)).has_value());
   EXPECT_TRUE(server_.has_news());
   server_.optimise();
   EXPECT_TRUE(judged(server_.map(), refused_).accepted);
-  ASSERT_TRUE(server_.receive(pair_, word(Wish::accept)).has_value());  // again
+  ASSERT_TRUE(server_.receive(pair_, decision(Wish::accept)).has_value());  // again
   EXPECT_FALSE(server_.has_news());
-  ASSERT_TRUE(server_.receive(pair_, word(Wish::withdraw, 2)).has_value());
+  ASSERT_TRUE(server_.receive(pair_, decision(Wish::withdraw, 2)).has_value());
   EXPECT_TRUE(server_.has_news());
   server_.optimise();
   EXPECT_FALSE(judged(server_.map(), refused_).accepted);
 }
 
 TEST_F(WordsToAServer, TheLaterWordHoldsInWhateverOrderTheyCome) {
-  std::vector<ClosureWord> words{word(Wish::accept, 3), word(Wish::reject, 2), word(Wish::withdraw, 1)};
-  std::ranges::sort(words, {}, &ClosureWord::given_ns);
+  std::vector<ClosureDecision> decisions{decision(Wish::accept, 3), decision(Wish::reject, 2),
+                                         decision(Wish::withdraw, 1)};
+  std::ranges::sort(decisions, {}, &ClosureDecision::given_ns);
   do {
     MapServer server = make(finder_, server_.state());
-    for (const ClosureWord& one : words) ASSERT_TRUE(server.receive(pair_, one).has_value());
-    EXPECT_EQ(server.state().words.at(pair_), word(Wish::accept, 3));
+    for (const ClosureDecision& one : decisions) ASSERT_TRUE(server.receive(pair_, one).has_value());
+    EXPECT_EQ(server.state().decisions.at(pair_), decision(Wish::accept, 3));
     server.optimise();
     EXPECT_TRUE(judged(server.map(), refused_).accepted);
-  } while (std::ranges::next_permutation(words, {}, &ClosureWord::given_ns).found);
+  } while (std::ranges::next_permutation(decisions, {}, &ClosureDecision::given_ns).found);
 }
 
 TEST_F(WordsToAServer, WhatIsAcceptedStaysWhateverOtherFindersSay) {
-  ASSERT_TRUE(server_.receive(pair_, word(Wish::accept)).has_value());
+  ASSERT_TRUE(server_.receive(pair_, decision(Wish::accept)).has_value());
   const auto other = std::make_shared<Other>();
   MapServer server = make(other, server_.state());
   const auto jobs = server.take_jobs();
@@ -226,7 +227,7 @@ TEST_F(WordsToAServer, WhatIsAcceptedStaysWhateverOtherFindersSay) {
   EXPECT_TRUE(server.map().closures.front().accepted);
   EXPECT_EQ(server.map().closures.front().closure, refused_);
 
-  ASSERT_TRUE(server.receive(pair_, word(Wish::withdraw, 2)).has_value());
+  ASSERT_TRUE(server.receive(pair_, decision(Wish::withdraw, 2)).has_value());
   const auto asked = server.take_jobs();  // which it was not, of this finder
   ASSERT_EQ(asked.size(), 1U);
   EXPECT_EQ(asked.front().pair, pair_);
@@ -241,10 +242,10 @@ TEST_F(WordsToAServer, WhatCannotBeMeantIsRefused) {
   const SubmapPair unknown{pair_.first, {RobotId{1}, 999}}, turned{pair_.second, pair_.first};
   const SubmapPair apart{{RobotId{0}, 0}, {RobotId{0}, 1}};  // neighbours are not asked for
   for (const SubmapPair& pair : {unknown, turned, apart})
-    EXPECT_FALSE(server_.receive(pair, word(Wish::accept)).has_value());
-  EXPECT_EQ(server_.state().words, before.words);
+    EXPECT_FALSE(server_.receive(pair, decision(Wish::accept)).has_value());
+  EXPECT_EQ(server_.state().decisions, before.decisions);
   EXPECT_FALSE(server_.has_news());
-  EXPECT_TRUE(server_.receive(apart, word(Wish::reject)).has_value());  // should one ever be found
+  EXPECT_TRUE(server_.receive(apart, decision(Wish::reject)).has_value());  // should one ever be found
   EXPECT_FALSE(server_.has_news());
 }
 
@@ -252,14 +253,14 @@ TEST_F(WordsToAServer, AClosureAddedByHandNeedsNoOtherAndIsBetweenKeyframesOfIts
   const SubmapSet submaps = server_.state().submaps;
   const SubmapPair between{submaps.begin()->first, std::prev(submaps.end())->first};
   const std::uint32_t last = std::prev(submaps.end())->second->keyframes.back().index;
-  ClosureWord added = word(Wish::accept, 10);
+  ClosureDecision added = decision(Wish::accept, 10);
   added.by_hand.push_back({});
   added.by_hand.front().from.index = submaps.begin()->second->keyframes.front().index;
   added.by_hand.front().to.index = last;
   added.by_hand.front().measurement.covariance = Matrix6d::Identity();
   ASSERT_TRUE(server_.receive(between, added).has_value());
   EXPECT_TRUE(server_.has_news());
-  EXPECT_EQ(server_.state().words.at(between).by_hand.front().to.chain, between.second.chain)
+  EXPECT_EQ(server_.state().decisions.at(between).by_hand.front().to.chain, between.second.chain)
       << "sessions are those of the pair";
   added.given_ns = 11;
   added.by_hand.front().to.index = last + 1;
@@ -268,5 +269,5 @@ TEST_F(WordsToAServer, AClosureAddedByHandNeedsNoOtherAndIsBetweenKeyframesOfIts
   EXPECT_NE(beyond.error().message.find("keyframes"), std::string::npos) << beyond.error().message;
 }
 
-}  // namespace closure_words_test
+}  // namespace closure_decisions_test
 }  // namespace tutti::server

@@ -14,12 +14,12 @@ namespace tutti {
 /// definite when the steps' are, however long the chain and however unequal its steps. n poses take 3.2 n matrices and
 /// time in proportion; a query adds at most 16 matrices, and two for every factor of 16 between its poses: sums within
 /// blocks of 16 poses, within blocks of 16 such blocks, and so on.
-class StretchCovariance {
+class SegmentCovariance {
  public:
-  StretchCovariance() = default;
+  SegmentCovariance() = default;
   /// `poses`: T_w_k in any one frame w, k = 0 .. n - 1. `steps[k]`: covariance of T_{k-1}^-1 T_k (right tangent);
   /// steps[0] is not used, but both spans have one size (checked).
-  StretchCovariance(std::span<const Pose3> poses, std::span<const Matrix6d> steps);
+  SegmentCovariance(std::span<const Pose3> poses, std::span<const Matrix6d> steps);
 
   [[nodiscard]] std::size_t size() const { return poses_.size(); }
   /// Covariance of T_a_b = T_w_a^-1 T_w_b (right tangent, first order), a <= b < size(); zero for a == b.

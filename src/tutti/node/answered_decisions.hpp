@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tutti/model/status.hpp"
+
+namespace tutti::node {
+
+/// The operators' decisions that the server answered last, as MissionStatus::words tells them.
+class AnsweredDecisions {
+ public:
+  /// Notes the answer to a decision: `frame` is the message as it came, `why` says why the decision is not stored
+  /// (empty: it is).
+  void note(const std::string& frame, const std::string& why);
+  [[nodiscard]] const std::vector<MissionStatus::Decision>& all() const { return decisions_; }
+
+ private:
+  std::vector<MissionStatus::Decision> decisions_;
+};
+
+}  // namespace tutti::node

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What operators say to the server of closures.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "tutti/base/plain_text.hpp"
+#include "tutti/node/decisions.hpp"
+#include "tutti/node/server_node.hpp"
+#include "tutti/storage/map_tables.hpp"
+#include "tutti/wire/codec.hpp"
+
+namespace tutti::node {
+namespace {
+
+constexpr std::size_t kLongestName = 64;  // of `tutti pki`
+
+}  // namespace
+
+/// An operator's decision is not a robot's or a worker's to give.
+void ServerNode::receive_decision(const bus::Envelope& envelope, Timestamp now, Step& step) {
+  if (envelope.from.role != bus::Endpoint::Role::viewer)
+    return refuse(
+        envelope,
+        fmt::format("a decision on closures from a {}, which only operators may make", name(envelope.from.role)), now,
+        step);
+  auto decision = wire::decode_decision(*envelope.bytes);
+  if (!decision) return refuse(envelope, decision.error().message, now, step);
+  if (!envelope.user.empty()) decision->by = plain_text(envelope.user, kLongestName);  // whatever it claims
+  const auto is_late = take_decision(envelope, *decision, now, step);
+  if (!is_late) refuse(envelope, is_late.error().message, now, step);
+  note_decision(*envelope.bytes, !is_late ? is_late.error().message : *is_late ? "a later decision on it holds" : "");
+}
+
+Result<bool> ServerNode::take_decision(const bus::Envelope& envelope, const ClosureDecision& decision, Timestamp now,
+                                       Step& step) {
+  const auto pair = closure_names().find(decision.closure);
+  if (!pair) return tl::unexpected(pair.error());
+  const DecisionSet& decisions = server_.state().decisions;
+  const auto known = decisions.find(*pair);
+  const auto before = known == decisions.end() ? std::nullopt : std::optional(known->second);
+  if (auto taken = server_.receive(*pair, decision); !taken) return tl::unexpected(taken.error());
+  if (before == decisions.at(*pair)) return before != decision;
+  step.writes.push_back(
+      {map_tables::kDecisions, key_of(*pair), envelope.user.empty() ? *envelope.bytes : wire::encode(decision)});
+  step.tell(now, DecisionTaken{*pair, decision.wish});
+  operator_decided_ = true;
+  send_jobs(std::nullopt, now, 0, config_.pairs_per_job, step);
+  return false;
+}
+
+void ServerNode::note_decision(const std::string& frame, const std::string& why) {
+  decisions_.note(frame, why);
+  ++changes_;
+}
+
+void ServerNode::recall_decisions() {
+  std::vector<ClosureDecision> given;
+  for (const auto& [pair, decision] : server_.state().decisions) given.push_back(decision);
+  std::ranges::sort(given, {}, &ClosureDecision::given_ns);
+  for (const ClosureDecision& decision : given) note_decision(wire::encode(decision), {});
+}
+
+std::map<RobotId, std::string> ServerNode::robot_names() const {
+  std::map<RobotId, std::string> names;
+  for (const auto& [robot, entry] : registry_.robots())
+    if (entry.is_claimed) names[robot] = entry.status.name;
+  return names;
+}
+
+server::ClosureNames ServerNode::closure_names() const {
+  std::set<ChainId> chains;
+  for (const auto& [id, submap] : server_.state().submaps) chains.insert(chains.end(), id.chain);
+  return {robot_names(), chains};
+}
+
+}  // namespace tutti::node
