@@ -28,6 +28,8 @@ class AnsweredPairs {
   /// as they are.
   void insert_all_but(SubmapId id, std::span<const SubmapId> open);
   [[nodiscard]] bool contains(const SubmapPair& pair) const;
+  /// True if it has any pair of this submap with one that came before it.
+  [[nodiscard]] bool has_any(SubmapId id) const { return !answered_[number_.at(id)].intervals().empty(); }
   /// The pairs of this submap with those that came before it that are not in the set, smaller submap first, in order of
   /// their arrival. Takes time in proportion to these pairs.
   [[nodiscard]] std::vector<SubmapPair> open(SubmapId id) const;
