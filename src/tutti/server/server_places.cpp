@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Which pairs a MapServer has verified, by what the places of submaps look like.
 #include <algorithm>
+#include <memory>
 #include <string_view>
 #include <vector>
 
@@ -9,15 +10,42 @@
 
 namespace tutti::server {
 
+namespace {
+
+/// Calls take(submap) of those that are wanted and that the finder would compare with this one, in the order of
+/// their ids. It does not look up anew for each pair what all share: in a large fleet these are hundreds of millions.
+template <class IsWanted, class Take>
+void for_each_comparable(const MapServerState& state, const ClosureFinder& finder, SubmapId id,
+                         const IsWanted& is_wanted, const Take& take) {
+  const auto own = state.submaps.find(id);
+  auto sized = state.payload_sizes.find(id);
+  const PayloadSize own_size = sized == state.payload_sizes.end() ? PayloadSize() : sized->second;
+  sized = state.payload_sizes.begin();
+  for (auto other = state.submaps.begin(); other != state.submaps.end(); ++other) {
+    if (other == own || !is_wanted(other->first)) continue;
+    while (sized != state.payload_sizes.end() && sized->first < other->first) ++sized;
+    const bool has_size = sized != state.payload_sizes.end() && sized->first == other->first;
+    const PayloadSize other_size = has_size ? sized->second : PayloadSize();
+    const bool is_first = id < other->first;
+    const auto &first = is_first ? *own : *other, &second = is_first ? *other : *own;
+    if (finder.can_compare(is_first ? own_size : other_size, is_first ? other_size : own_size) &&
+        finder.is_candidate(*first.second, *second.second))
+      take(*other);
+  }
+}
+
+}  // namespace
+
 void MapServer::compare_place(SubmapId id) {
   Place& place = state_.places.at(id);
   std::vector<SubmapId> others;
   std::vector<std::string_view> looks;
-  for (const auto& [other, known] : state_.places)
-    if (candidates_.has(other) && is_asked(ordered(id, other))) {
-      others.push_back(other);
-      looks.push_back(known.looks);
-    }
+  for_each_comparable(
+      state_, *finder_, id, [&](SubmapId other) { return candidates_.has(other); },
+      [&](const auto& other) {
+        others.push_back(other.first);
+        looks.push_back(state_.places.at(other.first).looks);
+      });
   std::vector<Alike> alike;
   for (const auto& [other, value, sensor] : finder_->likeness(place.looks, looks)) {
     TUTTI_CHECK(other < others.size() && sensor < ClosureFinder::kMostSensors, "place {} of {} compared by sensor {}",
@@ -43,30 +71,22 @@ void MapServer::plan_open_verifications() {
   std::ranges::sort(jobs_, {}, &VerificationJob::pair);
 }
 
-/// As plan_verification() of every pair of the newest submap, without looking up in each of them what all share: in a
-/// large fleet these are hundreds of millions.
+/// As plan_verification() of every pair of the newest submap.
 void MapServer::plan_verifications(SubmapId id) {
-  const auto own = state_.submaps.find(id);
-  const PayloadSize own_size = size_of(id);
   const bool any_answered = state_.answered.has_any(id);  // verdicts may have come before it
-  std::vector<SubmapId> open;
-  auto sized = state_.payload_sizes.begin();
-  for (auto other = state_.submaps.begin(); other != state_.submaps.end(); ++other) {
-    const SubmapPair pair = ordered(id, other->first);
-    if (other == own || candidates_.excludes(pair)) continue;
+  const std::shared_ptr<const Submap>& own = state_.submaps.at(id);
+  const auto is_open = [&](SubmapId other) {
+    const SubmapPair pair = ordered(id, other);
+    if (candidates_.excludes(pair)) return false;
     ++work_.pairs_looked_at;
-    while (sized != state_.payload_sizes.end() && sized->first < other->first) ++sized;
-    const bool has_size = sized != state_.payload_sizes.end() && sized->first == other->first;
-    const PayloadSize other_size = has_size ? sized->second : PayloadSize();
-    if (any_answered && is_answered(pair)) continue;
-    const bool is_first = pair.first == id;
-    const auto &first = is_first ? *own : *other, &second = is_first ? *other : *own;
-    if (!finder_->can_compare(is_first ? own_size : other_size, is_first ? other_size : own_size) ||
-        !finder_->is_candidate(*first.second, *second.second))
-      continue;
-    jobs_.push_back({pair, first.second, second.second});
-    open.push_back(other->first);
-  }
+    return !any_answered || !is_answered(pair);
+  };
+  std::vector<SubmapId> open;
+  for_each_comparable(state_, *finder_, id, is_open, [&](const auto& other) {
+    const bool is_first = id < other.first;
+    jobs_.push_back({ordered(id, other.first), is_first ? own : other.second, is_first ? other.second : own});
+    open.push_back(other.first);
+  });
   state_.answered.insert_all_but(id, open);
 }
 

@@ -9,14 +9,21 @@
 
 #include "tutti/program/page/view.hpp"
 #include "tutti/server/map_components.hpp"
+#include "tutti/server/map_server.hpp"
 
 namespace tutti::page {
 namespace {
 
 constexpr double kNoUpdate_s = 300.0;       // a robot that is heard, and does not use the map
+constexpr double kNoUpdate_pauses = 3.0;    // or so many pauses between updates, of a large map
 constexpr std::uint64_t kLongBacklog = 30;  // submaps, five minutes of mapping
 constexpr double kLowBattery_percent = 20.0;
 constexpr std::uint64_t kManyWaitingJobs = 200;
+
+double longest_without_update_s(const MissionStatus& status) {
+  const double pause_s = server::ServerConfig{}.update_pause_per_submap_s * static_cast<double>(status.submaps);
+  return std::max(kNoUpdate_s, kNoUpdate_pauses * pause_s);
+}
 
 Alert robot_alert(const MissionStatus::Robot& robot, const char* kind, const char* severity, std::string what,
                   std::string todo) {
@@ -65,7 +72,7 @@ void look_at_robot(const MissionStatus& status, const MissionStatus::Robot& robo
                               fmt::format("{} submaps are not on the server yet", own.backlog_submaps),
                               "Bring it nearer to the base, or wait: the newest come first."));
   if (is_heard && !own.finished && robot.submaps > 0 && status.revision > 0 &&
-      (!robot.last_update || status.time - *robot.last_update > kNoUpdate_s))
+      (!robot.last_update || status.time - *robot.last_update > longest_without_update_s(status)))
     out.push_back(robot_alert(robot, "uncorrected", "warning", "does not use the map",
                               "The way down may be cut: it hears no proxy graph."));
   if (own.health.battery_percent && *own.health.battery_percent < kLowBattery_percent)
