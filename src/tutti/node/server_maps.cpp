@@ -51,8 +51,8 @@ std::optional<MapTask> ServerNode::begin_map(Timestamp now) {
                .robots = robots_,
                .follow = config_.server.change_of_mind != "wait" || operator_decided,
                .broadcast = std::move(broadcast_)};
-  if (is_update)
-    pause_until_ = now + config_.server.update_pause_per_submap_s * static_cast<double>(task.job.submaps.size());
+  const double pause_s = config_.server.update_pause_per_submap_s * static_cast<double>(task.job.submaps.size());
+  if (is_update && pause_s > config_.server.update_period_s) pause_until_ = now + pause_s;
   for (const RobotId robot : robots_)
     if (const auto owner = registry_.owner(robot)) task.job.owners.push_back(*owner);
   return task;
