@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/bags/image_topic.hpp"
+
+#include <gtest/gtest.h>
+
+namespace tutti::bags {
+namespace image_topic_test {
+
+ImageTopic topic(const char* name, const char* encoding, bool is_compressed = false) {
+  return {name, is_compressed, ImageLook{encoding, "camera", 640, 480}, {}};
+}
+
+TEST(ImageTopic, ShowsWhatItsFirstMessageDoes) {
+  const ImageTopic unseen{"/image"};
+  EXPECT_FALSE(unseen.shows_picture());
+  EXPECT_FALSE(unseen.shows_depth());
+  EXPECT_EQ(unseen.check_picture().error().message, "/image: no images");
+  EXPECT_TRUE(topic("/image", "bgr8").check_picture().has_value());
+  EXPECT_TRUE(topic("/image/compressed", "jpeg", true).check_picture().has_value());
+  EXPECT_TRUE(topic("/depth", "16UC1").shows_depth());
+  EXPECT_EQ(topic("/depth", "16UC1").check_picture().error().message,
+            "/depth: encoding '16UC1' is no picture, but depth");
+  EXPECT_EQ(topic("/flow", "32FC2").check_picture().error().message, "/flow: encoding '32FC2' is no picture");
+}
+
+TEST(ImageTopic, OfPicturesTheCalibrationsSizeCounts) {
+  RosCameraInfo info;
+  info.width = 1280;
+  info.height = 720;
+  for (const char* encoding : {"mono8", "16UC1"}) {
+    ImageTopic seen = topic("/depth", encoding);
+    EXPECT_EQ(seen.width_px(), 640U);
+    seen.info = info;
+    EXPECT_EQ(seen.width_px(), seen.shows_depth() ? 640U : 1280U) << encoding;
+    EXPECT_EQ(seen.height_px(), seen.shows_depth() ? 480U : 720U) << encoding;
+  }
+}
+
+}  // namespace image_topic_test
+}  // namespace tutti::bags
