@@ -29,7 +29,7 @@ class ReplayedRobot final : public program::RobotDriver {
 
  private:
   std::unique_ptr<mission::RobotActor> actor_;
-  std::size_t scored_ = 0, timed_ = 0;  // updates that are told
+  std::size_t scored_ = 0, timed_ = 0;  // updates that have their note
 };
 
 }  // namespace tutti::lab

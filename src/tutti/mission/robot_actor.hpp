@@ -91,7 +91,8 @@ class RobotActor {
   /// Raw odometry against the map, at the node's last update.
   [[nodiscard]] const std::optional<consistency::Explanation>& explanation() const { return explanation_; }
   [[nodiscard]] std::vector<PolicyTiming> timing() const;
-  [[nodiscard]] double cpu_s() const { return cpu_s_; }  ///< The node's.
+  [[nodiscard]] const PolicyTiming& own_timing() const { return timing_; }  ///< The node's, the first of timing().
+  [[nodiscard]] double cpu_s() const { return cpu_s_; }                     ///< The node's.
   /// What went wrong (samples or scans refused, updates without a correction): one line per kind, with a count and the
   /// first case.
   [[nodiscard]] std::vector<std::string> troubles() const;

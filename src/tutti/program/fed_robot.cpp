@@ -19,10 +19,7 @@ void LiveRobot::receive(const bus::Envelope& envelope, Timestamp now) {
   take(node_->receive(envelope, now));
   node_->observe({});
   if (!is_update) return;
-  notes_.push_back({{"event", kUpdateTimed},
-                    {"update_ms", 1e3 * (Clock::steady_s() - begin_s)},
-                    {"comparison_ms", 1e3 * compare_s},
-                    {"optimisation_ms", 1e3 * optimise_s}});
+  notes_.push_back(update_timed(1e3 * (Clock::steady_s() - begin_s), 1e3 * compare_s, 1e3 * optimise_s));
 }
 
 void FedRobot::note(const node::Step& step) {

@@ -33,7 +33,14 @@ class RobotDriver {
   virtual std::vector<Json> take_notes() { return {}; }
 };
 
-inline constexpr const char* kUpdateTimed = "update_timed";  ///< An event: how long an update of the map took.
+inline constexpr const char* kUpdateTimed = "update_timed";
+/// The event with this name: how long an update of the map took.
+inline Json update_timed(double update_ms, double comparison_ms, double optimisation_ms) {
+  return {{"event", kUpdateTimed},
+          {"update_ms", update_ms},
+          {"comparison_ms", comparison_ms},
+          {"optimisation_ms", optimisation_ms}};
+}
 
 /// Makes the driver of a robot that replays a recording, on its store. It is called again when the store could not be
 /// written.
