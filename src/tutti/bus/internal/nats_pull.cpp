@@ -38,6 +38,7 @@ bool NatsPull::ask(int batch) {
   const auto wait = std::chrono::duration_cast<std::chrono::nanoseconds>(kListen).count();
   const std::string answer_to = fmt::format("{}.{}", inbox_, ++requests_);
   left_ = batch;
+  partly_ = false;
   until_ = Clock::now() + kListen + kIsLost;
   return connection_->publish(ask_, answer_to, "", fmt::format(R"({{"batch":{},"expires":{}}})", batch, wait))
       .has_value();
@@ -52,11 +53,16 @@ NatsPull::Next NatsPull::next(int batch) {
   natsMsg* heard = nullptr;
   const natsStatus status = natsSubscription_NextMsg(&heard, subscription_, kListen.count());
   NatsOwned<natsMsg> message(heard);
-  if (status == NATS_TIMEOUT) return {};
+  if (status == NATS_TIMEOUT) {
+    // Nats-server 2.9 does not always say that a request has run out when it has given some of what was asked for.
+    if (std::exchange(partly_, false)) left_ = 0;
+    return {};
+  }
   if (status != NATS_OK) return {State::lost, {}};
   unanswered_ = 0;
   if (std::string_view(natsMsg_GetSubject(heard)).starts_with(inbox_)) return {told(heard), {}};
   if (left_ > 0) --left_;
+  partly_ = true;
   return {State::message, std::move(message)};
 }
 

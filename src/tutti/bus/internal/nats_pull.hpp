@@ -42,8 +42,9 @@ class NatsPull {
   natsSubscription* subscription_;
   std::string inbox_;  ///< All requests'; each has a number behind it.
   std::uint64_t requests_ = 0;
-  int left_ = 0;        ///< The last request's.
-  int unanswered_ = 0;  ///< Requests, the last ones.
+  int left_ = 0;         ///< The last request's.
+  bool partly_ = false;  ///< Some of them came, and since then nothing was missed.
+  int unanswered_ = 0;   ///< Requests, the last ones.
   std::chrono::steady_clock::time_point until_;
 };
 
