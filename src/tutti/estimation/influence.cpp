@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
+#include <optional>
 #include <utility>
 
 #include "tutti/base/check.hpp"
@@ -25,6 +27,8 @@ using Vector12d = Eigen::Matrix<double, 12, 1>;
 
 /// Less than this share of what is known of a direction comes from elsewhere: nothing does.
 constexpr double kAlone = 1e-9;
+/// Less than this share comes from elsewhere: where that would have its ends is not known to first order.
+constexpr double kHardlyKnown = 1e-4;
 
 /// H^-1 at the ends of an edge; anchored ends do not move.
 Eigen::Matrix<double, 12, 12> covariance_of_ends(const SelectedInverse& inverse, const EdgeSlot& slot) {
@@ -88,28 +92,85 @@ Matrix6d known_together(const Whitened& a, const Whitened& b, const SelectedInve
   return out;
 }
 
-double misfit(const std::vector<Whitened>& group, const SelectedInverse& inverse) {
+using Group = std::vector<Whitened>;
+
+/// K = J H^-1 J^T of a group, of 1 in all: what the group knows of itself.
+Eigen::MatrixXd known_of(const Group& group, const SelectedInverse& inverse) {
   const auto edges = static_cast<Eigen::Index>(group.size());
   Eigen::MatrixXd K(6 * edges, 6 * edges);
-  Eigen::VectorXd residual(6 * edges);
-  for (Eigen::Index a = 0; a < edges; ++a) {
-    residual.segment<6>(6 * a) = group[static_cast<std::size_t>(a)].residual;
+  for (Eigen::Index a = 0; a < edges; ++a)
     for (Eigen::Index b = 0; b < edges; ++b)
       K.block<6, 6>(6 * a, 6 * b) =
           known_together(group[static_cast<std::size_t>(a)], group[static_cast<std::size_t>(b)], inverse);
-  }
+  return K;
+}
+
+Eigen::VectorXd residual_of(const Group& group) {
+  Eigen::VectorXd out(static_cast<Eigen::Index>(6 * group.size()));
+  for (std::size_t a = 0; a < group.size(); ++a) out.segment<6>(static_cast<Eigen::Index>(6 * a)) = group[a].residual;
+  return out;
+}
+
+/// 1 - K
+Eigen::LDLT<Eigen::MatrixXd> of_others(const Eigen::MatrixXd& K) {
   Eigen::MatrixXd others = -0.5 * (K + K.transpose());
   others.diagonal().array() += 1.0 + kAlone;
-  const Eigen::Index middle = 6 * (edges / 2);
-  Eigen::MatrixXd right(6 * edges, 7);  // (I - K)^-1 of the residuals, and of K's columns at the middle edge
-  right << residual, K.middleCols<6>(middle);
-  const Eigen::LDLT<Eigen::MatrixXd> factor(others);
+  return Eigen::LDLT<Eigen::MatrixXd>(others);
+}
+
+double misfit(const Group& group, const SelectedInverse& inverse) {
+  const Eigen::MatrixXd K = known_of(group, inverse);
+  const Eigen::Index middle = 6 * static_cast<Eigen::Index>(group.size() / 2);
+  Eigen::MatrixXd right(K.rows(), 7);  // (I - K)^-1 of the residuals, and of K's columns at the middle edge
+  right << residual_of(group), K.middleCols<6>(middle);
+  const Eigen::LDLT<Eigen::MatrixXd> factor = of_others(K);
   if (factor.info() != Eigen::Success || !factor.isPositive()) return 0.0;
   const Eigen::MatrixXd solved = factor.solve(right);
   const Vector6d moved = K.middleRows<6>(middle) * solved.col(0);
   const Matrix6d covariance = solved.middleRows<6>(middle).rightCols<6>();
   return std::max(0.0, moved.dot(Matrix6d(0.5 * (covariance + covariance.transpose())).ldlt().solve(moved)));
 }
+
+/// The normal equations at the optimum, factorised, of the graph without what only passes odometry on, and the groups
+/// in it.
+struct GroupEquations {
+  GroupEquations(const PoseGraph& graph, std::span<const Pose3> poses, std::span<const EdgeRole> roles,
+                 std::span<const std::vector<std::size_t>> groups, std::span<const std::size_t> nodes)
+      : reduced(reduce_chains(graph, roles, nodes, poses)) {
+    for (const std::size_t node : reduced.nodes) at.push_back(poses[node]);
+    std::vector<std::pair<std::size_t, std::size_t>> pairs;  // every end of a group with every other
+    for (const auto& group : groups)
+      for (const std::size_t a : group)
+        for (const std::size_t b : group) {
+          const PoseGraphEdge& x = edge(a);
+          const PoseGraphEdge& y = edge(b);
+          pairs.insert(pairs.end(), {{x.from, y.from}, {x.from, y.to}, {x.to, y.to}});
+        }
+    structure = internal::analyse_blocks(reduced.graph, pairs);
+    equations = std::make_unique<internal::GraphEquations>(reduced.graph, structure);
+    equations->linearise(at, {}, true);
+    is_determined = structure.variables > 0 && equations->factorise();
+  }
+  GroupEquations(const GroupEquations&) = delete;  // parts refer to each other
+  GroupEquations& operator=(const GroupEquations&) = delete;
+  [[nodiscard]] std::size_t position(std::size_t e) const {
+    TUTTI_CHECK(e < reduced.edge.size() && reduced.edge[e], "edge {} of {}", e, reduced.edge.size());
+    return *reduced.edge[e];
+  }
+  [[nodiscard]] const PoseGraphEdge& edge(std::size_t e) const { return reduced.graph.edges[position(e)]; }
+  [[nodiscard]] Group whitened(std::span<const std::size_t> group) const {
+    Group out;
+    for (const std::size_t e : group)
+      out.push_back(whiten(edge(e), structure.edges[position(e)], structure.component[edge(e).from], at));
+    return out;
+  }
+
+  ReducedGraph reduced;
+  std::vector<Pose3> at;  // of reduced nodes
+  BlockStructure structure;
+  std::unique_ptr<internal::GraphEquations> equations;
+  bool is_determined = false;
+};
 
 }  // namespace
 
@@ -167,33 +228,65 @@ std::vector<double> group_misfits(const PoseGraph& graph, std::span<const Pose3>
                                   std::span<const std::vector<std::size_t>> groups) {
   std::vector<double> out(groups.size(), 0.0);
   if (groups.empty()) return out;
-  const ReducedGraph reduced = reduce_chains(graph, roles);
-  std::vector<Pose3> at;
-  for (const std::size_t node : reduced.nodes) at.push_back(poses[node]);
-  const auto edge_of = [&](std::size_t e) {
-    TUTTI_CHECK(e < graph.edges.size() && reduced.edge[e], "edge {} of {}", e, graph.edges.size());
-    return *reduced.edge[e];
-  };
-  std::vector<std::pair<std::size_t, std::size_t>> pairs;  // every end of a group with every other
-  for (const auto& group : groups)
-    for (const std::size_t a : group)
-      for (const std::size_t b : group) {
-        const PoseGraphEdge& x = reduced.graph.edges[edge_of(a)];
-        const PoseGraphEdge& y = reduced.graph.edges[edge_of(b)];
-        pairs.insert(pairs.end(), {{x.from, y.from}, {x.from, y.to}, {x.to, y.to}});
-      }
-  const BlockStructure structure = internal::analyse_blocks(reduced.graph, pairs);
-  internal::GraphEquations equations(reduced.graph, structure);
-  equations.linearise(at, {}, true);
-  if (structure.variables == 0 || !equations.hessian().factorise()) return out;
-  const SelectedInverse inverse(equations.hessian().take_factor());
+  GroupEquations equations(graph, poses, roles, groups, {});
+  if (!equations.is_determined) return out;
+  const SelectedInverse inverse(equations.equations->hessian().take_factor());
+  for (std::size_t g = 0; g < groups.size(); ++g)
+    if (!groups[g].empty()) out[g] = misfit(equations.whitened(groups[g]), inverse);
+  return out;
+}
+
+struct GroupRemovals::State {
+  State(const PoseGraph& graph, std::span<const Pose3> poses, std::span<const EdgeRole> roles,
+        std::span<const std::vector<std::size_t>> groups, std::span<const std::size_t> nodes)
+      : equations(graph, poses, roles, groups, nodes), forces(groups.size()) {}
+  GroupEquations equations;
+  /// Per group the force on its ends, by variable, that has the effect of taking it away; empty: unknown.
+  using Force = std::vector<std::pair<int, Vector6d>>;
+  std::vector<std::optional<Force>> forces;
+};
+
+GroupRemovals::GroupRemovals(const PoseGraph& graph, std::span<const Pose3> poses, std::span<const EdgeRole> roles,
+                             std::span<const std::vector<std::size_t>> groups, std::span<const std::size_t> nodes)
+    : state_(std::make_unique<State>(graph, poses, roles, groups, nodes)) {
+  State& s = *state_;
+  if (!s.equations.is_determined) return;
+  const SelectedInverse inverse(s.equations.equations->hessian().factor().copy());
   for (std::size_t g = 0; g < groups.size(); ++g) {
-    std::vector<Whitened> group;
-    for (const std::size_t e : groups[g]) {
-      const PoseGraphEdge& edge = reduced.graph.edges[edge_of(e)];
-      group.push_back(whiten(edge, structure.edges[edge_of(e)], structure.component[edge.from], at));
+    const Group group = s.equations.whitened(groups[g]);
+    const Eigen::LDLT<Eigen::MatrixXd> others = of_others(known_of(group, inverse));
+    if (others.info() != Eigen::Success || !(others.vectorD().minCoeff() > kHardlyKnown)) continue;
+    const Eigen::VectorXd w = others.solve(residual_of(group));
+    State::Force& force = s.forces[g].emplace();
+    for (std::size_t a = 0; a < group.size(); ++a) {
+      const Vector6d own = w.segment<6>(static_cast<Eigen::Index>(6 * a));
+      if (group[a].slot.from >= 0) force.emplace_back(group[a].slot.from, group[a].J_from.transpose() * own);
+      if (group[a].slot.to >= 0) force.emplace_back(group[a].slot.to, group[a].J_to.transpose() * own);
     }
-    if (!group.empty()) out[g] = misfit(group, inverse);
+  }
+}
+GroupRemovals::~GroupRemovals() = default;
+
+Eigen::MatrixXd GroupRemovals::moves(std::span<const std::size_t> nodes) const {
+  const State& s = *state_;
+  const auto rows = static_cast<Eigen::Index>(6 * nodes.size());
+  Eigen::MatrixXd out = Eigen::MatrixXd::Constant(rows, static_cast<Eigen::Index>(s.forces.size()),
+                                                  std::numeric_limits<double>::infinity());
+  if (!s.equations.is_determined) return out;
+  // The columns of H^-1 at the nodes serve all groups, as H^-1 is symmetric.
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(6 * s.equations.structure.variables, rows);
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    const auto node = std::ranges::lower_bound(s.equations.reduced.nodes, nodes[k]);
+    TUTTI_CHECK(node != s.equations.reduced.nodes.end() && *node == nodes[k], "node {} was not asked for", nodes[k]);
+    const int v = s.equations.structure.variable[static_cast<std::size_t>(node - s.equations.reduced.nodes.begin())];
+    if (v >= 0) columns.block<6, 6>(6 * v, static_cast<Eigen::Index>(6 * k)).setIdentity();
+  }
+  s.equations.equations->hessian().solve(columns);
+  for (std::size_t g = 0; g < s.forces.size(); ++g) {
+    if (!s.forces[g]) continue;
+    auto moves = out.col(static_cast<Eigen::Index>(g));
+    moves.setZero();
+    for (const auto& [variable, force] : *s.forces[g]) moves += columns.middleRows<6>(6 * variable).transpose() * force;
   }
   return out;
 }

@@ -5,9 +5,13 @@
 #include <functional>
 #include <limits>
 #include <numeric>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "tutti/consistency/change_of_mind.hpp"
+#include "tutti/consistency/signal.hpp"
+#include "tutti/estimation/influence.hpp"
 #include "tutti/estimation/switched_graph.hpp"
 #include "tutti/judge/closure_groups.hpp"
 
@@ -34,16 +38,51 @@ Groups groups_to_try(const MapEstimate& map, const Beliefs& followed) {
   return groups;
 }
 
-/// The chain's proxy nodes at these poses of the map's nodes.
-ProxyGraph moved(const ProxyGraph& own, const ChainId& chain, const MapEstimate& map, const std::vector<Pose3>& poses) {
-  ProxyGraph out = own;
+/// A group carries a change only if without it the chain lies farther from the newer map than half of the change, to
+/// first order and but for the alignment. Groups that move it less than this share are not looked at any closer.
+constexpr double kShare = 0.25;
+/// Where that is looked at: a chain bends little between so many of its nodes.
+constexpr std::size_t kMostLookedAt = 32;
+
+/// The chain's proxy nodes and which of the map's nodes they are.
+struct OwnNodes {
+  std::vector<std::size_t> proxies;
+  std::vector<std::size_t> nodes;
+};
+
+OwnNodes own_nodes(const ProxyGraph& own, const ChainId& chain, const MapEstimate& map) {
+  OwnNodes out;
   auto node = map.nodes.begin();
-  for (ProxyNode& proxy : out.nodes) {
-    if (proxy.chain != chain) continue;
+  for (std::size_t k = 0; k < own.nodes.size(); ++k) {
+    if (own.nodes[k].chain != chain) continue;
     node = std::find_if(node, map.nodes.end(),
-                        [&](const MapNode& n) { return n.id.chain == chain && n.stamp == proxy.stamp; });
+                        [&](const MapNode& n) { return n.id.chain == chain && n.stamp == own.nodes[k].stamp; });
     if (node == map.nodes.end()) break;
-    proxy.T_world_body = poses[static_cast<std::size_t>(node - map.nodes.begin())];
+    out.proxies.push_back(k);
+    out.nodes.push_back(static_cast<std::size_t>(node - map.nodes.begin()));
+  }
+  return out;
+}
+
+/// By how much each group's loss moves the chain, to first order, metres; infinite where that says little.
+std::vector<double> first_order_moves(const MapEstimate& map, std::span<const estimation::EdgeRole> roles,
+                                      const Groups& groups, const OwnNodes& part) {
+  std::vector<std::size_t> nodes;
+  const std::size_t count = std::min(kMostLookedAt, part.nodes.size());
+  for (std::size_t k = 0; k < count; ++k)
+    nodes.push_back(part.nodes[count == 1 ? 0 : k * (part.nodes.size() - 1) / (count - 1)]);
+  std::vector<double> out(groups.size(), std::numeric_limits<double>::infinity());
+  if (nodes.size() < 2) return out;
+  std::vector<Pose3> with, without(nodes.size());
+  for (const std::size_t node : nodes) with.push_back(map.graph.poses[node]);
+  const Eigen::MatrixXd moves =
+      estimation::GroupRemovals(map.graph, map.graph.poses, roles, groups, nodes).moves(nodes);
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const auto move = moves.col(static_cast<Eigen::Index>(g));
+    if (!move.allFinite()) continue;
+    for (std::size_t k = 0; k < nodes.size(); ++k)
+      without[k] = retract(with[k], move.segment<6>(static_cast<Eigen::Index>(6 * k)));
+    out[g] = consistency::pose_difference(with, without).leftCols<3>().rowwise().norm().maxCoeff();
   }
   return out;
 }
@@ -57,21 +96,29 @@ ChangeSupport change_support(const MapEstimate& map, const Beliefs& followed_bel
   if (groups.empty()) return out;
   std::vector<estimation::EdgeRole> roles(map.graph.edges.size(), estimation::EdgeRole::robust);
   std::fill_n(roles.begin(), map.odometry_edges, estimation::EdgeRole::trusted);
+  const OwnNodes part = own_nodes(own, chain, map);
+  const std::vector<double> first_order = first_order_moves(map, roles, groups, part);
+  ++out.factorisations;
+  const double least_m = kShare * consistency::map_change(followed, own, chain).translation_m;
   estimation::SolverConfig from_there = solver;
   from_there.initialisation = "given";
-  estimation::SwitchedGraph graph(map.graph, roles, from_there);
-  for (const auto& group : groups) {
+  std::optional<estimation::SwitchedGraph> graph;  // made when the first group is looked at closely
+  for (std::size_t g = 0; g < groups.size() && out.lone_closures == 0; ++g) {
+    if (first_order[g] < least_m) continue;
+    if (!graph) graph.emplace(map.graph, roles, from_there);
     std::vector<char> in(map.graph.edges.size(), 1);
-    for (const std::size_t e : group) in[e] = 0;
-    if (!estimation::is_usable(graph.solve(in))) continue;
-    const ProxyGraph without = moved(own, chain, map, graph.poses());
-    if (consistency::map_change(followed, without, chain).translation_m >=
+    for (const std::size_t e : groups[g]) in[e] = 0;
+    ++out.tried;
+    if (!estimation::is_usable(graph->solve(in))) continue;
+    const std::vector<Pose3> poses = graph->poses();
+    ProxyGraph without = own;
+    for (std::size_t k = 0; k < part.nodes.size(); ++k)
+      without.nodes[part.proxies[k]].T_world_body = poses[part.nodes[k]];
+    if (consistency::map_change(followed, without, chain).translation_m <
         consistency::map_change(own, without, chain).translation_m)
-      continue;
-    out.lone_closures = group.size();
-    break;
+      out.lone_closures = groups[g].size();
   }
-  out.factorisations = graph.factorisations();
+  if (graph) out.factorisations += graph->factorisations();
   return out;
 }
 

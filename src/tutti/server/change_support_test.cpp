@@ -104,5 +104,17 @@ TEST(ChangeSupport, CostsAFewStepsAGroup) {
   EXPECT_LE(out.factorisations, 8 * 4);
 }
 
+// In a large map nearly all groups are far away, or agree.
+TEST(ChangeSupport, GroupsThatHardlyMoveTheChainAreNotTried) {
+  std::vector<std::size_t> places;
+  for (std::size_t place = 0; place < kRound - 8; place += 11) places.push_back(place);
+  const ChangeSupport many = support(map_with(places, 5.0));
+  EXPECT_EQ(many.lone_closures, 0U);
+  EXPECT_LE(many.tried, 1);
+  EXPECT_LE(many.factorisations, 8);
+  const ChangeSupport one = support(map_with({10}, 5.0));
+  EXPECT_EQ(one.tried, 1);
+}
+
 }  // namespace change_support_test
 }  // namespace tutti::server
