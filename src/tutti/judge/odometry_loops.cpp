@@ -57,15 +57,13 @@ class Ways {
 
 LoopClosure turned(const LoopClosure& closure) { return {closure.to, closure.from, inverse(closure.measurement)}; }
 
-/// Closures between two chains, the end of `one` first, in its order.
-std::vector<LoopClosure> closures_with(std::span<const LoopClosure> closures, const ChainId& one,
-                                       const ChainId& other) {
-  std::vector<LoopClosure> out;
-  for (LoopClosure closure : closures) {
-    if (closure.from.chain == other && closure.to.chain == one) closure = turned(closure);
-    if (closure.from.chain == one && closure.to.chain == other) out.push_back(closure);
+/// Closures by the two chains that they join, each from its smaller end to the other.
+std::map<std::pair<ChainId, ChainId>, std::vector<LoopClosure>> by_chains(std::span<const LoopClosure> closures) {
+  std::map<std::pair<ChainId, ChainId>, std::vector<LoopClosure>> out;
+  for (const LoopClosure& closure : closures) {
+    const LoopClosure forth = closure.to < closure.from ? turned(closure) : closure;
+    out[{forth.from.chain, forth.to.chain}].push_back(forth);
   }
-  std::ranges::stable_sort(out, {}, [](const LoopClosure& c) { return c.from.index; });
   return out;
 }
 
@@ -112,13 +110,8 @@ OdometryLoop loop_of(const ClosurePair& pair) {
 std::map<std::pair<ChainId, ChainId>, std::vector<ClosurePair>> neighbouring_closures(
     std::span<const OdometryPiece> pieces, std::span<const LoopClosure> closures) {
   const Ways ways(pieces);
-  std::map<std::pair<ChainId, ChainId>, std::vector<LoopClosure>> between;
-  for (const LoopClosure& closure : closures) {
-    const LoopClosure forth = closure.to < closure.from ? turned(closure) : closure;
-    between[{forth.from.chain, forth.to.chain}].push_back(forth);
-  }
   std::map<std::pair<ChainId, ChainId>, std::vector<ClosurePair>> out;
-  for (auto& [two, all] : between) {
+  for (auto& [two, all] : by_chains(closures)) {
     std::ranges::stable_sort(all, {}, [](const LoopClosure& c) { return std::pair(c.from, c.to); });
     std::set<std::pair<std::size_t, std::size_t>> known;
     for (std::size_t a = 0; a < all.size(); ++a) {
@@ -142,20 +135,20 @@ std::map<ChainId, std::vector<OdometryLoop>> odometry_loops(std::span<const Odom
       loops.at(from.chain)
           .push_back(over({local(measurement.T_a_b, odometry->T_a_b), odometry->covariance, measurement.covariance},
                           from, to));
-  for (auto one = loops.begin(); one != loops.end(); ++one)
-    for (auto two = std::next(one); two != loops.end(); ++two) {
-      const std::vector<LoopClosure> between = closures_with(closures, one->first, two->first);
-      const std::size_t apart = between.size() / 2;
-      for (std::size_t c = apart; c < between.size(); ++c) {
-        const LoopClosure &first = between[c - apart], &second = between[c];
-        const auto of_one = ways.between(first.from, second.from);
-        const auto of_two = ways.between(first.to, second.to);
-        if (!of_one || !of_two) continue;
-        const OdometryLoop loop = loop_of({first, second, *of_one, *of_two});
-        one->second.push_back(over(loop, first.from, second.from));
-        two->second.push_back(over(loop, first.to, second.to));
-      }
+  for (auto& [two, between] : by_chains(closures)) {
+    if (two.first == two.second || !loops.contains(two.first) || !loops.contains(two.second)) continue;
+    std::ranges::stable_sort(between, {}, [](const LoopClosure& c) { return c.from.index; });
+    const std::size_t apart = between.size() / 2;
+    for (std::size_t c = apart; c < between.size(); ++c) {
+      const LoopClosure &first = between[c - apart], &second = between[c];
+      const auto of_one = ways.between(first.from, second.from);
+      const auto of_two = ways.between(first.to, second.to);
+      if (!of_one || !of_two) continue;
+      const OdometryLoop loop = loop_of({first, second, *of_one, *of_two});
+      loops.at(two.first).push_back(over(loop, first.from, second.from));
+      loops.at(two.second).push_back(over(loop, first.to, second.to));
     }
+  }
   return loops;
 }
 
