@@ -102,7 +102,7 @@ class Ros1(unittest.TestCase):
         cls.folder = tempfile.TemporaryDirectory()
         cls.path = pathlib.Path(cls.folder.name)
         small = ["source=simulation", "simulation.world.network={rows: 2, columns: 2, block_m: 10.0, jitter_m: 1.0}",
-                 "simulation.lidar.azimuth_step_deg=1.0", "simulation.robots.0.walk.duration_s=40",
+                 "simulation.lidar.rays_share=0.4", "simulation.robots.0.walk.duration_s=40",
                  "simulation.robots.1.walk.duration_s=40"]
         run(TUTTI, "simulate", SOURCE / "missions/demo.yaml", "-o", cls.path, *(f"--set={s}" for s in small))
         cls.messages = {name: cls.converted(name) for name in ("alpha", "bravo")}

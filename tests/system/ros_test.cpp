@@ -175,7 +175,7 @@ constexpr const char* kSimulated = R"(
 source: simulation
 simulation:
   sensors: lidar
-  lidar: {azimuth_step_deg: 1.0}
+  lidar: {rays_share: 0.4}
   world: {kind: tunnel, network: {rows: 2, columns: 2, block_m: 10.0, jitter_m: 1.0}}
   robots:
     - {name: alpha, walk: {duration_s: 40}}

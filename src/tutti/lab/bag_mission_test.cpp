@@ -92,7 +92,7 @@ TEST(BagMission, FromSimulatedBagsIsTheMission) {
   MissionConfig config;
   config.source = "simulation";
   config.simulation.sensors = "lidar";
-  config.simulation.lidar.azimuth_step_deg = 1.0;
+  config.simulation.lidar.rays_share = 0.4;
   config.simulation.world.network = {.rows = 2, .columns = 2, .block_m = 10.0, .jitter_m = 1.0};
   config.simulation.robots.resize(2);
   for (auto& robot : config.simulation.robots) robot.walk.duration_s = 40.0;

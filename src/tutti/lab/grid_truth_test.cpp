@@ -17,7 +17,7 @@ TEST(GridTruth, AMapToDriveOnIsTheWorld) {
   MissionConfig config;
   config.source = "simulation";
   config.simulation.sensors = "lidar";
-  config.simulation.lidar.azimuth_step_deg = 1.0;
+  config.simulation.lidar.rays_share = 0.4;
   config.simulation.world.network = {.rows = 2, .columns = 2, .block_m = 15.0, .jitter_m = 2.0};
   config.simulation.robots.resize(1);
   config.simulation.robots[0].walk.duration_s = 30.0;

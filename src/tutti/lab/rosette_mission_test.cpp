@@ -8,7 +8,7 @@
 namespace tutti::lab {
 namespace rosette_mission_test {
 
-mission::ServerRecord server_of(const simulation::LidarConfig& lidar) {
+mission::ServerRecord server_of(const simulation::LidarChoice& lidar) {
   MissionConfig config;
   config.source = "simulation";
   config.simulation.sensors = "lidar";
@@ -23,13 +23,7 @@ mission::ServerRecord server_of(const simulation::LidarConfig& lidar) {
 
 /// Two robots in a small tunnel.
 TEST(RosetteMission, ItsClosuresAreRight) {
-  simulation::LidarConfig mid360;
-  mid360.pattern = "rosette";
-  mid360.beams = 4;
-  mid360.lowest_deg = -7.0;
-  mid360.highest_deg = 52.0;
-  mid360.points_per_s = 100'000.0;  // half of it, for the test's time
-  const mission::ServerRecord server = server_of(mid360);
+  const mission::ServerRecord server = server_of({.model = "rosette", .rays_share = 0.5});  // half, for the test's time
   ASSERT_FALSE(server.updates.empty());
   const mission::MapUpdateRecord& end = server.updates.back();
   fmt::print("{} closures\n", end.closures);

@@ -232,7 +232,8 @@ Result<std::vector<RobotToWrite>> walking_robots(const MissionConfig& config, st
   if (!world) return tl::unexpected(world.error());
   std::vector<RobotToWrite> out;
   for (Recording& recording : world->recordings)
-    out.push_back({.recording = std::move(recording), .images = {}, .T_body_lidar = config.simulation.lidar.pose()});
+    out.push_back(
+        {.recording = std::move(recording), .images = {}, .T_body_lidar = config.simulation.lidar.config().pose()});
   return out;
 }
 
@@ -241,8 +242,9 @@ Result<std::vector<RobotToWrite>> flying_robots(const MissionConfig& config, std
   if (!hall) return tl::unexpected(hall.error());
   std::vector<RobotToWrite> out;
   for (auto& [recording, images] : hall->robots)
-    out.push_back(
-        {.recording = std::move(recording), .images = std::move(images), .T_body_lidar = config.hall.lidar.pose()});
+    out.push_back({.recording = std::move(recording),
+                   .images = std::move(images),
+                   .T_body_lidar = config.hall.lidar.config().pose()});
   return out;
 }
 

@@ -84,7 +84,7 @@ TEST(WriteBags, WalkingRobotsAreHeardAsTheyWereSimulated) {
   MissionConfig config;
   config.source = "simulation";
   config.simulation.sensors = "lidar";
-  config.simulation.lidar.azimuth_step_deg = 10.0;
+  config.simulation.lidar.rays_share = 0.04;
   config.simulation.world.network = {.rows = 2, .columns = 2};
   for (auto& robot : config.simulation.robots) robot.walk.duration_s = 5.0;
   config.simulation.robots[1].start_s = 2.0;

@@ -8,6 +8,5 @@ namespace tutti::simulation {
 inline constexpr double kLongest_s = 7.0 * 86400.0;
 inline constexpr double kFarthest_m = 1e6;       ///< Limit on ways, moves and errors.
 inline constexpr double kLargestRoom_m = 100.0;  ///< Limit on widths and heights of corridors.
-inline constexpr double kMostPer100m = 1000.0;
 
 }  // namespace tutti::simulation

@@ -17,7 +17,7 @@ struct CorridorWorldConfig {
   double block_m = 25.0;
   double jitter_m = 5.0;
   double missing_share = 0.2;
-  double max_slope = 0.06;
+  double max_slope = 0.06;  ///< Steepest corridor, rise over run.
   template <class V>
   void describe(V& v) {
     v.field("rows", rows, between(2, 100), "Rows of junctions.");
@@ -27,7 +27,6 @@ struct CorridorWorldConfig {
             "Each junction moves by up to this along x and y; at most block_m / 4.");
     v.field("missing_share", missing_share, between(0.0, 1.0),
             "Share of corridors left out, as far as the network stays connected and without dead ends.");
-    v.field("max_slope", max_slope, between(0.0, 0.5), "Steepest corridor, rise over run.");
   }
 };
 

@@ -57,7 +57,8 @@ Result<SimulatedHall> simulate_hall(const HallMissionConfig& config, Timestamp s
     recording.increment_covariance = std::move(simulated.increment_covariance);
     recording.drift_origins = std::move(simulated.drift_origins);
     if (robot.sensors != "visual")
-      recording.scans = std::make_shared<SimulatedLidar>(walls, recording.reference, config.lidar, own.fork("lidar"));
+      recording.scans =
+          std::make_shared<SimulatedLidar>(walls, recording.reference, config.lidar.config(), own.fork("lidar"));
     if (robot.sensors != "lidar") {
       flown.images = simulate_images(scene, make_cameras(config.cameras, config.half_resolution), recording.reference,
                                      config.images, own.fork("images"),

@@ -44,7 +44,7 @@ struct HallMissionConfig {
   bool depth = false;
   bool half_resolution = true;  ///< Images of 376 x 240 pixels instead of 752 x 480, in a quarter of the time.
   bool imu = true;
-  LidarConfig lidar;
+  LidarChoice lidar;
   ImuConfig imu_noise;
   std::vector<FlyingRobotConfig> robots;
   template <class V>
@@ -56,7 +56,6 @@ struct HallMissionConfig {
             "The camera, of one, is an RGB-D camera: depth within 8 m, 1.4 mm off at 1 m, growing with its square.");
     v.field("imu", imu, any(), "Robots with a camera have an IMU, too.");
     v.field("lidar", lidar, any(), "LiDARs.");
-    v.field("imu_noise", imu_noise, any(), "IMUs.");
     v.field("robots", robots, any(), "The robots, each with its own start and odom frame.");
   }
 };

@@ -5,7 +5,6 @@
 #include <functional>
 #include <vector>
 
-#include "tutti/base/config.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/base/timestamp.hpp"
 #include "tutti/model/visual.hpp"
@@ -17,21 +16,13 @@ inline constexpr double kGravity_mps2 = 9.81;  ///< Along world -z.
 
 /// Rate and errors of a simulated IMU.
 struct ImuConfig {
-  double rate_hz = 200.0;
+  double rate_hz = 200.0;  ///< Samples per second.
   double gyro_noise_density = ImuNoise{}.gyro_noise_density;
   double gyro_random_walk = ImuNoise{}.gyro_random_walk;
   double accelerometer_noise_density = ImuNoise{}.accelerometer_noise_density;
   double accelerometer_random_walk = ImuNoise{}.accelerometer_random_walk;
   double gyro_bias_sigma = 0.01;           ///< rad/s; standard deviation of the bias at the start.
   double accelerometer_bias_sigma = 0.05;  ///< m/s^2; standard deviation of the bias at the start.
-  template <class V>
-  void describe(V& v) {
-    v.field("rate_hz", rate_hz, between(1.0, 10000.0), "Samples per second.");
-    v.field("gyro_noise_density", gyro_noise_density, at_least(0.0), "rad/s/sqrt(Hz)");
-    v.field("gyro_random_walk", gyro_random_walk, at_least(0.0), "rad/s^2/sqrt(Hz)");
-    v.field("accelerometer_noise_density", accelerometer_noise_density, at_least(0.0), "m/s^2/sqrt(Hz)");
-    v.field("accelerometer_random_walk", accelerometer_random_walk, at_least(0.0), "m/s^3/sqrt(Hz)");
-  }
   [[nodiscard]] ImuNoise noise() const {
     return {gyro_noise_density, gyro_random_walk, accelerometer_noise_density, accelerometer_random_walk};
   }

@@ -27,6 +27,30 @@ std::optional<double> measure(const Bvh& surface, const Eigen::Vector3f& origin,
 
 }  // namespace
 
+const std::vector<LidarModel>& lidar_models() {
+  static const std::vector<LidarModel> rows{
+      {"16-beam", "spinning, 16 beams within 15 degrees of level, every 0.4 degrees, 60 m", {}},
+      {"64-beam",
+       "spinning, 64 beams within 25 degrees of level, every 0.5 degrees, 80 m, as on a car",
+       {.beams = 64, .lowest_deg = -24.8, .highest_deg = 24.8, .azimuth_step_deg = 0.5, .max_range_m = 80.0}},
+      {"rosette",
+       "beams that swing from 7 degrees below level to 52 above while they turn, nowhere the same from sweep to sweep, "
+       "200,000 rays a second, as a Livox Mid-360's",
+       {.pattern = "rosette", .beams = 4, .lowest_deg = -7.0, .highest_deg = 52.0}},
+  };
+  return rows;
+}
+
+LidarConfig LidarChoice::config() const {
+  const LidarModel* row = row_of(lidar_models(), model);
+  TUTTI_CHECK(row != nullptr, "LiDAR '{}'", model);
+  LidarConfig out = row->config;
+  out.azimuth_step_deg /= rays_share;
+  out.points_per_s *= rays_share;
+  out.mount_height_m = mount_height_m;
+  return out;
+}
+
 std::optional<Scan> simulate_sweep(const Bvh& surface, const Trajectory& truth, Timestamp end,
                                    const LidarConfig& config, Rng rng) {
   const double sweep_s = 1.0 / config.rate_hz;

@@ -5,6 +5,8 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "tutti/base/config.hpp"
 #include "tutti/base/random.hpp"
@@ -22,38 +24,44 @@ namespace tutti::simulation {
 
 /// A multi-beam LiDAR whose axis is along the body's z.
 struct LidarConfig {
-  std::string pattern = "spinning";
-  int beams = 16;
-  double lowest_deg = -15.0;
-  double highest_deg = 15.0;
-  double rate_hz = 10.0;
-  double azimuth_step_deg = 0.4;
-  double points_per_s = 200'000.0;
-  double min_range_m = 0.4;
-  double max_range_m = 60.0;
+  std::string pattern = "spinning";  ///< A name of scan_patterns().
+  int beams = 16;                    ///< A spinning one has them evenly spaced from lowest_deg to highest_deg.
+  double lowest_deg = -15.0;         ///< Elevation of the lowest ray,
+  double highest_deg = 15.0;         ///< and of the highest.
+  double rate_hz = 10.0;             ///< Sweeps per second.
+  double azimuth_step_deg = 0.4;     ///< spinning: between two firings of all beams.
+  double points_per_s = 200'000.0;   ///< rosette: rays, of all beams.
+  double min_range_m = 0.4;          ///< Nothing is measured nearer
+  double max_range_m = 60.0;         ///< or farther than this.
   double range_sigma_m = 0.02;
-  double dropout_share = 0.02;
-  double grazing_cosine = 0.08;
+  double dropout_share = 0.02;   ///< Share of the echoes lost.
+  double grazing_cosine = 0.08;  ///< Below this cosine of the angle of incidence, echoes are lost in proportion.
+  double mount_height_m = 0.25;  ///< Sensor above the body frame.
+
+  /// T_body_lidar
+  [[nodiscard]] Pose3 pose() const { return {Eigen::Quaterniond::Identity(), {0.0, 0.0, mount_height_m}}; }
+};
+
+/// A LiDAR that can be chosen.
+struct LidarModel {
+  std::string_view name, help;
+  LidarConfig config;
+};
+const std::vector<LidarModel>& lidar_models();
+
+/// Which LiDAR robots carry.
+struct LidarChoice {
+  std::string model = "16-beam";
+  double rays_share = 1.0;
   double mount_height_m = 0.25;
   template <class V>
   void describe(V& v) {
-    v.field("pattern", pattern, one_of(names_of(scan_patterns())), help_of(scan_patterns()) + ".");
-    v.field("beams", beams, between(1, 128), "Beams; of a spinning one evenly spaced from lowest_deg to highest_deg.");
-    v.field("lowest_deg", lowest_deg, between(-90.0, 90.0), "Elevation of the lowest ray.");
-    v.field("highest_deg", highest_deg, between(-90.0, 90.0), "Elevation of the highest ray.");
-    v.field("rate_hz", rate_hz, between(0.5, 100.0), "Sweeps per second.");
-    v.field("azimuth_step_deg", azimuth_step_deg, between(0.05, 30.0), "spinning: between two firings of all beams.");
-    v.field("points_per_s", points_per_s, between(1.0, 1e7), "rosette: rays per second, of all beams.");
-    v.field("min_range_m", min_range_m, between(0.0, 1e4), "Nothing is measured nearer than this.");
-    v.field("max_range_m", max_range_m, above_zero_to(1e4), "Nothing is measured farther than this.");
-    v.field("range_sigma_m", range_sigma_m, between(0.0, 1e4), "Noise of a range.");
-    v.field("dropout_share", dropout_share, between(0.0, 1.0), "Share of the echoes lost.");
-    v.field("grazing_cosine", grazing_cosine, between(0.0, 1.0),
-            "Below this cosine of the angle of incidence, echoes are lost in proportion; at 0 all of them.");
+    v.field("model", model, one_of(names_of(lidar_models())), help_of(lidar_models()) + ".");
+    v.field("rays_share", rays_share, between(0.01, 4.0),
+            "Rays per sweep over the model's: fewer take less time and see less.");
     v.field("mount_height_m", mount_height_m, between(-kLargestRoom_m, kLargestRoom_m), "Sensor above the body frame.");
   }
-  /// T_body_lidar
-  [[nodiscard]] Pose3 pose() const { return {Eigen::Quaterniond::Identity(), {0.0, 0.0, mount_height_m}}; }
+  [[nodiscard]] LidarConfig config() const;
 };
 
 /// One sweep that begins 1 / rate_hz before `end`, of the configuration's pattern.

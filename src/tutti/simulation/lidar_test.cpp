@@ -50,8 +50,8 @@ Pose3 pose_at(const Trajectory& truth, Timestamp stamp) {
   return interpolate(truth[k].pose, truth[k + 1].pose, (stamp - truth[k].stamp) / 0.125);
 }
 
-LidarConfig ideal() {
-  LidarConfig config;
+LidarConfig ideal(const std::string& model = "16-beam") {
+  LidarConfig config = LidarChoice{.model = model}.config();
   config.range_sigma_m = config.dropout_share = config.grazing_cosine = 0.0;
   return config;
 }
@@ -102,17 +102,20 @@ TEST(Lidar, BeamsAndAzimuthsAreSpreadAsConfigured) {
   EXPECT_EQ(*elevations.rbegin(), 15);
 }
 
-LidarConfig mid360() {
-  LidarConfig config = ideal();
-  config.pattern = "rosette";
-  config.beams = 4;
-  config.lowest_deg = -7.0;
-  config.highest_deg = 52.0;
-  return config;
+TEST(Lidar, EveryModelCanBeChosenAndThinned) {
+  for (const LidarModel& model : lidar_models()) {
+    const LidarConfig whole = LidarChoice{.model = std::string(model.name)}.config();
+    const LidarConfig half =
+        LidarChoice{.model = std::string(model.name), .rays_share = 0.5, .mount_height_m = 1.2}.config();
+    const ScanPattern& pattern = scan_pattern(whole.pattern);
+    EXPECT_EQ(2 * pattern.firings(half), pattern.firings(whole)) << model.name;
+    EXPECT_EQ(half.mount_height_m, 1.2);
+    EXPECT_EQ(half.beams, whole.beams);
+  }
 }
 
 TEST(Lidar, ARosetteLooksEverywhereButNeverTheSameWayTwice) {
-  const LidarConfig config = mid360();
+  const LidarConfig config = ideal("rosette");
   const ScanPattern& pattern = scan_pattern(config.pattern);
   ASSERT_EQ(pattern.firings(config), 5000U);
   constexpr int kColumns = 36, kRows = 6;  // of 10 by 10 degrees
@@ -152,7 +155,7 @@ TEST(Lidar, ARosetteLooksEverywhereButNeverTheSameWayTwice) {
 }
 
 TEST(Lidar, ASweepOfARosetteGoesOnWhereTheLastHasEnded) {
-  const LidarConfig config = mid360();
+  const LidarConfig config = ideal("rosette");
   const ScanPattern& pattern = scan_pattern(config.pattern);
   const Timestamp end{1'767'225'600'000'000'000};
   std::vector<Eigen::Vector3d> last, next;
@@ -163,7 +166,7 @@ TEST(Lidar, ASweepOfARosetteGoesOnWhereTheLastHasEnded) {
 
 TEST(Lidar, PointsOfARosetteLieOnTheWallsOnceTheMotionIsUndone) {
   const Trajectory truth = walk();
-  const SimulatedLidar lidar(room(), truth, mid360(), Rng(1));
+  const SimulatedLidar lidar(room(), truth, ideal("rosette"), Rng(1));
   const Scan scan = (*lidar.scan(40)).value();
   ASSERT_EQ(scan.cloud->points.size(), 20'000U);
   for (std::size_t i = 0; i < scan.cloud->points.size(); ++i)

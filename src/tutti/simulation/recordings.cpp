@@ -86,8 +86,8 @@ Result<SimulatedWorld> simulate_recordings(const SimulationConfig& fleet, Timest
     recording.robot = RobotId{static_cast<std::uint32_t>(i)};
     recording.name = config.robots[i].name;
     if (walls)
-      recording.scans =
-          std::make_shared<SimulatedLidar>(walls, recording.reference, config.lidar, rng.fork(i).fork("lidar"));
+      recording.scans = std::make_shared<SimulatedLidar>(walls, recording.reference, config.lidar.config(),
+                                                         rng.fork(i).fork("lidar"));
     world.recordings.push_back(std::move(recording));
   }
   return world;

@@ -25,7 +25,7 @@ struct SimulatedRobotConfig {
   std::string name;  ///< Empty: "alpha", "bravo", ... by position in the list.
   int copies = 1;
   double start_s = 0.0;
-  std::optional<int> start_junction;
+  std::optional<int> start_junction;  ///< Where it starts; none: far from the others. A route says so, too.
   WalkConfig walk;
   OdometryNoiseConfig odometry;
   template <class V>
@@ -34,7 +34,6 @@ struct SimulatedRobotConfig {
     v.field("copies", copies, between(1, 100),
             "As many robots as this, alike but for what is drawn: start, walk, errors; of a name: it and a number.");
     v.field("start_s", start_s, between(0.0, kLongest_s), "Mission time at which it starts to walk.");
-    v.field("start_junction", start_junction, at_least(0.0), "Where it starts; none: far from the others.");
     v.field("walk", walk, any(), "How it walks.");
     v.field("odometry", odometry, any(), "Errors of its odometry.");
   }
@@ -45,7 +44,7 @@ struct SimulationConfig {
   std::string sensors = "none";
   WorldConfig world;
   SurfaceConfig surface;
-  LidarConfig lidar;
+  LidarChoice lidar;
   std::vector<SimulatedRobotConfig> robots = std::vector<SimulatedRobotConfig>(2);
   template <class V>
   void describe(V& v) {

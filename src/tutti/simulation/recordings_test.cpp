@@ -68,7 +68,7 @@ TEST(SimulateRecordings, LidarSeesTheWallsOfOneSharedWorld) {
   SimulationConfig config = short_walks(2);
   config.sensors = "lidar";
   config.world.network = {.rows = 2, .columns = 2, .block_m = 15.0, .jitter_m = 1.0};
-  config.lidar.azimuth_step_deg = 3.0;
+  config.lidar.rays_share = 0.13;
   const auto world = simulate_recordings(config, {}, 3);
   ASSERT_TRUE(world.has_value());
   ASSERT_TRUE(world->surface != nullptr);
@@ -107,7 +107,7 @@ TEST(SimulateRecordings, SettingsThatCannotBeComputedAreRefused) {
        {"robots: [{walk: {duration_s: .inf}}]", "robots: [{walk: {rate_hz: 1e9}}]", "robots: [{start_s: .inf}]",
         "robots: [{walk: {length_m: .inf}}]", "robots: [{walk: {lookahead_m: 0}}]",
         "robots: [{odometry: {slip_m: .inf}}]", "world: {network: {block_m: 0.001}}", "world: {roof_length_m: .inf}",
-        "surface: {width_m: .inf}", "surface: {doors_per_100m: .inf}", "lidar: {max_range_m: .inf}"}) {
+        "surface: {width_m: .inf}", "surface: {body_height_m: .inf}", "lidar: {rays_share: .inf}"}) {
     const auto node = parse_yaml(setting, "simulation");
     ASSERT_TRUE(node.has_value()) << setting;
     SimulationConfig config;

@@ -31,7 +31,7 @@ struct ReferenceClosureConfig {
   double sigma_deg = 0.5;
   double wrong_share = 0.1;
   double distant_share = 0.5;
-  double agreeing_share = 0.3;
+  double agreeing_share = 0.3;  ///< Share of the wrong ones that agree with neighbours, as where places look alike.
   template <class V>
   void describe(V& v) {
     v.field("radius_m", radius_m, greater_than(0.0), "Two submaps overlap when two keyframes are this close.");
@@ -45,8 +45,6 @@ struct ReferenceClosureConfig {
     v.field("wrong_share", wrong_share, between(0.0, 0.9),
             "Share of the reporting pairs that are wrong, as confident as the others.");
     v.field("distant_share", distant_share, between(0.0, 1.0), "Share of the wrong ones that join distant places.");
-    v.field("agreeing_share", agreeing_share, between(0.0, 1.0),
-            "Share of the wrong ones that agree with their neighbours, as places that look alike cause.");
   }
 };
 

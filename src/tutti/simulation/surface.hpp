@@ -22,22 +22,16 @@ struct SurfaceConfig {
   double cell_m = 0.25;
   double body_height_m = 0.55;
   double width_m = 3.2;
-  double office_width_m = 2.4;
-  double doors_per_100m = 20.0;
-  double parapet_height_m = 0.35;
-  int chimneys = 2;
+  double office_width_m = 2.4;     ///< Office corridors'.
+  double doors_per_100m = 20.0;    ///< Office: door niches; every third stands open to a room.
+  double parapet_height_m = 0.35;  ///< Roof: wall around its edge.
+  int chimneys = 2;                ///< Roof: the only things that stand on it, beside the house of the door.
   template <class V>
   void describe(V& v) {
     v.field("cell_m", cell_m, between(0.05, 1.0), "Grid the surface is built on: details below it are lost.");
     v.field("body_height_m", body_height_m, above_zero_to(kLargestRoom_m),
             "Height of the network's lines above the floor.");
     v.field("width_m", width_m, above_zero_to(kLargestRoom_m), "Width of rough and featureless corridors.");
-    v.field("office_width_m", office_width_m, above_zero_to(kLargestRoom_m), "Width of office corridors.");
-    v.field("doors_per_100m", doors_per_100m, between(0.0, kMostPer100m),
-            "Office: door niches; every third stands open to a room.");
-    v.field("parapet_height_m", parapet_height_m, between(0.0, kLargestRoom_m), "Roof: wall around its edge.");
-    v.field("chimneys", chimneys, between(0, 20),
-            "Roof: the only things that stand on it, beside the house of the door.");
   }
 };
 

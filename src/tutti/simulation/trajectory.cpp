@@ -123,11 +123,11 @@ struct Walker {
   }
 };
 
-/// `gait`: 1 = walking, 0 = standing.
-Pose3 body_pose(const Walker& walker, const WalkConfig& config, double time_s, double phase, double gait) {
-  const double step = 2.0 * kPi * config.step_hz * time_s + phase;
-  const double sway = gait * config.sway_deg * kRadPerDeg;
-  const double bob = gait * config.bob_m;
+/// `share` of the gait: 1 = walking, 0 = standing.
+Pose3 body_pose(const Walker& walker, const Gait& gait, double time_s, double phase, double share) {
+  const double step = 2.0 * kPi * gait.step_hz * time_s + phase;
+  const double sway = share * gait.sway_deg * kRadPerDeg;
+  const double bob = share * gait.bob_m;
   const Eigen::Quaterniond rotation =
       Eigen::AngleAxisd(walker.yaw, Eigen::Vector3d::UnitZ()) *
       Eigen::AngleAxisd(walker.pitch + sway * std::sin(2.0 * step), Eigen::Vector3d::UnitY()) *
@@ -209,6 +209,17 @@ Status check_route(const CorridorWorld& world, const std::vector<int>& junctions
 
 }  // namespace
 
+const std::vector<Gait>& gaits() {
+  static const std::vector<Gait> rows{
+      {"walking", "sways by 0.8 degrees, bobs by 1 cm, 1.3 steps a second", 0.8, 0.01, 1.3},
+      {"trotting", "bobs by 5 mm, 1 step a second", 0.8, 0.005, 1.0},
+      {"stepping", "bobs by 5 mm, 1.5 steps a second", 0.8, 0.005, 1.5},
+      {"driving", "a car: sways by 0.2 degrees", 0.2, 0.01, 1.3},
+      {"rolling", "wheels on a floor: neither", 0.0, 0.0, 1.0},
+  };
+  return rows;
+}
+
 Status check_walk(const CorridorWorld& world, const WalkConfig& config, std::optional<std::size_t> start_junction) {
   if (config.max_speed_mps < config.min_speed_mps)
     return fail(ErrorCode::configuration, "walk: max_speed_mps is {}, expected at least min_speed_mps = {}",
@@ -230,6 +241,8 @@ Trajectory simulate_walk(const CorridorWorld& world, const WalkConfig& config, T
                          std::optional<std::size_t> start_junction, Rng rng) {
   const Status ok = check_walk(world, config, start_junction);
   TUTTI_CHECK(ok.has_value(), "{}", ok.error().message);
+  const Gait* gait = row_of(gaits(), config.gait);
+  TUTTI_CHECK(gait != nullptr, "gait '{}'", config.gait);
   std::size_t first = start_junction.value_or(rng.index(world.junctions.size()));
   if (!config.route.empty()) first = static_cast<std::size_t>(config.route.front());
 
@@ -252,8 +265,8 @@ Trajectory simulate_walk(const CorridorWorld& world, const WalkConfig& config, T
   std::size_t step = 0;
   for (std::size_t i = 0; i < samples; ++i) {
     const double time_s = static_cast<double>(i) / config.rate_hz;
-    const double gait = std::min(1.0, speeds[step] / config.min_speed_mps);
-    truth.push_back({start + time_s, body_pose(walker, config, time_s, phase, gait)});
+    const double share = std::min(1.0, speeds[step] / config.min_speed_mps);
+    truth.push_back({start + time_s, body_pose(walker, *gait, time_s, phase, share)});
     for (int k = 0; k < substeps; ++k, ++step) {
       carrot.keep_ahead_of(walker.position);
       walker.step(carrot, pace * speeds[step], dt);

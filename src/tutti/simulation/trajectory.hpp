@@ -3,16 +3,28 @@
 
 #include <cstddef>
 #include <optional>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "tutti/base/config.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/base/result.hpp"
+#include "tutti/base/rows.hpp"
 #include "tutti/model/trajectory.hpp"
 #include "tutti/simulation/bounds.hpp"
 #include "tutti/simulation/corridor_world.hpp"
 
 namespace tutti::simulation {
+
+/// A gait that can be chosen.
+struct Gait {
+  std::string_view name, help;
+  double sway_deg = 0.0;  ///< Roll and pitch.
+  double bob_m = 0.0;     ///< Up and down.
+  double step_hz = 1.0;
+};
+const std::vector<Gait>& gaits();
 
 /// How a robot walks; `describe` explains the fields.
 struct WalkConfig {
@@ -25,9 +37,7 @@ struct WalkConfig {
   double pause_s = 8.0;
   std::vector<int> route;
   double lookahead_m = 2.0;
-  double sway_deg = 0.8;
-  double bob_m = 0.01;
-  double step_hz = 1.3;
+  std::string gait = "walking";
   template <class V>
   void describe(V& v) {
     v.field("duration_s", duration_s, above_zero_to(kLongest_s), "Length of the walk.");
@@ -43,9 +53,7 @@ struct WalkConfig {
             "must be joined by a corridor, without turning back. Empty: the corridors seen least.");
     v.field("lookahead_m", lookahead_m, between(0.1, kFarthest_m),
             "How far ahead the robot steers; wider turns with more.");
-    v.field("sway_deg", sway_deg, between(0.0, 10.0), "Roll and pitch of the gait; 0 for a wheeled robot.");
-    v.field("bob_m", bob_m, between(0.0, 0.2), "Up and down of the gait; 0 for a wheeled robot.");
-    v.field("step_hz", step_hz, above_zero_to(1000.0), "Gait frequency.");
+    v.field("gait", gait, one_of(names_of(gaits())), help_of(gaits()) + ".");
   }
 };
 

@@ -122,7 +122,7 @@ RC_GTEST_PROP(SimulateWalk, TravelsTheLengthAskedFor, ()) {
   config.duration_s = *rc::gen::element(300.0, 900.0);
   config.length_m = *rc::gen::element(0.3, 0.6) * config.duration_s;
   config.pauses_per_min = *rc::gen::element(0.0, 2.0);
-  config.bob_m = 0.0;  // the gait's ups and downs are no way travelled
+  config.gait = "rolling";  // a gait's ups and downs are no distance travelled
   const Trajectory truth = simulate_walk(world, config, {}, std::nullopt, Rng(*rc::gen::arbitrary<std::uint32_t>()));
   RC_ASSERT(truth.size() == static_cast<std::size_t>(config.duration_s * config.rate_hz) + 1);
   RC_ASSERT(std::abs(ground_length(truth) - config.length_m) < 0.005 * config.length_m);

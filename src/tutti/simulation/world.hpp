@@ -48,8 +48,6 @@ struct WorldConfig {
             "tunnel: share of the corridors that are straight, smooth and empty: the longest.");
     v.field("featureless", featureless, at_least(0.0),
             "tunnel: also the corridors between these junctions, two by two.");
-    v.field("office_length_m", office_length_m, above_zero_to(kLongestLoop_m), "terrace: the office loop, x.");
-    v.field("office_width_m", office_width_m, above_zero_to(kLongestLoop_m), "terrace: the office loop, y.");
     v.field("roof_length_m", roof_length_m, above_zero_to(kLongestLoop_m), "terrace: the loop on the roof, x.");
     v.field("roof_width_m", roof_width_m, above_zero_to(kLongestLoop_m), "terrace: the loop on the roof, y.");
     v.field("ramp_length_m", ramp_length_m, above_zero_to(kLongestLoop_m),
