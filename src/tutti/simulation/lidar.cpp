@@ -47,6 +47,7 @@ LidarConfig LidarChoice::config() const {
   LidarConfig out = row->config;
   out.azimuth_step_deg /= rays_share;
   out.points_per_s *= rays_share;
+  out.range_sigma_m = range_sigma_m;
   out.mount_height_m = mount_height_m;
   return out;
 }

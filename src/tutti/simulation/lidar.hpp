@@ -53,12 +53,14 @@ const std::vector<LidarModel>& lidar_models();
 struct LidarChoice {
   std::string model = "16-beam";
   double rays_share = 1.0;
+  double range_sigma_m = 0.02;
   double mount_height_m = 0.25;
   template <class V>
   void describe(V& v) {
     v.field("model", model, one_of(names_of(lidar_models())), help_of(lidar_models()) + ".");
     v.field("rays_share", rays_share, between(0.01, 4.0),
             "Rays per sweep over the model's: fewer take less time and see less.");
+    v.field("range_sigma_m", range_sigma_m, between(0.0, 1e4), "Noise of a range.");
     v.field("mount_height_m", mount_height_m, between(-kLargestRoom_m, kLargestRoom_m), "Sensor above the body frame.");
   }
   [[nodiscard]] LidarConfig config() const;
