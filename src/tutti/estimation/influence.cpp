@@ -7,7 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <optional>
+#include <memory>
 #include <utility>
 
 #include "tutti/base/check.hpp"
@@ -236,57 +236,35 @@ std::vector<double> group_misfits(const PoseGraph& graph, std::span<const Pose3>
   return out;
 }
 
-struct GroupRemovals::State {
-  State(const PoseGraph& graph, std::span<const Pose3> poses, std::span<const EdgeRole> roles,
-        std::span<const std::vector<std::size_t>> groups, std::span<const std::size_t> nodes)
-      : equations(graph, poses, roles, groups, nodes), forces(groups.size()) {}
-  GroupEquations equations;
-  /// Per group the force on its ends, by variable, that has the effect of taking it away; empty: unknown.
-  using Force = std::vector<std::pair<int, Vector6d>>;
-  std::vector<std::optional<Force>> forces;
-};
-
-GroupRemovals::GroupRemovals(const PoseGraph& graph, std::span<const Pose3> poses, std::span<const EdgeRole> roles,
-                             std::span<const std::vector<std::size_t>> groups, std::span<const std::size_t> nodes)
-    : state_(std::make_unique<State>(graph, poses, roles, groups, nodes)) {
-  State& s = *state_;
-  if (!s.equations.is_determined) return;
-  const SelectedInverse inverse(s.equations.equations->hessian().factor().copy());
+Eigen::MatrixXd group_removals(const PoseGraph& graph, std::span<const Pose3> poses, std::span<const EdgeRole> roles,
+                               std::span<const std::vector<std::size_t>> groups, std::span<const std::size_t> nodes) {
+  const auto rows = static_cast<Eigen::Index>(6 * nodes.size());
+  Eigen::MatrixXd out = Eigen::MatrixXd::Constant(rows, static_cast<Eigen::Index>(groups.size()),
+                                                  std::numeric_limits<double>::infinity());
+  GroupEquations equations(graph, poses, roles, groups, nodes);
+  if (!equations.is_determined) return out;
+  // The columns of H^-1 at the nodes serve all groups, as H^-1 is symmetric.
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(6 * equations.structure.variables, rows);
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    const auto node = std::ranges::lower_bound(equations.reduced.nodes, nodes[k]) - equations.reduced.nodes.begin();
+    const int v = equations.structure.variable[static_cast<std::size_t>(node)];
+    if (v >= 0) columns.block<6, 6>(6 * v, static_cast<Eigen::Index>(6 * k)).setIdentity();
+  }
+  equations.equations->hessian().solve(columns);
+  const SelectedInverse inverse(equations.equations->hessian().take_factor());
   for (std::size_t g = 0; g < groups.size(); ++g) {
-    const Group group = s.equations.whitened(groups[g]);
+    const Group group = equations.whitened(groups[g]);
     const Eigen::LDLT<Eigen::MatrixXd> others = of_others(known_of(group, inverse));
     if (others.info() != Eigen::Success || !(others.vectorD().minCoeff() > kHardlyKnown)) continue;
     const Eigen::VectorXd w = others.solve(residual_of(group));
-    State::Force& force = s.forces[g].emplace();
-    for (std::size_t a = 0; a < group.size(); ++a) {
-      const Vector6d own = w.segment<6>(static_cast<Eigen::Index>(6 * a));
-      if (group[a].slot.from >= 0) force.emplace_back(group[a].slot.from, group[a].J_from.transpose() * own);
-      if (group[a].slot.to >= 0) force.emplace_back(group[a].slot.to, group[a].J_to.transpose() * own);
-    }
-  }
-}
-GroupRemovals::~GroupRemovals() = default;
-
-Eigen::MatrixXd GroupRemovals::moves(std::span<const std::size_t> nodes) const {
-  const State& s = *state_;
-  const auto rows = static_cast<Eigen::Index>(6 * nodes.size());
-  Eigen::MatrixXd out = Eigen::MatrixXd::Constant(rows, static_cast<Eigen::Index>(s.forces.size()),
-                                                  std::numeric_limits<double>::infinity());
-  if (!s.equations.is_determined) return out;
-  // The columns of H^-1 at the nodes serve all groups, as H^-1 is symmetric.
-  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(6 * s.equations.structure.variables, rows);
-  for (std::size_t k = 0; k < nodes.size(); ++k) {
-    const auto node = std::ranges::lower_bound(s.equations.reduced.nodes, nodes[k]);
-    TUTTI_CHECK(node != s.equations.reduced.nodes.end() && *node == nodes[k], "node {} was not asked for", nodes[k]);
-    const int v = s.equations.structure.variable[static_cast<std::size_t>(node - s.equations.reduced.nodes.begin())];
-    if (v >= 0) columns.block<6, 6>(6 * v, static_cast<Eigen::Index>(6 * k)).setIdentity();
-  }
-  s.equations.equations->hessian().solve(columns);
-  for (std::size_t g = 0; g < s.forces.size(); ++g) {
-    if (!s.forces[g]) continue;
     auto moves = out.col(static_cast<Eigen::Index>(g));
     moves.setZero();
-    for (const auto& [variable, force] : *s.forces[g]) moves += columns.middleRows<6>(6 * variable).transpose() * force;
+    for (std::size_t a = 0; a < group.size(); ++a) {
+      const Vector6d own = w.segment<6>(static_cast<Eigen::Index>(6 * a));
+      for (const auto& [v, J] :
+           {std::pair(group[a].slot.from, &group[a].J_from), std::pair(group[a].slot.to, &group[a].J_to)})
+        if (v >= 0) moves += columns.middleRows<6>(6 * v).transpose() * (J->transpose() * own);
+    }
   }
   return out;
 }

@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <cstddef>
-#include <memory>
 #include <span>
 #include <vector>
 
@@ -45,26 +44,12 @@ std::vector<Influence> largest_influences(const PoseGraph& graph, std::span<cons
 std::vector<double> group_misfits(const PoseGraph& graph, std::span<const Pose3> poses, std::span<const EdgeRole> roles,
                                   std::span<const std::vector<std::size_t>> groups);
 
-/// What taking groups of edges away moves, to first order: with r, J and K of a group as above, all poses move by
-/// H^-1 J^T (I - K)^-1 r. One factorisation and one selected inverse serve all groups, and one solution for six columns
-/// a node all groups at that node.
-class GroupRemovals {
- public:
-  /// `groups`, `roles` as in group_misfits(); `nodes`: those of whose moves can be asked.
-  GroupRemovals(const PoseGraph& graph, std::span<const Pose3> poses, std::span<const EdgeRole> roles,
-                std::span<const std::vector<std::size_t>> groups, std::span<const std::size_t> nodes);
-  ~GroupRemovals();
-  GroupRemovals(const GroupRemovals&) = delete;
-  GroupRemovals& operator=(const GroupRemovals&) = delete;
-
-  /// 6 rows per node, right tangents, and a column per group. The first node of each connected component does not move.
-  /// Infinite where hardly anything but the group holds its ends together, so that the first order says little, and in
-  /// a graph that does not determine its poses.
-  [[nodiscard]] Eigen::MatrixXd moves(std::span<const std::size_t> nodes) const;
-
- private:
-  struct State;
-  std::unique_ptr<State> state_;
-};
+/// How taking each group of edges away moves `nodes`, to first order: with r, J and K of a group as above, all poses
+/// move by H^-1 J^T (I - K)^-1 r. 6 rows per node, right tangents, and a column per group; the first node of each
+/// connected component does not move. One factorisation, one selected inverse and six solutions a node serve all
+/// groups. Infinite where hardly anything but the group holds its ends together, so that the first order says little,
+/// and in a graph that does not determine its poses. `groups`, `roles` as in group_misfits().
+Eigen::MatrixXd group_removals(const PoseGraph& graph, std::span<const Pose3> poses, std::span<const EdgeRole> roles,
+                               std::span<const std::vector<std::size_t>> groups, std::span<const std::size_t> nodes);
 
 }  // namespace tutti::estimation

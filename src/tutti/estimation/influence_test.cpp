@@ -34,6 +34,11 @@ PoseGraph without(PoseGraph graph, std::size_t edge) {
   return graph;
 }
 
+PoseGraph without(PoseGraph graph, const std::vector<std::size_t>& group) {
+  for (auto e = group.rbegin(); e != group.rend(); ++e) graph = without(std::move(graph), *e);
+  return graph;
+}
+
 TEST(Influence, IsWhatTakingTheEdgeAwayDoes) {
   for (std::uint64_t seed = 0; seed < 6; ++seed) {
     Rng rng(seed);
@@ -108,8 +113,7 @@ TEST(GroupMisfits, AreWhatTakingTheGroupAwayDoes) {
     const auto misfits = group_misfits(graph, poses, roles_from_numbering(graph), groups);  // its chain is compounded
     ASSERT_EQ(misfits.size(), groups.size());
     for (std::size_t g = 0; g < groups.size(); ++g) {
-      PoseGraph less = graph;
-      for (auto e = groups[g].rbegin(); e != groups[g].rend(); ++e) less = without(less, *e);
+      const PoseGraph less = without(graph, groups[g]);
       const std::vector<Pose3> moved = optimum(less);
       const PoseGraphEdge& middle = graph.edges[groups[g][groups[g].size() / 2]];
       const auto relative = [&](const std::vector<Pose3>& p) { return p[middle.from].inverse() * p[middle.to]; };
@@ -129,14 +133,12 @@ TEST(GroupRemovals, MoveNodesAsTakingTheGroupAwayDoes) {
     const std::vector<Pose3> poses = optimum(graph);
     const Groups groups = {{39, 40, 41}, {44, 46}, {47}};
     const std::vector<std::size_t> nodes = {3, 11, 25, 39};
-    const GroupRemovals removals(graph, poses, roles_from_numbering(graph), groups, nodes);
-    const Eigen::MatrixXd moves = removals.moves(nodes);
+    const auto roles = roles_from_numbering(graph);
+    const Eigen::MatrixXd moves = group_removals(graph, poses, roles, groups, nodes);
     ASSERT_EQ(moves.rows(), 24);
     ASSERT_EQ(moves.cols(), 3);
     for (std::size_t g = 0; g < groups.size(); ++g) {
-      PoseGraph less = graph;
-      for (auto e = groups[g].rbegin(); e != groups[g].rend(); ++e) less = without(less, *e);
-      const std::vector<Pose3> moved = optimum(less);
+      const std::vector<Pose3> moved = optimum(without(graph, groups[g]));
       Eigen::VectorXd truly(24);
       for (std::size_t k = 0; k < nodes.size(); ++k)
         truly.segment<6>(static_cast<Eigen::Index>(6 * k)) = local(poses[nodes[k]], moved[nodes[k]]);
@@ -144,7 +146,7 @@ TEST(GroupRemovals, MoveNodesAsTakingTheGroupAwayDoes) {
       EXPECT_LT((truly - first_order).norm(), 0.1 * truly.norm() + 1e-6) << seed << " group " << g;
     }
     const std::vector<std::size_t> one = {25};
-    EXPECT_LT((removals.moves(one) - moves.middleRows<6>(12)).norm(), 1e-12);
+    EXPECT_LT((group_removals(graph, poses, roles, groups, one) - moves.middleRows<6>(12)).norm(), 1e-12);
   }
 }
 
@@ -155,8 +157,8 @@ TEST(GroupRemovals, WhereOnlyTheGroupHoldsItsEndsTheFirstOrderSaysNothing) {
   const std::vector<std::size_t> nodes = {0, 19};
   PoseGraph chain = graph;
   chain.edges.pop_back();
-  EXPECT_TRUE(GroupRemovals(graph, optimum(graph), {}, groups, nodes).moves(nodes).rightCols<1>().allFinite());
-  EXPECT_FALSE(GroupRemovals(chain, optimum(chain), {}, Groups{{7}}, nodes).moves(nodes).allFinite());
+  EXPECT_TRUE(group_removals(graph, optimum(graph), {}, groups, nodes).rightCols<1>().allFinite());
+  EXPECT_FALSE(group_removals(chain, optimum(chain), {}, Groups{{7}}, nodes).allFinite());
 }
 
 /// Each of five agrees with the odometry of a ring, and so do all of them: many say no more than one.

@@ -75,8 +75,7 @@ std::vector<double> first_order_moves(const MapEstimate& map, std::span<const es
   if (nodes.size() < 2) return out;
   std::vector<Pose3> with, without(nodes.size());
   for (const std::size_t node : nodes) with.push_back(map.graph.poses[node]);
-  const Eigen::MatrixXd moves =
-      estimation::GroupRemovals(map.graph, map.graph.poses, roles, groups, nodes).moves(nodes);
+  const Eigen::MatrixXd moves = estimation::group_removals(map.graph, map.graph.poses, roles, groups, nodes);
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const auto move = moves.col(static_cast<Eigen::Index>(g));
     if (!move.allFinite()) continue;

@@ -5,6 +5,8 @@
 #include <set>
 #include <utility>
 
+#include "tutti/simulation/imu.hpp"
+
 namespace tutti::simulation {
 namespace {
 
@@ -64,9 +66,10 @@ Result<SimulatedHall> simulate_hall(const HallMissionConfig& config, Timestamp s
                                      config.images, own.fork("images"),
                                      config.depth ? std::optional(DepthSensor{}) : std::nullopt);
       if (config.imu) {
+        const ImuConfig imu;
         recording.imu = simulate_imu([&](double time_s) { return flight_motion(robot.flight, time_s); },
-                                     start + robot.start_s, robot.flight.duration_s, config.imu_noise, own.fork("imu"));
-        recording.imu_noise = config.imu_noise.noise();
+                                     start + robot.start_s, robot.flight.duration_s, imu, own.fork("imu"));
+        recording.imu_noise = imu.noise();
       }
     }
     out.robots.push_back(std::move(flown));

@@ -13,7 +13,6 @@
 #include "tutti/simulation/camera.hpp"
 #include "tutti/simulation/flight.hpp"
 #include "tutti/simulation/hall.hpp"
-#include "tutti/simulation/imu.hpp"
 #include "tutti/simulation/lidar.hpp"
 #include "tutti/simulation/odometry.hpp"
 
@@ -45,7 +44,6 @@ struct HallMissionConfig {
   bool half_resolution = true;  ///< Images of 376 x 240 pixels instead of 752 x 480, in a quarter of the time.
   bool imu = true;
   LidarChoice lidar;
-  ImuConfig imu_noise;
   std::vector<FlyingRobotConfig> robots;
   template <class V>
   void describe(V& v) {

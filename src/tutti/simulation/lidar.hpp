@@ -53,8 +53,8 @@ const std::vector<LidarModel>& lidar_models();
 struct LidarChoice {
   std::string model = "16-beam";
   double rays_share = 1.0;
-  double range_sigma_m = 0.02;
-  double mount_height_m = 0.25;
+  double range_sigma_m = LidarConfig{}.range_sigma_m;
+  double mount_height_m = LidarConfig{}.mount_height_m;
   template <class V>
   void describe(V& v) {
     v.field("model", model, one_of(names_of(lidar_models())), help_of(lidar_models()) + ".");
