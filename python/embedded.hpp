@@ -11,7 +11,7 @@
 namespace tutti::python {
 
 /// An object that Python's threads may share. Its calls exclude each other, and release the interpreter meanwhile. The
-/// mutex is recursive, because a finder written in Python is called from within a call.
+/// mutex is recursive, because a verifier written in Python is called from within a call.
 template <class T>
 class Shared {
  public:

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "embedded.hpp"
 #include "map_values.hpp"
-#include "tutti/finders/sensor_finder_maker.hpp"
 #include "tutti/server/map_server.hpp"
+#include "tutti/verifiers/sensor_verifier_maker.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::python {
@@ -11,41 +11,41 @@ namespace {
 using server::MapServer;
 using server::VerificationJob;
 
-/// A submap as finders see it.
+/// A submap as verifiers see it.
 struct SeenSubmap {
   std::shared_ptr<const Submap> submap;
   std::shared_ptr<const PointCloud> cloud;  ///< Null where it was not asked for, or there is none.
 };
 
-/// What a finder written in Python found.
+/// What a verifier written in Python found.
 struct FoundClosure {
   std::uint32_t from_index = 0, to_index = 0;
   RelativePose measurement;
 };
 
-/// A finder written in Python: is_candidate(first, second) and verify(first, second).
-class PythonFinder final : public server::ClosureFinder {
+/// A verifier written in Python: is_candidate(first, second) and verify(first, second).
+class PythonVerifier final : public server::ClosureVerifier {
  public:
-  explicit PythonFinder(py::object finder) : finder_(std::move(finder)) {}
-  ~PythonFinder() override {
+  explicit PythonVerifier(py::object verifier) : verifier_(std::move(verifier)) {}
+  ~PythonVerifier() override {
     const py::gil_scoped_acquire acquire;
-    finder_ = py::object();
+    verifier_ = py::object();
   }
-  PythonFinder(const PythonFinder&) = delete;
-  PythonFinder& operator=(const PythonFinder&) = delete;
+  PythonVerifier(const PythonVerifier&) = delete;
+  PythonVerifier& operator=(const PythonVerifier&) = delete;
   [[nodiscard]] MethodId id() const override { return {"python", 1, 0}; }
   [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return true; }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
     const py::gil_scoped_acquire acquire;
-    return py::bool_(finder_.attr("is_candidate")(see(first, nullptr), see(second, nullptr)));
+    return py::bool_(verifier_.attr("is_candidate")(see(first, nullptr), see(second, nullptr)));
   }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const server::PayloadStore& payloads) const override {
     auto cloud_a = payloads.cloud(first.id), cloud_b = payloads.cloud(second.id);  // an error: it came without one
-    ClosureVerdict verdict{.pair = {first.id, second.id}, .closures = {}, .refusal = {}, .finder = id()};
+    ClosureVerdict verdict{.pair = {first.id, second.id}, .closures = {}, .refusal = {}, .verifier = id()};
     const py::gil_scoped_acquire acquire;
     const py::object found =
-        finder_.attr("verify")(see(first, cloud_a.value_or(nullptr)), see(second, cloud_b.value_or(nullptr)));
+        verifier_.attr("verify")(see(first, cloud_a.value_or(nullptr)), see(second, cloud_b.value_or(nullptr)));
     if (!found.is_none())
       for (const py::handle& one : found) {
         const auto closure = one.cast<FoundClosure>();
@@ -60,36 +60,36 @@ class PythonFinder final : public server::ClosureFinder {
   static SeenSubmap see(const Submap& submap, std::shared_ptr<const PointCloud> cloud) {
     return {std::make_shared<const Submap>(without_payloads(submap)), std::move(cloud)};
   }
-  py::object finder_;
+  py::object verifier_;
 };
 
 struct Server {
-  std::shared_ptr<const server::ClosureFinder> finder;
+  std::shared_ptr<const server::ClosureVerifier> verifier;
   std::shared_ptr<server::MemoryPayloadStore> payloads;
   Shared<MapServer> server;
 };
 
-std::shared_ptr<const server::ClosureFinder> make_finder(const py::object& finder, const py::dict& settings) {
-  if (!py::isinstance<py::str>(finder)) {
+std::shared_ptr<const server::ClosureVerifier> make_verifier(const py::object& verifier, const py::dict& settings) {
+  if (!py::isinstance<py::str>(verifier)) {
     for (const char* name : {"is_candidate", "verify"})
-      if (!py::hasattr(finder, name))
-        refuse("finder: has no {}(first, second), expected 'lidar' or an object that has", name);
-    return std::make_shared<const PythonFinder>(finder);
+      if (!py::hasattr(verifier, name))
+        refuse("verifier: has no {}(first, second), expected 'lidar' or an object that has", name);
+    return std::make_shared<const PythonVerifier>(verifier);
   }
-  if (const std::string name = py::str(finder); name != "lidar")
-    refuse("finder: is '{}', expected 'lidar' or an object with is_candidate() and verify()", name);
-  finders::FinderConfig config;
+  if (const std::string name = py::str(verifier); name != "lidar")
+    refuse("verifier: is '{}', expected 'lidar' or an object with is_candidate() and verify()", name);
+  verifiers::VerifierConfig config;
   set(config, settings);
-  return finders::make_finder(config);
+  return verifiers::make_verifier(config);
 }
 
-std::unique_ptr<Server> make_server(const std::vector<std::uint32_t>& robots, const py::object& finder,
-                                    const py::dict& settings, const py::dict& finder_settings, std::uint64_t epoch) {
+std::unique_ptr<Server> make_server(const std::vector<std::uint32_t>& robots, const py::object& verifier,
+                                    const py::dict& settings, const py::dict& verifier_settings, std::uint64_t epoch) {
   server::ServerConfig config;
   set(config, settings);
   std::set<RobotId> ids;
   for (const std::uint32_t robot : robots) ids.insert({robot});
-  auto found_by = make_finder(finder, finder_settings);
+  auto found_by = make_verifier(verifier, verifier_settings);
   auto payloads = std::make_shared<server::MemoryPayloadStore>();
   return std::unique_ptr<Server>(
       new Server{found_by, payloads, Shared<MapServer>(ids, found_by, payloads, config, epoch)});
@@ -109,7 +109,7 @@ py::bytes verify(const Server& server, const VerificationJob& job) {
   std::string out;
   {
     const py::gil_scoped_release release;
-    const ClosureVerdict verdict = value_of(server.finder->verify(*job.first, *job.second, *server.payloads));
+    const ClosureVerdict verdict = value_of(server.verifier->verify(*job.first, *job.second, *server.payloads));
     check(wire::validate(verdict));
     out = wire::encode(verdict);
   }
@@ -122,7 +122,7 @@ FoundClosure make_closure(std::uint32_t from_index, std::uint32_t to_index, cons
 }
 
 void bind_submap(py::module_& m) {
-  py::class_<SeenSubmap>(m, "Submap", "What one robot saw in about 10 s, as finders of closures are shown it.")
+  py::class_<SeenSubmap>(m, "Submap", "What one robot saw in about 10 s, as verifiers of closures are shown it.")
       .def_property_readonly(
           "robot", [](const SeenSubmap& s) { return s.submap->id.chain.robot.value; }, "Number of its robot,")
       .def_property_readonly(
@@ -147,7 +147,7 @@ void bind_submap(py::module_& m) {
           },
           "(n, 3) float32, metres in the submap's frame; None where it has none, and in is_candidate().")
       .def("__repr__", [](const SeenSubmap& s) { return fmt::format("<tutti.Submap {}>", to_string(s.submap->id)); });
-  py::class_<FoundClosure>(m, "Closure", "A loop closure, as a finder written in Python returns it.")
+  py::class_<FoundClosure>(m, "Closure", "A loop closure, as a verifier written in Python returns it.")
       .def(
           py::init(&make_closure), "from_index"_a, "to_index"_a, "T_from_to"_a, "covariance"_a,
           R"(Between keyframe from_index of the first submap and to_index of the second: T_from_to (4, 4), and the covariance (6, 6) of
@@ -177,11 +177,11 @@ void bind_server(py::module_& m) {
 
 No sockets, clocks or threads inside: how messages travel, and when it optimises, is yours. Several threads may share it.)")
       .def(
-          py::init(&make_server), "robots"_a, "finder"_a = "lidar", "settings"_a = py::dict(),
-          "finder_settings"_a = py::dict(), "epoch"_a = 1,
-          R"(robots: their numbers. finder: who finds closures, 'lidar' from the submaps' clouds, or an object of yours with
+          py::init(&make_server), "robots"_a, "verifier"_a = "lidar", "settings"_a = py::dict(),
+          "verifier_settings"_a = py::dict(), "epoch"_a = 1,
+          R"(robots: their numbers. verifier: who finds closures, 'lidar' from the submaps' clouds, or an object of yours with
 is_candidate(first, second), cheap, and verify(first, second), which returns Closures or None, of two Submaps, as a function of
-these alone. settings: {"change_of_mind": "follow"}, those of `tutti settings --of server` below server; finder_settings:
+these alone. settings: {"change_of_mind": "follow"}, those of `tutti settings --of server` below server; verifier_settings:
 {"min_submap_gap": 3}, those below closures. epoch: larger than at any start before. ValueError: a setting.)")
       .def(
           "receive", &receive_message, "message"_a,

@@ -79,8 +79,8 @@ build_and_test "$preset" Release "${tests[@]}"
 if [ "$sanitize" = yes ]; then
   export ASAN_OPTIONS=detect_stack_use_after_return=1:strict_string_checks=1
   export UBSAN_OPTIONS=print_stacktrace=1
-  targets=(test_bus test_feed test_finders test_integration test_program)
-  build_and_test tsan TSan -R '^(bus|feed|finders|program)/|^integration/mission$'
+  targets=(test_bus test_feed test_verifiers test_integration test_program)
+  build_and_test tsan TSan -R '^(bus|feed|verifiers|program)/|^integration/mission$'
   targets=()
   build_and_test asan "ASan + UBSan"
 fi

@@ -10,7 +10,7 @@
 
 #include "support/sanitized.hpp"
 #include "tutti/base/random.hpp"
-#include "tutti/lab/closure_finders.hpp"
+#include "tutti/lab/closure_verifiers.hpp"
 #include "tutti/robot/agent.hpp"
 #include "tutti/server/map_server.hpp"
 #include "tutti/simulation/recordings.hpp"
@@ -23,7 +23,7 @@ struct SmallMission {
   std::vector<mission::MissionRecording> recordings;
   std::set<RobotId> robots;
   std::vector<std::string> uploads;  // encoded submaps, in the order they were made
-  std::shared_ptr<const server::ClosureFinder> finder;
+  std::shared_ptr<const server::ClosureVerifier> verifier;
 };
 
 SmallMission make_mission() {
@@ -46,10 +46,10 @@ SmallMission make_mission() {
     out.recordings.push_back({.recording = std::move(recording)});
   }
   lab::MissionConfig mission;
-  mission.closure_changes.finder = "reference";
+  mission.closure_changes.verifier = "reference";
   mission.closure_changes.reference.wrong_share = 0.2;
   mission.closure_changes.reference.min_time_gap_s = 20.0;
-  out.finder = lab::make_closure_finder(mission, out.recordings, 5);
+  out.verifier = lab::make_closure_verifier(mission, out.recordings, 5);
   return out;
 }
 
@@ -60,11 +60,11 @@ server::MapEstimate final_map(server::MapServer& server) {
 
 /// Every message once, in order, verdicts at once.
 server::MapEstimate map_in_order(const SmallMission& mission) {
-  server::MapServer server(mission.robots, mission.finder, std::make_shared<server::MemoryPayloadStore>(), {}, 1);
+  server::MapServer server(mission.robots, mission.verifier, std::make_shared<server::MemoryPayloadStore>(), {}, 1);
   for (const std::string& bytes : mission.uploads) {
     EXPECT_TRUE(server.receive(*wire::decode_submap(bytes)).has_value());
     for (const auto& job : server.take_jobs())
-      EXPECT_TRUE(server.receive(*mission.finder->verify(*job.first, *job.second, server.payloads())).has_value());
+      EXPECT_TRUE(server.receive(*mission.verifier->verify(*job.first, *job.second, server.payloads())).has_value());
   }
   return final_map(server);
 }
@@ -79,7 +79,7 @@ server::MapEstimate map_in_disorder(const SmallMission& mission, Rng rng) {
     if (rng.bernoulli(0.2)) uploads.push_back(bytes);
   shuffle(uploads);
 
-  server::MapServer server(mission.robots, mission.finder, std::make_shared<server::MemoryPayloadStore>(), {}, 1);
+  server::MapServer server(mission.robots, mission.verifier, std::make_shared<server::MemoryPayloadStore>(), {}, 1);
   std::vector<ClosureVerdict> late;
   const auto hand_in = [&](double share) {
     shuffle(late);
@@ -95,7 +95,7 @@ server::MapEstimate map_in_disorder(const SmallMission& mission, Rng rng) {
   for (const std::string& bytes : uploads) {
     EXPECT_TRUE(server.receive(*wire::decode_submap(bytes)).has_value());
     for (const auto& job : server.take_jobs())
-      late.push_back(*mission.finder->verify(*job.first, *job.second, server.payloads()));
+      late.push_back(*mission.verifier->verify(*job.first, *job.second, server.payloads()));
     if (rng.bernoulli(0.3)) hand_in(rng.uniform(0.0, 1.0));
     if (rng.bernoulli(0.03)) server.optimise();
   }

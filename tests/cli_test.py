@@ -20,7 +20,7 @@ SMALL = [  # two minutes with LiDAR in a small tunnel
 
 BRIEF = [  # half a minute of trajectories only
     "--set", "simulation.robots=[{walk: {duration_s: 30}}, {walk: {duration_s: 30}}]",
-    "--set", "simulation.sensors=none", "--set", "closures.finder=reference",
+    "--set", "simulation.sensors=none", "--set", "closures.verifier=reference",
 ]
 
 
@@ -68,17 +68,17 @@ class CommandLine(unittest.TestCase):
         self.expect(tutti("help", "map", "exprot"), 2, "did you mean 'tutti map export'?")
 
     def test_an_option_takes_one_value_and_leaves_the_arguments_alone(self):
-        mission = self.mission("source: simulation\nclosures: {finder: reference}\nsimulation: {robots: [{name: alpha, walk: {duration_s: 5}}]}\n")
+        mission = self.mission("source: simulation\nclosures: {verifier: reference}\nsimulation: {robots: [{name: alpha, walk: {duration_s: 5}}]}\n")
         some = ("--set", "agent.submap.duration_s=7", "--set", "simulation.sensors=none")
         self.expect(tutti("run", "--print-config", *some, mission), 0, "duration_s: 7", "sensors: none")
         self.expect(tutti("world", *some, mission, "-o", self.path / "walls.ply"), 0, "triangles")
         self.expect(tutti("simulate", *some, mission, "-o", self.path / "bags"), 0, "messages")
-        self.expect(tutti("mission", "up", "--out", self.path / "up", "--set", "closures.finder=magic", mission), 2, "magic", "lidar")
+        self.expect(tutti("mission", "up", "--out", self.path / "up", "--set", "closures.verifier=magic", mission), 2, "magic", "lidar")
 
     def test_the_demo_is_a_mission_of_every_command(self):
         for program, settings in (("server", "judge"), ("robot", "agent:"), ("worker", "refinement:")):
-            self.expect(tutti(program, "--print-config", "--set", "closures.finder=visual"), 0, settings)
-        self.expect(tutti("server", "--print-config", "--set", "closures.finder=visual"), 0, "finder: visual")
+            self.expect(tutti(program, "--print-config", "--set", "closures.verifier=visual"), 0, settings)
+        self.expect(tutti("server", "--print-config", "--set", "closures.verifier=visual"), 0, "verifier: visual")
         self.expect(tutti("run", "demo", "--print-config", cwd=self.path), 0, "mission: demo\n")
         self.assertEqual(tutti("run", "demo", "--print-config").stdout, tutti("demo", "--print-config").stdout)
         self.expect(tutti("world", "demo", "-o", self.path / "walls.ply"), 0, "world of demo")
@@ -188,7 +188,7 @@ class CommandLine(unittest.TestCase):
 
     def test_bad_data_exits_1_and_names_file_and_line(self):
         mission = self.mission(
-            "robots: [{name: a, odometry: {file: a.tum}, reference: {file: a.tum}}]\nclosures: {finder: reference}\n")
+            "robots: [{name: a, odometry: {file: a.tum}, reference: {file: a.tum}}]\nclosures: {verifier: reference}\n")
         run = lambda: tutti("run", mission, "--data", self.path, "--out", self.path / "out")
         self.expect(run(), 1, "robot a", "a.tum")
         bad_lines = {
@@ -240,7 +240,7 @@ class CommandLine(unittest.TestCase):
         data = self.path / "data"
         (data / "clouds").mkdir(parents=True)
         (data / "clouds" / "000000.pcd").write_text("mine")
-        mission = self.mission("robots: [{name: a, odometry: {file: a.tum}, scans: clouds}]\nclosures: {finder: lidar}\n")
+        mission = self.mission("robots: [{name: a, odometry: {file: a.tum}, scans: clouds}]\nclosures: {verifier: lidar}\n")
         self.expect(tutti("run", mission, "--data", data, "--out", data), 1, "a.tum")  # never starts
         self.assertEqual([p.relative_to(data).as_posix() for p in sorted(data.rglob("*"))],
                          ["clouds", "clouds/000000.pcd"])
@@ -256,7 +256,7 @@ class CommandLine(unittest.TestCase):
     def test_wanted_scans_that_are_not_there_are_counted(self):
         self.write_way("a.tum", seconds=20)
         (self.path / "scans").mkdir()
-        mission = self.mission("robots: [{name: a, odometry: {file: a.tum}, scans: scans}]\nclosures: {finder: lidar}\n")
+        mission = self.mission("robots: [{name: a, odometry: {file: a.tum}, scans: scans}]\nclosures: {verifier: lidar}\n")
         run = lambda: tutti("run", mission, "--data", self.path, "--out", self.path / "out")
         (self.path / "scans" / "0.pcd").write_text("named otherwise")
         self.expect(run(), 1, "robot a", "scans: holds none of 000000.pcd (or .bin) to 000100.pcd")
@@ -278,10 +278,10 @@ class CommandLine(unittest.TestCase):
 
     def test_settings_say_what_can_be_set(self):
         few = tutti("settings")
-        self.expect(few, 0, "server.update_period_s = ", "closures.finder = ", "link.loss = 0", "--all")
+        self.expect(few, 0, "server.update_period_s = ", "closures.verifier = ", "link.loss = 0", "--all")
         self.assertLess(len(few.stdout.splitlines()), 35, few.stdout)
         everything = tutti("settings", "--all")
-        self.expect(everything, 0, "closures.finder = ", "simulation.robots[].start_s = 0")
+        self.expect(everything, 0, "closures.verifier = ", "simulation.robots[].start_s = 0")
         self.assertGreater(len(everything.stdout.splitlines()), 500)
         one = tutti("settings", "disagreement", "alarm")
         self.expect(one, 0, "agent.disagreement.false_alarm_rate = 0.01   (a number, ")
@@ -361,7 +361,7 @@ class CommandLine(unittest.TestCase):
         self.expect(tutti("export", self.path / "none", "-o", self.path / "x.mcap"), 1, "none")
 
     def test_simulate_writes_a_bag_a_robot(self):
-        mission = self.mission("source: simulation\nclosures: {finder: reference}\n"
+        mission = self.mission("source: simulation\nclosures: {verifier: reference}\n"
                                "simulation: {robots: [{name: alpha, walk: {duration_s: 5}}]}\n")
         self.expect(tutti("simulate", mission, "-o", self.path / "bags"), 0, "bags/alpha: ", " messages")
         self.expect(tutti("bag", "info", self.path / "bags/alpha"), 0, "/alpha/odom (alpha/odom -> alpha/base_link)")
@@ -370,7 +370,7 @@ class CommandLine(unittest.TestCase):
         self.expect(tutti("simulate", replayed, "-o", self.path / "x"), 2, "recordings", "simulation")
 
     def test_world_writes_the_walls_of_a_simulated_mission(self):
-        mission = self.mission("source: simulation\nclosures: {finder: reference}\n")
+        mission = self.mission("source: simulation\nclosures: {verifier: reference}\n")
         self.expect(tutti("world", mission, "-o", self.path / "walls.ply"), 0, "triangles")
         header = (self.path / "walls.ply").read_bytes()[:400]
         self.assertIn(b"element face", header)
@@ -682,7 +682,7 @@ class CommandLine(unittest.TestCase):
         self.expect(tutti("run", "--graph", one, "--out", self.path / "one"), 0, "report.html")
         robot = json.loads((self.path / "one/report.json").read_text())["robots"][0]
         self.assertEqual((robot["name"], robot["keyframes"], robot["onboard_rmse_m"]), ("a", 40, None))
-        self.expect(tutti("run", "--graph", one, "--print-config"), 0, "finder: recorded", "mission: one")
+        self.expect(tutti("run", "--graph", one, "--print-config"), 0, "verifier: recorded", "mission: one")
         self.expect(tutti("run", "--graph", self.path / "none.pyfg"), 2, "none.pyfg")
         self.expect(tutti("run", "--graph", one, "--bag", "a=b"), 2, "--bag")
         one.write_text("\n".join(edges[:9] + edges[10:]) + "\n")

@@ -122,7 +122,7 @@ class Consumer(unittest.TestCase):
             self.assertNotIn(absent, targets)
         # A robot and a server need no bundle adjustment.
         self.expect(self.configure("lacking", f"-DTUTTI_SOURCE={SOURCE}", "-DTUTTI_COMPONENTS=server", "-DTUTTI_WITH_CERES=OFF"), 0,
-                    "left out: bundle, for want of Ceres::ceres", "left out: finders")
+                    "left out: bundle, for want of Ceres::ceres", "left out: verifiers")
         self.expect(self.configure("lacking_more", f"-DTUTTI_SOURCE={SOURCE}", "-DTUTTI_COMPONENTS=server", "-DTUTTI_WITH_ZSTD=OFF"), 1,
                     "left out: wire, for want of tutti::zstd")
         self.expect(self.configure("odd", f"-DTUTTI_SOURCE={SOURCE}", "-DTUTTI_COMPONENTS=sever"), 1, "'sever' is none of")

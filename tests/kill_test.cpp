@@ -18,7 +18,7 @@
 #include "support/server/refiners.hpp"
 #include "tutti/bus/simulated_network.hpp"
 #include "tutti/evaluation/agreement.hpp"
-#include "tutti/lab/closure_finders.hpp"
+#include "tutti/lab/closure_verifiers.hpp"
 #include "tutti/node/robot_node.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/worker_node.hpp"
@@ -37,7 +37,7 @@ constexpr double kUpdatePeriod_s = 20.0;
 struct World {
   std::vector<mission::MissionRecording> recordings;
   std::set<RobotId> robots;
-  std::shared_ptr<const server::ClosureFinder> finder;
+  std::shared_ptr<const server::ClosureVerifier> verifier;
 };
 
 World make_world() {
@@ -55,10 +55,10 @@ World make_world() {
     out.recordings.push_back({.recording = std::move(recording)});
   }
   lab::MissionConfig mission;
-  mission.closure_changes.finder = "reference";
+  mission.closure_changes.verifier = "reference";
   mission.closure_changes.reference.wrong_share = 0.2;
   mission.closure_changes.reference.min_time_gap_s = 20.0;
-  out.finder = lab::make_closure_finder(mission, out.recordings, 5);
+  out.verifier = lab::make_closure_verifier(mission, out.recordings, 5);
   return out;
 }
 
@@ -180,7 +180,7 @@ class Mission {
     config.server.update_period_s = kUpdatePeriod_s;
     config.server.change_of_mind = change_of_mind_;
     config.refiner = refiner_;
-    return std::move(node::ServerNode::open(world_.robots, world_.finder, config, kEpoch, *program.store).value());
+    return std::move(node::ServerNode::open(world_.robots, world_.verifier, config, kEpoch, *program.store).value());
   }
   std::unique_ptr<node::RobotNode> open(Program<node::RobotNode>& program) {
     program.store = std::make_unique<storage::MemoryStore>(storage::robot_schema(), std::move(program.saved));
@@ -191,7 +191,7 @@ class Mission {
   std::unique_ptr<node::WorkerNode> open(Program<node::WorkerNode>& program) {
     const auto submaps = std::make_shared<node::SubmapFrames>(
         [this](SubmapId id) { return Result<std::string>(**server_.store->read("submaps", node::key_of(id))); });
-    auto node = std::make_unique<node::WorkerNode>(program.self, world_.finder, submaps);
+    auto node = std::make_unique<node::WorkerNode>(program.self, world_.verifier, submaps);
     node->refine_with(refiner_);
     return node;
   }

@@ -23,7 +23,7 @@ lab::MissionConfig small_mission() {
     robot.walk.duration_s = 200.0;
     robot.odometry.yaw_bias_deg_per_m = 0.05;
   }
-  config.closure_changes.finder = "reference";
+  config.closure_changes.verifier = "reference";
   config.closure_changes.reference.min_time_gap_s = 20.0;
   return config;
 }
@@ -192,7 +192,7 @@ TEST(Mission, ALoneRobotIsAMissionToo) {
 
 TEST(Mission, TheReportNamesTheSegmentWhereOdometryFailed) {
   const auto config = lab::load_mission(test::source_path("missions/terrace.yaml"),
-                                        {"simulation.sensors=none", "closures.finder=reference"});
+                                        {"simulation.sensors=none", "closures.verifier=reference"});
   ASSERT_TRUE(config.has_value()) << config.error().message;
   const MissionRecord record = run(*config);
   const RobotRecord& alpha = record.robots[0];

@@ -9,7 +9,7 @@
 
 #include "tutti/base/random.hpp"
 #include "tutti/evaluation/agreement.hpp"
-#include "tutti/lab/closure_finders.hpp"
+#include "tutti/lab/closure_verifiers.hpp"
 #include "tutti/robot/agent.hpp"
 #include "tutti/server/map_server.hpp"
 #include "tutti/simulation/recordings.hpp"
@@ -61,12 +61,12 @@ class Restart : public testing::Test {
       recordings_.push_back({.recording = std::move(recording)});
     }
     lab::MissionConfig mission;
-    mission.closure_changes.finder = "reference";
+    mission.closure_changes.verifier = "reference";
     mission.closure_changes.reference.min_time_gap_s = 20.0;
-    finder_ = lab::make_closure_finder(mission, recordings_, 5);
+    verifier_ = lab::make_closure_verifier(mission, recordings_, 5);
     for (const mission::MissionRecording& robot : recordings_)
       walkers_.push_back({&robot.recording, robot::RobotAgent(robot.recording.robot, kFirstSession, {})});
-    server_ = std::make_unique<server::MapServer>(ids_, finder_, payloads_, server::ServerConfig{}, 1);
+    server_ = std::make_unique<server::MapServer>(ids_, verifier_, payloads_, server::ServerConfig{}, 1);
   }
 
   void upload() {
@@ -80,7 +80,7 @@ class Restart : public testing::Test {
   }
   void answer_jobs() {
     for (const auto& job : server_->take_jobs()) {
-      const auto verdict = finder_->verify(*job.first, *job.second, *payloads_);
+      const auto verdict = verifier_->verify(*job.first, *job.second, *payloads_);
       ASSERT_TRUE(verdict.has_value()) << verdict.error().message;
       const auto decoded = wire::decode_verdict(wire::encode(*verdict));
       ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
@@ -111,7 +111,7 @@ class Restart : public testing::Test {
 
   std::set<RobotId> ids_;
   std::vector<mission::MissionRecording> recordings_;
-  std::shared_ptr<const server::ClosureFinder> finder_;
+  std::shared_ptr<const server::ClosureVerifier> verifier_;
   std::shared_ptr<server::PayloadStore> payloads_ = std::make_shared<server::MemoryPayloadStore>();
   std::unique_ptr<server::MapServer> server_;
   std::vector<Walker> walkers_;
@@ -158,7 +158,7 @@ TEST_F(Restart, AServerBackFromAnOlderStateIsHeardAtOnce) {
   go_on_until(200.0);
   const ProxyGraphMessage late = wire::decode_proxy_graph(wire::encode(server_->optimise())).value();
 
-  server_ = std::make_unique<server::MapServer>(ids_, finder_, payloads_, server::ServerConfig{}, 1, saved);
+  server_ = std::make_unique<server::MapServer>(ids_, verifier_, payloads_, server::ServerConfig{}, 1, saved);
   answer_jobs();
   const ProxyGraphMessage heard = broadcast();
   ASSERT_LT(heard.graph.revision, late.graph.revision);

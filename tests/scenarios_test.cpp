@@ -305,7 +305,7 @@ TEST(Scenarios, LateJoinsLoseContactAndReturn) {
 /// While alpha's odometry fails, far from everything it knows, four look-alikes that agree are its only closures: two
 /// failures of 70 m that cancel each other would explain them.
 TEST(Scenarios, LookAlikesInTheMidstOfAFailureDoNotMoveTheMap) {
-  const std::vector<std::string> trajectories{"closures.finder=reference", "simulation.sensors=none"};
+  const std::vector<std::string> trajectories{"closures.verifier=reference", "simulation.sensors=none"};
   expect_repaired(run(scenario("terrace", trajectories), 5), "terrace, seed 5");
 }
 

@@ -85,9 +85,9 @@ void print_origin(const mapfile::ClosureInfo& info) {
                info.decision->by.empty() ? "" : " by " + info.decision->by, time_of(info.decision->given_ns));
   if (info.verdict) {
     const ClosureVerdict& verdict = *info.verdict;
-    fmt::print("verified     by {}{}, finder {}\n",
+    fmt::print("verified     by {}{}, verifier {}\n",
                verdict.worker > 0 ? fmt::format("worker {}", verdict.worker - 1) : "an unknown worker",
-               verdict.verified_ns != 0 ? " at " + time_of(verdict.verified_ns) : "", to_string(verdict.finder));
+               verdict.verified_ns != 0 ? " at " + time_of(verdict.verified_ns) : "", to_string(verdict.verifier));
     for (const Refusal& measured : verdict.evidence) {
       const RefusalKind& kind = kind_of(measured.reason);
       fmt::print("  {:<40} {:>8.3f} {:<4} {} {:.3f}\n", kind.words, measured.value, kind.unit,

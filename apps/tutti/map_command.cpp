@@ -144,16 +144,16 @@ void print_robots(const mapfile::Content& content, const server::MapEstimate& ma
   }
 }
 
-void print_finders(const mapfile::Content& content) {
+void print_verifiers(const mapfile::Content& content) {
   std::map<MethodId, std::size_t> found;
   for (const auto& [pair, verdict] : content.verdicts)
-    if (!verdict.closures.empty()) ++found[verdict.finder];
-  for (const auto& [finder, pairs] : content.refused) found.try_emplace(finder, 0);
-  for (const auto& [finder, pairs] : found)
-    fmt::print("finder       {}: closures between {} pairs, {} refused\n", to_string(finder), pairs,
-               content.refused.contains(finder) ? content.refused.at(finder) : 0);
-  for (const auto& [finder, pairs] : content.aside)
-    fmt::print("finder       {}: closures between {} pairs that are not believed\n", to_string(finder), pairs);
+    if (!verdict.closures.empty()) ++found[verdict.verifier];
+  for (const auto& [verifier, pairs] : content.refused) found.try_emplace(verifier, 0);
+  for (const auto& [verifier, pairs] : found)
+    fmt::print("verifier       {}: closures between {} pairs, {} refused\n", to_string(verifier), pairs,
+               content.refused.contains(verifier) ? content.refused.at(verifier) : 0);
+  for (const auto& [verifier, pairs] : content.aside)
+    fmt::print("verifier       {}: closures between {} pairs that are not believed\n", to_string(verifier), pairs);
 }
 
 int show_map(const fs::path& file) {
@@ -173,7 +173,7 @@ int show_map(const fs::path& file) {
   if (const auto& last = content->counts)
     fmt::print("last update  revision {}: {} keyframes, {} closures accepted, {} components\n", last->revision,
                last->keyframes, last->closures, last->components);
-  print_finders(*content);
+  print_verifiers(*content);
   print_tables(*content);
   std::fflush(stdout);  // what follows takes as long as an update of the map
 

@@ -14,7 +14,7 @@
 
 #include "tutti/consistency/disagreement.hpp"
 #include "tutti/estimation/marginals.hpp"
-#include "tutti/lab/closure_finders.hpp"
+#include "tutti/lab/closure_verifiers.hpp"
 #include "tutti/lab/mission_config.hpp"
 #include "tutti/lab/mission_input.hpp"
 #include "tutti/robot/agent.hpp"
@@ -127,9 +127,9 @@ void run(const Options& options, const lab::MissionConfig& config,
     ids.insert(robot.recording.robot);
     speakers.emplace_back(robot, config.agent);
   }
-  const auto finder = lab::make_closure_finder(config, robots, options.seed);
+  const auto verifier = lab::make_closure_verifier(config, robots, options.seed);
   const auto clouds = std::make_shared<server::MemoryPayloadStore>();
-  server::MapServer server(ids, finder, clouds, config.server, 1);
+  server::MapServer server(ids, verifier, clouds, config.server, 1);
   std::size_t update = 0;
   const double end_s = config.duration_s > 0.0 ? config.duration_s : std::numeric_limits<double>::infinity();
   bool done = false;
@@ -142,7 +142,7 @@ void run(const Options& options, const lab::MissionConfig& config,
       done = done && speaker.done();
     }
     for (const auto& job : server.take_jobs())
-      if (const auto verdict = finder->verify(*job.first, *job.second, *clouds)) (void)server.receive(*verdict);
+      if (const auto verdict = verifier->verify(*job.first, *job.second, *clouds)) (void)server.receive(*verdict);
     if (!server.has_news()) continue;
     const ProxyGraphMessage broadcast = *wire::decode_proxy_graph(wire::encode(server.optimise()));
     if (++update % options.every == 0 || done) judge(options, update, server.map(), broadcast.graph, names);

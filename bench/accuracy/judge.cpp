@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Who is wrong, on simulated places of every scale: a room, a hall, a tunnel, a street; wrong closures strewn about and
-// in groups that agree, odometry that fails, and that is three times too sure or unsure of itself. One JSON object per
-// map: its error over that of a judge who is told which closures are wrong.
+// Outlier rejection on simulated places of every scale: a room, a hall, a tunnel, a street; wrong closures strewn about
+// and in groups that agree, odometry that fails, and that is three times too sure or unsure of itself. One JSON object
+// per map: its error over that of a judge who is told which closures are wrong.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
@@ -119,7 +119,7 @@ nlohmann::json judged(const Case& of, const server::MapConfig& config) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Who is wrong, on simulated places of every scale.");
+  CLI::App app("Outlier rejection on simulated places of every scale.");
   std::uint64_t seeds = 1;
   std::vector<std::string> assignments;
   std::string only;

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Who is wrong, on simulated places of every scale. Writes docs/results/judge.md.
+"""Outlier rejection on simulated places of every scale. Writes docs/results/judge.md.
 
 Usage: bench/accuracy/judge.py JUDGE_PROGRAM [--seeds N] [--places NAME...] [--out FOLDER]
 JUDGE_PROGRAM is build/bench/bench/accuracy/tutti_bench_judge. A place that is finished in --out is not made again.
@@ -55,7 +55,7 @@ def main():
     arguments = parser.parse_args()
     maps = {place: maps_of(arguments, place) for place in arguments.places}
     everything = [m for of in maps.values() for m in of]
-    text = ["# Who is wrong, in places of every scale", "",
+    text = ["# Outlier rejection in places of every scale", "",
             f"Written by `bench/accuracy/judge.py JUDGE_PROGRAM --seeds {arguments.seeds} --places {' '.join(arguments.places)}`.",
             "Simulated: two robots walk or drive through a network of corridors (room: 2.5 m between junctions, 0.7 m/s; hall: 8 m, 1 m/s;",
             "tunnel: 60 m, 2 m/s; street: 120 m, 12 m/s), closures from the truth with noise. Every place with odometry that is honest,",

@@ -14,7 +14,7 @@ import statistics
 
 from runs import mission_file, outcome_of, row, write_results
 
-REFERENCE = ["closures.finder=reference", "simulation.sensors=none"]
+REFERENCE = ["closures.verifier=reference", "simulation.sensors=none"]
 # name: (mission file below the shared folder or a mission's name, seeds, settings)
 CASES = {
     "v1_two_flights": ("cases/rooms/v1_two_flights.yaml", range(1, 6), []),

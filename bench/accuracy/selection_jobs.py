@@ -13,7 +13,7 @@ from runs import SOURCE, compare, mission_file, without_partial
 
 DEFAULT, TOP, OLD = "adaptive", "spectral, `top`", "old default"
 COMPARED = ["none", "every_node", "every_node_2", "spectral", "uniform", "random", "skeleton"]
-TRAJECTORIES = ["simulation.sensors=none", "closures.finder=reference", "closures.reference.radius_m=1.5"]
+TRAJECTORIES = ["simulation.sensors=none", "closures.verifier=reference", "closures.reference.radius_m=1.5"]
 FLEETS = {f"fleet_{n}": ["fleet", f"simulation.robots.0.copies={n}"] for n in (4, 8)}
 ROOM = ["tunnel", *TRAJECTORIES, "simulation.world.featureless_share=0",
         "simulation.world.network={rows: 2, columns: 2, block_m: 8, jitter_m: 1}",
@@ -31,7 +31,7 @@ ABLATIONS = {  # a mechanism switched off: what it takes
     "directions": ["agent.disagreement.without=directions"],
     "hinges": ["server.proxy_graph.shape_deletions=0"],
     "a quarter of sigma": ["agent.policy.adaptive_error_share=1000"],
-    "failed odometry": ["server.map.who_is_wrong.let_odometry_fail=false"],
+    "failed odometry": ["server.map.outlier_rejection.let_odometry_fail=false"],
     "honesty of odometry": ["server.map.judge_odometry=false"],
 }
 

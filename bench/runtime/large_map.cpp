@@ -4,9 +4,9 @@
 //   bench_large_map MISSION.yaml MAP SUBMAPS [POINTS PER SUBMAP [CANDIDATES PER SUBMAP]]   makes one, then measures
 //   bench_large_map MISSION.yaml MAP                                                       measures on what is there
 // The map is of simulated robots of half an hour each, as many as it takes. Every pair of submaps has been looked at,
-// as with scans whose places are not known: those near each other have the closures of the mission's finder, the others
-// were refused. With candidates it is only the nearest that were, and a tenth of these have closures, as in a large
-// fleet with scans.
+// as with scans whose places are not known: those near each other have the closures of the mission's verifier, the
+// others were refused. With candidates it is only the nearest that were, and a tenth of these have closures, as in a
+// large fleet with scans.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -27,7 +27,7 @@
 #include <vector>
 
 #include "tutti/base/random.hpp"
-#include "tutti/lab/closure_finders.hpp"
+#include "tutti/lab/closure_verifiers.hpp"
 #include "tutti/lab/mission_config.hpp"
 #include "tutti/lab/mission_input.hpp"
 #include "tutti/mapfile/content.hpp"
@@ -52,7 +52,7 @@ constexpr std::size_t kRowsPerCommit = 2000;
 constexpr std::size_t kPlaceBytes = 4105;
 
 /// As one that compares scans: every pair is worth a look that is a candidate.
-class EveryPair final : public server::ClosureFinder {
+class EveryPair final : public server::ClosureVerifier {
  public:
   static MethodId who() { return {"large_map", 1, 1}; }
   [[nodiscard]] MethodId id() const override { return who(); }
@@ -156,7 +156,7 @@ void make_map(const lab::MissionConfig& config, const std::filesystem::path& fil
               std::size_t candidates) {
   const auto input = lab::load_input(config, "", 1);
   if (!input) throw std::runtime_error(input.error().message);
-  const auto finder = lab::make_closure_finder(config, input->robots, 1);
+  const auto verifier = lab::make_closure_verifier(config, input->robots, 1);
   auto store = storage::open_sqlite_store(file, storage::map_schema(), {.min_free_bytes = 0}).value();
   const auto nothing = node::SubmapFrames::of(*store);
   Writer writer(*store);
@@ -176,9 +176,9 @@ void make_map(const lab::MissionConfig& config, const std::filesystem::path& fil
     for (const std::size_t a : compared.with(b, writer)) {
       ClosureVerdict verdict{
           .pair = {all[a].id, all[b].id}, .closures = {}, .refusal = Refusal{RefusalReason::unlike_from_above}};
-      if ((begin[a] - begin[b]).norm() < kFar_m && compared.may_close() && finder->is_candidate(all[a], all[b]))
-        verdict = finder->verify(all[a], all[b], *nothing).value();
-      verdict.finder = EveryPair::who();
+      if ((begin[a] - begin[b]).norm() < kFar_m && compared.may_close() && verifier->is_candidate(all[a], all[b]))
+        verdict = verifier->verify(all[a], all[b], *nothing).value();
+      verdict.verifier = EveryPair::who();
       if (!verdict.refusal) {
         ++closed;
         writer.put({"verdicts", node::key_of(verdict.pair), wire::encode(verdict)});

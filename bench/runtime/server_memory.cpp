@@ -22,8 +22,7 @@
 #include <vector>
 
 #include "tutti/base/random.hpp"
-#include "tutti/finders/sensor_finder_maker.hpp"
-#include "tutti/lab/closure_finders.hpp"
+#include "tutti/lab/closure_verifiers.hpp"
 #include "tutti/lab/mission_config.hpp"
 #include "tutti/lab/mission_input.hpp"
 #include "tutti/node/server_node.hpp"
@@ -31,6 +30,7 @@
 #include "tutti/robot/submap_builder.hpp"
 #include "tutti/server/graph_monitor.hpp"
 #include "tutti/storage/sqlite_store.hpp"
+#include "tutti/verifiers/sensor_verifier_maker.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace {
@@ -153,7 +153,7 @@ void run(const Arguments& arguments) {
   double hours = 0.0;
   for (const auto& robot : input->robots)
     hours += (robot.recording.odometry.back().stamp - robot.recording.odometry.front().stamp) / 3600.0;
-  const auto finder = lab::make_closure_finder(*config, input->robots, 1);
+  const auto verifier = lab::make_closure_verifier(*config, input->robots, 1);
   auto arrivals = submaps_of(*input, config->agent.submap, points);
   std::set<RobotId> ids;
   for (const auto& robot : input->robots) ids.insert(robot.recording.robot);
@@ -163,10 +163,10 @@ void run(const Arguments& arguments) {
   auto store = storage::open_sqlite_store(path, storage::map_schema(), {.min_free_bytes = 0}).value();
   malloc_trim(0);
   const double heap_before = heap_mb(), resident_before = resident_mb("VmRSS:");
-  const auto refiner = finders::make_refiner(config->closures, config->refinement);
-  auto node = node::ServerNode::open(ids, finder, {.server = config->server, .refiner = refiner}, 1, *store).value();
+  const auto refiner = verifiers::make_refiner(config->closures, config->refinement);
+  auto node = node::ServerNode::open(ids, verifier, {.server = config->server, .refiner = refiner}, 1, *store).value();
   const auto frames = node::SubmapFrames::of(*store);
-  node::WorkerNode worker(bus::Endpoint::worker(0), finder, frames);
+  node::WorkerNode worker(bus::Endpoint::worker(0), verifier, frames);
   worker.refine_with(refiner);
   std::size_t pairs = 0;
   const std::function<void(node::Step)> carry_out = [&](node::Step step) {

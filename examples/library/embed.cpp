@@ -31,7 +31,7 @@ Pose3 truth(RobotId robot, double seconds) {
 double seconds_of(const Keyframe& keyframe) { return keyframe.stamp - Timestamp{}; }
 
 /// Yours compares what the submaps carry (tutti::lidar, tutti::visual); this one knows the truth.
-class Finder final : public server::ClosureFinder {
+class Verifier final : public server::ClosureVerifier {
  public:
   [[nodiscard]] MethodId id() const override { return {"example", 1, 0}; }
   [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return true; }
@@ -46,7 +46,7 @@ class Finder final : public server::ClosureFinder {
     const Keyframe &a = middle(first), &b = middle(second);
     const Pose3 T_a_b =
         truth(first.id.chain.robot, seconds_of(a)).inverse() * truth(second.id.chain.robot, seconds_of(b));
-    ClosureVerdict verdict{.pair = {first.id, second.id}, .closures = {}, .refusal = {}, .finder = id()};
+    ClosureVerdict verdict{.pair = {first.id, second.id}, .closures = {}, .refusal = {}, .verifier = id()};
     verdict.closures.push_back(
         {{first.id.chain, a.index}, {second.id.chain, b.index}, {T_a_b, 1e-4 * Matrix6d::Identity()}});
     return verdict;
@@ -66,9 +66,9 @@ double rmse_m(RobotId robot, const Trajectory& trajectory) {
 
 int main() {
   std::deque<std::string> to_server, to_robots;  // your transport
-  const auto finder = std::make_shared<const Finder>();
+  const auto verifier = std::make_shared<const Verifier>();
   const auto payloads = std::make_shared<server::MemoryPayloadStore>();
-  server::MapServer server({RobotId{0}, RobotId{1}}, finder, payloads, server::ServerConfig{}, 1);
+  server::MapServer server({RobotId{0}, RobotId{1}}, verifier, payloads, server::ServerConfig{}, 1);
   std::vector<robot::RobotAgent> robots;
   std::vector<Pose3> T_odom_body(2);
   std::vector<Trajectory> odometry(2);
@@ -90,7 +90,7 @@ int main() {
     for (; !to_server.empty(); to_server.pop_front())
       if (const auto submap = wire::decode_submap(to_server.front())) static_cast<void>(server.receive(*submap));
     for (const server::VerificationJob& job : server.take_jobs())  // or in a thread, or on another machine
-      if (const auto verdict = finder->verify(*job.first, *job.second, *payloads))
+      if (const auto verdict = verifier->verify(*job.first, *job.second, *payloads))
         static_cast<void>(server.receive(*verdict));
     if (server.has_news() && (step % 100 == 0 || step == kSteps)) to_robots.push_back(wire::encode(server.optimise()));
     for (; !to_robots.empty(); to_robots.pop_front())

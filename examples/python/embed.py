@@ -19,7 +19,7 @@ def truth(robot, seconds):
     return turned(angle + np.pi / 2, radius * np.cos(angle), radius * np.sin(angle))
 
 
-class Finder:
+class Verifier:
     """Yours compares what the submaps carry (submap.points); this one knows the truth."""
 
     @staticmethod
@@ -39,7 +39,7 @@ class Finder:
 
 
 robots = [tutti.RobotAgent(r) for r in range(2)]
-server = tutti.MapServer([0, 1], Finder())
+server = tutti.MapServer([0, 1], Verifier())
 odometry = [[np.eye(4)], [np.eye(4)]]
 covariance = np.diag([1e-6] * 3 + [1e-5] * 3)  # of a step, m2 and rad2
 for step in range(STEPS + 1):

@@ -65,7 +65,7 @@ class Embedded(InFolder):
         self.assertIsNone(job.first.points)
         self.assertEqual((seen[0][0].shape[1], seen[0][0].dtype, seen[0][2]), (3, np.float32, 3))
 
-    def test_what_a_finder_raises_is_raised(self):
+    def test_what_a_verifier_raises_is_raised(self):
         class Broken(Nothing):
             def verify(self, first, second):
                 raise KeyError("mine")
@@ -113,8 +113,8 @@ class Embedded(InFolder):
         self.refuses("submap.nonsense", tutti.RobotAgent, 0, settings={"submap.nonsense": 1})
         self.refuses("duration_s|must be", tutti.RobotAgent, 0, settings={"submap.duration_s": -1})
         self.refuses("policy", tutti.RobotAgent, 0, settings={"policy.name": "luck"})
-        self.refuses("is_candidate", tutti.MapServer, [0], finder=3)
-        self.refuses("'magic'", tutti.MapServer, [0], finder="magic")
+        self.refuses("is_candidate", tutti.MapServer, [0], verifier=3)
+        self.refuses("'magic'", tutti.MapServer, [0], verifier="magic")
         self.refuses("", tutti.RobotAgent, -1, error=TypeError)
         self.refuses("stamp", agent.add_odometry, 1.0, np.eye(4), STEP)  # back in time
         self.refuses("stamp|nan", agent.add_odometry, np.nan, np.eye(4), STEP)

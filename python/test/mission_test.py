@@ -9,7 +9,7 @@ import tutti
 from support import InFolder, program, run
 
 BRIEF = {"simulation.robots": [{"walk": {"duration_s": 120}}, {"walk": {"duration_s": 120}}], "simulation.sensors": "none",
-         "closures.finder": "reference"}
+         "closures.verifier": "reference"}
 
 
 class Missions(InFolder):

@@ -238,7 +238,7 @@ class Programs(ProgramsTest):
         (self.path / "fleet.pyfg").write_text(fleet())
         (self.path / "fleet.yaml").write_text(
             "robots: [{name: a, graph: {file: fleet.pyfg}}, {name: bravo, graph: {file: fleet.pyfg, robot: b}}]\n"
-            "closures: {finder: recorded}\n")
+            "closures: {verifier: recorded}\n")
         expected, out = self.path / "run", self.path / "up"
         for words in (("run",), ("mission", "up", "--rate", "20")):
             done = run(*words, self.path / "fleet.yaml", "--data", self.path, "--out", out if len(words) > 1 else expected)
@@ -295,7 +295,7 @@ class Programs(ProgramsTest):
 
     def test_a_bare_worker_has_the_servers_settings(self):
         """Of a LiDAR's mission, and not the default ones: no pair is ever one place."""
-        settings = ["--set", "closures.finder=lidar", "--set", "simulation.sensors=lidar", "--set", "duration_s=40",
+        settings = ["--set", "closures.verifier=lidar", "--set", "simulation.sensors=lidar", "--set", "duration_s=40",
                     "--set", "agent.submap.duration_s=8", "--set", "closures.min_submap_gap=1",
                     "--set", "closures.lidar.min_points=999000"]
         server, bus = self.start_server("--threads", "0", *settings)
@@ -310,7 +310,7 @@ class Programs(ProgramsTest):
             code, said = program.end()
             self.assertEqual(code, 0, said)
         info = run("map", "info", self.path / "server/map.tutti").stdout
-        self.assertRegex(info, r"finder +lidar [0-9]+ \(settings [0-9a-f]{16}\): closures between 0 pairs, [1-9]")
+        self.assertRegex(info, r"verifier +lidar [0-9]+ \(settings [0-9a-f]{16}\): closures between 0 pairs, [1-9]")
 
     def test_a_mission_has_one_server_and_others_are_told(self):
         server, bus = self.start_server("--mission", "alps")

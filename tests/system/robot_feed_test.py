@@ -42,7 +42,7 @@ robots:
   - {{name: bravo, odometry: {{file: bravo.tum}}, reference: {{file: bravo_reference.tum}}, covariance: {noise},
      fixes: bravo.csv, antenna_m: [0.1, 0.0, 0.2]}}
 closures:
-  finder: reference
+  verifier: reference
   reference: {{wrong_share: 0.2, min_time_gap_s: 20.0}}
 """.format(noise="{translation_m_per_sqrt_m: 0, translation_m_per_sqrt_deg: 0, translation_m_per_sqrt_s: 0.01, "
                  "rotation_deg_per_sqrt_m: 0, rotation_deg_per_sqrt_deg: 0, rotation_deg_per_sqrt_s: 0.4}")

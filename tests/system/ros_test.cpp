@@ -182,7 +182,7 @@ simulation:
     - {name: bravo, walk: {duration_s: 40}}
 receivers: [{rate_hz: 2.0, sigma_m: 0.5, antenna_m: [0.3, 0.0, 0.6]}]
 odometry_hz: 20
-closures: {finder: lidar}
+closures: {verifier: lidar}
 )";
 constexpr std::size_t kOdometrySamples = 802;
 constexpr const char* kRecorded = R"(
@@ -191,7 +191,7 @@ robots:
   - {name: alpha, bag: alpha}
   - {name: bravo, bag: bravo}
 agent: {submap: {duration_s: 6.0}}
-closures: {finder: lidar}
+closures: {verifier: lidar}
 )";
 
 /// What is published of map -> odom, by robot: its stamps, and when that was.
@@ -395,11 +395,11 @@ robots:
   - {name: bravo, bag: bravo}
 agent: {submap: {duration_s: 5.0, representative_distance_m: 0.3, visual: {send_imu: true}}}
 tracking: {tracker: {descriptors: {kind: orb}}}
-closures: {finder: visual, visual: {max_hamming: 0.2}}
+closures: {verifier: visual, visual: {max_hamming: 0.2}}
 )";
 
-/// Finders draw by submaps' names, hence the session. Alpha's cameras and IMU are found by type, because the mission's
-/// closures are of images; bravo is told its own. TUTTI_ROS_RATE as above.
+/// Verifiers draw by submaps' names, hence the session. Alpha's cameras and IMU are found by type, because the
+/// mission's closures are of images; bravo is told its own. TUTTI_ROS_RATE as above.
 class RosImages : public Ros {
  protected:
   void expect_closures_of_bags(const std::string& cameras, const std::vector<std::string>& images,

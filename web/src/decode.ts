@@ -101,7 +101,7 @@ function status(value: unknown): s.Status {
       return { from: words(e.from, "from"), kind: words(e.kind, "kind"), count: count(e.count, "count"), why: words(e.last_why, "last_why") };
     }),
     trouble: words(f.trouble, "trouble"),
-    finder: words(f.finder, "finder"),
+    verifier: words(f.verifier, "verifier"),
     waiting: count(f.waiting, "waiting"),
     why_waiting: words(f.why_waiting, "why_waiting"),
   };
@@ -195,7 +195,7 @@ function closure(value: unknown): s.Closure {
     reason: words(f.reason, "reason"),
     by_hand: f.by_hand === true,
     word: operator_word(f.word),
-    finder: words(f.finder, "finder"),
+    verifier: words(f.verifier, "verifier"),
     worker: words(f.worker, "worker"),
     verified_ns: maybe(f.verified_ns, "verified_ns"),
     links: maybe_list(f.links, "links", link),

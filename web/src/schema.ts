@@ -72,7 +72,7 @@ export interface Status {
   workers: WorkerStatus[];
   refused: { from: string; kind: string; count: number; why: string }[];
   trouble: string;
-  finder: string;
+  verifier: string;
   waiting: number;
   why_waiting: string;
 }
@@ -143,7 +143,7 @@ export interface Closure {
   reason: string;
   by_hand: boolean;
   word: { wish: Wish; by: string; wall_ns: number | null } | null;
-  finder: string;
+  verifier: string;
   worker: string;
   verified_ns: number | null;
   links: Link[];

@@ -279,7 +279,7 @@ function credential() {
 const kHostile = '<img src=x onerror="window.hacked=1"><script>window.hacked=1</script>';
 test("scripts in names, words, reasons and photos do nothing", async () => {
   const mission = small({ robots: [kHostile, "bravo", "charlie"], name: kHostile });
-  for (const c of mission.closures.values()) Object.assign(c, { reason: kHostile, finder: kHostile, word: { wish: "reject", by: kHostile, wall_ns: 1 } });
+  for (const c of mission.closures.values()) Object.assign(c, { reason: kHostile, verifier: kHostile, word: { wish: "reject", by: kHostile, wall_ns: 1 } });
   mission.marks.set("m1", { id: "m1", submap: "0:1/2", at: [0, 0, 0], text: kHostile, by: kHostile, wall_ns: 1, photo: "data:text/html,<script>window.hacked=1</script>" });
   mission.silent.set(0, mission.time - 20);
   await served(mission, async (page) => {

@@ -109,7 +109,7 @@ export class FakeMission {
       name, from: a.id, to: b.id, state, by_hand,
       reason: refused ? "overlap: 0.16, at least 0.30 needed" : "",
       word: by ? { wish: "accept", by, wall_ns: Date.now() * 1e6 } : null,
-      finder: "cloud 7", worker: "worker-1", verified_ns: Date.now() * 1e6,
+      verifier: "cloud 7", worker: "worker-1", verified_ns: Date.now() * 1e6,
       links: [{ at_from: a.path[5], at_to: b.path[5], T_from_to, misfit_m: refused ? 1.31 : 0.041, misfit_deg: refused ? 4.2 : 0.31, chi2: refused ? 88.1 : 3.4, reason: "" }],
       evidence: [{ reason: "overlap", value: refused ? 0.16 : 0.61, limit: 0.3, unit: "", at_least: true, ok: !refused }, { reason: "plane RMSE", value: 0.043, limit: 0.12, unit: "m", ok: true }, { reason: "free to slide", value: 0.21, limit: 0.05, unit: "", at_least: true, ok: true }],
     });
@@ -147,7 +147,7 @@ export class FakeMission {
       const backlog = this.backlog[number];
       return { number, last_seen_s_ago: 0.4 + silent, last_update_s_ago: 4 + silent, submaps: own, refused_submaps: 0, conflict: "", name, session: 1, start: 1, version: "0.3.0", backlog_submaps: backlog, backlog_bytes: 14000 * backlog, heard_epoch: 1, heard_revision: this.revision, update_age_s: 4.2, keyframes: own * 10, T_odom_body: { translation_m: way(number, this.time * 0.9).p, quaternion_xyzw: [0, 0, 0, 1] }, alerts: 0, finished: false, jobs_done: 0, trouble: "", can: [], submaps_begun: own, battery_v: 24.1, battery_percent: 90 - 31 * number, unread_submaps: 0 };
     });
-    return { time_ns: this.time * 1e9, wall_ns: Date.now() * 1e6, version: "0.3.0", epoch: 1, revision: this.revision, submaps: this.submaps.length, closures: this.poses().accepted, components: 1 + this.apart.size, pending_jobs: 2, has_news: false, robots, workers: [{ number: 1, last_seen_s_ago: 0.6, name: "worker-1", jobs_done: 120 }], refusals: [], trouble: "", incarnation: 1, finder: "cloud 7", former_pairs: 0, waiting: 0, why_waiting: "", words: [] };
+    return { time_ns: this.time * 1e9, wall_ns: Date.now() * 1e6, version: "0.3.0", epoch: 1, revision: this.revision, submaps: this.submaps.length, closures: this.poses().accepted, components: 1 + this.apart.size, pending_jobs: 2, has_news: false, robots, workers: [{ number: 1, last_seen_s_ago: 0.6, name: "worker-1", jobs_done: 120 }], refusals: [], trouble: "", incarnation: 1, verifier: "cloud 7", former_pairs: 0, waiting: 0, why_waiting: "", words: [] };
   }
 
   alerts() {

@@ -25,7 +25,7 @@ def generate_launch_description():
         "imu": ("", "topic of sensor_msgs/Imu, which goes with images; empty: none"),
         "bus": ("", "nats://HOST:PORT as the server prints it; empty: tutti robot is started by somebody else"),
         "mission": ("tutti", "name of the mission on the bus, as the server's"),
-        "finder": ("lidar", "of closures, as the server's: lidar, visual (of images), sensors (of whatever two submaps both carry)"),
+        "verifier": ("lidar", "of closures, as the server's: lidar, visual (of images), sensors (of whatever two submaps both carry)"),
         "state": (["/tmp/tutti_", value("namespace")], "folder that the robot keeps what it knows in"),
         "socket": ([value("state"), ".feed"], "of tutti robot --feed"),
         "params": (os.path.join(get_package_share_directory("tutti_ros"), "config", "robot.yaml"), "parameters"),
@@ -36,7 +36,7 @@ def generate_launch_description():
     robot = ExecuteProcess(
         cmd=["tutti", "robot", "--name", value("namespace"), "--bus", value("bus"), "--mission", value("mission"),
              "--state", value("state"), "--feed", value("socket"), "--stay",
-             "--set", ["closures.finder=", value("finder")]],
+             "--set", ["closures.verifier=", value("verifier")]],
         output="screen", respawn=True, respawn_delay=2.0,
         condition=IfCondition(PythonExpression(["'", value("bus"), "' != ''"])))
     node = Node(

@@ -11,11 +11,11 @@ from launch_ros.parameter_descriptions import ParameterValue
 
 def generate_launch_description():
     value = LaunchConfiguration
-    server = ["tutti", "server", "--state", value("state"), "--mission", value("mission"), "--set", ["closures.finder=", value("finder")]]
+    server = ["tutti", "server", "--state", value("state"), "--mission", value("mission"), "--set", ["closures.verifier=", value("verifier")]]
     return LaunchDescription([
         DeclareLaunchArgument("state", default_value="/tmp/tutti_server", description="folder of the map"),
         DeclareLaunchArgument("mission", default_value="tutti", description="name of the mission on the bus"),
-        DeclareLaunchArgument("finder", default_value="lidar", description="of closures, as the robots': lidar, visual, sensors"),
+        DeclareLaunchArgument("verifier", default_value="lidar", description="of closures, as the robots': lidar, visual, sensors"),
         DeclareLaunchArgument("ros", default_value="false",
                               description="the server itself publishes the map, by CycloneDDS, on loopback only: map, map_points (docs/ros.md)"),
         DeclareLaunchArgument("grid", default_value="false",

@@ -26,7 +26,7 @@ robots:
   - {name: bravo, bag: bravo}
 agent: {submap: {duration_s: 5.0, representative_distance_m: 0.3, visual: {send_imu: true}}}
 tracking: {tracker: {descriptors: {kind: orb}}}
-closures: {finder: visual, visual: {max_hamming: 0.2}}
+closures: {verifier: visual, visual: {max_hamming: 0.2}}
 """
 TOPICS = ("odom", "imu", "camera0/image_raw", "camera0/camera_info", "camera1/image_raw", "camera1/camera_info",
           "depth/image_raw")

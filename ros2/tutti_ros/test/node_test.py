@@ -142,7 +142,7 @@ class Programs(WithPrograms):
         mission = [self.path / "fed.yaml", "--data", self.path]
         lines = "".join(f"  - {{name: {name}, odometry: {{file: {name}_onboard.tum}}, reference: "
                         f"{{file: {name}_reference.tum}}}}\n" for name in ("alpha", "bravo"))
-        mission[0].write_text(f"mission: fed\ninput: simulated\nrobots:\n{lines}closures:\n  finder: reference\n"
+        mission[0].write_text(f"mission: fed\ninput: simulated\nrobots:\n{lines}closures:\n  verifier: reference\n"
                               "  reference: {min_time_gap_s: 20.0}\n")
         server, bus = self.start_server(*mission, "--rate", "50")
         names = ("alpha", "bravo")

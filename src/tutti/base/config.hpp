@@ -24,13 +24,14 @@
 /// such structs. This header is all that a settings struct needs; base/config_io.hpp reads, writes and lists settings.
 namespace tutti {
 
-/// Range of a number, closed at both ends unless `low_open`; an infinite end is no limit. Strings may list their
-/// choices.
+/// What a setting may be: the range of a number, closed at both ends unless `low_open`; an infinite end is no limit.
+/// Strings may list their choices.
 struct Bound {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
   bool low_open = false;
   std::vector<std::string> choices;
+  std::string formerly;  ///< The setting's name in the version before, which is still read. Empty: it had none.
 };
 inline Bound any() { return {}; }
 inline Bound at_least(double low) { return {.low = low}; }
@@ -38,5 +39,9 @@ inline Bound greater_than(double low) { return {.low = low, .low_open = true}; }
 inline Bound between(double low, double high) { return {.low = low, .high = high}; }
 inline Bound above_zero_to(double high) { return {.low = 0.0, .high = high, .low_open = true}; }
 inline Bound one_of(std::vector<std::string> choices) { return {.choices = std::move(choices)}; }
+inline Bound formerly(std::string name, Bound bound = {}) {
+  bound.formerly = std::move(name);
+  return bound;
+}
 
 }  // namespace tutti

@@ -201,11 +201,11 @@ std::vector<std::string> each_once(const std::vector<std::string>& words) {
 
 /// Keys of a place that no struct knows.
 void complain_of_unknown(Findings& findings, const std::string& path, const Findings::Place& place) {
-  const auto& [node, known] = place;
+  const auto& [node, known, former] = place;
   if (node->kind != ConfigNode::Kind::map && node->kind != ConfigNode::Kind::null)
     complain(findings, *node, path, "expected a map of settings");
   for (const auto& [key, value] : node->map) {
-    if (std::ranges::find(known, key) != known.end()) continue;
+    if (std::ranges::find(known, key) != known.end() || std::ranges::find(former, key) != former.end()) continue;
     if (findings.problems.size() >= kMostProblems || key.size() > kMostShown) {
       complain(findings, value, path, fmt::format("unknown key '{:.80}'", key));
       continue;

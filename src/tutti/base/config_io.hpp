@@ -102,6 +102,7 @@ struct Findings {
   struct Place {
     const ConfigNode* node = nullptr;
     std::vector<std::string> known;
+    std::vector<std::string> former;  ///< Former names that the document uses.
   };
   std::vector<std::string> problems;
   std::map<std::string, Place> places;  ///< By path.
@@ -120,6 +121,14 @@ class Loader {
     findings_.places[path_].known.emplace_back(name);
     const ConfigNode* child = node_.find(name);
     const std::string path = path_.empty() ? std::string(name) : path_ + "." + std::string(name);
+    if (const ConfigNode* older = bound.formerly.empty() ? nullptr : node_.find(bound.formerly)) {
+      findings_.places[path_].former.push_back(bound.formerly);
+      if (child != nullptr)
+        complain(findings_, *older, path,
+                 fmt::format("given twice, the second time by its former name '{}'", bound.formerly));
+      else
+        child = older;
+    }
     if (child == nullptr || child->kind == ConfigNode::Kind::null) return;
     read(*child, path, value, bound);
   }

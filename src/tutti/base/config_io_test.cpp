@@ -121,6 +121,28 @@ TEST(Config, ReportsEveryProblemWithLinePathValueAndBound) {
             "x.yaml:3: robots.0.nmae: unknown key, did you mean 'name'?");
 }
 
+struct RenamedSettings {
+  double distance_m = 1.0;
+  template <class V>
+  void describe(V& v) {
+    v.field("distance_m", distance_m, formerly("way_m", greater_than(0.0)));
+  }
+};
+
+TEST(Config, AFormerNameIsRead) {
+  RenamedSettings settings;
+  ASSERT_TRUE(load_config(parse("way_m: 2"), settings, "x.yaml"));
+  EXPECT_EQ(settings.distance_m, 2.0);
+  const auto problem_of = [&](const std::string& text) {
+    const Status status = load_config(parse(text), settings, "x.yaml");
+    return status ? "" : status.error().message;
+  };
+  EXPECT_EQ(problem_of("way_m: -1"), "x.yaml:1: distance_m: is -1, must be > 0");
+  EXPECT_EQ(problem_of("distance_m: 2\nway_m: 3"),
+            "x.yaml:2: distance_m: given twice, the second time by its former name 'way_m'");
+  EXPECT_EQ(problem_of("weg_m: 2"), "x.yaml:1: weg_m: unknown key, known here: distance_m");
+}
+
 TEST(Config, SaysWhatStandsThereInstead) {
   EXPECT_EQ(problems("base: {offset_m: [~, {}]}"),
             "x.yaml:1: base.offset_m.0: expected a number, got nothing\n"

@@ -39,9 +39,9 @@ struct Judgement {
   SearchWork work;
 };
 
-/// Decides between closures and odometry that contradict each other (docs/math.md, "Who is wrong?"). A hypothesis says
-/// which runs of odometry (a run lies between two neighbouring ends of closures) may be let go, and which closures are
-/// wrong for certain. Its misfit is that of the pose graph solved under it by graduated non-convexity, with every
+/// Decides between closures and odometry that contradict each other (docs/math.md, "Outlier rejection"). A hypothesis
+/// says which runs of odometry (a run lies between two neighbouring ends of closures) may be let go, and which closures
+/// are wrong for certain. Its misfit is that of the pose graph solved under it by graduated non-convexity, with every
 /// closure truncated and the closures at one keyframe sharing one vote, plus the price of its failed segments. The
 /// hypothesis with the least misfit is taken. Tried are: nothing failed; what fails when all odometry may fail, less
 /// whatever does not pay for itself; and the largest `groups` of closures as wrong all together. `graph`: its first

@@ -9,12 +9,12 @@
 #include <optional>
 #include <string>
 
-#include "tutti/finders/sensor_finder_maker.hpp"
 #include "tutti/lab/mission_input.hpp"
 #include "tutti/lab/write_bags.hpp"
 #include "tutti/mapfile/content.hpp"
 #include "tutti/mission/runner.hpp"
 #include "tutti/robot/odometry_covariance.hpp"
+#include "tutti/verifiers/sensor_verifier_maker.hpp"
 
 namespace tutti::lab {
 namespace bag_mission_test {
@@ -47,13 +47,13 @@ class MapOf {
 /// mission's is, too. `from_bags` has its settings.
 void expect_same(const MissionConfig& config, mission::MissionConfig from_bags) {
   mission::MissionParts parts{
-      .input = load_input(config, {}, 1).value(), .finder = nullptr, .refiner = nullptr, .companions = {}};
+      .input = load_input(config, {}, 1).value(), .verifier = nullptr, .refiner = nullptr, .companions = {}};
   for (mission::MissionRecording& robot : parts.input.robots) {
     robot.recording.increment_covariance = robot::increment_covariances(robot.recording.odometry, {});
     robot.recording.imu_noise = {};
   }
-  parts.finder = finders::make_finder(config.closures);
-  parts.refiner = finders::make_refiner(config.closures, config.refinement);
+  parts.verifier = verifiers::make_verifier(config.closures);
+  parts.refiner = verifiers::make_refiner(config.closures, config.refinement);
   MapOf simulated, recorded;
   ASSERT_TRUE(mission::run_mission(config, std::move(parts), simulated.options()));
 
@@ -105,7 +105,7 @@ TEST(BagMission, OfRgbdCamerasIsTheMission) {
   config.agent.submap.duration_s = 5.0;
   config.agent.submap.representative_distance_m = 0.3;
   config.tracking.tracker.descriptors.kind = "orb";
-  config.closures.finder = "visual";
+  config.closures.verifier = "visual";
   config.closures.visual.max_hamming = 0.2;
   mission::MissionConfig from_bags = config;
   config.source = "hall";

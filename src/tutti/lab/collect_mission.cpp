@@ -221,12 +221,12 @@ Result<mission::MissionRecord> collect_mission(const MissionConfig& config, cons
     robots.push_back(std::move(*robot));
     ids.insert(recording.recording.robot);
   }
-  auto finder = make_finder(config, source);
-  if (!finder) return tl::unexpected(finder.error());
+  auto verifier = make_verifier(config, source);
+  if (!verifier) return tl::unexpected(verifier.error());
   const fs::path map = state / "server" / program::kMapFile;
   const auto store = storage::open_sqlite_store(map, storage::map_schema());
   if (!store) return tl::unexpected(store.error());
-  const auto server = node::ServerNode::open(ids, *finder, {.server = config.server}, 1, **store);
+  const auto server = node::ServerNode::open(ids, *verifier, {.server = config.server}, 1, **store);
   if (!server) return in_context(map.string(), server.error());
   static_cast<void>((*server)->resume(Timestamp{}));
   if (const auto due = (*server)->next_timer()) static_cast<void>((*server)->on_timer(*due));  // computes the map

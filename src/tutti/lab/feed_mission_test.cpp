@@ -10,7 +10,7 @@
 #include "support/program/feed/client.hpp"
 #include "support/program/feed/node_target.hpp"
 #include "support/sanitized.hpp"
-#include "tutti/lab/closure_finders.hpp"
+#include "tutti/lab/closure_verifiers.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/worker_node.hpp"
 #include "tutti/program/feed/feed_session.hpp"
@@ -61,15 +61,15 @@ class Mission {
       fed_.emplace_back(recordings_.back().recording.robot, settings_);
     }
     lab::MissionConfig mission;
-    mission.closure_changes.finder = "reference";
+    mission.closure_changes.verifier = "reference";
     mission.closure_changes.reference.wrong_share = 0.0;
-    finder_ = lab::make_closure_finder(mission, recordings_, 5);
+    verifier_ = lab::make_closure_verifier(mission, recordings_, 5);
     node::ServerNodeConfig of_server;
     of_server.server.update_period_s = 20.0;
-    server_ = std::move(node::ServerNode::open(robots, finder_, of_server, 1, map_).value());
+    server_ = std::move(node::ServerNode::open(robots, verifier_, of_server, 1, map_).value());
     const auto submaps = std::make_shared<node::SubmapFrames>(
         [this](SubmapId id) { return Result<std::string>(**map_.read("submaps", node::key_of(id))); });
-    worker_ = std::make_unique<node::WorkerNode>(bus::Endpoint::worker(0), finder_, submaps);
+    worker_ = std::make_unique<node::WorkerNode>(bus::Endpoint::worker(0), verifier_, submaps);
     carry_out(server_->resume({}));
   }
 
@@ -148,7 +148,7 @@ class Mission {
   std::vector<mission::MissionRecording> recordings_;
   std::deque<Fed> fed_;
   std::map<std::size_t, Pose3> shown_;  ///< T_map_odom by robot.
-  std::shared_ptr<const server::ClosureFinder> finder_;
+  std::shared_ptr<const server::ClosureVerifier> verifier_;
   storage::MemoryStore map_{storage::map_schema()};
   std::unique_ptr<node::ServerNode> server_;
   std::unique_ptr<node::WorkerNode> worker_;

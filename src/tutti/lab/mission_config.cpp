@@ -31,20 +31,20 @@ void check_names(const Robots& robots, const char* path, std::vector<std::string
 void check_closures(const MissionConfig& config, std::vector<std::string>& problems) {
   const ClosureChanges& closures = config.closure_changes;
   if (!closures.come_with_mission()) {
-    std::ranges::move(mission::problems_of_finder(config), std::back_inserter(problems));
+    std::ranges::move(mission::problems_of_verifier(config), std::back_inserter(problems));
   }
-  if (!closures.planted.empty() && closures.finder != "reference")
+  if (!closures.planted.empty() && closures.verifier != "reference")
     problems.push_back(
-        fmt::format("closures.planted: given, but closures.finder is '{}', expected 'reference'", closures.finder));
+        fmt::format("closures.planted: given, but closures.verifier is '{}', expected 'reference'", closures.verifier));
   for (std::size_t i = 0; i < config.robots.size(); ++i)
-    if (const LabFinder* kind = closures.lab_finder(); kind != nullptr && !kind->has(config.robots[i]))
+    if (const LabVerifier* kind = closures.lab_verifier(); kind != nullptr && !kind->has(config.robots[i]))
       problems.push_back(
-          fmt::format("robots.{}.{}: missing, but closures.finder is '{}'", i, kind->needs, closures.finder));
-  if (closures.finder == "recorded" && config.source != "recordings")
-    problems.push_back(fmt::format("closures.finder: is 'recorded', but source is '{}'", config.source));
-  if (config.source == "simulation" && closures.finder == "lidar" && config.simulation.sensors != "lidar")
+          fmt::format("robots.{}.{}: missing, but closures.verifier is '{}'", i, kind->needs, closures.verifier));
+  if (closures.verifier == "recorded" && config.source != "recordings")
+    problems.push_back(fmt::format("closures.verifier: is 'recorded', but source is '{}'", config.source));
+  if (config.source == "simulation" && closures.verifier == "lidar" && config.simulation.sensors != "lidar")
     problems.push_back(
-        fmt::format("closures.finder: is 'lidar', but simulation.sensors is '{}'; expected finder 'reference'",
+        fmt::format("closures.verifier: is 'lidar', but simulation.sensors is '{}'; expected verifier 'reference'",
                     config.simulation.sensors));
 }
 
@@ -83,10 +83,13 @@ Result<MissionConfig> finish(ConfigNode root, const std::string& name, const std
   return config;
 }
 
-/// Who finds closures is of the laboratory's settings where they come with the mission.
-ConfigNode without_finder(ConfigNode root) {
+/// Where closures come with the mission, their source is a setting of the laboratory.
+ConfigNode without_verifier(ConfigNode root) {
   for (auto& [key, value] : root.map)
-    if (key == "closures") std::erase_if(value.map, [](const auto& entry) { return entry.key == "finder"; });
+    if (key == "closures")
+      std::erase_if(value.map, [](const auto& entry) {
+        return entry.key == "verifier" || entry.key == verifiers::VerifierConfig::kFormerName;
+      });
   return root;
 }
 
@@ -96,7 +99,7 @@ Result<MissionConfig> read_mission(const ConfigNode& root, const std::string& na
   MissionConfig config;
   ConfigLoader loader;
   loader.load(root, config);
-  const ConfigNode rest = config.closure_changes.come_with_mission() ? without_finder(root) : root;
+  const ConfigNode rest = config.closure_changes.come_with_mission() ? without_verifier(root) : root;
   loader.load(rest, of_recordings(config));
   if (const auto ok = loader.finish(name); !ok) return tl::unexpected(ok.error());
   if (mission::has_graphs(config)) config.agent.submap.keyframe_time_s = kEveryPose_s;
@@ -133,7 +136,7 @@ Result<MissionConfig> demo_mission(const std::vector<std::string>& assignments, 
 std::string to_yaml(const MissionConfig& config) {
   ConfigNode all = dump_config<mission::MissionConfig>(config);
   MissionConfig rest = config;
-  if (!rest.closure_changes.come_with_mission()) rest.closure_changes.finder = config.closures.finder;
+  if (!rest.closure_changes.come_with_mission()) rest.closure_changes.verifier = config.closures.verifier;
   merge_config(all, dump_config(rest));
   return tutti::to_yaml(all);
 }

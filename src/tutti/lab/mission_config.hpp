@@ -36,43 +36,43 @@ struct RobotChanges {
 };
 
 struct MissionConfig;
-/// A finder whose closures are made of the mission's recordings, not of what sensors saw.
-struct LabFinder {
+/// A verifier whose closures are made of the mission's recordings, not of what sensors saw.
+struct LabVerifier {
   std::string_view name;
   std::string_view help;
   std::string_view needs;                          ///< The setting that every replayed robot must have,
   bool (*has)(const mission::RobotConfig& robot);  ///< and whether this one has it.
-  std::shared_ptr<const server::ClosureFinder> (*make)(const MissionConfig& config,
-                                                       const std::vector<mission::MissionRecording>& recordings,
-                                                       std::uint64_t seed);
+  std::shared_ptr<const server::ClosureVerifier> (*make)(const MissionConfig& config,
+                                                         const std::vector<mission::MissionRecording>& recordings,
+                                                         std::uint64_t seed);
 };
-const std::vector<LabFinder>& lab_finders();
+const std::vector<LabVerifier>& lab_verifiers();
 
 /// Closures that come with the mission, and ways to make found closures wrong.
 struct ClosureChanges {
-  std::string finder = mission::MissionConfig().closures.finder;
+  std::string verifier = mission::MissionConfig().closures.verifier;
   simulation::ReferenceClosureConfig reference;
   double wrong_share = 0.0;
   SpoiledClosureConfig wrong;
   std::vector<PlantedClosureConfig> planted;
   template <class V>
   void describe(V& v) {
-    v.field("finder", finder, one_of(all_finders()),
-            help_of(finders::finder_kinds()) + "; " + help_of(lab_finders()) + ".");
+    v.field("verifier", verifier, formerly(verifiers::VerifierConfig::kFormerName, one_of(all_verifiers())),
+            help_of(verifiers::verifier_kinds()) + "; " + help_of(lab_verifiers()) + ".");
     v.field("reference", reference);
     v.field("wrong_share", wrong_share, between(0.0, 0.9),
             "Share of the closures found that are made wrong on purpose.");
     v.field("wrong", wrong, any(), "How wrong these are.");
     v.field("planted", planted, any(), "reference: wrong closures at given places and times.");
   }
-  /// The chosen row of lab_finders(); null: sensors' closures are found.
-  [[nodiscard]] const LabFinder* lab_finder() const { return row_of(lab_finders(), finder); }
-  [[nodiscard]] bool come_with_mission() const { return lab_finder() != nullptr; }
+  /// The chosen row of lab_verifiers(); null: sensors' closures are found.
+  [[nodiscard]] const LabVerifier* lab_verifier() const { return row_of(lab_verifiers(), verifier); }
+  [[nodiscard]] bool come_with_mission() const { return lab_verifier() != nullptr; }
 
  private:
-  static std::vector<std::string> all_finders() {
-    std::vector<std::string> names = names_of(finders::finder_kinds());
-    std::ranges::move(names_of(lab_finders()), std::back_inserter(names));
+  static std::vector<std::string> all_verifiers() {
+    std::vector<std::string> names = names_of(verifiers::verifier_kinds());
+    std::ranges::move(names_of(lab_verifiers()), std::back_inserter(names));
     return names;
   }
 };

@@ -23,12 +23,12 @@ std::string problem_with(const std::string& yaml, const std::vector<std::string>
 }
 
 constexpr const char* kGood =
-    "robots: [{name: a, odometry: {file: a.tum}, reference: {file: a.tum}}]\nclosures: {finder: reference}\n";
+    "robots: [{name: a, odometry: {file: a.tum}, reference: {file: a.tum}}]\nclosures: {verifier: reference}\n";
 
 TEST(MissionConfig, TheDemosAreMissions) {
   const auto named = [](DemoSensors sensors) {
     const auto demo = demo_mission({}, sensors);
-    return demo ? demo->mission + " " + demo->source + " " + demo->closures.finder : demo.error().message;
+    return demo ? demo->mission + " " + demo->source + " " + demo->closures.verifier : demo.error().message;
   };
   EXPECT_EQ(named(DemoSensors::lidar), "demo simulation lidar");
   EXPECT_EQ(named(DemoSensors::visual), "hall hall visual");
@@ -54,7 +54,7 @@ TEST(MissionConfig, WhatAMissionNeedsIsAskedForByName) {
 TEST(MissionConfig, ImagesComeFromOnePlace) {
   const auto problem = [](const std::string& images, const std::string& odometry = "{file: a}") {
     return problem_with("robots: [{name: a, odometry: " + odometry + ", images: {" + images +
-                        "}}]\nclosures: {finder: visual}\n");
+                        "}}]\nclosures: {verifier: visual}\n");
   };
   EXPECT_EQ(problem("euroc_folder: f, most_cameras: 1, time_offset_s: -0.01"), "");
   EXPECT_EQ(problem("list: l, cameras: c, imu: i"), "");
@@ -62,7 +62,7 @@ TEST(MissionConfig, ImagesComeFromOnePlace) {
   const auto expect = [&](const std::string& images, const std::string& words) {
     EXPECT_NE(problem(images).find("robots.0." + words), std::string::npos) << problem(images);
   };
-  expect("", "images: missing, but closures.finder is 'visual'");
+  expect("", "images: missing, but closures.verifier is 'visual'");
   expect("euroc_folder: f, list: l, cameras: c", "images: several of euroc_folder, list and maplab_submaps are given");
   expect("list: l", "images.cameras: missing, but images.list is given");
   expect("cameras: c", "images.list: missing, but images.cameras is given");
@@ -147,7 +147,7 @@ TEST(MissionConfig, AssignmentsAreCheckedLikeTheFile) {
   EXPECT_NE(problem_with(kGood, {"robots.0.start_s=.inf"}).find("start_s: is .inf"), std::string::npos);
   EXPECT_NE(problem_with(kGood, {"robots.0.reference_offset_m=[1, 2]"}).find("expected 3"), std::string::npos);
   EXPECT_EQ(problem_with(kGood, {"closures.planted=[{robot: a, at_s: 9}]"}), "");
-  EXPECT_NE(problem_with(kGood, {"closures.planted=[{robot: a}]", "closures.finder=lidar", "robots.0.scans=s"})
+  EXPECT_NE(problem_with(kGood, {"closures.planted=[{robot: a}]", "closures.verifier=lidar", "robots.0.scans=s"})
                 .find("closures.planted"),
             std::string::npos);
 }

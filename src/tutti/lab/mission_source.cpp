@@ -6,7 +6,7 @@
 
 #include "tutti/base/config_io.hpp"
 #include "tutti/bus/transport.hpp"
-#include "tutti/lab/closure_finders.hpp"
+#include "tutti/lab/closure_verifiers.hpp"
 #include "tutti/lab/mission_input.hpp"
 #include "tutti/lab/replayed_robot.hpp"
 #include "tutti/mission/runner.hpp"
@@ -22,8 +22,8 @@ Result<MissionConfig> load(const MissionSource& source) {
     if (const auto ok = apply_override(*root, assignment); !ok) return tl::unexpected(ok.error());
   auto config = read_mission(*root, "--set");
   if (config && config->closure_changes.come_with_mission())
-    return fail(ErrorCode::configuration, "closures.finder is '{}': without a mission there is none",
-                config->closure_changes.finder);
+    return fail(ErrorCode::configuration, "closures.verifier is '{}': without a mission there is none",
+                config->closure_changes.verifier);
   return config;
 }
 
@@ -51,22 +51,22 @@ std::vector<std::string> robot_names(const MissionConfig& config) {
   return names;
 }
 
-Result<std::shared_ptr<const server::ClosureFinder>> make_finder(const MissionConfig& config,
-                                                                 const MissionSource& source) {
-  if (!config.closure_changes.come_with_mission()) return make_closure_finder(config, {}, source.seed);
+Result<std::shared_ptr<const server::ClosureVerifier>> make_verifier(const MissionConfig& config,
+                                                                     const MissionSource& source) {
+  if (!config.closure_changes.come_with_mission()) return make_closure_verifier(config, {}, source.seed);
   const auto input = load_input(config, source.data, source.seed);
   if (!input) return tl::unexpected(input.error());
-  return make_closure_finder(config, input->robots, source.seed);
+  return make_closure_verifier(config, input->robots, source.seed);
 }
 
 namespace {
 
-/// The finder is made here where it needs the mission.
-Result<program::FinderSettings> finder_settings(const MissionConfig& config, const MissionSource& source) {
-  program::FinderSettings out{.closures = config.closures, .refinement = config.refinement, .other = {}};
-  auto finder = make_finder(config, source);
-  if (!finder) return tl::unexpected(finder.error());
-  if ((*finder)->settings().empty()) out.other = std::move(*finder);
+/// The verifier is made here where it needs the mission.
+Result<program::VerifierSettings> verifier_settings(const MissionConfig& config, const MissionSource& source) {
+  program::VerifierSettings out{.closures = config.closures, .refinement = config.refinement, .other = {}};
+  auto verifier = make_verifier(config, source);
+  if (!verifier) return tl::unexpected(verifier.error());
+  if ((*verifier)->settings().empty()) out.other = std::move(*verifier);
   return out;
 }
 
@@ -77,13 +77,13 @@ Result<program::ServerSettings> server_settings(const MissionSource& source) {
   if (!config) return tl::unexpected(config.error());
   auto name = name_on_bus(source, *config);
   if (!name) return tl::unexpected(name.error());
-  auto finders = finder_settings(*config, source);
-  if (!finders) return tl::unexpected(finders.error());
+  auto verifiers = verifier_settings(*config, source);
+  if (!verifiers) return tl::unexpected(verifiers.error());
   program::ServerSettings out{.mission = std::move(*name),
                               .robots = {},
                               .accepts_others = !config->closure_changes.come_with_mission(),
                               .server = config->server,
-                              .finders = std::move(*finders)};
+                              .verifiers = std::move(*verifiers)};
   if (source.file.empty()) return out;
   out.robots = robot_names(*config);
   out.robot_arguments = source.file;
@@ -93,9 +93,9 @@ Result<program::ServerSettings> server_settings(const MissionSource& source) {
 Result<program::WorkerSettings> worker_settings(const MissionSource& source) {
   const auto config = load(source);
   if (!config) return tl::unexpected(config.error());
-  auto finders = finder_settings(*config, source);
-  if (!finders) return tl::unexpected(finders.error());
-  program::WorkerSettings out{.mission = {}, .finders = std::move(*finders)};
+  auto verifiers = verifier_settings(*config, source);
+  if (!verifiers) return tl::unexpected(verifiers.error());
+  program::WorkerSettings out{.mission = {}, .verifiers = std::move(*verifiers)};
   if (!is_named(source)) return out;
   auto name = name_on_bus(source, *config);
   if (!name) return tl::unexpected(name.error());

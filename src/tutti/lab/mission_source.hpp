@@ -13,7 +13,7 @@
 #include "tutti/program/robot_program.hpp"
 #include "tutti/program/server_program.hpp"
 #include "tutti/program/worker_program.hpp"
-#include "tutti/server/closure_finder.hpp"
+#include "tutti/server/closure_verifier.hpp"
 
 namespace tutti::lab {
 
@@ -37,9 +37,9 @@ bool is_named(const MissionSource& source);
 
 /// The robots of the mission; a robot's position in the list is its number. Empty when there is no mission.
 std::vector<std::string> robot_names(const MissionConfig& config);
-/// The mission's closure finder. Recordings are read only if the finder needs them.
-Result<std::shared_ptr<const server::ClosureFinder>> make_finder(const MissionConfig& config,
-                                                                 const MissionSource& source);
+/// The mission's closure verifier. Recordings are read only if the verifier needs them.
+Result<std::shared_ptr<const server::ClosureVerifier>> make_verifier(const MissionConfig& config,
+                                                                     const MissionSource& source);
 /// The settings that the mission gives its server and workers.
 Result<program::ServerSettings> server_settings(const MissionSource& source);
 Result<program::WorkerSettings> worker_settings(const MissionSource& source);

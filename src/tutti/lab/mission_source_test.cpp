@@ -26,23 +26,23 @@ TEST(MissionSource, WithoutAMissionClosuresAreFoundFromScans) {
   const auto defaults = load({.assignments = {"server.update_period_s=3"}});
   ASSERT_TRUE(defaults.has_value()) << defaults.error().message;
   EXPECT_EQ(defaults->server.update_period_s, 3.0);
-  EXPECT_EQ(defaults->closures.finder, "lidar");
-  EXPECT_FALSE(load({.assignments = {"closures.finder=reference"}}).has_value());
+  EXPECT_EQ(defaults->closures.verifier, "lidar");
+  EXPECT_FALSE(load({.assignments = {"closures.verifier=reference"}}).has_value());
   EXPECT_FALSE(load({.assignments = {"closures.colour=red"}}).has_value());
   EXPECT_FALSE(load({.file = "nowhere.yaml"}).has_value());
 }
 
 // What is drawn, or taken from a reference, only who has the mission can find.
-TEST(MissionSource, OnlyFindersThatNeedTheMissionAreMadeOfIt) {
+TEST(MissionSource, OnlyVerifiersThatNeedTheMissionAreMadeOfIt) {
   const auto plain = server_settings({.file = "demo"});
   ASSERT_TRUE(plain.has_value()) << plain.error().message;
-  EXPECT_EQ(plain->finders.other, nullptr);
+  EXPECT_EQ(plain->verifiers.other, nullptr);
   EXPECT_TRUE(plain->accepts_others);
   EXPECT_EQ(plain->robots, (std::vector<std::string>{"alpha", "bravo"}));
-  EXPECT_EQ(plain->finders.finder()->id().name, "lidar");
+  EXPECT_EQ(plain->verifiers.verifier()->id().name, "lidar");
   const auto spoiled = worker_settings({.file = "demo", .assignments = {"closures.wrong_share=0.1"}});
   ASSERT_TRUE(spoiled.has_value()) << spoiled.error().message;
-  EXPECT_NE(spoiled->finders.other, nullptr);
+  EXPECT_NE(spoiled->verifiers.other, nullptr);
   EXPECT_TRUE(worker_settings({}).has_value() && worker_settings({})->mission.empty());
 }
 

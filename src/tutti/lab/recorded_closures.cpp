@@ -20,7 +20,7 @@ const Keyframe* recorded_keyframe(const Submap& submap, RobotId robot, Timestamp
 
 }  // namespace
 
-RecordedClosureFinder::RecordedClosureFinder(const std::vector<mission::MissionRecording>& recordings) {
+RecordedClosureVerifier::RecordedClosureVerifier(const std::vector<mission::MissionRecording>& recordings) {
   std::map<std::pair<std::string, std::string>, RobotId> robots;
   for (const mission::MissionRecording& recording : recordings)
     robots[{recording.graph, recording.graph_robot}] = recording.recording.robot;
@@ -41,8 +41,8 @@ RecordedClosureFinder::RecordedClosureFinder(const std::vector<mission::MissionR
   std::ranges::stable_sort(closures_, {}, &Recorded::from);
 }
 
-std::vector<const RecordedClosureFinder::Recorded*> RecordedClosureFinder::between(const Submap& first,
-                                                                                   const Submap& second) const {
+std::vector<const RecordedClosureVerifier::Recorded*> RecordedClosureVerifier::between(const Submap& first,
+                                                                                       const Submap& second) const {
   const RobotId robot = first.id.chain.robot;
   const auto begin =
       std::ranges::lower_bound(closures_, End{robot, first.keyframes.front().stamp}, {}, &Recorded::from);
@@ -56,13 +56,13 @@ std::vector<const RecordedClosureFinder::Recorded*> RecordedClosureFinder::betwe
   return out;
 }
 
-bool RecordedClosureFinder::is_candidate(const Submap& first, const Submap& second) const {
+bool RecordedClosureVerifier::is_candidate(const Submap& first, const Submap& second) const {
   return !between(first, second).empty();
 }
 
-Result<ClosureVerdict> RecordedClosureFinder::verify(const Submap& first, const Submap& second,
-                                                     const server::PayloadStore& /*payloads*/) const {
-  ClosureVerdict verdict{.pair = {first.id, second.id}, .closures = {}, .refusal = {}, .finder = id()};
+Result<ClosureVerdict> RecordedClosureVerifier::verify(const Submap& first, const Submap& second,
+                                                       const server::PayloadStore& /*payloads*/) const {
+  ClosureVerdict verdict{.pair = {first.id, second.id}, .closures = {}, .refusal = {}, .verifier = id()};
   for (const Recorded* closure : between(first, second)) {
     const Keyframe* from = recorded_keyframe(first, closure->from.robot, closure->from.stamp);
     const Keyframe* to = recorded_keyframe(second, closure->to.robot, closure->to.stamp);
@@ -72,7 +72,7 @@ Result<ClosureVerdict> RecordedClosureFinder::verify(const Submap& first, const 
   return verdict;
 }
 
-std::vector<Timestamp> RecordedClosureFinder::known_at(const Submap& first, const Submap& second) const {
+std::vector<Timestamp> RecordedClosureVerifier::known_at(const Submap& first, const Submap& second) const {
   std::vector<Timestamp> out;
   for (const Recorded* closure : between(first, second)) out.push_back(closure->known_at);
   return out;

@@ -4,16 +4,16 @@
 #include <vector>
 
 #include "tutti/mission/recordings.hpp"
-#include "tutti/server/closure_finder.hpp"
+#include "tutti/server/closure_verifier.hpp"
 
 namespace tutti::lab {
 
 /// Finds the closures that came with the recordings (a pose graph of several robots), each when it arrived then, and
 /// none before both of its keyframes were taken. A keyframe that two submaps share counts for the earlier one. A
 /// closure within one submap joins no pair and is never found.
-class RecordedClosureFinder final : public server::ClosureFinder {
+class RecordedClosureVerifier final : public server::ClosureVerifier {
  public:
-  explicit RecordedClosureFinder(const std::vector<mission::MissionRecording>& recordings);
+  explicit RecordedClosureVerifier(const std::vector<mission::MissionRecording>& recordings);
   [[nodiscard]] MethodId id() const override { return {"recorded", 1, 0}; }
   [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return true; }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override;

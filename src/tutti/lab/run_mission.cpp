@@ -3,10 +3,10 @@
 
 #include <utility>
 
-#include "tutti/finders/sensor_finder_maker.hpp"
-#include "tutti/lab/closure_finders.hpp"
+#include "tutti/lab/closure_verifiers.hpp"
 #include "tutti/lab/mission_input.hpp"
 #include "tutti/lab/shadows.hpp"
+#include "tutti/verifiers/sensor_verifier_maker.hpp"
 
 namespace tutti::lab {
 
@@ -15,12 +15,12 @@ Result<mission::MissionRecord> run_mission(const MissionConfig& config, mission:
   if (!input) return tl::unexpected(input.error());
   options.settings_yaml = to_yaml(config);
   mission::MissionParts parts{.input = std::move(*input),
-                              .finder = nullptr,
-                              .refiner = finders::make_refiner(config.closures, config.refinement),
+                              .verifier = nullptr,
+                              .refiner = verifiers::make_refiner(config.closures, config.refinement),
                               .companions = [&config, &options](const Recording& recording) {
                                 return make_shadows(recording, config.agent, config.compare_policies, options.seed);
                               }};
-  parts.finder = make_closure_finder(config, parts.input.robots, options.seed);
+  parts.verifier = make_closure_verifier(config, parts.input.robots, options.seed);
   return mission::run_mission(config, std::move(parts), options);
 }
 

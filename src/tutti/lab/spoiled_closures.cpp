@@ -47,12 +47,12 @@ const Pose3& block_anchor(const Submap& submap) {
 
 }  // namespace
 
-SpoiledClosureFinder::SpoiledClosureFinder(std::shared_ptr<const server::ClosureFinder> inner, double wrong_share,
-                                           const SpoiledClosureConfig& config, std::uint64_t seed)
-    : WrappedFinder(std::move(inner)), wrong_share_(wrong_share), config_(config), seed_(seed) {}
+SpoiledClosureVerifier::SpoiledClosureVerifier(std::shared_ptr<const server::ClosureVerifier> inner, double wrong_share,
+                                               const SpoiledClosureConfig& config, std::uint64_t seed)
+    : WrappedVerifier(std::move(inner)), wrong_share_(wrong_share), config_(config), seed_(seed) {}
 
-Result<ClosureVerdict> SpoiledClosureFinder::verify(const Submap& first, const Submap& second,
-                                                    const server::PayloadStore& payloads) const {
+Result<ClosureVerdict> SpoiledClosureVerifier::verify(const Submap& first, const Submap& second,
+                                                      const server::PayloadStore& payloads) const {
   auto verdict = wrapped().verify(first, second, payloads);
   if (!verdict) return verdict;
   const auto error = draw_error(verdict->pair, wrong_share_, config_, seed_);

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "tutti/base/config.hpp"
-#include "tutti/server/closure_finder.hpp"
+#include "tutti/server/closure_verifier.hpp"
 #include "tutti/simulation/bounds.hpp"
 
 namespace tutti::lab {
@@ -23,14 +23,14 @@ struct SpoiledClosureConfig {
   }
 };
 
-/// Makes a share of another finder's accepted verdicts wrong, with their covariance unchanged. Which ones, and how
+/// Makes a share of another verifier's accepted verdicts wrong, with their covariance unchanged. Which ones, and how
 /// wrong they are, depends on (seed, pair) only; agreeing ones share their error over blocks of two submaps of each
 /// robot.
-class SpoiledClosureFinder final : public server::WrappedFinder {
+class SpoiledClosureVerifier final : public server::WrappedVerifier {
  public:
-  /// It has the other finder's id; the caller must give it one of its own (finders::NamedFinder).
-  SpoiledClosureFinder(std::shared_ptr<const server::ClosureFinder> inner, double wrong_share,
-                       const SpoiledClosureConfig& config, std::uint64_t seed);
+  /// It has the other verifier's id; the caller must give it one of its own (verifiers::NamedVerifier).
+  SpoiledClosureVerifier(std::shared_ptr<const server::ClosureVerifier> inner, double wrong_share,
+                         const SpoiledClosureConfig& config, std::uint64_t seed);
   /// Nothing: a worker cannot make it.
   [[nodiscard]] std::string settings() const override { return {}; }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,

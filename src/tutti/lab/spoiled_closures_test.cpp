@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "tutti/geometry/so3.hpp"
-#include "tutti/lab/closure_finders.hpp"
+#include "tutti/lab/closure_verifiers.hpp"
 
 namespace tutti::lab {
 namespace spoiled_closures_test {
@@ -24,7 +24,7 @@ Submap submap(std::uint32_t robot, std::uint32_t index) {
 }
 
 /// Finds every pair, between the middle keyframes, exactly.
-class Perfect final : public server::ClosureFinder {
+class Perfect final : public server::ClosureVerifier {
  public:
   [[nodiscard]] MethodId id() const override { return {"perfect", 7, 0}; }
   [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return true; }
@@ -46,10 +46,10 @@ class Spoiled : public testing::Test {
  protected:
   /// Claimed pose of the second submap from the true one, seen from the block's shared keyframe of the first.
   Pose3 error(std::uint32_t i, std::uint32_t j, std::uint64_t seed = 1) const {
-    const SpoiledClosureFinder finder(std::make_shared<Perfect>(), 0.3, config_, seed);
+    const SpoiledClosureVerifier verifier(std::make_shared<Perfect>(), 0.3, config_, seed);
     const Submap first = submap(0, i);
     const Submap second = submap(1, j);
-    const LoopClosure closure = finder.verify(first, second, payloads_)->closures.at(0);
+    const LoopClosure closure = verifier.verify(first, second, payloads_)->closures.at(0);
     const Pose3 T_odom_claimed = first.keyframes[1].T_odom_body * closure.measurement.T_a_b;
     const Pose3& anchor = first.keyframes[i % 2 == 0 ? 2 : 0].T_odom_body;
     return anchor.inverse() * T_odom_claimed * second.keyframes[1].T_odom_body.inverse() * anchor;
@@ -100,23 +100,23 @@ class Planted : public testing::Test {
         for (const Keyframe& keyframe : submap(robot, index).keyframes)
           if (reference[RobotId{robot}].empty() || reference[RobotId{robot}].back().stamp < keyframe.stamp)
             reference[RobotId{robot}].push_back({keyframe.stamp, keyframe.T_odom_body});
-    finder_ = std::make_shared<ReferenceClosureFinder>(
+    verifier_ = std::make_shared<ReferenceClosureVerifier>(
         reference, simulation::ReferenceClosureConfig{.radius_m = 1e-3, .wrong_share = 0.0}, 1,
         std::vector<PlantedClosure>{{RobotId{1}, Timestamp{} + 21.2, RobotId{0}, Timestamp{} + 4.9, error_}});
   }
   const Pose3 error_{so3_exp({0.0, 0.0, 0.1}), {1.5, -0.5, 0.0}};
   server::MemoryPayloadStore payloads_;
-  std::shared_ptr<ReferenceClosureFinder> finder_;
+  std::shared_ptr<ReferenceClosureVerifier> verifier_;
 };
 
 TEST_F(Planted, OnePairOfSubmapsHasTheWrongClosure) {
   int found = 0;
   for (std::uint32_t i = 0; i < 20; ++i)
     for (std::uint32_t j = 0; j < 20; ++j) {
-      const auto verdict = finder_->verify(submap(0, i), submap(1, j), payloads_);
-      EXPECT_EQ(finder_->is_candidate(submap(0, i), submap(1, j)), !verdict->closures.empty());
+      const auto verdict = verifier_->verify(submap(0, i), submap(1, j), payloads_);
+      EXPECT_EQ(verifier_->is_candidate(submap(0, i), submap(1, j)), !verdict->closures.empty());
       EXPECT_EQ(verdict->refusal.has_value(), verdict->closures.empty());
-      EXPECT_EQ(verdict->finder, finder_->id());
+      EXPECT_EQ(verdict->verifier, verifier_->id());
       if (verdict->closures.empty()) continue;
       ++found;
       const LoopClosure& closure = verdict->closures.front();
@@ -129,8 +129,8 @@ TEST_F(Planted, OnePairOfSubmapsHasTheWrongClosure) {
 }
 
 TEST_F(Planted, TheOrderOfThePairOnlyInvertsTheClosure) {
-  const LoopClosure forth = finder_->verify(submap(0, 2), submap(1, 10), payloads_)->closures.at(0);
-  const LoopClosure back = finder_->verify(submap(1, 10), submap(0, 2), payloads_)->closures.at(0);
+  const LoopClosure forth = verifier_->verify(submap(0, 2), submap(1, 10), payloads_)->closures.at(0);
+  const LoopClosure back = verifier_->verify(submap(1, 10), submap(0, 2), payloads_)->closures.at(0);
   EXPECT_EQ(back.from, forth.to);
   EXPECT_EQ(back.to, forth.from);
   EXPECT_LT(local(back.measurement.T_a_b, forth.measurement.T_a_b.inverse()).norm(), 1e-9);

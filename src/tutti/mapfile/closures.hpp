@@ -40,7 +40,7 @@ struct ClosureInfo {
   ClosureState state = ClosureState::candidate;  ///< Accepted when any of the closures is.
   std::string reason;                       ///< For people: why the state is not accepted, or which operator decided.
   std::vector<ClosureFit> closures;         ///< Empty when an operator has rejected in advance what may be found.
-  std::optional<ClosureVerdict> verdict;    ///< With the evidence, the finder's version, the worker and the time.
+  std::optional<ClosureVerdict> verdict;    ///< With the evidence, the verifier's version, the worker and the time.
   std::optional<ClosureDecision> decision;  ///< The operator's decision, also one that was withdrawn.
 };
 

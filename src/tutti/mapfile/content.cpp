@@ -59,12 +59,12 @@ Status read_submaps(const storage::TableStore& map, Content& content) {
 
 Status read_verdicts(const storage::TableStore& map, Content& content) {
   const auto take = [&](std::string_view, ClosureVerdict verdict) {
-    if (verdict.refusal) ++content.refused[verdict.finder];
+    if (verdict.refusal) ++content.refused[verdict.verifier];
     content.verdicts.insert_or_assign(verdict.pair, std::move(verdict));
   };
   const auto count = [&](std::string_view, const Verdicts& answer) {
     for (const ClosureVerdict& verdict : answer.verdicts)
-      ++(verdict.refusal ? content.refused : content.aside)[verdict.finder];
+      ++(verdict.refusal ? content.refused : content.aside)[verdict.verifier];
   };
   if (auto ok = read_table(map, map_tables::kVerdicts, wire::decode_verdict, take, content); !ok) return ok;
   return read_table(map, map_tables::kAnswers, wire::decode_verdicts, count, content);

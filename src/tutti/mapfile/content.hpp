@@ -28,8 +28,8 @@ struct Content {
   server::Refinements refinements;
   server::CandidatePairs candidates;  ///< Verdicts of other pairs are not in the map.
   std::map<RobotId, std::string> names;
-  std::map<MethodId, std::size_t> refused;  ///< Refused pairs, by the finder that refused them.
-  /// Pairs with closures of other finders than the server's, which are not believed.
+  std::map<MethodId, std::size_t> refused;  ///< Refused pairs, by the verifier that refused them.
+  /// Pairs with closures of other verifiers than the server's, which are not believed.
   std::map<MethodId, std::size_t> aside;
   struct Table {
     std::size_t rows = 0;

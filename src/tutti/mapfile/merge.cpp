@@ -82,15 +82,15 @@ Result<std::string> no_two_submaps(std::string_view key, const std::string&, con
               message ? to_string(message->submap.id) : std::string(key));
 }
 
-/// By one finder, a refusal is taken, as the server does; by two versions of one, the later's verdict; otherwise the
-/// first map's. The server that opens the map asks its own finder again where it is none of them.
+/// By one verifier, a refusal is taken, as the server does; by two versions of one, the later's verdict; otherwise the
+/// first map's. The server that opens the map asks its own verifier again where it is none of them.
 Result<std::string> newer_verdict(std::string_view, std::string a, std::string b) {
   const auto one = wire::decode_verdict(a), other = wire::decode_verdict(b);
   if (!one) return tl::unexpected(one.error());
   if (!other) return tl::unexpected(other.error());
-  if (one->finder.name == other->finder.name && one->finder.version != other->finder.version)
-    return one->finder.version > other->finder.version ? a : b;
-  if (one->finder != other->finder) return a;
+  if (one->verifier.name == other->verifier.name && one->verifier.version != other->verifier.version)
+    return one->verifier.version > other->verifier.version ? a : b;
+  if (one->verifier != other->verifier) return a;
   return other->refusal && !one->refusal ? b : a;
 }
 

@@ -18,11 +18,11 @@ class MapOfPlaces : public testing::Test {
  protected:
   MapOfPlaces() { config_.candidates_per_submap = 1; }
   [[nodiscard]] test::Mapper mapper(MemoryStore& store, std::uint64_t epoch = 1000) const {
-    return {{kAlpha, kBravo, kCharlie}, store, finder_, config_, epoch};
+    return {{kAlpha, kBravo, kCharlie}, store, verifier_, config_, epoch};
   }
   server::ServerConfig config_;
-  std::shared_ptr<const server::ClosureFinder> finder_ =
-      std::make_shared<server::test::RankingFinder>(std::make_shared<test::ExplainingFinder>());
+  std::shared_ptr<const server::ClosureVerifier> verifier_ =
+      std::make_shared<server::test::RankingVerifier>(std::make_shared<test::ExplainingVerifier>());
   MemoryStore store_{storage::map_schema()};
 };
 
@@ -82,13 +82,13 @@ TEST_F(MapOfPlaces, ADamagedRowIsASubmapWhosePairsAreAllVerified) {
   ASSERT_FALSE(place.candidates.empty());
   const Write row = node::to_row(id, place);
   EXPECT_EQ(node::place_of_row(row.key, *row.bytes), std::pair(id, place));
-  for (const std::uint32_t sensor : {0U, 1U, server::ClosureFinder::kMostSensors}) {
+  for (const std::uint32_t sensor : {0U, 1U, server::ClosureVerifier::kMostSensors}) {
     const auto with = [&, at = place]() mutable {
       at.candidates.front().sensor = sensor;
       return at;
     }();
     const auto back = node::place_of_row(row.key, *node::to_row(id, with).bytes);
-    if (sensor < server::ClosureFinder::kMostSensors)
+    if (sensor < server::ClosureVerifier::kMostSensors)
       EXPECT_EQ(back, std::pair(id, with));
     else
       EXPECT_FALSE(back.has_value());

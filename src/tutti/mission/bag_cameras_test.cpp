@@ -110,7 +110,7 @@ class BagCameras : public testing::Test {
     std::ranges::stable_sort(samples, {}, &Sample::ns);
     write_bytes(folder_ / "bag", mcap_of(samples, "zstd", 37));
     auto root = parse_yaml(bag_mission({"alpha=" + (folder_ / "bag").string()}, topics).value(), "--bag").value();
-    EXPECT_TRUE(apply_override(root, "closures.finder=visual"));
+    EXPECT_TRUE(apply_override(root, "closures.verifier=visual"));
     for (const std::string& setting : settings) EXPECT_TRUE(apply_override(root, setting));
     MissionConfig config;
     EXPECT_TRUE(load_config(root, config, "--bag"));
@@ -279,7 +279,7 @@ TEST_F(BagCameras, ARangeThatIsNoneIsRefused) {
   std::ranges::stable_sort(samples, {}, &Sample::ns);
   write_bytes(folder_ / "bag", mcap_of(samples, "zstd", 37));
   MissionConfig config;
-  config.closures.finder = "visual";
+  config.closures.verifier = "visual";
   config.robots = {{.name = "alpha", .bag = (folder_ / "bag").string()}};
   config.robots[0].images.depth.sensor.most_m = 0.1;
   const auto input = load_input(config, "", 1);

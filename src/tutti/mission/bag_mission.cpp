@@ -52,7 +52,7 @@ Result<std::string> bag_mission(const std::vector<std::string>& bags, const std:
   const ConfigNode mission = map({{"mission", scalar("bags")},
                                   {"input", scalar("real: bags as they were recorded")},
                                   {"robots", robots},
-                                  {"closures", map({{"finder", scalar("lidar")}})}});
+                                  {"closures", map({{"verifier", scalar("lidar")}})}});
   return to_yaml(mission);
 }
 

@@ -426,7 +426,7 @@ TEST_F(Bags, WithoutScansThereIsNothingToCloseOn) {
   write(samples);
   EXPECT_NE(
       problem().find(
-          "no scans (sensor_msgs/PointCloud2, or CustomMsg of a Livox); but closures.finder is 'lidar', expected"),
+          "no scans (sensor_msgs/PointCloud2, or CustomMsg of a Livox); but closures.verifier is 'lidar', expected"),
       std::string::npos)
       << problem();
 }
@@ -434,7 +434,7 @@ TEST_F(Bags, WithoutScansThereIsNothingToCloseOn) {
 TEST_F(Bags, ImagesAndImuAreTakenWhereClosuresAreFoundFromThem) {
   write(with_camera(robot({}), odometry_, kBodyLidar, "mono8"));
   EXPECT_EQ(load()->robots.front().recording.visual, nullptr);  // closures are LiDAR's
-  const auto input = load({}, {"closures.finder=sensors"});
+  const auto input = load({}, {"closures.verifier=sensors"});
   ASSERT_TRUE(input) << input.error().message;
   const Recording& recording = input->robots.front().recording;
   EXPECT_NE(recording.scans, nullptr);
@@ -451,12 +451,12 @@ TEST_F(Bags, ImagesAndImuAreTakenWhereClosuresAreFoundFromThem) {
 TEST_F(Bags, ImagesThatCannotBeUsedAreSaid) {
   write(with_camera(robot({}), odometry_, kBodyLidar, "32FC1"));
   EXPECT_NE(
-      load({}, {"closures.finder=visual"}).error().message.find("/camera/image_raw: encoding '32FC1' is no picture"),
+      load({}, {"closures.verifier=visual"}).error().message.find("/camera/image_raw: encoding '32FC1' is no picture"),
       std::string::npos);
   std::vector<Sample> samples = with_camera(robot({}), odometry_, kBodyLidar, "mono8");
   std::erase_if(samples, [](const Sample& sample) { return sample.topic == "/camera/camera_info"; });
   write(samples);
-  const auto input = load({}, {"closures.finder=sensors"});
+  const auto input = load({}, {"closures.verifier=sensors"});
   ASSERT_TRUE(input) << input.error().message;
   EXPECT_NE(notes_of(*input).find("no images are used: /camera/image_raw: no sensor_msgs/CameraInfo beside it"),
             std::string::npos)

@@ -84,7 +84,7 @@ class EvaluateMap : public ::testing::Test {
   const Pose3 T_odom_reference_{Eigen::Quaterniond(Eigen::AngleAxisd(2.0, Eigen::Vector3d::UnitZ())), {9.0, -4.0, 1.0}};
   const Pose3 T_reference_world_{Eigen::Quaterniond(Eigen::AngleAxisd(-0.7, Eigen::Vector3d::UnitX())),
                                  {100.0, 20.0, 3.0}};
-  server::MapServer server_{robots_, std::make_shared<const server::test::TestFinder>(1),
+  server::MapServer server_{robots_, std::make_shared<const server::test::TestVerifier>(1),
                             std::make_shared<server::MemoryPayloadStore>(), server::ServerConfig{}, 1};
   std::vector<std::uint32_t> seen_;
   bool by_camera_ = false;

@@ -10,7 +10,7 @@ namespace tutti::mission {
 namespace evaluate_server_test {
 
 /// No submap is compared with any other.
-class NoClosures final : public server::ClosureFinder {
+class NoClosures final : public server::ClosureVerifier {
  public:
   [[nodiscard]] MethodId id() const override { return {"none", 1, 0}; }
   [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return true; }

@@ -134,7 +134,7 @@ Result<std::string> graph_mission(const std::string& file, const std::filesystem
   return to_yaml(map({{"mission", scalar(std::filesystem::path(file).stem().string())},
                       {"input", scalar("a pose graph: its odometry, and its closures at their time of arrival")},
                       {"robots", robots},
-                      {"closures", map({{"finder", scalar("recorded")}})}}));
+                      {"closures", map({{"verifier", scalar("recorded")}})}}));
 }
 
 }  // namespace tutti::mission

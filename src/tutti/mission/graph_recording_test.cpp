@@ -170,7 +170,7 @@ TEST_F(GraphRecordingTest, AGraphIsAMission) {
   const std::string path = path_of(formats::to_pyfg(fleet("ab")));
   const auto text = graph_mission("g.pyfg", folder_);
   ASSERT_TRUE(text) << text.error().message;
-  for (const char* part : {"mission: g\n", "finder: recorded", "name: a", "name: b"})
+  for (const char* part : {"mission: g\n", "verifier: recorded", "name: a", "name: b"})
     EXPECT_NE(text->find(part), std::string::npos) << *text;
   EXPECT_FALSE(graph_mission("none.pyfg", folder_));
 }

@@ -130,13 +130,13 @@ std::vector<std::string> problems_of(const MissionConfig& config) {
   return problems;
 }
 
-std::vector<std::string> problems_of_finder(const MissionConfig& config) {
+std::vector<std::string> problems_of_verifier(const MissionConfig& config) {
   std::vector<std::string> problems;
-  const finders::FinderKind& kind = config.closures.kind();
+  const verifiers::VerifierKind& kind = config.closures.kind();
   for (std::size_t i = 0; i < config.robots.size(); ++i) {
     const RobotConfig& robot = config.robots[i];
     const auto note = [&](const char* what) {
-      problems.push_back(fmt::format("robots.{}.{}: missing, but closures.finder is '{}'", i, what, kind.name));
+      problems.push_back(fmt::format("robots.{}.{}: missing, but closures.verifier is '{}'", i, what, kind.name));
     };
     if (!robot.bag.empty()) continue;
     if (!kind.uses_images && robot.scans.empty()) note("scans");

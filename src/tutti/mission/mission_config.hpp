@@ -11,12 +11,12 @@
 #include "tutti/bus/simulated_radio.hpp"
 #include "tutti/estimation/bundle/refine_map.hpp"
 #include "tutti/evaluation/association.hpp"
-#include "tutti/finders/finder_config.hpp"
 #include "tutti/perception/lidar/scan_times.hpp"
 #include "tutti/perception/visual/frontend/tracking_source.hpp"
 #include "tutti/robot/agent.hpp"
 #include "tutti/robot/odometry_covariance.hpp"
 #include "tutti/server/map_server.hpp"
+#include "tutti/verifiers/verifier_config.hpp"
 
 namespace tutti::mission {
 
@@ -148,7 +148,7 @@ struct GraphConfig {
   void describe(V& v) {
     v.field("file", file, any(),
             "Instead of odometry and reference: a pose graph of several robots with times, PyFG or JRL. Edges along a "
-            "robot's poses are its odometry, vertices the reference, all other edges closures (closures.finder: "
+            "robot's poses are its odometry, vertices the reference, all other edges closures (closures.verifier: "
             "recorded).");
     v.field("robot", robot, any(), "The robot's letter in the graph; by default its name.");
   }
@@ -263,7 +263,7 @@ struct MissionConfig {
   robot::AgentConfig agent;
   server::ServerConfig server;
   bundle::RefinementConfig refinement;
-  finders::FinderConfig closures;
+  verifiers::VerifierConfig closures;
   bus::LinkConfig link;
   std::vector<RobotLinkConfig> robot_links;
   template <class V>
@@ -291,9 +291,9 @@ struct MissionConfig {
 
 /// Problems that concern several fields (unique names, files given): one line each, "path: what is wrong".
 std::vector<std::string> problems_of(const MissionConfig& config);
-/// Problems of robots' data with config.closures, in the same form; for missions whose closures the configured finder
+/// Problems of robots' data with config.closures, in the same form; for missions whose closures the configured verifier
 /// finds.
-std::vector<std::string> problems_of_finder(const MissionConfig& config);
+std::vector<std::string> problems_of_verifier(const MissionConfig& config);
 /// True if robots are from pose graphs. Every pose is a keyframe then, whatever agent.submap says.
 bool has_graphs(const MissionConfig& config);
 /// Why files cannot be named after a robot of this name; empty when they can.

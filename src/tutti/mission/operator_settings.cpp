@@ -22,7 +22,7 @@ std::span<const OperatorSetting> operator_settings() {
       {"agent.disagreement.false_alarm_rate",
        "The chance, per robot and mission, to be told of a disagreement that is only the server's own uncertainty."},
       {"server.update_period_s", "The server optimises and broadcasts once in this time."},
-      {"closures.finder", "Loop closures come from LiDAR scans, or from the reference where there are none."},
+      {"closures.verifier", "Loop closures come from LiDAR scans, or from the reference where there are none."},
       {"closures.lidar.min_overlap",
        "Two submaps that overlap less than this are not joined: lower finds more closures, and more wrong ones."},
       {"link.loss", "The share of radio messages that is lost."},

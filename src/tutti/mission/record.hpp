@@ -328,7 +328,7 @@ struct ServerWorkRecord {
   std::size_t updates = 0;
   std::size_t pairs_looked_at = 0;  ///< Pairs of submaps.
   std::size_t pairs_verified = 0;
-  std::size_t hypotheses = 0;       ///< Hypotheses tried about who is wrong.
+  std::size_t hypotheses = 0;       ///< Hypotheses of outlier rejection that were tried.
   std::size_t factorisations = 0;   ///< Factorisations of normal equations of poses.
   std::size_t sample_products = 0;  ///< Columns of samples times products with a graph's Laplacian.
   std::size_t places_compared = 0;  ///< Pairs of what submaps look like from above.

@@ -49,7 +49,7 @@ void note_understated_closures(const server::MapEstimate& map, MissionRecord& re
   for (const auto& [chains, factor] : map.closure_factors)
     record.notes.push_back(fmt::format(
         "{}: closures err {:.1f} times as much as they say in rotation and {:.1f} times in position, by their "
-        "neighbours; the map counts them so (stamps of a sensor that are late do this, or a finder that is too sure)",
+        "neighbours; the map counts them so (stamps of a sensor that are late do this, or a verifier that is too sure)",
         names_of({chains.first.robot, chains.second.robot}, record), std::sqrt(factor.rotation),
         std::sqrt(factor.translation)));
 }

@@ -125,16 +125,16 @@ void align_starts(std::vector<MissionRecording>& robots) {
 }
 
 /// A bag without what closures are found from would silently have none.
-Status check_bag(const RobotConfig& robot, const finders::FinderKind& finder, const MissionRecording& loaded) {
-  const bool has = (finder.uses_scans && loaded.recording.scans != nullptr) ||
-                   (finder.uses_images && loaded.recording.visual != nullptr);
+Status check_bag(const RobotConfig& robot, const verifiers::VerifierKind& verifier, const MissionRecording& loaded) {
+  const bool has = (verifier.uses_scans && loaded.recording.scans != nullptr) ||
+                   (verifier.uses_images && loaded.recording.visual != nullptr);
   if (robot.bag.empty() || has) return {};
   std::string said;
   for (const std::string& text : loaded.notes) said += (said.empty() ? "" : "; ") + text;
   return fail(ErrorCode::invalid,
-              "robot {}: {}; but closures.finder is '{}', expected one that uses what is there (--set "
-              "closures.finder=..; {})",
-              robot.name, said, finder.name, help_of(finders::finder_kinds()));
+              "robot {}: {}; but closures.verifier is '{}', expected one that uses what is there (--set "
+              "closures.verifier=..; {})",
+              robot.name, said, verifier.name, help_of(verifiers::verifier_kinds()));
 }
 
 /// What a robot's odometry is from, where that has more than odometry.

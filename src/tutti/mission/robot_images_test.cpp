@@ -60,7 +60,7 @@ class RobotImages : public testing::Test {
   RobotImages() {
     config_.robots = {{.name = "a", .odometry = {.file = "odometry.tum"}, .images = {.euroc_folder = "hall"}}};
     config_.agent.submap.duration_s = 2.0;
-    config_.closures.finder = "visual";
+    config_.closures.verifier = "visual";
     config_.tracking.tracker.descriptors.kind = "orb";
   }
   [[nodiscard]] MissionRecord run() const {

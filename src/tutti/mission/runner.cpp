@@ -11,8 +11,6 @@
 #include "tutti/base/check.hpp"
 #include "tutti/base/freed_memory.hpp"
 #include "tutti/bus/simulated_network.hpp"
-#include "tutti/finders/parallel.hpp"
-#include "tutti/finders/sensor_finder_maker.hpp"
 #include "tutti/mission/evaluate.hpp"
 #include "tutti/mission/load_meter.hpp"
 #include "tutti/mission/make_record.hpp"
@@ -27,6 +25,8 @@
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/node/worker_node.hpp"
 #include "tutti/storage/memory_store.hpp"
+#include "tutti/verifiers/parallel.hpp"
+#include "tutti/verifiers/sensor_verifier_maker.hpp"
 #include "tutti/wire/limits.hpp"
 
 namespace tutti::mission {
@@ -66,18 +66,18 @@ class MissionRun {
         survey_(std::move(parts.input.survey)),
         threads_(options.threads > 0 ? static_cast<std::size_t>(options.threads)
                                      : std::max(1U, std::thread::hardware_concurrency())),
-        meter_(std::move(parts.finder), std::move(parts.refiner)),
+        meter_(std::move(parts.verifier), std::move(parts.refiner)),
         network_(radio(), kMissionStart),
         store_(storage::map_schema()),
-        server_(node::ServerNode::open(robot_ids(recordings_), meter_.finder(),
+        server_(node::ServerNode::open(robot_ids(recordings_), meter_.verifier(),
                                        {.server = config.server,
                                         .pairs_per_job = SubmapPair::kMost,
                                         .job_timeout_s = 0.0,
                                         .refiner = meter_.refiner()},
                                        kEpoch, store_)
                     .value()),
-        worker_(kWorker, meter_.finder(), node::SubmapFrames::of(store_),
-                [this](std::size_t count, const auto& call) { finders::for_each_parallel(count, threads_, call); }),
+        worker_(kWorker, meter_.verifier(), node::SubmapFrames::of(store_),
+                [this](std::size_t count, const auto& call) { verifiers::for_each_parallel(count, threads_, call); }),
         server_port_(network_.connect(bus::Endpoint::server())),
         worker_port_(network_.connect(kWorker)),
         pace_(options.rate),
@@ -198,8 +198,8 @@ class MissionRun {
       if (robot.actor->next_time() <= time_s_) due.push_back(&robot);
     // A simulated scan or image is much work, an odometry sample hardly any.
     const bool heavy = std::ranges::any_of(due, [](const Robot* robot) { return robot->actor->has_sensors(); });
-    finders::for_each_parallel(due.size(), heavy ? threads_ : 1,
-                               [&](std::size_t i) { due[i]->actor->replay_next(now()); });
+    verifiers::for_each_parallel(due.size(), heavy ? threads_ : 1,
+                                 [&](std::size_t i) { due[i]->actor->replay_next(now()); });
     for (Robot* robot : due) carry_out(*robot->port, robot->actor->take_step());
   }
 
@@ -382,8 +382,8 @@ Result<MissionRecord> run_mission(const MissionConfig& config, const RunOptions&
   if (!input) return tl::unexpected(input.error());
   return run_mission(config,
                      {.input = std::move(*input),
-                      .finder = finders::make_finder(config.closures),
-                      .refiner = finders::make_refiner(config.closures, config.refinement),
+                      .verifier = verifiers::make_verifier(config.closures),
+                      .refiner = verifiers::make_refiner(config.closures, config.refinement),
                       .companions = {}},
                      options);
 }

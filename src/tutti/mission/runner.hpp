@@ -14,7 +14,7 @@
 #include "tutti/mission/record.hpp"
 #include "tutti/mission/recordings.hpp"
 #include "tutti/mission/robot_actor.hpp"
-#include "tutti/server/closure_finder.hpp"
+#include "tutti/server/closure_verifier.hpp"
 #include "tutti/storage/table_store.hpp"
 
 namespace tutti::mission {
@@ -31,7 +31,7 @@ struct Progress {
 /// The parts that a mission is run with.
 struct MissionParts {
   MissionInput input;
-  std::shared_ptr<const server::ClosureFinder> finder;
+  std::shared_ptr<const server::ClosureVerifier> verifier;
   std::shared_ptr<const server::MapRefiner> refiner;  ///< May be null.
   /// Makes the companions of each robot. Not set, or returning null: there are none.
   std::function<std::unique_ptr<Companions>(const Recording&)> companions;
@@ -59,7 +59,7 @@ double duration_of(const MissionConfig& config, const std::vector<MissionRecordi
 /// Fails when a radio is configured for a robot that the mission does not have, when all scans of a robot fail, or when
 /// keep_map does.
 Result<MissionRecord> run_mission(const MissionConfig& config, MissionParts parts, const RunOptions& options);
-/// The same with the mission's recordings as they are and the configured finder; also fails when recordings cannot be
+/// The same with the mission's recordings as they are and the configured verifier; also fails when recordings cannot be
 /// loaded.
 Result<MissionRecord> run_mission(const MissionConfig& config, const RunOptions& options);
 

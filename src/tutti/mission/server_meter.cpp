@@ -6,8 +6,8 @@
 
 namespace tutti::mission {
 
-Result<ClosureVerdict> MeasuredFinder::verify(const Submap& first, const Submap& second,
-                                              const server::PayloadStore& payloads) const {
+Result<ClosureVerdict> MeasuredVerifier::verify(const Submap& first, const Submap& second,
+                                                const server::PayloadStore& payloads) const {
   double cpu_s = 0.0;
   Stopwatch watch;
   auto verdict = [&] {
@@ -66,12 +66,12 @@ void ServerMeter::note_update(double time_s, double took_ms) {
 }
 
 void ServerMeter::record(double mission_s, TimingRecord& timing) const {
-  timing.server_verification_ms = finder_->took_ms();
+  timing.server_verification_ms = verifier_->took_ms();
   timing.server_optimisation_ms = optimisation_ms_;
   if (refiner_) timing.server_refinements = refiner_->took();
   timing.server_load = {.mission_s = mission_s,
                         .map_cpu_s = map_cpu_s_,
-                        .verification_cpu_s = finder_->cpu_s(),
+                        .verification_cpu_s = verifier_->cpu_s(),
                         .update_latency_ms = update_latency_ms_,
                         .peak_memory_mb = peak_memory_mb(),
                         .refinement_cpu_s = refinement_cpu_s()};

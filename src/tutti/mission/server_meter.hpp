@@ -11,15 +11,16 @@
 #include "tutti/mission/load_meter.hpp"
 #include "tutti/mission/record.hpp"
 #include "tutti/node/step.hpp"
-#include "tutti/server/closure_finder.hpp"
+#include "tutti/server/closure_verifier.hpp"
 #include "tutti/server/map_refiner.hpp"
 
 namespace tutti::mission {
 
-/// Wraps a finder and measures how long it takes for each pair.
-class MeasuredFinder final : public server::WrappedFinder {
+/// Wraps a verifier and measures how long it takes for each pair.
+class MeasuredVerifier final : public server::WrappedVerifier {
  public:
-  explicit MeasuredFinder(std::shared_ptr<const server::ClosureFinder> finder) : WrappedFinder(std::move(finder)) {}
+  explicit MeasuredVerifier(std::shared_ptr<const server::ClosureVerifier> verifier)
+      : WrappedVerifier(std::move(verifier)) {}
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const server::PayloadStore& payloads) const override;
 
@@ -56,12 +57,12 @@ class MeasuredRefiner final : public server::MapRefiner {
 class ServerMeter {
  public:
   /// `refiner` may be null.
-  explicit ServerMeter(std::shared_ptr<const server::ClosureFinder> finder,
+  explicit ServerMeter(std::shared_ptr<const server::ClosureVerifier> verifier,
                        std::shared_ptr<const server::MapRefiner> refiner = nullptr)
-      : finder_(std::make_shared<MeasuredFinder>(std::move(finder))),
+      : verifier_(std::make_shared<MeasuredVerifier>(std::move(verifier))),
         refiner_(refiner ? std::make_shared<MeasuredRefiner>(std::move(refiner)) : nullptr) {}
   /// To be given to server and workers.
-  [[nodiscard]] std::shared_ptr<const server::ClosureFinder> finder() const { return finder_; }
+  [[nodiscard]] std::shared_ptr<const server::ClosureVerifier> verifier() const { return verifier_; }
   [[nodiscard]] std::shared_ptr<const server::MapRefiner> refiner() const { return refiner_; }
 
   /// Calls `step` of the server, which may store a submap, and returns its result.
@@ -84,14 +85,14 @@ class ServerMeter {
   /// Calls `step` of a worker for this job, and returns its result.
   template <class F>
   node::Step verify(const std::string& job, F&& step) {
-    const double before_s = finder_->cpu_s();
+    const double before_s = verifier_->cpu_s();
     node::Step made = step();
-    note_job(job, finder_->cpu_s() - before_s);
+    note_job(job, verifier_->cpu_s() - before_s);
     return made;
   }
 
   /// CPU time of everything measured so far.
-  [[nodiscard]] double cpu_s() const { return map_cpu_s_ + finder_->cpu_s() + refinement_cpu_s(); }
+  [[nodiscard]] double cpu_s() const { return map_cpu_s_ + verifier_->cpu_s() + refinement_cpu_s(); }
   /// Writes the figures of a mission that lasted `mission_s` into `timing`.
   void record(double mission_s, TimingRecord& timing) const;
 
@@ -105,7 +106,7 @@ class ServerMeter {
   void note_job(const std::string& job, double cpu_s);
   void note_update(double time_s, double took_ms);
 
-  std::shared_ptr<MeasuredFinder> finder_;
+  std::shared_ptr<MeasuredVerifier> verifier_;
   std::shared_ptr<MeasuredRefiner> refiner_;
   double map_cpu_s_ = 0.0;
   std::vector<Unanswered> unanswered_;         // submaps that no broadcast contains yet

@@ -17,7 +17,7 @@ node::Step stored(const std::string& job) {
 }
 
 TEST(ServerMeter, MeasuresFromASubmapsArrivalToTheUpdateThatContainsIt) {
-  ServerMeter meter(std::make_shared<node::test::EvenFinder>());
+  ServerMeter meter(std::make_shared<node::test::EvenVerifier>());
   const auto nothing = [] { return node::Step{}; };
   meter.serve(1.0, [] { return stored("1/0"); });
   meter.serve(3.0, [] { return stored("1/1"); });
@@ -25,7 +25,7 @@ TEST(ServerMeter, MeasuresFromASubmapsArrivalToTheUpdateThatContainsIt) {
   meter.verify("1/1", [&] {
     const server::MemoryPayloadStore none;
     const Submap a = node::test::submap(RobotId{0}, 0).submap, b = node::test::submap(RobotId{0}, 1).submap;
-    EXPECT_FALSE(meter.finder()->verify(a, b, none).has_value());
+    EXPECT_FALSE(meter.verifier()->verify(a, b, none).has_value());
     return node::Step{};
   });
   meter.update(10.0, nothing);

@@ -53,15 +53,15 @@ struct SubmapPair {
   friend auto operator<=>(const SubmapPair&, const SubmapPair&) = default;
 };
 
-/// Outcome of verifying one pair: either closures or a refusal. A verdict depends on the two submaps and the finder
+/// Outcome of verifying one pair: either closures or a refusal. A verdict depends on the two submaps and the verifier
 /// only, never on the state of the map; therefore the map is a function of the set of submaps and verdicts.
 struct ClosureVerdict {
   SubmapPair pair;
   std::vector<LoopClosure> closures;  ///< From keyframes of pair.first to keyframes of pair.second.
   std::optional<Refusal> refusal;     ///< Why there are no closures.
-  MethodId finder;                    ///< server::ClosureFinder::id() of the finder that verified the pair.
+  MethodId verifier;                  ///< server::ClosureVerifier::id() of the verifier that verified the pair.
   // What follows is for people, and only set with closures; the map does not depend on it.
-  std::vector<Refusal> evidence;  ///< What the finder measured, with the limit that each value met.
+  std::vector<Refusal> evidence;  ///< What the verifier measured, with the limit that each value met.
   std::uint64_t worker = 0;       ///< 1 + the number of the worker that verified the pair; 0 when unknown.
   std::int64_t verified_ns = 0;   ///< When, by that worker's clock, since the Unix epoch; 0 when unknown.
   template <class V>
@@ -72,14 +72,14 @@ struct ClosureVerdict {
     v.field(4, "second_index", pair.second.index);
     v.field(5, "closure", closures, {.at_most = 1000});
     v.field(7, "refused", refusal, {.is_spread = true});
-    v.field(11, "finder_version", finder.version);
+    v.field(11, "verifier_version", verifier.version);
     v.field(12, "first_session", pair.first.chain.session);
     v.field(13, "second_session", pair.second.chain.session);
     v.field(13, "evidence", evidence, {.at_most = kRefusalKinds.size(), .is_spread = true});  // 14 to 16
     v.field(17, "worker", worker, {.low = 0, .high = 1.0 + std::numeric_limits<std::uint32_t>::max()});
     v.field(18, "verified_ns", verified_ns);
-    v.field(19, "finder_name", finder.name, MethodId::kName);
-    v.field(20, "finder_settings", finder.settings, {.fixed = true});
+    v.field(19, "verifier_name", verifier.name, MethodId::kName);
+    v.field(20, "verifier_settings", verifier.settings, {.fixed = true});
   }
   [[nodiscard]] Status check() const;
   [[nodiscard]] std::string where() const;  ///< The pair's submaps, for messages of errors.

@@ -117,14 +117,14 @@ struct Receipt {
 struct Job {
   std::string id;
   std::vector<SubmapPair> pairs;
-  MethodId finder{};       ///< Only this finder may verify them. Without a name (from an older server) any finder may.
-  std::string settings{};  ///< Settings to make the finder with (server::ClosureFinder::settings()); empty: only a
-                           ///< worker that has the finder can.
+  MethodId verifier{};  ///< Only this verifier may verify them. Without a name (from an older server) any verifier may.
+  std::string settings{};  ///< Settings to make the verifier with (server::ClosureVerifier::settings()); empty: only a
+                           ///< worker that has the verifier can.
   template <class V>
   void describe(V& v) {
     v.field(1, "id", id, kJobId);
     v.field(2, "pairs", pairs, {.at_most = SubmapPair::kMost, .always = true});
-    v.field(3, "finder", finder);
+    v.field(3, "verifier", verifier);
     v.field(4, "settings", settings, kMethodSettings);
   }
   friend bool operator==(const Job&, const Job&) = default;
@@ -136,7 +136,7 @@ struct Verdicts {
   std::vector<ClosureVerdict> verdicts;
   std::vector<SubmapPair> failed;  ///< Pairs without a verdict, say because a cloud could not be read.
   std::string why;                 ///< Why the first of `failed` has no verdict.
-  bool cannot = false;  ///< Every pair failed because this worker does not have the job's finder; another worker may.
+  bool cannot = false;  ///< Every pair failed because this worker does not have the job's verifier; another worker may.
   template <class V>
   void describe(V& v) {
     v.field(1, "job", job, kJobId);

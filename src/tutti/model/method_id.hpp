@@ -11,7 +11,7 @@
 
 namespace tutti {
 
-/// Identifies a method, which is a closure finder or a map refiner. Methods with equal ids compute the same from the
+/// Identifies a method, which is a closure verifier or a map refiner. Methods with equal ids compute the same from the
 /// same submaps, on any machine. Ids that differ say nothing about which method is better.
 struct MethodId {
   static constexpr FieldRule kName{.text = FieldRule::Text::word, .at_most = 64};

@@ -50,7 +50,7 @@ struct NodeStatus {
   bool finished = false;        ///< Its recording has ended.
   std::uint64_t jobs_done = 0;  ///< A worker's jobs since it started.
   std::string trouble;          ///< A problem, for people; empty: none.
-  std::vector<MethodId> can;    ///< A worker's finders and refiners; those without settings can be made with any.
+  std::vector<MethodId> can;    ///< A worker's verifiers and refiners; those without settings can be made with any.
   Health health;                ///< The newest that its body has reported within a minute.
   template <class V>
   void describe(V& v) {
@@ -157,8 +157,8 @@ struct MissionStatus {
   std::vector<Worker> workers;     ///< Sorted by number.
   std::vector<Refusals> refusals;  ///< Messages that were refused.
   std::string trouble;             ///< A problem, for people; empty: none.
-  std::string finder;              ///< to_string(MethodId) of the finder that verifies closures.
-  /// Pairs with closures of other finders, which stay in the map until the present finder has answered.
+  std::string verifier;            ///< to_string(MethodId) of the verifier that verifies closures.
+  /// Pairs with closures of other verifiers, which stay in the map until the present verifier has answered.
   std::uint64_t former_pairs = 0;
   std::uint64_t waiting = 0;        ///< Pairs and refinements that no present worker can compute,
   std::string why_waiting;          ///< and what the last worker that tried said.
@@ -180,7 +180,7 @@ struct MissionStatus {
     v.field(13, "refusals", refusals);
     v.field(14, "trouble", trouble);
     v.field(15, "incarnation", incarnation, {.fixed = true});
-    v.field(20, "finder", finder);
+    v.field(20, "verifier", verifier);
     v.field(21, "former_pairs", former_pairs);
     v.field(22, "waiting", waiting);
     v.field(23, "why_waiting", why_waiting);

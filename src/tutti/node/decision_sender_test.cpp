@@ -26,12 +26,12 @@ class Decisions : public testing::Test {
       for (const bus::Envelope& message :
            does(server_->receive(test::envelope(test::submap({RobotId{0}, 7}, i)), {}))) {
         if (message.kind != bus::MessageKind::job) continue;
-        WorkerNode worker(Endpoint::worker(0), finder_, SubmapFrames::of(store_));
+        WorkerNode worker(Endpoint::worker(0), verifier_, SubmapFrames::of(store_));
         for (const bus::Envelope& verdicts : worker.receive(message, {}).messages) does(server_->receive(verdicts, {}));
       }
   }
   void start() {
-    server_ = ServerNode::open({RobotId{0}}, finder_, {}, 1000, store_).value();
+    server_ = ServerNode::open({RobotId{0}}, verifier_, {}, 1000, store_).value();
     does(server_->resume({}));
   }
   std::vector<bus::Envelope> does(const Step& step) {
@@ -46,7 +46,7 @@ class Decisions : public testing::Test {
 
   const Endpoint kSelf = Endpoint::viewer(9);
   storage::MemoryStore store_{storage::map_schema()};
-  std::shared_ptr<const server::ClosureFinder> finder_ = std::make_shared<test::EvenFinder>();
+  std::shared_ptr<const server::ClosureVerifier> verifier_ = std::make_shared<test::EvenVerifier>();
   std::unique_ptr<ServerNode> server_;
 };
 

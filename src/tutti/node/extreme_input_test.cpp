@@ -155,7 +155,7 @@ RC_GTEST_PROP(ExtremeInput, AServerThatHearsItGoesOnToo, ()) {
   Timestamp now = robot.now;  // one clock: the robot says how long ago it heard a graph
   for (int round = 0; round < 2; ++round) {
     storage::MemoryStore store(storage::map_schema(), tables);
-    auto node = ServerNode::open({kRobot}, std::make_shared<test::EvenFinder>(), {}, 1000 + round, store);
+    auto node = ServerNode::open({kRobot}, std::make_shared<test::EvenVerifier>(), {}, 1000 + round, store);
     RC_ASSERT(node.has_value());
     const auto done = [&](const Step& step) { RC_ASSERT(store.commit(step.writes).has_value()); };
     done((*node)->resume(now));

@@ -94,10 +94,10 @@ TEST(Incarnation, JobsOfAnOlderMapHaveNamesOfTheirOwn) {
   std::set<std::string> names;
   for (const std::uint32_t incarnation : {11U, 12U}) {
     storage::MemoryStore store(storage::map_schema());  // the same again
-    const auto server =
-        ServerNode::open({chain.robot}, std::make_shared<test::EvenFinder>(), {.incarnation = incarnation}, 1000, store)
-            .value();
-    WorkerNode worker(bus::Endpoint::worker(0), std::make_shared<test::EvenFinder>(), SubmapFrames::of(store));
+    const auto server = ServerNode::open({chain.robot}, std::make_shared<test::EvenVerifier>(),
+                                         {.incarnation = incarnation}, 1000, store)
+                            .value();
+    WorkerNode worker(bus::Endpoint::worker(0), std::make_shared<test::EvenVerifier>(), SubmapFrames::of(store));
     const auto does = [&](const Step& step) {
       EXPECT_TRUE(store.commit(step.writes).has_value());
       return step;

@@ -13,8 +13,8 @@
 
 namespace tutti::node {
 
-/// The answers of a worker whose finder knows closures one after the other (server::ClosureFinder::known_at()). A pair
-/// is answered anew, with all closures known so far, whenever there is one more; a job is answered with its last
+/// The answers of a worker whose verifier knows closures one after the other (server::ClosureVerifier::known_at()). A
+/// pair is answered anew, with all closures known so far, whenever there is one more; a job is answered with its last
 /// closure.
 ///
 /// Robots' clocks begin elsewhere than a program's. A submap comes no earlier than its newest keyframe was taken; the

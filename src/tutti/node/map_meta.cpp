@@ -102,7 +102,7 @@ std::optional<std::pair<SubmapId, server::Place>> place_of_row(std::string_view 
   for (auto at = numbers->begin(); at != numbers->end(); at += kNumbers) {
     const std::uint64_t robot = at[0], index = at[2], sensor = index >> 32U;
     const auto likeness = std::bit_cast<double>(at[3]);
-    if (robot >> 32U != 0 || sensor >= server::ClosureFinder::kMostSensors || !std::isfinite(likeness))
+    if (robot >> 32U != 0 || sensor >= server::ClosureVerifier::kMostSensors || !std::isfinite(likeness))
       return std::nullopt;
     const SubmapId other{{RobotId{static_cast<std::uint32_t>(robot)}, at[1]}, static_cast<std::uint32_t>(index)};
     place.candidates.push_back({other, likeness, static_cast<std::uint32_t>(sensor)});

@@ -52,7 +52,7 @@ struct Program {
 class RobotCopy : public testing::Test {
  protected:
   RobotCopy() {
-    node_ = ServerNode::open({kRobot}, std::make_shared<test::EvenFinder>(), {}, 1, store_).value();
+    node_ = ServerNode::open({kRobot}, std::make_shared<test::EvenVerifier>(), {}, 1, store_).value();
     carry_out(node_->resume(now_));
   }
   void carry_out(Step step) {

@@ -40,7 +40,7 @@ void ServerNode::receive_verdicts(const bus::Envelope& envelope, Timestamp now, 
   for (const ClosureVerdict& verdict : answer->verdicts) unanswered.erase(verdict.pair);
   for (const SubmapPair& pair : answer->failed) unanswered.erase(pair);
   std::vector<ClosureVerdict> strange;
-  const auto is_strange = [&](const ClosureVerdict& verdict) { return verdict.finder != server_.state().finder; };
+  const auto is_strange = [&](const ClosureVerdict& verdict) { return verdict.verifier != server_.state().verifier; };
   std::ranges::copy_if(answer->verdicts, std::back_inserter(strange), is_strange);
   std::erase_if(answer->verdicts, is_strange);
   if (!strange.empty()) set_aside(envelope, strange, now, step);
@@ -63,13 +63,12 @@ void ServerNode::receive_verdicts(const bus::Envelope& envelope, Timestamp now, 
   step.tell(now, VerdictsTaken{answer->job, answer->verdicts.size()});
 }
 
-/// Verdicts of another finder than the server's, as of a program of another version: believed once the server has that
-/// finder.
-/// Closures are kept until then, one answer for each pair.
+/// Verdicts of another verifier than the server's, as of a program of another version: believed once the server has
+/// that verifier. Closures are kept until then, one answer for each pair.
 void ServerNode::set_aside(const bus::Envelope& envelope, const std::vector<ClosureVerdict>& verdicts, Timestamp now,
                            Step& step) {
-  const std::string why = fmt::format("answers of finder {}, expected {}: not believed",
-                                      to_string(verdicts.front().finder), to_string(server_.state().finder));
+  const std::string why = fmt::format("answers of verifier {}, expected {}: not believed",
+                                      to_string(verdicts.front().verifier), to_string(server_.state().verifier));
   refuse(envelope, why, now, step);
   std::vector<SubmapPair> pairs;
   for (const ClosureVerdict& verdict : verdicts) {
@@ -94,7 +93,7 @@ void ServerNode::note_waiting(const std::vector<SubmapPair>& pairs, const std::s
   why_waiting_ = plain_text(why);
   if (was_empty && !waiting_.empty()) step.tell(now, VerificationFailed{*waiting_.begin(), why});
   if (was_empty != waiting_.empty()) ++changes_;
-  if (workers_.any_can(server_.finder().id(), now)) ask_waiting(now, step);
+  if (workers_.any_can(server_.verifier().id(), now)) ask_waiting(now, step);
 }
 
 void ServerNode::ask_waiting(Timestamp now, Step& step) {
@@ -136,11 +135,13 @@ void ServerNode::note_failed(const SubmapPair& pair, const std::string& why, Tim
   if (next == FailedPairs::Next::ask_now) give_back(pair);
 }
 
-/// The map goes on without it, and another finder asks again.
+/// The map goes on without it, and another verifier asks again.
 void ServerNode::give_up(const SubmapPair& pair, const std::string& why, Timestamp now, Verdicts& refused, Step& step) {
   failed_.forget(pair);
-  const ClosureVerdict verdict{
-      .pair = pair, .closures = {}, .refusal = Refusal{RefusalReason::unverified}, .finder = server_.state().finder};
+  const ClosureVerdict verdict{.pair = pair,
+                               .closures = {},
+                               .refusal = Refusal{RefusalReason::unverified},
+                               .verifier = server_.state().verifier};
   if (!take(verdict, refused, step)) return;
   note_refusal(bus::Endpoint::Role::worker, bus::MessageKind::job,
                fmt::format("submaps {} and {} are given up: {}", to_string(pair.first), to_string(pair.second), why));
@@ -179,8 +180,8 @@ void ServerNode::send_jobs(std::optional<SubmapId> newest, Timestamp now, unsign
       const auto at = [&](std::size_t i) { return of_it.begin() + static_cast<std::ptrdiff_t>(i); };
       const Job job{.id = jobs_.next_name(),
                     .pairs = {at(first), at(last)},
-                    .finder = server_.state().finder,
-                    .settings = server_.finder().settings()};
+                    .verifier = server_.state().verifier,
+                    .settings = server_.verifier().settings()};
       jobs_.open({job.pairs, nullptr, now, asked});
       step.messages.push_back({bus::Endpoint::server(), bus::Endpoint::any_worker(), bus::MessageKind::job, job.id,
                                std::make_shared<const std::string>(wire::encode(job))});

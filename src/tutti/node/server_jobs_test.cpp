@@ -44,7 +44,7 @@ class ServerJobs : public test::StoredServer {
         {from, Endpoint::server(), MessageKind::job, job.id, std::make_shared<const std::string>(wire::encode(job))});
   }
   void answer(const Job& job) {
-    WorkerNode worker(Endpoint::worker(0), finder_, SubmapFrames::of(*store_));
+    WorkerNode worker(Endpoint::worker(0), verifier_, SubmapFrames::of(*store_));
     const bus::Envelope asked{Endpoint::server(), Endpoint::any_worker(), MessageKind::job, job.id,
                               std::make_shared<const std::string>(wire::encode(job))};
     for (const bus::Envelope& verdicts : worker.receive(asked, now_).messages) receive(verdicts);
@@ -165,7 +165,7 @@ class StrangeAnswers : public ServerJobs {
             .verdicts = {{.pair = pair,
                           .closures = {},
                           .refusal = Refusal{RefusalReason::unverified},
-                          .finder = finder_->id()}},
+                          .verifier = verifier_->id()}},
             .failed = {},
             .why = {}};
   }
@@ -185,7 +185,7 @@ TEST_F(StrangeAnswers, ToAJobThatIsAnsweredAreDropped) {
 /// What members have said, said again 10,000 times by somebody who has their credential and their disk.
 TEST_F(StrangeAnswers, ReplaysChangeNothing) {
   const Job job = ask();
-  WorkerNode worker(Endpoint::worker(0), finder_, SubmapFrames::of(*store_));
+  WorkerNode worker(Endpoint::worker(0), verifier_, SubmapFrames::of(*store_));
   const bus::Envelope asked{Endpoint::server(), Endpoint::any_worker(), MessageKind::job, job.id,
                             std::make_shared<const std::string>(wire::encode(job))};
   const auto verdicts = worker.receive(asked, now_).messages;

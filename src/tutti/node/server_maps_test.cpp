@@ -29,7 +29,7 @@ class MapBeingMade : public test::StoredServer {
   }
   /// A submap of each robot, and what workers say of it.
   void take_both(std::uint32_t index) {
-    WorkerNode worker(bus::Endpoint::worker(0), finder_, SubmapFrames::of(*store_));
+    WorkerNode worker(bus::Endpoint::worker(0), verifier_, SubmapFrames::of(*store_));
     for (const ChainId& chain : {kAlpha, kBravo})
       for (const auto& job : of_kind(receive(test::submap(chain, index)), MessageKind::job))
         for (const auto& verdicts : worker.receive(job, now_).messages) receive(verdicts);

@@ -35,12 +35,12 @@ bus::MessageKind kind_of(std::string_view table) {
 }  // namespace
 
 Result<std::unique_ptr<ServerNode>> ServerNode::open(std::set<RobotId> robots,
-                                                     std::shared_ptr<const server::ClosureFinder> finder,
+                                                     std::shared_ptr<const server::ClosureVerifier> verifier,
                                                      const ServerNodeConfig& config, std::uint64_t epoch,
                                                      const storage::TableStore& store) {
-  TUTTI_CHECK(finder != nullptr && epoch > 0, "no finder or no epoch");
+  TUTTI_CHECK(verifier != nullptr && epoch > 0, "no verifier or no epoch");
   TUTTI_CHECK(config.pairs_per_job > 0, "jobs of no pairs");
-  auto opened = OpenedMap::from(store, finder->id());
+  auto opened = OpenedMap::from(store, verifier->id());
   if (!opened) return tl::unexpected(opened.error());
   if (opened->epoch > 0) epoch = opened->epoch;
   opened->registry.forget_strangers();
@@ -48,17 +48,17 @@ Result<std::unique_ptr<ServerNode>> ServerNode::open(std::set<RobotId> robots,
     for (const auto& [robot, receipt] : opened->receipts) robots.insert(robot);
     for (const auto& [robot, entry] : opened->registry.robots()) robots.insert(robot);
   }
-  return std::unique_ptr<ServerNode>(
-      new ServerNode(std::move(robots), std::move(finder), config, epoch, SubmapFrames::of(store), std::move(*opened)));
+  return std::unique_ptr<ServerNode>(new ServerNode(std::move(robots), std::move(verifier), config, epoch,
+                                                    SubmapFrames::of(store), std::move(*opened)));
 }
 
-ServerNode::ServerNode(std::set<RobotId> robots, std::shared_ptr<const server::ClosureFinder> finder,
+ServerNode::ServerNode(std::set<RobotId> robots, std::shared_ptr<const server::ClosureVerifier> verifier,
                        const ServerNodeConfig& config, std::uint64_t epoch, std::shared_ptr<SubmapFrames> frames,
                        OpenedMap opened)
     : robots_(robots),
       config_(config),
       frames_(frames),
-      server_(std::move(robots), std::move(finder), std::move(frames), config.server, epoch, std::move(opened.state)),
+      server_(std::move(robots), std::move(verifier), std::move(frames), config.server, epoch, std::move(opened.state)),
       receipts_(std::move(opened.receipts)),
       registry_(std::move(opened.registry)),
       unread_rows_(std::move(opened.unread_rows)),

@@ -63,7 +63,7 @@ class ServerNode {
   /// otherwise goes on with the stored map. Fails when the store has something other than a map. The store must outlive
   /// the node.
   static Result<std::unique_ptr<ServerNode>> open(std::set<RobotId> robots,
-                                                  std::shared_ptr<const server::ClosureFinder> finder,
+                                                  std::shared_ptr<const server::ClosureVerifier> verifier,
                                                   const ServerNodeConfig& config, std::uint64_t epoch,
                                                   const storage::TableStore& store);
 
@@ -105,7 +105,7 @@ class ServerNode {
   [[nodiscard]] const ProxyGraph& broadcast() const { return *last_broadcast_; }
 
  private:
-  ServerNode(std::set<RobotId> robots, std::shared_ptr<const server::ClosureFinder> finder,
+  ServerNode(std::set<RobotId> robots, std::shared_ptr<const server::ClosureVerifier> verifier,
              const ServerNodeConfig& config, std::uint64_t epoch, std::shared_ptr<SubmapFrames> frames,
              OpenedMap opened);
 
@@ -163,7 +163,7 @@ class ServerNode {
   void set_aside(const bus::Envelope& envelope, const std::vector<ClosureVerdict>& verdicts, Timestamp now, Step& step);
   /// An answer to a job that is not open.
   void refuse_unasked(const bus::Envelope& envelope, const std::string& job, Timestamp now, Step& step);
-  /// A worker did not have the finder for these pairs: they are asked again when a worker has it.
+  /// A worker did not have the verifier for these pairs: they are asked again when a worker has it.
   void note_waiting(const std::vector<SubmapPair>& pairs, const std::string& why, Timestamp now, Step& step);
   void ask_waiting(Timestamp now, Step& step);
   /// A worker says which methods it has.
@@ -196,7 +196,7 @@ class ServerNode {
   std::uint64_t start_ = 0;  // number of starts on this store; part of jobs' names
   JobBook jobs_;             // of this start
   FailedPairs failed_;
-  std::set<SubmapPair> waiting_;  // for a worker that has the finder
+  std::set<SubmapPair> waiting_;  // for a worker that has the verifier
   std::string why_waiting_;
   RefinementQueue refinements_;
   std::optional<Timestamp> settle_at_;

@@ -43,7 +43,7 @@ class ServerNodeTest : public test::StoredServer {
   }
   /// Everything that a step asks workers for is answered, and so many times taken.
   void answer(const Step& step, std::size_t taken = 1) {
-    WorkerNode worker(Endpoint::worker(0), finder_, SubmapFrames::of(*store_));
+    WorkerNode worker(Endpoint::worker(0), verifier_, SubmapFrames::of(*store_));
     for (const auto& job : of_kind(step, MessageKind::job))
       for (const auto& verdicts : worker.receive(job, now_).messages)
         EXPECT_EQ(told<VerdictsTaken>(receive(verdicts)), taken);
@@ -342,7 +342,7 @@ TEST_F(ServerNodeTest, NobodyElseHasAWordAndNotOnWhatIsNotThere) {
 TEST_F(ServerNodeTest, TheMapSaysWhoVerifiedAClosureAndWhenButTheServerDoesNotCare) {
   receive(test::submap(kAlpha, 0));
   const Step asked = receive(test::submap(kBravo, 0));
-  WorkerNode worker(Endpoint::worker(4), finder_, SubmapFrames::of(*store_));
+  WorkerNode worker(Endpoint::worker(4), verifier_, SubmapFrames::of(*store_));
   worker.set_clock([] { return std::int64_t{1'700'000'000'000'000'000}; });
   for (const auto& job : of_kind(asked, MessageKind::job))
     for (const auto& verdicts : worker.receive(job, now_).messages) receive(verdicts);
@@ -351,7 +351,7 @@ TEST_F(ServerNodeTest, TheMapSaysWhoVerifiedAClosureAndWhenButTheServerDoesNotCa
   ASSERT_TRUE(row.has_value());
   EXPECT_EQ(row->worker, 1U + 4U);
   EXPECT_EQ(row->verified_ns, 1'700'000'000'000'000'000);
-  EXPECT_EQ(row->finder, finder_->id());
+  EXPECT_EQ(row->verifier, verifier_->id());
   const auto verdicts = node_->map_server().state().verdicts;
   EXPECT_EQ(verdicts.at(pair).worker, 0U);
   restart();
@@ -389,7 +389,7 @@ TEST_F(ServerNodeTest, ItIsReadyBeforeTheMapIsComputedAndSaysWhatTheStoreKnows) 
   const auto before = node_->mission_status(now_);
   ASSERT_GT(before.closures, 0U);
   const CountingStore store(*store_);
-  const auto again = std::move(ServerNode::open({RobotId{0}, RobotId{1}}, finder_, {}, 1, store).value());
+  const auto again = std::move(ServerNode::open({RobotId{0}, RobotId{1}}, verifier_, {}, 1, store).value());
   const Step first = again->resume(now_);
   EXPECT_EQ(of_kind(first, MessageKind::receipt).size(), 2U);
   EXPECT_TRUE(of_kind(first, MessageKind::proxy_graph).empty());
@@ -415,7 +415,7 @@ TEST_F(ServerNodeTest, WhatComesBeforeTheMapIsComputedIsInTheFirstOne) {
   fill();
   now_ = Timestamp{} + 20.0;
   done(node_->on_timer(now_));
-  const auto again = std::move(ServerNode::open({RobotId{0}, RobotId{1}}, finder_, {}, 1, *store_).value());
+  const auto again = std::move(ServerNode::open({RobotId{0}, RobotId{1}}, verifier_, {}, 1, *store_).value());
   now_ = now_ + 1.0;
   done(again->resume(now_));
   const Step step = done(again->receive(test::envelope(test::submap(kAlpha, 9)), now_));
@@ -436,14 +436,14 @@ TEST_F(ServerNodeTest, AStoreThatIsDamagedIsNoMap) {
     auto tables = store_->tables();
     tables.at(table).begin()->second.pop_back();
     const storage::MemoryStore damaged(storage::map_schema(), tables);
-    const auto opened = ServerNode::open({RobotId{0}, RobotId{1}}, finder_, {}, 1, damaged);
+    const auto opened = ServerNode::open({RobotId{0}, RobotId{1}}, verifier_, {}, 1, damaged);
     ASSERT_FALSE(opened.has_value()) << table;
     EXPECT_NE(opened.error().message.find("map"), std::string::npos) << opened.error().message;
   }
 }
 
 /// Says that odometry lost a metre in the middle.
-class LostMetreFinder final : public server::ClosureFinder {
+class LostMetreVerifier final : public server::ClosureVerifier {
  public:
   [[nodiscard]] MethodId id() const override { return even_.id(); }
   [[nodiscard]] std::string settings() const override { return even_.settings(); }
@@ -461,14 +461,14 @@ class LostMetreFinder final : public server::ClosureFinder {
 
  private:
   static constexpr std::uint32_t kMiddle = 8;
-  test::EvenFinder even_;
+  test::EvenVerifier even_;
 };
 
 class ChangedMap : public ServerNodeTest {
  protected:
   /// The next update changes its mind.
   void reach(const std::string& setting) {
-    finder_ = std::make_shared<LostMetreFinder>();
+    verifier_ = std::make_shared<LostMetreVerifier>();
     ServerNodeConfig config{.pairs_per_job = 1000};
     config.server.change_of_mind = setting;
     start({RobotId{0}}, config);

@@ -39,7 +39,7 @@ class ServerRefinement : public test::StoredServer {
   static Step answer_of(WorkerNode& worker, const bus::Envelope& job) { return worker.receive(job, Timestamp{}); }
   Step answer(const bus::Envelope& job) { return receive(answer_of(*worker_, job).messages.at(0)); }
   Step fail(const bus::Envelope& job) {
-    WorkerNode blind(Endpoint::worker(1), finder_, SubmapFrames::of(*store_));
+    WorkerNode blind(Endpoint::worker(1), verifier_, SubmapFrames::of(*store_));
     return receive(answer_of(blind, job).messages.at(0));
   }
   static std::optional<bool> given_up(const Step& step) {
@@ -58,10 +58,10 @@ class ServerRefinement : public test::StoredServer {
 
   std::shared_ptr<const server::MapRefiner> refiner_ = std::make_shared<const server::test::Shrinker>();
   std::unique_ptr<WorkerNode> worker_ = [this] {
-    auto worker =
-        std::make_unique<WorkerNode>(Endpoint::worker(0), finder_, std::make_shared<SubmapFrames>([this](SubmapId id) {
-                                       return Result<std::string>(**store_->read("submaps", key_of(id)));
-                                     }));
+    auto worker = std::make_unique<WorkerNode>(Endpoint::worker(0), verifier_,
+                                               std::make_shared<SubmapFrames>([this](SubmapId id) {
+                                                 return Result<std::string>(**store_->read("submaps", key_of(id)));
+                                               }));
     worker->refine_with(refiner_);
     return worker;
   }();
@@ -190,7 +190,7 @@ TEST_F(ServerRefinement, ADistantWorkerGetsTheSubmapsFirst) {
   take(0);
   take(1);
   const bus::Envelope job = wait(10.0).at(0);
-  WorkerNode distant(Endpoint::worker(5), finder_, std::make_shared<FrameCache>(1U << 20U));
+  WorkerNode distant(Endpoint::worker(5), verifier_, std::make_shared<FrameCache>(1U << 20U));
   distant.refine_with(refiner_);
   std::vector<bus::Envelope> said = distant.receive(job, now_).messages;
   ASSERT_EQ(said.size(), 1U);

@@ -64,7 +64,7 @@ void ServerNode::receive_status(const bus::Envelope& envelope, Timestamp now, St
 
 void ServerNode::receive_status_of_worker(std::uint32_t number, const NodeStatus& status, Timestamp now, Step& step) {
   workers_.hear(number, status, now);
-  if (!waiting_.empty() && can(status, server_.finder().id())) ask_waiting(now, step);
+  if (!waiting_.empty() && can(status, server_.verifier().id())) ask_waiting(now, step);
   if (refinements_.waiting() && can(status, refinements_.waiting()->refiner))
     ask_for_refinement(*refinements_.take_waiting(), now, 0, step);
 }
@@ -130,7 +130,7 @@ MissionStatus ServerNode::mission_status(Timestamp now) const {
                     .pending_jobs = jobs_.size() + failed_.waiting() + (refinements_.next_due() ? 1 : 0) +
                                     (settle_at_ ? 1 : 0) + waiting,
                     .has_news = server_.has_news()};
-  out.finder = to_string(state.finder);
+  out.verifier = to_string(state.verifier);
   out.former_pairs = server_.former_pairs();
   out.waiting = waiting;
   if (waiting > 0) out.why_waiting = why_waiting_;

@@ -24,8 +24,8 @@ class ServerStatus : public testing::Test {
   void restart() {
     store_ = std::make_unique<storage::MemoryStore>(storage::map_schema(),
                                                     store_ ? store_->tables() : storage::MemoryStore::Tables{});
-    node_ = ServerNode::open({kAlpha}, std::make_shared<test::EvenFinder>(), {.accepts_others = accepts_others_}, 1000,
-                             *store_)
+    node_ = ServerNode::open({kAlpha}, std::make_shared<test::EvenVerifier>(), {.accepts_others = accepts_others_},
+                             1000, *store_)
                 .value();
     done(node_->resume(now_));
   }

@@ -79,9 +79,9 @@ std::string mission_status_text(const MissionStatus& status, double silent_s) {
       status.revision, status.has_news ? ", the next is due" : "",
       status.pending_jobs > 0 ? fmt::format(", {} jobs wait", status.pending_jobs) : "");
   if (!status.trouble.empty()) say("trouble: {}\n", status.trouble);
-  if (!status.finder.empty()) say("closures are found by {}\n", status.finder);
+  if (!status.verifier.empty()) say("closures are found by {}\n", status.verifier);
   if (status.former_pairs > 0)
-    say("between {} pairs of submaps they are another finder's, until this one has answered\n", status.former_pairs);
+    say("between {} pairs of submaps they are another verifier's, until this one has answered\n", status.former_pairs);
   if (status.waiting > 0)
     say("{} pairs of submaps or refinements wait for a worker that can: {}\n", status.waiting, status.why_waiting);
   if (status.robots.empty() && status.workers.empty()) say("Nobody is there: no robot and no worker.\n");

@@ -119,14 +119,14 @@ TEST(Upgrade, AnOlderRobotSaysWhatItCannotReadAndGoesOn) {
 /// As when a newer server has had the map, and an older one gets it back.
 TEST(Upgrade, RowsOfANewerVersionAreLeftAloneAndTold) {
   const ChainId chain{RobotId{0}, 7};
-  const auto finder = std::make_shared<test::EvenFinder>();
+  const auto verifier = std::make_shared<test::EvenVerifier>();
   storage::MemoryStore store(storage::map_schema());
-  const auto open = [&] { return ServerNode::open({chain.robot}, finder, {}, 1000, store).value(); };
+  const auto open = [&] { return ServerNode::open({chain.robot}, verifier, {}, 1000, store).value(); };
   {
     const auto server = open();
     const auto does = [&](const Step& step) { ASSERT_TRUE(store.commit(step.writes).has_value()); };
     does(server->resume({}));
-    WorkerNode worker(Endpoint::worker(0), finder, SubmapFrames::of(store));
+    WorkerNode worker(Endpoint::worker(0), verifier, SubmapFrames::of(store));
     for (std::uint32_t i = 0; i < 5; ++i) {
       const Step step = server->receive(test::envelope(test::submap(chain, i)), {});
       does(step);
@@ -228,7 +228,7 @@ TEST(Upgrade, SubmapsOfEveryVersionAreInTheMap) {
     map["submaps"][key_of(id)] = *frame;
     map["meta"]["map"] = storage::key_of({9, 3, 1, 2});
     const storage::MemoryStore store(storage::map_schema(), map);
-    const auto server = ServerNode::open({id.chain.robot}, std::make_shared<test::EvenFinder>(), {}, 1000, store);
+    const auto server = ServerNode::open({id.chain.robot}, std::make_shared<test::EvenVerifier>(), {}, 1000, store);
     ASSERT_TRUE(server.has_value()) << server.error().message;
     EXPECT_TRUE((*server)->map_server().state().submaps.contains(id));
   }
@@ -241,7 +241,7 @@ TEST(Upgrade, AnOlderWorkerLeavesAJobToAnother) {
     return bus::Envelope{Endpoint::server(), Endpoint::worker(1), kind, "1/0",
                          std::make_shared<const std::string>(std::move(bytes))};
   };
-  WorkerNode worker(Endpoint::worker(1), std::make_shared<test::EvenFinder>(), std::make_shared<FrameCache>(1 << 20));
+  WorkerNode worker(Endpoint::worker(1), std::make_shared<test::EvenVerifier>(), std::make_shared<FrameCache>(1 << 20));
   const auto leaves = [&](const Step& step) {
     EXPECT_EQ(step.events.size(), 1U);
     EXPECT_TRUE(step.messages.empty());

@@ -33,7 +33,7 @@ std::set<SubmapId> submaps_of(const std::variant<Job, RefinementJob>& job) {
   return std::visit([](const auto& one) { return submaps_of(one); }, job);
 }
 
-/// What a finder or refiner throws is a defect of ours, which costs the pair, or the refinement, and nothing else.
+/// What a verifier or refiner throws is a defect of ours, which costs the pair, or the refinement, and nothing else.
 template <class T, class Call>
 Result<T> caught(Call&& call) {
   try {
@@ -49,14 +49,14 @@ void WorkerNode::one_by_one(std::size_t count, const std::function<void(std::siz
   for (std::size_t i = 0; i < count; ++i) call(i);
 }
 
-WorkerNode::WorkerNode(bus::Endpoint self, std::shared_ptr<const server::ClosureFinder> finder,
+WorkerNode::WorkerNode(bus::Endpoint self, std::shared_ptr<const server::ClosureVerifier> verifier,
                        std::shared_ptr<const SubmapFrames> submaps, ForEach for_each)
-    : self_(self), finder_(std::move(finder)), submaps_(std::move(submaps)), for_each_(std::move(for_each)) {}
+    : self_(self), verifier_(std::move(verifier)), submaps_(std::move(submaps)), for_each_(std::move(for_each)) {}
 
-WorkerNode::WorkerNode(bus::Endpoint self, std::shared_ptr<const server::ClosureFinder> finder,
+WorkerNode::WorkerNode(bus::Endpoint self, std::shared_ptr<const server::ClosureVerifier> verifier,
                        std::shared_ptr<FrameCache> cache, ForEach for_each)
     : self_(self),
-      finder_(std::move(finder)),
+      verifier_(std::move(verifier)),
       cache_(std::move(cache)),
       submaps_(std::make_shared<const SubmapFrames>([frames = cache_](SubmapId id) { return frames->get(id); })),
       for_each_(std::move(for_each)) {}
@@ -70,7 +70,7 @@ Result<ClosureVerdict> WorkerNode::verify_or_throw(const SubmapPair& pair) const
   if (!first) return tl::unexpected(first.error());
   const auto second = submaps_->submap(pair.second);
   if (!second) return tl::unexpected(second.error());
-  auto verdict = asked_finder_->verify(**first, **second, *submaps_);
+  auto verdict = asked_verifier_->verify(**first, **second, *submaps_);
   if (!verdict) return verdict;
   if (auto ok = wire::validate(*verdict); !ok) return tl::unexpected(ok.error());
   return verdict;
@@ -95,21 +95,21 @@ Result<WorkerNode::AnyJob> WorkerNode::decode(const bus::Envelope& envelope) {
 std::vector<MethodId> WorkerNode::can() const {
   std::vector<MethodId> out;
   if (maker_) out = maker_->can();
-  out.push_back(finder_->id());
+  out.push_back(verifier_->id());
   if (refiner_ && !refiner_->id().name.empty()) out.push_back(refiner_->id());
   return out;
 }
 
 Status WorkerNode::prepare(const Job& job) {
-  if (job.finder.name.empty() || job.finder == finder_->id()) {
-    asked_finder_ = finder_;
+  if (job.verifier.name.empty() || job.verifier == verifier_->id()) {
+    asked_verifier_ = verifier_;
     return {};
   }
-  if (asked_finder_ && asked_finder_->id() == job.finder) return {};
-  auto made = maker_ ? maker_->finder(job.finder, job.settings)
-                     : fail(ErrorCode::unsupported, "this worker has finder {} alone", to_string(finder_->id()));
+  if (asked_verifier_ && asked_verifier_->id() == job.verifier) return {};
+  auto made = maker_ ? maker_->verifier(job.verifier, job.settings)
+                     : fail(ErrorCode::unsupported, "this worker has verifier {} alone", to_string(verifier_->id()));
   if (!made) return tl::unexpected(made.error());
-  asked_finder_ = std::move(*made);
+  asked_verifier_ = std::move(*made);
   return {};
 }
 
@@ -274,7 +274,7 @@ void WorkerNode::answer(const AnyJob& job, Timestamp now, Step& step) {
 std::vector<Timestamp> WorkerNode::known_at(const ClosureVerdict& verdict, Timestamp now) {
   const auto first = submaps_->submap(verdict.pair.first), second = submaps_->submap(verdict.pair.second);
   if (verdict.closures.empty() || !first || !second) return {};
-  auto known_at = asked_finder_->known_at(**first, **second);
+  auto known_at = asked_verifier_->known_at(**first, **second);
   if (!known_at.empty())
     later_.note_newest(std::max((*first)->keyframes.back().stamp, (*second)->keyframes.back().stamp), now);
   return known_at;

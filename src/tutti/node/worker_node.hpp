@@ -15,16 +15,16 @@
 #include "tutti/node/later_answers.hpp"
 #include "tutti/node/step.hpp"
 #include "tutti/node/submap_frames.hpp"
-#include "tutti/server/closure_finder.hpp"
+#include "tutti/server/closure_verifier.hpp"
 #include "tutti/server/map_refiner.hpp"
 
 namespace tutti::node {
 
-/// Verifies loop closures and refines maps for the server, with the finder or refiner that the job names: the worker's
-/// own, or one made from the job's settings. A job that it cannot do goes back to the server, and the worker then
-/// pauses so that other workers get the job. It keeps nothing between jobs that it could not get again, except closures
-/// that become known later (LaterAnswers): a worker that ends forgets those of pairs that it has begun to answer. A
-/// worker that lacks submaps of a job asks the server for them, and holds the job until they are there.
+/// Verifies loop closures and refines maps for the server, with the verifier or refiner that the job names: the
+/// worker's own, or one made from the job's settings. A job that it cannot do goes back to the server, and the worker
+/// then pauses so that other workers get the job. It keeps nothing between jobs that it could not get again, except
+/// closures that become known later (LaterAnswers): a worker that ends forgets those of pairs that it has begun to
+/// answer. A worker that lacks submaps of a job asks the server for them, and holds the job until they are there.
 class WorkerNode {
  public:
   /// Calls its argument with 0 ... count - 1, in any order and possibly on several threads, and returns after the last
@@ -40,22 +40,22 @@ class WorkerNode {
   static constexpr double kRest_s = 10.0;  ///< Pause after a job that the worker cannot do.
 
   /// A worker that has all submaps.
-  WorkerNode(bus::Endpoint self, std::shared_ptr<const server::ClosureFinder> finder,
+  WorkerNode(bus::Endpoint self, std::shared_ptr<const server::ClosureVerifier> verifier,
              std::shared_ptr<const SubmapFrames> submaps, ForEach for_each = one_by_one);
   /// A worker that has the submaps in `cache`, and asks the server for others.
-  WorkerNode(bus::Endpoint self, std::shared_ptr<const server::ClosureFinder> finder, std::shared_ptr<FrameCache> cache,
-             ForEach for_each = one_by_one);
+  WorkerNode(bus::Endpoint self, std::shared_ptr<const server::ClosureVerifier> verifier,
+             std::shared_ptr<FrameCache> cache, ForEach for_each = one_by_one);
 
   /// Sets the clock (nanoseconds since the Unix epoch) for the evidence of closures; without it there is no evidence.
   void set_clock(std::function<std::int64_t()> clock) { clock_ = std::move(clock); }
   /// Sets the worker's own refiner.
   void refine_with(std::shared_ptr<const server::MapRefiner> refiner) { refiner_ = std::move(refiner); }
-  /// Sets what makes finders and refiners that are not the worker's own; without it the worker has only its own.
-  void make_others_with(std::shared_ptr<const server::FinderMaker> maker) { maker_ = std::move(maker); }
+  /// Sets what makes verifiers and refiners that are not the worker's own; without it the worker has only its own.
+  void make_others_with(std::shared_ptr<const server::VerifierMaker> maker) { maker_ = std::move(maker); }
   /// Sets the pause after a job that the worker cannot do. 0 is for the server's own worker, as nobody else waits for
   /// its jobs.
   void rest_for(double seconds) { rest_s_ = seconds; }
-  /// The worker's finders and refiners, for its status.
+  /// The worker's verifiers and refiners, for its status.
   [[nodiscard]] std::vector<MethodId> can() const;
   /// Takes a job, only when holds_job() is false, or a submap that was asked for. The same job gives the same verdicts.
   Step receive(const bus::Envelope& envelope, Timestamp now);
@@ -80,7 +80,7 @@ class WorkerNode {
   void receive_job(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_copy(const bus::Envelope& envelope, Timestamp now, Step& step);
   void ask(Timestamp now, Step& step);
-  /// Sets the finder (refiner) that the job asks for.
+  /// Sets the verifier (refiner) that the job asks for.
   Status prepare(const Job& job);
   Status prepare(const RefinementJob& job);
   /// Answers that nothing of the job was done; `cannot`: because this worker lacks what the job asks for.
@@ -98,14 +98,14 @@ class WorkerNode {
   void send(bus::MessageKind kind, const std::string& job, std::string bytes, Step& step) const;
 
   bus::Endpoint self_;
-  std::shared_ptr<const server::ClosureFinder> finder_;  // its own finder
-  std::shared_ptr<FrameCache> cache_;                    // null: all submaps are there
+  std::shared_ptr<const server::ClosureVerifier> verifier_;  // its own verifier
+  std::shared_ptr<FrameCache> cache_;                        // null: all submaps are there
   std::shared_ptr<const SubmapFrames> submaps_;
   ForEach for_each_;
   std::function<std::int64_t()> clock_;
   std::shared_ptr<const server::MapRefiner> refiner_;  // its own; null: none
-  std::shared_ptr<const server::FinderMaker> maker_;
-  std::shared_ptr<const server::ClosureFinder> asked_finder_;  // of the last job; likewise the refiner
+  std::shared_ptr<const server::VerifierMaker> maker_;
+  std::shared_ptr<const server::ClosureVerifier> asked_verifier_;  // of the last job; likewise the refiner
   std::shared_ptr<const server::MapRefiner> asked_refiner_;
   std::optional<Held> held_;
   double rest_s_ = kRest_s;

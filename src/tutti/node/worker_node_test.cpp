@@ -36,13 +36,13 @@ class WorkerNodeTest : public testing::Test {
     EXPECT_EQ(step.messages.at(0).to, bus::Endpoint::server());
     return wire::decode_verdicts(*step.messages.at(0).bytes).value();
   }
-  std::shared_ptr<const server::ClosureFinder> finder_ = std::make_shared<test::EvenFinder>();
+  std::shared_ptr<const server::ClosureVerifier> verifier_ = std::make_shared<test::EvenVerifier>();
 };
 
 TEST_F(WorkerNodeTest, AnswersEveryPairOfAJobTheSameOnAnyNumberOfThreads) {
   Job job{.id = "1/0", .pairs = {}};
   for (std::uint32_t i = 0; i < 5; ++i) job.pairs.push_back({{kAlpha, i}, {kBravo, 2}});
-  WorkerNode alone(kWorker, finder_, frames());
+  WorkerNode alone(kWorker, verifier_, frames());
   const Verdicts verdicts = answer(alone.receive(envelope(job), Timestamp{}));
   EXPECT_EQ(verdicts.job, "1/0");
   ASSERT_EQ(verdicts.verdicts.size(), 4U);
@@ -51,7 +51,7 @@ TEST_F(WorkerNodeTest, AnswersEveryPairOfAJobTheSameOnAnyNumberOfThreads) {
   EXPECT_EQ(verdicts.failed, (std::vector<SubmapPair>{job.pairs[4]}));
   EXPECT_NE(verdicts.why.find("no submap"), std::string::npos) << verdicts.why;
 
-  WorkerNode many(kWorker, finder_, frames(), [](std::size_t count, const std::function<void(std::size_t)>& call) {
+  WorkerNode many(kWorker, verifier_, frames(), [](std::size_t count, const std::function<void(std::size_t)>& call) {
     std::vector<std::jthread> threads;
     for (std::size_t i = 0; i < count; ++i) threads.emplace_back(call, count - 1 - i);
   });
@@ -59,8 +59,8 @@ TEST_F(WorkerNodeTest, AnswersEveryPairOfAJobTheSameOnAnyNumberOfThreads) {
   EXPECT_EQ(answer(many.receive(envelope(job), Timestamp{})), verdicts);  // again
 }
 
-TEST_F(WorkerNodeTest, AFinderThatThrowsCostsThePairAndNothingElse) {
-  class Throwing final : public server::ClosureFinder {
+TEST_F(WorkerNodeTest, AVerifierThatThrowsCostsThePairAndNothingElse) {
+  class Throwing final : public server::ClosureVerifier {
    public:
     [[nodiscard]] MethodId id() const override { return there_.id(); }
     [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
@@ -76,7 +76,7 @@ TEST_F(WorkerNodeTest, AFinderThatThrowsCostsThePairAndNothingElse) {
     }
 
    private:
-    test::EvenFinder there_;
+    test::EvenVerifier there_;
   };
   WorkerNode worker(kWorker, std::make_shared<Throwing>(), frames());
   Job job{.id = "1/0", .pairs = {}};
@@ -88,7 +88,7 @@ TEST_F(WorkerNodeTest, AFinderThatThrowsCostsThePairAndNothingElse) {
 }
 
 /// Knows the closure of submap n 100 n seconds after the robots' clock began, and one more 1000 s later.
-class LaterFinder final : public server::ClosureFinder {
+class LaterVerifier final : public server::ClosureVerifier {
  public:
   [[nodiscard]] MethodId id() const override { return there_.id(); }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
@@ -108,11 +108,11 @@ class LaterFinder final : public server::ClosureFinder {
   }
 
  private:
-  test::EvenFinder there_;
+  test::EvenVerifier there_;
 };
 
 TEST_F(WorkerNodeTest, AnswersWithEachClosureWhenItIsKnownAndTheJobWithTheLast) {
-  WorkerNode worker(kWorker, std::make_shared<LaterFinder>(), frames());
+  WorkerNode worker(kWorker, std::make_shared<LaterVerifier>(), frames());
   Job job{.id = "1/0", .pairs = {}};
   for (std::uint32_t i = 0; i < 3; ++i) job.pairs.push_back({{kAlpha, i}, {kBravo, 2}});
   const Timestamp newest = test::submap(kBravo, 2).submap.keyframes.back().stamp;
@@ -166,7 +166,7 @@ class DistantWorkerTest : public WorkerNodeTest {
             std::make_shared<const std::string>(wire::encode(SubmapCopy{id, frame}))};
   }
   std::shared_ptr<FrameCache> cache_ = std::make_shared<FrameCache>(1U << 20U);
-  WorkerNode worker_{kWorker, finder_, cache_};
+  WorkerNode worker_{kWorker, verifier_, cache_};
 };
 
 TEST_F(DistantWorkerTest, AsksForWhatItLacksAndHoldsTheJobUntilItHasAll) {
@@ -180,7 +180,7 @@ TEST_F(DistantWorkerTest, AsksForWhatItLacksAndHoldsTheJobUntilItHasAll) {
   }
   const Step last = worker_.receive(copy(open[0], open[0]), Timestamp{});
   EXPECT_FALSE(worker_.holds_job());
-  WorkerNode near(kWorker, finder_, frames());
+  WorkerNode near(kWorker, verifier_, frames());
   EXPECT_EQ(answer(last), answer(near.receive(envelope(job), Timestamp{})));
   EXPECT_EQ(answer(worker_.receive(envelope(job), Timestamp{})), answer(last));  // it has them now
 }
@@ -286,7 +286,7 @@ TEST(SubmapFrames, ScannedAgainAndAgainTheyDecodeWhatDoesNotFit) {
 }
 
 TEST_F(WorkerNodeTest, WhatIsNoJobIsRefused) {
-  WorkerNode worker(kWorker, finder_, frames());
+  WorkerNode worker(kWorker, verifier_, frames());
   for (bus::Envelope bad : {test::envelope(test::submap(kAlpha, 0)), envelope({"1/0", {}})}) {
     if (bad.kind == bus::MessageKind::job) bad.bytes = std::make_shared<const std::string>("no frame");
     const Step step = worker.receive(bad, Timestamp{});
@@ -297,8 +297,8 @@ TEST_F(WorkerNodeTest, WhatIsNoJobIsRefused) {
 }
 
 TEST_F(WorkerNodeTest, AfterAJobThatItCannotDoItRestsForOthersToGetTheNext) {
-  WorkerNode worker(kWorker, finder_, frames());
-  const Job job{.id = "1/0", .pairs = {{{kAlpha, 0}, {kBravo, 2}}}, .finder = {"sonar", 2, 1}, .settings = "a: 1\n"};
+  WorkerNode worker(kWorker, verifier_, frames());
+  const Job job{.id = "1/0", .pairs = {{{kAlpha, 0}, {kBravo, 2}}}, .verifier = {"sonar", 2, 1}, .settings = "a: 1\n"};
   const Verdicts declined = answer(worker.receive(envelope(job), Timestamp{}));
   EXPECT_TRUE(declined.cannot);
   EXPECT_EQ(declined.failed, job.pairs);

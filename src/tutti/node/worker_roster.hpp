@@ -12,7 +12,7 @@ namespace tutti::node {
 class WorkerRoster {
  public:
   void hear(std::uint32_t number, const NodeStatus& status, Timestamp now);
-  /// True if a worker that was heard recently has this finder or refiner.
+  /// True if a worker that was heard recently has this verifier or refiner.
   [[nodiscard]] bool any_can(const MethodId& id, Timestamp now) const;
   [[nodiscard]] const std::map<std::uint32_t, MissionStatus::Worker>& all() const { return workers_; }
 
@@ -20,7 +20,7 @@ class WorkerRoster {
   std::map<std::uint32_t, MissionStatus::Worker> workers_;  // the latest status of each
 };
 
-/// True if this worker has the finder or refiner, or can make it from its settings.
+/// True if this worker has the verifier or refiner, or can make it from its settings.
 bool can(const NodeStatus& worker, const MethodId& id);
 
 }  // namespace tutti::node

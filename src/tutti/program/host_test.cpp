@@ -351,10 +351,10 @@ TEST_F(HostTest, WhatIsThrownWhileItWaitsOrEndsEndsNothing) {
   host_->run(stop);
 }
 
-/// A mapping server whose finder throws when it is asked for submap 0/7/1.
+/// A mapping server whose verifier throws when it is asked for submap 0/7/1.
 class Mapper final : public Hosted {
  public:
-  class Finder final : public server::ClosureFinder {
+  class Verifier final : public server::ClosureVerifier {
    public:
     [[nodiscard]] MethodId id() const override { return there_.id(); }
     [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
@@ -371,11 +371,11 @@ class Mapper final : public Hosted {
     }
 
    private:
-    node::test::EvenFinder there_;
+    node::test::EvenVerifier there_;
   };
   explicit Mapper(const storage::TableStore& store)
       : node_(std::move(
-            node::ServerNode::open({RobotId{0}}, std::make_shared<Finder>(), node::ServerNodeConfig{}, 1, store)
+            node::ServerNode::open({RobotId{0}}, std::make_shared<Verifier>(), node::ServerNodeConfig{}, 1, store)
                 .value())) {}
   Answer start(Timestamp now) override { return {node_->resume(now), {}}; }
   Answer receive(const bus::Received& message, Timestamp now) override {
@@ -393,7 +393,7 @@ class Mapper final : public Hosted {
   std::unique_ptr<node::ServerNode> node_;
 };
 
-TEST_F(HostTest, AServerWhoseFinderThrowsOnOneSubmapMapsTheOthers) {
+TEST_F(HostTest, AServerWhoseVerifierThrowsOnOneSubmapMapsTheOthers) {
   storage::MemoryStore store(storage::map_schema());
   Host host(
       {.store = &store,

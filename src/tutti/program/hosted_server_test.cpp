@@ -46,7 +46,7 @@ class HostedServerTest : public testing::Test {
     parts.store = &store_;
     parts.open_port = [this]() -> Result<std::unique_ptr<bus::Port>> { return std::make_unique<Post>(owed_, sent_); };
     parts.open_node = [this, make_map](bus::Port&) -> Result<std::unique_ptr<Hosted>> {
-      auto node = node::ServerNode::open({kAlpha.robot}, std::make_shared<node::test::EvenFinder>(), {}, 1, store_);
+      auto node = node::ServerNode::open({kAlpha.robot}, std::make_shared<node::test::EvenVerifier>(), {}, 1, store_);
       return std::make_unique<HostedServer>(
           std::move(*node), store_, "1", [] { return std::string(); }, is_over_, viewers_, clock_, make_map);
     };

@@ -14,7 +14,7 @@
 #include "tutti/model/status.hpp"
 #include "tutti/program/event_log.hpp"
 #include "tutti/program/radio_count.hpp"
-#include "tutti/server/closure_finder.hpp"
+#include "tutti/server/closure_verifier.hpp"
 #include "tutti/storage/table_store.hpp"
 
 namespace tutti::program {
@@ -32,7 +32,7 @@ struct ViewedMission {
   std::string name;
   std::string version;
   storage::TableStore& map;  ///< Viewers write nothing but marks (mapfile/marks.hpp) in it.
-  std::shared_ptr<const server::ClosureFinder> finder;
+  std::shared_ptr<const server::ClosureVerifier> verifier;
   double rate = 1.0;          ///< Mission time per wall time.
   std::filesystem::path pki;  ///< Of `tutti pki`; empty: whoever reaches the server may do all.
   std::function<void(Level, const std::string&)> say;

@@ -36,15 +36,15 @@ namespace {
 /// The server's own worker: on a thread of its own, over a port of its own, with the map's file at hand.
 class OwnWorker {
  public:
-  OwnWorker(const bus::BusOptions& where, std::shared_ptr<const server::ClosureFinder> finder,
+  OwnWorker(const bus::BusOptions& where, std::shared_ptr<const server::ClosureVerifier> verifier,
             std::shared_ptr<const server::MapRefiner> refiner, const storage::TableStore& map,
             const std::string& version, std::size_t threads, const Clock& clock, EventLog& log)
       : host_({.store = nullptr,
                .open_port = [where] { return bus::open_port(kSelf, where); },
-               .open_node = [this, finder, refiner, version, threads,
+               .open_node = [this, verifier, refiner, version, threads,
                              &map](bus::Port& port) -> Result<std::unique_ptr<Hosted>> {
                  const auto make = [&](node::WorkerNode::ForEach for_each) {
-                   node::WorkerNode node(kSelf, finder, node::SubmapFrames::of(map), std::move(for_each));
+                   node::WorkerNode node(kSelf, verifier, node::SubmapFrames::of(map), std::move(for_each));
                    node.refine_with(refiner);
                    node.rest_for(0.0);
                    return node;
@@ -165,7 +165,7 @@ class ServerProgram {
   std::shared_ptr<const bus::MissionLease> lease_;
   bool is_over_ = false;  // the lease is another's
   std::unique_ptr<storage::TableStore> store_;
-  std::shared_ptr<const server::ClosureFinder> finder_;
+  std::shared_ptr<const server::ClosureVerifier> verifier_;
   std::optional<Clock> clock_;
   std::optional<Host> host_;
   std::optional<OwnWorker> worker_;
@@ -175,14 +175,14 @@ class ServerProgram {
 
 Result<std::unique_ptr<Hosted>> ServerProgram::open_node() {
   node::ServerNodeConfig config{
-      .server = settings_.server, .refiner = settings_.finders.refiner(), .accepts_others = settings_.accepts_others};
+      .server = settings_.server, .refiner = settings_.verifiers.refiner(), .accepts_others = settings_.accepts_others};
   config.incarnation = any_incarnation();
   if (guard_)
     config.name_objection = [this](RobotId robot, const std::string& name) { return guard_->objection(robot, name); };
   config.job_timeout_s *= std::max(1.0, options_.rate);  // a bus waits in wall time
   std::set<RobotId> robots;
   for (std::uint32_t i = 0; i < settings_.robots.size(); ++i) robots.insert(RobotId{i});
-  auto node = node::ServerNode::open(std::move(robots), finder_, config, folder_->made_ns(), *store_);
+  auto node = node::ServerNode::open(std::move(robots), verifier_, config, folder_->made_ns(), *store_);
   if (!node) return in_context((folder_->path() / kMapFile).string(), node.error());
   return std::make_unique<HostedServer>(
       std::move(*node), *store_, options_.version, [this] { return host_->all_trouble(); }, is_over_, viewers_,
@@ -259,7 +259,7 @@ Status ServerProgram::start() {
   auto log = EventLog::open(folder_->path(), "server", options_.console);
   if (!log) return tl::unexpected(log.error());
   log_ = std::move(*log);
-  finder_ = settings_.finders.finder();
+  verifier_ = settings_.verifiers.verifier();
   auto store = storage::open_sqlite_store(folder_->path() / kMapFile, storage::map_schema());
   if (!store) return tl::unexpected(store.error());
   store_ = std::move(*store);
@@ -287,7 +287,7 @@ Status ServerProgram::start() {
   const ViewedMission viewed{.name = settings_.mission,
                              .version = options_.version,
                              .map = *store_,
-                             .finder = finder_,
+                             .verifier = verifier_,
                              .rate = options_.rate,
                              .pki = options_.pki,
                              .say = [this](Level level, const std::string& sentence) { log_->say(level, sentence); }};
@@ -297,7 +297,7 @@ Status ServerProgram::start() {
     viewers_.push_back(std::move(*viewer));
   }
   if (options_.threads == 0) return {};
-  worker_.emplace(bus_, finder_, settings_.finders.refiner(), *store_, options_.version,
+  worker_.emplace(bus_, verifier_, settings_.verifiers.refiner(), *store_, options_.version,
                   static_cast<std::size_t>(options_.threads), *clock_, *log_);
   return worker_->start();
 }

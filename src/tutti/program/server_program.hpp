@@ -12,8 +12,8 @@
 #include "tutti/base/result.hpp"
 #include "tutti/bus/transport.hpp"
 #include "tutti/program/event_log.hpp"
-#include "tutti/program/finder_settings.hpp"
 #include "tutti/program/map_viewer.hpp"
+#include "tutti/program/verifier_settings.hpp"
 #include "tutti/server/map_server.hpp"
 
 namespace tutti::program {
@@ -29,12 +29,12 @@ struct ServerSettings {
   bool accepts_others = true;                     ///< Other robots join with their first submap.
   std::string robot_arguments = "--feed SOCKET";  ///< The last arguments of the command that starts a robot.
   server::ServerConfig server;
-  FinderSettings finders;
+  VerifierSettings verifiers;
   /// Describes the settings that a mission file may have.
   template <class V>
   void describe(V& v) {
     v.field("server", server);
-    finders.describe(v);
+    verifiers.describe(v);
   }
 };
 

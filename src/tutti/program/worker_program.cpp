@@ -14,9 +14,9 @@
 #include "tutti/base/random.hpp"
 #include "tutti/bus/delivery.hpp"
 #include "tutti/bus/mission_lease.hpp"
-#include "tutti/finders/parallel.hpp"
 #include "tutti/node/status_envelope.hpp"
 #include "tutti/program/stop.hpp"
+#include "tutti/verifiers/parallel.hpp"
 
 namespace tutti::program {
 namespace {
@@ -49,7 +49,7 @@ HostedWorker::HostedWorker(bus::Endpoint self, std::string version, const Make& 
 /// The port is this thread's: it says that work goes on while others do it.
 void HostedWorker::for_each(std::size_t count, const std::function<void(std::size_t)>& call) {
   auto done = std::async(std::launch::async, [&] {
-    finders::for_each_parallel(count, threads_, [&](std::size_t i) {
+    verifiers::for_each_parallel(count, threads_, [&](std::size_t i) {
       if (stop_) throw Stopped();
       call(i);
     });
@@ -93,8 +93,8 @@ Json HostedWorker::status(Timestamp /*now*/) const {
 }
 
 Status run_worker(const WorkerOptions& options, const std::atomic<bool>& stop) {
-  const FinderSettings& settings = options.settings.finders;
-  const auto finder = settings.finder();
+  const VerifierSettings& settings = options.settings.verifiers;
+  const auto verifier = settings.verifier();
   const auto log = EventLog::on_console("worker", options.console);
   const auto& known = options.bus.credentials.known;
   const bus::Endpoint self = bus::Endpoint::worker(known ? known->number : any_number());
@@ -115,9 +115,9 @@ Status run_worker(const WorkerOptions& options, const std::atomic<bool>& stop) {
                                                   : std::max(1U, std::thread::hardware_concurrency());
   const auto cache = std::make_shared<node::FrameCache>(kCacheBytes);
   const auto make = [&](node::WorkerNode::ForEach for_each) {
-    node::WorkerNode node(self, finder, cache, std::move(for_each));
+    node::WorkerNode node(self, verifier, cache, std::move(for_each));
     node.refine_with(settings.refiner());
-    node.make_others_with(std::make_shared<const finders::SensorFinderMaker>(settings.closures.feature_cache_mb));
+    node.make_others_with(std::make_shared<const verifiers::SensorVerifierMaker>(settings.closures.feature_cache_mb));
     return node;
   };
   const Clock clock;

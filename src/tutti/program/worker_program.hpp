@@ -9,19 +9,19 @@
 
 #include "tutti/bus/transport.hpp"
 #include "tutti/node/worker_node.hpp"
-#include "tutti/program/finder_settings.hpp"
 #include "tutti/program/host.hpp"
+#include "tutti/program/verifier_settings.hpp"
 
 namespace tutti::program {
 
 /// What a worker is told about its mission.
 struct WorkerSettings {
   std::string mission;  ///< Its name on the bus; empty: the mission that has a server there.
-  FinderSettings finders;
+  VerifierSettings verifiers;
   /// Describes the settings that a mission file may have, which a worker needs only when closures are made up.
   template <class V>
   void describe(V& v) {
-    finders.describe(v);
+    verifiers.describe(v);
   }
 };
 

@@ -12,7 +12,7 @@
 
 namespace tutti::server {
 
-/// Another submap, and how alike it looks (ClosureFinder::Likeness).
+/// Another submap, and how alike it looks (ClosureVerifier::Likeness).
 struct Alike {
   SubmapId submap;
   double likeness = 0.0;
@@ -22,7 +22,7 @@ struct Alike {
 
 /// What the place looks like that a submap shows, and which submaps it made a candidate with when it came.
 struct Place {
-  std::string looks;       ///< ClosureFinder::place_of().
+  std::string looks;       ///< ClosureVerifier::place_of().
   bool is_ranked = false;  ///< False: it was not compared with others yet.
   std::vector<Alike> candidates;
   friend bool operator==(const Place&, const Place&) = default;

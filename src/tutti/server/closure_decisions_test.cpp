@@ -11,22 +11,22 @@
 namespace tutti::server {
 namespace closure_decisions_test {
 
-using test::TestFinder;
+using test::TestVerifier;
 
 struct Inputs {
   SubmapSet submaps;
   VerdictSet verdicts;
 };
 
-Inputs make_inputs(const TestFinder& finder, std::uint64_t seed) {
+Inputs make_inputs(const TestVerifier& verifier, std::uint64_t seed) {
   Inputs in;
   for (std::uint32_t r = 0; r < 2; ++r)
     for (Submap& submap : test::make_submaps(RobotId{r}, {}, Rng(seed).fork(r)))
       in.submaps[submap.id] = std::make_shared<const Submap>(std::move(submap));
   for (auto a = in.submaps.begin(); a != in.submaps.end(); ++a)
     for (auto b = std::next(a); b != in.submaps.end(); ++b)
-      if (finder.is_candidate(*a->second, *b->second))
-        in.verdicts[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryPayloadStore());
+      if (verifier.is_candidate(*a->second, *b->second))
+        in.verdicts[{a->first, b->first}] = *verifier.verify(*a->second, *b->second, MemoryPayloadStore());
   return in;
 }
 
@@ -52,7 +52,7 @@ std::size_t accepted(const MapEstimate& map) {
 }
 
 TEST(ClosureDecisions, ARejectedClosureIsAsIfItHadNotBeenFound) {
-  const Inputs in = make_inputs(TestFinder(2), 2);
+  const Inputs in = make_inputs(TestVerifier(2), 2);
   const MapEstimate plain = estimate_map(in.submaps, in.verdicts, {});
   for (const auto& [pair, verdict] : in.verdicts) {
     const LoopClosure& closure = verdict.closures.front();
@@ -76,11 +76,11 @@ TEST(ClosureDecisions, ARejectedClosureIsAsIfItHadNotBeenFound) {
 TEST(ClosureDecisions, AnAcceptedClosureIsInTheMapWhateverItContradicts) {
   std::size_t wrong = 0;
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
-    const Inputs in = make_inputs(TestFinder(seed, 4), seed);
+    const Inputs in = make_inputs(TestVerifier(seed, 4), seed);
     const MapEstimate plain = estimate_map(in.submaps, in.verdicts, {});
     for (const auto& [pair, verdict] : in.verdicts) {
       const LoopClosure& closure = verdict.closures.front();
-      if (!TestFinder::is_wrong(closure)) continue;
+      if (!TestVerifier::is_wrong(closure)) continue;
       ++wrong;
       EXPECT_FALSE(judged(plain, closure).accepted);
       EXPECT_NE(judged(plain, closure).objection, judge::Objection::none);
@@ -96,7 +96,7 @@ TEST(ClosureDecisions, AnAcceptedClosureIsInTheMapWhateverItContradicts) {
 }
 
 TEST(ClosureDecisions, AnAcceptedClosureKeepsItsCovarianceAndNothingElseOfTheMapChanges) {
-  const Inputs in = make_inputs(TestFinder(4), 4);
+  const Inputs in = make_inputs(TestVerifier(4), 4);
   const MapEstimate plain = estimate_map(in.submaps, in.verdicts, {});
   DecisionSet decisions;
   for (const auto& [pair, verdict] : in.verdicts) decisions[pair] = decision(Wish::accept);
@@ -116,7 +116,7 @@ TEST(ClosureDecisions, AnAcceptedClosureKeepsItsCovarianceAndNothingElseOfTheMap
 }
 
 TEST(ClosureDecisions, OneAcceptedClosureJoinsTwoRobots) {
-  const Inputs in = make_inputs(TestFinder(3), 3);
+  const Inputs in = make_inputs(TestVerifier(3), 3);
   const auto inter = std::ranges::find_if(
       in.verdicts, [](const auto& entry) { return entry.first.first.chain != entry.first.second.chain; });
   const VerdictSet one{*inter};
@@ -127,7 +127,7 @@ TEST(ClosureDecisions, OneAcceptedClosureJoinsTwoRobots) {
 }
 
 TEST(ClosureDecisions, AClosureAddedByHandJoinsTwoRobotsAndIsGoneWhenItIsWithdrawn) {
-  const Inputs in = make_inputs(TestFinder(3), 3);
+  const Inputs in = make_inputs(TestVerifier(3), 3);
   const auto inter = std::ranges::find_if(
       in.verdicts, [](const auto& entry) { return entry.first.first.chain != entry.first.second.chain; });
   ClosureDecision added = decision(Wish::accept);
@@ -145,13 +145,13 @@ TEST(ClosureDecisions, AClosureAddedByHandJoinsTwoRobotsAndIsGoneWhenItIsWithdra
   }
 }
 
-/// A server that knows all submaps, and the finder's verdicts on all pairs it asks for.
+/// A server that knows all submaps, and the verifier's verdicts on all pairs it asks for.
 class WordsToAServer : public testing::Test {
  protected:
-  WordsToAServer() : server_(make(finder_)) {
-    for (const auto& [id, submap] : make_inputs(TestFinder(5, 4), 5).submaps)
+  WordsToAServer() : server_(make(verifier_)) {
+    for (const auto& [id, submap] : make_inputs(TestVerifier(5, 4), 5).submaps)
       EXPECT_TRUE(server_.receive(SubmapMessage{{id.chain.robot, id.chain.session, id.index}, *submap}).has_value());
-    answer(server_, *finder_);
+    answer(server_, *verifier_);
     server_.optimise();
     for (const JudgedClosure& closure : server_.map().closures)
       if (closure.objection == judge::Objection::contradicted || closure.objection == judge::Objection::dear)
@@ -159,16 +159,16 @@ class WordsToAServer : public testing::Test {
     for (const auto& [pair, verdict] : server_.state().verdicts)
       if (verdict.closures.front() == refused_) pair_ = pair;
   }
-  static MapServer make(std::shared_ptr<const ClosureFinder> finder, MapServerState state = {}) {
-    return {{RobotId{0}, RobotId{1}}, std::move(finder), std::make_shared<MemoryPayloadStore>(), {}, 1,
+  static MapServer make(std::shared_ptr<const ClosureVerifier> verifier, MapServerState state = {}) {
+    return {{RobotId{0}, RobotId{1}}, std::move(verifier), std::make_shared<MemoryPayloadStore>(), {}, 1,
             std::move(state)};
   }
-  static void answer(MapServer& server, const ClosureFinder& finder) {
+  static void answer(MapServer& server, const ClosureVerifier& verifier) {
     for (const VerificationJob& job : server.take_jobs())
-      EXPECT_TRUE(server.receive(*finder.verify(*job.first, *job.second, MemoryPayloadStore())).has_value());
+      EXPECT_TRUE(server.receive(*verifier.verify(*job.first, *job.second, MemoryPayloadStore())).has_value());
   }
   /// Nothing is found anywhere, says another one.
-  class Other final : public ClosureFinder {
+  class Other final : public ClosureVerifier {
    public:
     [[nodiscard]] MethodId id() const override { return {"nothing", 1, 0}; }
     [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return true; }
@@ -178,7 +178,7 @@ class WordsToAServer : public testing::Test {
     }
   };
 
-  std::shared_ptr<const TestFinder> finder_ = std::make_shared<TestFinder>(5, 4);
+  std::shared_ptr<const TestVerifier> verifier_ = std::make_shared<TestVerifier>(5, 4);
   MapServer server_;
   LoopClosure refused_;
   SubmapPair pair_;
@@ -203,7 +203,7 @@ TEST_F(WordsToAServer, TheLaterWordHoldsInWhateverOrderTheyCome) {
                                          decision(Wish::withdraw, 1)};
   std::ranges::sort(decisions, {}, &ClosureDecision::given_ns);
   do {
-    MapServer server = make(finder_, server_.state());
+    MapServer server = make(verifier_, server_.state());
     for (const ClosureDecision& one : decisions) ASSERT_TRUE(server.receive(pair_, one).has_value());
     EXPECT_EQ(server.state().decisions.at(pair_), decision(Wish::accept, 3));
     server.optimise();
@@ -211,7 +211,7 @@ TEST_F(WordsToAServer, TheLaterWordHoldsInWhateverOrderTheyCome) {
   } while (std::ranges::next_permutation(decisions, {}, &ClosureDecision::given_ns).found);
 }
 
-TEST_F(WordsToAServer, WhatIsAcceptedStaysWhateverOtherFindersSay) {
+TEST_F(WordsToAServer, WhatIsAcceptedStaysWhateverOtherVerifiersSay) {
   ASSERT_TRUE(server_.receive(pair_, decision(Wish::accept)).has_value());
   const auto other = std::make_shared<Other>();
   MapServer server = make(other, server_.state());
@@ -228,7 +228,7 @@ TEST_F(WordsToAServer, WhatIsAcceptedStaysWhateverOtherFindersSay) {
   EXPECT_EQ(server.map().closures.front().closure, refused_);
 
   ASSERT_TRUE(server.receive(pair_, decision(Wish::withdraw, 2)).has_value());
-  const auto asked = server.take_jobs();  // which it was not, of this finder
+  const auto asked = server.take_jobs();  // which it was not, of this verifier
   ASSERT_EQ(asked.size(), 1U);
   EXPECT_EQ(asked.front().pair, pair_);
   answer(server, *other);

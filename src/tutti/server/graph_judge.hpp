@@ -35,7 +35,7 @@ struct JudgedGraph {
 };
 
 /// Makes a map from any pose graph as the server does: decides which closures and which segments of odometry are wrong
-/// (docs/math.md, "Who is wrong?"), and optimises with the others. The frame of each component is its first robot's
+/// (docs/math.md, "Outlier rejection"), and optimises with the others. The frame of each component is its first robot's
 /// odometry frame.
 JudgedGraph judge_graph(const RobotGraph& graph, const MapConfig& config);
 

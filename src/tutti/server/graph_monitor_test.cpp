@@ -17,21 +17,21 @@
 namespace tutti::server {
 namespace graph_monitor_test {
 
-VerdictSet verdicts_of(const SubmapSet& submaps, const test::TestFinder& finder) {
+VerdictSet verdicts_of(const SubmapSet& submaps, const test::TestVerifier& verifier) {
   VerdictSet out;
   for (auto a = submaps.begin(); a != submaps.end(); ++a)
     for (auto b = std::next(a); b != submaps.end(); ++b)
-      if (finder.is_candidate(*a->second, *b->second))
-        out[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryPayloadStore());
+      if (verifier.is_candidate(*a->second, *b->second))
+        out[{a->first, b->first}] = *verifier.verify(*a->second, *b->second, MemoryPayloadStore());
   return out;
 }
 
 TEST(MonitorGraph, SaysLessWhereClosuresHelp) {
-  const test::TestFinder finder(1);
+  const test::TestVerifier verifier(1);
   SubmapSet submaps;
   for (Submap& submap : test::make_submaps(RobotId{0}, {}, Rng(1)))
     submaps[submap.id] = std::make_shared<const Submap>(std::move(submap));
-  const VerdictSet verdicts = verdicts_of(submaps, finder);
+  const VerdictSet verdicts = verdicts_of(submaps, verifier);
   ASSERT_GT(verdicts.size(), 2U);
   const ProxyGraph without = monitor_graph(estimate_map(submaps, {}, {}), 1, {});
   const ProxyGraph with = monitor_graph(estimate_map(submaps, verdicts, {}), 2, {});
@@ -50,12 +50,12 @@ TEST(MonitorGraph, SaysLessWhereClosuresHelp) {
 
 /// Robots around a circle with closures.
 MapEstimate circle_map(std::uint64_t seed, std::uint32_t robots = 2) {
-  const test::TestFinder finder(seed);
+  const test::TestVerifier verifier(seed);
   SubmapSet submaps;
   for (std::uint32_t r = 0; r < robots; ++r)
     for (Submap& submap : test::make_submaps(RobotId{r}, {}, Rng(seed).fork(r)))
       submaps[submap.id] = std::make_shared<const Submap>(std::move(submap));
-  const VerdictSet verdicts = verdicts_of(submaps, finder);
+  const VerdictSet verdicts = verdicts_of(submaps, verifier);
   return estimate_map(submaps, verdicts, {});
 }
 
@@ -100,7 +100,8 @@ TEST(MonitorGraph, AGapNearTheStartLeavesTheLargerPiece) {
   ASSERT_EQ(graph.components.size(), 2U);
   EXPECT_EQ(graph.components[0].component, 1U);  // component 0 is the piece left out
   // Closures join the pieces: both are sent.
-  const ProxyGraph joined = monitor_graph(estimate_map(submaps, verdicts_of(submaps, test::TestFinder(1)), {}), 2, {});
+  const ProxyGraph joined =
+      monitor_graph(estimate_map(submaps, verdicts_of(submaps, test::TestVerifier(1)), {}), 2, {});
   EXPECT_EQ(std::ranges::count_if(joined.nodes, [](const ProxyNode& n) { return n.chain.robot == RobotId{0}; }),
             36 + 6);
   ASSERT_EQ(joined.uncertainties.size(), 2U);
@@ -221,8 +222,8 @@ TEST(MonitorGraph, WhatHangsOnOneClosureThatOdometryContradictsIsDoubted) {
   SubmapSet submaps;
   for (Submap& submap : test::make_submaps(robot, {.sigma_m = 0.1, .sigma_rad = 0.02}, Rng(4)))
     submaps[submap.id] = std::make_shared<const Submap>(std::move(submap));
-  const test::TestFinder finder(4);
-  const VerdictSet all = verdicts_of(submaps, finder);
+  const test::TestVerifier verifier(4);
+  const VerdictSet all = verdicts_of(submaps, verifier);
   ASSERT_GT(all.size(), 2U);
   const auto doubted_m = [](const MapEstimate& map, int deletions) {
     const auto doubted = monitor_graph(map, 1, {.shape_deletions = deletions}).uncertainties.at(0).doubted;

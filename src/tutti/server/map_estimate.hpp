@@ -101,7 +101,7 @@ struct MapConfig {
   GeoreferenceConfig georeference;
   template <class V>
   void describe(V& v) {
-    v.field("who_is_wrong", outlier_rejection);
+    v.field("outlier_rejection", outlier_rejection, formerly("who_is_wrong"));
     v.field("gnc", gnc);
     v.field("judge_odometry", judge_odometry, any(),
             "Odometry that turns better than it says, or is far worse, counts as the closures show (off: as it says).");

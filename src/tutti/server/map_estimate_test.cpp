@@ -14,22 +14,22 @@
 namespace tutti::server {
 namespace map_estimate_test {
 
-using test::TestFinder;
+using test::TestVerifier;
 
 struct Inputs {
   SubmapSet submaps;
   VerdictSet verdicts;
 };
 
-Inputs make_inputs(std::uint32_t robots, const TestFinder& finder, std::uint64_t seed) {
+Inputs make_inputs(std::uint32_t robots, const TestVerifier& verifier, std::uint64_t seed) {
   Inputs in;
   for (std::uint32_t r = 0; r < robots; ++r)
     for (Submap& submap : test::make_submaps(RobotId{r}, {}, Rng(seed).fork(r)))
       in.submaps[submap.id] = std::make_shared<const Submap>(std::move(submap));
   for (auto a = in.submaps.begin(); a != in.submaps.end(); ++a)
     for (auto b = std::next(a); b != in.submaps.end(); ++b)
-      if (finder.is_candidate(*a->second, *b->second))
-        in.verdicts[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryPayloadStore());
+      if (verifier.is_candidate(*a->second, *b->second))
+        in.verdicts[{a->first, b->first}] = *verifier.verify(*a->second, *b->second, MemoryPayloadStore());
   return in;
 }
 
@@ -55,7 +55,7 @@ TEST(MapEstimate, IsEmptyWithoutSubmaps) {
 }
 
 TEST(MapEstimate, WithoutClosuresEveryRobotIsAComponentAndKeepsItsOdometry) {
-  const Inputs in = make_inputs(2, TestFinder(1), 1);
+  const Inputs in = make_inputs(2, TestVerifier(1), 1);
   const MapEstimate map = estimate_map(in.submaps, {}, {});
   EXPECT_EQ(map.components, 2U);
   ASSERT_EQ(map.nodes.size(), 182U);  // 91 keyframes each, the shared ones once
@@ -63,7 +63,7 @@ TEST(MapEstimate, WithoutClosuresEveryRobotIsAComponentAndKeepsItsOdometry) {
 }
 
 TEST(MapEstimate, JoinsRobotsInUnknownFramesAndBeatsTheirOdometry) {
-  const Inputs in = make_inputs(3, TestFinder(2), 2);
+  const Inputs in = make_inputs(3, TestVerifier(2), 2);
   const MapEstimate map = estimate_map(in.submaps, in.verdicts, {});
   EXPECT_TRUE(map.converged);
   EXPECT_EQ(map.components, 1U);
@@ -74,12 +74,12 @@ TEST(MapEstimate, JoinsRobotsInUnknownFramesAndBeatsTheirOdometry) {
 
 TEST(MapEstimate, RejectsWrongClosures) {
   for (const std::uint64_t seed : {1U, 2U, 3U, 4U, 5U}) {
-    const Inputs in = make_inputs(2, TestFinder(seed, 4), seed);
+    const Inputs in = make_inputs(2, TestVerifier(seed, 4), seed);
     const MapEstimate map = estimate_map(in.submaps, in.verdicts, {});
     std::size_t wrong = 0;
     std::size_t right = 0;
     for (const JudgedClosure& judged : map.closures) {
-      const bool is_wrong = TestFinder::is_wrong(judged.closure);
+      const bool is_wrong = TestVerifier::is_wrong(judged.closure);
       EXPECT_FALSE(is_wrong && judged.accepted);
       wrong += is_wrong ? 1 : 0;
       right += !is_wrong && judged.accepted ? 1 : 0;
@@ -94,7 +94,7 @@ TEST(MapEstimate, RejectsWrongClosures) {
 TEST(MapEstimate, SeesThroughRotationsThatAreBetterThanStated) {
   double judged = 0.0, stated = 0.0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    Inputs in = make_inputs(2, TestFinder(seed), seed);
+    Inputs in = make_inputs(2, TestVerifier(seed), seed);
     for (auto& [id, submap] : in.submaps) {
       Submap overstated = *submap;
       for (RelativePose& odometry : overstated.odometry) odometry.covariance.bottomRightCorner<3, 3>() *= 100.0;
@@ -107,7 +107,7 @@ TEST(MapEstimate, SeesThroughRotationsThatAreBetterThanStated) {
 }
 
 TEST(MapEstimate, ALoneClosureDoesNotJoinTwoRobots) {
-  Inputs in = make_inputs(2, TestFinder(3), 3);
+  Inputs in = make_inputs(2, TestVerifier(3), 3);
   const auto inter = std::find_if(in.verdicts.begin(), in.verdicts.end(), [](const auto& entry) {
     return entry.first.first.chain != entry.first.second.chain;
   });
@@ -118,7 +118,7 @@ TEST(MapEstimate, ALoneClosureDoesNotJoinTwoRobots) {
 }
 
 TEST(MapEstimate, AMissingSubmapLeavesAGapAndNothingElse) {
-  Inputs in = make_inputs(1, TestFinder(4), 4);
+  Inputs in = make_inputs(1, TestVerifier(4), 4);
   in.submaps.erase({RobotId{0}, 4});
   std::erase_if(in.verdicts,
                 [](const auto& entry) { return entry.first.first.index == 4 || entry.first.second.index == 4; });
@@ -147,7 +147,7 @@ void expect_unharmed(const Inputs& in, const std::string& what, double most_m = 
 /// Changes what robot 2 sent.
 template <class Change>
 Inputs changed(Change change) {
-  Inputs in = make_inputs(3, TestFinder(2), 2);
+  Inputs in = make_inputs(3, TestVerifier(2), 2);
   for (auto& [id, submap] : in.submaps) {
     if (id.chain.robot != RobotId{2}) continue;
     Submap copy = *submap;
@@ -188,7 +188,7 @@ TEST(MapEstimate, DivergedOdometryOfOneRobotHarmsNoOther) {
 
 // Numbers that nobody can solve, of the robot after which there is none.
 TEST(MapEstimate, TheLastRobotThereCanBeIsLeftOutLikeAnyOther) {
-  Inputs in = make_inputs(2, TestFinder(2), 2);
+  Inputs in = make_inputs(2, TestVerifier(2), 2);
   constexpr RobotId kLast{std::numeric_limits<std::uint32_t>::max()};
   for (const Submap& submap : test::make_submaps(RobotId{2}, {}, Rng(2).fork(2))) {
     Submap wild = submap;
@@ -232,7 +232,7 @@ TEST(MapEstimate, SubmapsThatContradictEarlierOnesAreLeftOut) {
 }
 
 TEST(MapEstimate, TheFirstPoseOfAComponentStaysWhereItsOdometryPutIt) {
-  const Inputs in = make_inputs(2, TestFinder(5), 5);
+  const Inputs in = make_inputs(2, TestVerifier(5), 5);
   const MapEstimate map = estimate_map(in.submaps, in.verdicts, {});
   EXPECT_LT(local(map.nodes.front().T_odom_body, map.nodes.front().T_world_body).norm(), 1e-9);
 }

@@ -8,7 +8,7 @@
 
 #include "tutti/consistency/proxy_graph_builder.hpp"
 #include "tutti/model/messages.hpp"
-#include "tutti/server/closure_finder.hpp"
+#include "tutti/server/closure_verifier.hpp"
 #include "tutti/server/graph_monitor.hpp"
 #include "tutti/server/map_estimate.hpp"
 #include "tutti/server/refinements.hpp"

@@ -15,8 +15,8 @@ namespace tutti::server {
 class MapRefiner {
  public:
   virtual ~MapRefiner() = default;
-  /// Identifies the refiner, as ClosureFinder::id() does a finder. Without a name, only a worker that was given this
-  /// very refiner can do its jobs.
+  /// Identifies the refiner, as ClosureVerifier::id() does a verifier. Without a name, only a worker that was given
+  /// this very refiner can do its jobs.
   [[nodiscard]] virtual MethodId id() const { return {}; }
   [[nodiscard]] virtual std::string settings() const { return {}; }
   /// True if a submap with a payload of this size has what refine() needs; other submaps take no part.

@@ -84,8 +84,8 @@ Status check_alone(const ClosureVerdict& verdict, const std::set<RobotId>& robot
   return {};
 }
 
-/// Does `a` hold rather than `b`, both by one finder on one pair, whichever came first? In doubt there is no closure.
-/// More closures are those of a finder that knows them one after the other.
+/// Does `a` hold rather than `b`, both by one verifier on one pair, whichever came first? In doubt there is no closure.
+/// More closures are those of a verifier that knows them one after the other.
 bool holds_over(const ClosureVerdict& a, const ClosureVerdict& b) {
   if (a.closures.empty() || b.closures.empty()) return a.closures.empty() && !b.closures.empty();
   if (a.closures.size() != b.closures.size()) return a.closures.size() > b.closures.size();
@@ -107,29 +107,29 @@ bool holds_over(const ClosureVerdict& a, const ClosureVerdict& b) {
 
 }  // namespace
 
-MapServer::MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder,
+MapServer::MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureVerifier> verifier,
                      std::shared_ptr<PayloadStore> payloads, const ServerConfig& config, std::uint64_t epoch)
-    : MapServer(std::move(robots), std::move(finder), std::move(payloads), config, epoch, MapServerState{}) {}
+    : MapServer(std::move(robots), std::move(verifier), std::move(payloads), config, epoch, MapServerState{}) {}
 
-MapServer::MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder,
+MapServer::MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureVerifier> verifier,
                      std::shared_ptr<PayloadStore> payloads, const ServerConfig& config, std::uint64_t epoch,
                      MapServerState state)
     : robots_(std::move(robots)),
-      finder_(std::move(finder)),
+      verifier_(std::move(verifier)),
       payloads_(std::move(payloads)),
       config_(config),
       state_(std::move(state)) {
-  TUTTI_CHECK(finder_ != nullptr && payloads_ != nullptr, "no finder or no store of payloads");
-  const MethodId who = finder_->id();
-  TUTTI_CHECK(!who.name.empty() && who.version > 0, "a finder without a name or a version");
+  TUTTI_CHECK(verifier_ != nullptr && payloads_ != nullptr, "no verifier or no store of payloads");
+  const MethodId who = verifier_->id();
+  TUTTI_CHECK(!who.name.empty() && who.version > 0, "a verifier without a name or a version");
   state_.epoch = std::max(epoch, state_.epoch + 1);
-  if (state_.finder != who) {
-    state_.finder = who;
+  if (state_.verifier != who) {
+    state_.verifier = who;
     state_.answered.forget_answers();
     state_.refused.clear();
   }
   former_pairs_ = static_cast<std::size_t>(
-      std::ranges::count_if(state_.verdicts, [&](const auto& entry) { return entry.second.finder != who; }));
+      std::ranges::count_if(state_.verdicts, [&](const auto& entry) { return entry.second.verifier != who; }));
   for (const auto& [id, submap] : state_.submaps) state_.answered.add_submap(id);
   restore_candidates();
   plan_open_verifications();
@@ -157,7 +157,7 @@ Status MapServer::receive(const SubmapMessage& message) {
   state_.submaps[id] = std::make_shared<const Submap>(without_payloads(message.submap));
   state_.answered.add_submap(id);
   if (config_.candidates_per_submap > 0)
-    if (std::string looks = finder_->place_of(message.submap); !looks.empty()) {
+    if (std::string looks = verifier_->place_of(message.submap); !looks.empty()) {
       state_.places[id] = {.looks = std::move(looks), .candidates = {}};
       compare_place(id);
     }
@@ -199,13 +199,13 @@ bool MapServer::is_asked(const SubmapPair& pair) const {
   const auto first = state_.submaps.find(pair.first);
   const auto second = state_.submaps.find(pair.second);
   return first != state_.submaps.end() && second != state_.submaps.end() &&
-         finder_->can_compare(size_of(pair.first), size_of(pair.second)) &&
-         finder_->is_candidate(*first->second, *second->second);
+         verifier_->can_compare(size_of(pair.first), size_of(pair.second)) &&
+         verifier_->is_candidate(*first->second, *second->second);
 }
 
 bool MapServer::is_answered(const SubmapPair& pair) const {
   if (const auto found = state_.verdicts.find(pair); found != state_.verdicts.end())
-    return found->second.finder == state_.finder || says(state_.decisions, pair, Wish::accept);
+    return found->second.verifier == state_.verifier || says(state_.decisions, pair, Wish::accept);
   return state_.answered.contains(pair);
 }
 
@@ -217,9 +217,9 @@ void MapServer::give_back(VerificationJob job) {
 
 Status MapServer::receive(const ClosureVerdict& verdict) {
   if (auto ok = check_alone(verdict, robots_); !ok) return ok;
-  if (verdict.finder != state_.finder)
-    return fail(ErrorCode::unsupported, "{}: of finder {}, expected {}", name_of(verdict), to_string(verdict.finder),
-                to_string(state_.finder));
+  if (verdict.verifier != state_.verifier)
+    return fail(ErrorCode::unsupported, "{}: of verifier {}, expected {}", name_of(verdict),
+                to_string(verdict.verifier), to_string(state_.verifier));
   if (!has_submaps_of(verdict)) return wait_for_submaps(verdict);
   if (auto ok = check_against_submaps(verdict); !ok) return ok;
   take(verdict);
@@ -270,7 +270,7 @@ void MapServer::take(const ClosureVerdict& verdict) {
   if (!verdict.closures.empty() || is_kept) note_news();
   state_.answered.insert(pair);
   ++work_.pairs_verified;
-  if (is_kept && kept->second.finder != state_.finder) --former_pairs_;
+  if (is_kept && kept->second.verifier != state_.verifier) --former_pairs_;
   if (verdict.refusal) {
     count_refusal(*verdict.refusal, pair.first.chain.robot, pair.second.chain.robot, state_.refused);
     state_.verdicts.erase(pair);
@@ -304,7 +304,7 @@ Status MapServer::receive(const SubmapPair& pair, const ClosureDecision& given) 
       known == state_.decisions.end() ? decision.wish != Wish::withdraw : known->second.wish != decision.wish;
   const bool adds = !decision.by_hand.empty() || (known != state_.decisions.end() && !known->second.by_hand.empty());
   state_.decisions.insert_or_assign(pair, decision);
-  if (was_accepted && decision.wish != Wish::accept) plan_verification(pair);  // other finders were not asked
+  if (was_accepted && decision.wish != Wish::accept) plan_verification(pair);  // other verifiers were not asked
   if ((changes && has_closures) || adds) note_news();
   return {};
 }

@@ -16,7 +16,7 @@
 #include "tutti/model/messages.hpp"
 #include "tutti/server/answered_pairs.hpp"
 #include "tutti/server/candidate_pairs.hpp"
-#include "tutti/server/closure_finder.hpp"
+#include "tutti/server/closure_verifier.hpp"
 #include "tutti/server/graph_monitor.hpp"
 #include "tutti/server/map_estimate.hpp"
 #include "tutti/server/map_job.hpp"
@@ -64,7 +64,7 @@ struct ServerConfig {
 };
 
 /// Verification of one pair, heavy work that leaves the server as a message: the answer is
-/// ClosureFinder::verify(*first, *second, payloads), computed anywhere that has the payloads.
+/// ClosureVerifier::verify(*first, *second, payloads), computed anywhere that has the payloads.
 struct VerificationJob {
   SubmapPair pair;
   std::shared_ptr<const Submap> first;
@@ -76,15 +76,15 @@ struct VerificationJob {
 struct MapServerState {
   SubmapSet submaps;                              ///< Without payloads.
   std::map<SubmapId, PayloadSize> payload_sizes;  ///< Only submaps that carry any.
-  /// The verdicts with closures: those of `finder`, and those of earlier finders on pairs that `finder` has not
+  /// The verdicts with closures: those of `verifier`, and those of earlier verifiers on pairs that `verifier` has not
   /// answered. Refusals are only counted: a pair that is in `answered` and not here was refused, or is not to be
   /// verified.
   VerdictSet verdicts;
-  MethodId finder;
+  MethodId verifier;
   DecisionSet decisions;   ///< Words of operators.
-  AnsweredPairs answered;  ///< Pairs that `finder` has answered, or that are not to be verified.
+  AnsweredPairs answered;  ///< Pairs that `verifier` has answered, or that are not to be verified.
   PlaceSet places;         ///< Each tells which candidates its submap has.
-  RefusalCounts refused;   ///< Refusals by `finder`.
+  RefusalCounts refused;   ///< Refusals by `verifier`.
   Refinements refinements;
   std::uint64_t epoch = 0;  ///< Epoch of the server whose state this is.
   std::uint64_t revision = 0;
@@ -105,14 +105,14 @@ struct ServerWork {
 class MapServer {
  public:
   /// The starter gives the epoch, which must be larger than at any earlier start (such as the time of the start):
-  /// robots ignore late broadcasts of earlier epochs. `finder` and `payloads` must not be null.
-  MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder,
+  /// robots ignore late broadcasts of earlier epochs. `verifier` and `payloads` must not be null.
+  MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureVerifier> verifier,
             std::shared_ptr<PayloadStore> payloads, const ServerConfig& config, std::uint64_t epoch);
-  /// Goes on from a saved state. Verifications without a verdict become jobs again; all of them do when the finder is
-  /// another than the state's. What the former finder found stays in the map until the new one has answered, for good
+  /// Goes on from a saved state. Verifications without a verdict become jobs again; all of them do when the verifier is
+  /// another than the state's. What the former verifier found stays in the map until the new one has answered, for good
   /// on pairs that the new one cannot compare. The epoch is raised above the saved one if it is not larger; when two
   /// servers start from one saved state, only the epochs that they are given tell them apart.
-  MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder,
+  MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureVerifier> verifier,
             std::shared_ptr<PayloadStore> payloads, const ServerConfig& config, std::uint64_t epoch,
             MapServerState state);
 
@@ -132,14 +132,14 @@ class MapServer {
   /// Takes the answer to a job; answers may come in any order and any number of times. If two verdicts on one pair
   /// differ, a refusal wins, then more closures, then those with the smaller numbers, so that the order does not
   /// matter. A verdict that comes before its submaps waits for them. On an error nothing changes: the verdict is of
-  /// another finder than the server's; a closure joins anything else than a keyframe of pair.first to one of
-  /// pair.second; the finder would not verify the pair; or kMostWaiting verdicts wait already, and the pair is verified
-  /// again.
+  /// another verifier than the server's; a closure joins anything else than a keyframe of pair.first to one of
+  /// pair.second; the verifier would not verify the pair; or kMostWaiting verdicts wait already, and the pair is
+  /// verified again.
   Status receive(const ClosureVerdict& verdict);
   static constexpr std::size_t kMostWaiting = 1000;
   /// Takes an operator's decision on the closures of a pair, any number of times; the next optimise() follows it. The
   /// later of two words on one pair counts. When an operator accepts closures, their verdict stays, whatever other
-  /// finders say. On an error nothing changes: the map lacks one of the submaps, or there are no closures to accept.
+  /// verifiers say. On an error nothing changes: the map lacks one of the submaps, or there are no closures to accept.
   Status receive(const SubmapPair& pair, const ClosureDecision& decision);
   /// Takes the answer to a refinement job, in any order, any number of times, however late; the next optimise() follows
   /// it. Where two refinements have one step, the one of the newer map counts (Refinements). On an error the map stays
@@ -164,7 +164,7 @@ class MapServer {
   /// The job that is out will never be answered.
   void give_up_refinement() { refining_.reset(); }
 
-  /// How many pairs have the closures of an earlier finder, until this one has answered.
+  /// How many pairs have the closures of an earlier verifier, until this one has answered.
   [[nodiscard]] std::size_t former_pairs() const { return former_pairs_; }
   /// True when something has come that map() was made without.
   [[nodiscard]] bool has_news() const { return news_ || makes_news_; }
@@ -187,7 +187,7 @@ class MapServer {
   [[nodiscard]] const MapServerState& state() const { return state_; }
   /// Refused pairs, counted by reason.
   [[nodiscard]] const RefusalCounts& refusals() const { return state_.refused; }
-  [[nodiscard]] const ClosureFinder& finder() const { return *finder_; }
+  [[nodiscard]] const ClosureVerifier& verifier() const { return *verifier_; }
   [[nodiscard]] const PayloadStore& payloads() const { return *payloads_; }
 
  private:
@@ -195,9 +195,9 @@ class MapServer {
   /// Restores the payload from a repeated submap, if the store has lost it and the sizes agree.
   Status replace_lost_payload(const Submap& duplicate);
   [[nodiscard]] PayloadSize size_of(SubmapId id) const;
-  /// True if both submaps are there and the finder wants the pair.
+  /// True if both submaps are there and the verifier wants the pair.
   [[nodiscard]] bool is_asked(const SubmapPair& pair) const;
-  /// True if the server's finder has answered the pair, or an operator's decision stands instead.
+  /// True if the server's verifier has answered the pair, or an operator's decision stands instead.
   [[nodiscard]] bool is_answered(const SubmapPair& pair) const;
   void plan_verification(const SubmapPair& pair);
   /// Asks for all pairs that are not answered, in order.
@@ -222,7 +222,7 @@ class MapServer {
   void take(const ClosureVerdict& verdict);
 
   std::set<RobotId> robots_;
-  std::shared_ptr<const ClosureFinder> finder_;
+  std::shared_ptr<const ClosureVerifier> verifier_;
   std::shared_ptr<PayloadStore> payloads_;
   ServerConfig config_;
   MapServerState state_;

@@ -10,7 +10,7 @@
 namespace tutti::server {
 namespace map_server_test {
 
-using test::TestFinder;
+using test::TestVerifier;
 
 const std::set<RobotId> kRobots{RobotId{0}, RobotId{1}};
 
@@ -18,20 +18,20 @@ SubmapMessage message_of(const Submap& submap) {
   return {.header = {.robot = submap.id.chain.robot, .session = submap.id.chain.session}, .submap = submap};
 }
 
-void do_job(MapServer& server, const ClosureFinder& finder, const VerificationJob& job) {
-  const auto verdict = finder.verify(*job.first, *job.second, server.payloads());
+void do_job(MapServer& server, const ClosureVerifier& verifier, const VerificationJob& job) {
+  const auto verdict = verifier.verify(*job.first, *job.second, server.payloads());
   ASSERT_TRUE(verdict.has_value()) << verdict.error().message;
   ASSERT_TRUE(server.receive(*verdict).has_value());
 }
 
-void do_jobs(MapServer& server, const ClosureFinder& finder) {
-  for (const VerificationJob& job : server.take_jobs()) do_job(server, finder, job);
+void do_jobs(MapServer& server, const ClosureVerifier& verifier) {
+  for (const VerificationJob& job : server.take_jobs()) do_job(server, verifier, job);
 }
 
 std::shared_ptr<PayloadStore> some_store() { return std::make_shared<MemoryPayloadStore>(); }
 
-MapServer filled_server(const std::shared_ptr<const TestFinder>& finder) {
-  MapServer server(kRobots, finder, some_store(), {}, 1);
+MapServer filled_server(const std::shared_ptr<const TestVerifier>& verifier) {
+  MapServer server(kRobots, verifier, some_store(), {}, 1);
   for (const RobotId robot : kRobots)
     for (const Submap& submap : test::make_submaps(robot, {}, Rng(1).fork(robot.value)))
       EXPECT_TRUE(server.receive(message_of(submap)).has_value());
@@ -39,9 +39,9 @@ MapServer filled_server(const std::shared_ptr<const TestFinder>& finder) {
 }
 
 TEST(MapServer, TurnsSubmapsIntoAProxyGraphOfTheRepresentativeNodes) {
-  const auto finder = std::make_shared<const TestFinder>(1);
-  MapServer server = filled_server(finder);
-  do_jobs(server, *finder);
+  const auto verifier = std::make_shared<const TestVerifier>(1);
+  MapServer server = filled_server(verifier);
+  do_jobs(server, *verifier);
   EXPECT_TRUE(server.has_news());
   const ProxyGraphMessage message = server.optimise();
   EXPECT_FALSE(server.has_news());
@@ -52,8 +52,8 @@ TEST(MapServer, TurnsSubmapsIntoAProxyGraphOfTheRepresentativeNodes) {
 }
 
 TEST(MapServer, AsksForEachPairOnceAndIgnoresDuplicates) {
-  const auto finder = std::make_shared<const TestFinder>(1);
-  MapServer server = filled_server(finder);
+  const auto verifier = std::make_shared<const TestVerifier>(1);
+  MapServer server = filled_server(verifier);
   EXPECT_GT(server.take_jobs().size(), 5U);
   for (const Submap& submap : test::make_submaps(RobotId{0}, {}, Rng(1).fork(0)))
     EXPECT_TRUE(server.receive(message_of(submap)).has_value());
@@ -62,21 +62,21 @@ TEST(MapServer, AsksForEachPairOnceAndIgnoresDuplicates) {
 }
 
 TEST(MapServer, HandsOutAJobThatWasGivenBackUntilItHasAVerdict) {
-  const auto finder = std::make_shared<const TestFinder>(1);
-  MapServer server = filled_server(finder);
+  const auto verifier = std::make_shared<const TestVerifier>(1);
+  MapServer server = filled_server(verifier);
   const std::vector<VerificationJob> jobs = server.take_jobs();
   server.give_back(jobs[2]);  // its cloud could not be read
   const std::vector<VerificationJob> again = server.take_jobs();
   ASSERT_EQ(again.size(), 1U);
   EXPECT_EQ(again.front().pair, jobs[2].pair);
-  EXPECT_TRUE(server.receive(ClosureVerdict{jobs[2].pair, {}, Refusal{}, finder->id()}));
+  EXPECT_TRUE(server.receive(ClosureVerdict{jobs[2].pair, {}, Refusal{}, verifier->id()}));
   server.give_back(jobs[2]);
   EXPECT_TRUE(server.take_jobs().empty());
 }
 
 TEST(MapServer, RefusesStrangersAndMalformedSubmapsAndKeepsTheMap) {
-  const auto finder = std::make_shared<const TestFinder>(1);
-  MapServer server = filled_server(finder);
+  const auto verifier = std::make_shared<const TestVerifier>(1);
+  MapServer server = filled_server(verifier);
   const std::size_t before = server.state().submaps.size();
 
   const auto refused = [&](Submap submap, ErrorCode code, const char* word) {
@@ -122,16 +122,16 @@ TEST(MapServer, RefusesStrangersAndMalformedSubmapsAndKeepsTheMap) {
 }
 
 TEST(MapServer, GoesOnFromASavedState) {
-  const auto finder = std::make_shared<const TestFinder>(1, 5);
-  MapServer whole = filled_server(finder);
+  const auto verifier = std::make_shared<const TestVerifier>(1, 5);
+  MapServer whole = filled_server(verifier);
   std::vector<VerificationJob> jobs = whole.take_jobs();
-  for (std::size_t i = 0; i < jobs.size() / 2; ++i) do_job(whole, *finder, jobs[i]);
+  for (std::size_t i = 0; i < jobs.size() / 2; ++i) do_job(whole, *verifier, jobs[i]);
   whole.optimise();
 
-  MapServer restored(kRobots, finder, some_store(), {}, 2, whole.state());  // killed with half of the verdicts
+  MapServer restored(kRobots, verifier, some_store(), {}, 2, whole.state());  // killed with half of the verdicts
   EXPECT_TRUE(restored.has_news());
-  do_jobs(restored, *finder);
-  for (std::size_t i = jobs.size() / 2; i < jobs.size(); ++i) do_job(whole, *finder, jobs[i]);
+  do_jobs(restored, *verifier);
+  for (std::size_t i = jobs.size() / 2; i < jobs.size(); ++i) do_job(whole, *verifier, jobs[i]);
   ProxyGraphMessage a = whole.optimise();
   const ProxyGraphMessage b = restored.optimise();
   EXPECT_GT(b.graph.age(), a.graph.age());
@@ -140,13 +140,13 @@ TEST(MapServer, GoesOnFromASavedState) {
 }
 
 TEST(MapServer, EveryStartIsALaterEpochThanTheStateItGoesOnFrom) {
-  const auto finder = std::make_shared<const TestFinder>(1);
-  MapServer first(kRobots, finder, some_store(), {}, 1'700);
+  const auto verifier = std::make_shared<const TestVerifier>(1);
+  MapServer first(kRobots, verifier, some_store(), {}, 1'700);
   EXPECT_EQ(first.optimise().graph.age(), std::pair(std::uint64_t{1'700}, std::uint64_t{1}));
   const MapServerState saved = first.state();
   for (int i = 0; i < 20; ++i) first.optimise();  // lost
   const auto epoch_of_start = [&](std::uint64_t given) {
-    MapServer again(kRobots, finder, some_store(), {}, given, saved);
+    MapServer again(kRobots, verifier, some_store(), {}, given, saved);
     const ProxyGraphMessage message = again.optimise();
     EXPECT_GT(message.graph.age(), first.optimise().graph.age());
     EXPECT_EQ(message.header.session, message.graph.epoch);
@@ -164,9 +164,9 @@ std::vector<Submap> second_session(std::uint64_t session) {
 
 TEST(MapServer, ARobotThatStartsAgainBeginsAChainOfItsOwnAndLosesNothing) {
   for (const std::uint64_t session : {std::uint64_t{1}, std::uint64_t{1'700'000'000'000'000'000}, ~std::uint64_t{0}}) {
-    const auto finder = std::make_shared<const TestFinder>(1);
-    MapServer server = filled_server(finder);
-    do_jobs(server, *finder);
+    const auto verifier = std::make_shared<const TestVerifier>(1);
+    MapServer server = filled_server(verifier);
+    do_jobs(server, *verifier);
     server.optimise();
     const MapEstimate before = server.map();
     const std::vector<Submap> again = second_session(session);
@@ -180,7 +180,7 @@ TEST(MapServer, ARobotThatStartsAgainBeginsAChainOfItsOwnAndLosesNothing) {
     }
     for (int copies = 0; copies < 2; ++copies)
       for (const Submap& submap : again) ASSERT_TRUE(server.receive(message_of(submap)).has_value());
-    do_jobs(server, *finder);
+    do_jobs(server, *verifier);
     const ProxyGraph graph = server.optimise().graph;
     EXPECT_EQ(server.map().components, 1U);
     EXPECT_TRUE(server.map().left_out.empty());
@@ -201,16 +201,16 @@ TEST(MapServer, ARobotThatStartsAgainBeginsAChainOfItsOwnAndLosesNothing) {
 }
 
 TEST(MapServer, WithTwoSessionsTheMapIsAFunctionOfTheSet) {
-  const auto finder = std::make_shared<const TestFinder>(1, 5);
+  const auto verifier = std::make_shared<const TestVerifier>(1, 5);
   std::vector<Submap> submaps = second_session(7);
   for (const RobotId robot : kRobots)
     std::ranges::copy(test::make_submaps(robot, {}, Rng(1).fork(robot.value)), std::back_inserter(submaps));
   const auto map_of = [&] {
-    MapServer server(kRobots, finder, some_store(), {}, 1);
+    MapServer server(kRobots, verifier, some_store(), {}, 1);
     for (const Submap& submap : submaps) EXPECT_TRUE(server.receive(message_of(submap)).has_value());
     std::vector<VerificationJob> jobs = server.take_jobs();
     if (submaps.front().id.index % 2 == 0) std::ranges::reverse(jobs);
-    for (const VerificationJob& job : jobs) do_job(server, *finder, job);
+    for (const VerificationJob& job : jobs) do_job(server, *verifier, job);
     return server.optimise().graph;
   };
   const ProxyGraph expected = map_of();
@@ -222,7 +222,7 @@ TEST(MapServer, WithTwoSessionsTheMapIsAFunctionOfTheSet) {
 }
 
 /// Verifies by looking at the clouds: as many points as the submap's number says, each at x = that number.
-class CloudReader final : public ClosureFinder {
+class CloudReader final : public ClosureVerifier {
  public:
   [[nodiscard]] MethodId id() const override { return {"clouds", 1, 0}; }
   [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
@@ -282,10 +282,10 @@ std::vector<SubmapMessage> submaps_with_some_clouds() {
   return messages;
 }
 
-TEST(MapServer, KeepsCloudsInTheStoreOnlyAndHandsThemToTheFinder) {
-  const auto finder = std::make_shared<const CloudReader>();
+TEST(MapServer, KeepsCloudsInTheStoreOnlyAndHandsThemToTheVerifier) {
+  const auto verifier = std::make_shared<const CloudReader>();
   const auto store = std::make_shared<BrokenStore>();
-  MapServer server(kRobots, finder, store, {}, 1);
+  MapServer server(kRobots, verifier, store, {}, 1);
   for (const SubmapMessage& message : submaps_with_some_clouds()) ASSERT_TRUE(server.receive(message).has_value());
   for (const auto& [id, submap] : server.state().submaps) EXPECT_EQ(submap->cloud, nullptr);
   EXPECT_EQ(server.state().payload_sizes.size(), 4U);  // of submaps 1, 3, 5, 7 of 0 ... 8
@@ -293,18 +293,18 @@ TEST(MapServer, KeepsCloudsInTheStoreOnlyAndHandsThemToTheFinder) {
 
   const auto jobs = server.take_jobs();
   EXPECT_EQ(jobs.size(), 4U * 3U / 2U);
-  do_job(server, *finder, jobs.back());
+  do_job(server, *verifier, jobs.back());
   EXPECT_EQ(server.refusals().at(RefusalReason::too_small).nearest.value, 57.0);
 
   // All but one were not answered: after a restart they are asked again, from the same store.
-  MapServer restored(kRobots, finder, store, {}, 2, server.state());
+  MapServer restored(kRobots, verifier, store, {}, 2, server.state());
   EXPECT_EQ(restored.take_jobs().size(), 5U);
 }
 
 TEST(MapServer, ACloudThatIsLostOrCannotBeKeptCostsNothingElse) {
-  const auto finder = std::make_shared<const CloudReader>();
+  const auto verifier = std::make_shared<const CloudReader>();
   const auto store = std::make_shared<BrokenStore>();
-  MapServer server(kRobots, finder, store, {}, 1);
+  MapServer server(kRobots, verifier, store, {}, 1);
   const auto messages = submaps_with_some_clouds();
   store->is_full = true;
   EXPECT_TRUE(server.receive(messages[0]).has_value());  // has none
@@ -315,7 +315,7 @@ TEST(MapServer, ACloudThatIsLostOrCannotBeKeptCostsNothingElse) {
   store->lost = {{RobotId{0}, 3}};
   std::size_t failures = 0;
   for (const VerificationJob& job : server.take_jobs()) {
-    const auto verdict = finder->verify(*job.first, *job.second, server.payloads());
+    const auto verdict = verifier->verify(*job.first, *job.second, server.payloads());
     failures += verdict ? 0 : 1;
     if (!verdict) continue;
     EXPECT_TRUE(server.receive(*verdict).has_value());
@@ -326,9 +326,9 @@ TEST(MapServer, ACloudThatIsLostOrCannotBeKeptCostsNothingElse) {
 }
 
 TEST(MapServer, ASubmapThatComesAgainReplacesItsLostCloud) {
-  const auto finder = std::make_shared<const CloudReader>();
+  const auto verifier = std::make_shared<const CloudReader>();
   const auto store = std::make_shared<BrokenStore>();
-  MapServer server(kRobots, finder, store, {}, 1);
+  MapServer server(kRobots, verifier, store, {}, 1);
   const auto messages = submaps_with_some_clouds();
   for (const SubmapMessage& message : messages) ASSERT_TRUE(server.receive(message).has_value());
   const std::size_t puts = store->puts;
@@ -357,8 +357,8 @@ TEST(MapServer, ASubmapThatComesAgainReplacesItsLostCloud) {
 }
 
 TEST(MapServer, RefusesSessionsBeyondARobotsShare) {
-  const auto finder = std::make_shared<const CloudReader>();  // nothing to verify
-  MapServer server(kRobots, finder, some_store(), {}, 1);
+  const auto verifier = std::make_shared<const CloudReader>();  // nothing to verify
+  MapServer server(kRobots, verifier, some_store(), {}, 1);
   const Submap all = test::make_submaps(RobotId{0}, {}, Rng(1)).front();
   Submap one{.id = all.id, .keyframes = {all.keyframes.front()}};
   const std::size_t most = ProxyGraph::kMostChains / kRobots.size();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// "Who is wrong?": wrong closures and failed odometry, told apart with one setting.
+// Outlier rejection: wrong closures and failed odometry, told apart with one setting.
 #include <gtest/gtest.h>
 
 #include <algorithm>

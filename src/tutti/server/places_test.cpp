@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Which pairs a server has verified where its finder says what places look like.
+// Which pairs a server has verified where its verifier says what places look like.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,12 +27,12 @@ class Places : public testing::Test {
     return config;
   }
   [[nodiscard]] MapServer server(int candidates, MapServerState state = {}) const {
-    return {kRobots, finder_, std::make_shared<MemoryPayloadStore>(), with(candidates), 1, std::move(state)};
+    return {kRobots, verifier_, std::make_shared<MemoryPayloadStore>(), with(candidates), 1, std::move(state)};
   }
   std::size_t answer(MapServer& server) const {
     const auto jobs = server.take_jobs();
     for (const VerificationJob& job : jobs)
-      EXPECT_TRUE(server.receive(*finder_->verify(*job.first, *job.second, server.payloads())).has_value());
+      EXPECT_TRUE(server.receive(*verifier_->verify(*job.first, *job.second, server.payloads())).has_value());
     return jobs.size();
   }
   /// All submaps, in the order of these numbers; jobs are answered at once or all at the end.
@@ -53,8 +53,8 @@ class Places : public testing::Test {
   static std::vector<Pose3> poses(const MapServer& server) { return server.map().graph.poses; }
 
   std::vector<SubmapMessage> uploads_;
-  std::shared_ptr<const ClosureFinder> finder_ =
-      std::make_shared<test::RankingFinder>(std::make_shared<test::TestFinder>(1));
+  std::shared_ptr<const ClosureVerifier> verifier_ =
+      std::make_shared<test::RankingVerifier>(std::make_shared<test::TestVerifier>(1));
 };
 
 TEST_F(Places, AreComparedAndOnlyTheMostAlikeVerified) {

@@ -80,13 +80,13 @@ TEST(Refinements, WithoutStepsOrForOtherKeyframesTheMapIsAsItWas) {
 }
 
 TEST(Refinements, ClosuresSayWhatTheRefinedKeyframesSay) {
-  const test::TestFinder finder(1);
+  const test::TestVerifier verifier(1);
   const SubmapSet submaps = one_robot();
   VerdictSet verdicts;
   for (auto a = submaps.begin(); a != submaps.end(); ++a)
     for (auto b = std::next(a); b != submaps.end(); ++b)
-      if (finder.is_candidate(*a->second, *b->second))
-        verdicts[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryPayloadStore());
+      if (verifier.is_candidate(*a->second, *b->second))
+        verdicts[{a->first, b->first}] = *verifier.verify(*a->second, *b->second, MemoryPayloadStore());
   const MapEstimate map = estimate_map(submaps, verdicts, {});
   ASSERT_GT(map.graph.edges.size(), map.odometry_edges);
   Refinement truth{.steps = true_steps(map)};
@@ -110,7 +110,7 @@ TEST(Refinements, OdometryThatFailedIsNoStepsPlace) {
 class RefinedServer {
  public:
   explicit RefinedServer(int refine_every, MapServerState state = {})
-      : server_({RobotId{0}, RobotId{1}}, finder_, payloads_, {.refine_every = refine_every}, 1, std::move(state)) {
+      : server_({RobotId{0}, RobotId{1}}, verifier_, payloads_, {.refine_every = refine_every}, 1, std::move(state)) {
     server_.refine_with(oracle_);
   }
   static std::vector<SubmapMessage> messages() {
@@ -128,7 +128,7 @@ class RefinedServer {
     for (const VerificationJob& job : server_.take_jobs()) answer(job);
   }
   void answer(const VerificationJob& job) {
-    ASSERT_TRUE(server_.receive(*finder_->verify(*job.first, *job.second, *payloads_)).has_value());
+    ASSERT_TRUE(server_.receive(*verifier_->verify(*job.first, *job.second, *payloads_)).has_value());
   }
   std::optional<RefinementJob> update() {
     server_.optimise();
@@ -157,7 +157,7 @@ class RefinedServer {
   MapServer* operator->() { return &server_; }
 
  private:
-  std::shared_ptr<const test::TestFinder> finder_ = std::make_shared<const test::TestFinder>(1);
+  std::shared_ptr<const test::TestVerifier> verifier_ = std::make_shared<const test::TestVerifier>(1);
   std::shared_ptr<MemoryPayloadStore> payloads_ = std::make_shared<MemoryPayloadStore>();
   std::shared_ptr<const test::Oracle> oracle_ = std::make_shared<const test::Oracle>();
   MapServer server_;

@@ -12,10 +12,10 @@ namespace tutti::server {
 
 namespace {
 
-/// Calls take(submap) of those that are wanted and that the finder would compare with this one, in the order of
+/// Calls take(submap) of those that are wanted and that the verifier would compare with this one, in the order of
 /// their ids. It does not look up anew for each pair what all share: in a large fleet these are hundreds of millions.
 template <class IsWanted, class Take>
-void for_each_comparable(const MapServerState& state, const ClosureFinder& finder, SubmapId id,
+void for_each_comparable(const MapServerState& state, const ClosureVerifier& verifier, SubmapId id,
                          const IsWanted& is_wanted, const Take& take) {
   const auto own = state.submaps.find(id);
   auto sized = state.payload_sizes.find(id);
@@ -28,8 +28,8 @@ void for_each_comparable(const MapServerState& state, const ClosureFinder& finde
     const PayloadSize other_size = has_size ? sized->second : PayloadSize();
     const bool is_first = id < other->first;
     const auto &first = is_first ? *own : *other, &second = is_first ? *other : *own;
-    if (finder.can_compare(is_first ? own_size : other_size, is_first ? other_size : own_size) &&
-        finder.is_candidate(*first.second, *second.second))
+    if (verifier.can_compare(is_first ? own_size : other_size, is_first ? other_size : own_size) &&
+        verifier.is_candidate(*first.second, *second.second))
       take(*other);
   }
 }
@@ -41,14 +41,14 @@ void MapServer::compare_place(SubmapId id) {
   std::vector<SubmapId> others;
   std::vector<std::string_view> looks;
   for_each_comparable(
-      state_, *finder_, id, [&](SubmapId other) { return candidates_.has(other); },
+      state_, *verifier_, id, [&](SubmapId other) { return candidates_.has(other); },
       [&](const auto& other) {
         others.push_back(other.first);
         looks.push_back(state_.places.at(other.first).looks);
       });
   std::vector<Alike> alike;
-  for (const auto& [other, value, sensor] : finder_->likeness(place.looks, looks)) {
-    TUTTI_CHECK(other < others.size() && sensor < ClosureFinder::kMostSensors, "place {} of {} compared by sensor {}",
+  for (const auto& [other, value, sensor] : verifier_->likeness(place.looks, looks)) {
+    TUTTI_CHECK(other < others.size() && sensor < ClosureVerifier::kMostSensors, "place {} of {} compared by sensor {}",
                 other, others.size(), sensor);
     alike.push_back({others[other], value, sensor});
   }
@@ -62,7 +62,7 @@ void MapServer::plan_verification(const SubmapPair& pair) {
   ++work_.pairs_looked_at;
   if (!is_answered(pair) && is_asked(pair))
     return jobs_.push_back({pair, state_.submaps.at(pair.first), state_.submaps.at(pair.second)});
-  state_.answered.insert(pair);  // what an earlier finder has found there stays
+  state_.answered.insert(pair);  // what an earlier verifier has found there stays
 }
 
 void MapServer::plan_open_verifications() {
@@ -82,7 +82,7 @@ void MapServer::plan_verifications(SubmapId id) {
     return !any_answered || !is_answered(pair);
   };
   std::vector<SubmapId> open;
-  for_each_comparable(state_, *finder_, id, is_open, [&](const auto& other) {
+  for_each_comparable(state_, *verifier_, id, is_open, [&](const auto& other) {
     const bool is_first = id < other.first;
     jobs_.push_back({ordered(id, other.first), is_first ? own : other.second, is_first ? other.second : own});
     open.push_back(other.first);
@@ -93,7 +93,7 @@ void MapServer::plan_verifications(SubmapId id) {
 void MapServer::restore_candidates() {
   if (config_.candidates_per_submap == 0) return state_.places.clear();
   std::erase_if(state_.places, [&](const auto& entry) {
-    const bool is_read = finder_->can_rank(entry.second.looks);
+    const bool is_read = verifier_->can_rank(entry.second.looks);
     if (!is_read)
       new_places_.push_back(entry.first);  // who reads the map's file is not to believe its candidates either
     return !is_read || !state_.submaps.contains(entry.first);

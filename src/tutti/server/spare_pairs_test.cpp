@@ -22,11 +22,11 @@ Room one_room(std::uint32_t submaps) {
   for (const std::uint32_t robot : {0U, 1U})
     for (Submap& submap : test::make_submaps(RobotId{robot}, {.keyframes = 10 * submaps + 1}, Rng(robot)))
       out.submaps[submap.id] = std::make_shared<const Submap>(std::move(submap));
-  const test::TestFinder finder(1);
+  const test::TestVerifier verifier(1);
   for (auto a = out.submaps.begin(); a != out.submaps.end(); ++a)
     for (auto b = std::next(a); b != out.submaps.end(); ++b)
       if (a->first.chain != b->first.chain || b->first.index > a->first.index + 1)
-        out.verdicts[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryPayloadStore());
+        out.verdicts[{a->first, b->first}] = *verifier.verify(*a->second, *b->second, MemoryPayloadStore());
   return out;
 }
 

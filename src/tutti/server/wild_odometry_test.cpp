@@ -50,7 +50,7 @@ struct World {
 
 /// Three robots, the last one's odometry wild.
 World wild_world(std::uint64_t seed) {
-  const test::TestFinder finder(1);
+  const test::TestVerifier verifier(1);
   World out;
   for (std::uint32_t r = 0; r < 3; ++r) {
     auto made = test::make_submaps(RobotId{r}, {.keyframes = 71}, Rng(seed).fork(r));
@@ -59,8 +59,8 @@ World wild_world(std::uint64_t seed) {
   }
   for (auto a = out.submaps.begin(); a != out.submaps.end(); ++a)
     for (auto b = std::next(a); b != out.submaps.end(); ++b)
-      if (finder.is_candidate(*a->second, *b->second))
-        out.verdicts[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryPayloadStore());
+      if (verifier.is_candidate(*a->second, *b->second))
+        out.verdicts[{a->first, b->first}] = *verifier.verify(*a->second, *b->second, MemoryPayloadStore());
   return out;
 }
 

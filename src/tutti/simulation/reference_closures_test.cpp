@@ -52,10 +52,10 @@ const Mission& shared_mission() {
   return mission;
 }
 
-std::vector<ClosureVerdict> all_verdicts(const ReferenceClosures& finder, const std::vector<Submap>& submaps) {
+std::vector<ClosureVerdict> all_verdicts(const ReferenceClosures& verifier, const std::vector<Submap>& submaps) {
   std::vector<ClosureVerdict> verdicts;
   for (std::size_t i = 0; i < submaps.size(); ++i)
-    for (std::size_t j = i + 1; j < submaps.size(); ++j) verdicts.push_back(finder.verify(submaps[i], submaps[j]));
+    for (std::size_t j = i + 1; j < submaps.size(); ++j) verdicts.push_back(verifier.verify(submaps[i], submaps[j]));
   return verdicts;
 }
 
@@ -68,9 +68,9 @@ Timestamp stamp_of(const Mission& mission, KeyframeId id) {
 }
 
 /// measured = true * error
-Pose3 error_of(const ReferenceClosures& finder, const Mission& mission, const LoopClosure& closure) {
-  const auto truth = finder.true_relative_pose(closure.from.chain.robot, stamp_of(mission, closure.from),
-                                               closure.to.chain.robot, stamp_of(mission, closure.to));
+Pose3 error_of(const ReferenceClosures& verifier, const Mission& mission, const LoopClosure& closure) {
+  const auto truth = verifier.true_relative_pose(closure.from.chain.robot, stamp_of(mission, closure.from),
+                                                 closure.to.chain.robot, stamp_of(mission, closure.to));
   return truth->inverse() * closure.measurement.T_a_b;
 }
 
@@ -78,16 +78,16 @@ bool is_wrong(const Pose3& error) { return error.translation.norm() > 0.5 || rot
 
 TEST(ReferenceClosures, EachSubmapIsPlacedOnceHoweverManyPairsItIsIn) {
   const Mission mission = make_mission(5, 120.0);
-  const ReferenceClosures finder(mission.reference, {}, 1);
-  const auto verdicts = all_verdicts(finder, mission.submaps);
-  EXPECT_EQ(finder.submaps_placed(), mission.submaps.size());
+  const ReferenceClosures verifier(mission.reference, {}, 1);
+  const auto verdicts = all_verdicts(verifier, mission.submaps);
+  EXPECT_EQ(verifier.submaps_placed(), mission.submaps.size());
   for (std::size_t i = 0; i + 1 < mission.submaps.size(); ++i)
-    EXPECT_EQ(finder.verify(mission.submaps[i], mission.submaps[i + 1]),
+    EXPECT_EQ(verifier.verify(mission.submaps[i], mission.submaps[i + 1]),
               ReferenceClosures(mission.reference, {}, 1).verify(mission.submaps[i], mission.submaps[i + 1]));
-  EXPECT_EQ(finder.submaps_placed(), mission.submaps.size());
+  EXPECT_EQ(verifier.submaps_placed(), mission.submaps.size());
   Submap other = mission.submaps[1];  // under an id that is known
   other.id = mission.submaps[0].id;
-  EXPECT_EQ(finder.verify(other, mission.submaps.back()),
+  EXPECT_EQ(verifier.verify(other, mission.submaps.back()),
             ReferenceClosures(mission.reference, {}, 1).verify(other, mission.submaps.back()));
 }
 
@@ -97,13 +97,13 @@ TEST(ReferenceClosures, TheAskedShareIsWrongAndTheRestIsAsGoodAsItsCovariance) {
   config.wrong_share = 0.2;
   double reports = 0.0, wrong = 0.0, wrong_distant = 0.0, squared = 0.0;
   for (std::uint64_t seed = 0; seed < 5; ++seed) {
-    const ReferenceClosures finder(mission.reference, config, seed);
-    for (const ClosureVerdict& verdict : all_verdicts(finder, mission.submaps)) {
+    const ReferenceClosures verifier(mission.reference, config, seed);
+    for (const ClosureVerdict& verdict : all_verdicts(verifier, mission.submaps)) {
       ASSERT_EQ(verdict.closures.empty(), verdict.refusal.has_value());
       if (verdict.closures.empty()) continue;
       ASSERT_EQ(verdict.closures.size(), 1U);
       const LoopClosure& closure = verdict.closures.front();
-      const Pose3 error = error_of(finder, mission, closure);
+      const Pose3 error = error_of(verifier, mission, closure);
       reports += 1.0;
       if (is_wrong(error)) {
         wrong += 1.0;
@@ -125,14 +125,14 @@ TEST(ReferenceClosures, WithoutWrongOnesAllOverlapsAndOnlyTheseAreReported) {
   ReferenceClosureConfig config;
   config.wrong_share = 0.0;
   config.per_pair = 3;
-  const ReferenceClosures finder(mission.reference, config, 1);
+  const ReferenceClosures verifier(mission.reference, config, 1);
   std::size_t several = 0, between_robots = 0, of_one_robot = 0;
-  for (const ClosureVerdict& verdict : all_verdicts(finder, mission.submaps)) {
+  for (const ClosureVerdict& verdict : all_verdicts(verifier, mission.submaps)) {
     EXPECT_LE(verdict.closures.size(), 3U);
     if (verdict.closures.size() > 1) ++several;
     std::set<std::uint32_t> from, to;
     for (const LoopClosure& closure : verdict.closures) {
-      EXPECT_FALSE(is_wrong(error_of(finder, mission, closure)));
+      EXPECT_FALSE(is_wrong(error_of(verifier, mission, closure)));
       EXPECT_LT(closure.measurement.T_a_b.translation.norm(), config.radius_m + 5.0 * config.sigma_m);
       EXPECT_TRUE(from.insert(closure.from.index).second);
       EXPECT_TRUE(to.insert(closure.to.index).second);
@@ -153,17 +153,17 @@ TEST(ReferenceClosures, SomeWrongClosuresAgree) {
   config.wrong_share = 0.3;
   config.distant_share = 1.0;
   config.agreeing_share = 1.0;
-  const ReferenceClosures finder(mission.reference, config, 1);
+  const ReferenceClosures verifier(mission.reference, config, 1);
   // Wrong closures of one look-alike claim one and the same displacement between the two places.
   std::map<std::pair<SubmapId, SubmapId>, std::vector<Pose3>> claims;
-  for (const ClosureVerdict& verdict : all_verdicts(finder, mission.submaps)) {
+  for (const ClosureVerdict& verdict : all_verdicts(verifier, mission.submaps)) {
     if (verdict.closures.empty()) continue;
     const LoopClosure& closure = verdict.closures.front();
-    if (!is_wrong(error_of(finder, mission, closure))) continue;
-    const Pose3 from = *finder.true_relative_pose(RobotId{0}, mission.submaps.front().keyframes.front().stamp,
-                                                  closure.from.chain.robot, stamp_of(mission, closure.from));
-    const Pose3 to = *finder.true_relative_pose(RobotId{0}, mission.submaps.front().keyframes.front().stamp,
-                                                closure.to.chain.robot, stamp_of(mission, closure.to));
+    if (!is_wrong(error_of(verifier, mission, closure))) continue;
+    const Pose3 from = *verifier.true_relative_pose(RobotId{0}, mission.submaps.front().keyframes.front().stamp,
+                                                    closure.from.chain.robot, stamp_of(mission, closure.from));
+    const Pose3 to = *verifier.true_relative_pose(RobotId{0}, mission.submaps.front().keyframes.front().stamp,
+                                                  closure.to.chain.robot, stamp_of(mission, closure.to));
     const SubmapId first{verdict.pair.first.chain.robot, verdict.pair.first.index / 2};
     const SubmapId second{verdict.pair.second.chain.robot, verdict.pair.second.index / 2};
     claims[{first, second}].push_back(from * closure.measurement.T_a_b * to.inverse());
@@ -227,37 +227,37 @@ TEST(ReferenceClosures, MissingReferenceRefusesInsteadOfGuessing) {
   const Timestamp hole_begin = reference.front().stamp + 12.0;
   const Timestamp hole_end = reference.front().stamp + 38.0;
   std::erase_if(reference, [&](const StampedPose& p) { return p.stamp > hole_begin && p.stamp < hole_end; });
-  const ReferenceClosures finder(mission.reference, {}, 1);
+  const ReferenceClosures verifier(mission.reference, {}, 1);
   const Submap& alpha = mission.submaps.front();
   for (const Submap& submap : mission.submaps) {
     if (submap.id.chain.robot != bravo || submap.id.index != 2) continue;  // 20 .. 30 s
-    const ClosureVerdict verdict = finder.verify(alpha, submap);
+    const ClosureVerdict verdict = verifier.verify(alpha, submap);
     EXPECT_TRUE(verdict.closures.empty());
     EXPECT_EQ(verdict.refusal, Refusal{RefusalReason::no_reference});
   }
-  EXPECT_FALSE(finder.true_relative_pose(RobotId{0}, {1'000'000'000}, RobotId{7}, {1'000'000'000}).has_value());
-  EXPECT_EQ(finder.verify(alpha, alpha).refusal, Refusal{RefusalReason::same_submap});
-  EXPECT_EQ(finder.verify(alpha, Submap{.id = {RobotId{9}, 5}}).refusal, Refusal{RefusalReason::no_reference});
+  EXPECT_FALSE(verifier.true_relative_pose(RobotId{0}, {1'000'000'000}, RobotId{7}, {1'000'000'000}).has_value());
+  EXPECT_EQ(verifier.verify(alpha, alpha).refusal, Refusal{RefusalReason::same_submap});
+  EXPECT_EQ(verifier.verify(alpha, Submap{.id = {RobotId{9}, 5}}).refusal, Refusal{RefusalReason::no_reference});
 }
 
 TEST(ReferenceClosures, InterpolatesBetweenReferenceStamps) {
   const Trajectory line{{{0}, {}}, {{1'000'000'000}, {Eigen::Quaterniond::Identity(), {2.0, 0.0, 0.0}}}};
-  const ReferenceClosures finder({{RobotId{0}, line}}, {}, 1);
-  const auto T = finder.true_relative_pose(RobotId{0}, {0}, RobotId{0}, {250'000'000});
+  const ReferenceClosures verifier({{RobotId{0}, line}}, {}, 1);
+  const auto T = verifier.true_relative_pose(RobotId{0}, {0}, RobotId{0}, {250'000'000});
   ASSERT_TRUE(T.has_value());
   EXPECT_NEAR(T->translation.x(), 0.5, 1e-12);
-  EXPECT_FALSE(finder.true_relative_pose(RobotId{0}, {0}, RobotId{0}, {1'250'000'000}).has_value());
+  EXPECT_FALSE(verifier.true_relative_pose(RobotId{0}, {0}, RobotId{0}, {1'250'000'000}).has_value());
 }
 
 TEST(ReferenceClosures, AnswerTheSameFromSeveralThreads) {
   const Mission& mission = shared_mission();
-  const ReferenceClosures finder(mission.reference, {}, 5);
+  const ReferenceClosures verifier(mission.reference, {}, 5);
   const std::vector<Submap> some(mission.submaps.begin(), mission.submaps.begin() + 40);
-  const auto expected = all_verdicts(finder, some);
+  const auto expected = all_verdicts(verifier, some);
   std::vector<std::vector<ClosureVerdict>> results(3);
   {
     std::vector<std::jthread> threads;
-    for (auto& result : results) threads.emplace_back([&] { result = all_verdicts(finder, some); });
+    for (auto& result : results) threads.emplace_back([&] { result = all_verdicts(verifier, some); });
   }
   for (const auto& result : results) EXPECT_EQ(result, expected);
 }

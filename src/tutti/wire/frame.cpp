@@ -67,7 +67,7 @@ const char* name(MessageKind kind) {
 
 // What each version changed:
 //   submap       2 to 4 nothing (all kinds shared one number up to 4), 5 sessions, 6 what cameras saw
-//   verdict      5 why a pair was refused as a word of a list, and the finder's version; 6 sessions; 7 evidence
+//   verdict      5 why a pair was refused as a word of a list, and the verifier's version; 6 sessions; 7 evidence
 //   verdicts     2 evidence
 //   proxy graph  6 uncertainty in today's terms, 7 where others were last seen, 8 less about whole scales. Nobody keeps
 //                a graph, so the older ones are not read.

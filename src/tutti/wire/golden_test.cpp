@@ -208,7 +208,7 @@ TEST(Golden, Verdict) {
     return ClosureVerdict{
         .pair = {{RobotId{0}, 3}, {one, 4}},
         .closures = {{{RobotId{0}, 31}, {one, 45}, {{kQuarterTurn, {0.1, 0.2, 0.3}}, diagonal(1e-3, 1e-4)}}},
-        .finder = {.name = {}, .version = 3}};
+        .verifier = {.name = {}, .version = 3}};
   };
   ClosureVerdict explained = of_session(1'700'000'123);
   explained.evidence = {{RefusalReason::overlap, 0.625, 0.3}, {RefusalReason::misfit, 1.25, 2.5}};

@@ -81,23 +81,23 @@ struct World {
     auto input = lab::load_input(config, {}, source.seed);
     EXPECT_TRUE(input.has_value());
     recordings = std::move(input->robots);
-    finder = lab::make_finder(config, source).value();
+    verifier = lab::make_verifier(config, source).value();
   }
   [[nodiscard]] std::unique_ptr<node::ServerNode> open(const storage::TableStore& map) const {
-    auto node = node::ServerNode::open({RobotId{0}, RobotId{1}}, finder, {.server = config.server}, 1, map);
+    auto node = node::ServerNode::open({RobotId{0}, RobotId{1}}, verifier, {.server = config.server}, 1, map);
     EXPECT_TRUE(node.has_value()) << node.error().message;
     return std::move(*node);
   }
   lab::MissionConfig config;
   std::vector<mission::MissionRecording> recordings;
-  std::shared_ptr<const server::ClosureFinder> finder;
+  std::shared_ptr<const server::ClosureVerifier> verifier;
 };
 
 /// All submaps, one after the other, and every job done at once.
 inline std::unique_ptr<storage::MemoryStore> undisturbed(const World& world) {
   auto map = std::make_unique<storage::MemoryStore>(storage::map_schema());
   const auto server = world.open(*map);
-  node::WorkerNode worker(bus::Endpoint::worker(0), world.finder, node::SubmapFrames::of(*map));
+  node::WorkerNode worker(bus::Endpoint::worker(0), world.verifier, node::SubmapFrames::of(*map));
   const auto serve = [&](const auto& self, const node::Step& step) -> void {
     EXPECT_TRUE(map->commit(step.writes));
     for (const bus::Envelope& message : step.messages)

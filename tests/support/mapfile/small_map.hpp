@@ -21,19 +21,19 @@
 namespace tutti::mapfile::test {
 
 /// True relative poses with evidence; every fourth is wrong. Sessions of one robot walk the same way at other times.
-class ExplainingFinder final : public server::WrappedFinder {
+class ExplainingVerifier final : public server::WrappedVerifier {
  public:
-  ExplainingFinder() : WrappedFinder(std::make_shared<server::test::TestFinder>(7, 4)) {}
+  ExplainingVerifier() : WrappedVerifier(std::make_shared<server::test::TestVerifier>(7, 4)) {}
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const server::PayloadStore& payloads) const override {
     auto verdict = wrapped().verify(first, second, payloads);
     verdict->evidence = {{RefusalReason::overlap, 0.75, 0.3}};
     return verdict;
   }
-  /// What verify() says, not what the wrapped finder would.
+  /// What verify() says, not what the wrapped verifier would.
   [[nodiscard]] Result<Look> look(const Submap& first, const Submap& second, const server::PayloadStore& payloads,
                                   const std::optional<Pose3>& T_first_second) const override {
-    return ClosureFinder::look(first, second, payloads, T_first_second);
+    return ClosureVerifier::look(first, second, payloads, T_first_second);
   }
 };
 
@@ -41,11 +41,11 @@ class ExplainingFinder final : public server::WrappedFinder {
 class Mapper {
  public:
   Mapper(std::set<RobotId> robots, storage::TableStore& store, std::uint64_t epoch = 1000)
-      : Mapper(std::move(robots), store, std::make_shared<ExplainingFinder>(), {}, epoch) {}
-  Mapper(std::set<RobotId> robots, storage::TableStore& store, std::shared_ptr<const server::ClosureFinder> finder,
+      : Mapper(std::move(robots), store, std::make_shared<ExplainingVerifier>(), {}, epoch) {}
+  Mapper(std::set<RobotId> robots, storage::TableStore& store, std::shared_ptr<const server::ClosureVerifier> verifier,
          const server::ServerConfig& config, std::uint64_t epoch = 1000)
-      : store_(store), finder_(std::move(finder)) {
-    auto opened = node::ServerNode::open(std::move(robots), finder_, {.server = config}, epoch, store);
+      : store_(store), verifier_(std::move(verifier)) {
+    auto opened = node::ServerNode::open(std::move(robots), verifier_, {.server = config}, epoch, store);
     EXPECT_TRUE(opened.has_value()) << opened.error().message;
     node_ = std::move(*opened);
     take(node_->resume(now_));
@@ -81,14 +81,14 @@ class Mapper {
     EXPECT_TRUE(store_.commit(step.writes).has_value());
     for (const node::Event& event : step.events)
       if (const auto* refused = std::get_if<node::MessageRefused>(&event.what)) ADD_FAILURE() << refused->why;
-    node::WorkerNode worker(bus::Endpoint::worker(2), finder_, node::SubmapFrames::of(store_));
+    node::WorkerNode worker(bus::Endpoint::worker(2), verifier_, node::SubmapFrames::of(store_));
     for (const bus::Envelope& message : step.messages)
       if (message.kind == bus::MessageKind::job)
         for (const bus::Envelope& answer : worker.receive(message, now_).messages) take(node_->receive(answer, now_));
   }
 
   storage::TableStore& store_;
-  std::shared_ptr<const server::ClosureFinder> finder_;
+  std::shared_ptr<const server::ClosureVerifier> verifier_;
   std::unique_ptr<node::ServerNode> node_;
   Timestamp now_;
 };

@@ -54,7 +54,7 @@ class Site {
     ServerNodeConfig config{.accepts_others = true};
     config.incarnation = 0x1000 + ++starts_;
     config.server.update_period_s = update_period_s_;
-    auto opened = ServerNode::open({}, std::make_shared<EvenFinder>(), config, epoch_, *server_store_);
+    auto opened = ServerNode::open({}, std::make_shared<EvenVerifier>(), config, epoch_, *server_store_);
     ASSERT_TRUE(opened.has_value()) << opened.error().message;
     server_ = std::move(*opened);
     server_does(server_->resume(now_));

@@ -24,7 +24,7 @@ class StoredServer : public testing::Test {
   Step start(const std::set<RobotId>& robots, const ServerNodeConfig& config) {
     store_ = std::make_unique<storage::MemoryStore>(storage::map_schema(),
                                                     store_ ? store_->tables() : storage::MemoryStore::Tables{});
-    node_ = ServerNode::open(robots, finder_, config, 1000 + ++starts_, *store_).value();
+    node_ = ServerNode::open(robots, verifier_, config, 1000 + ++starts_, *store_).value();
     Step first = done(node_->resume(now_));
     if (node_->map_server().has_news() || node_->has_map() || node_->next_timer() != now_) return first;
     Step map = done(node_->on_timer(now_));
@@ -55,7 +55,7 @@ class StoredServer : public testing::Test {
     return out;
   }
 
-  std::shared_ptr<const server::ClosureFinder> finder_ = std::make_shared<EvenFinder>();
+  std::shared_ptr<const server::ClosureVerifier> verifier_ = std::make_shared<EvenVerifier>();
   std::unique_ptr<storage::MemoryStore> store_;
   std::unique_ptr<ServerNode> node_;
   std::uint64_t starts_ = 0;

@@ -8,7 +8,7 @@
 
 #include "tutti/bus/envelope.hpp"
 #include "tutti/node/submap_frames.hpp"
-#include "tutti/server/closure_finder.hpp"
+#include "tutti/server/closure_verifier.hpp"
 #include "tutti/server/map_refiner.hpp"
 #include "tutti/wire/codec.hpp"
 
@@ -45,9 +45,9 @@ inline bus::Envelope envelope(const ClosureDecision& decision) {
 }
 
 /// Asks for every pair; those of even numbers are in one place, the others refused. Needs both clouds.
-class EvenFinder final : public server::ClosureFinder {
+class EvenVerifier final : public server::ClosureVerifier {
  public:
-  explicit EvenFinder(std::string settings = "gap: 0\n") : settings_(std::move(settings)) {}
+  explicit EvenVerifier(std::string settings = "gap: 0\n") : settings_(std::move(settings)) {}
   [[nodiscard]] MethodId id() const override { return {"even", 3, settings_hash(settings_)}; }
   [[nodiscard]] std::string settings() const override { return settings_; }
   [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
@@ -58,7 +58,7 @@ class EvenFinder final : public server::ClosureFinder {
                                               const server::PayloadStore& payloads) const override {
     for (const Submap* submap : {&first, &second})
       if (const auto cloud = payloads.cloud(submap->id); !cloud) return tl::unexpected(cloud.error());
-    ClosureVerdict verdict{.pair = {first.id, second.id}, .closures = {}, .refusal = {}, .finder = id()};
+    ClosureVerdict verdict{.pair = {first.id, second.id}, .closures = {}, .refusal = {}, .verifier = id()};
     if (first.id.index % 2 == 0 && second.id.index % 2 == 0)
       verdict.closures.push_back({{first.id.chain, first.keyframes.front().index},
                                   {second.id.chain, second.keyframes.front().index},
@@ -74,13 +74,13 @@ class EvenFinder final : public server::ClosureFinder {
 };
 
 /// Makes such ones.
-class EvenMaker final : public server::FinderMaker {
+class EvenMaker final : public server::VerifierMaker {
  public:
   [[nodiscard]] std::vector<MethodId> can() const override { return {{"even", 3, 0}}; }
-  [[nodiscard]] Result<std::shared_ptr<const server::ClosureFinder>> finder(
+  [[nodiscard]] Result<std::shared_ptr<const server::ClosureVerifier>> verifier(
       const MethodId& id, const std::string& settings) const override {
-    auto made = std::make_shared<const EvenFinder>(settings);
-    if (made->id() != id) return fail(ErrorCode::unsupported, "no finder {}", to_string(id));
+    auto made = std::make_shared<const EvenVerifier>(settings);
+    if (made->id() != id) return fail(ErrorCode::unsupported, "no verifier {}", to_string(id));
     return made;
   }
   [[nodiscard]] Result<std::shared_ptr<const server::MapRefiner>> refiner(const MethodId& id,

@@ -142,7 +142,7 @@ inline CorridorRun corridor_run(const CorridorRunConfig& config, std::uint64_t s
     if (open.keyframes.size() > 1) run.submaps[open.id] = std::make_shared<const Submap>(open);
     run.truth[robot] = truth;
   }
-  const simulation::ReferenceClosures finder(run.truth, config.closures, seed);
+  const simulation::ReferenceClosures verifier(run.truth, config.closures, seed);
   const auto is_blind = [&](const Submap& submap) {
     return std::ranges::any_of(config.blind, [&](const Failure& f) {
       return f.robot == submap.id.chain.robot && submap.keyframes.back().stamp - Timestamp{1'000'000'000} > f.from_s &&
@@ -152,7 +152,7 @@ inline CorridorRun corridor_run(const CorridorRunConfig& config, std::uint64_t s
   for (auto a = run.submaps.begin(); a != run.submaps.end(); ++a)
     for (auto b = std::next(a); b != run.submaps.end(); ++b) {
       if (is_blind(*a->second) || is_blind(*b->second)) continue;
-      ClosureVerdict verdict = finder.verify(*a->second, *b->second);
+      ClosureVerdict verdict = verifier.verify(*a->second, *b->second);
       if (!verdict.closures.empty()) run.verdicts[verdict.pair] = std::move(verdict);
     }
   add_look_alikes(run, config, rng.fork("alike"));

@@ -15,7 +15,7 @@
 
 #include "support/random_pose.hpp"
 #include "tutti/base/random.hpp"
-#include "tutti/server/closure_finder.hpp"
+#include "tutti/server/closure_verifier.hpp"
 #include "tutti/server/map_estimate.hpp"
 
 /// Small maps with known truth for the tests of this folder.
@@ -62,9 +62,9 @@ inline std::vector<Submap> make_submaps(const ChainId& chain, const TestWorldCon
 
 /// True relative poses with noise between the middle keyframes of submaps closer than 4 m; every `wrong_every`-th
 /// reporting pair is wrong by 3 m.
-class TestFinder final : public ClosureFinder {
+class TestVerifier final : public ClosureVerifier {
  public:
-  explicit TestFinder(std::uint64_t seed, std::uint32_t wrong_every = 0, std::uint32_t version = 1)
+  explicit TestVerifier(std::uint64_t seed, std::uint32_t wrong_every = 0, std::uint32_t version = 1)
       : seed_(seed), wrong_every_(wrong_every), version_(version) {}
 
   [[nodiscard]] MethodId id() const override { return {"test", version_, 0}; }
@@ -106,10 +106,10 @@ class TestFinder final : public ClosureFinder {
   std::uint32_t version_;
 };
 
-/// A finder that says what places look like: where on the circle they are. The nearer, the more alike.
-class RankingFinder final : public WrappedFinder {
+/// A verifier that says what places look like: where on the circle they are. The nearer, the more alike.
+class RankingVerifier final : public WrappedVerifier {
  public:
-  explicit RankingFinder(std::shared_ptr<const ClosureFinder> finder) : WrappedFinder(std::move(finder)) {}
+  explicit RankingVerifier(std::shared_ptr<const ClosureVerifier> verifier) : WrappedVerifier(std::move(verifier)) {}
   [[nodiscard]] std::string place_of(const Submap& submap) const override {
     const Keyframe& middle = submap.keyframes[submap.keyframes.size() / 2];
     const Eigen::Vector3d at = true_pose(submap.id.chain.robot, middle.index).translation;

@@ -155,7 +155,7 @@ inline ClosureVerdict any_verdict(Rng& rng, std::size_t closures) {
                                 {any_pose(rng, 5.0), any_covariance(rng)}});
   if (closures == 0) verdict.refusal = Refusal{RefusalReason::overlap, rng.uniform(0.0, 0.3), 0.3};
   if (rng.bernoulli(0.7))
-    verdict.finder = {rng.bernoulli(0.5) ? "lidar" : "", static_cast<std::uint32_t>(rng.index(3)), rng.index(3)};
+    verdict.verifier = {rng.bernoulli(0.5) ? "lidar" : "", static_cast<std::uint32_t>(rng.index(3)), rng.index(3)};
   if (closures > 0 && rng.bernoulli(0.7)) {
     verdict.evidence = {{RefusalReason::overlap, rng.uniform(0.3, 1.0), 0.3}, {RefusalReason::plane_rmse, 0.02, 0.1}};
     verdict.worker = 1 + rng.index(3);

@@ -88,6 +88,6 @@ export function gates(evidence: Gate[]): Child {
 }
 
 function origin(closure: Closure): Child {
-  const words = [closure.finder && `found by ${closure.finder}`, closure.worker && `verified by ${/^\d+$/.test(closure.worker) ? "worker " : ""}${closure.worker}`, closure.verified_ns && `at ${wall(closure.verified_ns)}`].filter((w) => w);
+  const words = [closure.verifier && `found by ${closure.verifier}`, closure.worker && `verified by ${/^\d+$/.test(closure.worker) ? "worker " : ""}${closure.worker}`, closure.verified_ns && `at ${wall(closure.verified_ns)}`].filter((w) => w);
   return words.length ? h("p", { class: "detail" }, words.join(", ")) : null;
 }

@@ -60,25 +60,25 @@ Status OpenedMap::read_meta(const storage::TableStore& store) {
   return ok;
 }
 
-/// As MapServer::take() leaves it: the closures of earlier finders hold until this one has answered. A pair without
+/// As MapServer::take() leaves it: the closures of earlier verifiers hold until this one has answered. A pair without
 /// both of its submaps, as in a map that was salvaged, is asked again when they come.
 void OpenedMap::add(ClosureVerdict verdict) {
   const SubmapPair pair = verdict.pair;
   if (!state.answered.has_both(pair)) return;
   if (verdict.refusal) return add_answer(std::move(verdict));
-  if (verdict.finder == state.finder)
+  if (verdict.verifier == state.verifier)
     state.answered.insert(pair);
   else
     ++former_;
   state.verdicts.insert_or_assign(pair, without_evidence(std::move(verdict)));
 }
 
-/// After those. What others have refused need not be known; closures that were set aside are believed when their finder
-/// is the server's.
+/// After those. What others have refused need not be known; closures that were set aside are believed when their
+/// verifier is the server's.
 void OpenedMap::add_answer(ClosureVerdict verdict) {
   const SubmapPair pair = verdict.pair;
   if (!state.answered.has_both(pair)) return;
-  if (verdict.finder != state.finder) return;
+  if (verdict.verifier != state.verifier) return;
   if (says(state.decisions, pair, Wish::accept) && state.verdicts.contains(pair)) return;
   if (!state.answered.insert(pair)) return;
   if (verdict.refusal) {
@@ -89,9 +89,9 @@ void OpenedMap::add_answer(ClosureVerdict verdict) {
   }
 }
 
-Result<OpenedMap> OpenedMap::from(const storage::TableStore& store, MethodId finder) {
+Result<OpenedMap> OpenedMap::from(const storage::TableStore& store, MethodId verifier) {
   OpenedMap opened;
-  opened.state.finder = std::move(finder);
+  opened.state.verifier = std::move(verifier);
   const auto meta = read_map_meta(store);
   if (!meta) return tl::unexpected(meta.error());
   if (!*meta) return opened;

@@ -29,7 +29,7 @@ struct OpenedMap {
   bool news = false;
   std::optional<MapCounts> counts;
 
-  static Result<OpenedMap> from(const storage::TableStore& store, MethodId finder);
+  static Result<OpenedMap> from(const storage::TableStore& store, MethodId verifier);
 
  private:
   Status read_meta(const storage::TableStore& store);
@@ -40,7 +40,7 @@ struct OpenedMap {
   void add(ClosureVerdict verdict);
   void add_answer(ClosureVerdict verdict);
 
-  std::size_t former_ = 0;  // verdicts of earlier finders
+  std::size_t former_ = 0;  // verdicts of earlier verifiers
 };
 
 }  // namespace tutti::node

@@ -14,7 +14,7 @@ namespace tutti::lidar {
 
 /// Version of what extract_features(), plausible_pair(), verify_pair() and to_verdict() find. A commit that changes
 /// their results, if only by a gate's default, raises it by hand: servers then ask again what another version answered.
-inline constexpr std::uint32_t kFinderVersion = 2;
+inline constexpr std::uint32_t kVerifierVersion = 2;
 
 /// What verify_pair() found. The measured quantities are those of the best alignment, also when it is refused, as far
 /// as they were measured: where a rival refuses a pair, the finest level is left out. Without any alignment they are 0.
@@ -53,7 +53,7 @@ PairVerification verify_near(const SubmapFeatures& a, const SubmapFeatures& b, c
 PairVerification inverse(PairVerification verification);
 
 /// The verdict of a pair. Its closure joins the middle keyframes, where bent submaps agree best; pair.first <
-/// pair.second whatever the order of a and b. ClosureVerdict::finder is left empty for the caller.
+/// pair.second whatever the order of a and b. ClosureVerdict::verifier is left empty for the caller.
 ClosureVerdict to_verdict(const Submap& a, const Submap& b, const PairVerification& verification);
 
 }  // namespace tutti::lidar

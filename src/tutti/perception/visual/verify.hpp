@@ -12,7 +12,7 @@ namespace tutti::visual {
 
 /// Version of what extract_features(), is_candidate() and verify_pair() find. A commit that changes their results, if
 /// only by a gate's default, raises it by hand: servers then ask again what another version answered.
-inline constexpr std::uint32_t kFinderVersion = 3;
+inline constexpr std::uint32_t kVerifierVersion = 3;
 
 /// Counts of what verifying pairs costs.
 struct VerificationWork {
@@ -34,7 +34,7 @@ bool is_candidate(const Submap& first, const Submap& second, std::uint32_t min_s
 /// (absolute_pose()). A closure joins it with the keyframe that saw most of these landmarks. It is believed for how
 /// certain its position is and over how much of an image its inliers are spread, not for their number, because many
 /// inliers in one patch prove nothing. A refusal gives the reason met by the keyframe that came farthest. The result
-/// does not depend on the order of a and b; ClosureVerdict::finder is left empty for the caller. The cost is added to
+/// does not depend on the order of a and b; ClosureVerdict::verifier is left empty for the caller. The cost is added to
 /// `work` unless that is null.
 ClosureVerdict verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, const VisualClosureConfig& config,
                            VerificationWork* work = nullptr);

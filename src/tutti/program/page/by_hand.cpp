@@ -80,7 +80,7 @@ std::optional<ByHand::Seen> ByHand::look_at(const Json& body, Response& response
     return std::nullopt;
   };
   Seen out{.map = site_.last_map.get()};
-  if (out.map == nullptr || site_.finder == nullptr) return refuse(409, "there is no map yet");
+  if (out.map == nullptr || site_.verifier == nullptr) return refuse(409, "there is no map yet");
   const auto& submaps = out.map->content.submaps;
   const auto called = [&](const char* key) {
     const std::string id = body.value(key, "");
@@ -103,7 +103,7 @@ std::optional<ByHand::Seen> ByHand::look_at(const Json& body, Response& response
   out.pair = {first->first, second->first};
   out.name = out.map->content.closure_names().of(out.pair);
   const std::scoped_lock one_at_a_time(looks_);
-  auto look = site_.finder->look(*first->second, *second->second, *site_.clouds, T_first_second);
+  auto look = site_.verifier->look(*first->second, *second->second, *site_.clouds, T_first_second);
   if (!look) return refuse(500, look.error().message);
   out.look = std::move(*look);
   return out;

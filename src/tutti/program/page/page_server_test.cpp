@@ -293,7 +293,7 @@ TEST(PageOptions, ALoopbackAddressOrCredentialsAreNeeded) {
   const program::ViewedMission mission{.name = "cave",
                                        .version = "1",
                                        .map = store,
-                                       .finder = nullptr,
+                                       .verifier = nullptr,
                                        .pki = {},
                                        .say = [](program::Level, const std::string&) {}};
   const auto open = serve_page({.listen = "0.0.0.0"}, mission);

@@ -116,7 +116,7 @@ std::string closure_json(const ShownMap& map, const mapfile::ClosureInfo& info) 
   out["by_hand"] = info.decision && !info.decision->by_hand.empty();
   out["evidence"] = FieldJson::array();
   if (info.verdict) {
-    out["finder"] = to_string(info.verdict->finder);
+    out["verifier"] = to_string(info.verdict->verifier);
     out["worker"] = info.verdict->worker;
     out["verified_ns"] = info.verdict->verified_ns;
     for (const Refusal& refusal : info.verdict->evidence) out["evidence"].push_back(evidence_json(refusal));

@@ -59,7 +59,7 @@ class ServedPage : public ::testing::Test {
     auto made = serve_page(options, {.name = "cave",
                                      .version = "1",
                                      .map = store_,
-                                     .finder = std::make_shared<mapfile::test::ExplainingFinder>(),
+                                     .verifier = std::make_shared<mapfile::test::ExplainingVerifier>(),
                                      .pki = pki,
                                      .say = [](program::Level, const std::string&) {}});
     ASSERT_TRUE(made.has_value()) << made.error().message;

@@ -18,13 +18,13 @@ class ByHand {
  public:
   explicit ByHand(Site& site) : site_(site) {}
 
-  /// What a finder sees in two submaps of the last map, in the order of their ids.
+  /// What a verifier sees in two submaps of the last map, in the order of their ids.
   struct Seen {
     std::shared_ptr<const mapfile::ShownMap> map;
     SubmapPair pair;
     bool is_turned = false;  ///< The page has asked for them the other way round.
     std::string name;
-    server::ClosureFinder::Look look;
+    server::ClosureVerifier::Look look;
   };
   /// Nothing: the answer says why.
   std::optional<Seen> look_at(const Json& body, Response& response);

@@ -82,7 +82,7 @@ struct Site {
   explicit Site(const program::ViewedMission& mission)
       : mission_name(mission.name),
         store(mission.map),
-        finder(mission.finder),
+        verifier(mission.verifier),
         sign_in(mission.pki),
         clouds(node::SubmapFrames::of(mission.map)),
         marks(mission.map) {}
@@ -90,7 +90,7 @@ struct Site {
   bool is_secure = false;
   const std::string mission_name;
   const storage::TableStore& store;  ///< The map's.
-  const std::shared_ptr<const server::ClosureFinder> finder;
+  const std::shared_ptr<const server::ClosureVerifier> verifier;
   const std::uint32_t incarnation = program::any_incarnation();
   SignIn sign_in;
   LiveBoard board;

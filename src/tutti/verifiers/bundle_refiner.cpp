@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/finders/bundle_refiner.hpp"
+#include "tutti/verifiers/bundle_refiner.hpp"
 
 #include <fmt/format.h>
 
@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "tutti/finders/sensor_finder_maker.hpp"
+#include "tutti/verifiers/sensor_verifier_maker.hpp"
 
-namespace tutti::finders {
+namespace tutti::verifiers {
 namespace {
 
 /// The job's submaps where it has them, with what their cameras saw.
@@ -110,4 +110,4 @@ Result<Refinement> BundleRefiner::refine(const RefinementJob& job, const server:
   return out;
 }
 
-}  // namespace tutti::finders
+}  // namespace tutti::verifiers

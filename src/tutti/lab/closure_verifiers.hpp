@@ -9,7 +9,7 @@
 
 #include "tutti/lab/mission_config.hpp"
 #include "tutti/mission/recordings.hpp"
-#include "tutti/server/closure_finder.hpp"
+#include "tutti/server/closure_verifier.hpp"
 
 namespace tutti::lab {
 
@@ -25,10 +25,10 @@ struct PlantedClosure {
 /// For recordings without sensor data: closures from true relative poses, with noise and a share of wrong ones. For the
 /// two submaps that contain the moments of a planted closure it gives that one instead: between the keyframes nearest
 /// to these moments, the true relative pose with the given error, and the covariance of right ones.
-class ReferenceClosureFinder final : public server::ClosureFinder {
+class ReferenceClosureVerifier final : public server::ClosureVerifier {
  public:
-  ReferenceClosureFinder(std::map<RobotId, Trajectory> reference, const simulation::ReferenceClosureConfig& config,
-                         std::uint64_t seed, std::vector<PlantedClosure> planted = {});
+  ReferenceClosureVerifier(std::map<RobotId, Trajectory> reference, const simulation::ReferenceClosureConfig& config,
+                           std::uint64_t seed, std::vector<PlantedClosure> planted = {});
   [[nodiscard]] MethodId id() const override { return {"reference", simulation::ReferenceClosures::kVersion, 0}; }
   [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return true; }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
@@ -41,7 +41,7 @@ class ReferenceClosureFinder final : public server::ClosureFinder {
       verdict.closures.push_back(*planted);
     else
       verdict = closures_.verify(first, second);
-    verdict.finder = id();
+    verdict.verifier = id();
     return verdict;
   }
 
@@ -53,9 +53,10 @@ class ReferenceClosureFinder final : public server::ClosureFinder {
   Matrix6d covariance_;  // of planted closures
 };
 
-/// The finder of a mission that load_input() has accepted (planted closures then name robots of the mission). A finder
-/// that needs the mission, because it draws or knows the reference, has no settings from which a worker could make it.
-std::shared_ptr<const server::ClosureFinder> make_closure_finder(
+/// The verifier of a mission that load_input() has accepted (planted closures then name robots of the mission). A
+/// verifier that needs the mission, because it draws or knows the reference, has no settings from which a worker could
+/// make it.
+std::shared_ptr<const server::ClosureVerifier> make_closure_verifier(
     const MissionConfig& config, const std::vector<mission::MissionRecording>& recordings, std::uint64_t seed);
 
 }  // namespace tutti::lab

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/finders/sensor_finder_maker.hpp"
+#include "tutti/verifiers/sensor_verifier_maker.hpp"
 
 #include <algorithm>
 #include <string_view>
 #include <utility>
 
 #include "tutti/base/config_io.hpp"
-#include "tutti/finders/bundle_refiner.hpp"
-#include "tutti/finders/sensor_finders.hpp"
+#include "tutti/verifiers/bundle_refiner.hpp"
+#include "tutti/verifiers/sensor_verifiers.hpp"
 
-namespace tutti::finders {
+namespace tutti::verifiers {
 namespace {
 
-struct FinderSettings {
-  FinderConfig closures;
+struct VerifierSettings {
+  VerifierConfig closures;
   template <class V>
   void describe(V& v) {
     v.field("closures", closures);
@@ -38,56 +38,59 @@ tl::unexpected<Error> other_settings(const MethodId& id, const MethodId& made) {
 
 }  // namespace
 
-std::string settings_of(const FinderConfig& config) {
-  ConfigNode node = dump_config(FinderSettings{config});
+std::string settings_of(const VerifierConfig& config) {
+  ConfigNode node = dump_config(VerifierSettings{config});
   const std::vector<std::string_view>& used = config.kind().settings;
-  std::erase_if(node.map.front().value.map, [&](const auto& entry) {
-    return entry.key != "finder" && std::ranges::find(used, entry.key) == used.end();
+  std::vector<ConfigNode::Entry>& settings = node.map.front().value.map;
+  std::erase_if(settings, [&](const auto& entry) {
+    return entry.key != "verifier" && std::ranges::find(used, entry.key) == used.end();
   });
+  // Verdicts of all maps there are hold the hash of this text, and workers of before read it.
+  std::ranges::find(settings, "verifier", &ConfigNode::Entry::key)->key = VerifierConfig::kFormerName;
   return to_yaml(node);
 }
 
-std::shared_ptr<const server::ClosureFinder> make_finder(const FinderConfig& config) {
-  auto finder = config.kind().make(config);
+std::shared_ptr<const server::ClosureVerifier> make_verifier(const VerifierConfig& config) {
+  auto verifier = config.kind().make(config);
   std::string settings = settings_of(config);
-  MethodId id = finder->id();
+  MethodId id = verifier->id();
   id.settings = settings_hash(settings);
-  return std::make_shared<NamedFinder>(std::move(finder), std::move(id), std::move(settings));
+  return std::make_shared<NamedVerifier>(std::move(verifier), std::move(id), std::move(settings));
 }
 
-std::shared_ptr<const server::MapRefiner> make_refiner(const FinderConfig& finder,
+std::shared_ptr<const server::MapRefiner> make_refiner(const VerifierConfig& verifier,
                                                        const bundle::RefinementConfig& config) {
-  if (!finder.kind().uses_images) return nullptr;
+  if (!verifier.kind().uses_images) return nullptr;
   return std::make_shared<const BundleRefiner>(config);
 }
 
 std::string settings_of(const bundle::RefinementConfig& config) { return to_yaml(dump_config(config)); }
 
-std::vector<MethodId> SensorFinderMaker::can() const {
+std::vector<MethodId> SensorVerifierMaker::can() const {
   std::vector<MethodId> out;
-  for (const FinderKind& kind : finder_kinds()) out.push_back({std::string(kind.name), kind.version, 0});
+  for (const VerifierKind& kind : verifier_kinds()) out.push_back({std::string(kind.name), kind.version, 0});
   out.push_back({BundleRefiner::kName, BundleRefiner::kVersion, 0});
   return out;
 }
 
-Result<std::shared_ptr<const server::ClosureFinder>> SensorFinderMaker::finder(const MethodId& id,
-                                                                               const std::string& settings) const {
+Result<std::shared_ptr<const server::ClosureVerifier>> SensorVerifierMaker::verifier(
+    const MethodId& id, const std::string& settings) const {
   if (auto ok = check_known(id, can(), settings); !ok) return tl::unexpected(ok.error());
   const auto node = parse_yaml(settings, "the job's settings");
   if (!node) return tl::unexpected(node.error());
-  FinderSettings read;
+  VerifierSettings read;
   if (auto ok = load_config(*node, read, "the job's settings"); !ok) return tl::unexpected(ok.error());
-  if (read.closures.finder != id.name)
-    return fail(ErrorCode::invalid, "the job's settings are of finder '{}', expected {}", read.closures.finder,
+  if (read.closures.verifier != id.name)
+    return fail(ErrorCode::invalid, "the job's settings are of verifier '{}', expected {}", read.closures.verifier,
                 to_string(id));
   read.closures.feature_cache_mb = feature_cache_mb_;
-  auto made = make_finder(read.closures);
+  auto made = make_verifier(read.closures);
   if (made->id() != id) return other_settings(id, made->id());
   return made;
 }
 
-Result<std::shared_ptr<const server::MapRefiner>> SensorFinderMaker::refiner(const MethodId& id,
-                                                                             const std::string& settings) const {
+Result<std::shared_ptr<const server::MapRefiner>> SensorVerifierMaker::refiner(const MethodId& id,
+                                                                               const std::string& settings) const {
   if (auto ok = check_known(id, can(), settings); !ok) return tl::unexpected(ok.error());
   const auto node = parse_yaml(settings, "the job's settings");
   if (!node) return tl::unexpected(node.error());
@@ -98,4 +101,4 @@ Result<std::shared_ptr<const server::MapRefiner>> SensorFinderMaker::refiner(con
   return made;
 }
 
-}  // namespace tutti::finders
+}  // namespace tutti::verifiers

@@ -13,7 +13,7 @@
 #include "tutti/base/ids.hpp"
 #include "tutti/base/result.hpp"
 
-namespace tutti::finders {
+namespace tutti::verifiers {
 
 /// Keeps the features of the newest submaps that fit into a budget of bytes; F is their type, and bytes_of(const F&), a
 /// function beside it, tells their size. Every new submap is compared with all others in turn; keeping the last used
@@ -93,4 +93,4 @@ std::size_t FeatureCache<F>::held_bytes() const {
   return held_bytes_;
 }
 
-}  // namespace tutti::finders
+}  // namespace tutti::verifiers

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/finders/sensor_finders.hpp"
+#include "tutti/verifiers/sensor_verifiers.hpp"
 
 #include <fmt/ranges.h>
 
@@ -17,31 +17,31 @@
 #include "tutti/perception/visual/place_descriptor.hpp"
 #include "tutti/perception/visual/verify.hpp"
 
-namespace tutti::finders {
+namespace tutti::verifiers {
 namespace {
 
 template <class Matcher>
-std::vector<server::ClosureFinder::Likeness> likeness_by(const Matcher& matcher,
-                                                         std::span<const std::string_view> others) {
-  std::vector<server::ClosureFinder::Likeness> out;
+std::vector<server::ClosureVerifier::Likeness> likeness_by(const Matcher& matcher,
+                                                           std::span<const std::string_view> others) {
+  std::vector<server::ClosureVerifier::Likeness> out;
   for (std::size_t i = 0; i < others.size(); ++i) out.push_back({.other = i, .value = matcher.likeness(others[i])});
   return out;
 }
 
-constexpr std::string_view kJoined = "places ";  // no finder's own begins so
+constexpr std::string_view kJoined = "places ";  // no verifier's own begins so
 
 }  // namespace
 
-LidarClosureFinder::LidarClosureFinder(const lidar::LidarClosureConfig& config, int min_submap_gap,
-                                       std::size_t cache_bytes)
+LidarClosureVerifier::LidarClosureVerifier(const lidar::LidarClosureConfig& config, int min_submap_gap,
+                                           std::size_t cache_bytes)
     : config_(config), min_submap_gap_(static_cast<std::uint32_t>(min_submap_gap)), cache_(cache_bytes) {}
 
-bool LidarClosureFinder::is_candidate(const Submap& first, const Submap& second) const {
+bool LidarClosureVerifier::is_candidate(const Submap& first, const Submap& second) const {
   return first.id.chain != second.id.chain || second.id.index - first.id.index >= min_submap_gap_;  // first < second
 }
 
-Result<ClosureVerdict> LidarClosureFinder::verify(const Submap& first, const Submap& second,
-                                                  const server::PayloadStore& payloads) const {
+Result<ClosureVerdict> LidarClosureVerifier::verify(const Submap& first, const Submap& second,
+                                                    const server::PayloadStore& payloads) const {
   const auto features_a = features_of(first, payloads);
   if (!features_a) return tl::unexpected(features_a.error());
   const auto features_b = features_of(second, payloads);
@@ -54,13 +54,13 @@ Result<ClosureVerdict> LidarClosureFinder::verify(const Submap& first, const Sub
   if (!a->usable || !b->usable) return refuse(a->usable ? b->refusal : a->refusal);
   if (!lidar::plausible_pair(*a, *b)) return refuse(Refusal{RefusalReason::unlike_from_above});
   ClosureVerdict verdict = lidar::to_verdict(first, second, lidar::verify_pair(*a, *b, config_));
-  verdict.finder = id();
+  verdict.verifier = id();
   return verdict;
 }
 
-Result<LidarClosureFinder::Look> LidarClosureFinder::look(const Submap& first, const Submap& second,
-                                                          const server::PayloadStore& payloads,
-                                                          const std::optional<Pose3>& T_first_second) const {
+Result<LidarClosureVerifier::Look> LidarClosureVerifier::look(const Submap& first, const Submap& second,
+                                                              const server::PayloadStore& payloads,
+                                                              const std::optional<Pose3>& T_first_second) const {
   const auto a = features_of(first, payloads);
   if (!a) return tl::unexpected(a.error());
   const auto b = features_of(second, payloads);
@@ -81,16 +81,18 @@ Result<LidarClosureFinder::Look> LidarClosureFinder::look(const Submap& first, c
   return out;
 }
 
-std::string LidarClosureFinder::place_of(const Submap& submap) const { return lidar::describe_place(submap, config_); }
+std::string LidarClosureVerifier::place_of(const Submap& submap) const {
+  return lidar::describe_place(submap, config_);
+}
 
-bool LidarClosureFinder::can_rank(std::string_view place) const { return lidar::is_descriptor(place, config_); }
+bool LidarClosureVerifier::can_rank(std::string_view place) const { return lidar::is_descriptor(place, config_); }
 
-std::vector<LidarClosureFinder::Likeness> LidarClosureFinder::likeness(std::string_view place,
-                                                                       std::span<const std::string_view> others) const {
+std::vector<LidarClosureVerifier::Likeness> LidarClosureVerifier::likeness(
+    std::string_view place, std::span<const std::string_view> others) const {
   return likeness_by(lidar::PlaceMatcher(place), others);
 }
 
-Result<std::shared_ptr<const lidar::SubmapFeatures>> LidarClosureFinder::features_of(
+Result<std::shared_ptr<const lidar::SubmapFeatures>> LidarClosureVerifier::features_of(
     const Submap& submap, const server::PayloadStore& payloads) const {
   return cache_.get(submap.id, [&]() -> Result<FeatureCache<lidar::SubmapFeatures>::Features> {
     auto cloud = payloads.cloud(submap.id);
@@ -101,38 +103,38 @@ Result<std::shared_ptr<const lidar::SubmapFeatures>> LidarClosureFinder::feature
   });
 }
 
-VisualClosureFinder::VisualClosureFinder(const visual::VisualClosureConfig& config, int min_submap_gap,
-                                         std::size_t cache_bytes)
+VisualClosureVerifier::VisualClosureVerifier(const visual::VisualClosureConfig& config, int min_submap_gap,
+                                             std::size_t cache_bytes)
     : config_(config), min_submap_gap_(static_cast<std::uint32_t>(min_submap_gap)), cache_(cache_bytes) {}
 
-bool VisualClosureFinder::is_candidate(const Submap& first, const Submap& second) const {
+bool VisualClosureVerifier::is_candidate(const Submap& first, const Submap& second) const {
   return visual::is_candidate(first, second, min_submap_gap_, config_);
 }
 
-Result<ClosureVerdict> VisualClosureFinder::verify(const Submap& first, const Submap& second,
-                                                   const server::PayloadStore& payloads) const {
+Result<ClosureVerdict> VisualClosureVerifier::verify(const Submap& first, const Submap& second,
+                                                     const server::PayloadStore& payloads) const {
   const auto a = features_of(first, payloads);
   if (!a) return tl::unexpected(a.error());
   const auto b = features_of(second, payloads);
   if (!b) return tl::unexpected(b.error());
   ClosureVerdict verdict = visual::verify_pair(**a, **b, config_);
-  verdict.finder = id();
+  verdict.verifier = id();
   return verdict;
 }
 
-std::string VisualClosureFinder::place_of(const Submap& submap) const {
+std::string VisualClosureVerifier::place_of(const Submap& submap) const {
   return visual::describe_place(submap, config_);
 }
 
-bool VisualClosureFinder::can_rank(std::string_view place) const { return visual::is_descriptor(place); }
+bool VisualClosureVerifier::can_rank(std::string_view place) const { return visual::is_descriptor(place); }
 
-std::vector<VisualClosureFinder::Likeness> VisualClosureFinder::likeness(
+std::vector<VisualClosureVerifier::Likeness> VisualClosureVerifier::likeness(
     std::string_view place, std::span<const std::string_view> others) const {
   return likeness_by(visual::PlaceMatcher(place, config_), others);
 }
 
-Result<VisualClosureFinder::Features> VisualClosureFinder::features_of(const Submap& submap,
-                                                                       const server::PayloadStore& payloads) const {
+Result<VisualClosureVerifier::Features> VisualClosureVerifier::features_of(const Submap& submap,
+                                                                           const server::PayloadStore& payloads) const {
   return cache_.get(submap.id, [&]() -> Result<Features> {
     auto payload = payloads.visual(submap.id);
     if (!payload) return tl::unexpected(payload.error());
@@ -142,23 +144,23 @@ Result<VisualClosureFinder::Features> VisualClosureFinder::features_of(const Sub
   });
 }
 
-JointClosureFinder::JointClosureFinder(std::vector<std::shared_ptr<const server::ClosureFinder>> finders)
-    : finders_(std::move(finders)) {}
+JointClosureVerifier::JointClosureVerifier(std::vector<std::shared_ptr<const server::ClosureVerifier>> verifiers)
+    : verifiers_(std::move(verifiers)) {}
 
-bool JointClosureFinder::can_compare(const PayloadSize& first, const PayloadSize& second) const {
-  return std::ranges::any_of(finders_, [&](const auto& finder) { return finder->can_compare(first, second); });
+bool JointClosureVerifier::can_compare(const PayloadSize& first, const PayloadSize& second) const {
+  return std::ranges::any_of(verifiers_, [&](const auto& verifier) { return verifier->can_compare(first, second); });
 }
 
-bool JointClosureFinder::is_candidate(const Submap& first, const Submap& second) const {
-  return std::ranges::any_of(finders_, [&](const auto& finder) { return finder->is_candidate(first, second); });
+bool JointClosureVerifier::is_candidate(const Submap& first, const Submap& second) const {
+  return std::ranges::any_of(verifiers_, [&](const auto& verifier) { return verifier->is_candidate(first, second); });
 }
 
-Result<ClosureVerdict> JointClosureFinder::verify(const Submap& first, const Submap& second,
-                                                  const server::PayloadStore& payloads) const {
-  ClosureVerdict out{.pair = {first.id, second.id}, .finder = id()};
-  for (const auto& finder : finders_) {
-    if (!finder->is_candidate(first, second)) continue;
-    auto verdict = finder->verify(first, second, payloads);
+Result<ClosureVerdict> JointClosureVerifier::verify(const Submap& first, const Submap& second,
+                                                    const server::PayloadStore& payloads) const {
+  ClosureVerdict out{.pair = {first.id, second.id}, .verifier = id()};
+  for (const auto& verifier : verifiers_) {
+    if (!verifier->is_candidate(first, second)) continue;
+    auto verdict = verifier->verify(first, second, payloads);
     if (!verdict) return verdict;
     std::ranges::move(verdict->closures, std::back_inserter(out.closures));
     std::ranges::move(verdict->evidence, std::back_inserter(out.evidence));
@@ -169,25 +171,25 @@ Result<ClosureVerdict> JointClosureFinder::verify(const Submap& first, const Sub
   return out;
 }
 
-Result<JointClosureFinder::Look> JointClosureFinder::look(const Submap& first, const Submap& second,
-                                                          const server::PayloadStore& payloads,
-                                                          const std::optional<Pose3>& T_first_second) const {
+Result<JointClosureVerifier::Look> JointClosureVerifier::look(const Submap& first, const Submap& second,
+                                                              const server::PayloadStore& payloads,
+                                                              const std::optional<Pose3>& T_first_second) const {
   Look out{.best = {}, .refusal = Refusal{RefusalReason::other}, .evidence = {}};
-  for (const auto& finder : finders_) {
-    auto look = finder->look(first, second, payloads, T_first_second);
+  for (const auto& verifier : verifiers_) {
+    auto look = verifier->look(first, second, payloads, T_first_second);
     if (!look || look->best) return look;
     if (look->refusal && look->refusal->reason != RefusalReason::too_small) out = std::move(*look);
   }
   return out;
 }
 
-/// What one finder alone says as that finder says it; several parts after kJoined, and the length of each, as text.
-std::string JointClosureFinder::place_of(const Submap& submap) const {
+/// What one verifier alone says as that verifier says it; several parts after kJoined, and the length of each, as text.
+std::string JointClosureVerifier::place_of(const Submap& submap) const {
   const PayloadSize size = payload_size(submap);
   std::vector<std::string> parts;
-  for (const auto& finder : finders_) {
-    const bool is_seen = finder->can_compare(size, size);
-    parts.push_back(is_seen ? finder->place_of(submap) : std::string());
+  for (const auto& verifier : verifiers_) {
+    const bool is_seen = verifier->can_compare(size, size);
+    parts.push_back(is_seen ? verifier->place_of(submap) : std::string());
     if (is_seen && parts.back().empty()) return {};  // else another one's ranking would rule out what this one closes
   }
   const std::string all = fmt::format("{}", fmt::join(parts, ""));
@@ -197,10 +199,10 @@ std::string JointClosureFinder::place_of(const Submap& submap) const {
   return head + all;
 }
 
-std::vector<std::string_view> JointClosureFinder::parts_of(std::string_view place) const {
-  std::vector<std::string_view> parts(finders_.size());
+std::vector<std::string_view> JointClosureVerifier::parts_of(std::string_view place) const {
+  std::vector<std::string_view> parts(verifiers_.size());
   for (std::size_t i = 0; i < parts.size(); ++i) {
-    if (!finders_[i]->can_rank(place)) continue;
+    if (!verifiers_[i]->can_rank(place)) continue;
     parts[i] = place;
     return parts;
   }
@@ -215,14 +217,14 @@ std::vector<std::string_view> JointClosureFinder::parts_of(std::string_view plac
   for (std::size_t i = 0; i < parts.size(); ++i) {
     if (sizes[i] > place.size()) return {};
     parts[i] = place.substr(0, sizes[i]);
-    if (!parts[i].empty() && !finders_[i]->can_rank(parts[i])) return {};
+    if (!parts[i].empty() && !verifiers_[i]->can_rank(parts[i])) return {};
     place.remove_prefix(sizes[i]);
   }
   return place.empty() ? parts : std::vector<std::string_view>();
 }
 
-std::vector<JointClosureFinder::Likeness> JointClosureFinder::likeness(std::string_view place,
-                                                                       std::span<const std::string_view> others) const {
+std::vector<JointClosureVerifier::Likeness> JointClosureVerifier::likeness(
+    std::string_view place, std::span<const std::string_view> others) const {
   const std::vector<std::string_view> own = parts_of(place);
   std::vector<std::vector<std::string_view>> parts;
   for (const std::string_view other : others) parts.push_back(parts_of(other));
@@ -236,7 +238,7 @@ std::vector<JointClosureFinder::Likeness> JointClosureFinder::likeness(std::stri
       which.push_back(i);
       seen.push_back(parts[i][sensor]);
     }
-    for (const auto& [other, value, _] : finders_[sensor]->likeness(own[sensor], seen))
+    for (const auto& [other, value, _] : verifiers_[sensor]->likeness(own[sensor], seen))
       out.push_back({which[other], value, static_cast<std::uint32_t>(sensor)});
   }
   return out;
@@ -244,41 +246,43 @@ std::vector<JointClosureFinder::Likeness> JointClosureFinder::likeness(std::stri
 
 namespace {
 
-using Made = std::shared_ptr<const server::ClosureFinder>;
+using Made = std::shared_ptr<const server::ClosureVerifier>;
 
-std::size_t cache_bytes(const FinderConfig& config) { return static_cast<std::size_t>(config.feature_cache_mb * 1e6); }
-
-Made make_lidar(const FinderConfig& config) {
-  return std::make_shared<LidarClosureFinder>(config.lidar, config.min_submap_gap, cache_bytes(config));
+std::size_t cache_bytes(const VerifierConfig& config) {
+  return static_cast<std::size_t>(config.feature_cache_mb * 1e6);
 }
 
-Made make_visual(const FinderConfig& config) {
-  return std::make_shared<VisualClosureFinder>(config.visual, config.min_submap_gap, cache_bytes(config));
+Made make_lidar(const VerifierConfig& config) {
+  return std::make_shared<LidarClosureVerifier>(config.lidar, config.min_submap_gap, cache_bytes(config));
 }
 
-Made make_joint(const FinderConfig& config) {
-  return std::make_shared<JointClosureFinder>(std::vector<Made>{make_lidar(config), make_visual(config)});
+Made make_visual(const VerifierConfig& config) {
+  return std::make_shared<VisualClosureVerifier>(config.visual, config.min_submap_gap, cache_bytes(config));
+}
+
+Made make_joint(const VerifierConfig& config) {
+  return std::make_shared<JointClosureVerifier>(std::vector<Made>{make_lidar(config), make_visual(config)});
 }
 
 }  // namespace
 
-const std::vector<FinderKind>& finder_kinds() {
-  static const std::vector<FinderKind> rows{
-      {.name = LidarClosureFinder::kName,
+const std::vector<VerifierKind>& verifier_kinds() {
+  static const std::vector<VerifierKind> rows{
+      {.name = LidarClosureVerifier::kName,
        .help = "from the submap clouds",
-       .version = lidar::kFinderVersion,
+       .version = lidar::kVerifierVersion,
        .uses_scans = true,
        .settings = {"min_submap_gap", "lidar"},
        .make = &make_lidar},
-      {.name = VisualClosureFinder::kName,
+      {.name = VisualClosureVerifier::kName,
        .help = "from images",
-       .version = visual::kFinderVersion,
+       .version = visual::kVerifierVersion,
        .uses_images = true,
        .settings = {"min_submap_gap", "visual"},
        .make = &make_visual},
-      {.name = JointClosureFinder::kName,
+      {.name = JointClosureVerifier::kName,
        .help = "from whatever two submaps both carry",
-       .version = JointClosureFinder::kVersion,
+       .version = JointClosureVerifier::kVersion,
        .uses_scans = true,
        .uses_images = true,
        .settings = {"min_submap_gap", "lidar", "visual"},
@@ -287,10 +291,10 @@ const std::vector<FinderKind>& finder_kinds() {
   return rows;
 }
 
-const FinderKind& FinderConfig::kind() const {
-  const FinderKind* found = row_of(finder_kinds(), finder);
-  TUTTI_CHECK(found != nullptr, "finder '{}'", finder);
+const VerifierKind& VerifierConfig::kind() const {
+  const VerifierKind* found = row_of(verifier_kinds(), verifier);
+  TUTTI_CHECK(found != nullptr, "verifier '{}'", verifier);
   return *found;
 }
 
-}  // namespace tutti::finders
+}  // namespace tutti::verifiers

@@ -8,7 +8,7 @@
 #include <future>
 #include <vector>
 
-namespace tutti::finders {
+namespace tutti::verifiers {
 
 /// Calls task(0) ... task(count - 1), each once, on up to `threads` threads including the calling one, and returns when
 /// all are done. The first exception of a task is rethrown. There is no pool of threads, because batches are few and
@@ -24,4 +24,4 @@ inline void for_each_parallel(std::size_t count, std::size_t threads, const std:
   for (std::future<void>& helper : helpers) helper.get();
 }
 
-}  // namespace tutti::finders
+}  // namespace tutti::verifiers

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Who finds closures: a server's finder and those of its workers, of the same settings and of others.
+// A server's loop-closure verifier and those of its workers, with the same settings and with others.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -14,16 +14,16 @@
 #include "tutti/node/worker_node.hpp"
 
 namespace tutti::node {
-namespace server_finders_test {
+namespace server_verifiers_test {
 
 using bus::Endpoint, bus::MessageKind;
 const ChainId kAlpha{RobotId{0}, 7}, kBravo{RobotId{1}, 7};
 const SubmapPair kPair{{kAlpha, 0}, {kBravo, 0}};
 
-/// Another kind than EvenFinder: what a worker has that was started for another mission.
-class OtherFinder final : public server::ClosureFinder {
+/// Another kind than EvenVerifier: what a worker has that was started for another mission.
+class OtherVerifier final : public server::ClosureVerifier {
  public:
-  explicit OtherFinder(MethodId id = {"other", 8, 0}) : id_(std::move(id)) {}
+  explicit OtherVerifier(MethodId id = {"other", 8, 0}) : id_(std::move(id)) {}
   [[nodiscard]] MethodId id() const override { return id_; }
   [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return true; }
   [[nodiscard]] bool is_candidate(const Submap&, const Submap&) const override { return true; }
@@ -50,18 +50,18 @@ class NamedShrinker final : public server::MapRefiner {
   server::test::Shrinker shrinker_;
 };
 
-class ServerFinders : public test::StoredServer {
+class ServerVerifiers : public test::StoredServer {
  protected:
-  ServerFinders() { restart(); }
+  ServerVerifiers() { restart(); }
   Step restart() { return start({RobotId{0}, RobotId{1}}, {.refiner = refiner_}); }
-  Step restart(std::shared_ptr<const server::ClosureFinder> finder) {
-    finder_ = std::move(finder);
+  Step restart(std::shared_ptr<const server::ClosureVerifier> verifier) {
+    verifier_ = std::move(verifier);
     return restart();
   }
-  WorkerNode worker(std::uint32_t number, std::shared_ptr<const server::ClosureFinder> finder, bool makes = false) {
+  WorkerNode worker(std::uint32_t number, std::shared_ptr<const server::ClosureVerifier> verifier, bool makes = false) {
     auto frames = std::make_shared<SubmapFrames>(
         [this](SubmapId id) { return Result<std::string>(**store_->read("submaps", key_of(id))); });
-    WorkerNode made(Endpoint::worker(number), std::move(finder), std::move(frames));
+    WorkerNode made(Endpoint::worker(number), std::move(verifier), std::move(frames));
     if (makes) made.make_others_with(std::make_shared<test::EvenMaker>());
     return made;
   }
@@ -83,19 +83,19 @@ class ServerFinders : public test::StoredServer {
   std::shared_ptr<const server::MapRefiner> refiner_;
 };
 
-TEST_F(ServerFinders, AWorkerWithoutAMissionMakesTheFinderOfTheJob) {
-  WorkerNode bare = worker(3, std::make_shared<OtherFinder>(), true);
+TEST_F(ServerVerifiers, AWorkerWithoutAMissionMakesTheVerifierOfTheJob) {
+  WorkerNode bare = worker(3, std::make_shared<OtherVerifier>(), true);
   answer(bare, ask());
   EXPECT_TRUE(has_closure());
-  EXPECT_EQ(node_->map_server().state().verdicts.at(kPair).finder, finder_->id());
+  EXPECT_EQ(node_->map_server().state().verdicts.at(kPair).verifier, verifier_->id());
   EXPECT_FALSE(bare.holds_job());
-  restart(std::make_shared<test::EvenFinder>("gap: 2\n"));  // settings that it has not met
+  restart(std::make_shared<test::EvenVerifier>("gap: 2\n"));  // settings that it has not met
   for (const bus::Envelope& job : jobs(restart())) answer(bare, job);
-  EXPECT_EQ(node_->map_server().state().verdicts.at(kPair).finder, finder_->id());
+  EXPECT_EQ(node_->map_server().state().verdicts.at(kPair).verifier, verifier_->id());
 }
 
-TEST_F(ServerFinders, WhatAWorkerCannotDoWaitsForOneThatCan) {
-  WorkerNode unable = worker(3, std::make_shared<OtherFinder>());
+TEST_F(ServerVerifiers, WhatAWorkerCannotDoWaitsForOneThatCan) {
+  WorkerNode unable = worker(3, std::make_shared<OtherVerifier>());
   hear(unable, 3);
   const Step declined = answer(unable, ask());
   EXPECT_TRUE(jobs(declined).empty());
@@ -106,7 +106,7 @@ TEST_F(ServerFinders, WhatAWorkerCannotDoWaitsForOneThatCan) {
   EXPECT_TRUE(jobs(hear(unable, 3)).empty());
   EXPECT_TRUE(node_->map_server().refusals().empty());
 
-  WorkerNode proper = worker(4, finder_);
+  WorkerNode proper = worker(4, verifier_);
   const auto again = jobs(hear(proper, 4));
   ASSERT_EQ(again.size(), 1U);
   EXPECT_EQ(status().waiting, 0U);
@@ -116,27 +116,27 @@ TEST_F(ServerFinders, WhatAWorkerCannotDoWaitsForOneThatCan) {
   EXPECT_EQ(status().pending_jobs, 0U);
 }
 
-TEST_F(ServerFinders, WhatAWorkerCannotDoIsAskedAgainAtOnceWhereAnotherCan) {
-  WorkerNode unable = worker(3, std::make_shared<OtherFinder>());
-  const WorkerNode maker = worker(4, std::make_shared<OtherFinder>(), true);
+TEST_F(ServerVerifiers, WhatAWorkerCannotDoIsAskedAgainAtOnceWhereAnotherCan) {
+  WorkerNode unable = worker(3, std::make_shared<OtherVerifier>());
+  const WorkerNode maker = worker(4, std::make_shared<OtherVerifier>(), true);
   hear(maker, 4);
   const bus::Envelope job = ask();
   const auto again = jobs(answer(unable, job));
   ASSERT_EQ(again.size(), 1U);
-  WorkerNode another = worker(5, std::make_shared<OtherFinder>());
+  WorkerNode another = worker(5, std::make_shared<OtherVerifier>());
   EXPECT_TRUE(jobs(answer(another, job)).empty());  // which is not open any more
   EXPECT_EQ(status().waiting, 0U);
   now_ = now_ + 60.0;  // not heard for a minute: it is gone
-  WorkerNode third = worker(6, std::make_shared<OtherFinder>());
+  WorkerNode third = worker(6, std::make_shared<OtherVerifier>());
   EXPECT_TRUE(jobs(answer(third, again[0])).empty());
   EXPECT_EQ(status().waiting, 1U);
 }
 
-TEST_F(ServerFinders, AVerdictOfAnUnknownFinderIsKeptButNotBelieved) {
+TEST_F(ServerVerifiers, AVerdictOfAnUnknownVerifierIsKeptButNotBelieved) {
   const MethodId of_old_programs{"", 3, 0};
   const bus::Envelope job = ask();
-  Verdicts said = wire::decode_verdicts(*worker(3, finder_).receive(job, now_).messages.at(0).bytes).value();
-  said.verdicts.at(0).finder = of_old_programs;
+  Verdicts said = wire::decode_verdicts(*worker(3, verifier_).receive(job, now_).messages.at(0).bytes).value();
+  said.verdicts.at(0).verifier = of_old_programs;
   const auto envelope = [&] {
     return bus::Envelope{Endpoint::worker(3), Endpoint::server(), MessageKind::verdicts, said.job,
                          std::make_shared<const std::string>(wire::encode(said))};
@@ -152,48 +152,48 @@ TEST_F(ServerFinders, AVerdictOfAnUnknownFinderIsKeptButNotBelieved) {
 
   EXPECT_EQ(jobs(restart()).size(), 1U);  // as if it had not come
   EXPECT_FALSE(has_closure());
-  restart(std::make_shared<OtherFinder>(MethodId{"unnamed", 3, 0}));
+  restart(std::make_shared<OtherVerifier>(MethodId{"unnamed", 3, 0}));
   EXPECT_FALSE(has_closure());
 }
 
-TEST_F(ServerFinders, WhatWasSetAsideIsBelievedWhenItsFinderIsTheServers) {
-  const auto other = std::make_shared<test::EvenFinder>("gap: 1\n");
+TEST_F(ServerVerifiers, WhatWasSetAsideIsBelievedWhenItsVerifierIsTheServers) {
+  const auto other = std::make_shared<test::EvenVerifier>("gap: 1\n");
   const bus::Envelope job = ask();
-  Verdicts said = wire::decode_verdicts(*worker(3, finder_).receive(job, now_).messages.at(0).bytes).value();
-  said.verdicts.at(0).finder = other->id();
+  Verdicts said = wire::decode_verdicts(*worker(3, verifier_).receive(job, now_).messages.at(0).bytes).value();
+  said.verdicts.at(0).verifier = other->id();
   receive({Endpoint::worker(3), Endpoint::server(), MessageKind::verdicts, said.job,
            std::make_shared<const std::string>(wire::encode(said))});
   EXPECT_FALSE(has_closure());
   EXPECT_TRUE(jobs(restart(other)).empty());
   ASSERT_TRUE(has_closure());
-  EXPECT_EQ(node_->map_server().state().verdicts.at(kPair).finder, other->id());
+  EXPECT_EQ(node_->map_server().state().verdicts.at(kPair).verifier, other->id());
 }
 
-TEST_F(ServerFinders, AnotherFinderKeepsClosuresUntilItHasAnswered) {
-  WorkerNode first = worker(3, finder_);
+TEST_F(ServerVerifiers, AnotherVerifierKeepsClosuresUntilItHasAnswered) {
+  WorkerNode first = worker(3, verifier_);
   answer(first, ask());
-  const auto even = finder_;
-  const auto asked = jobs(restart(std::make_shared<OtherFinder>()));
+  const auto even = verifier_;
+  const auto asked = jobs(restart(std::make_shared<OtherVerifier>()));
   ASSERT_EQ(asked.size(), 1U);
   EXPECT_TRUE(has_closure());
   EXPECT_EQ(status().former_pairs, 1U);
-  EXPECT_EQ(status().finder, "other 8");
+  EXPECT_EQ(status().verifier, "other 8");
   EXPECT_TRUE(wait_for(MessageKind::job, 30.0).empty());
   EXPECT_EQ(node_->map_server().map().closures.size(), 1U);
 
   EXPECT_TRUE(jobs(restart(even)).empty());  // and back: it had answered
   EXPECT_EQ(status().former_pairs, 0U);
-  WorkerNode second = worker(4, std::make_shared<OtherFinder>());
-  answer(second, jobs(restart(std::make_shared<OtherFinder>())).at(0));  // which refuses
+  WorkerNode second = worker(4, std::make_shared<OtherVerifier>());
+  answer(second, jobs(restart(std::make_shared<OtherVerifier>())).at(0));  // which refuses
   EXPECT_FALSE(has_closure());
   EXPECT_TRUE(jobs(restart()).empty());
   EXPECT_EQ(jobs(restart(even)).size(), 1U);
 }
 
-TEST_F(ServerFinders, ARefinementThatAWorkerCannotDoWaitsForOneThatCan) {
+TEST_F(ServerVerifiers, ARefinementThatAWorkerCannotDoWaitsForOneThatCan) {
   refiner_ = std::make_shared<const NamedShrinker>();
   restart();
-  WorkerNode unable = worker(3, finder_, true);
+  WorkerNode unable = worker(3, verifier_, true);
   answer(unable, ask());
   const auto asked = wait_for(MessageKind::refinement_job, 10.0);
   ASSERT_EQ(asked.size(), 1U);
@@ -203,7 +203,7 @@ TEST_F(ServerFinders, ARefinementThatAWorkerCannotDoWaitsForOneThatCan) {
   EXPECT_NE(status().why_waiting.find("shrinker 1"), std::string::npos) << status().why_waiting;
   EXPECT_TRUE(wait_for(MessageKind::refinement_job, 1e5).empty());
 
-  WorkerNode proper = worker(4, finder_);
+  WorkerNode proper = worker(4, verifier_);
   proper.refine_with(refiner_);
   const auto again = of_kind(hear(proper, 4), MessageKind::refinement_job);
   ASSERT_EQ(again.size(), 1U);
@@ -214,5 +214,5 @@ TEST_F(ServerFinders, ARefinementThatAWorkerCannotDoWaitsForOneThatCan) {
   EXPECT_TRUE(status().refusals.empty());  // none was given up
 }
 
-}  // namespace server_finders_test
+}  // namespace server_verifiers_test
 }  // namespace tutti::node

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/lab/closure_finders.hpp"
+#include "tutti/lab/closure_verifiers.hpp"
 
 #include <fmt/format.h>
 
@@ -10,10 +10,10 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/base/config_io.hpp"
-#include "tutti/finders/sensor_finder_maker.hpp"
-#include "tutti/finders/sensor_finders.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/lab/recorded_closures.hpp"
+#include "tutti/verifiers/sensor_verifier_maker.hpp"
+#include "tutti/verifiers/sensor_verifiers.hpp"
 
 namespace tutti::lab {
 
@@ -29,16 +29,16 @@ const Keyframe* keyframe_at(const Submap& submap, RobotId robot, Timestamp stamp
 
 }  // namespace
 
-ReferenceClosureFinder::ReferenceClosureFinder(std::map<RobotId, Trajectory> reference,
-                                               const simulation::ReferenceClosureConfig& config, std::uint64_t seed,
-                                               std::vector<PlantedClosure> planted)
+ReferenceClosureVerifier::ReferenceClosureVerifier(std::map<RobotId, Trajectory> reference,
+                                                   const simulation::ReferenceClosureConfig& config, std::uint64_t seed,
+                                                   std::vector<PlantedClosure> planted)
     : closures_(std::move(reference), config, seed), planted_(std::move(planted)) {
   Vector6d sigma;
   sigma << Eigen::Vector3d::Constant(config.sigma_m), Eigen::Vector3d::Constant(config.sigma_deg * kRadPerDeg);
   covariance_ = sigma.cwiseAbs2().asDiagonal();
 }
 
-std::optional<LoopClosure> ReferenceClosureFinder::planted_in(const Submap& first, const Submap& second) const {
+std::optional<LoopClosure> ReferenceClosureVerifier::planted_in(const Submap& first, const Submap& second) const {
   const auto claim = [&](const PlantedClosure& planted, const Submap& from,
                          const Submap& to) -> std::optional<LoopClosure> {
     const Keyframe* a = keyframe_at(from, planted.other, planted.other_stamp);
@@ -79,16 +79,16 @@ std::vector<PlantedClosure> planted_closures(const std::vector<PlantedClosureCon
   return out;
 }
 
-std::shared_ptr<const server::ClosureFinder> make_reference_finder(
+std::shared_ptr<const server::ClosureVerifier> make_reference_verifier(
     const MissionConfig& config, const std::vector<mission::MissionRecording>& recordings, std::uint64_t seed) {
   std::map<RobotId, Trajectory> reference;
   for (const mission::MissionRecording& robot : recordings)
     reference[robot.recording.robot] = robot.recording.reference;
-  return std::make_shared<ReferenceClosureFinder>(std::move(reference), config.closure_changes.reference, seed,
-                                                  planted_closures(config.closure_changes.planted, recordings));
+  return std::make_shared<ReferenceClosureVerifier>(std::move(reference), config.closure_changes.reference, seed,
+                                                    planted_closures(config.closure_changes.planted, recordings));
 }
 
-/// Names the recordings that the finder's answers depend on, in short.
+/// Names the recordings that the verifier's answers depend on, in short.
 std::string extent_of(const MissionConfig& config, const std::vector<mission::MissionRecording>& recordings) {
   std::string out;
   if (!config.closure_changes.come_with_mission()) return out;
@@ -101,9 +101,9 @@ std::string extent_of(const MissionConfig& config, const std::vector<mission::Mi
   return out;
 }
 
-/// All that the answers of a finder which draws depend on.
+/// All that the answers of a verifier which draws depend on.
 struct DrawnSettings {
-  finders::FinderConfig closures;
+  verifiers::VerifierConfig closures;
   ClosureChanges changes;
   std::uint64_t seed = 1;
   template <class V>
@@ -114,42 +114,42 @@ struct DrawnSettings {
   }
 };
 
-std::shared_ptr<const server::ClosureFinder> make_recorded_finder(
+std::shared_ptr<const server::ClosureVerifier> make_recorded_verifier(
     const MissionConfig& /*config*/, const std::vector<mission::MissionRecording>& recordings, std::uint64_t /*seed*/) {
-  return std::make_shared<RecordedClosureFinder>(recordings);
+  return std::make_shared<RecordedClosureVerifier>(recordings);
 }
 
 }  // namespace
 
-const std::vector<LabFinder>& lab_finders() {
-  static const std::vector<LabFinder> rows{
+const std::vector<LabVerifier>& lab_verifiers() {
+  static const std::vector<LabVerifier> rows{
       {.name = "reference",
        .help = "true relative poses plus noise and a share of wrong ones",
        .needs = "reference.file",
        .has =
            [](const mission::RobotConfig& robot) { return !robot.reference.file.empty() || !robot.graph.file.empty(); },
-       .make = &make_reference_finder},
+       .make = &make_reference_verifier},
       {.name = "recorded",
        .help = "those of robots[].graph, when they arrived",
        .needs = "graph.file",
        .has = [](const mission::RobotConfig& robot) { return !robot.graph.file.empty(); },
-       .make = &make_recorded_finder},
+       .make = &make_recorded_verifier},
   };
   return rows;
 }
 
-std::shared_ptr<const server::ClosureFinder> make_closure_finder(
+std::shared_ptr<const server::ClosureVerifier> make_closure_verifier(
     const MissionConfig& config, const std::vector<mission::MissionRecording>& recordings, std::uint64_t seed) {
   const ClosureChanges& changes = config.closure_changes;
-  const LabFinder* own = changes.lab_finder();
-  if (own == nullptr && changes.wrong_share == 0.0) return finders::make_finder(config.closures);
-  auto finder = own != nullptr ? own->make(config, recordings, seed) : config.closures.kind().make(config.closures);
-  MethodId id = finder->id();
+  const LabVerifier* own = changes.lab_verifier();
+  if (own == nullptr && changes.wrong_share == 0.0) return verifiers::make_verifier(config.closures);
+  auto verifier = own != nullptr ? own->make(config, recordings, seed) : config.closures.kind().make(config.closures);
+  MethodId id = verifier->id();
   if (changes.wrong_share > 0.0)
-    finder = std::make_shared<SpoiledClosureFinder>(std::move(finder), changes.wrong_share, changes.wrong, seed);
+    verifier = std::make_shared<SpoiledClosureVerifier>(std::move(verifier), changes.wrong_share, changes.wrong, seed);
   id.settings = settings_hash(tutti::to_yaml(dump_config(DrawnSettings{config.closures, changes, seed})) +
                               extent_of(config, recordings));
-  return std::make_shared<finders::NamedFinder>(std::move(finder), std::move(id), "");
+  return std::make_shared<verifiers::NamedVerifier>(std::move(verifier), std::move(id), "");
 }
 
 }  // namespace tutti::lab

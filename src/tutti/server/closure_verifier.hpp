@@ -22,15 +22,15 @@ namespace tutti::server {
 /// the simulator. is_candidate() and verify() depend on the two submaps only, never on the map or on the order of
 /// calls, and may be called from several threads at once. They get the submaps in the order of their ids and without
 /// payloads.
-class ClosureFinder {
+class ClosureVerifier {
  public:
-  virtual ~ClosureFinder() = default;
-  /// Identifies the finder; every verdict carries this id. The name is not empty; the version is at least 1, and a
-  /// commit that changes gates, methods or candidates raises it by hand; `settings` is a hash of the finder's settings.
-  /// A server that starts with another finder than before has every pair verified again, and keeps the old closures
-  /// until then.
+  virtual ~ClosureVerifier() = default;
+  /// Identifies the verifier; every verdict carries this id. The name is not empty; the version is at least 1, and a
+  /// commit that changes gates, methods or candidates raises it by hand; `settings` is a hash of the verifier's
+  /// settings. A server that starts with another verifier than before has every pair verified again, and keeps the old
+  /// closures until then.
   [[nodiscard]] virtual MethodId id() const = 0;
-  /// All that a worker of the same program needs to make this finder (FinderMaker); empty when text alone is not
+  /// All that a worker of the same program needs to make this verifier (VerifierMaker); empty when text alone is not
   /// enough.
   [[nodiscard]] virtual std::string settings() const { return {}; }
   /// True if submaps with payloads of these sizes have what verify() needs. Other pairs are never verified.
@@ -84,9 +84,10 @@ class ClosureFinder {
   }
 };
 
-/// Another finder, of which who derives from this changes what it overrides. All else is the other finder's, also what
-/// finders are asked in later versions; look() too, so that who changes what verify() finds says what look() shows.
-class WrappedFinder : public ClosureFinder {
+/// Another verifier, of which who derives from this changes what it overrides. All else is the other verifier's, also
+/// what verifiers are asked in later versions; look() too, so that who changes what verify() finds says what look()
+/// shows.
+class WrappedVerifier : public ClosureVerifier {
  public:
   [[nodiscard]] MethodId id() const override { return wrapped_->id(); }
   [[nodiscard]] std::string settings() const override { return wrapped_->settings(); }
@@ -116,24 +117,24 @@ class WrappedFinder : public ClosureFinder {
 
  protected:
   /// Must not be null.
-  explicit WrappedFinder(std::shared_ptr<const ClosureFinder> wrapped) : wrapped_(std::move(wrapped)) {}
-  [[nodiscard]] const ClosureFinder& wrapped() const { return *wrapped_; }
+  explicit WrappedVerifier(std::shared_ptr<const ClosureVerifier> wrapped) : wrapped_(std::move(wrapped)) {}
+  [[nodiscard]] const ClosureVerifier& wrapped() const { return *wrapped_; }
 
  private:
-  std::shared_ptr<const ClosureFinder> wrapped_;
+  std::shared_ptr<const ClosureVerifier> wrapped_;
 };
 
 class MapRefiner;
 
-/// Makes the finder or refiner that a job names, so that a worker needs no settings of its own.
-class FinderMaker {
+/// Makes the verifier or refiner that a job names, so that a worker needs no settings of its own.
+class VerifierMaker {
  public:
-  virtual ~FinderMaker() = default;
+  virtual ~VerifierMaker() = default;
   /// The methods that it can make; an id without settings means any settings.
   [[nodiscard]] virtual std::vector<MethodId> can() const = 0;
-  /// Makes a finder (a refiner) with exactly this id, never null; an error says what is missing.
-  [[nodiscard]] virtual Result<std::shared_ptr<const ClosureFinder>> finder(const MethodId& id,
-                                                                            const std::string& settings) const = 0;
+  /// Makes a verifier (a refiner) with exactly this id, never null; an error says what is missing.
+  [[nodiscard]] virtual Result<std::shared_ptr<const ClosureVerifier>> verifier(const MethodId& id,
+                                                                                const std::string& settings) const = 0;
   [[nodiscard]] virtual Result<std::shared_ptr<const MapRefiner>> refiner(const MethodId& id,
                                                                           const std::string& settings) const = 0;
 };

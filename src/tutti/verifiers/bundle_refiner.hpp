@@ -8,7 +8,7 @@
 #include "tutti/estimation/bundle/refine_map.hpp"
 #include "tutti/server/map_refiner.hpp"
 
-namespace tutti::finders {
+namespace tutti::verifiers {
 
 /// Refines a map by bundle adjustment over everything that cameras saw of a job's submaps. Landmarks are merged where
 /// neighbouring submaps share a keyframe, and where an accepted visual closure found them to be the same point.
@@ -28,4 +28,4 @@ class BundleRefiner final : public server::MapRefiner {
   std::string settings_;
 };
 
-}  // namespace tutti::finders
+}  // namespace tutti::verifiers

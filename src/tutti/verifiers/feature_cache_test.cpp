@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/finders/feature_cache.hpp"
+#include "tutti/verifiers/feature_cache.hpp"
 
 #include <gtest/gtest.h>
 // RapidCheck after gtest.
@@ -12,10 +12,10 @@
 #include <thread>
 #include <vector>
 
-#include "tutti/finders/parallel.hpp"
 #include "tutti/perception/lidar/submap_features.hpp"
+#include "tutti/verifiers/parallel.hpp"
 
-namespace tutti::finders {
+namespace tutti::verifiers {
 namespace feature_cache_test {
 
 constexpr SubmapId id_of(std::uint32_t index) { return {RobotId{index % 3}, index / 3}; }
@@ -124,4 +124,4 @@ TEST(FeatureCache, BytesAreThoseOfTheParts) {
 }
 
 }  // namespace feature_cache_test
-}  // namespace tutti::finders
+}  // namespace tutti::verifiers

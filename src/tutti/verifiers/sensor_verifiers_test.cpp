@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/finders/sensor_finders.hpp"
+#include "tutti/verifiers/sensor_verifiers.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,10 +13,10 @@
 
 #include "support/perception/visual/textured_room.hpp"
 #include "tutti/base/random.hpp"
-#include "tutti/finders/parallel.hpp"
+#include "tutti/verifiers/parallel.hpp"
 
-namespace tutti::finders {
-namespace sensor_finders_test {
+namespace tutti::verifiers {
+namespace sensor_verifiers_test {
 
 /// Counts how often each cloud is looked at: as often as features are computed.
 class CountingStore final : public server::PayloadStore {
@@ -64,14 +64,14 @@ struct Rooms {
     for (std::uint32_t i = 0; i < count; ++i) submaps.push_back(room({RobotId{0}, i}, store));
   }
   /// Every new one with all before it, as the server asks for it.
-  std::vector<ClosureVerdict> verify_all(const LidarClosureFinder& finder, std::size_t threads) {
+  std::vector<ClosureVerdict> verify_all(const LidarClosureVerifier& verifier, std::size_t threads) {
     std::vector<std::pair<std::size_t, std::size_t>> pairs;
     for (std::size_t b = 0; b < submaps.size(); ++b)
       for (std::size_t a = 0; a < b; ++a) pairs.emplace_back(a, b);
     std::vector<ClosureVerdict> verdicts(pairs.size());
     store.gets = 0;
     for_each_parallel(pairs.size(), threads, [&](std::size_t i) {
-      verdicts[i] = *finder.verify(submaps[pairs[i].first], submaps[pairs[i].second], store);
+      verdicts[i] = *verifier.verify(submaps[pairs[i].first], submaps[pairs[i].second], store);
     });
     return verdicts;
   }
@@ -81,41 +81,41 @@ struct Rooms {
 
 constexpr std::size_t kMuch = 1'000'000'000;
 
-TEST(LidarClosureFinder, ComputesFeaturesOnceWhileThereIsRoom) {
+TEST(LidarClosureVerifier, ComputesFeaturesOnceWhileThereIsRoom) {
   Rooms rooms(4);
-  const LidarClosureFinder finder({}, 1, kMuch);
-  const auto verdicts = rooms.verify_all(finder, 3);  // no thread repeats another one's work
+  const LidarClosureVerifier verifier({}, 1, kMuch);
+  const auto verdicts = rooms.verify_all(verifier, 3);  // no thread repeats another one's work
   EXPECT_EQ(rooms.store.gets, 4U);
   EXPECT_TRUE(std::ranges::any_of(verdicts, [](const ClosureVerdict& v) { return !v.closures.empty(); }));
-  EXPECT_EQ(rooms.verify_all(finder, 1), verdicts);
+  EXPECT_EQ(rooms.verify_all(verifier, 1), verdicts);
   EXPECT_EQ(rooms.store.gets, 0U);
 }
 
-TEST(LidarClosureFinder, FindsTheSameWhateverItKeeps) {
+TEST(LidarClosureVerifier, FindsTheSameWhateverItKeeps) {
   Rooms rooms(4);
-  const LidarClosureFinder all({}, 1, kMuch);
+  const LidarClosureVerifier all({}, 1, kMuch);
   const auto verdicts = rooms.verify_all(all, 2);
   const std::size_t one = all.cache().held_bytes() / 4;
   for (const std::size_t budget : {std::size_t{0}, 2 * one}) {
-    const LidarClosureFinder finder({}, 1, budget);
-    EXPECT_EQ(rooms.verify_all(finder, 2), verdicts);
+    const LidarClosureVerifier verifier({}, 1, budget);
+    EXPECT_EQ(rooms.verify_all(verifier, 2), verdicts);
     EXPECT_GT(rooms.store.gets, 4U);
-    EXPECT_LE(finder.cache().held_bytes(), budget);
-    EXPECT_GE(finder.cache().held_bytes(), budget / 3);
+    EXPECT_LE(verifier.cache().held_bytes(), budget);
+    EXPECT_GE(verifier.cache().held_bytes(), budget / 3);
   }
 }
 
-TEST(SensorFinders, SayWhatAPlaceLooksLikeFromAbove) {
+TEST(SensorVerifiers, SayWhatAPlaceLooksLikeFromAbove) {
   Rooms rooms(2);
   Submap seen = rooms.submaps[0];
   seen.cloud = rooms.store.cloud(seen.id).value();
-  const auto lidar = std::make_shared<LidarClosureFinder>(lidar::LidarClosureConfig{}, 1, kMuch);
-  const auto visual = std::make_shared<VisualClosureFinder>(visual::VisualClosureConfig{}, 1, kMuch);
-  const JointClosureFinder joint({lidar, visual});
+  const auto lidar = std::make_shared<LidarClosureVerifier>(lidar::LidarClosureConfig{}, 1, kMuch);
+  const auto visual = std::make_shared<VisualClosureVerifier>(visual::VisualClosureConfig{}, 1, kMuch);
+  const JointClosureVerifier joint({lidar, visual});
   const std::string place = lidar->place_of(seen);
   ASSERT_FALSE(place.empty());
   EXPECT_EQ(joint.place_of(seen), place);
-  EXPECT_EQ(NamedFinder(lidar, {"named", 1, 0}, "").place_of(seen), place);
+  EXPECT_EQ(NamedVerifier(lidar, {"named", 1, 0}, "").place_of(seen), place);
   EXPECT_TRUE(joint.can_rank(place));
   EXPECT_FALSE(joint.can_rank("somewhere"));
   Submap other = rooms.submaps[1];
@@ -135,11 +135,11 @@ TEST(SensorFinders, SayWhatAPlaceLooksLikeFromAbove) {
   EXPECT_EQ(joint.place_of({.id = seen.id}), "");
 }
 
-TEST(SensorFinders, SayWhatCamerasSawWhereTheyAreTheOnlySensor) {
+TEST(SensorVerifiers, SayWhatCamerasSawWhereTheyAreTheOnlySensor) {
   using visual::test::fly, visual::test::make_submap, visual::test::stereo_cameras, visual::test::textured_room;
-  const auto lidar = std::make_shared<LidarClosureFinder>(lidar::LidarClosureConfig{}, 1, kMuch);
-  const auto visual = std::make_shared<VisualClosureFinder>(visual::VisualClosureConfig{}, 1, kMuch);
-  const JointClosureFinder joint({lidar, visual});
+  const auto lidar = std::make_shared<LidarClosureVerifier>(lidar::LidarClosureConfig{}, 1, kMuch);
+  const auto visual = std::make_shared<VisualClosureVerifier>(visual::VisualClosureConfig{}, 1, kMuch);
+  const JointClosureVerifier joint({lidar, visual});
   const auto place_of = [&](std::uint64_t room, double yaw_rad) {
     const Submap seen = make_submap(
         {RobotId{0}, 0}, fly(textured_room(700, Rng(room)), stereo_cameras(), {.yaw_rad = yaw_rad}, Rng(room)),
@@ -156,16 +156,16 @@ TEST(SensorFinders, SayWhatCamerasSawWhereTheyAreTheOnlySensor) {
   const auto likeness = joint.likeness(place, others), to_cameras = visual->likeness(place, others);
   ASSERT_EQ(likeness.size(), 2U);
   for (std::size_t i = 0; i < 2; ++i)
-    EXPECT_EQ(likeness[i], (server::ClosureFinder::Likeness{i, to_cameras[i].value, 1}));
+    EXPECT_EQ(likeness[i], (server::ClosureVerifier::Likeness{i, to_cameras[i].value, 1}));
   EXPECT_GT(likeness[0].value, 5 * likeness[1].value);
 }
 
-TEST(SensorFinders, SayHowAlikePlacesLookToEachSensorThatShowsBoth) {
+TEST(SensorVerifiers, SayHowAlikePlacesLookToEachSensorThatShowsBoth) {
   using visual::test::fly, visual::test::make_submap, visual::test::stereo_cameras, visual::test::textured_room;
-  using Likeness = server::ClosureFinder::Likeness;
-  const auto lidar = std::make_shared<LidarClosureFinder>(lidar::LidarClosureConfig{}, 1, kMuch);
-  const auto visual = std::make_shared<VisualClosureFinder>(visual::VisualClosureConfig{}, 1, kMuch);
-  const JointClosureFinder joint({lidar, visual});
+  using Likeness = server::ClosureVerifier::Likeness;
+  const auto lidar = std::make_shared<LidarClosureVerifier>(lidar::LidarClosureConfig{}, 1, kMuch);
+  const auto visual = std::make_shared<VisualClosureVerifier>(visual::VisualClosureConfig{}, 1, kMuch);
+  const JointClosureVerifier joint({lidar, visual});
   Rooms rooms(2);
   Submap scans = rooms.submaps[0], elsewhere = rooms.submaps[1];
   scans.cloud = rooms.store.cloud(scans.id).value();
@@ -205,5 +205,5 @@ TEST(SensorFinders, SayHowAlikePlacesLookToEachSensorThatShowsBoth) {
     EXPECT_FALSE(joint.can_rank(text)) << text;
 }
 
-}  // namespace sensor_finders_test
-}  // namespace tutti::finders
+}  // namespace sensor_verifiers_test
+}  // namespace tutti::verifiers

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/finders/parallel.hpp"
+#include "tutti/verifiers/parallel.hpp"
 
 #include <gtest/gtest.h>
 
 #include <stdexcept>
 
-namespace tutti::finders {
+namespace tutti::verifiers {
 namespace parallel_test {
 
 TEST(ForEachParallel, DoesEveryTaskOnce) {
@@ -27,4 +27,4 @@ TEST(ForEachParallel, AnExceptionReachesTheCaller) {
 }
 
 }  // namespace parallel_test
-}  // namespace tutti::finders
+}  // namespace tutti::verifiers

@@ -10,23 +10,23 @@
 #include <utility>
 #include <vector>
 
-#include "tutti/finders/feature_cache.hpp"
-#include "tutti/finders/finder_config.hpp"
 #include "tutti/perception/lidar/submap_features.hpp"
 #include "tutti/perception/lidar/verify.hpp"
 #include "tutti/perception/visual/submap_features.hpp"
 #include "tutti/perception/visual/verify.hpp"
-#include "tutti/server/closure_finder.hpp"
+#include "tutti/server/closure_verifier.hpp"
+#include "tutti/verifiers/feature_cache.hpp"
+#include "tutti/verifiers/verifier_config.hpp"
 
-namespace tutti::finders {
+namespace tutti::verifiers {
 
 /// Finds closures from submap clouds. Features of the newest submaps are kept in `cache_bytes` of memory; those of
 /// others are computed again for each pair, with the same result.
-class LidarClosureFinder final : public server::ClosureFinder {
+class LidarClosureVerifier final : public server::ClosureVerifier {
  public:
-  LidarClosureFinder(const lidar::LidarClosureConfig& config, int min_submap_gap, std::size_t cache_bytes);
+  LidarClosureVerifier(const lidar::LidarClosureConfig& config, int min_submap_gap, std::size_t cache_bytes);
   static constexpr const char* kName = "lidar";
-  [[nodiscard]] MethodId id() const override { return {kName, lidar::kFinderVersion, 0}; }
+  [[nodiscard]] MethodId id() const override { return {kName, lidar::kVerifierVersion, 0}; }
   [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
     return first.points > 0 && second.points > 0;
   }
@@ -50,12 +50,12 @@ class LidarClosureFinder final : public server::ClosureFinder {
   mutable FeatureCache<lidar::SubmapFeatures> cache_;
 };
 
-/// Finds closures from what cameras saw. Features are kept as LidarClosureFinder keeps them.
-class VisualClosureFinder final : public server::ClosureFinder {
+/// Finds closures from what cameras saw. Features are kept as LidarClosureVerifier keeps them.
+class VisualClosureVerifier final : public server::ClosureVerifier {
  public:
-  VisualClosureFinder(const visual::VisualClosureConfig& config, int min_submap_gap, std::size_t cache_bytes);
+  VisualClosureVerifier(const visual::VisualClosureConfig& config, int min_submap_gap, std::size_t cache_bytes);
   static constexpr const char* kName = "visual";
-  [[nodiscard]] MethodId id() const override { return {kName, visual::kFinderVersion, 0}; }
+  [[nodiscard]] MethodId id() const override { return {kName, visual::kVerifierVersion, 0}; }
   [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
     return first.observations > 0 && second.observations > 0;
   }
@@ -76,15 +76,15 @@ class VisualClosureFinder final : public server::ClosureFinder {
   mutable FeatureCache<visual::SubmapFeatures> cache_;
 };
 
-/// Combines several finders, one per kind of payload: each pair is compared by every finder that can. Robots with
-/// different sensors are joined through robots that carry both kinds. A place is what every finder that can compare its
-/// submap says of it; each ranks by its own part, as the sensor of its number. A place that one of them cannot describe
-/// is unknown.
-class JointClosureFinder final : public server::ClosureFinder {
+/// Combines several verifiers, one per kind of payload: each pair is compared by every verifier that can. Robots with
+/// different sensors are joined through robots that carry both kinds. A place is what every verifier that can compare
+/// its submap says of it; each ranks by its own part, as the sensor of its number. A place that one of them cannot
+/// describe is unknown.
+class JointClosureVerifier final : public server::ClosureVerifier {
  public:
-  explicit JointClosureFinder(std::vector<std::shared_ptr<const server::ClosureFinder>> finders);
+  explicit JointClosureVerifier(std::vector<std::shared_ptr<const server::ClosureVerifier>> verifiers);
   static constexpr const char* kName = "sensors";
-  static constexpr std::uint32_t kVersion = 1000 * lidar::kFinderVersion + visual::kFinderVersion;
+  static constexpr std::uint32_t kVersion = 1000 * lidar::kVerifierVersion + visual::kVerifierVersion;
   [[nodiscard]] MethodId id() const override { return {kName, kVersion, 0}; }
   [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override;
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override;
@@ -98,23 +98,23 @@ class JointClosureFinder final : public server::ClosureFinder {
                                                std::span<const std::string_view> others) const override;
 
  private:
-  /// Each finder's part of a place, empty where it has none. Nothing when it is no such place.
+  /// Each verifier's part of a place, empty where it has none. Nothing when it is no such place.
   [[nodiscard]] std::vector<std::string_view> parts_of(std::string_view place) const;
-  std::vector<std::shared_ptr<const server::ClosureFinder>> finders_;
+  std::vector<std::shared_ptr<const server::ClosureVerifier>> verifiers_;
 };
 
-/// Another finder under an id that covers its settings; its verdicts carry this id too.
-class NamedFinder final : public server::WrappedFinder {
+/// Another verifier under an id that covers its settings; its verdicts carry this id too.
+class NamedVerifier final : public server::WrappedVerifier {
  public:
-  /// `settings` is the text that ClosureFinder::settings() returns.
-  NamedFinder(std::shared_ptr<const server::ClosureFinder> finder, MethodId id, std::string settings)
-      : WrappedFinder(std::move(finder)), id_(std::move(id)), settings_(std::move(settings)) {}
+  /// `settings` is the text that ClosureVerifier::settings() returns.
+  NamedVerifier(std::shared_ptr<const server::ClosureVerifier> verifier, MethodId id, std::string settings)
+      : WrappedVerifier(std::move(verifier)), id_(std::move(id)), settings_(std::move(settings)) {}
   [[nodiscard]] MethodId id() const override { return id_; }
   [[nodiscard]] std::string settings() const override { return settings_; }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const server::PayloadStore& payloads) const override {
     auto verdict = wrapped().verify(first, second, payloads);
-    if (verdict) verdict->finder = id_;
+    if (verdict) verdict->verifier = id_;
     return verdict;
   }
 
@@ -123,4 +123,4 @@ class NamedFinder final : public server::WrappedFinder {
   std::string settings_;
 };
 
-}  // namespace tutti::finders
+}  // namespace tutti::verifiers
