@@ -11,14 +11,14 @@
 namespace tutti::judge {
 
 /// What makes a group. Neighbours are as near in time as one submap is long; segments longer than three submaps do not
-/// look alike; larger groups cost more to test than they are worth.
+/// resemble each other; larger groups cost more to test than they are worth.
 struct GroupLimits {
   double near_s = 10.0;
   double longest_s = 30.0;
   std::size_t most_closures = 24;
 };
 
-/// Groups `closures` (positions in `edges`, which join `nodes`) that tell about one pair of places. Each closure of a
+/// Groups `closures` (positions in `edges`, which join `nodes`) that are about one pair of places. Each closure of a
 /// group is within limits.near_s of another one of it at both ends, on the same two chains. Two places that look alike
 /// make all closures between them wrong, so however many they are they count as one witness. Groups that exceed
 /// limits.longest_s on either chain, or limits.most_closures, are left out. Groups are ordered by their first closures.

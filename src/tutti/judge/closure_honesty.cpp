@@ -34,7 +34,8 @@ bool a_quarter_fits(const std::vector<ClosurePair>& pairs, const ClosureHonesty&
   return static_cast<double>(within) >= kPairsShare * static_cast<double>(pairs.size());
 }
 
-/// The least factor for which `fits` holds, at least 1; also 1 if none does: then too many closures are wrong to tell.
+/// The least factor for which `fits` holds, at least 1; also 1 if none does: then too many closures are wrong to judge
+/// by.
 template <class Fits>
 double least_raise(const Fits& fits) {
   if (fits(1.0) || !fits(kMostRaised)) return 1.0;

@@ -45,7 +45,7 @@ OdometryPiece chain_of(RobotId robot, const Case& c, Rng& rng, std::vector<Pose3
 ClosureHonesty found(const Case& c, std::uint64_t seed) {
   Rng rng(seed);
   std::vector<Pose3> one, two;
-  const std::vector<OdometryPiece> pieces{chain_of(kOne, c, rng, one), chain_of(kTwo, c, rng, two)};
+  const std::vector<OdometryPiece> odometry{chain_of(kOne, c, rng, one), chain_of(kTwo, c, rng, two)};
   std::vector<LoopClosure> closures;
   while (closures.size() < c.closures) {
     const auto a = static_cast<std::uint32_t>(rng.index(kLength));
@@ -57,7 +57,7 @@ ClosureHonesty found(const Case& c, std::uint64_t seed) {
          {kTwo, b},
          {T_a_b, test::diagonal_covariance(c.scale * kError_m * c.stated_m, kError_rad * c.stated_rad)}});
   }
-  const auto all = closure_honesty(pieces, closures);
+  const auto all = closure_honesty(odometry, closures);
   const auto it = all.find({kOne, kTwo});
   return it == all.end() ? ClosureHonesty{} : it->second;
 }

@@ -13,7 +13,7 @@
 namespace tutti::judge {
 namespace {
 
-/// A closure from the piece with the smaller number to the other; within one piece from the earlier node.
+/// A closure from the segment with the smaller number to the other; within one segment from the earlier node.
 struct Directed {
   std::size_t from = 0;
   std::size_t to = 0;
@@ -66,16 +66,16 @@ std::vector<bool> supported_closures(const OdometryTrajectories& odometry, std::
   const Agreement agreement(odometry, config);
   std::vector<Directed> all;
   std::vector<int> support(closures.size(), 0);
-  std::map<std::pair<std::size_t, std::size_t>, std::vector<std::size_t>> by_pieces;
+  std::map<std::pair<std::size_t, std::size_t>, std::vector<std::size_t>> by_segments;
   for (std::size_t c = 0; c < closures.size(); ++c) {
     all.push_back(agreement.directed(closures[c]));
     if (agreement.fits_odometry(all[c])) support[c] = config.least_support;
-    by_pieces[{odometry.piece(all[c].from), odometry.piece(all[c].to)}].push_back(c);
+    by_segments[{odometry.piece(all[c].from), odometry.piece(all[c].to)}].push_back(c);
   }
   const auto is_open = [&](std::size_t c) { return support[c] < config.least_support; };
-  for (const auto& [pieces, members] : by_pieces) {
+  for (const auto& [segments, members] : by_segments) {
     const auto count = [](const auto& of) { return static_cast<int>(of.size()); };
-    if (pieces.first != pieces.second && count(members) < config.min_joining_closures) continue;
+    if (segments.first != segments.second && count(members) < config.min_joining_closures) continue;
     // Where there are too few others, those there are must do.
     for (const std::size_t c : members) support[c] += std::max(0, config.least_support - count(members) + 1);
     for (std::size_t k = 0; k < members.size(); ++k)

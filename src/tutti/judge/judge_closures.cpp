@@ -86,14 +86,14 @@ class Optimiser {
             .work = found.work};
   }
 
-  /// Too few closures do not join two pieces of odometry, unless an operator says so.
+  /// Too few closures do not join two segments of odometry, unless an operator decided so.
   void leave_unjoined(const OdometryTrajectories& odometry, std::vector<Objection>& objections) const {
     std::map<std::pair<std::size_t, std::size_t>, std::vector<std::size_t>> between;
     for (std::size_t c = 0; c < closures_.size(); ++c)
       between[std::minmax({odometry.piece(closure_edges_[c].from), odometry.piece(closure_edges_[c].to)})].push_back(c);
     const auto least = config_.min_joining_closures;
-    for (const auto& [pieces, all] : between) {
-      if (pieces.first == pieces.second || std::ranges::any_of(all, [&](std::size_t c) { return certain_[c]; }))
+    for (const auto& [segments, all] : between) {
+      if (segments.first == segments.second || std::ranges::any_of(all, [&](std::size_t c) { return certain_[c]; }))
         continue;
       const bool never_enough = std::ssize(all) < least;
       const auto is_left = [&](std::size_t c) { return objections[c] == Objection::none; };

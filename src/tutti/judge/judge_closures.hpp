@@ -22,7 +22,7 @@ enum class Objection {
   operators,     ///< An operator has rejected it.
   fixes,         ///< Fixes of both robots contradict it (server/refuted_closures.hpp).
   contradicted,  ///< Odometry and other closures contradict it (explain_closures.hpp).
-  too_few,       ///< Too few closures join these two pieces of odometry.
+  too_few,       ///< Too few closures join these two segments of odometry.
   dear,          ///< The map would pay more for it than a right one costs (settle.hpp).
   lone,          ///< With the other closures of its pair of places it contradicts all the rest of the map.
   no_map         ///< The map could not be solved.

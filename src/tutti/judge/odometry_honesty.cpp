@@ -23,8 +23,8 @@ constexpr int kBisections = 12;
 
 using Loops = std::vector<const OdometryLoop*>;
 
-/// Those that tell of odometry: it knows the first three of their last N coordinates worse than closures do. None if
-/// there are too few.
+/// The loops that measure odometry: it knows the first three of their last N coordinates worse than closures do. None
+/// if there are too few.
 template <int N>
 Loops telling(const std::vector<OdometryLoop>& loops) {
   Loops out;

@@ -18,7 +18,7 @@ namespace tutti::judge {
 struct OdometryHonesty {
   /// On the variances of rotation, in [0.04, 1], from 70 % of the loops. Closures need not be judged before: fewer than
   /// 30 % wrong ones make the factor larger, on the safe side; more make it 1. Translation has no such factor: errors
-  /// of rotation add up like a random walk, while errors of translation depend on the length of the way.
+  /// of rotation add up like a random walk, while errors of translation depend on the distance travelled.
   double rotation = 1.0;
   /// On all variances, in [0.04, 400], from half of the loops. Closures must have been judged before. Below 1 the
   /// closures' covariance is scaled, too, so that closures that overstate theirs do not make odometry too certain.

@@ -44,13 +44,13 @@ OdometryHonesty honesty(const Case& c, std::uint64_t seed) {
   while (closures.size() < c.closures) {
     const auto a = static_cast<std::uint32_t>(rng.index(kKeyframes));
     const auto b = static_cast<std::uint32_t>(rng.index(kKeyframes));
-    if (const auto way = std::max(a, b) - std::min(a, b); way < 40 || way > c.longest) continue;
+    if (const auto apart = std::max(a, b) - std::min(a, b); apart < 40 || apart > c.longest) continue;
     Pose3 T_a_b = retract(truth[a].inverse() * truth[b], test::draw(rng, kClosure_m, kClosure_rad));
     if (rng.bernoulli(c.wrong_share)) T_a_b = T_a_b * Pose3{so3_exp(Eigen::Vector3d(0, 0, 1.0)), {3, 2, 1}};
     closures.push_back({{kRobot, a}, {kRobot, b}, {T_a_b, test::diagonal_covariance(kClosure_m, kClosure_rad)}});
   }
-  const std::vector<OdometryPiece> pieces{chain};
-  return odometry_honesty(pieces, closures).at(kRobot);
+  const std::vector<OdometryPiece> odometry{chain};
+  return odometry_honesty(odometry, closures).at(kRobot);
 }
 
 double factor(const Case& c, std::uint64_t seed) { return honesty(c, seed).rotation; }
@@ -92,13 +92,13 @@ TEST(OdometryHonesty, AScaleErrorIsNoneOfItsBusiness) {
 }
 
 TEST(OdometryHonesty, StaysWithinItsBounds) {
-  EXPECT_EQ(factor({.stated = 4.0, .closures = 7}, 1), 1.0);  // too few to tell
+  EXPECT_EQ(factor({.stated = 4.0, .closures = 7}, 1), 1.0);  // too few to judge
   EXPECT_GE(factor({.stated = 100.0}, 1), 0.04);
   EXPECT_LT(factor({.stated = 100.0}, 1), 0.12);
   EXPECT_TRUE(odometry_honesty({}, {}).empty());
 }
 
-// Judged closures tell of the whole, either way.
+// Judged closures measure the whole odometry, in either order.
 TEST(OdometryHonesty, SeesHowMuchTheWholeIsOverstatedOrUnderstated) {
   for (const double stated : {0.15, 0.5, 1.0, 3.0}) {
     std::vector<double> ratios;  // of the factor to the true one
@@ -111,7 +111,8 @@ TEST(OdometryHonesty, SeesHowMuchTheWholeIsOverstatedOrUnderstated) {
   }
 }
 
-// As many loops, but of a twentieth of the way: they share less odometry, so what they say is nearly taken at its word.
+// As many loops, but over a twentieth of the distance: they share less odometry, so their factor is nearly taken as it
+// is.
 TEST(OdometryHonesty, LoopsThatShareNoOdometryAreBelievedMore) {
   double of_long = 0.0, of_short = 0.0;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
@@ -123,8 +124,8 @@ TEST(OdometryHonesty, LoopsThatShareNoOdometryAreBelievedMore) {
   EXPECT_GT(of_long, 1.25 * of_short);
 }
 
-// Closures that say little of odometry, as they share nearly all of it, do not make the map surer than it is.
-TEST(OdometryHonesty, HonestOdometryKeepsItsWord) {
+// Closures that measure little of odometry, as they share nearly all of it, do not make the map surer than it is.
+TEST(OdometryHonesty, HonestOdometryKeepsItsCovariance) {
   for (const std::size_t closures : {10, 20, 80}) {
     std::size_t lowered = 0;
     for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {

@@ -14,37 +14,37 @@ namespace tutti::judge {
 namespace {
 
 /// Odometry between any two keyframes of one chain.
-class Ways {
+class OdometrySegments {
  public:
-  explicit Ways(std::span<const OdometryPiece> pieces) {
+  explicit OdometrySegments(std::span<const OdometryPiece> pieces) {
     for (const OdometryPiece& odometry : pieces) {
-      Piece& piece = pieces_[{odometry.id, odometry.first_index}];
-      piece.odometry = &odometry;
-      piece.covariance.push_back(Matrix6d::Zero());
+      Segment& segment = segments_[{odometry.id, odometry.first_index}];
+      segment.odometry = &odometry;
+      segment.covariance.push_back(Matrix6d::Zero());
       for (std::size_t k = 0; k < odometry.step_covariance.size(); ++k) {
         const Matrix6d Ad = adjoint(T_first_body(odometry, k + 1));
-        piece.covariance.push_back(piece.covariance.back() + Ad * odometry.step_covariance[k] * Ad.transpose());
+        segment.covariance.push_back(segment.covariance.back() + Ad * odometry.step_covariance[k] * Ad.transpose());
       }
     }
   }
 
   /// T_a_b with covariance; nothing across a gap.
   [[nodiscard]] std::optional<RelativePose> between(const KeyframeId& a, const KeyframeId& b) const {
-    const auto after = pieces_.upper_bound(std::min(a, b));
-    if (after == pieces_.begin()) return std::nullopt;
-    const auto& [first, piece] = *std::prev(after);
+    const auto after = segments_.upper_bound(std::min(a, b));
+    if (after == segments_.begin()) return std::nullopt;
+    const auto& [first, segment] = *std::prev(after);
     const std::size_t from = a.index - first.index, to = b.index - first.index;
-    if (first.chain != a.chain || first.chain != b.chain || std::max(from, to) >= piece.covariance.size())
+    if (first.chain != a.chain || first.chain != b.chain || std::max(from, to) >= segment.covariance.size())
       return std::nullopt;
-    const Pose3 T_first_b = T_first_body(*piece.odometry, to);
+    const Pose3 T_first_b = T_first_body(*segment.odometry, to);
     const Matrix6d to_b = adjoint(T_first_b.inverse());
     const double sign = from < to ? 1.0 : -1.0;
-    return RelativePose{T_first_body(*piece.odometry, from).inverse() * T_first_b,
-                        sign * to_b * (piece.covariance[to] - piece.covariance[from]) * to_b.transpose()};
+    return RelativePose{T_first_body(*segment.odometry, from).inverse() * T_first_b,
+                        sign * to_b * (segment.covariance[to] - segment.covariance[from]) * to_b.transpose()};
   }
 
  private:
-  struct Piece {
+  struct Segment {
     const OdometryPiece* odometry = nullptr;
     std::vector<Matrix6d> covariance;  ///< Each pose's, in the frame of the first.
   };
@@ -52,7 +52,7 @@ class Ways {
     return odometry.T_odom_body.front().inverse() * odometry.T_odom_body[k];
   }
 
-  std::map<KeyframeId, Piece> pieces_;  // by first keyframe
+  std::map<KeyframeId, Segment> segments_;  // by first keyframe
 };
 
 LoopClosure turned(const LoopClosure& closure) { return {closure.to, closure.from, inverse(closure.measurement)}; }
@@ -78,11 +78,11 @@ std::uint32_t keyframes_between(const KeyframeId& a, const KeyframeId& b) {
 }
 
 /// The nearest other one of `all`, which are sorted by where they begin, on one chain; the first of equals. Those that
-/// begin farther away than the nearest so far are not looked at: a day has tens of thousands of closures.
+/// begin farther away than the nearest so far are not compared: a day has tens of thousands of closures.
 std::optional<std::size_t> nearest_to(std::size_t a, std::span<const LoopClosure> all) {
   std::optional<std::size_t> nearest;
   std::uint32_t least = std::numeric_limits<std::uint32_t>::max();
-  const auto look = [&](std::size_t b) {  // false: no farther this way
+  const auto compare = [&](std::size_t b) {  // false: no farther in this direction
     const std::uint32_t begin = keyframes_between(all[a].from, all[b].from);
     if (begin > least) return false;
     const std::uint32_t apart = std::max(begin, keyframes_between(all[a].to, all[b].to));
@@ -91,8 +91,8 @@ std::optional<std::size_t> nearest_to(std::size_t a, std::span<const LoopClosure
     least = apart;
     return true;
   };
-  for (std::size_t b = a; b > 0 && look(b - 1);) --b;
-  for (std::size_t b = a + 1; b < all.size() && look(b);) ++b;
+  for (std::size_t b = a; b > 0 && compare(b - 1);) --b;
+  for (std::size_t b = a + 1; b < all.size() && compare(b);) ++b;
   return nearest;
 }
 
@@ -109,7 +109,7 @@ OdometryLoop loop_of(const ClosurePair& pair) {
 
 std::map<std::pair<ChainId, ChainId>, std::vector<ClosurePair>> neighbouring_closures(
     std::span<const OdometryPiece> pieces, std::span<const LoopClosure> closures) {
-  const Ways ways(pieces);
+  const OdometrySegments segments(pieces);
   std::map<std::pair<ChainId, ChainId>, std::vector<ClosurePair>> out;
   for (auto& [two, all] : by_chains(closures)) {
     std::ranges::stable_sort(all, {}, [](const LoopClosure& c) { return std::pair(c.from, c.to); });
@@ -118,7 +118,7 @@ std::map<std::pair<ChainId, ChainId>, std::vector<ClosurePair>> neighbouring_clo
       const auto nearest = nearest_to(a, all);
       if (!nearest || !known.insert(std::minmax(a, *nearest)).second) continue;
       const auto& [first, second] = std::pair(all[std::min(a, *nearest)], all[std::max(a, *nearest)]);
-      const auto of_one = ways.between(first.from, second.from), of_two = ways.between(first.to, second.to);
+      const auto of_one = segments.between(first.from, second.from), of_two = segments.between(first.to, second.to);
       if (of_one && of_two) out[two].push_back({first, second, *of_one, *of_two});
     }
   }
@@ -127,11 +127,11 @@ std::map<std::pair<ChainId, ChainId>, std::vector<ClosurePair>> neighbouring_clo
 
 std::map<ChainId, std::vector<OdometryLoop>> odometry_loops(std::span<const OdometryPiece> pieces,
                                                             std::span<const LoopClosure> closures) {
-  const Ways ways(pieces);
+  const OdometrySegments segments(pieces);
   std::map<ChainId, std::vector<OdometryLoop>> loops;
-  for (const OdometryPiece& piece : pieces) loops[piece.id];
+  for (const OdometryPiece& segment : pieces) loops[segment.id];
   for (const auto& [from, to, measurement] : closures)
-    if (const auto odometry = ways.between(from, to))
+    if (const auto odometry = segments.between(from, to))
       loops.at(from.chain)
           .push_back(over({local(measurement.T_a_b, odometry->T_a_b), odometry->covariance, measurement.covariance},
                           from, to));
@@ -141,8 +141,8 @@ std::map<ChainId, std::vector<OdometryLoop>> odometry_loops(std::span<const Odom
     const std::size_t apart = between.size() / 2;
     for (std::size_t c = apart; c < between.size(); ++c) {
       const LoopClosure &first = between[c - apart], &second = between[c];
-      const auto of_one = ways.between(first.from, second.from);
-      const auto of_two = ways.between(first.to, second.to);
+      const auto of_one = segments.between(first.from, second.from);
+      const auto of_two = segments.between(first.to, second.to);
       if (!of_one || !of_two) continue;
       const OdometryLoop loop = loop_of({first, second, *of_one, *of_two});
       loops.at(two.first).push_back(over(loop, first.from, second.from));

@@ -13,7 +13,8 @@
 
 namespace tutti::judge {
 
-/// A piece of a chain's odometry without a gap. A chain with missing submaps has several pieces, which do not overlap.
+/// A segment of a chain's odometry without a gap. A chain with missing submaps has several segments, which do not
+/// overlap.
 struct OdometryPiece {
   ChainId id;
   std::uint32_t first_index = 0;          ///< KeyframeId::index of T_odom_body[0]; the others count up from it.
@@ -30,9 +31,9 @@ struct OdometryLoop {
   std::uint32_t last = 0;   ///< ... and of the last one.
 };
 
-/// The loops that tell of each chain's odometry, with an entry for every chain in `pieces`. Each closure of a chain
+/// The loops that measure each chain's odometry, with an entry for every chain in `pieces`. Each closure of a chain
 /// with itself is a loop; and so are, with every other chain, pairs of closures with both odometries between their
-/// ends, which tell of both chains. The two closures of a pair are half of their number apart, so that much odometry
+/// ends, which measure both chains. The two closures of a pair are half of their number apart, so that much odometry
 /// lies between them: it, not the closures, is to be judged. Loops over a gap in odometry are left out.
 std::map<ChainId, std::vector<OdometryLoop>> odometry_loops(std::span<const OdometryPiece> pieces,
                                                             std::span<const LoopClosure> closures);

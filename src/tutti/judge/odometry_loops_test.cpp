@@ -21,7 +21,7 @@ RelativePose measured(const Pose3& truth, double sigma_m, double sigma_rad, Rng&
   return {retract(truth, test::draw(rng, sigma_m, sigma_rad)), test::diagonal_covariance(sigma_m, sigma_rad)};
 }
 
-/// Two robots on one winding way, the second a metre beside the first.
+/// Two robots on one winding trajectory, the second a metre beside the first.
 struct Walk {
   std::vector<OdometryPiece> pieces;
   std::vector<Pose3> truth;  ///< T_world_body of both, one after the other.
@@ -102,8 +102,8 @@ TEST(OdometryLoops, NotOverAGap) {
   EXPECT_NEAR(loops.at(kOne).front().odometry(5, 5), 15 * 0.002 * 0.002, 1e-9);
 }
 
-/// A covariance between two keyframes is the difference of two that have grown along the whole way: 0.08 % are lost
-/// here.
+/// A covariance between two keyframes is the difference of two that have grown along the whole trajectory: 0.08 % are
+/// lost here.
 TEST(OdometryLoops, AreAsCertainAfterADayByCarAsAtItsBegin) {
   constexpr std::uint32_t kSteps = 40'000;
   constexpr double kStep_m = 20.0;

@@ -11,38 +11,38 @@
 
 namespace tutti::judge {
 
-/// The odometry of a pose graph, for relative poses between any two of its nodes. Odometry consists of pieces without a
-/// gap, each a chain of edges that lead from a node to a later one.
+/// The odometry of a pose graph, for relative poses between any two of its nodes. Odometry consists of segments without
+/// a gap, each a chain of edges that lead from a node to a later one.
 class OdometryTrajectories {
  public:
   /// `seconds`: time of each node, from any origin. `odometry`: at most one edge begins and one ends at a node, and
   /// from < to.
   OdometryTrajectories(std::span<const double> seconds, std::span<const PoseGraphEdge> odometry);
 
-  /// The first node of the piece that holds this one.
+  /// The first node of this one's segment.
   [[nodiscard]] std::size_t piece(std::size_t node) const { return at_[node].piece; }
   [[nodiscard]] double seconds(std::size_t node) const { return at_[node].seconds; }
-  /// Median speed of all steps, m/s, above 0, which occasional failures and one diverged piece hardly change.
+  /// Median speed of all steps, m/s, above 0, which occasional failures and one diverged segment hardly change.
   [[nodiscard]] double usual_speed() const { return usual_speed_; }
-  /// T_first_node, `first` being the first node of its piece.
+  /// T_first_node, `first` being the first node of its segment.
   [[nodiscard]] const Pose3& pose(std::size_t node) const { return at_[node].pose; }
-  /// T_a_b of two nodes of one piece, either first.
+  /// T_a_b of two nodes of one segment, either first.
   [[nodiscard]] Pose3 T(std::size_t a, std::size_t b) const { return pose(a).inverse() * pose(b); }
   /// T_a_b with its covariance.
   [[nodiscard]] RelativePose between(std::size_t a, std::size_t b) const;
-  /// Trace of the rotation's covariance between two nodes of one piece.
+  /// Trace of the rotation's covariance between two nodes of one segment.
   [[nodiscard]] double turn_variance(std::size_t a, std::size_t b) const;
 
  private:
   struct At {
     std::size_t piece = 0;
-    std::size_t position = 0;  ///< Along the piece.
+    std::size_t position = 0;  ///< Along the segment.
     double seconds = 0.0;
-    double turn_variance = 0.0;  ///< Since the piece began.
+    double turn_variance = 0.0;  ///< Since the segment began.
     Pose3 pose;
   };
   std::vector<At> at_;
-  std::vector<SegmentCovariance> covariance_;  // per piece, by its first node
+  std::vector<SegmentCovariance> covariance_;  // per segment, by its first node
   double usual_speed_ = 0.0;
 };
 

@@ -27,9 +27,9 @@ struct Settled {
 /// Asks every closure for its price until none changes sides: what the map pays for it is its error against its own
 /// covariance and the map's (estimation/switched_graph.hpp), chi-square of 6 degrees of freedom where both are right,
 /// and at most most_paid(). `graph`: its first `odometry_edges` edges are odometry, all others closures; `in`: per
-/// closure whether the map begins with it. What begins outside is let in generously at first, since a map without
-/// right closures is farther off than it says. `certain`: per closure whether it is in whatever it costs. A closure
-/// between two parts that no others join has no price and stays outside.
+/// closure whether the map begins with it. What begins outside is taken in generously at first, since a map without
+/// right closures is farther off than its covariance states. `certain`: per closure whether it is in whatever it costs.
+/// A closure between two parts that no others join has no price and stays outside.
 Settled settle_closures(const PoseGraph& graph, std::size_t odometry_edges, std::vector<char> in,
                         const std::vector<bool>& certain, const OutlierRejectionConfig& config,
                         const estimation::SolverConfig& solver);
