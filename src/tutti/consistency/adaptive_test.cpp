@@ -12,7 +12,7 @@ namespace adaptive_test {
 
 using namespace test;
 
-/// One robot with a server that knows its map as well as `map` says.
+/// One robot with a server whose map is as accurate as `map` states.
 struct Scene {
   std::vector<Pose3> server;
   std::vector<Pose3> increments;
@@ -78,8 +78,8 @@ TEST(Adaptive, AddsLinksOnceItDrifts) {
 TEST(Adaptive, LinksAreAChainFromEarlierToLater) {
   Scene scene = drifting(1);
   scene.receive();
-  const auto& held = scene.ledger.constraints();
-  for (std::size_t i = 1; i < held.size(); ++i) EXPECT_EQ(held[i - 1].to_stamp, held[i].from_stamp);
+  const auto& kept = scene.ledger.constraints();
+  for (std::size_t i = 1; i < kept.size(); ++i) EXPECT_EQ(kept[i - 1].to_stamp, kept[i].from_stamp);
 }
 
 TEST(Adaptive, HoldsOnWhileNothingChanges) {
@@ -105,9 +105,9 @@ TEST(Adaptive, WithdrawsAllWhenTheMapComesBackToOdometry) {
   for (std::size_t n = 80; n < kNodes; ++n) scene.server[n].translation.y() += 2.0;
   EXPECT_GT(scene.receive().added, 0U);
   scene.receive();
-  const std::size_t held = scene.ledger.size();
+  const std::size_t kept = scene.ledger.size();
   scene.server = right;
-  EXPECT_EQ(scene.receive().removed, held);
+  EXPECT_EQ(scene.receive().removed, kept);
   EXPECT_EQ(scene.ledger.size(), 0U);
   scene.receive();
   EXPECT_EQ(scene.ledger.size(), 0U);

@@ -81,7 +81,7 @@ std::vector<double> sigmas(const MatrixXd& products, double samples, double roun
   return out;
 }
 
-/// Per scale, how many waves it holds, the constant not counted: the trace of g_s(L)^2, by random signs (Hutchinson
+/// Per scale, how many waves it contains, the constant not counted: the trace of g_s(L)^2, by random signs (Hutchinson
 /// 1990).
 std::vector<double> waves(const spectral::WaveletFilter& filter, Index nodes) {
   Rng rng(0);
@@ -99,13 +99,13 @@ std::vector<ScaleUncertainty> scales(const spectral::SparseMatrix& laplacian, co
   const spectral::WaveletFilter filter(laplacian, internal::kScales);
   if (products != nullptr)
     *products += static_cast<std::size_t>((2 * samples.position_m.cols() + kProbes) * filter.degree());
-  const std::vector<double> held = waves(filter, laplacian.rows());
+  const std::vector<double> contained = waves(filter, laplacian.rows());
   const auto position_m = filter.scatter(samples.position_m), rotation_rad = filter.scatter(samples.rotation_rad);
   const double count = static_cast<double>(samples.position_m.cols()) / 3.0;
   std::vector<ScaleUncertainty> out(internal::kScales);
   for (std::size_t s = 0; s < out.size(); ++s) {
-    if (held[s] < kLeastWaves) continue;
-    const double share = std::sqrt(held[s] / static_cast<double>(laplacian.rows()));
+    if (contained[s] < kLeastWaves) continue;
+    const double share = std::sqrt(contained[s] / static_cast<double>(laplacian.rows()));
     const std::vector<double> metres = sigmas(position_m[s], count, share * internal::kRounding.position_m);
     const std::vector<double> radians = sigmas(rotation_rad[s], count, share * internal::kRounding.rotation_rad);
     for (std::size_t b = 0; b < metres.size(); ++b) out[s].sigma.push_back({metres[b], radians[b]});
@@ -148,7 +148,7 @@ MatrixXd by_odometry(std::span<const Pose3> poses, std::span<const Matrix6d> ste
   return scaled * moves.transpose();
 }
 
-/// In one byte a number; `v` becomes what they say. None: a kind is all zero.
+/// In one byte a number; `v` becomes their values. None: a kind is all zero.
 std::optional<KnownDirection> coded(Eigen::VectorXd& v) {
   std::array<double, 2> largest{};
   for (Index k = 0; k < v.size(); ++k) largest[k % 6 / 3] = std::max(largest[k % 6 / 3], std::abs(v(k)));

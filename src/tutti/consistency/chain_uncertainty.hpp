@@ -24,7 +24,7 @@ struct ChainKnowledge {
   std::vector<Matrix6d> spread_odometry;
 };
 
-/// With fewer samples nothing is said about scales.
+/// With fewer samples there is no estimate per scale.
 inline constexpr Eigen::Index kLeastSamples = 16;
 
 /// How sure the map is of one chain, in the quantities with which a robot compares itself to the map (docs/math.md).

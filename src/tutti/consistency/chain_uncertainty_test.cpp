@@ -186,7 +186,7 @@ TEST(ChainUncertainty, DirectionsAreWhatClosuresKnowFarBetterThanOdometry) {
   for (int draw = 0; draw < kDraws; ++draw) {
     const auto drawn = map.displace(scene.server, Rng(8).fork(static_cast<std::uint64_t>(draw)));
     Rng rng = Rng(9).fork(static_cast<std::uint64_t>(draw));
-    // Between spread nodes the errors of odometry are those of the straight way, as chain_uncertainty() is told.
+    // Between spread nodes the errors of odometry are those of the straight trajectory, which chain_uncertainty() gets.
     std::vector<Pose3> odometry{scene.server.front()};
     const auto spread = ChainUncertainty::spread(kNodes);
     for (std::size_t k = 1; k < spread.size(); ++k) {
@@ -215,8 +215,8 @@ TEST(ChainUncertainty, DirectionsAreWhatClosuresKnowFarBetterThanOdometry) {
   }
 }
 
-// One closure turned a third of the way by 0.1 rad, 200 times what odometry may turn a step, or by 0.003 rad, which it
-// may well have missed; the robot is to follow the map without the former, every node of it.
+// One closure, a third along the trajectory, turned by 0.1 rad, 200 times what odometry may turn a step, or by 0.003
+// rad, which it may well have missed; the robot is to follow the map without the former, every node of it.
 TEST(ChainUncertainty, WhatOneClosureSaysAgainstOdometryIsDoubted) {
   const Scene scene(test::corridor(kNodes));
   ChainKnowledge known = usual_map().knowledge(scene.graph, kBravo);
@@ -252,7 +252,7 @@ TEST(ChainUncertainty, WhatOneClosureSaysAgainstOdometryIsDoubted) {
   (void)turned_by(0.003);
   const auto little = chain_uncertainty(graph, kBravo, known).doubted;
   EXPECT_LT(little ? little->sigma : 0.0, 0.03 * 0.03 * largest_m);
-  // Odometry that says nothing speaks against no closure.
+  // Odometry without information contradicts no closure.
   (void)turned_by(0.1);
   for (Matrix6d& step : known.spread_odometry) step *= 1e6;
   const auto open = chain_uncertainty(graph, kBravo, known).doubted;

@@ -10,7 +10,7 @@
 namespace tutti::consistency {
 namespace {
 
-/// Three standard deviations, on both sides. The first look of a DisagreementTest has half of the rate.
+/// Three standard deviations, on both sides. The first comparison of a DisagreementTest has half of the rate.
 constexpr double kThreeSigma = 0.0027;
 
 }  // namespace

@@ -10,13 +10,13 @@ namespace tutti::consistency {
 /// uncertainty.
 struct MapChange {
   /// The largest difference divided by three of the older map's standard deviations. Above 1 the map has changed its
-  /// mind, and not merely learned more. 0 where the older map does not say how sure it is, or where the two maps have
+  /// mind, and not merely learned more. 0 where the older map has no uncertainty, or where the two maps have
   /// fewer than two nodes in common.
   double significance = 0.0;
   /// The largest movement of any node, after one rigid alignment of the two trajectories.
   double translation_m = 0.0;
   double rotation_rad = 0.0;
-  /// The first and last moment of the nodes that move in position by at least half of `translation_m`.
+  /// The first and last keyframe time of the nodes that move in position by at least half of `translation_m`.
   Timestamp from, until;
   template <class V>
   void describe(V& v) {

@@ -88,7 +88,8 @@ TEST(MapChange, HasNoLengthInIt) {
     return map_change(older, build_proxy_graph(2, test::server_nodes(kBravo, after), {}, config), kBravo).significance;
   };
   EXPECT_NEAR(significance(1.0), significance(10.0), 0.02 * significance(1.0));
-  EXPECT_NEAR(significance(1.0), significance(0.1), 0.2 * significance(1.0));  // no map says of itself a millimetre
+  EXPECT_NEAR(significance(1.0), significance(0.1),
+              0.2 * significance(1.0));  // no map states an uncertainty of a millimetre
 }
 
 }  // namespace change_of_mind_test

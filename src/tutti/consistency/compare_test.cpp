@@ -127,7 +127,7 @@ TEST(Compare, NodesOutOfReachOfEachOtherDisagreeInScaleZeroOnly) {
   EXPECT_LT(comparison.disagreement.rightCols(6).maxCoeff(), 1e-12);
 }
 
-TEST(Compare, DisconnectedPiecesOfEqualMapsAgree) {
+TEST(Compare, DisconnectedPartsOfEqualMapsAgree) {
   auto poses = test::corridor(60);
   for (std::size_t n = 30; n < 60; ++n) poses[n].translation.z() += 500.0;
   for (const int budget : {0, 30}) {

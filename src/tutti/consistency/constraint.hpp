@@ -13,7 +13,7 @@
 
 namespace tutti::consistency {
 
-/// The group of scales that asked for a constraint; `other` comes from policies that do not look at scales.
+/// The group of scales that asked for a constraint; `other` comes from policies that do not use scales.
 enum class ConstraintKind { small, mid, large, other };
 
 /// A constraint: a relative pose between two of the robot's own nodes, taken from the server's map.
@@ -27,7 +27,7 @@ struct Constraint {
 };
 
 /// Makes constraints between synchronised nodes of one robot from the server's poses: T_from_to = T_world_from^-1
-/// T_world_to. Its covariance compounds those of the proxy nodes on the way, multiplied by kOdometryInside^2.
+/// T_world_to. Its covariance compounds those of the proxy nodes in between, multiplied by kOdometryInside^2.
 ///
 /// The factor is there because the server's estimate already contains the robot's own odometry. If a constraint were
 /// weighed against that odometry as an independent measurement, the robot would end halfway between both (with 1295

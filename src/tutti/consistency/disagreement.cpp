@@ -70,7 +70,7 @@ DisagreementTest::DisagreementTest(const ProxyGraph& graph, const ChainId& chain
   for (const ProxyNode& node : nodes) server_.push_back(node.T_world_body);
   for (const NodePair& pair : pairs) ranks_.push_back(pair.proxy - first);
   const double doublings = std::floor(std::log2(static_cast<double>(update)));
-  look_ = config.false_alarm_rate / ((doublings + 1.0) * (doublings + 2.0));
+  rate_ = config.false_alarm_rate / ((doublings + 1.0) * (doublings + 2.0));
   if (uncertainty_ == nullptr) return;
   if (uncertainty_->scales.size() >= 2) {
     laplacian_ = internal::chain_laplacian(graph, chain);
@@ -104,7 +104,7 @@ void DisagreementTest::measure_scales(const MatrixXd& W, Disagreement& out) cons
   const auto n = static_cast<Index>(server_.size());
   const double tests = 2.0 * std::max(1.0, tested);
   const double local = kFewSamples * std::sqrt(chi_square_exceeded_with(
-                                         look_ * kCoefficientsShare / (tests * static_cast<double>(n)), 3.0));
+                                         rate_ * kCoefficientsShare / (tests * static_cast<double>(n)), 3.0));
   MatrixXd metres(n, scales()), radians(n, scales()), significance = MatrixXd::Zero(n, scales());
   for (int s = 0; s < scales(); ++s) {
     metres.col(s) = W.middleCols<3>(6 * s).rowwise().norm();
@@ -149,7 +149,7 @@ double DisagreementTest::measure_directions(std::span<const Pose3> robot) const 
     largest = std::max(largest, square);
   }
   const auto count = static_cast<double>(directions.size());
-  const double rate = look_ * kDirectionsShare;
+  const double rate = rate_ * kDirectionsShare;
   return std::sqrt(
       std::max(squares / chi_square_exceeded_with(rate, count), largest / chi_square_exceeded_with(rate / count, 1.0)));
 }

@@ -47,14 +47,14 @@ struct Disagreement {
 
 /// Tests the hypothesis that a robot differs from the server's map only within the server's own uncertainty. The
 /// robot's errors, after one rigid alignment, are seen through the Meyer wavelets of the chain's own proximity graph at
-/// the server's positions, in the same way in which the server has seen draws of its own errors (ChainUncertainty), and
+/// the server's positions, just as the server has seen draws of its own errors (ChainUncertainty), and
 /// along the directions that closures determine.
 ///
 /// Half of the false-alarm rate is for single coefficients (chi distribution, 3 degrees of freedom), which detect local
 /// differences. The other half is for the directions (chi-square of all, and each one alone), which detect that a robot
-/// has not returned to where closures say it has. Updates are grouped into looks, because updates while a run doubles
-/// in length see much the same: look k = 1, 2, ... has the share 1 / (k (k + 1)) of the rate, which sums to 1 over a
-/// mission of any length (docs/math.md).
+/// has not returned to where closures say it has. Updates are grouped into comparisons, because updates while a run
+/// doubles in length see much the same: comparison k = 1, 2, ... has the share 1 / (k (k + 1)) of the rate, which sums
+/// to 1 over a mission of any length (docs/math.md).
 class DisagreementTest {
  public:
   /// `pairs` are the chain's synchronised nodes in time order, at least two. `update` counts from 1. Keeps a pointer
@@ -62,16 +62,16 @@ class DisagreementTest {
   DisagreementTest(const ProxyGraph& graph, const ChainId& chain, std::span<const NodePair> pairs, std::uint64_t update,
                    const DisagreementConfig& config);
 
-  /// The server says how sure it is of this chain. Otherwise nothing disagrees.
+  /// The server has sent the uncertainty of this chain. Otherwise nothing disagrees.
   [[nodiscard]] bool is_informed() const { return uncertainty_ != nullptr; }
   /// Tests a robot's poses at the synchronised nodes, given in any one frame.
   [[nodiscard]] Disagreement operator()(std::span<const Pose3> robot) const;
   /// Standard deviation of the server's position of each synchronised node, over all scales, m; empty when the server
-  /// does not say.
+  /// does not send it.
   [[nodiscard]] const Eigen::VectorXd& sigma_m() const { return sigma_m_; }
   [[nodiscard]] int scales() const;
-  /// The length along the way that a scale stands for, m: half of the wave whose frequency on the graph is the middle
-  /// of the scale's band. For scale 0, the length of the whole way.
+  /// The distance along the trajectory that a scale stands for, m: half of the wave whose frequency on the graph is the
+  /// middle of the scale's band. For scale 0, the length of the whole trajectory.
   [[nodiscard]] double scale_length_m(int scale) const;
 
  private:
@@ -82,7 +82,7 @@ class DisagreementTest {
   std::vector<Pose3> server_;       ///< All nodes of the chain.
   std::vector<std::size_t> ranks_;  ///< Positions of the synchronised nodes in server_.
   const ChainUncertainty* uncertainty_;
-  double look_;  ///< False-alarm rate of this look.
+  double rate_;  ///< False-alarm rate of this comparison.
   DisagreementConfig config_;
   spectral::SparseMatrix laplacian_;
   std::unique_ptr<spectral::WaveletFilter> filter_;

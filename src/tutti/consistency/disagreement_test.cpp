@@ -59,7 +59,7 @@ TEST(DisagreementTest, DrawsOfTheMapsOwnErrorsPass) {
   const std::vector<Kind> maps = kinds();
   for (const auto& [name, map] : maps) {
     const Scene scene(map);
-    const DisagreementTest test = scene.test_with({.false_alarm_rate = 0.02});  // first look: half of it
+    const DisagreementTest test = scene.test_with({.false_alarm_rate = 0.02});  // first comparison: half of it
     int here = 0;
     for (int draw = 0; draw < draws; ++draw)
       here += test(map.displace(scene.server, Rng(5).fork(static_cast<std::uint64_t>(draw)))).disagrees() ? 1 : 0;
@@ -103,7 +103,7 @@ TEST(DisagreementTest, FindsABumpAJumpAndSlowDrift) {
   EXPECT_TRUE(test(drift).disagrees());
 }
 
-// What odometry can say of two far ends is nothing beside what a closure between them says.
+// What odometry knows of two far ends is nothing beside what a closure between them measures.
 TEST(DisagreementTest, DirectionsFindWhatOnlyClosuresKnow) {
   const test::WalkWithClosures map(kNodes, kNodes - 1, {0.02, 1e-4}, {0.005, 1e-4});
   const Scene scene(map);

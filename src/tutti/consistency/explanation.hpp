@@ -54,7 +54,7 @@ struct Explanation {
   Eigen::MatrixXd significance;          ///< Disagreement over its threshold, the larger of position and rotation.
   double direction_significance = 0.0;   ///< The same along the directions that closures determine.
   double aligned_rmse_m = 0.0;           ///< Between the two estimates, after one rigid alignment.
-  double expected_rmse_m = 0.0;          ///< The error that the server expects of itself; 0 when it does not say.
+  double expected_rmse_m = 0.0;          ///< The error that the server expects of itself; 0 when unknown.
   std::vector<SuspectedOrigin> origins;  ///< In time order, none overlapping.
   /// Some difference exceeds what the server's uncertainty explains.
   [[nodiscard]] bool disagrees() const {
@@ -62,9 +62,9 @@ struct Explanation {
   }
 };
 
-/// Explains `found`, the result of `test` on raw odometry (odometry_at()), and looks for the segments where the
-/// difference was born, with the given false-alarm rate. `pairs` are those of the test. There are no origins when
-/// `found` does not disagree.
+/// Explains `found`, the result of `test` on raw odometry (odometry_at()), and finds the segments where the difference
+/// arose, with the given false-alarm rate. `pairs` are those of the test. There are no origins when `found` does not
+/// disagree.
 Explanation explain(const ProxyGraph& graph, const ChainId& chain, std::span<const RobotNode> nodes,
                     std::span<const NodePair> pairs, const DisagreementTest& test, Disagreement found,
                     double false_alarm_rate);

@@ -24,7 +24,7 @@ struct Scene {
 };
 
 /// The robot's odometry is the server's map (in another frame) off by its stated uncertainty; from kFirst to kLast it
-/// slides by 10 cm a step, which its covariance may say. Another robot's nodes come first in the graph.
+/// slides by 10 cm a step, which its covariance may state. Another robot's nodes come first in the graph.
 Scene scene(std::uint64_t seed, double slide_m, double stated = 1.0) {
   Rng rng(seed);
   const auto truth = test::corridor(kNodes);

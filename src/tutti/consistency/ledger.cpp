@@ -19,14 +19,14 @@ constexpr double kReplaceSigmaShare = 0.1;  // or when a standard deviation chan
 using Key = std::pair<Timestamp, Timestamp>;
 Key key(const Constraint& constraint) { return {constraint.from_stamp, constraint.to_stamp}; }
 
-bool says_otherwise(const Constraint& held, const Constraint& fresh) {
-  const Pose3 difference = held.measurement.T_a_b.inverse() * fresh.measurement.T_a_b;
+bool measures_otherwise(const Constraint& kept, const Constraint& fresh) {
+  const Pose3 difference = kept.measurement.T_a_b.inverse() * fresh.measurement.T_a_b;
   return difference.translation.norm() > kReplaceTranslation_m || rotation_angle(difference) > kReplaceRotation_rad;
 }
 
 /// The server has become surer or less sure.
-bool counts_otherwise(const Constraint& held, const Constraint& fresh) {
-  const Eigen::Array<double, 6, 1> before = held.measurement.covariance.diagonal().array().sqrt();
+bool counts_otherwise(const Constraint& kept, const Constraint& fresh) {
+  const Eigen::Array<double, 6, 1> before = kept.measurement.covariance.diagonal().array().sqrt();
   const Eigen::Array<double, 6, 1> now = fresh.measurement.covariance.diagonal().array().sqrt();
   return ((now - before).abs() > kReplaceSigmaShare * before).any();
 }
@@ -54,18 +54,18 @@ LedgerUpdate Ledger::update(std::vector<Constraint> chosen, bool replaces_all) {
   LedgerUpdate counts;
   std::vector<Constraint> next;
   next.reserve(constraints_.size() + fresh.size());
-  for (Constraint& held : constraints_) {
-    const auto found = fresh.find(key(held));
+  for (Constraint& kept : constraints_) {
+    const auto found = fresh.find(key(kept));
     if (found == fresh.end()) {
       if (replaces_all)
         ++counts.removed;
       else
-        next.push_back(std::move(held));
+        next.push_back(std::move(kept));
       continue;
     }
-    const bool replace = says_otherwise(held, found->second) || counts_otherwise(held, found->second);
+    const bool replace = measures_otherwise(kept, found->second) || counts_otherwise(kept, found->second);
     ++(replace ? counts.replaced : counts.unchanged);
-    next.push_back(std::move(replace ? found->second : held));
+    next.push_back(std::move(replace ? found->second : kept));
     fresh.erase(found);
   }
   counts.added = fresh.size();

@@ -17,7 +17,7 @@ struct LedgerUpdate {
   std::size_t withdrawn = 0;  ///< Dropped, because the server's map no longer has an end of it.
 };
 
-/// The constraints that a robot holds, at most one per pair of nodes. A plain value.
+/// The constraints that a robot keeps, at most one per pair of nodes. A plain value.
 class Ledger {
  public:
   Ledger() = default;
@@ -30,7 +30,7 @@ class Ledger {
 
   /// Takes `chosen` in. A constraint between the same two nodes (in either direction) is replaced only when the new one
   /// differs by more than 0.5 mm, 0.005 degrees or a tenth of a standard deviation; otherwise it stays untouched, which
-  /// keeps the robot's solution where it is. With `replaces_all`, held constraints on pairs that are not in `chosen`
+  /// keeps the robot's solution where it is. With `replaces_all`, kept constraints on pairs that are not in `chosen`
   /// are removed. If `chosen` has several constraints on one pair, the last counts.
   LedgerUpdate update(std::vector<Constraint> chosen, bool replaces_all);
 

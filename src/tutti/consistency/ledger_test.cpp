@@ -52,7 +52,7 @@ TEST(Ledger, ReplacesAConstraintThatCountsOtherwise) {
   EXPECT_EQ(ledger.update({weighing(0.0105, 4)}, false).replaced, 1U);
 }
 
-// Small steps each below the threshold must not add up unseen: the comparison is with what is held.
+// Small steps each below the threshold must not add up unseen: the comparison is with what is kept.
 TEST(Ledger, SmallStepsAddUpToAReplacement) {
   Ledger ledger({link(0, 1)});
   std::size_t replaced = 0;
@@ -140,17 +140,17 @@ RC_GTEST_PROP(Ledger, NeverHoldsAPairTwiceAndCountsAddUp, ()) {
     RC_ASSERT(ledger.size() == before + update.added - update.removed - update.withdrawn);
     RC_ASSERT(before == update.replaced + update.unchanged + update.removed + update.withdrawn || !replaces_all);
     RC_ASSERT(replaces_all || update.removed == 0U);
-    const auto& held = ledger.constraints();
-    for (std::size_t i = 0; i < held.size(); ++i) {
-      RC_ASSERT(held[i].from_stamp < held[i].to_stamp);
-      RC_ASSERT(held[i].from < held[i].to);
+    const auto& kept = ledger.constraints();
+    for (std::size_t i = 0; i < kept.size(); ++i) {
+      RC_ASSERT(kept[i].from_stamp < kept[i].to_stamp);
+      RC_ASSERT(kept[i].from < kept[i].to);
       if (i > 0)
-        RC_ASSERT(std::pair(held[i - 1].from_stamp, held[i - 1].to_stamp) <
-                  std::pair(held[i].from_stamp, held[i].to_stamp));
+        RC_ASSERT(std::pair(kept[i - 1].from_stamp, kept[i - 1].to_stamp) <
+                  std::pair(kept[i].from_stamp, kept[i].to_stamp));
     }
-    RC_ASSERT(Ledger(held) == ledger);  // saved and loaded
+    RC_ASSERT(Ledger(kept) == ledger);  // saved and loaded
     Ledger again = ledger;
-    RC_ASSERT(again.update(held, true).unchanged == held.size());
+    RC_ASSERT(again.update(kept, true).unchanged == kept.size());
     RC_ASSERT(again == ledger);
     std::vector<std::size_t> known;
     for (std::size_t n = 0; n < 10; ++n)

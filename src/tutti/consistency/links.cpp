@@ -72,11 +72,11 @@ LinkCollector::LinkCollector(const PolicyInput& input, bool from_scratch)
     : maker_(input.graph, input.chain, input.nodes, input.pairs) {
   selection_.replaces_all = from_scratch && maker_.size() >= 2;
   if (from_scratch) return;
-  for (const Constraint& held : input.ledger.constraints()) {
-    const auto a = node_at(input, held.from_stamp), b = node_at(input, held.to_stamp);
+  for (const Constraint& kept : input.ledger.constraints()) {
+    const auto a = node_at(input, kept.from_stamp), b = node_at(input, kept.to_stamp);
     if (!a || !b) continue;
     linked_.emplace(std::min(*a, *b), std::max(*a, *b));
-    selection_.constraints.push_back(maker_.make(*a, *b, held.kind));
+    selection_.constraints.push_back(maker_.make(*a, *b, kept.kind));
   }
 }
 

@@ -57,7 +57,7 @@ class LinkCollector {
   /// Does nothing when the two nodes are linked already (here, or in the ledger unless from scratch).
   void add(Link link, ConstraintKind kind);
   void add(const std::vector<Link>& links, ConstraintKind kind);
-  /// The new constraints. Unless from scratch they follow every held constraint whose nodes are synchronised, made
+  /// The new constraints. Unless from scratch they follow every kept constraint whose nodes are synchronised, made
   /// again from the newest map; the ledger then decides whether it differs enough.
   [[nodiscard]] Selection take() &&;
 

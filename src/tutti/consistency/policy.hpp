@@ -18,7 +18,7 @@
 
 namespace tutti::consistency {
 
-/// Everything that a policy may look at. The references are valid during the call only.
+/// Everything that a policy may use. The references are valid during the call only.
 struct PolicyInput {
   const ProxyGraph& graph;
   ChainId chain;
@@ -34,7 +34,7 @@ struct PolicyInput {
 /// The constraints that a policy chooses.
 struct Selection {
   std::vector<Constraint> constraints;
-  /// True: the ledger shall hold these and no others. False: they are added to the ledger, or refresh it.
+  /// True: the ledger shall keep these and no others. False: they are added to the ledger, or refresh it.
   bool replaces_all = false;
   int order = 0;  ///< Polynomial order of the comparison that was made; 0: exact, or none was made.
 };

@@ -19,7 +19,7 @@ struct ServerNode {
   Matrix6d covariance = Matrix6d::Zero();
 };
 
-/// How a proxy graph is made, and how much the server says about its own uncertainty.
+/// How a proxy graph is made, and how much it contains about the server's uncertainty.
 struct ProxyGraphConfig {
   double radius_m = 7.0;
   double sigma_m = 1.0;
@@ -27,7 +27,7 @@ struct ProxyGraphConfig {
   std::string reducer = "budget";
   double sparsify_threshold = 1e-3;  ///< A reduced edge is dropped when its weight is below this fraction of the
                                      ///< smaller degree of its ends, unless it holds the graph together; 0 = keep all.
-  /// Number of samples from which the server estimates how sure it is of each trajectory's shape; 0 = it does not say.
+  /// Number of samples from which the server estimates how sure it is of each trajectory's shape; 0 = none is sent.
   int shape_samples = 64;
   int shape_deletions = 32;
 

@@ -10,7 +10,7 @@
 
 namespace tutti::consistency {
 
-/// One moment of one robot, in the server's estimate and in its own.
+/// One keyframe time of one robot, in the server's estimate and in its own.
 struct NodePair {
   std::size_t proxy = 0;  ///< Position in ProxyGraph::nodes.
   std::size_t robot = 0;  ///< Position in the list of RobotNode.

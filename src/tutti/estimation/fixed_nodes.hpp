@@ -7,9 +7,9 @@
 #include "tutti/estimation/gnc.hpp"
 #include "tutti/estimation/pose_graph_solver.hpp"
 
-/// The solvers for graphs that name nodes to be held (g2o's FIX). The nodes `fixed` (positions) keep their given poses,
-/// whatever the edges between them say; in a connected component without a fixed node the first node keeps its pose, as
-/// without this argument.
+/// The solvers for graphs with nodes to be fixed (g2o's FIX). The nodes `fixed` (positions) keep their given poses,
+/// whatever the edges between them measure; in a connected component without a fixed node the first node keeps its
+/// pose, as without this argument.
 namespace tutti::estimation {
 
 PoseGraphSolution solve_pose_graph(const PoseGraph& graph, const SolverConfig& config, std::span<const EdgeRole> roles,

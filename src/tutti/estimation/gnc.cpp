@@ -109,7 +109,7 @@ GncResult solve_pose_graph_gnc(const PoseGraph& graph, const GncConfig& config, 
                                std::span<const std::size_t> fixed) {
   TUTTI_CHECK(roles.empty() || roles.size() == graph.edges.size(), "{} roles, {} edges", roles.size(),
               graph.edges.size());
-  if (!internal::is_finite(graph)) return reweight(graph, config, roles, fixed);  // says so
+  if (!internal::is_finite(graph)) return reweight(graph, config, roles, fixed);  // reports it
   const ReducedGraph reduced = reduce_chains(graph, roles, fixed);
   if (reduced.runs.empty()) return reweight(graph, config, roles, fixed);
 

@@ -29,7 +29,7 @@ struct GncResult {
 /// Truncated least squares by graduated non-convexity: Yang, Antonante, Tzoumas, Carlone, "Graduated Non-Convexity for
 /// Robust Spatial Perception", RA-L 2020: initial mu (remark 5), weights eq. (14), mu <- 2 mu. Runs of trusted edges
 /// are compounded first (chain_reduction.hpp); the full graph is solved with the decided weights. `roles`: per edge, or
-/// empty: all robust. Parts that robust edges alone hold together may lose all of these edges; each part then stays
+/// empty: all robust. Parts that robust edges alone join may lose all of these edges; each part then stays
 /// where it is. Numerical failures are in the summary.
 GncResult solve_pose_graph_gnc(const PoseGraph& graph, const GncConfig& config, std::span<const EdgeRole> roles = {});
 

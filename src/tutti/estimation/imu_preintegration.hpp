@@ -17,7 +17,7 @@ struct ImuBias {
   Eigen::Vector3d accelerometer = Eigen::Vector3d::Zero();  ///< m/s^2
 };
 
-/// Longest time between two samples: a longer gap is an error, as nothing tells what happened in it.
+/// Longest time between two samples: a longer gap is an error, as nothing measures what happened in it.
 inline constexpr double kMaxImuGap_s = 0.1;
 
 /// The relative motion between two keyframes by the samples, eqs. (35) to (38), with its covariance, eq. (63), and its

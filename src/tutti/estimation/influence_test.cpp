@@ -161,7 +161,7 @@ TEST(GroupRemovals, WhereOnlyTheGroupHoldsItsEndsTheFirstOrderSaysNothing) {
   EXPECT_FALSE(group_removals(chain, optimum(chain), {}, Groups{{7}}, nodes).allFinite());
 }
 
-/// Each of five agrees with the odometry of a ring, and so do all of them: many say no more than one.
+/// Each of five agrees with the odometry of a ring, and so do all of them: many are no more evidence than one.
 TEST(GroupMisfits, DoNotGrowWithTheGroup) {
   PoseGraph graph;
   constexpr std::size_t kSteps = 60;
@@ -197,7 +197,7 @@ TEST(GroupMisfits, AGroupThatAloneHoldsItsEndsTogetherContradictsNothing) {
   EXPECT_TRUE(group_misfits(graph, optimum(graph), {}, {}).empty());
 }
 
-/// As of a robot whose way is in pieces: what lies in another piece is no witness.
+/// A robot whose trajectory is in segments: what lies in another segment is no witness.
 TEST(GroupMisfits, EdgesOfAnotherComponentSayNothing) {
   Rng rng(3);
   PoseGraph graph = random_graph(rng, 20, 5, 0.3).graph;

@@ -59,7 +59,7 @@ struct SmootherState {
   /// given, and if none are given all follow from `solution`.
   LongList<Pose3> poses;
   /// Poses of the reduced graph of `constraints`, before polishing, if the last solve was usable. Empty if there was no
-  /// such solve: then all poses but the held ones are composed from odometry.
+  /// such solve: then all poses but the first `held` ones are composed from odometry.
   std::vector<Pose3> solution;
   std::size_t held = 0;  ///< Number of poses, from the first on, that do not follow from the rest.
   friend bool operator==(const SmootherState&, const SmootherState&) = default;

@@ -50,7 +50,7 @@ TEST(OnboardSmoother, PolishingConvergesToTheFullOptimumUnderHeavyDrift) {
   EXPECT_LT(largest_position_difference(smoother.poses(), full_optimum(m, smoother.poses())), 1e-5);
 }
 
-/// Wheel odometry: sure of its plane, and says of the rest that it does not know.
+/// Wheel odometry: sure of its plane, and of the rest its covariance is large.
 Mission planar_mission(Rng& rng, double unknown) {
   Mission out{.truth = {{}}, .odometry = {}, .constraints = {}};
   Vector6d sigma(0.007, 0.007, 0.0, 0.0, 0.0, 0.0012);
@@ -87,7 +87,7 @@ TEST(OnboardSmoother, PolishingNeverMakesMattersWorse) {
   EXPECT_TRUE(refused);
 }
 
-/// A constraint that contradicts the odometry by 30 sigmas of both is weighed by its covariance, not let go.
+/// A constraint that contradicts the odometry by 30 sigmas of both is weighed by its covariance, not released.
 RC_GTEST_PROP(OnboardSmoother, ConstraintsHoldAgainstOdometry, ()) {
   Rng rng(*rc::gen::arbitrary<std::uint32_t>());
   auto m = mission(rng, 200, 3);
@@ -136,7 +136,7 @@ TEST(OnboardSmoother, BadNumbersLeaveThePosesAlone) {
   EXPECT_EQ(smoother.solve().termination, Termination::invalid_input);
   EXPECT_EQ(smoother.poses(), before);
   m.constraints.pop_back();
-  m.constraints.push_back({3, 3, {}});  // from == to says nothing
+  m.constraints.push_back({3, 3, {}});  // from == to measures nothing
   smoother.set_constraints(m.constraints);
   EXPECT_EQ(smoother.solve().termination, Termination::converged);
   EXPECT_THROW(smoother.set_constraints({{0, 101, {}}}), std::logic_error);

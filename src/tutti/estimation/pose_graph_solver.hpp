@@ -29,7 +29,7 @@ struct SolverConfig {
 /// Whether an edge may be wrong: `trusted` edges (odometry) never get a robust loss.
 enum class EdgeRole : unsigned char { trusted, robust };
 
-/// Roles for a graph that does not say which edges are odometry: edges between consecutive nodes are trusted, all
+/// Roles for a graph that does not mark odometry: edges between consecutive nodes are trusted, all
 /// others robust.
 std::vector<EdgeRole> roles_from_numbering(const PoseGraph& graph);
 

@@ -5,7 +5,7 @@
 
 namespace tutti::estimation {
 
-/// How an optimisation ended. A summary that was never filled says `not_run`.
+/// How an optimisation ended. A summary that was never filled is `not_run`.
 enum class Termination {
   not_run,
   converged,

@@ -105,7 +105,7 @@ ExtremalPair largest_eigenpair(const SparseMatrix& laplacian, double tolerance) 
     fix_sign(out.vector);
     out.converged = (laplacian * out.vector - out.value * out.vector).norm() <= tolerance * out.value;
   }
-  // Spectra 1.0 breaks down where a start vector holds fewer than kKrylov eigenvectors (the complete graph has two).
+  // Spectra 1.0 breaks down where a start vector contains fewer than kKrylov eigenvectors (the complete graph has two).
   return out.converged ? out : dense_largest_eigenpair(laplacian);
 }
 

@@ -49,7 +49,7 @@ Selection AdaptivePolicy::choose(const PolicyInput& input) const {
   if (nodes < 2 || input.test == nullptr || !input.test->is_informed()) return std::move(collector).take();
   TUTTI_CHECK(input.odometry_disagreement != nullptr, "a test without what it says");
   const bool corrects = input.ledger.size() > 0;
-  if (input.odometry_disagreement->largest() <= (corrects ? kLetGo : 1.0)) return std::move(collector).take();
+  if (input.odometry_disagreement->largest() <= (corrects ? kRelease : 1.0)) return std::move(collector).take();
 
   const TimeChain chain = time_chain(input.graph, input.nodes, input.pairs);
   const OdometryDrift drift(chain.server, chain.odometry);

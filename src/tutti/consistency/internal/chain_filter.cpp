@@ -11,7 +11,7 @@ namespace tutti::consistency::internal {
 namespace {
 
 constexpr int kMostNeighbours = 32;
-/// Turns about axes with less than this share of the largest moment of inertia move nothing and are not looked for.
+/// Turns about axes with less than this share of the largest moment of inertia move nothing and are ignored.
 constexpr double kSmallestInertiaShare = 1e-12;
 
 }  // namespace
@@ -46,10 +46,10 @@ RigidMotion::RigidMotion(std::span<const ProxyNode> nodes) : arms_(static_cast<E
 
 void RigidMotion::remove(Eigen::Ref<Eigen::MatrixX3d> displacements) const {
   remove_mean(displacements);
-  Eigen::Vector3d moment = Eigen::Vector3d::Zero();
+  Eigen::Vector3d torque = Eigen::Vector3d::Zero();
   for (Eigen::Index k = 0; k < arms_.rows(); ++k)
-    moment += Eigen::Vector3d(arms_.row(k)).cross(Eigen::Vector3d(displacements.row(k)));
-  displacements -= arms_ * skew(inverse_inertia_ * moment).transpose();
+    torque += Eigen::Vector3d(arms_.row(k)).cross(Eigen::Vector3d(displacements.row(k)));
+  displacements -= arms_ * skew(inverse_inertia_ * torque).transpose();
 }
 
 void remove_mean(Eigen::Ref<Eigen::MatrixX3d> rotations) {

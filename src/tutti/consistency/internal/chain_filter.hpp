@@ -7,7 +7,7 @@
 #include "tutti/model/proxy_graph.hpp"
 #include "tutti/spectral/graph.hpp"
 
-/// How server and robot look at what one chain's nodes are off by: on the graph of the chain's own nodes where the
+/// How server and robot see the errors of one chain's nodes: on the graph of the chain's own nodes where the
 /// server has them, one graph for both, so that the difference of the two sides' coefficients is the transform of the
 /// difference.
 namespace tutti::consistency::internal {

@@ -177,7 +177,7 @@ std::vector<DriftSegment> drift_segments(const TimeChain& chain, std::span<const
   std::vector<DriftSegment> out;
   if (nodes < 4) return out;
   const Scan scan(chain, server_variances(scale_lengths_m, uncertainty, nodes));
-  // Segments that overlap tell much the same: about as many independent ones as nodes.
+  // Segments that overlap measure much the same: about as many independent ones as nodes.
   const double threshold = chi_square_exceeded_with(probability / static_cast<double>(nodes), kDegrees);
   std::vector<Segment> found = candidates(scan, nodes, threshold);
   while (!found.empty() && out.size() < kMostSegments) {

@@ -8,12 +8,12 @@
 
 namespace tutti::consistency::internal {
 
-/// Odometry from node `first` to node `last` misses the server's map by more than can be told.
+/// Odometry from node `first` to node `last` misses the server's map by more than their uncertainty explains.
 struct DriftSegment {
   std::size_t first = 0;
   std::size_t last = 0;
   double significance = 0.0;  ///< Mahalanobis distance over its threshold, against what odometry usually does.
-  bool alert = false;         ///< Also against what odometry says it did there.
+  bool alert = false;         ///< Also against odometry's own covariance there.
 };
 
 /// Scan statistic (Kulldorff 1997; Arias-Castro, Donoho, Huo 2005): over segments of all places and of lengths in

@@ -23,10 +23,10 @@ class OdometryDrift {
   [[nodiscard]] std::size_t size() const { return nodes_.size(); }
   /// [position m; rotation rad] by which odometry misses node b when it is laid on node a, in the server's axes.
   [[nodiscard]] Vector6d missed(std::size_t a, std::size_t b) const;
-  /// Per node [position m; rotation rad] in the server's axes, n x 6, with these nodes (sorted, not empty) held where
-  /// the server has them: of a node between two held ones, a < k < b, by the most likely error,
+  /// Per node [position m; rotation rad] in the server's axes, n x 6, with these nodes (sorted, not empty) fixed where
+  /// the server has them: of a node between two fixed ones, a < k < b, by the most likely error,
   ///   (E_k - E_a) - S_k S_b^-1 (E_b - E_a),   S the covariance of odometry summed from a in the common frame
-  /// (the linear-Gaussian bridge, the onboard smoother's first step); of one beyond the last held one E_k - E_a.
+  /// (the linear-Gaussian bridge, the onboard smoother's first step); of one beyond the last fixed one E_k - E_a.
   [[nodiscard]] Eigen::MatrixXd held(std::span<const std::size_t> nodes) const;
 
  private:

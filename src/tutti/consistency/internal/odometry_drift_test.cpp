@@ -13,7 +13,7 @@ namespace odometry_drift_test {
 
 constexpr std::size_t kNodes = 50;
 
-/// A server's poses and odometry that errs by `size` times what its covariances say, which are correlated and differ.
+/// A server's poses and odometry that errs by `size` times its covariances, which are correlated and differ.
 struct DriftedRun {
   std::vector<Pose3> server;
   std::vector<RelativePose> odometry;
@@ -69,9 +69,9 @@ TEST(OdometryDrift, MissesTheNodeByThePoseDifferenceToFirstOrder) {
       const DriftedRun run(small ? 1e-3 : 1e-2);
       Pose3 T = run.server[a];
       for (std::size_t k = a + 1; k <= b; ++k) T = T * run.odometry[k].T_a_b;
-      const Vector6d truth = run.off(b, T), told = OdometryDrift(run.server, run.odometry).missed(a, b);
-      neglected[small ? 1 : 0] = (told - truth).norm();
-      EXPECT_LT((told - truth).norm(), (small ? 1e-3 : 1e-2) * truth.norm()) << a << " " << b;
+      const Vector6d truth = run.off(b, T), predicted = OdometryDrift(run.server, run.odometry).missed(a, b);
+      neglected[small ? 1 : 0] = (predicted - truth).norm();
+      EXPECT_LT((predicted - truth).norm(), (small ? 1e-3 : 1e-2) * truth.norm()) << a << " " << b;
     }
     EXPECT_LT(neglected[1], 0.02 * neglected[0]) << a << " " << b;
   }
@@ -87,13 +87,13 @@ TEST(OdometryDrift, BeyondTheLastHeldNodeItIsWhatOdometryMisses) {
   for (const std::size_t node : {0U, 8U}) EXPECT_LT((off.row(node).transpose() - drift.missed(9, node)).norm(), 1e-12);
 }
 
-// What is left when links hold nodes on the server's map is what the onboard smoother leaves.
+// What is left when links fix nodes on the server's map is what the onboard smoother leaves.
 TEST(OdometryDrift, IsTheFirstStepOfTheOnboardSmoother) {
   constexpr double kSize = 1e-3;
   const std::vector<std::size_t> held{3, 10, 11, 25, 40};
   for (std::uint64_t seed = 1; seed < 5; ++seed) {
     const DriftedRun run(kSize, seed);
-    const Eigen::MatrixXd told = OdometryDrift(run.server, run.odometry).held(held);
+    const Eigen::MatrixXd predicted = OdometryDrift(run.server, run.odometry).held(held);
     estimation::OnboardSmoother smoother;
     for (std::size_t k = 1; k < kNodes; ++k) smoother.append(run.odometry[k]);
     std::vector<estimation::ChainConstraint> links;
@@ -105,8 +105,8 @@ TEST(OdometryDrift, IsTheFirstStepOfTheOnboardSmoother) {
     smoother.solve();
     const Pose3 T = run.server[held.front()] * smoother.pose(held.front()).inverse();
     for (std::size_t k = 0; k < kNodes; ++k) {
-      const Vector6d row = told.row(static_cast<Eigen::Index>(k));
-      EXPECT_LT((run.off(k, T * smoother.pose(k)) - row).norm(), 0.01 * told.rowwise().norm().maxCoeff()) << k;
+      const Vector6d row = predicted.row(static_cast<Eigen::Index>(k));
+      EXPECT_LT((run.off(k, T * smoother.pose(k)) - row).norm(), 0.01 * predicted.rowwise().norm().maxCoeff()) << k;
     }
   }
 }

@@ -11,14 +11,14 @@ class NonePolicy final : public ConstraintPolicy {
   [[nodiscard]] Selection choose(const PolicyInput&) const override { return {}; }
 };
 
-/// The paper's baseline: every node linked to the next, whatever the two maps say.
+/// The paper's baseline: every node linked to the next, whatever the difference of the two maps.
 class EveryNodePolicy final : public ConstraintPolicy {
  public:
   [[nodiscard]] Selection choose(const PolicyInput& input) const override;
 };
 
-/// The paper's: compare() says how much the two maps disagree at every node and scale, links_where() what is done about
-/// it.
+/// The paper's: compare() measures how much the two maps disagree at every node and scale, links_where() decides what
+/// is done about it.
 class SpectralPolicy final : public ConstraintPolicy {
  public:
   SpectralPolicy(const PolicyConfig& config, const CompareConfig& compare) : config_(config), compare_(compare) {}
@@ -36,7 +36,7 @@ class SpectralPolicy final : public ConstraintPolicy {
 Selection links_where(const PolicyInput& input, const Eigen::MatrixXd& disagreement, const PolicyConfig& config);
 
 /// Nothing while raw odometry differs from the server's map only within the server's uncertainty (DisagreementTest).
-/// Once it has been told otherwise: a chain of links over the whole run, held where the server has its ends; a run is
+/// Once it differs by more: a chain of links over the whole run, fixed where the server has its ends; a run is
 /// split where odometry bent to the links is predicted to be farther from the map than `adaptive_error_share` of what
 /// the map itself is unsure of there, and where the same test still sees a difference. So the lengths of links follow
 /// the scale of the disagreement. Planned afresh at every update; no links again once odometry agrees well within the
@@ -49,7 +49,7 @@ class AdaptivePolicy final : public ConstraintPolicy {
 
  private:
   static constexpr double kLeastError_m = 1e-3;  ///< Poses on the wire are rounded to half of it.
-  static constexpr double kLetGo = 0.5;          ///< Share of the threshold below which links held are given up.
+  static constexpr double kRelease = 0.5;        ///< Share of the threshold below which kept links are released.
   PolicyConfig config_;
 };
 

@@ -18,10 +18,10 @@ struct BundleConfig {
   double odometry_scale_sigma = 0.02;
   double gyro_random_walk = 1e-4;           ///< Random walk of the gyro's bias, rad/s^2/sqrt(Hz).
   double accelerometer_random_walk = 4e-3;  ///< Random walk of the accelerometer's bias, m/s^3/sqrt(Hz).
-  double max_bias_sigma = 0.05;  ///< A run of IMU factors is held back when the accelerometer's bias stays less certain
+  double max_bias_sigma = 0.05;  ///< A run of IMU factors is left out when the accelerometer's bias stays less certain
                                  ///< than this, m/s^2 (a tenth of its prior's standard deviation),
-  double max_imu_scale_sigmas = 3.0;  ///< ... or when it changes the length of the way by more than this many standard
-                                      ///< deviations of that length without IMU factors.
+  double max_imu_scale_sigmas = 3.0;  ///< ... or when it changes the length of the trajectory by more than this many
+                                      ///< standard deviations of that length without IMU factors.
 
   template <class V>
   void describe(V& v) {

@@ -64,7 +64,7 @@ class PairMatcher {
  public:
   PairMatcher(const Prepared& one, const Prepared& other, const GuidedMatchConfig& config)
       : one_(one), other_(other), config_(config) {
-    for (const auto& image : other.images) look_in(image);
+    for (const auto& image : other.images) match_in(image);
   }
 
   /// Landmarks that name each other.
@@ -83,7 +83,7 @@ class PairMatcher {
   }
 
  private:
-  void look_in(const Image& image) {
+  void match_in(const Image& image) {
     for (std::uint32_t l = 0; l < one_.rows.size(); ++l) {
       if (one_.rows[l].empty()) continue;
       const Eigen::Vector3d p_world =

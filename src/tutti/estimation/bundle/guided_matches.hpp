@@ -23,7 +23,7 @@ struct GuidedMatchConfig {
 };
 
 /// Finds landmarks that two submaps have in common, where a loop closure ties the submaps together and the poses
-/// therefore say where to look. Every landmark of the first submap is projected into the images of the second and
+/// therefore predict where to search. Every landmark of the first submap is projected into the images of the second and
 /// matched with the descriptors around; each image votes for one landmark, and two landmarks match when each has most
 /// of the other's votes. A pair gives no matches when `submaps` lacks one of the two or when their descriptors are of
 /// different kinds.

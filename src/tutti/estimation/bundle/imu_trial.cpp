@@ -58,11 +58,11 @@ class Trial {
       const std::size_t middle = steps[steps.size() / 2].from;
       const Eigen::Matrix3d bias = posterior_with.accelerometer_bias(middle);
       run.bias_sigma_mps2 = std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(bias).eigenvalues().maxCoeff());
-      const WayScale way = way_scale(steps, without, posterior_without);
-      run.scale = way.scale > 0.0 ? 1.0 / way.scale : 1.0;
-      run.scale_sigma = std::sqrt(way.variance);
+      const WayScale fit = way_scale(steps, without, posterior_without);
+      run.scale = fit.scale > 0.0 ? 1.0 / fit.scale : 1.0;
+      run.scale_sigma = std::sqrt(fit.variance);
       run.is_held_back = run.bias_sigma_mps2 > config.max_bias_sigma ||
-                         std::abs(1.0 - way.scale) > config.max_imu_scale_sigmas * run.scale_sigma + kRounding;
+                         std::abs(1.0 - fit.scale) > config.max_imu_scale_sigmas * run.scale_sigma + kRounding;
     }
   }
   void hold_all_back() {

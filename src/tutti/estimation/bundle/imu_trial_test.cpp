@@ -58,7 +58,7 @@ TEST(ImuTrial, TheLastDigitsAreTheSameWhereverTheMemoryIs) {
   }
 }
 
-/// Three seconds do not tell the bias from gravity: the map is what it is without an IMU.
+/// Three seconds do not distinguish the bias from gravity: the map is what it is without an IMU.
 TEST(ImuTrial, AShortFlightIsAsWithoutAnImu) {
   const RefinedMap out = refined(3, with_imu()), without = refined(3, {});
   ASSERT_EQ(out.imu.size(), 1U);
@@ -72,7 +72,7 @@ TEST(ImuTrial, AShortFlightIsAsWithoutAnImu) {
 }
 
 /// An accelerometer in other units, or of another body.
-TEST(ImuTrial, OneThatContradictsTheWayIsHeldBack) {
+TEST(ImuTrial, OneThatContradictsTheTrajectoryIsLeftOut) {
   const RefinedMap out = refined(15, with_imu(), 1.4);
   ASSERT_EQ(out.imu.size(), 1U);
   EXPECT_TRUE(out.imu[0].is_held_back);

@@ -32,7 +32,7 @@ void join_neighbours(const Assembly& assembly, DisjointSets& sets, MergeSummary&
   }
 }
 
-/// Matches with submaps that are not here say nothing here.
+/// Matches with submaps that are not here are ignored.
 Status join_matches(const Assembly& assembly, std::span<const LandmarkMatch> matches, DisjointSets& sets,
                     MergeSummary& summary) {
   std::map<SubmapId, std::size_t> number;
@@ -54,7 +54,7 @@ Status join_matches(const Assembly& assembly, std::span<const LandmarkMatch> mat
   return {};
 }
 
-/// Landmarks that are said to be one thing, with all their views.
+/// Landmarks that are matched as one, with all their views.
 struct Group {
   std::vector<std::size_t> members;  ///< Numbers in the assembly.
   Views views;                       ///< BundleObservation::landmark: which member.

@@ -19,7 +19,7 @@ namespace tutti::bundle {
 struct PosedSubmap {
   std::shared_ptr<const Submap> submap;
   std::vector<Pose3> T_world_body;  ///< Per keyframe of the submap.
-  bool is_constant = false;         ///< The adjustment holds its keyframes, also one that a neighbouring submap shares.
+  bool is_constant = false;  ///< The adjustment keeps its keyframes fixed, also one that a neighbouring submap shares.
 };
 
 /// A landmark, by the submap that carries it.
@@ -85,9 +85,9 @@ struct MergedMap {
 
 /// Makes one bundle problem of several submaps. Landmarks of neighbouring submaps of one chain are joined when they
 /// share a keypoint of the shared keyframe (same camera, same pixel: one ray), landmarks of other submaps when
-/// `matches` says so. Landmarks that only constant keyframes see are left out. A joined landmark is triangulated again
-/// along all its rays from `T_world_body`, never averaged, because two submaps disagree along the viewing ray. Views
-/// that contradict the new position are dropped; where most do, the join is undone. A pure function; the order of
+/// `matches` joins them. Landmarks that only constant keyframes see are left out. A joined landmark is triangulated
+/// again along all its rays from `T_world_body`, never averaged, because two submaps disagree along the viewing ray.
+/// Views that contradict the new position are dropped; where most do, the join is undone. A pure function; the order of
 /// submaps and matches does not matter. Errors (ErrorCode::invalid) name input that does not fit together: a keyframe
 /// without pose, an index out of range, a number that is not finite.
 Result<MergedMap> merge_landmarks(std::span<const PosedSubmap> submaps, std::span<const LandmarkMatch> matches,

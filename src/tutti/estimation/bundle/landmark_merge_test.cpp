@@ -29,7 +29,7 @@ double distance_to_nearest(const Eigen::Vector3d& p, const std::vector<Eigen::Ve
   return best;
 }
 
-VisualPayload& payload(PosedSubmap& posed) {  // tests change what nobody else holds
+VisualPayload& payload(PosedSubmap& posed) {  // tests change what nobody else owns
   auto visual = std::make_shared<VisualPayload>(*posed.submap->visual);
   auto submap = std::make_shared<Submap>(*posed.submap);
   submap->visual = visual;
@@ -58,7 +58,7 @@ TEST(LandmarkMerge, MatchesJoinTheRest) {
   EXPECT_GT(joined.summary.closure_joins, 20U);
   EXPECT_LT(joined.summary.landmarks_out, alone.summary.landmarks_out);
   EXPECT_EQ(joined.summary.two_things, 0U);
-  // Matches with a submap that is not here say nothing.
+  // Matches with a submap that is not here are ignored.
   const std::span first(scene.input.submaps.data(), 1);
   EXPECT_EQ(merge_landmarks(first, scene.input.matches, everything()).value().summary.closure_joins, 0U);
 }

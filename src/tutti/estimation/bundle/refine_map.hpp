@@ -30,7 +30,7 @@ struct RefinementConfig {
 struct RefinementInput {
   /// Any robots' submaps; one without a visual payload contributes its odometry alone.
   std::vector<PosedSubmap> submaps;
-  /// Pairs tied by accepted closures, in which guided_matches() looks for common landmarks.
+  /// Pairs tied by accepted closures, in which guided_matches() searches common landmarks.
   std::vector<SubmapPair> closed;
   std::vector<LandmarkMatch> matches;  ///< Further landmarks that are known to be common.
 };
@@ -59,7 +59,7 @@ struct RefinedMap {
 };
 
 /// Adjusts the submaps' keyframes and landmarks in one bundle adjustment that starts from the given poses. A component
-/// with constant submaps is held by them: it has no other gauge, and its covariances are conditional on their poses.
+/// with constant submaps is fixed by them: it has no other gauge, and its covariances are conditional on their poses.
 /// Factors between keyframes that see no landmark, and all factors when the adjustment fails, are those of the
 /// odometry. A pure function; the order of submaps and matches does not matter. Errors (ErrorCode::invalid) name input
 /// that is not finite or contradicts itself.

@@ -38,7 +38,7 @@ TEST(RefineMap, ExactWithoutNoise) {
   }
 }
 
-/// Squared error of the factors over their covariance, on average: 6 when the covariance is what it says.
+/// Squared error of the factors over their covariance, on average: 6 when the covariance is honest.
 double mean_nees(const Scene& scene, const RefinedMap& refined) {
   double sum = 0.0;
   for (const auto& [from, to, measurement] : refined.factors) {
@@ -81,7 +81,7 @@ TEST(RefineMap, CovarianceIsConsistentWithImu) {
   EXPECT_NEAR(average_nees({.keyframes = 15, .points = 60, .imu = true}, config, 12), 6.0, 0.9);
 }
 
-/// Pixels that are worse than they say are noticed.
+/// Pixels that are worse than their sigma are noticed.
 TEST(RefineMap, ViewsWeighWhatTheyTurnOutToBe) {
   TUTTI_STATISTIC();
   Scene scene = make_scene({.points = 120, .pixel_sigma = 2.0}, 3);
@@ -173,7 +173,7 @@ TEST(RefineMap, UnconnectedMapsKeepTheirPlaces) {
     }
 }
 
-/// The scene with its true poses where they are held.
+/// The scene with its true poses where they are fixed.
 Scene partly_held(const SceneOptions& options, std::uint64_t seed) {
   Scene scene = make_scene(options, seed);
   for (auto& posed : scene.input.submaps) {

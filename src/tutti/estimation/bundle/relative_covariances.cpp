@@ -90,7 +90,7 @@ void add_landmark(std::span<const BundleObservation* const> views, const BundleP
     V += weight * at->J_landmark.transpose() * at->J_landmark;
   }
   const Eigen::LLT<Eigen::Matrix3d> llt(V);
-  if (llt.info() != Eigen::Success) return;  // it says nothing
+  if (llt.info() != Eigen::Success) return;  // it has no information
   for (const auto& [i, of_i] : by_keyframe) {
     blocks.at(i, i) += of_i.first;
     const Matrix63d E_V = llt.solve(of_i.second.transpose()).transpose();

@@ -11,14 +11,14 @@
 namespace tutti::bundle {
 
 /// Variance of the views over the variance that they claim (sigma_px^2), at the solution: 1 where they are as good as
-/// they say. It is the median squared residual over that of unit noise, less the degrees of freedom that the landmarks
+/// claimed. It is the median squared residual over that of unit noise, less the degrees of freedom that the landmarks
 /// absorb.
 double view_variance(const BundleProblem& problem, const BundleSolution& solution);
 
 /// The joint Gauss-Newton posterior at the solution, landmarks eliminated (Schur complement). Views weigh as the robust
 /// loss left them, and less by view_variance() where it is above 1. Each robot's odometry has an unknown common scale
-/// with the prior odometry_scale_sigma: without a second camera, depth or an IMU, nothing else tells how long the steps
-/// are.
+/// with the prior odometry_scale_sigma: without a second camera, depth or an IMU, nothing else measures how long the
+/// steps are.
 class Posterior {
  public:
   /// No value when the problem does not determine every pose.

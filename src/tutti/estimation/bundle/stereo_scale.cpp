@@ -24,7 +24,7 @@ std::set<RobotId> robots_with_several(const BundleProblem& problem) {
   return out;
 }
 
-/// What the robot's images say without anybody else, and without the lengths of its odometry.
+/// What the robot's images measure without anybody else's, and without the lengths of its odometry.
 BundleProblem alone(const BundleProblem& problem, RobotId robot) {
   BundleProblem out = problem;
   out.imu.clear();
@@ -32,13 +32,13 @@ BundleProblem alone(const BundleProblem& problem, RobotId robot) {
   std::erase_if(out.observations, [&](const auto& view) { return out.cameras[view.camera].robot != robot; });
   std::erase_if(out.odometry, [&](const auto& step) { return out.keyframes[step.from].id.chain.robot != robot; });
   for (BundleOdometry& step : out.odometry) {
-    const Eigen::Vector3d t = step.measurement.T_a_b.translation;  // free by all of its length, both ways
+    const Eigen::Vector3d t = step.measurement.T_a_b.translation;  // free by all of its length, in both directions
     step.measurement.covariance.topLeftCorner<3, 3>() += t * t.transpose();
   }
   return out;
 }
 
-/// Steps weigh by how well the images know their length: those that no image spans say nothing.
+/// Steps weigh by how well the images know their length: those that no image spans have no weight.
 std::optional<StereoScale> compared(const BundleProblem& own, const std::vector<RelativePose>& odometry,
                                     const BundleSolution& solution, const Posterior& posterior,
                                     const BundleConfig& bundle, const StereoConfig& config) {
@@ -57,11 +57,11 @@ std::optional<StereoScale> compared(const BundleProblem& own, const std::vector<
     weights_m2 += weight * t.squaredNorm();
     variance_m2 += weight * weight * stated_m4;
   }
-  const WayScale way = way_scale(steps, solution, posterior);
-  if (!(way.way_m > 0.0)) return std::nullopt;
-  StereoScale out{.robot = own.keyframes[own.odometry.front().from].id.chain.robot, .ratio = way.scale};
-  const double odometry_sigma = bundle.odometry_scale_sigma * way.scale;
-  out.sigma = std::sqrt(way.variance + variance_m2 / (weights_m2 * weights_m2) + odometry_sigma * odometry_sigma);
+  const WayScale fit = way_scale(steps, solution, posterior);
+  if (!(fit.way_m > 0.0)) return std::nullopt;
+  StereoScale out{.robot = own.keyframes[own.odometry.front().from].id.chain.robot, .ratio = fit.scale};
+  const double odometry_sigma = bundle.odometry_scale_sigma * fit.scale;
+  out.sigma = std::sqrt(fit.variance + variance_m2 / (weights_m2 * weights_m2) + odometry_sigma * odometry_sigma);
   const bool is_contradicted = std::abs(out.ratio - 1.0) > config.max_sigmas * out.sigma;
   out.is_corrected = is_contradicted && config.contradicted == "correct" && out.ratio > 0.0;
   out.is_refused = is_contradicted && !out.is_corrected;
@@ -81,7 +81,7 @@ void keep_first_camera(RobotId robot, BundleProblem& problem) {
     const BundleCamera& camera = problem.cameras[view.camera];
     return camera.robot == robot && camera.index != first;
   });
-  // What one view is left of says nothing, and no pose holds it.
+  // A landmark with one view left measures nothing, and no pose constrains it.
   std::vector<std::set<std::size_t>> seen_from(problem.landmarks.size());
   for (const BundleObservation& view : problem.observations) seen_from[view.landmark].insert(view.keyframe);
   std::erase_if(problem.observations, [&](const auto& view) { return seen_from[view.landmark].size() < 2; });

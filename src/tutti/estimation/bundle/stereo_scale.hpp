@@ -11,8 +11,8 @@
 namespace tutti::bundle {
 
 struct StereoConfig {
-  /// A robot's cameras are contradicted by its odometry when the length of the way that they see differs from that of
-  /// the odometry by more than this many standard deviations: their calibration may be wrong.
+  /// A robot's cameras are contradicted by its odometry when the length of the trajectory that they see differs from
+  /// that of the odometry by more than this many standard deviations: their calibration may be wrong.
   double max_sigmas = 3.0;
   std::string contradicted = "one_camera";
   template <class V>
@@ -22,7 +22,7 @@ struct StereoConfig {
   }
 };
 
-/// Length of a robot's way as its cameras see it together, over the length by its odometry.
+/// Length of a robot's trajectory as its cameras see it together, over the length by its odometry.
 struct StereoScale {
   RobotId robot;
   double ratio = 1.0;
@@ -32,9 +32,9 @@ struct StereoScale {
 };
 
 /// Measures the scale of every robot with several cameras, by its own images alone: its odometry contributes how it
-/// turned, but not how far it went. Where images and odometry contradict each other, StereoConfig::contradicted says
-/// how `problem` is changed. `odometry`: MergedMap::odometry. Errors are those of BundleAdjuster::adjust(); robots
-/// whose adjustment fails numerically are left out of the result.
+/// turned, but not how far it went. Where images and odometry contradict each other, StereoConfig::contradicted
+/// determines how `problem` is changed. `odometry`: MergedMap::odometry. Errors are those of BundleAdjuster::adjust();
+/// robots whose adjustment fails numerically are left out of the result.
 Result<std::vector<StereoScale>> judge_stereo(BundleProblem& problem, const std::vector<RelativePose>& odometry,
                                               const BundleConfig& config, const StereoConfig& stereo);
 

@@ -48,7 +48,7 @@ TEST(StereoScale, ARightCalibrationIsBelieved) {
   EXPECT_LT(chi2, 13.0);
 }
 
-/// The ratio says by how much; the map keeps odometry's scale.
+/// The ratio shows by how much; the map keeps odometry's scale.
 TEST(StereoScale, ABaselineTenPerCentTooLongIsRefused) {
   const Outcome out = flight(longer_m(0.02)), believed = flight(longer_m(0.02), 5, 1e9);
   const StereoScale& scale = out.refined.stereo.front();
@@ -57,7 +57,7 @@ TEST(StereoScale, ABaselineTenPerCentTooLongIsRefused) {
   EXPECT_LT(out.rmse_m, 0.5 * believed.rmse_m) << out.rmse_m << " m, believed " << believed.rmse_m;
 }
 
-/// By as much as odometry says, which has errors of its own; in one scale all along, as two cameras see it.
+/// By as much as odometry measures, which has errors of its own; in one scale all along, as two cameras see it.
 TEST(StereoScale, ABaselineIsCorrectedWhereThatIsAskedFor) {
   double corrected_m = 0.0, one_camera_m = 0.0;
   for (std::uint64_t seed = 0; seed < 4; ++seed) {

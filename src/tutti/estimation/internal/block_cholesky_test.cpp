@@ -85,7 +85,7 @@ Eigen::MatrixXd fill(const BlockStructure& structure, BlockCholesky& matrix, Rng
   return dense;
 }
 
-/// By the rows that its supernodes say.
+/// By the rows of its supernodes.
 template <int B>
 Eigen::MatrixXd dense_of(const CholeskyFactor& factor) {
   const auto size = static_cast<Eigen::Index>(B * factor.block_columns());

@@ -21,14 +21,14 @@ using Pair = std::pair<int, int>;  // column < row
 /// Per node: fixed, or the first of a component without a fixed one.
 std::vector<bool> anchors(const BlockStructure& s, std::span<const std::size_t> fixed) {
   std::vector<bool> anchored(s.component.size(), false);
-  std::vector<bool> held(s.components, false);  // per component
-  const auto anchor = [&](std::size_t i) { anchored[i] = held[s.component[i]] = true; };
+  std::vector<bool> anchored_component(s.components, false);  // per component
+  const auto anchor = [&](std::size_t i) { anchored[i] = anchored_component[s.component[i]] = true; };
   for (const std::size_t i : fixed) {
     TUTTI_CHECK(i < anchored.size(), "fixed node {} of {} nodes", i, anchored.size());
     anchor(i);
   }
   for (std::size_t i = 0; i < anchored.size(); ++i)
-    if (!held[s.component[i]]) anchor(i);
+    if (!anchored_component[s.component[i]]) anchor(i);
   return anchored;
 }
 

@@ -117,8 +117,8 @@ RunSum sum_about(std::span<const RelativePose> steps, std::span<const Pose3> pos
 }
 
 PoseGraphEdge as_edge(const RunSum& run, std::size_t from, std::size_t to) {
-  // At b, the run says delta_b - Ad(T_a_b^-1) delta_a = at_b. An edge measured as below has the residual J_b times
-  // -at_b and J_a = -J_b Ad(T_a_b^-1), with J_b = diag(Exp(-at_b), Jr^-1(-at_b)) of the rotation's part.
+  // At b, the run's residual is delta_b - Ad(T_a_b^-1) delta_a = at_b. An edge measured as below has the residual J_b
+  // times -at_b and J_a = -J_b Ad(T_a_b^-1), with J_b = diag(Exp(-at_b), Jr^-1(-at_b)) of the rotation's part.
   const Vector6d at_b = adjoint(run.T_a_b.inverse()) * run.offset;
   Matrix6d J_b_inverse = Matrix6d::Zero();
   J_b_inverse.topLeftCorner<3, 3>() = so3_exp(at_b.tail<3>()).toRotationMatrix();

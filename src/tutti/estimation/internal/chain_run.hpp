@@ -11,7 +11,7 @@
 namespace tutti::estimation::internal {
 
 /// A run of odometry steps T_k-1_k, k = 1..m, between two nodes a = 0 and b = m, linearised about poses X_k. With
-/// E_k = X_k-1^-1 X_k and r_k = local(T_k-1_k, E_k), a step says
+/// E_k = X_k-1^-1 X_k and r_k = local(T_k-1_k, E_k), a step gives
 ///   delta_k = Ad(E_k^-1) delta_k-1 + b_k + w_k,   b_k = -G_k^-1 r_k,   w_k ~ N(0, G_k^-1 Q_k G_k^-T),
 /// G_k = d r_k / d delta_k. In the tangent of node a, zeta_k = Ad(C_k) delta_k with C_k = X_a^-1 X_k, the transport is
 /// the identity, so a whole run is a plain sum of its steps:

@@ -40,7 +40,7 @@ RC_GTEST_PROP(ChainRun, SumsAboutRawOdometryAgree, ()) {
   RC_ASSERT(local(raw.T_a_b, about.T_a_b).norm() < 1e-10);
 }
 
-/// Two ways to the same poses, from gaps of a micrometre to gaps of a metre and a radian.
+/// Two computations of the same poses, from gaps of a micrometre to gaps of a metre and a radian.
 RC_GTEST_PROP(ChainRun, BendingRawOdometryIsBendingAboutIt, ()) {
   Rng rng(*rc::gen::arbitrary<std::uint32_t>());
   const Run run = any_run(rng);

@@ -84,14 +84,14 @@ Eigen::MatrixXd posterior_samples(const CholeskyFactor& factor, std::span<const 
 
 Eigen::MatrixXd posterior_covariance(const CholeskyFactor& factor, std::span<const int> variables) {
   std::vector<Matrix6d> y(factor.block_columns(), Matrix6d::Zero());
-  struct Way {
+  struct Path {
     std::vector<std::size_t> block;  // ascending
     std::vector<Matrix6d> y;
   };
-  std::vector<Way> ways(variables.size());
+  std::vector<Path> paths(variables.size());
   for (std::size_t v = 0; v < variables.size(); ++v) {
     if (variables[v] < 0) continue;
-    Way& way = ways[v];
+    Path& path = paths[v];
     y[static_cast<std::size_t>(variables[v])].setIdentity();
     for (std::optional<std::size_t> j = static_cast<std::size_t>(variables[v]); j;) {
       const CholeskyFactor::Column column(factor, *j);
@@ -106,22 +106,22 @@ Eigen::MatrixXd posterior_covariance(const CholeskyFactor& factor, std::span<con
         Matrix6d& y_i = y[column.row(b)];
         for (int c = 0; c < 6; ++c) y_i.noalias() -= L_ij.col(c) * y_j.row(c);
       }
-      way.block.push_back(*j);
-      way.y.push_back(y_j);
+      path.block.push_back(*j);
+      path.y.push_back(y_j);
       j = column.parent();
     }
-    for (const std::size_t j : way.block) y[j].setZero();
+    for (const std::size_t j : path.block) y[j].setZero();
   }
   const auto size = static_cast<Eigen::Index>(6 * variables.size());
   Eigen::MatrixXd out = Eigen::MatrixXd::Zero(size, size);
-  for (std::size_t a = 0; a < ways.size(); ++a)
-    for (std::size_t b = a; b < ways.size(); ++b) {
+  for (std::size_t a = 0; a < paths.size(); ++a)
+    for (std::size_t b = a; b < paths.size(); ++b) {
       Matrix6d sum = Matrix6d::Zero();
-      for (std::size_t i = 0, k = 0; i < ways[a].block.size() && k < ways[b].block.size();) {
-        if (ways[a].block[i] == ways[b].block[k])
-          sum.noalias() += ways[a].y[i++].transpose() * ways[b].y[k++];
+      for (std::size_t i = 0, k = 0; i < paths[a].block.size() && k < paths[b].block.size();) {
+        if (paths[a].block[i] == paths[b].block[k])
+          sum.noalias() += paths[a].y[i++].transpose() * paths[b].y[k++];
         else
-          ways[a].block[i] < ways[b].block[k] ? ++i : ++k;
+          paths[a].block[i] < paths[b].block[k] ? ++i : ++k;
       }
       const auto row = static_cast<Eigen::Index>(6 * a), column = static_cast<Eigen::Index>(6 * b);
       out.block<6, 6>(row, column) = sum;

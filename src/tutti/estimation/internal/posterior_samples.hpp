@@ -18,7 +18,7 @@ Eigen::MatrixXd posterior_samples(const CholeskyFactor& factor, std::span<const 
                                   Rng rng);
 
 /// The rows and columns of (L L^T)^-1 that belong to these block variables (6 each; < 0: anchored, zero), exactly: Y^T
-/// Y with Y = L^-1 E, every column of which is zero but on the way from its variable to the root of the elimination
+/// Y with Y = L^-1 E, every column of which is zero but on the path from its variable to the root of the elimination
 /// tree.
 Eigen::MatrixXd posterior_covariance(const CholeskyFactor& factor, std::span<const int> variables);
 

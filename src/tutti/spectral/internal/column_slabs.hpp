@@ -10,8 +10,8 @@
 namespace tutti::spectral::internal {
 
 /// A sparse symmetric matrix laid out for products with very many vectors, sixteen at a time and in single precision:
-/// every coefficient is read once for all sixteen, whose entries of one node lie side by side. For samples, which say
-/// nothing beyond a few per cent; for few vectors, and to full precision, see RowBlocks.
+/// every coefficient is read once for all sixteen, whose entries of one node lie side by side. For samples, which are
+/// no more accurate than a few per cent; for few vectors, and to full precision, see RowBlocks.
 class ColumnSlabs {
  public:
   static constexpr std::size_t kLanes = 16;

@@ -96,12 +96,12 @@ RowBlocks::Wave RowBlocks::wave(std::size_t cache_bytes) const {
   Wave out{.rows = static_cast<std::ptrdiff_t>(blocks), .reach = reach_};
   if (bytes <= cache_bytes) return out;
   // Half of the cache for the rows, half for those that the steps lie behind each other.
-  const auto held = static_cast<std::ptrdiff_t>(static_cast<double>(cache_bytes) / static_cast<double>(bytes) *
-                                                static_cast<double>(blocks));
-  const std::ptrdiff_t steps = held / 2 / std::max<std::ptrdiff_t>(reach_, 1);
+  const auto cached = static_cast<std::ptrdiff_t>(static_cast<double>(cache_bytes) / static_cast<double>(bytes) *
+                                                  static_cast<double>(blocks));
+  const std::ptrdiff_t steps = cached / 2 / std::max<std::ptrdiff_t>(reach_, 1);
   if (steps < 2) return out;
   out.steps = static_cast<std::size_t>(steps);
-  out.rows = held / 2;
+  out.rows = cached / 2;
   return out;
 }
 

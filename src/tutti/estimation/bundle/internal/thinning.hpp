@@ -10,7 +10,7 @@ namespace tutti::bundle::internal {
 std::size_t thin_landmarks(BundleProblem& problem, std::size_t per_keyframe);
 
 /// Takes their views from keyframes of whose landmarks nine in ten have `other_views` views elsewhere, never from two
-/// neighbours in the list; odometry still holds them. Returns how many keyframes gave up theirs.
+/// neighbours in the list; odometry still constrains them. Returns how many keyframes gave up theirs.
 std::size_t thin_keyframes(BundleProblem& problem, std::size_t other_views);
 
 /// Drops landmarks that fewer than two views are left of, and numbers the others anew. Returns how many went.
