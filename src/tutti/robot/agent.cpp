@@ -172,7 +172,7 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, const StageO
     odometry_disagreement = (*test)(consistency::odometry_at(own, pairs));
   }
   const std::size_t withdrawn = state_.ledger.withdraw_unknown(graph, chain_);
-  const consistency::Ledger held = state_.ledger;
+  const consistency::Ledger kept = state_.ledger;
   const auto selection = policy_->choose({.graph = graph,
                                           .chain = chain_,
                                           .nodes = own,
@@ -187,7 +187,7 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, const StageO
   summary.optimised = optimise();
   if (!estimation::is_usable(summary.optimised)) {
     summary.taken_back = true;
-    state_.ledger = held;
+    state_.ledger = kept;
     if (!estimation::is_usable(optimise())) {
       state_.ledger = {};
       optimise();

@@ -62,7 +62,7 @@ struct UpdateSummary {
   consistency::LedgerUpdate ledger;  ///< What the update did to the ledger.
   /// How the optimisation with the new constraints ended.
   estimation::Termination optimised = estimation::Termination::not_run;
-  /// The optimisation failed. The ledger then holds what it held before, without withdrawn constraints; or nothing if
+  /// The optimisation failed. The ledger is then what it was before, without withdrawn constraints; or nothing if
   /// that fails too.
   bool taken_back = false;
   /// Where raw odometry differs from the server's map; empty unless AgentConfig::explain.
@@ -143,7 +143,7 @@ class RobotAgent {
   [[nodiscard]] bool wants_scan(Timestamp stamp) const { return submaps_.wants_scan(stamp); }
   [[nodiscard]] bool wants_images(Timestamp stamp) const { return submaps_.wants_images(stamp); }
   [[nodiscard]] NextKeyframe next_keyframe() const { return submaps_.next_keyframe(); }
-  /// Stamp of the newest keyframe before this moment; nothing when there is none.
+  /// Stamp of the newest keyframe before this time; nothing when there is none.
   [[nodiscard]] std::optional<Timestamp> keyframe_before(Timestamp stamp) const;
   /// Sets SubmapConfig::has_scans and has_images, for a robot of which they become known after its start.
   void expect_sensors(bool scans, bool images);
@@ -230,7 +230,7 @@ class RobotAgent {
   std::unique_ptr<const consistency::ConstraintPolicy> policy_;
   SubmapBuilder submaps_;
   estimation::OnboardSmoother smoother_;
-  AgentState state_;  // without what submaps_ and smoother_ hold
+  AgentState state_;  // without the state of submaps_ and smoother_
   std::vector<OdometryJump> jumps_;
 };
 

@@ -37,7 +37,7 @@ TEST_P(AgentPolicies, CorrectsTheRobotFromAnUnrelatedFrame) {
   EXPECT_LT(local(agent.keyframes().front().T_odom_body, agent.corrected().front().pose).norm(), 1e-9);
 }
 
-/// Odometry in the plane says nothing of height, roll and pitch; an unknown one says that it knows nothing.
+/// Odometry in the plane is unsure of height, roll and pitch; an unknown one is unsure of everything.
 TEST_P(AgentPolicies, CorrectsOdometryInThePlaneAndOfUnknownHeight) {
   for (const double others : {0.0, 1e6, 1e20}) {
     AgentConfig config;
@@ -59,7 +59,7 @@ TEST_P(AgentPolicies, CorrectsOdometryInThePlaneAndOfUnknownHeight) {
   }
 }
 
-/// Two sessions of three robots, side by side on one way, the last of them in a map of its own.
+/// Two sessions of three robots, side by side on one trajectory, the last of them in a map of its own.
 ProxyGraphMessage everybodys(const RobotAgent& agent, std::uint64_t revision, bool reduced) {
   const ProxyGraphMessage sent = broadcast(agent, revision, kWorld);
   std::vector<consistency::ServerNode> nodes;
@@ -245,7 +245,7 @@ TEST(Agent, SynchronisesWithItsOwnSessionAndSeesTheOthersInTheirNewest) {
   }
   ProxyNode newest = message.graph.nodes.back();
   newest.chain.session = 3;
-  newest.stamp = at(2);  // its newest session, whatever the stamps say
+  newest.stamp = at(2);  // its newest session, whatever the stamps
   newest.T_world_body = kWorld * true_pose(11);
   ProxyGraphMessage both = message;
   both.graph.nodes.insert(both.graph.nodes.begin(), older.begin(), older.end());
@@ -312,8 +312,8 @@ TEST(Agent, SaysWhereTheRobotIsNow) {
   EXPECT_EQ(revision, 2U);
 }
 
-// The default policy looks at none of it, and it takes longer than all the rest of an update.
-TEST(Agent, ComparesGraphSignalsOnlyForWhoLooksAtThem) {
+// The default policy uses none of it, and it takes longer than all the rest of an update.
+TEST(Agent, ComparesGraphSignalsOnlyForPoliciesThatUseThem) {
   const auto order = [](const char* policy) {
     AgentConfig config;
     config.policy.name = policy;

@@ -19,7 +19,7 @@ struct Variances {
   double position_m2 = 0.0, rotation_rad2 = 0.0;
 };
 
-/// One node against the whole chain: what the map says of all scales together, and never less than the chain's mean.
+/// One node against the whole chain: the map's covariance of all scales together, and never less than the chain's mean.
 Variances at_node(const ChainUncertainty& known, std::size_t node) {
   Variances out;
   for (const ScaleUncertainty& scale : known.scales) {
@@ -41,8 +41,8 @@ Matrix6d step_by_step(std::span<const ProxyNode> nodes, std::size_t from, std::s
   return out;
 }
 
-/// Both ends against the whole chain, which may err in opposite ways, and the way between them a lever of the first
-/// one's rotation.
+/// Both ends against the whole chain, which may err in opposite ways, and the distance between them a lever of the
+/// first one's rotation.
 Matrix6d end_to_end(const ChainUncertainty& known, std::span<const ProxyNode> nodes, std::size_t from, std::size_t to) {
   const Variances a = at_node(known, from), b = at_node(known, to);
   const double lever_m2 = (nodes[to].T_world_body.translation - nodes[from].T_world_body.translation).squaredNorm();

@@ -10,7 +10,7 @@
 namespace tutti::robot {
 
 /// The covariance of T_map_body of the newest keyframe: right tangent, as seen from the first keyframe, where `map`
-/// begins. Over the segments that the ledger's constraints span, it is what the map says of its own accuracy; before,
+/// begins. Over the segments that the ledger's constraints span, it is the map's own covariance; before,
 /// between and behind them it is odometry's (docs/math.md, "How sure a robot is"). `graph` is the whole map, before
 /// consistency::without_doubted(); `stamps` are those of the smoother's nodes.
 Matrix6d map_covariance(const ProxyGraph& graph, const ChainId& chain, std::span<const Timestamp> stamps,

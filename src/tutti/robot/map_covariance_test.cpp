@@ -36,8 +36,8 @@ struct Scene {
   [[nodiscard]] consistency::Ledger linked(std::size_t from, std::size_t to) const {
     return consistency::Ledger({{.from_stamp = stamps[from], .to_stamp = stamps[to], .from = from, .to = to}});
   }
-  [[nodiscard]] Matrix6d covariance(const consistency::Ledger& held) const {
-    return map_covariance(graph, kAlpha, stamps, held, smoother);
+  [[nodiscard]] Matrix6d covariance(const consistency::Ledger& kept) const {
+    return map_covariance(graph, kAlpha, stamps, kept, smoother);
   }
   std::vector<Pose3> truth;
   ProxyGraph graph;
@@ -47,7 +47,7 @@ struct Scene {
 };
 
 // Closures at every 40th or 10th node, loose and tight: the newest node as seen from the first lies within it, and it
-// is not so large that it says nothing.
+// is not so large that it is useless.
 TEST(MapCovariance, HoldsTheErrorsOfMapsThatItSpeaksOf) {
   const PoseSigma step{0.02, 0.002};
   for (const std::size_t every : {10UL, 40UL})

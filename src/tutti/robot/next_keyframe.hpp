@@ -9,7 +9,7 @@
 
 namespace tutti::robot {
 
-/// Tells when the next keyframe is due: after some travel, rotation or time since the last one.
+/// Determines when the next keyframe is due: after some travel, rotation or time since the last one.
 struct NextKeyframe {
   /// T_odom_body of the last keyframe; nothing when there is none, and one is due at once.
   std::optional<StampedPose> last;

@@ -9,8 +9,8 @@
 
 namespace tutti::robot {
 
-/// How much to trust real odometry that comes without covariance. Variances add up along the way, so dividing a step in
-/// two changes nothing.
+/// How much to trust real odometry that comes without covariance. Variances add up along the trajectory, so dividing a
+/// step in two changes nothing.
 struct OdometryCovarianceConfig {
   double translation_m_per_sqrt_m = 0.02;
   double translation_m_per_sqrt_deg = 0.001;

@@ -53,7 +53,7 @@ struct Case {
 /// The front end begins anew at the origin; it is elsewhere by 500 m, by 5 m.
 class Jumps : public testing::TestWithParam<std::tuple<double, bool, Case>> {};
 
-TEST_P(Jumps, AreToldAndTheRobotGoesOnFromWhereItIs) {
+TEST_P(Jumps, AreReportedAndTheRobotGoesOnFromWhereItIs) {
   const auto& [rate_hz, with_scans, jump] = GetParam();
   const auto& [what, at_s, offset_m, jump_m] = jump;
   RobotAgent agent(RobotId{1}, 1, {}), undisturbed(RobotId{1}, 1, {});
@@ -65,7 +65,8 @@ TEST_P(Jumps, AreToldAndTheRobotGoesOnFromWhereItIs) {
   ASSERT_EQ(fed.jumps.size(), 1U);
   EXPECT_NEAR(fed.jumps[0].translation_m, jump_m, 0.3);
   EXPECT_NEAR(fed.jumps[0].to - at(0), at_s, 1e-9);
-  // The way of one step is not known: the robot is where it would be, but for that, and knows it.
+  // The motion of one step is not known: the robot is where it would be but for that step, and its covariance includes
+  // it.
   EXPECT_LT((agent.T_odom_body().translation - undisturbed.T_odom_body().translation).norm(), 1.01 / rate_hz);
   EXPECT_LT(sigma_m(undisturbed), 1.0);
   EXPECT_GT(sigma_m(agent), 9.0);
@@ -121,7 +122,7 @@ TEST(OdometryJumps, AStampTwiceOrOfBeforeIsRefusedAndTheRobotGoesOn) {
   EXPECT_EQ(agent.T_odom_body(), ahead(10.0));
 }
 
-/// What the server says takes the uncertainty away, and the robot's own answers go on from there.
+/// The server's map takes the uncertainty away, and the robot's own answers go on from there.
 TEST(OdometryJumps, TheMapSaysWhereTheRobotIsAfterwards) {
   AgentConfig config;
   RobotAgent agent(RobotId{1}, 1, config);

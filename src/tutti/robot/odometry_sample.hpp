@@ -7,7 +7,7 @@
 #include "tutti/base/result.hpp"
 #include "tutti/robot/sensor_timeline.hpp"
 
-/// Which odometry a robot accepts, also for code that looks at samples before the robot does.
+/// Which odometry a robot accepts, also for code that checks samples before the robot does.
 namespace tutti::robot {
 
 /// The sample as the robot uses it: the quaternion normalised where it is off by rounding (1e-3), the covariance given

@@ -27,7 +27,7 @@ struct OdometryWatchConfig {
 /// unknown.
 struct OdometryJump {
   Timestamp from, to;
-  double translation_m = 0.0, rotation_rad = 0.0;  ///< As the odometry says.
+  double translation_m = 0.0, rotation_rad = 0.0;  ///< As in the odometry.
   friend bool operator==(const OdometryJump&, const OdometryJump&) = default;
 };
 /// Text such as "odometry jumps by 500.0 m and 0.0 degrees within 0.100 s at 1700000000000000000 ns".
@@ -39,7 +39,7 @@ std::string to_string(const OdometryJump& jump);
 ///
 /// What a body can do in a step of dt: a slack (1 m, 30 degrees: noise, and corrections by the front end), plus dt
 /// times the allowed speed. This is ten times the greatest speed so far, plus what an acceleration of 10 m/s^2 (50
-/// rad/s^2) adds within dt, but at most what the settings say; for the first step only the settings count. A step
+/// rad/s^2) adds within dt, but at most what the settings allow; for the first step only the settings count. A step
 /// raises the greatest speed only as far as that acceleration allows.
 class OdometryWatch {
  public:

@@ -20,17 +20,17 @@ Pose3 ahead(double x_m, double yaw_rad = 0.0) {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ())), {x_m, 0.0, 0.0}};
 }
 
-/// How many jumps are told when odometry at this speed and rate is elsewhere by `jump` from some time on.
+/// How many jumps are reported when odometry at this speed and rate is elsewhere by `jump` from some time on.
 int jumps(double speed_mps, double rate_hz, const Pose3& jump, double seconds = 20.0) {
   OdometryWatch watch;
-  int told = 0;
+  int reported = 0;
   const int samples = static_cast<int>(seconds * rate_hz);
   for (int i = 0; i < samples; ++i) {
     const double t = i / rate_hz;
     const Pose3 T = ahead(speed_mps * t);
-    if (watch.take({kStart + t, i < samples / 2 ? T : jump * T}).jump) ++told;
+    if (watch.take({kStart + t, i < samples / 2 ? T : jump * T}).jump) ++reported;
   }
-  return told;
+  return reported;
 }
 
 TEST(OdometryWatch, TellsWhatNoBodyDoes) {
@@ -65,12 +65,12 @@ TEST(OdometryWatch, LetsAGapInTheDataBe) {
   for (const double speed_mps : {1.0, 15.0, 40.0})
     for (const double gap_s : {1.0, 10.0, 600.0}) {
       OdometryWatch watch;
-      int told = 0;
+      int reported = 0;
       for (int i = 0; i < 200; ++i) {
         const double t = 0.1 * i + (i < 100 ? 0.0 : gap_s);
-        if (watch.take({kStart + t, ahead(speed_mps * t, 0.3 * t)}).jump) ++told;
+        if (watch.take({kStart + t, ahead(speed_mps * t, 0.3 * t)}).jump) ++reported;
       }
-      EXPECT_EQ(told, 0) << speed_mps << " m/s, " << gap_s << " s";
+      EXPECT_EQ(reported, 0) << speed_mps << " m/s, " << gap_s << " s";
     }
   // From rest: during the gap a car has started.
   OdometryWatch watch;
@@ -81,13 +81,13 @@ TEST(OdometryWatch, LetsAGapInTheDataBe) {
 TEST(OdometryWatch, NoiseAtAHighRateIsNoSpeed) {
   OdometryWatch watch;
   Rng rng(1);
-  int told = 0;
+  int reported = 0;
   for (int i = 0; i < 20'000; ++i) {
     Vector6d noise;
     for (double& x : noise) x = 0.01 * rng.normal();
-    if (watch.take({kStart + 0.001 * i, retract(ahead(0.001 * i), noise)}).jump) ++told;
+    if (watch.take({kStart + 0.001 * i, retract(ahead(0.001 * i), noise)}).jump) ++reported;
   }
-  EXPECT_EQ(told, 0);
+  EXPECT_EQ(reported, 0);
   EXPECT_TRUE(watch.take({kStart + 20.0, ahead(25.0)}).jump.has_value());
 }
 
@@ -111,12 +111,12 @@ TEST(OdometryWatch, AStampThatDoesNotFollowChangesNothing) {
   EXPECT_EQ(watch.state(), before);
 }
 
-/// Jumps or not, what comes out moves as the robot does, and tells how the frame of the front end lies in it.
+/// Jumps or not, what comes out moves as the robot does, and states how the frame of the front end lies in it.
 RC_GTEST_PROP(OdometryWatch, WhatComesOutNeverJumps, ()) {
   Rng rng(*rc::gen::arbitrary<std::uint32_t>());
   OdometryWatch watch;
   Pose3 truth, T_fed_odom, last;
-  int made = 0, told = 0;
+  int made = 0, reported = 0;
   for (int i = 0; i < 400; ++i) {
     Vector6d motion, elsewhere;
     for (double& x : motion) x = 0.02 * rng.normal();
@@ -130,7 +130,7 @@ RC_GTEST_PROP(OdometryWatch, WhatComesOutNeverJumps, ()) {
     }
     const Pose3 fed = T_fed_odom * truth;
     const auto step = watch.take({kStart + 0.1 * i, fed});
-    if (step.jump) ++told;
+    if (step.jump) ++reported;
     if (made == 0) RC_ASSERT(step.T_odom_body == fed);
     if (i > 0) RC_ASSERT((step.T_odom_body.translation - last.translation).norm() < 0.5);
     RC_ASSERT(local(watch.T_odom_fed() * fed, step.T_odom_body).norm() < 1e-6);
@@ -139,8 +139,8 @@ RC_GTEST_PROP(OdometryWatch, WhatComesOutNeverJumps, ()) {
     if (rng.bernoulli(0.1)) watch = OdometryWatch({}, watch.state());
   }
   // A jump may by chance lead where the robot is.
-  RC_ASSERT(told <= made);
-  RC_ASSERT(2 * told >= made);
+  RC_ASSERT(reported <= made);
+  RC_ASSERT(2 * reported >= made);
 }
 
 }  // namespace odometry_watch_test

@@ -28,11 +28,11 @@ struct OdometryStep {
 /// Two consecutive steps as one, to the end of the second; neither may be a jump.
 OdometryStep joined(const OdometryStep& first, const OdometryStep& second);
 
-/// Divides the step from `from` to `to` at a moment between them: straight motion with a constant turn rate, covariance
+/// Divides the step from `from` to `to` at a time between them: straight motion with a constant turn rate, covariance
 /// in proportion to time. Compounding the two gives the step again, up to rounding.
 std::pair<OdometryStep, OdometryStep> split(const StampedPose& from, const OdometryStep& to, Timestamp at);
 
-/// What sensors saw at one moment. With neither, it is a moment at which a sensor saw something that nobody keeps.
+/// What sensors saw at one time. With neither, it is a time at which a sensor saw something that nobody keeps.
 struct SensorSample {
   Timestamp stamp;
   std::optional<Scan> scan;
@@ -49,16 +49,16 @@ struct SensorTimeline {
 
   /// Adds a step after the newest one.
   void add(const OdometryStep& step);
-  /// Adds sensor data, to what another sensor saw at the same moment if there is any.
+  /// Adds sensor data, to what another sensor saw at the same time if there is any.
   void add(SensorSample sample);
-  /// The pose at a moment not before `last`, the last step that was taken; nothing after the newest step.
+  /// The pose at a time not before `last`, the last step that was taken; nothing after the newest step.
   [[nodiscard]] std::optional<Pose3> pose_at(const StampedPose& last, Timestamp at) const;
 
   struct Moment {
     OdometryStep step;
     std::optional<SensorSample> sensors;
   };
-  /// Takes the next moment of the stream, unless it is after `until`. `last` is the last step that was taken.
+  /// Takes the next instant of the stream, unless it is after `until`. `last` is the last step that was taken.
   std::optional<Moment> take(const StampedPose& last, Timestamp until);
 };
 

@@ -146,11 +146,11 @@ TEST(SensorTimeline, ScansThatAreLaterThanTheLagAreInTheMapAllTheSame) {
     EXPECT_GE(drive.scans_[i], submaps[i].keyframes.size() / 2) << i;
     ASSERT_NE(submaps[i].cloud, nullptr);
     // 5 m ahead of where the scan was taken, not of where it was heard.
-    const double way = submaps[i].keyframes.back().T_odom_body.translation.x() -
-                       submaps[i].keyframes.front().T_odom_body.translation.x();
+    const double distance = submaps[i].keyframes.back().T_odom_body.translation.x() -
+                            submaps[i].keyframes.front().T_odom_body.translation.x();
     for (const Eigen::Vector3f& p : submaps[i].cloud->points) {
       EXPECT_GT(p.x(), 5.0 - 1.0);
-      EXPECT_LT(p.x(), 5.0 + way + 1e-3);
+      EXPECT_LT(p.x(), 5.0 + distance + 1e-3);
     }
   }
 }
@@ -175,7 +175,7 @@ TEST(SensorTimeline, KeyframesDoNotWaitForASensorThatIsSilent) {
   for (std::size_t i = 1; i < keyframes.size(); ++i) longest_s = std::max(longest_s, keyframes[i] - keyframes[i - 1]);
   EXPECT_LE(longest_s, 0.3 + SubmapBuilder::kPatience_s + 0.02);
   EXPECT_GT(longest_s, 1.0);
-  EXPECT_GT(keyframes.size(), 50U);  // one per 0.3 or 0.4 m, but for the moment of patience
+  EXPECT_GT(keyframes.size(), 50U);  // one per 0.3 or 0.4 m, but for the time of patience
 }
 
 TEST(SensorTimeline, ImagesAreAtKeyframesWhateverTheirStamps) {

@@ -8,8 +8,8 @@
 
 namespace tutti::robot {
 
-/// Tells which stamps of a robot's odometry to believe. One wrong stamp must not shut out all that come after it, and a
-/// clock that was set back or began anew must not either. The verdicts are a function of the stamps so far.
+/// Decides which stamps of a robot's odometry to believe. One wrong stamp must not shut out all that come after it, and
+/// a clock that was set back or began anew must not either. The verdicts are a function of the stamps so far.
 class StampWatch {
  public:
   static constexpr double kFar_s = 60.0;  ///< A step of more than this needs a second stamp that confirms it.

@@ -44,12 +44,12 @@ Result<VisualPayload> see(const Submap& submap, const std::vector<TrackedImages>
   std::vector<visual::KeyframeImages> seen;
   std::vector<Vector6d> drift{Vector6d::Zero()};  // variances since the submap's begin
   for (const RelativePose& step : submap.odometry) drift.push_back(drift.back() + step.covariance.diagonal());
-  for (const TrackedImages& moment : images) {
-    const auto keyframe = std::ranges::find(submap.keyframes, moment.stamp, &Keyframe::stamp);
-    TUTTI_CHECK(keyframe != submap.keyframes.end(), "images at {} ns of no keyframe", moment.stamp.ns);
+  for (const TrackedImages& instant : images) {
+    const auto keyframe = std::ranges::find(submap.keyframes, instant.stamp, &Keyframe::stamp);
+    TUTTI_CHECK(keyframe != submap.keyframes.end(), "images at {} ns of no keyframe", instant.stamp.ns);
     const Vector6d& variance = drift[static_cast<std::size_t>(keyframe - submap.keyframes.begin())];
     seen.push_back({keyframe->index, submap.keyframes.front().T_odom_body.inverse() * keyframe->T_odom_body,
-                    moment.images, variance.tail<3>().mean(), variance.head<3>().mean()});
+                    instant.images, variance.tail<3>().mean(), variance.head<3>().mean()});
   }
   auto payload = visual::make_visual_payload(seen, *images.front().cameras, config);
   if (!payload) return in_context("images of submap " + to_string(submap.id), payload.error());
@@ -107,7 +107,7 @@ RelativePose SubmapBuilder::since_keyframe() const {
   return since;
 }
 
-/// What sensors saw at moments of which nobody knows where the robot was.
+/// What sensors saw at times for which the robot's pose is unknown.
 void SubmapBuilder::drop_between(Timestamp before, Timestamp after, const std::string& why) {
   std::erase_if(state_.waiting.sensors, [&](const SensorSample& sample) {
     const bool is_between = sample.stamp > before && sample.stamp < after;
@@ -146,13 +146,13 @@ void SubmapBuilder::advance() {
     const std::optional<Timestamp>& heard = has_images() ? state_.heard_images : state_.heard_scan;
     if (heard) until = std::max(until, *heard);
   }
-  while (auto moment = state_.waiting.take(state_.recent.back(), until)) take(std::move(*moment));
+  while (auto instant = state_.waiting.take(state_.recent.back(), until)) take(std::move(*instant));
 }
 
-bool SubmapBuilder::makes_keyframe(const SensorTimeline::Moment& moment) {
-  const OdometryStep& step = moment.step;
+bool SubmapBuilder::makes_keyframe(const SensorTimeline::Moment& instant) {
+  const OdometryStep& step = instant.step;
   const bool has_sensors = has_scans() || has_images();
-  const bool is_waited_for = moment.sensors && (moment.sensors->images || !moment.sensors->scan || !has_images());
+  const bool is_waited_for = instant.sensors && (instant.sensors->images || !instant.sensors->scan || !has_images());
   if (is_waited_for) state_.is_blind = false;
   if (!is_keyframe(step.stamp, step.T_odom_body)) return false;
   if (state_.keyframes.empty() || !has_sensors || is_waited_for || state_.is_blind) return true;
@@ -178,10 +178,10 @@ void SubmapBuilder::take_jump(const OdometryStep& jump) {
   state_.recent = {{jump.stamp, jump.T_odom_body}};
 }
 
-void SubmapBuilder::take(SensorTimeline::Moment moment) {
-  const auto& [stamp, T_odom_body, covariance, is_jump] = moment.step;
+void SubmapBuilder::take(SensorTimeline::Moment instant) {
+  const auto& [stamp, T_odom_body, covariance, is_jump] = instant.step;
   if (is_jump) {
-    take_jump(moment.step);
+    take_jump(instant.step);
   } else {
     if (!state_.recent.empty()) {
       const Pose3 step = state_.recent.back().pose.inverse() * T_odom_body;
@@ -191,10 +191,10 @@ void SubmapBuilder::take(SensorTimeline::Moment moment) {
     remember(stamp, T_odom_body);
     place_fixes();
     if (!state_.finished.empty()) state_.finished.back().awaits_images = false;
-    if (makes_keyframe(moment)) add_keyframe(stamp, T_odom_body);
+    if (makes_keyframe(instant)) add_keyframe(stamp, T_odom_body);
   }
-  if (!moment.sensors) return;
-  auto& [at, scan, images] = *moment.sensors;
+  if (!instant.sensors) return;
+  auto& [at, scan, images] = *instant.sensors;
   if (images && state_.keyframes.back().stamp == stamp) keep(*images);
   if (!scan || state_.keyframes_without_scan == 0) return;
   if (const auto undistorted_scan = undistorted(*scan))
@@ -252,7 +252,7 @@ bool SubmapBuilder::wants_images(Timestamp stamp) const {
   return stamp == state_.recent.back().stamp && stamp == state_.keyframes.back().stamp;
 }
 
-/// That odometry is, or will be, at this moment.
+/// Whether odometry covers this time, or will.
 Status SubmapBuilder::check_moment(Timestamp stamp, const char* what) const {
   const auto newest = newest_sample();
   if (!newest || stamp - *newest > kLongestGap_s)
@@ -390,8 +390,8 @@ std::optional<Submap> SubmapBuilder::take_submap() {
 
 void SubmapBuilder::finish() {
   if (state_.recent.empty()) return;
-  while (auto moment = state_.waiting.take(state_.recent.back(), Timestamp{std::numeric_limits<std::int64_t>::max()}))
-    take(std::move(*moment));
+  while (auto instant = state_.waiting.take(state_.recent.back(), Timestamp{std::numeric_limits<std::int64_t>::max()}))
+    take(std::move(*instant));
   if (state_.keyframes.size() < 2) return;
   close_submap();
   start_submap(state_.keyframes.back());

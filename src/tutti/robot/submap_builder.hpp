@@ -103,14 +103,14 @@ struct SubmapBuilderState {
 };
 
 /// Turns raw odometry and sensor data into keyframes and overlapping submaps. It never gets corrections, so a submap
-/// cannot carry what the server said before.
+/// cannot carry what the server sent before.
 ///
 /// Odometry and sensors have rates of their own. A robot with sensors has its keyframes where they see: at the first
-/// images (without a camera, the first scan) at which a keyframe is due, with odometry interpolated to that moment. A
-/// plain odometry sample becomes a keyframe only when no sensor is heard for `kPatience_s` after one is due.
+/// images (without a camera, the first scan) at which a keyframe is due, with odometry interpolated to that time. A
+/// plain odometry sample becomes a keyframe only when no sensor data arrives for `kPatience_s` after one is due.
 ///
-/// For this the builder works with a delay: moments are settled when they are `kLag_s` old, or older than what the
-/// sensor sent last. A scan that arrives after its moment was settled is still merged where it belongs; such images are
+/// For this the builder works with a delay: times are settled when they are `kLag_s` old, or older than what the
+/// sensor sent last. A scan that arrives after its time was settled is still merged where it belongs; such images are
 /// refused. Where every sample has its scan or images, nothing is delayed; a robot that is not known to have a sensor
 /// has its keyframes at once.
 class SubmapBuilder {
@@ -128,7 +128,7 @@ class SubmapBuilder {
   /// before the first sample, or more than `kSweepHistoryS` ago. A scan at a keyframe is not required: one that shows
   /// nothing new is left out.
   Status add_scan(const Scan& scan);
-  /// Adds the images of a moment; they are used when a keyframe is due at their stamp. Fails unless check_images()
+  /// Adds the images of one time; they are used when a keyframe is due at their stamp. Fails unless check_images()
   /// passes and cameras are the same as before.
   Status add_images(const TrackedImages& images);
   /// Adds a position fix; its stamp may be as that of a scan. The fix belongs to the submap that is open at its stamp,
@@ -142,7 +142,7 @@ class SubmapBuilder {
     config_.has_scans = scans;
     config_.has_images = images;
   }
-  /// True if a scan with this stamp would be used. Also true when only later odometry can tell, or when add_scan()
+  /// True if a scan with this stamp would be used. Also true when only later odometry can decide, or when add_scan()
   /// would fail.
   [[nodiscard]] bool wants_scan(Timestamp stamp) const;
   /// The same for images, but false when add_images() would fail.
@@ -158,7 +158,7 @@ class SubmapBuilder {
   [[nodiscard]] std::optional<Timestamp> newest_sample() const;
   /// Raw odometry from the last keyframe to the newest odometry sample.
   [[nodiscard]] RelativePose since_keyframe() const;
-  /// Everything before this moment is settled.
+  /// Everything before this time is settled.
   [[nodiscard]] std::optional<Timestamp> settled() const;
 
   /// The oldest finished submap that was not taken yet. It is here that scans are merged and landmarks triangulated,
@@ -191,8 +191,8 @@ class SubmapBuilder {
   void drop_between(Timestamp before, Timestamp after, const std::string& why);
   Status check_moment(Timestamp stamp, const char* what) const;
   void advance();
-  void take(SensorTimeline::Moment moment);
-  [[nodiscard]] bool makes_keyframe(const SensorTimeline::Moment& moment);
+  void take(SensorTimeline::Moment instant);
+  [[nodiscard]] bool makes_keyframe(const SensorTimeline::Moment& instant);
   void add_keyframe(Timestamp stamp, const Pose3& T_odom_body);
   Result<Scan> undistorted(const Scan& scan) const;
   void merge(const Scan& scan, const Pose3& T_odom_body);

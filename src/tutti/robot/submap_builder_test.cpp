@@ -89,7 +89,7 @@ std::vector<Submap> travel(double speed_mps, const SubmapConfig& config) {
 }
 
 // 10 s by car are 70 m, over which odometry bends.
-TEST(SubmapBuilder, ByCarTheWayEndsASubmap) {
+TEST(SubmapBuilder, ByCarTheDistanceEndsASubmap) {
   const std::vector<Submap> submaps = travel(7.0, {});
   EXPECT_NEAR(static_cast<double>(submaps.size()), 60.0 * 7.0 / 20.0, 1.0);
   for (const Submap& submap : submaps) {
@@ -212,7 +212,7 @@ TEST(SubmapBuilder, BadInputIsRefusedAndChangesNothing) {
   EXPECT_FALSE(builder.take_submap().has_value());
 }
 
-/// A wall of points 3 m to the left of the way, seen by a camera that looks there.
+/// A wall of points 3 m to the left of the trajectory, seen by a camera that looks there.
 TrackedImages images_at(Timestamp stamp, double way_m, bool swapped = false) {
   const Eigen::Quaterniond left(Eigen::AngleAxisd(-std::numbers::pi / 2, Eigen::Vector3d::UnitX()));
   const Camera camera{.model = {CameraKind::pinhole, 752, 480, 400.0, 400.0, 376.0, 240.0, {}},

@@ -8,7 +8,7 @@
 
 namespace tutti::robot {
 
-/// Those of which odometry now tells where they were taken.
+/// The fixes whose times odometry now covers.
 void SubmapBuilder::place_fixes() {
   std::vector<PositionFix>& waiting = state_.waiting_fixes;
   const auto later = std::ranges::upper_bound(waiting, state_.recent.back().stamp, {}, &PositionFix::stamp);

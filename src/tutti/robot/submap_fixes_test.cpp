@@ -41,8 +41,8 @@ std::vector<Submap> drive(SubmapBuilder& builder, const Drive& how) {
   return out;
 }
 
-/// The moments of a submap's fixes, which their heights tell.
-std::vector<double> moments(const Submap& submap) {
+/// The times of a submap's fixes, which their heights encode.
+std::vector<double> fix_times(const Submap& submap) {
   std::vector<double> out;
   for (const SubmapFix& fix : submap.fixes) out.push_back(fix.antenna.height_m - 600.0);
   return out;
@@ -65,12 +65,12 @@ TEST(SubmapFixes, AreSeenFromAKeyframeNearby) {
   EXPECT_EQ(fixes, 40U);  // the last one comes after the last keyframe
 }
 
-TEST(SubmapFixes, EachGoesWithTheSubmapOfItsMomentOnce) {
+TEST(SubmapFixes, EachGoesWithTheSubmapOfItsTimeOnce) {
   for (const double late_s : {0.0, 0.3, 0.9}) {
     SubmapBuilder builder(RobotId{3}, {});
     std::vector<double> all;
     for (const Submap& submap : drive(builder, {.late_s = late_s}))
-      for (const double t : moments(submap)) {
+      for (const double t : fix_times(submap)) {
         EXPECT_GE(at(t), submap.keyframes.front().stamp - late_s - 0.1);
         EXPECT_LE(at(t), submap.keyframes.back().stamp);
         all.push_back(t);
@@ -92,7 +92,7 @@ TEST(SubmapFixes, AFastReceiverIsThinnedAndASlowOneIsNot) {
 TEST(SubmapFixes, AcrossAJumpNoneIsOnTheWrongSide) {
   SubmapBuilder builder(RobotId{3}, {});
   for (const Submap& submap : drive(builder, {.jump_at_s = 15.0}))
-    for (const double t : moments(submap)) {
+    for (const double t : fix_times(submap)) {
       EXPECT_GE(at(t), submap.keyframes.front().stamp);
       EXPECT_LE(at(t), submap.keyframes.back().stamp);
     }

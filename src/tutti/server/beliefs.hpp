@@ -11,7 +11,7 @@
 
 namespace tutti::server {
 
-/// What a map takes for true, without its poses: enough to tell why the next map differs from it.
+/// What a map takes for true, without its poses: enough to explain why the next map differs from it.
 struct Beliefs {
   using Ends = std::pair<KeyframeId, KeyframeId>;
   std::set<Ends> accepted, refused;  ///< Closures by their ends.

@@ -12,7 +12,7 @@
 
 namespace tutti::server {
 
-/// Another submap, and how alike it looks (ClosureVerifier::Likeness).
+/// Another submap, and its similarity (ClosureVerifier::Likeness).
 struct Alike {
   SubmapId submap;
   double likeness = 0.0;
@@ -20,7 +20,7 @@ struct Alike {
   friend bool operator==(const Alike&, const Alike&) = default;
 };
 
-/// What the place looks like that a submap shows, and which submaps it made a candidate with when it came.
+/// The appearance of the place that a submap shows, and the submaps it was paired with when it came.
 struct Place {
   std::string looks;       ///< ClosureVerifier::place_of().
   bool is_ranked = false;  ///< False: it was not compared with others yet.
@@ -29,11 +29,11 @@ struct Place {
 };
 using PlaceSet = std::map<SubmapId, Place>;
 
-/// Which pairs of submaps are worth verifying, where every submap says what its place looks like: those of which either
-/// is among the `most` that look most alike to the other, to some sensor that shows both. Their number thus grows with
-/// the submaps and not with their square. Robots take turns: first comes the one of each robot that looks most alike,
-/// then the second of each. So a robot that stands in one place for hours, or makes up submaps, does not keep others
-/// from being compared there.
+/// Which pairs of submaps are worth verifying, where every submap has the appearance of its place: those of which
+/// either is among the `most` most similar ones to the other, to some sensor that shows both. Their number thus grows
+/// with the submaps and not with their square. Robots take turns: first comes the most similar one of each robot, then
+/// the second of each. So a robot that stands in one place for hours, or makes up submaps, does not keep others from
+/// being compared there.
 ///
 /// What is a candidate is a function of the set of submaps and their likeness. A further submap takes candidates away
 /// from others and never gives them any but itself, so whatever is a candidate in the end was one as soon as both were
@@ -58,7 +58,7 @@ class CandidatePairs {
  private:
   struct Ranked {
     Alike alike;
-    std::size_t turn = 0;  ///< How many of the same robot look more alike.
+    std::size_t turn = 0;  ///< How many of the same robot are more similar.
   };
   static bool comes_first(const Ranked& a, const Ranked& b);
   using List = std::vector<Ranked>;  // best first, at most most_
@@ -71,7 +71,7 @@ class CandidatePairs {
   std::unordered_map<SubmapId, std::vector<List>> most_alike_;  // by sensor
 };
 
-/// The candidates that a map's store tells of; none are excluded when some place was not compared yet.
+/// The candidates that a map's store has; none are excluded when some place was not compared yet.
 CandidatePairs restored(const PlaceSet& places, std::size_t most);
 
 /// The verdicts that the map is made with: of candidates, and those that an operator has spoken of.

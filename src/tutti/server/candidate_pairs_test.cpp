@@ -15,7 +15,7 @@ SubmapId submap(std::size_t i) {
   return {ChainId(RobotId{static_cast<std::uint32_t>(i % 3)}), static_cast<std::uint32_t>(i / 3)};
 }
 
-/// How alike 40 submaps look, with ties.
+/// The similarity of 40 submaps, with ties.
 std::map<SubmapPair, double> any_likeness(std::size_t count) {
   Rng rng(5);
   std::map<SubmapPair, double> out;
@@ -55,7 +55,7 @@ std::vector<std::size_t> numbers(std::size_t count) {
   return out;
 }
 
-/// Position of `other` among those that look most alike to `of`, robots taking turns.
+/// Position of `other` among those most similar to `of`, robots taking turns.
 std::size_t rank_of(SubmapId of, SubmapId other, std::size_t count, const std::map<SubmapPair, double>& likeness) {
   const auto is_better = [&](SubmapId a, SubmapId b) {
     return std::pair(-likeness.at(ordered(of, a)), a) < std::pair(-likeness.at(ordered(of, b)), b);
@@ -106,7 +106,7 @@ TEST(CandidatePairs, OfOneRobotDoNotCrowdOutThoseOfAnother) {
   for (std::uint32_t i = 0; i < 4; ++i)
     if (!pairs.excludes({alpha, {ChainId(RobotId{1}), i}})) ++bravos;
   EXPECT_EQ(bravos, 4U);
-  EXPECT_EQ(pairs.all().at(alpha).size(), 6U + 4U + 200U);  // both ways: each of theirs has only alpha
+  EXPECT_EQ(pairs.all().at(alpha).size(), 6U + 4U + 200U);  // in both directions: each of theirs has only alpha
 }
 
 TEST(CandidatePairs, AreAFunctionOfTheSetAndWereAllCandidatesBefore) {
@@ -144,7 +144,7 @@ bool shows(std::uint32_t sensor, std::size_t i) { return sensor == 0 ? i % 3 != 
 TEST(CandidatePairs, AreThoseThatAnySensorFindsMostAlike) {
   constexpr std::size_t kCount = 36, kMost = 4;
   std::vector<std::map<SubmapPair, double>> likeness{any_likeness(kCount), {}};
-  for (const auto& [pair, value] : likeness[0])  // to the other sensor, what looks alike looks different
+  for (const auto& [pair, value] : likeness[0])  // to the other sensor, what is similar looks different
     likeness[1][pair] = 1.0 - value;
   const auto pairs_of = [&](const std::vector<std::size_t>& order, const std::vector<std::uint32_t>& sensors,
                             PlaceSet* places) {

@@ -146,9 +146,9 @@ TEST(ClosureDecisions, AClosureAddedByHandJoinsTwoRobotsAndIsGoneWhenItIsWithdra
 }
 
 /// A server that knows all submaps, and the verifier's verdicts on all pairs it asks for.
-class WordsToAServer : public testing::Test {
+class DecisionsToAServer : public testing::Test {
  protected:
-  WordsToAServer() : server_(make(verifier_)) {
+  DecisionsToAServer() : server_(make(verifier_)) {
     for (const auto& [id, submap] : make_inputs(TestVerifier(5, 4), 5).submaps)
       EXPECT_TRUE(server_.receive(SubmapMessage{{id.chain.robot, id.chain.session, id.index}, *submap}).has_value());
     answer(server_, *verifier_);
@@ -167,7 +167,7 @@ class WordsToAServer : public testing::Test {
     for (const VerificationJob& job : server.take_jobs())
       EXPECT_TRUE(server.receive(*verifier.verify(*job.first, *job.second, MemoryPayloadStore())).has_value());
   }
-  /// Nothing is found anywhere, says another one.
+  /// Another one finds nothing anywhere.
   class Other final : public ClosureVerifier {
    public:
     [[nodiscard]] MethodId id() const override { return {"nothing", 1, 0}; }
@@ -184,7 +184,7 @@ class WordsToAServer : public testing::Test {
   SubmapPair pair_;
 };
 
-TEST_F(WordsToAServer, TheMapFollowsAtTheNextUpdate) {
+TEST_F(DecisionsToAServer, TheMapFollowsAtTheNextUpdate) {
   EXPECT_FALSE(server_.has_news());
   ASSERT_TRUE(server_.receive(pair_, decision(Wish::accept)).has_value());
   EXPECT_TRUE(server_.has_news());
@@ -198,7 +198,7 @@ TEST_F(WordsToAServer, TheMapFollowsAtTheNextUpdate) {
   EXPECT_FALSE(judged(server_.map(), refused_).accepted);
 }
 
-TEST_F(WordsToAServer, TheLaterWordHoldsInWhateverOrderTheyCome) {
+TEST_F(DecisionsToAServer, TheLaterDecisionCountsInWhateverOrderTheyCome) {
   std::vector<ClosureDecision> decisions{decision(Wish::accept, 3), decision(Wish::reject, 2),
                                          decision(Wish::withdraw, 1)};
   std::ranges::sort(decisions, {}, &ClosureDecision::given_ns);
@@ -211,7 +211,7 @@ TEST_F(WordsToAServer, TheLaterWordHoldsInWhateverOrderTheyCome) {
   } while (std::ranges::next_permutation(decisions, {}, &ClosureDecision::given_ns).found);
 }
 
-TEST_F(WordsToAServer, WhatIsAcceptedStaysWhateverOtherVerifiersSay) {
+TEST_F(DecisionsToAServer, WhatIsAcceptedStaysWhateverOtherVerifiersSay) {
   ASSERT_TRUE(server_.receive(pair_, decision(Wish::accept)).has_value());
   const auto other = std::make_shared<Other>();
   MapServer server = make(other, server_.state());
@@ -237,7 +237,7 @@ TEST_F(WordsToAServer, WhatIsAcceptedStaysWhateverOtherVerifiersSay) {
   EXPECT_TRUE(server.map().closures.empty());
 }
 
-TEST_F(WordsToAServer, WhatCannotBeMeantIsRefused) {
+TEST_F(DecisionsToAServer, WhatCannotBeMeantIsRefused) {
   const MapServerState before = server_.state();
   const SubmapPair unknown{pair_.first, {RobotId{1}, 999}}, turned{pair_.second, pair_.first};
   const SubmapPair apart{{RobotId{0}, 0}, {RobotId{0}, 1}};  // neighbours are not asked for
@@ -249,7 +249,7 @@ TEST_F(WordsToAServer, WhatCannotBeMeantIsRefused) {
   EXPECT_FALSE(server_.has_news());
 }
 
-TEST_F(WordsToAServer, AClosureAddedByHandNeedsNoOtherAndIsBetweenKeyframesOfItsSubmaps) {
+TEST_F(DecisionsToAServer, AClosureAddedByHandNeedsNoOtherAndIsBetweenKeyframesOfItsSubmaps) {
   const SubmapSet submaps = server_.state().submaps;
   const SubmapPair between{submaps.begin()->first, std::prev(submaps.end())->first};
   const std::uint32_t last = std::prev(submaps.end())->second->keyframes.back().index;

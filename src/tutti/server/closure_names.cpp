@@ -63,7 +63,7 @@ std::optional<SubmapId> ClosureNames::submap(std::string_view name) const {
 }
 
 Result<SubmapPair> ClosureNames::find(std::string_view name) const {
-  // A name may have a hyphen, but no slash: what leads to the second one cannot be read in two ways, but for the hyphen
+  // A name may have a hyphen, but no slash: what leads to the second one is never ambiguous, but for the hyphen
   // behind the first number.
   for (std::size_t at = name.find('-'); at != std::string_view::npos; at = name.find('-', at + 1)) {
     const auto a = submap(name.substr(0, at)), b = submap(name.substr(at + 1));

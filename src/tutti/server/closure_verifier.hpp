@@ -37,12 +37,12 @@ class ClosureVerifier {
   [[nodiscard]] virtual bool can_compare(const PayloadSize& first, const PayloadSize& second) const = 0;
   /// Cheap test whether verifying the pair is worth its cost.
   [[nodiscard]] virtual bool is_candidate(const Submap& first, const Submap& second) const = 0;
-  /// What the place looks like that a submap shows, which it has its payloads for; the same bytes whenever and wherever
+  /// The appearance of the place that a submap shows, computed from its payloads; the same bytes whenever and wherever
   /// they are computed. Empty: unknown, and each of its pairs is verified.
   [[nodiscard]] virtual std::string place_of(const Submap& /*submap*/) const { return {}; }
   /// True if likeness() can compare this place, which another version may have made, or other settings.
   [[nodiscard]] virtual bool can_rank(std::string_view /*place*/) const { return false; }
-  /// How alike a place and one of the others look to one kind of sensor.
+  /// The similarity of a place and one of the others to one kind of sensor.
   struct Likeness {
     std::size_t other = 0;     ///< Which of the others.
     double value = 0.0;        ///< The larger the more; comparable for one sensor only.
@@ -50,8 +50,9 @@ class ClosureVerifier {
     friend bool operator==(const Likeness&, const Likeness&) = default;
   };
   static constexpr std::uint32_t kMostSensors = 8;
-  /// How alike the place and each of the others look, to every sensor that shows both: of those that look most alike to
-  /// a submap, verify() finds closures most often. Takes far less time than verify(), and all places can_rank() allows.
+  /// The similarity of the place and each of the others, to every sensor that shows both: among the submaps most
+  /// similar to one, verify() finds closures most often. Takes far less time than verify(), and all places can_rank()
+  /// allows.
   [[nodiscard]] virtual std::vector<Likeness> likeness(std::string_view /*place*/,
                                                        std::span<const std::string_view> /*others*/) const {
     return {};
@@ -60,7 +61,7 @@ class ClosureVerifier {
   /// error means that one could not be read: there is no verdict, and the pair may be verified another time.
   [[nodiscard]] virtual Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                                       const PayloadStore& payloads) const = 0;
-  /// What there is to say of a pair that somebody looks at.
+  /// What is known of a pair that an operator inspects.
   struct Look {
     std::optional<LoopClosure> best;  ///< The best alignment that can be measured, also where verify() refuses it.
     std::optional<Refusal> refusal;   ///< Why verify() would refuse it, or why there is none.
@@ -85,8 +86,8 @@ class ClosureVerifier {
 };
 
 /// Another verifier, of which who derives from this changes what it overrides. All else is the other verifier's, also
-/// what verifiers are asked in later versions; look() too, so that who changes what verify() finds says what look()
-/// shows.
+/// what verifiers are asked in later versions; look() too, so that who changes what verify() finds also determines what
+/// look() shows.
 class WrappedVerifier : public ClosureVerifier {
  public:
   [[nodiscard]] MethodId id() const override { return wrapped_->id(); }
@@ -132,7 +133,7 @@ class VerifierMaker {
   virtual ~VerifierMaker() = default;
   /// The methods that it can make; an id without settings means any settings.
   [[nodiscard]] virtual std::vector<MethodId> can() const = 0;
-  /// Makes a verifier (a refiner) with exactly this id, never null; an error says what is missing.
+  /// Makes a verifier (a refiner) with exactly this id, never null; an error names what is missing.
   [[nodiscard]] virtual Result<std::shared_ptr<const ClosureVerifier>> verifier(const MethodId& id,
                                                                                 const std::string& settings) const = 0;
   [[nodiscard]] virtual Result<std::shared_ptr<const MapRefiner>> refiner(const MethodId& id,

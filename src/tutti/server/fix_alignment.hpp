@@ -36,7 +36,7 @@ struct FixAlignment {
   [[nodiscard]] double sigma_yaw_rad() const;
 };
 
-/// Standard deviation of the direction that an odometry takes for up, where nothing else tells.
+/// Standard deviation of the direction that an odometry takes for up, where nothing else measures it.
 inline constexpr double kSigmaLevel_rad = 0.02;
 
 /// The rigid alignment that most points agree with, even if up to half of them are wrong (least median of squares,

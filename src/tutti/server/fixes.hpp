@@ -13,7 +13,7 @@
 #include "tutti/geometry/geodesy.hpp"
 #include "tutti/model/pose_graph.hpp"
 
-/// Says where on the earth a map lies, as derived from the fixes of its submaps.
+/// Where on the earth a map lies, as derived from the fixes of its submaps.
 namespace tutti::server {
 
 /// What position fixes do to a map.
@@ -64,7 +64,7 @@ struct Georeference {
   double sigma_yaw_rad = 0.0;  ///< and of the rotation about the vertical.
 };
 
-/// All that fixes say of a map.
+/// All that fixes determine of a map.
 struct Fixes {
   std::optional<Georeference> georeference;
   std::vector<JudgedFixes> judged;  ///< One for every submap with fixes; sorted by submap.

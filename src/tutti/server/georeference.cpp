@@ -13,14 +13,14 @@ namespace {
 
 using Eigen::Matrix3d, Eigen::Vector3d;
 
-/// A map is wrong by no more than the whole way that was gone, but for this.
-constexpr double kBeyondWay_m = 100.0;
+/// A map is wrong by no more than the whole distance travelled, plus this.
+constexpr double kBeyondDistance_m = 100.0;
 
 /// A part of the map without a gap, and how it lies on the earth.
 struct Part {
   std::vector<std::size_t> submaps;  ///< Indices in PlacedFixes.
   FixAlignment alignment;
-  double way_m = 0.0;
+  double distance_m = 0.0;
   [[nodiscard]] bool is_aligned() const { return alignment.why_not.empty(); }
 };
 using Parts = std::map<std::uint32_t, Part>;  // by component
@@ -37,7 +37,7 @@ Parts align_parts(PlacedFixes& placed, const MapEstimate& map, std::map<ChainId,
   for (std::size_t s = 0; s < placed.submaps.size(); ++s) parts[placed.submaps[s].component].submaps.push_back(s);
   for (std::size_t e = 0; e < map.odometry_edges; ++e)
     if (const auto part = parts.find(map.nodes[map.graph.edges[e].from].component); part != parts.end())
-      part->second.way_m += map.graph.edges[e].T_from_to.translation.norm();
+      part->second.distance_m += map.graph.edges[e].T_from_to.translation.norm();
   std::map<std::uint32_t, Pose3> T_enu_world;
   for (auto& [component, part] : parts) {
     part.alignment = align(part, placed, map);
@@ -95,13 +95,14 @@ FixFactors nothing_yet(const PlacedFixes& placed, const Pose3& T_enu_world) {
 }
 
 /// What the alignment of a part makes of each submap's fixes, before the map is bent.
-void look_at(const Part& part, const PlacedFixes& placed, const MapEstimate& map, FixFactors& factors) {
+void assess(const Part& part, const PlacedFixes& placed, const MapEstimate& map, FixFactors& factors) {
   for (const std::size_t s : part.submaps) {
     factors.joined[s] = join(placed.submaps[s], map.graph.poses, factors.T_enu_world);
     factors.objections[s] = FixObjection::none;
     if (factors.joined[s].used == 0)
       factors.objections[s] = FixObjection::contradictory;
-    else if (missed_by(factors.joined[s], map.graph.poses, factors.T_enu_world).norm() > part.way_m + kBeyondWay_m)
+    else if (missed_by(factors.joined[s], map.graph.poses, factors.T_enu_world).norm() >
+             part.distance_m + kBeyondDistance_m)
       factors.objections[s] = FixObjection::misfit;
   }
 }
@@ -121,7 +122,7 @@ void bend_what_does_not_fit(const PlacedFixes& placed, const estimation::GncConf
     if (part.is_aligned() || part.submaps.size() < 3) continue;
     MapEstimate bent = map;
     FixFactors factors = nothing_yet(placed, part.alignment.T_enu_world);
-    look_at(part, placed, map, factors);
+    assess(part, placed, map, factors);
     std::vector<LevelNode> level;
     if (const auto node = level_node(part, placed, map, factors.T_enu_world)) level.push_back(*node);
     if (!bend_to_fixes(placed, level, gnc, bent, factors)) continue;
@@ -149,7 +150,7 @@ void judge_as_it_is(const PlacedFixes& placed, const Parts& parts, const MapEsti
   }
 }
 
-void tell(const PlacedFixes& placed, const Parts& parts, const FixFactors& factors, MapEstimate& map) {
+void report_fixes(const PlacedFixes& placed, const Parts& parts, const FixFactors& factors, MapEstimate& map) {
   for (std::size_t s = 0; s < placed.submaps.size(); ++s) {
     const FixObjection objection = factors.objections[s];
     const bool has_place = factors.joined[s].used > 0;
@@ -191,7 +192,7 @@ MapEstimate georeferenced(MapEstimate map, const SubmapSet& submaps, const Geore
   if (config.mode == "factors") bend_what_does_not_fit(*placed, gnc, parts, map);
   const auto first = std::ranges::find_if(parts, [](const auto& part) { return part.second.is_aligned(); });
   if (first == parts.end()) {
-    tell(*placed, parts, nothing_yet(*placed, {}), map);
+    report_fixes(*placed, parts, nothing_yet(*placed, {}), map);
     return map;
   }
   join_parts(parts, map);
@@ -200,12 +201,12 @@ MapEstimate georeferenced(MapEstimate map, const SubmapSet& submaps, const Geore
   std::vector<LevelNode> level;
   for (const auto& [component, part] : parts) {
     if (!part.is_aligned()) continue;
-    look_at(part, *placed, map, factors);
+    assess(part, *placed, map, factors);
     if (const auto node = level_node(part, *placed, map, factors.T_enu_world)) level.push_back(*node);
   }
   if (config.mode == "only" || !bend_to_fixes(*placed, level, gnc, map, factors))
     judge_as_it_is(*placed, parts, map, factors);
-  tell(*placed, parts, factors, map);
+  report_fixes(*placed, parts, factors, map);
   Georeference out{.origin = placed->origin,
                    .T_enu_world = factors.T_enu_world,
                    .component = map.nodes[placed->submaps[first->second.submaps.front()].fixes.front().node].component};

@@ -9,7 +9,7 @@ namespace tutti::server {
 /// Lays the map on the earth by the fixes of its submaps (docs/math.md, "Position fixes"). Parts of the map whose place
 /// is certain enough become one part, in the world of the first, although no closure joins them. Depending on
 /// `config.mode` the map stays rigid or follows the fixes. Without usable fixes the map stays as it is, except that
-/// MapEstimate::fixes says what became of them.
+/// MapEstimate::fixes reports what became of them.
 MapEstimate georeferenced(MapEstimate map, const SubmapSet& submaps, const GeoreferenceConfig& config,
                           const estimation::GncConfig& gnc);
 

@@ -25,7 +25,7 @@ struct Robot {
   Eigen::Vector3d start{0, 0, 0};  ///< In the truth.
   double drift_deg_per_m = 0.0;    ///< In yaw.
   double sigma_deg = 0.5;          ///< A step's turn, as stated.
-  double slip_deg = 0.0;           ///< Half way, and stated nowhere.
+  double slip_deg = 0.0;           ///< At half of the trajectory, and stated nowhere.
   double tilt_deg = 0.0;           ///< Its odometry frame's.
   ReceiverConfig receiver{.sigma_m = 0.5, .sigma_up_m = 1.0};
 };
@@ -51,28 +51,30 @@ struct World {
   std::map<ChainId, Trajectory> truth;
 
   void add(const Robot& robot, std::uint64_t seed = 1, int seconds = 480) {
-    const Trajectory way = truth_of(robot, seconds);
+    const Trajectory trajectory = truth_of(robot, seconds);
     Rng rng = Rng(seed).fork(robot.id);
     Trajectory odometry{
-        {way[0].stamp,
+        {trajectory[0].stamp,
          {Eigen::Quaterniond(Eigen::AngleAxisd(robot.tilt_deg * std::numbers::pi / 180.0, Eigen::Vector3d::UnitX())),
           {3, 2, 1}}}};
     Matrix6d covariance = Matrix6d::Identity();
     covariance.topLeftCorner<3, 3>() *= 0.01 * 0.01;
     covariance.bottomRightCorner<3, 3>() *= std::pow(robot.sigma_deg * std::numbers::pi / 180.0, 2);
-    for (std::size_t k = 1; k < way.size(); ++k) {
+    for (std::size_t k = 1; k < trajectory.size(); ++k) {
       Vector6d error = Vector6d::Zero();
       for (int axis = 0; axis < 3; ++axis) error(axis) = rng.normal(0.01);
-      error(5) = (rng.normal(robot.sigma_deg) + robot.drift_deg_per_m + (k == way.size() / 2 ? robot.slip_deg : 0.0)) *
-                 std::numbers::pi / 180.0;
+      error(5) =
+          (rng.normal(robot.sigma_deg) + robot.drift_deg_per_m + (k == trajectory.size() / 2 ? robot.slip_deg : 0.0)) *
+          std::numbers::pi / 180.0;
       odometry.push_back(
-          {way[k].stamp, retract(odometry.back().pose * way[k - 1].pose.inverse() * way[k].pose, error)});
+          {trajectory[k].stamp,
+           retract(odometry.back().pose * trajectory[k - 1].pose.inverse() * trajectory[k].pose, error)});
     }
-    const auto fixes = simulation::simulate_fixes(way, robot.receiver, {}, rng.fork("receiver"));
+    const auto fixes = simulation::simulate_fixes(trajectory, robot.receiver, {}, rng.fork("receiver"));
     const ChainId chain{RobotId{robot.id}};
-    truth[chain] = way;
-    for (std::size_t first = 0; first + 1 < way.size(); first += kPerSubmap) {
-      const std::size_t last = std::min(first + kPerSubmap, way.size() - 1);
+    truth[chain] = trajectory;
+    for (std::size_t first = 0; first + 1 < trajectory.size(); first += kPerSubmap) {
+      const std::size_t last = std::min(first + kPerSubmap, trajectory.size() - 1);
       Submap submap{.id = {chain, static_cast<std::uint32_t>(first / kPerSubmap)}};
       for (std::size_t k = first; k <= last; ++k) {
         submap.keyframes.push_back({static_cast<std::uint32_t>(k), odometry[k].stamp, odometry[k].pose, true});
@@ -80,7 +82,7 @@ struct World {
       }
       for (const PositionFix& fix : fixes)
         if (fix.stamp >= odometry[first].stamp && fix.stamp < odometry[last].stamp) {
-          const auto k = static_cast<std::uint32_t>(std::lround(fix.stamp - way[0].stamp));
+          const auto k = static_cast<std::uint32_t>(std::lround(fix.stamp - trajectory[0].stamp));
           submap.fixes.push_back({k, fix.p_body_antenna, fix.antenna, fix.covariance});
         }
       submaps[submap.id] = std::make_shared<const Submap>(std::move(submap));
@@ -234,7 +236,7 @@ TEST(Georeference, ALeverArmCountsWithTheHeading) {
   EXPECT_LT(world.rmse(world.map()), 0.1);
 }
 
-/// The frame of an odometry may be tilted as it likes where fixes tell how.
+/// The frame of an odometry may be tilted as it likes where fixes measure how.
 TEST(Georeference, ATiltedFrameIsLaidFlat) {
   World world;
   Robot robot{.tilt_deg = 70.0};

@@ -13,7 +13,7 @@
 namespace tutti::server {
 namespace {
 
-/// Information below this share of the largest tells nothing along its axis.
+/// Information below this share of the largest is no information along its axis.
 constexpr double kLeastShare = 1e-12;
 
 RelativePose measurement_of(const PoseGraphEdge& edge) {
@@ -30,13 +30,13 @@ struct Closure {
   LoopClosure closure;
 };
 
-/// The graph as submaps: one for every piece of odometry without a gap.
+/// The graph as submaps: one for every segment of odometry without a gap.
 class Submaps {
  public:
-  explicit Submaps(const RobotGraph& graph) : graph_(graph), step_(graph.vertices.size()), piece_(step_.size()) {
+  explicit Submaps(const RobotGraph& graph) : graph_(graph), step_(graph.vertices.size()), segment_(step_.size()) {
     find_steps();
     for (std::size_t v = 0; v < graph.vertices.size(); ++v) add_vertex(v);
-    close_piece();
+    close_segment();
     for (std::size_t e = 0; e < graph.graph.edges.size(); ++e)
       if (!is_step(e)) add_closure(e);
     std::ranges::stable_sort(closures_, {}, [](const Closure& c) { return std::pair(c.closure.from, c.closure.to); });
@@ -49,7 +49,8 @@ class Submaps {
     VerdictSet out;
     for (const Closure& c : closures_) {
       const PoseGraphEdge& edge = graph_.graph.edges[c.edge];
-      const SubmapPair pair{std::min(piece_[edge.from], piece_[edge.to]), std::max(piece_[edge.from], piece_[edge.to])};
+      const SubmapPair pair{std::min(segment_[edge.from], segment_[edge.to]),
+                            std::max(segment_[edge.from], segment_[edge.to])};
       ClosureVerdict& verdict = out[pair];
       verdict.pair = pair;
       verdict.closures.push_back(c.closure);
@@ -78,15 +79,15 @@ class Submaps {
       open_.odometry.push_back(edge.from < edge.to ? stated : inverse(stated));
       T_odom_body = open_.keyframes.back().T_odom_body * open_.odometry.back().T_a_b;
     } else {
-      close_piece();
+      close_segment();
       const bool same_chain = !submaps_.empty() && submaps_.rbegin()->first.chain == id.chain;
       open_.id = {id.chain, same_chain ? submaps_.rbegin()->first.index + 1 : 0};
     }
     open_.keyframes.push_back({id.index, graph_.stamps[v], T_odom_body, true});
-    piece_[v] = open_.id;
+    segment_[v] = open_.id;
   }
 
-  void close_piece() {
+  void close_segment() {
     if (!open_.keyframes.empty()) submaps_.emplace(open_.id, std::make_shared<const Submap>(std::move(open_)));
     open_ = {};
   }
@@ -100,7 +101,7 @@ class Submaps {
 
   const RobotGraph& graph_;
   std::vector<std::optional<std::size_t>> step_;  // per vertex: the odometry that ends there
-  std::vector<SubmapId> piece_;                   // per vertex
+  std::vector<SubmapId> segment_;                 // per vertex
   Submap open_;
   SubmapSet submaps_;
   std::vector<Closure> closures_;

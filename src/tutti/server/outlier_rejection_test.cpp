@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Outlier rejection: wrong closures and failed odometry, told apart with one setting.
+// Outlier rejection: wrong closures and failed odometry, distinguished with one setting.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -112,8 +112,8 @@ TEST(OutlierRejection, ASlipIsFoundNearItsStep) {
   }
 }
 
-// Odometry that turns 0.02 degrees a metre wrongly and says a sixth of that: by its word nearly all right closures are
-// inconsistent with it and with each other.
+// Odometry that turns 0.02 degrees a metre wrongly and states a sixth of that: by its covariance nearly all right
+// closures are inconsistent with it and with each other.
 TEST(OutlierRejection, OdometryThatSaysTooLittleOfItsErrorsCostsNoClosures) {
   for (std::uint64_t seed = 1; seed <= tutti::seeds(3U); ++seed) {
     CorridorRunConfig config;

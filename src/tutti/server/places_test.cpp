@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Which pairs a server has verified where its verifier says what places look like.
+// Which pairs a server has verified where its verifier describes the appearance of places.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -119,7 +119,7 @@ std::vector<SubmapId> neighbours(const SubmapId& id, const std::set<SubmapId>& s
 }
 
 /// What is tied to the free ones, and is not free.
-std::set<SubmapId> held(const RefinementScope& scope, const std::set<SubmapId>& free) {
+std::set<SubmapId> fixed_submaps(const RefinementScope& scope, const std::set<SubmapId>& free) {
   std::set<SubmapId> out;
   for (const SubmapId& id : free)
     for (const SubmapId& next : neighbours(id, scope.submaps)) out.insert(next);
@@ -204,7 +204,7 @@ std::optional<RefinementJob> plan_refinement(const RefinementScope& scope, const
     job.whole = 2 * free.size() > scope.submaps.size();
     if (job.whole) free = scope.submaps;
   }
-  std::set<SubmapId> all = held(scope, free);
+  std::set<SubmapId> all = fixed_submaps(scope, free);
   all.insert(free.begin(), free.end());
   for (const SubmapId& id : all)
     job.parts.push_back({id, free.contains(id), poses_of(*submaps.at(id), job.whole ? estimate : map)});

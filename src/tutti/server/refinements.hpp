@@ -65,7 +65,7 @@ struct RefinementCadence {
 /// The job that refines a map of this scope; nothing when the refinements have taken all of it into account. A job of
 /// the whole map (by the cadence, or because half of the map would be free anyway) has the poses of `estimate`, the
 /// pose graph's map. Any other job frees new submaps, older ones of which closed pairs are new or gone, and the
-/// neighbours of both in their chains; everything tied to these is held where it is in `map`, the refined map.
+/// neighbours of both in their chains; everything tied to these is fixed where it is in `map`, the refined map.
 std::optional<RefinementJob> plan_refinement(const RefinementScope& scope, const Refinements& refinements,
                                              const MapEstimate& estimate, const MapEstimate& map,
                                              const SubmapSet& submaps, const RefinementCadence& cadence,

@@ -68,7 +68,7 @@ TEST(Refinements, StepsTakeThePlaceOfOdometry) {
   EXPECT_LT(error_at_the_end(better, RobotId{0}), 1e-6);
   EXPECT_EQ(better.odometry_of_steps.size(), map.odometry_edges);
   for (const auto& [edge, covariance] : better.odometry_of_steps)
-    EXPECT_NEAR(covariance(0, 0), 0.02 * 0.02, 1e-7);  // what the odometry says of itself, for those who ask
+    EXPECT_NEAR(covariance(0, 0), 0.02 * 0.02, 1e-7);  // the odometry's own covariance, for those who ask
   EXPECT_EQ(local(better.nodes[0].T_world_body, map.nodes[0].T_world_body).norm(), 0.0);
 }
 
@@ -264,8 +264,8 @@ TEST(Refinements, InAnyOrderTheyEndInOneMap) {
   }
 }
 
-/// A refinement of two maps that nothing joined has them in unrelated frames. The closures that join them then say
-/// what they measured, until a refinement knows them.
+/// A refinement of two maps that nothing joined has them in unrelated frames. The closures that join them then place
+/// them as they measured, until a refinement includes them.
 TEST(Refinements, WhatItHadInUnrelatedFramesTiesNothing) {
   RefinedServer server(5);
   std::vector<VerificationJob> between;
@@ -279,7 +279,7 @@ TEST(Refinements, WhatItHadInUnrelatedFramesTiesNothing) {
   }
   const auto job = server.update();
   ASSERT_TRUE(job.has_value() && server->map().components == 2U);
-  Refinement refinement = server.answer(*job);  // the oracle knows where the two are; nothing tells a real one
+  Refinement refinement = server.answer(*job);  // the oracle knows where the two are; a real one has no way to know
   for (auto& [id, T_world_body] : refinement.T_world_body)
     if (id.chain.robot == RobotId{1}) T_world_body = Pose3{Eigen::Quaterniond(0, 0, 1, 0), {3, 4, 5}} * T_world_body;
   ASSERT_TRUE(server->receive(refinement).has_value());

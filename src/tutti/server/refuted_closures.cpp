@@ -14,8 +14,8 @@ constexpr double kRefuted = 5.0;
 /// One wrong join gone, another may be believed.
 constexpr int kRounds = 3;
 
-/// How well the fixes alone say where on the earth a place on a session is: what half of its fixes miss by is what
-/// drift and their own errors make.
+/// How well the fixes alone determine where on the earth a place on a session is: what half of its fixes miss by is
+/// what drift and their own errors make.
 double sigma_m(const FixAlignment& session, const Eigen::Vector3d& p_enu) {
   return session.sigma_m() + session.sigma_yaw_rad() * (p_enu - session.middle_enu).norm() + session.median_miss_m;
 }
@@ -49,9 +49,9 @@ std::set<SubmapPair> refuted_by_fixes(const MapEstimate& map, const SubmapSet& s
     const auto a = sessions.find(closure.from.chain), b = sessions.find(closure.to.chain);
     if (a == sessions.end() || b == sessions.end() || !accepted.contains({closure.from, closure.to})) return false;
     const Pose3 T_world_to = find_node(map, closure.from)->T_world_body * closure.measurement.T_a_b;
-    const Eigen::Vector3d said = a->second.T_enu_world * T_world_to.translation;
+    const Eigen::Vector3d by_fixes = a->second.T_enu_world * T_world_to.translation;
     const Eigen::Vector3d found = b->second.T_enu_world * find_node(map, closure.to)->T_world_body.translation;
-    return (said - found).norm() > kRefuted * std::hypot(sigma_m(a->second, said), sigma_m(b->second, found));
+    return (by_fixes - found).norm() > kRefuted * std::hypot(sigma_m(a->second, by_fixes), sigma_m(b->second, found));
   };
   for (const auto& [pair, verdict] : verdicts)
     if (!says(decisions, pair, Wish::accept) && std::ranges::any_of(verdict.closures, is_refuted)) out.insert(pair);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Which pairs a MapServer has verified, by what the places of submaps look like.
+// Which pairs a MapServer has verified, by the appearance of their places.
 #include <algorithm>
 #include <memory>
 #include <string_view>
@@ -13,7 +13,7 @@ namespace tutti::server {
 namespace {
 
 /// Calls take(submap) of those that are wanted and that the verifier would compare with this one, in the order of
-/// their ids. It does not look up anew for each pair what all share: in a large fleet these are hundreds of millions.
+/// their ids. It looks up only once what all pairs share: in a large fleet these are hundreds of millions.
 template <class IsWanted, class Take>
 void for_each_comparable(const MapServerState& state, const ClosureVerifier& verifier, SubmapId id,
                          const IsWanted& is_wanted, const Take& take) {
@@ -39,15 +39,15 @@ void for_each_comparable(const MapServerState& state, const ClosureVerifier& ver
 void MapServer::compare_place(SubmapId id) {
   Place& place = state_.places.at(id);
   std::vector<SubmapId> others;
-  std::vector<std::string_view> looks;
+  std::vector<std::string_view> appearances;
   for_each_comparable(
       state_, *verifier_, id, [&](SubmapId other) { return candidates_.has(other); },
       [&](const auto& other) {
         others.push_back(other.first);
-        looks.push_back(state_.places.at(other.first).looks);
+        appearances.push_back(state_.places.at(other.first).looks);
       });
   std::vector<Alike> alike;
-  for (const auto& [other, value, sensor] : verifier_->likeness(place.looks, looks)) {
+  for (const auto& [other, value, sensor] : verifier_->likeness(place.looks, appearances)) {
     TUTTI_CHECK(other < others.size() && sensor < ClosureVerifier::kMostSensors, "place {} of {} compared by sensor {}",
                 other, others.size(), sensor);
     alike.push_back({others[other], value, sensor});

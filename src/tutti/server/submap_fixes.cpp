@@ -67,7 +67,7 @@ void share_errors(const MapEstimate& map, double correlation_s, std::vector<Subm
   }
 }
 
-/// How far what two fixes say of the way between them is from the map's, squared, in standard deviations.
+/// How far the displacement between two fixes is from the map's, squared, in standard deviations.
 double apart(const SubmapFixes::Fix& a, const SubmapFixes::Fix& b, const Vector3d& moved) {
   const Vector3d error = b.p_enu - a.p_enu - moved;
   const Matrix3d covariance =

@@ -94,12 +94,12 @@ class Verdicts : public testing::Test {
 
 TEST_F(Verdicts, ThatDoNotBelongToTheirPairAreErrorsAndChangeNothing) {
   server_.optimise();
-  const auto refused = [&](const char* word, auto corrupt) {
+  const auto refused = [&](const char* expected, auto corrupt) {
     ClosureVerdict bad = good_;
     corrupt(bad);
     const Status status = server_.receive(bad);
-    ASSERT_FALSE(status.has_value()) << word;
-    EXPECT_NE(status.error().message.find(word), std::string::npos) << status.error().message;
+    ASSERT_FALSE(status.has_value()) << expected;
+    EXPECT_NE(status.error().message.find(expected), std::string::npos) << status.error().message;
     EXPECT_FALSE(server_.has_news());
     EXPECT_TRUE(server_.state().verdicts.empty());
   };
@@ -129,7 +129,7 @@ TEST_F(Verdicts, OfOneVerifierTheSameHoldsWhateverComesFirst) {
   ClosureVerdict more = other;  // of a verifier that knows closures one after the other
   more.closures.push_back(good_.closures[0]);
   const ClosureVerdict no{good_.pair, {}, Refusal{RefusalReason::misfit, 1.5, 1.2}, verifier_->id()};
-  // The last one holds, however they are shuffled: more, then the one with smaller numbers, and in doubt none.
+  // The last one counts, however they are shuffled: more, then the one with smaller numbers, and in doubt none.
   for (const std::vector<ClosureVerdict>& all :
        {std::vector{other, good_}, {other, good_, more}, {good_, other, more, no}, {good_, no}}) {
     for (std::uint64_t seed = 0; seed < 12; ++seed) {

@@ -17,7 +17,7 @@ double any_magnitude(Rng& rng, double least, double most) {
   return std::exp(rng.uniform(std::log(least), std::log(most)));
 }
 
-/// Has any size, is correlated in any way, and is not always of full rank.
+/// Has any size and correlation, and is not always of full rank.
 Matrix6d any_covariance(Rng& rng) {
   const auto columns = static_cast<Eigen::Index>(1 + rng.index(6));
   Eigen::Matrix<double, 6, Eigen::Dynamic> root(6, columns);
@@ -90,7 +90,7 @@ TEST(WildOdometry, OfOneRobotHarmsNoOther) {
     without_it += closures_between_good_robots(estimate_map(world.submaps, world.verdicts, {}));
   }
   EXPECT_GT(without_it, 9 * kSeeds);
-  // What is left: a map that is solved, but too ill-conditioned to say how sure it is.
+  // What is left: a map that is solved, but too ill-conditioned for a covariance.
   EXPECT_GE(informed, kSeeds * 95 / 100);
   EXPECT_GE(kept, without_it * 95 / 100);
 }
