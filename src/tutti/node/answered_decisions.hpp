@@ -8,10 +8,10 @@
 
 namespace tutti::node {
 
-/// The operators' decisions that the server answered last, as MissionStatus::words tells them.
+/// The operators' decisions that the server answered last, as in MissionStatus::words.
 class AnsweredDecisions {
  public:
-  /// Notes the answer to a decision: `frame` is the message as it came, `why` says why the decision is not stored
+  /// Notes the answer to a decision: `frame` is the message as it came, `why` is why the decision is not stored
   /// (empty: it is).
   void note(const std::string& frame, const std::string& why);
   [[nodiscard]] const std::vector<MissionStatus::Decision>& all() const { return decisions_; }

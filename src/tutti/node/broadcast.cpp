@@ -22,16 +22,16 @@ void Broadcast::send(ProxyGraphMessage map, std::shared_ptr<const server::Belief
     ProxyGraph own = consistency::own_part(last_->graph, robot);
     ChangeWatch::Decision decision = watch_.take(robot, {own, beliefs}, lone, now);
     if (decision.send) send_last(robot, std::move(own), whole, step);
-    for (ChangeOfMind& told : decision.told) step.tell(now, std::move(told));
+    for (ChangeOfMind& report : decision.told) step.tell(now, std::move(report));
   }
 }
 
 void Broadcast::send_waiting(const std::set<RobotId>& robots, Timestamp now, Step& step) {
   std::shared_ptr<const std::string> whole;
   for (const RobotId robot : robots)
-    if (auto told = watch_.follow(robot, now)) {
+    if (auto report = watch_.follow(robot, now)) {
       send_last(robot, consistency::own_part(last_->graph, robot), whole, step);
-      step.tell(now, std::move(*told));
+      step.tell(now, std::move(*report));
     }
 }
 

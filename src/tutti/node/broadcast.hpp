@@ -24,7 +24,7 @@ class Broadcast {
   /// With `to_all` every robot is sent the whole map, as in the paper (ServerConfig::broadcast).
   explicit Broadcast(bool to_all) : to_all_(to_all) {}
 
-  /// Sends a new map, which holds `beliefs` for true. With `lone` (ChangeWatch::take), robots about which it changes
+  /// Sends a new map, which rests on `beliefs`. With `lone` (ChangeWatch::take), robots about which it changes
   /// its mind are not sent it yet; otherwise every robot is sent it.
   void send(ProxyGraphMessage map, std::shared_ptr<const server::Beliefs> beliefs, const std::set<RobotId>& robots,
             const ChangeWatch::LoneClosures& lone, Timestamp now, Step& step);

@@ -32,9 +32,9 @@ struct ChangeOfMind {
 /// Decides which maps robots are sent, so that no robot follows a change that the next map takes back. A robot follows
 /// the last map that it was sent. A map that differs from that one by no more than it allowed for is sent at once; any
 /// other waits. The next map is sent if it is nearer to the waiting map than to the followed one: the change stands. A
-/// change that rests on the closures of one pair of places must stand for kStands_s: places that look alike come in
-/// groups, and what is right is seen again from elsewhere.
-/// The watch is not stored, so after a restart of the server the first map is sent as it is.
+/// change that rests on the closures of one pair of places must stand for kStands_s: similar places come in groups, and
+/// what is right is seen again from elsewhere. The watch is not stored, so after a restart of the server the first map
+/// is sent as it is.
 class ChangeWatch {
  public:
   static constexpr double kStands_s = 120.0;

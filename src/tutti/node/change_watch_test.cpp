@@ -18,7 +18,7 @@ using consistency::test::kBravo;
 
 constexpr std::size_t kNodes = 160;  // round a corner: along a line, what lies aside of it may be turned about it
 
-/// The map, in which the second half of the robot's way lies `aside` of where odometry has it.
+/// The map, in which the second half of the robot's trajectory lies `aside` of where odometry has it.
 ProxyGraph map_with(double aside_m, const ChainId& chain = {kBravo, 1}) {
   static const consistency::test::WalkWithClosures errors{kNodes, 20, {0.01, 5e-4}, {0.02, 2e-3}};
   std::vector<Pose3> poses = consistency::test::corridor(kNodes);
@@ -37,8 +37,8 @@ class ChangeWatchTest : public testing::Test {
     const auto lone = [&](const ChangeWatch::Map&, const ProxyGraph&) { return lone_closures; };
     return watch_.take(kBravo, {map, std::make_shared<const server::Beliefs>()}, lone, now_ = now_ + 10.0);
   }
-  /// What is told, one outcome at most.
-  static std::optional<ChangeOutcome> told(const ChangeWatch::Decision& decision) {
+  /// What is reported, one outcome at most.
+  static std::optional<ChangeOutcome> reported(const ChangeWatch::Decision& decision) {
     EXPECT_LE(decision.told.size(), 1U);
     return decision.told.empty() ? std::nullopt : std::optional(decision.told.front().outcome);
   }
@@ -50,7 +50,7 @@ TEST_F(ChangeWatchTest, TheFirstMapAndThoseLikeItAreSent) {
   for (const double aside_m : {0.0, 0.01, 0.02}) {
     const auto decision = take(map_with(aside_m));
     EXPECT_TRUE(decision.send);
-    EXPECT_EQ(told(decision), std::nullopt);
+    EXPECT_EQ(reported(decision), std::nullopt);
   }
   EXPECT_FALSE(watch_.anything_waits());
 }
@@ -59,13 +59,13 @@ TEST_F(ChangeWatchTest, AChangeThatStandsIsSentOneUpdateLater) {
   take(map_with(0.0));
   const auto first = take(map_with(2.0));
   EXPECT_FALSE(first.send);
-  EXPECT_EQ(told(first), ChangeOutcome::waits);
+  EXPECT_EQ(reported(first), ChangeOutcome::waits);
   EXPECT_GT(first.told[0].change.significance, 1.0);
   EXPECT_TRUE(watch_.anything_waits());
   const auto second = take(map_with(2.1));
   EXPECT_TRUE(second.send);
-  EXPECT_EQ(told(second), ChangeOutcome::stands);
-  EXPECT_EQ(told(take(map_with(2.1))), std::nullopt);
+  EXPECT_EQ(reported(second), ChangeOutcome::stands);
+  EXPECT_EQ(reported(take(map_with(2.1))), std::nullopt);
 }
 
 TEST_F(ChangeWatchTest, AChangeThatIsTakenBackIsNeverSent) {
@@ -74,12 +74,12 @@ TEST_F(ChangeWatchTest, AChangeThatIsTakenBackIsNeverSent) {
     EXPECT_FALSE(take(map_with(2.0)).send);
     const auto back = take(map_with(0.0));
     EXPECT_TRUE(back.send);
-    EXPECT_EQ(told(back), ChangeOutcome::gone);
+    EXPECT_EQ(reported(back), ChangeOutcome::gone);
   }
 }
 
 // Even where it goes on changing, as odometry that is far too sure makes it: what came nearer stands.
-TEST_F(ChangeWatchTest, AMapThatGoesOnTheSameWayIsFollowed) {
+TEST_F(ChangeWatchTest, AMapThatGoesOnInTheSameDirectionIsFollowed) {
   take(map_with(0.0));
   EXPECT_FALSE(take(map_with(2.0)).send);
   EXPECT_TRUE(take(map_with(3.5)).send);
@@ -105,21 +105,21 @@ TEST_F(ChangeWatchTest, AnUpdateWithoutNewsLetsItStand) {
   EXPECT_TRUE(take(map_with(2.0)).send);
 }
 
-// The robot stays where it was for two minutes, whether or not there is news, and is told of one change only.
+// The robot stays where it was for two minutes, whether or not there is news, and one change only is reported.
 TEST_F(ChangeWatchTest, WhatRestsOnOnePlaceStandsForMinutes) {
   take(map_with(0.0));
   const auto first = take(map_with(2.0), 4);
-  EXPECT_EQ(told(first), ChangeOutcome::waits);
+  EXPECT_EQ(reported(first), ChangeOutcome::waits);
   EXPECT_EQ(first.told[0].reason.lone, 4U);
   for (const Timestamp since = now_; now_ - since < ChangeWatch::kStands_s - 10.0;) {
     const auto next = take(map_with(2.1), 5);
     EXPECT_FALSE(next.send);
-    EXPECT_EQ(told(next), std::nullopt);
+    EXPECT_EQ(reported(next), std::nullopt);
     EXPECT_FALSE(watch_.follow(kBravo, now_).has_value());
   }
   const auto last = take(map_with(2.1), 6);
   EXPECT_TRUE(last.send);
-  EXPECT_EQ(told(last), ChangeOutcome::stands);
+  EXPECT_EQ(reported(last), ChangeOutcome::stands);
   EXPECT_EQ(last.told[0].reason.lone, 5U);  // of the map that waited
 }
 

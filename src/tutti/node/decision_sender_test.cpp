@@ -17,7 +17,7 @@ namespace decision_sender_test {
 
 using bus::Endpoint;
 
-/// A server with one closure, and whoever says words to it over a bus that loses some.
+/// A server with one closure, and whoever sends decisions to it over a bus that loses some.
 class Decisions : public testing::Test {
  protected:
   Decisions() {
@@ -87,7 +87,7 @@ TEST_F(Decisions, WhatIsNotTakenIsAnsweredWithTheReason) {
   EXPECT_EQ(decisions(), 1U);
 }
 
-TEST_F(Decisions, OnlyTheLastAreTold) {
+TEST_F(Decisions, OnlyTheLastAreReported) {
   for (int i = 0; i < 100; ++i)
     does(server_->receive(*DecisionSender(kSelf, {"0/0-0/2", Wish::reject, "ada", i}).due(0.0), {}));
   EXPECT_EQ(status().decisions.size(), 32U);

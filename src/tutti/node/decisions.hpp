@@ -12,7 +12,7 @@
 
 namespace tutti::node {
 
-/// The operators' decisions in a map's store. `leave` is told why a decision of a version that this program cannot read
+/// The operators' decisions in a map's store. `leave` gets why a decision of a version that this program cannot read
 /// was left out. Fails when the table is damaged.
 Result<DecisionSet> read_decisions(const storage::TableStore& map,
                                    const std::function<void(const std::string&)>& leave);

@@ -19,16 +19,16 @@
 /// the same events; the host measures them.
 namespace tutti::node {
 
-/// Told by the server, once per submap.
+/// Reported by the server, once per submap.
 struct SubmapStored {
   SubmapId id;
 };
-/// Told by the server; each refused verdict of the job has a MessageRefused beside.
+/// Reported by the server; each refused verdict of the job has a MessageRefused beside.
 struct VerdictsTaken {
   std::string job;
   std::size_t pairs = 0;
 };
-/// Told by the server: an operator's decision.
+/// Reported by the server: an operator's decision.
 struct DecisionTaken {
   SubmapPair pair;
   Wish wish = Wish::withdraw;
@@ -39,7 +39,7 @@ struct VerificationFailed {
   std::string why;
   bool given_up = false;  ///< The pair was refused instead.
 };
-/// Told by the server.
+/// Reported by the server.
 struct RefinementTaken {
   std::string job;
   std::uint64_t revision = 0;  ///< Revision of the map that was refined.
@@ -53,13 +53,13 @@ struct RefinementFailed {
   std::string why;
   bool given_up = false;  ///< There is no further try until something new has come; the map stays as it is.
 };
-/// Told by the server: an update of the map has ended.
+/// Reported by the server: an update of the map has ended.
 struct MapUpdated {
   std::uint64_t revision = 0;
   std::size_t submaps = 0;
   std::size_t accepted = 0;  ///< Number of accepted closures.
 };
-/// Told by a robot: it has used a proxy graph.
+/// Reported by a robot: it has used a proxy graph.
 struct RobotUpdated {
   RobotId robot;
   robot::UpdateSummary summary;
@@ -70,13 +70,13 @@ struct MessageRefused {
   bus::MessageKind kind = bus::MessageKind::submap;
   std::string why;
 };
-/// Told by the server: from now on this session owns the robot's name and number.
+/// Reported by the server: from now on this session owns the robot's name and number.
 struct RobotJoined {
   RobotId robot;
   std::string name;
   std::uint64_t session = 0;
 };
-/// Another program uses this name or number; told by the server and by the robot.
+/// Another program uses this name or number; reported by the server and by the robot.
 struct RobotRefused {
   RobotId robot;
   std::uint64_t session = 0;
@@ -88,18 +88,18 @@ struct StateLost {
   std::uint64_t session = 0;  ///< The new session.
   std::string why;
 };
-/// Told by the robot: it has begun a new session, a chain of its own; its unsent submaps are kept.
+/// Reported by the robot: it has begun a new session, a chain of its own; its unsent submaps are kept.
 struct SessionBegun {
   RobotId robot;
   std::uint64_t session = 0;  ///< The new session.
   std::string why;
 };
-/// Told by the robot: the server's map is another one than before and lacks these submaps, which are sent again.
+/// Reported by the robot: the server's map is another one than before and lacks these submaps, which are sent again.
 struct SubmapsForgotten {
   RobotId robot;
   std::size_t submaps = 0;
 };
-/// Told by a robot: an odometry sample was refused.
+/// Reported by a robot: an odometry sample was refused.
 struct SampleRefused {
   RobotId robot;
   std::string why;
@@ -109,19 +109,19 @@ struct OdometryJumped {
   RobotId robot;
   robot::OdometryJump jump;
 };
-/// Told by a robot: a scan was refused.
+/// Reported by a robot: a scan was refused.
 struct ScanRefused {
   RobotId robot;
   std::string why;
   bool later = false;  ///< Refused after the step that took it, because odometry came later than the scan.
 };
-/// Told by a robot: images were refused.
+/// Reported by a robot: images were refused.
 struct ImagesRefused {
   RobotId robot;
   std::string why;
   bool later = false;  ///< Refused after the step that took them.
 };
-/// Told by a robot: a position fix was refused.
+/// Reported by a robot: a position fix was refused.
 struct FixRefused {
   RobotId robot;
   std::string why;

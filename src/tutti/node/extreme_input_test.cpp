@@ -152,7 +152,7 @@ RC_GTEST_PROP(ExtremeInput, AServerThatHearsItGoesOnToo, ()) {
   robot.live(60);
   robot.done(robot.node->finish(robot.now));
   storage::MemoryStore::Tables tables;
-  Timestamp now = robot.now;  // one clock: the robot says how long ago it heard a graph
+  Timestamp now = robot.now;  // one clock: the robot reports how long ago it received a graph
   for (int round = 0; round < 2; ++round) {
     storage::MemoryStore store(storage::map_schema(), tables);
     auto node = ServerNode::open({kRobot}, std::make_shared<test::EvenVerifier>(), {}, 1000 + round, store);

@@ -83,8 +83,8 @@ class FailedPairs {
   /// answer; each further one after twice as long. With `timeout_s` = 0 it comes at once.
   FailedPairs(double timeout_s, unsigned most_tries) : timeout_s_(timeout_s), most_tries_(most_tries) {}
 
-  /// Notes that a pair has failed, and says what to do. `nothing` means that the failure was known, because an answer
-  /// has come twice. A pair that is given up is forgotten.
+  /// Notes that a pair has failed, and decides what to do. `nothing` means that the failure was known, because an
+  /// answer has come twice. A pair that is given up is forgotten.
   Next note(const SubmapPair& pair, Timestamp now);
   /// The pair has been verified after all.
   void forget(const SubmapPair& pair) { failed_.erase(pair); }

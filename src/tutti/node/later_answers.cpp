@@ -30,13 +30,13 @@ std::vector<Verdicts> LaterAnswers::take_due(Timestamp now) {
       const auto known = static_cast<std::size_t>(
           std::ranges::find_if(awaited.known_at, [&](Timestamp stamp) { return here(stamp) > now; }) -
           awaited.known_at.begin());
-      if (known <= awaited.told) continue;
-      awaited.told = known;
+      if (known <= awaited.answered) continue;
+      awaited.answered = known;
       ClosureVerdict verdict = awaited.verdict;
       verdict.closures.resize(known);
       answer.verdicts.push_back(std::move(verdict));
     }
-    std::erase_if(job->second, [](const Awaited& awaited) { return awaited.told == awaited.known_at.size(); });
+    std::erase_if(job->second, [](const Awaited& awaited) { return awaited.answered == awaited.known_at.size(); });
     const bool is_last = job->second.empty();
     if (!is_last) answer.job = part_of(job->first);
     if (!answer.verdicts.empty()) out.push_back(std::move(answer));
@@ -49,7 +49,7 @@ std::optional<Timestamp> LaterAnswers::next_due() const {
   std::optional<Timestamp> next;
   for (const auto& [job, all] : awaited_)
     for (const Awaited& awaited : all) {
-      const Timestamp due = here(awaited.known_at[awaited.told]);
+      const Timestamp due = here(awaited.known_at[awaited.answered]);
       next = std::min(next.value_or(due), due);
     }
   return next;

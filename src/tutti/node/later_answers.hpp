@@ -18,7 +18,7 @@ namespace tutti::node {
 /// closure.
 ///
 /// Robots' clocks begin elsewhere than a program's. A submap comes no earlier than its newest keyframe was taken; the
-/// least time between the two tells how far this clock is ahead, so no closure is told before it is known.
+/// least time between the two measures how far this clock is ahead, so no closure is sent before it is known.
 class LaterAnswers {
  public:
   /// A pair was asked whose newest keyframe is of this stamp.
@@ -27,19 +27,19 @@ class LaterAnswers {
   /// note_newest().
   void add(const std::string& job, ClosureVerdict verdict, std::vector<Timestamp> known_at);
   [[nodiscard]] bool has(const std::string& job) const { return awaited_.contains(job); }
-  /// What is to be told now. Only the last answer to a job carries its name; the others have names of their own, so the
+  /// What is to be sent now. Only the last answer to a job carries its name; the others have names of their own, so the
   /// server goes on waiting.
   [[nodiscard]] std::vector<Verdicts> take_due(Timestamp now);
   /// When take_due() has something to return; nothing: never.
   [[nodiscard]] std::optional<Timestamp> next_due() const;
-  /// A name under which a part of the job's answer is told.
+  /// A name under which a part of the job's answer is sent.
   [[nodiscard]] std::string part_of(const std::string& job);
 
  private:
   struct Awaited {
     ClosureVerdict verdict;
     std::vector<Timestamp> known_at;
-    std::size_t told = 0;  ///< Number of closures.
+    std::size_t answered = 0;  ///< Number of closures.
   };
   [[nodiscard]] Timestamp here(Timestamp robots) const { return {robots.ns + ahead_ns_}; }
 

@@ -43,7 +43,7 @@ TEST(LaterAnswers, AnswerEachTimeWithAllThatIsKnownAndTheJobAtTheEnd) {
   EXPECT_FALSE(later.has("1/0"));
 }
 
-TEST(LaterAnswers, TellNothingBeforeItIsKnownWhateverTheWayOfTheSubmaps) {
+TEST(LaterAnswers, SendNothingBeforeItIsKnownHoweverTheSubmapsCome) {
   LaterAnswers later;
   later.note_newest(kRobots, kHere + 300.0);  // it came late: no radio
   later.add("1/0", verdict(7, 1), {kRobots + 20.0});

@@ -27,7 +27,7 @@ storage::Write to_row(const MapMeta& meta);
 /// Nothing when no server has opened this map yet.
 Result<std::optional<MapMeta>> read_map_meta(const storage::TableStore& map);
 
-/// The row `counts`: figures of the last update, so that they can be told after a start before the map is computed.
+/// The row `counts`: figures of the last update, so that they can be reported after a start before the map is computed.
 struct MapCounts {
   std::uint64_t revision = 0;
   std::uint64_t keyframes = 0;
@@ -50,9 +50,9 @@ Result<server::ServerConfig> read_settings(const storage::TableStore& map);
 std::string refinement_key(std::uint64_t revision);
 Result<server::Refinements> read_refinements(const storage::TableStore& map);
 
-/// Rows `place/SUBMAP`: what the places of submaps look like, and their candidates. Encoded as numbers of 8 bytes
+/// Rows `place/SUBMAP`: the appearance of the submaps' places, and their candidates. Encoded as numbers of 8 bytes
 /// (whether it was compared, how many candidates; for each its robot, session, index plus 2^32 times the sensor, and
-/// the bits of its likeness), followed by what it looks like. Rows that cannot be read are skipped: the pairs of these
+/// the bits of its likeness), followed by its appearance. Rows that cannot be read are skipped: the pairs of these
 /// submaps are all verified.
 storage::Write to_row(SubmapId id, const server::Place& place);
 /// The key of a submap's row.

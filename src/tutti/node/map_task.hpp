@@ -28,7 +28,7 @@ struct MapOfTask {
   server::MadeMap made;
   bool is_update = false;
   Broadcast broadcast;
-  Step step;  ///< What robots are sent of the map, and what is told of that.
+  Step step;  ///< What robots are sent of the map, and what is reported of that.
 };
 
 /// Makes the map, and what robots are sent of it.

@@ -18,7 +18,7 @@ constexpr double kReceiptAgain_s = 60.0;
 constexpr std::size_t kMostUnreadSessions = 100;
 constexpr std::size_t kMostUnreadIntervals = 500;  // in each of these
 constexpr std::size_t kMostRefused = 256;          // of a robot; the last ones
-constexpr std::size_t kMostStrangers = 1000;       // who are told something
+constexpr std::size_t kMostStrangers = 1000;       // who are sent something
 
 }  // namespace
 
@@ -50,7 +50,7 @@ void Receipts::admit(RobotId robot) {
 }
 
 void Receipts::dismiss(RobotId robot, Timestamp now) {
-  if (auto told = members_.extract(robot)) strangers_.insert({robot, {std::move(told.mapped()), now}});
+  if (auto member = members_.extract(robot)) strangers_.insert({robot, {std::move(member.mapped()), now}});
 }
 
 bool Receipts::waits_too_long(RobotId robot, const NodeStatus& status, Timestamp now) {

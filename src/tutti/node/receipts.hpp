@@ -12,8 +12,8 @@
 
 namespace tutti::node {
 
-/// What the server has told each robot about its submaps, or is to tell: the mission's robots (members), and others
-/// (strangers). Memory is bounded, whatever anybody sends.
+/// What the server has reported to each robot about its submaps, or is to report: the mission's robots (members), and
+/// others (strangers). Memory is bounded, whatever anybody sends.
 class Receipts {
  public:
   /// A stranger's receipt may be dropped this long after its last message.

@@ -9,11 +9,11 @@ namespace receipts_test {
 constexpr Timestamp kStart{0};
 constexpr RobotId kAlpha{0}, kStranger{7};
 
-TEST(Receipts, AStrangerThatIsAdmittedKeepsWhatItWasTold) {
+TEST(Receipts, AStrangerThatIsAdmittedKeepsItsReceipt) {
   Receipts receipts;
-  Receipt* const told = receipts.of_anybody(kStranger, false, kStart);
-  ASSERT_NE(told, nullptr);
-  told->why_refused = "garbage";
+  Receipt* const receipt = receipts.of_anybody(kStranger, false, kStart);
+  ASSERT_NE(receipt, nullptr);
+  receipt->why_refused = "garbage";
   EXPECT_TRUE(receipts.members().empty());
   receipts.admit(kStranger);
   EXPECT_EQ(receipts.of_member(kStranger).why_refused, "garbage");

@@ -81,7 +81,7 @@ TEST_P(RobotClock, ABreakIsGoneOnAfterWithItsFirstSample) {
   drive(10.0);
   const double before_s = driven_s_;
   drive(5.0, kHour_s);
-  EXPECT_EQ(refused_, 1);  // it waits, and is told so
+  EXPECT_EQ(refused_, 1);  // it waits, and learns so
   EXPECT_EQ(node_->agent().newest_sample(), kStart + (driven_s_ + kHour_s));
   EXPECT_EQ(node_->agent().chain().session, 100U);
   EXPECT_TRUE(node_->agent().keyframe_before(kStart + (before_s + kHour_s + 1.5 / GetParam())).value() >

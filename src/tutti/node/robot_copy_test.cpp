@@ -33,7 +33,7 @@ struct Program {
     ASSERT_TRUE(store.commit(step.writes).has_value());
     for (bus::Envelope& message : step.messages) sent.push_back(std::move(message));
     for (const Event& event : step.events)
-      if (const auto* refused = std::get_if<RobotRefused>(&event.what)) told.push_back(refused->why);
+      if (const auto* refused = std::get_if<RobotRefused>(&event.what)) refusals.push_back(refused->why);
   }
   void drive(double from_s, double until_s) {
     for (double s = from_s; s < until_s; s += 0.1) {
@@ -46,7 +46,7 @@ struct Program {
   double direction;
   std::unique_ptr<RobotNode> node;
   std::vector<bus::Envelope> sent;
-  std::vector<std::string> told;
+  std::vector<std::string> refusals;
 };
 
 class RobotCopy : public testing::Test {
@@ -96,11 +96,12 @@ TEST_F(RobotCopy, TheSecondOfTwoLivingProgramsIsRefusedAndBeginsASessionOfItsOwn
   }
   EXPECT_EQ(first.node->agent().chain().session, 100U);
   EXPECT_FALSE(first.node->conflict());
-  EXPECT_TRUE(first.told.empty());
+  EXPECT_TRUE(first.refusals.empty());
   EXPECT_GE(refused_, 1);
   EXPECT_EQ(second.node->agent().chain().session, 100U + 1 + 8);
-  ASSERT_FALSE(second.told.empty());
-  EXPECT_NE(second.told[0].find("the state folder of this one was copied"), std::string::npos) << second.told[0];
+  ASSERT_FALSE(second.refusals.empty());
+  EXPECT_NE(second.refusals[0].find("the state folder of this one was copied"), std::string::npos)
+      << second.refusals[0];
   EXPECT_NE(second.node->status(now_).trouble, "");
   first.drive(30.0, 60.0);
   second.drive(30.0, 60.0);
@@ -141,7 +142,7 @@ TEST_F(RobotCopy, ASubmapThatIsInTheMapWithOtherContentIsNoStoredOne) {
   EXPECT_GE(second.node->status(now_).backlog_submaps, of_first - 1);
   EXPECT_LT(second.node->status(now_).backlog_submaps, waiting + 2);
   EXPECT_NE(second.node->status(now_).trouble.find("submaps stay out of the map"), std::string::npos);
-  ASSERT_EQ(second.told.size(), 1U);
+  ASSERT_EQ(second.refusals.size(), 1U);
   EXPECT_FALSE(second.node->conflict());  // so that its program goes on
   second.drive(75.0, 120.0);
   talk(second, {&second});

@@ -73,7 +73,7 @@ void RobotNode::receive_graph(const bus::Envelope& envelope, Timestamp now, Step
   }
   if (!agent_.is_news(heard)) return;
   if (config_.keeps_state) remember(HeardGraph{wire::encode(**graph)}, now, step);
-  write_journal(step);  // what is told of it holds
+  write_journal(step);  // what is reported of it is true
   step.tell(now, RobotUpdated{agent_.robot(), agent_.receive(**graph, observer_)});
   note(std::get<RobotUpdated>(step.events.back().what).summary);
   updated_ = now;

@@ -87,12 +87,12 @@ Status RobotNode::read_outbox() {
   if (auto read = store_.sizes(kOutbox, keep); !read || !ok) return read ? ok : read;
   if (auto read = store_.sizes(kArchive, mark); !read || !ok) return read ? ok : read;
   for (const auto& [id, size] : kept) uplink_.add(id, size);
-  const auto hold = [&](std::string_view key, std::size_t) {
+  const auto take_foreign = [&](std::string_view key, std::size_t) {
     if (const auto session = storage::numbers_of(key.substr(std::min(key.size(), kForeign.size())), 1);
         session && key.starts_with(kForeign))
       foreign_sessions_.insert(session->front());
   };
-  if (auto read = store_.sizes(kMeta, hold); !read) return read;
+  if (auto read = store_.sizes(kMeta, take_foreign); !read) return read;
   hold_foreign();
   const auto heard = store_.read(kMeta, kIncarnations);
   if (!heard) return tl::unexpected(heard.error());
@@ -107,7 +107,7 @@ Status RobotNode::read_outbox() {
 Status RobotNode::hear_again(const JournalEntry& entry) {
   if (const auto* sample = std::get_if<OdometrySample>(&entry)) {
     Status ok = agent_.add_odometry(sample->stamp, sample->T_odom_body, sample->increment_covariance);
-    agent_.take_odometry_jumps();  // told when it was heard
+    agent_.take_odometry_jumps();  // reported when it came
     return ok;
   }
   if (const auto* scan = std::get_if<Scan>(&entry)) return agent_.add_scan(*scan);
@@ -208,11 +208,11 @@ void RobotNode::settle(Timestamp now, Step& step) {
   }
   for (Error& error : agent_.take_scan_errors())
     step.tell(now, ScanRefused{agent_.robot(), std::move(error.message), true});
-  const auto watch = [&](const char* sensor, std::optional<std::uint64_t> keyframes, bool& told) {
+  const auto watch = [&](const char* sensor, std::optional<std::uint64_t> keyframes, bool& reported) {
     const bool is_missing = keyframes && *keyframes >= config_.most_keyframes_without;
-    if (is_missing != told && keyframes)
+    if (is_missing != reported && keyframes)
       step.tell(now, SensorMissing{agent_.robot(), sensor, is_missing ? *keyframes : 0});
-    told = is_missing;
+    reported = is_missing;
   };
   watch("scan", agent_.keyframes_without_scan(), tells_no_scan_);
   watch("images", agent_.keyframes_without_images(), tells_no_images_);

@@ -33,9 +33,9 @@ struct RobotNodeConfig {
   /// Odometry and sensor data are written together, at most this much mission time after the first of them. A kill
   /// loses no more than that, and the disk is not used at every sample.
   double journal_period_s = 0.5;
-  /// Keyframes without a scan (or images) after which SensorMissing is told.
+  /// Keyframes without a scan (or images) after which SensorMissing is reported.
   std::uint64_t most_keyframes_without = 20;
-  double jump_told_s = 600.0;  ///< How long status() says that odometry has jumped, or why a session has begun.
+  double jump_told_s = 600.0;  ///< How long status() reports that odometry has jumped, or why a session has begun.
 };
 
 /// A robot as a node: RobotAgent with its store and messages. It takes odometry, sensor data and proxy graphs, and
@@ -50,8 +50,8 @@ class RobotNode {
   /// On an empty store, begins a new chain with this session, or a later one than the store knows. Otherwise the robot
   /// goes on as if it had never stopped; `config` must be as before. A state that cannot be read (for example because
   /// another version wrote it) is set aside in the store: the robot then begins a session after all earlier ones, keeps
-  /// its outbox, and tells StateLost. So it does without a state where the row robot_tables::kLost says why. Fails when
-  /// the store cannot be read or is another robot's. The store must outlive the node.
+  /// its outbox, and reports StateLost. So it does without a state where the row robot_tables::kLost has a reason.
+  /// Fails when the store cannot be read or is another robot's. The store must outlive the node.
   static Result<std::unique_ptr<RobotNode>> open(RobotId robot, std::uint64_t session, const RobotNodeConfig& config,
                                                  const storage::TableStore& store);
 
@@ -59,9 +59,9 @@ class RobotNode {
   Step resume(Timestamp now);
   /// RobotAgent::expect_sensors(); not stored, so call it after every start.
   void expect_sensors(bool scans, bool images);
-  /// As the functions of RobotAgent with these names; what the agent refuses is told as an event. Data that come again,
-  /// as after a restart, are refused or change nothing. Odometry passes an OdometryGate: where its clock begins anew,
-  /// so does the robot (begin_session()).
+  /// As the functions of RobotAgent with these names; what the agent refuses is reported as an event. Data that come
+  /// again, as after a restart, are refused or change nothing. Odometry passes an OdometryGate: where its clock begins
+  /// anew, so does the robot (begin_session()).
   Step add_odometry(const OdometrySample& sample, Timestamp now);
   Step add_scan(const Scan& scan, Timestamp now);
   Step add_images(const TrackedImages& images, Timestamp now);
@@ -88,8 +88,8 @@ class RobotNode {
 
   /// The robot's status, without what only the host knows: version, trouble.
   [[nodiscard]] NodeStatus status(Timestamp now) const;
-  /// Why the server says that another program owns this robot's name or number; nothing when it does not say so about
-  /// this session and start.
+  /// Why, by the server, another program owns this robot's name or number; nothing when it does not report so of this
+  /// session and start.
   [[nodiscard]] const std::optional<std::string>& conflict() const { return conflict_; }
   /// The same, or that the map has somebody else's submaps in the place of this robot's; empty when neither.
   [[nodiscard]] std::string dispute() const { return conflict_ ? *conflict_ : foreign_; }
@@ -97,8 +97,8 @@ class RobotNode {
   [[nodiscard]] std::optional<std::uint64_t> owner_session() const { return owner_session_; }
 
   [[nodiscard]] const robot::RobotAgent& agent() const { return agent_; }
-  /// True when the newest graph since the start has the robot's last representative keyframe, so that the map can tell
-  /// it no more about itself.
+  /// True when the newest graph since the start has the robot's last representative keyframe, so that the map has
+  /// nothing more about itself for it.
   [[nodiscard]] bool is_whole_in_map() const;
   /// Submaps that the server has named as stored or refused, as far as the archive keeps them, with their size in
   /// bytes.
@@ -124,7 +124,7 @@ class RobotNode {
   /// Sends the submaps that may go now; `fresh` has frames that are not in the store yet.
   void send_submaps(Timestamp now, const Frames& fresh, Step& step);
   void receive_graph(const bus::Envelope& envelope, Timestamp now, Step& step);
-  /// To be called after each input: tells what became of earlier inputs.
+  /// To be called after each input: reports what became of earlier inputs.
   void settle(Timestamp now, Step& step);
   [[nodiscard]] bool is_refused_as_it_is(SubmapId id, const Receipt& receipt) const;
   [[nodiscard]] std::string odometry_trouble(Timestamp now) const;
@@ -147,7 +147,7 @@ class RobotNode {
   void take_back(const Receipt& receipt, bool has_started, Timestamp now, Step& step);
   void archive(SubmapId id, bool is_refused, Step& step);
   void remember_incarnations(Step& step) const;
-  /// Tells a refused message, and keeps it for status() if this program cannot read its version.
+  /// Reports a refused message, and keeps it for status() if this program cannot read its version.
   void refuse(const bus::Envelope& envelope, const Error& error, Timestamp now, Step& step);
   [[nodiscard]] bus::Envelope submap_envelope(SubmapId id, std::shared_ptr<const std::string> frame) const;
 
@@ -170,7 +170,7 @@ class RobotNode {
   std::optional<ProxyGraph> base_;             // the last graph that came in full
   std::shared_ptr<const std::string> delta_;   // the last message that gave differences from base_
   std::uint64_t jumps_ = 0;                    // since the start
-  std::optional<std::pair<Timestamp, robot::OdometryJump>> newest_jump_;  // when it was told
+  std::optional<std::pair<Timestamp, robot::OdometryJump>> newest_jump_;  // when it was reported
   bool tells_no_scan_ = false, tells_no_images_ = false;
   std::uint64_t journal_ = 0;           // number of entries since the checkpoint that are written
   std::vector<std::string> unwritten_;  // and the entries that are not

@@ -124,7 +124,7 @@ TEST_F(RobotNodeTest, KeepsSubmapsUntilTheServerHasStoredThem) {
   EXPECT_EQ(node_->archive().size(), all.size());
 }
 
-TEST_F(RobotNodeTest, WhatTheServerRefusesForGoodLeavesTheOutboxAndIsTold) {
+TEST_F(RobotNodeTest, WhatTheServerRefusesForGoodLeavesTheOutboxAndIsReported) {
   walk(0, 100);
   const SubmapId bad = node_->backlog().begin()->first;
   Receipt receipt{.robot = kRobot, .why_refused = "no good"};
@@ -226,25 +226,25 @@ TEST_F(RobotNodeTest, SaysHowItIs) {
 }
 
 TEST_F(RobotNodeTest, KnowsWhenItsNameIsSomebodyElses) {
-  const auto told = [&](std::uint64_t session, std::uint64_t start, const std::string& why) {
+  const auto reported = [&](std::uint64_t session, std::uint64_t start, const std::string& why) {
     Receipt receipt{.robot = kRobot, .owner_session = 7, .conflict = Receipt::Conflict{session, start, why}};
     return done(node_->receive(from_server(MessageKind::receipt, wire::encode(receipt)), now_)).events.size();
   };
   EXPECT_EQ(node_->owner_session(), std::nullopt);
-  EXPECT_EQ(told(101, 7, "of another start"), 0U);
+  EXPECT_EQ(reported(101, 7, "of another start"), 0U);
   EXPECT_EQ(node_->owner_session(), 7U);
-  EXPECT_EQ(told(55, 1, "of another session"), 0U);
+  EXPECT_EQ(reported(55, 1, "of another session"), 0U);
   EXPECT_EQ(node_->conflict(), std::nullopt);
-  EXPECT_EQ(told(101, 1, "alpha is there"), 1U);
+  EXPECT_EQ(reported(101, 1, "alpha is there"), 1U);
   EXPECT_EQ(node_->conflict(), "alpha is there");
-  EXPECT_EQ(told(101, 1, "alpha is there"), 0U);
+  EXPECT_EQ(reported(101, 1, "alpha is there"), 0U);
   walk(0, 100);
   EXPECT_FALSE(sent_.empty());  // it goes on
   confirm({});
   EXPECT_EQ(node_->conflict(), std::nullopt);
-  EXPECT_EQ(told(101, 1, "alpha is there"), 1U);
+  EXPECT_EQ(reported(101, 1, "alpha is there"), 1U);
   restart();
-  EXPECT_EQ(told(101, 1, "alpha is there"), 0U);  // what was said before it started again
+  EXPECT_EQ(reported(101, 1, "alpha is there"), 0U);  // what was said before it started again
 }
 
 TEST_F(RobotNodeTest, AKillLosesNoMoreThanThePeriodAndWhatIsFedAgainMakesTheSame) {
@@ -385,7 +385,7 @@ TEST_F(RobotNodeTest, AKillBetweenSamplesAndScansThatNeverMeetLosesNothing) {
 }
 
 TEST_F(RobotNodeTest, KeyframesWithoutAScanAreTold) {
-  const auto told = [&](int from, int to, bool with_scans) {
+  const auto reported = [&](int from, int to, bool with_scans) {
     std::vector<SensorMissing> out;
     const auto cloud = std::make_shared<const PointCloud>(PointCloud{{{5.0F, 3.0F, 1.0F}}});
     for (int i = from; i < to; ++i) {
@@ -400,13 +400,13 @@ TEST_F(RobotNodeTest, KeyframesWithoutAScanAreTold) {
     }
     return out;
   };
-  EXPECT_TRUE(told(0, 400, false).empty());  // it has no such sensor, as far as anybody knows
-  EXPECT_TRUE(told(400, 600, true).empty());
-  auto missing = told(600, 1000, false);
+  EXPECT_TRUE(reported(0, 400, false).empty());  // it has no such sensor, as far as anybody knows
+  EXPECT_TRUE(reported(400, 600, true).empty());
+  auto missing = reported(600, 1000, false);
   ASSERT_EQ(missing.size(), 1U);
   EXPECT_EQ(missing[0].sensor, "scan");
   EXPECT_EQ(missing[0].keyframes, config_.most_keyframes_without);
-  missing = told(1000, 1100, true);
+  missing = reported(1000, 1100, true);
   ASSERT_EQ(missing.size(), 1U);
   EXPECT_EQ(missing[0].keyframes, 0U);
 }
@@ -443,9 +443,9 @@ TEST_F(RobotNodeTest, AForgedRevisionIsNotTheLastThatIsBelieved) {
   EXPECT_TRUE(hear(6).events.empty());
   const Step step = hear(7);
   ASSERT_EQ(step.events.size(), 2U);
-  const auto* told = std::get_if<MessageRefused>(&step.events[0].what);
-  ASSERT_NE(told, nullptr);
-  EXPECT_NE(told->why.find("20931"), std::string::npos) << told->why;
+  const auto* reported = std::get_if<MessageRefused>(&step.events[0].what);
+  ASSERT_NE(reported, nullptr);
+  EXPECT_NE(reported->why.find("20931"), std::string::npos) << reported->why;
   EXPECT_EQ(node_->agent().state().revision, 7U);
   EXPECT_EQ(hear(8).events.size(), 1U);
   restart();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Odometry that jumps, or is refused: what a robot's node tells of it, and that a kill changes nothing.
+// Odometry that jumps, or is refused: what a robot's node reports of it, and that a kill changes nothing.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -38,28 +38,28 @@ class RobotOdometry : public testing::Test {
   Timestamp now_;
 };
 
-// A jump is told once, with its size and stamp, and a kill right before or after it changes nothing.
-TEST_F(RobotOdometry, OdometryThatJumpsIsToldAndAKillChangesNothing) {
+// A jump is reported once, with its size and stamp, and a kill right before or after it changes nothing.
+TEST_F(RobotOdometry, OdometryThatJumpsIsReportedAndAKillChangesNothing) {
   const auto pose = [](int i) {
     return Pose3{Eigen::Quaterniond::Identity(),
                  {0.1 * i + (i < 150 ? 0.0 : -15.0) + (i < 253 ? 0.0 : 500.0), 0.0, 0.0}};
   };
-  std::vector<OdometryJumped> told;
+  std::vector<OdometryJumped> reported;
   const auto live = [&](int from, int to) {
     for (int i = from; i < to; ++i) {
       now_ = Timestamp{} + 0.1 * i;
       const Step step = done(node_->add_odometry({kStart + 0.1 * i, pose(i), 1e-6 * Matrix6d::Identity()}, now_));
       for (const Event& event : step.events)
-        if (const auto* jumped = std::get_if<OdometryJumped>(&event.what)) told.push_back(*jumped);
+        if (const auto* jumped = std::get_if<OdometryJumped>(&event.what)) reported.push_back(*jumped);
     }
   };
   EXPECT_EQ(node_->status(now_).trouble, "");
   live(0, 400);
-  ASSERT_EQ(told.size(), 2U);
-  EXPECT_EQ(told[0].jump.to, kStart + 15.0);
-  EXPECT_NEAR(told[0].jump.translation_m, 14.9, 1e-9);
-  EXPECT_NEAR(told[1].jump.translation_m, 500.1, 1e-9);
-  EXPECT_EQ(node_->status(now_).trouble, to_string(told[1].jump) + " (2 so far)");
+  ASSERT_EQ(reported.size(), 2U);
+  EXPECT_EQ(reported[0].jump.to, kStart + 15.0);
+  EXPECT_NEAR(reported[0].jump.translation_m, 14.9, 1e-9);
+  EXPECT_NEAR(reported[1].jump.translation_m, 500.1, 1e-9);
+  EXPECT_EQ(node_->status(now_).trouble, to_string(reported[1].jump) + " (2 so far)");
   EXPECT_EQ(node_->status(now_ + config_.jump_told_s).trouble, "");
   const std::string whole = wire::encode(node_->agent().state());
   const Pose3 T_odom_fed = node_->agent().T_odom_fed();
@@ -69,14 +69,14 @@ TEST_F(RobotOdometry, OdometryThatJumpsIsToldAndAKillChangesNothing) {
     now_ = {};
     restart();
     live(0, kill);
-    told.clear();
+    reported.clear();
     restart();  // without what waited to be written
     EXPECT_TRUE(resumed_.events.empty());
     const auto newest = node_->agent().newest_sample().value();
     live(static_cast<int>(std::lround((newest - kStart) / 0.1)) + 1, 400);
     EXPECT_EQ(wire::encode(node_->agent().state()), whole) << kill;
     EXPECT_EQ(node_->agent().T_odom_fed(), T_odom_fed) << kill;
-    EXPECT_LE(told.size(), 2U) << kill;
+    EXPECT_LE(reported.size(), 2U) << kill;
   }
 }
 

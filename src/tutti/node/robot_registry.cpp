@@ -19,8 +19,8 @@ void remember(std::set<std::uint64_t>& sessions, std::uint64_t session) {
   if (sessions.size() > RobotRow::kMostSessions) sessions.erase(sessions.begin());
 }
 
-/// It has begun a new session, for example because its clock was set back. Only a start with a random part tells. While
-/// two programs seem to have the owner's session, it is the first of them.
+/// It has begun a new session, for example because its clock was set back. Only a start with a random part
+/// distinguishes this. While two programs seem to have the owner's session, it is the first of them.
 bool is_one_program(const RobotRegistry::Robot& robot, const NodeStatus& now, Timestamp when) {
   constexpr std::uint64_t kCounts = std::uint64_t{1} << 32U;
   if (now.start < kCounts || now.session <= robot.status.session) return false;
@@ -114,7 +114,7 @@ void RobotRegistry::take_over(RobotId id, Robot& robot, const NodeStatus& status
 bool RobotRegistry::note_start(Robot& robot, const NodeStatus& status, Timestamp now) {
   const std::uint64_t known = robot.status.start;
   if (status.start == known || known == 0 || status.start == 0) return true;
-  if (status.start != robot.start_before) {  // it has started again, as far as can be told
+  if (status.start != robot.start_before) {  // it has started again, as far as can be known
     robot.start_before = known;
     robot.heard_again.reset();
     return true;

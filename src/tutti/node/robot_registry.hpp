@@ -77,7 +77,7 @@ class RobotRegistry {
   void make_room();
   /// Why the status is refused; empty when it is not.
   [[nodiscard]] std::string objection(RobotId id, const NodeStatus& status, Timestamp now) const;
-  /// Takes the start of a status of the owner's session; false when the status is an old one's, and says nothing new.
+  /// Takes the start of a status of the owner's session; false when the status is an old one's, and has nothing new.
   static bool note_start(Robot& robot, const NodeStatus& status, Timestamp now);
   void take_over(RobotId id, Robot& robot, const NodeStatus& status) const;
 

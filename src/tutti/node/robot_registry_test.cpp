@@ -56,9 +56,9 @@ TEST_F(Registry, ANameAndANumberBelongToOneSessionWhileItIsThere) {
 
 /// A status of the session and start, and whether it is accepted.
 bool hears(RobotRegistry& registry, std::uint64_t session, std::uint64_t start, double s) {
-  NodeStatus said = status("alpha", session);
-  said.start = start;
-  return registry.hear(kOne, said, at(s)).accepted;
+  NodeStatus sent = status("alpha", session);
+  sent.start = start;
+  return registry.hear(kOne, sent, at(s)).accepted;
 }
 
 TEST_F(Registry, OfTwoLivingProgramsOfASessionTheSecondIsRefusedUntilTheFirstIsGone) {
@@ -135,7 +135,7 @@ TEST_F(Registry, AfterThirtySecondsANewSessionTakesItsPlaceForGood) {
   EXPECT_FALSE(hear(kOne, "bravo", 12, 1000));  // a number with submaps keeps its name
 }
 
-TEST_F(Registry, AClaimWithoutSubmapsHoldsWhileItIsThereAndGivesWayToOneWithSubmaps) {
+TEST_F(Registry, AClaimWithoutSubmapsCountsWhileItIsThereAndYieldsToOneWithSubmaps) {
   EXPECT_TRUE(hear(kOne, "nobody", 99, 0));
   EXPECT_FALSE(hear(kOne, "alpha", 10, 1));
   EXPECT_TRUE(registry_.note_session({kOne, 10}));  // the robot's submaps come all the same
@@ -151,7 +151,7 @@ TEST_F(Registry, AClaimWithoutSubmapsHoldsWhileItIsThereAndGivesWayToOneWithSubm
   EXPECT_EQ(owner(kOne), 10U);
 }
 
-TEST_F(Registry, StrangersAreBoundedNotStoredAndInNobodysWay) {
+TEST_F(Registry, StrangersAreBoundedNotStoredAndBlockNobody) {
   registry_.note_session({kOne, 10});
   for (std::uint32_t i = 0; i < 1200; ++i) {
     const auto heard = registry_.hear({100 + i}, status("fake_" + std::to_string(i), 1), at(i * 0.001));
@@ -202,7 +202,7 @@ TEST_F(Registry, RowsThatAreDamagedAreNotTaken) {
     EXPECT_FALSE(RobotRegistry::robot_of(key)) << key;
 }
 
-/// Whatever programs say and however often the server starts again: a session that has lost its place never has it
+/// Whatever programs send and however often the server starts again: a session that has lost its place never has it
 /// again, and only one that was not heard for 30 s loses it. (All are strangers, or none is.)
 RC_GTEST_PROP(RegistryProperty, OwnersChangeOnlyWhenTheyAreGoneAndNeverBack, ()) {
   RobotRegistry registry;

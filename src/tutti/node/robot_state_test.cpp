@@ -53,8 +53,8 @@ struct Robot {
                      robot::test::drifting_odometry(2)[1].pose;
 };
 
-// A checkpoint used to be the whole way so far.
-TEST(RobotState, WhatASubmapWritesDoesNotGrowWithTheWay) {
+// A checkpoint used to be the whole trajectory so far.
+TEST(RobotState, WhatASubmapWritesDoesNotGrowWithTheTrajectory) {
   storage::MemoryStore store(storage::robot_schema());
   Robot robot(store);
   ASSERT_TRUE(store.commit(robot.node->resume({}).writes).has_value());
@@ -102,7 +102,7 @@ TEST(RobotState, OfTheLinksToTheMapOnlyThoseThatChangedAreWritten) {
   ASSERT_GT(links, 1U);
   EXPECT_EQ(links_in(to_the_next_submap()), static_cast<std::ptrdiff_t>(links));
   EXPECT_EQ(links_in(to_the_next_submap()), 0);
-  ProxyGraphMessage other = graph;  // the end of what the links hold to is no longer known: some links go
+  ProxyGraphMessage other = graph;  // the end that the links are fixed to is no longer known: some links go
   other.graph.revision = 2;
   other.graph.nodes.erase(other.graph.nodes.begin() + 40, other.graph.nodes.end() - 1);
   other.graph.uncertainties.clear();
@@ -269,7 +269,7 @@ TEST(RobotState, OfEveryVersionOnIsReadToTheBit) {
   }
 }
 
-/// Whoever adds to what a row holds raises the version of the agent state (docs/storage.md): an older program of the
+/// Whoever adds to what a row contains raises the version of the agent state (docs/storage.md): an older program of the
 /// same version would take the row for garbage.
 TEST(RobotState, IsWrittenAsItsVersionWasWhenItWasRaised) {
   const auto tables = stored_tables(wire::versions(kState).current);

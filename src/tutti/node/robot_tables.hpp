@@ -19,7 +19,7 @@ inline constexpr const char* kMeta = "meta";
 inline constexpr const char* kRobot = "robot";      // which robot the store belongs to
 inline constexpr const char* kStarts = "starts";    // number of starts on this store
 inline constexpr const char* kSession = "session";  // newest session on this store
-inline constexpr const char* kLost = "lost";        // why there is no checkpoint, until it is told
+inline constexpr const char* kLost = "lost";        // why there is no checkpoint, until it is reported
 // the server's incarnations in the last graph and in the last receipt
 inline constexpr const char* kIncarnations = "incarnations";
 inline constexpr std::string_view kForeign = "foreign/";  // followed by a session that another body has, too

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What operators say to the server of closures.
+// The operators' decisions on closures that come to the server.
 #include <fmt/format.h>
 
 #include <algorithm>

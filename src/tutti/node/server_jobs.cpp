@@ -15,7 +15,7 @@
 
 namespace tutti::node {
 
-/// A bus may bring an answer twice, which is nothing to tell.
+/// A bus may bring an answer twice, which is nothing to report.
 void ServerNode::refuse_unasked(const bus::Envelope& envelope, const std::string& job, Timestamp now, Step& step) {
   if (!jobs_.has_given(job))
     refuse(envelope, fmt::format("job '{}' is none of this server's since it started", plain_text(job)), now, step);

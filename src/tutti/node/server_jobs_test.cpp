@@ -155,9 +155,9 @@ class StrangeAnswers : public ServerJobs {
     receive(test::submap(kAlpha, 0));
     return jobs_of(receive(test::submap(kBravo, 0))).at(0);
   }
-  Step say(const Verdicts& said) {
-    return receive({Endpoint::worker(9), Endpoint::server(), MessageKind::verdicts, said.job,
-                    std::make_shared<const std::string>(wire::encode(said))});
+  Step say(const Verdicts& sent) {
+    return receive({Endpoint::worker(9), Endpoint::server(), MessageKind::verdicts, sent.job,
+                    std::make_shared<const std::string>(wire::encode(sent))});
   }
   /// A verdict that refuses the job's pair.
   [[nodiscard]] Verdicts refusal_of(const std::string& job, const SubmapPair& pair = kBad) const {
@@ -182,7 +182,7 @@ TEST_F(StrangeAnswers, ToAJobThatIsAnsweredAreDropped) {
   EXPECT_EQ(store_->tables(), before);
 }
 
-/// What members have said, said again 10,000 times by somebody who has their credential and their disk.
+/// What members have sent, sent again 10,000 times by somebody who has their credential and their disk.
 TEST_F(StrangeAnswers, ReplaysChangeNothing) {
   const Job job = ask();
   WorkerNode worker(Endpoint::worker(0), verifier_, SubmapFrames::of(*store_));
@@ -225,7 +225,7 @@ TEST_F(StrangeAnswers, CountOnlyForWhatWasAsked) {
   ASSERT_FALSE(next.empty());
   EXPECT_TRUE(say(refusal_of(next[0].id, kBad)).writes.empty());
   EXPECT_TRUE(has_closure());
-  // It said nothing of what it was asked: that has failed, and is asked again.
+  // It answered nothing of what it was asked: that has failed, and is asked again.
   EXPECT_FALSE(wait(60.0).empty());
 }
 

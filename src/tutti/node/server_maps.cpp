@@ -17,7 +17,7 @@ Timestamp ServerNode::next_update(Timestamp now) const {
 }
 
 /// At the next update, whether or not there is news by then.
-void ServerNode::look_again_at_what_waits(Timestamp now) {
+void ServerNode::review_waiting_changes(Timestamp now) {
   if (broadcast_.anything_waits()) timer_ = now + config_.server.update_period_s;
 }
 
@@ -32,7 +32,7 @@ Step ServerNode::tend(Timestamp now) {
   if (is_due(timer_, now) && !server_.has_news() && broadcast_.anything_waits()) {
     timer_.reset();
     broadcast_.send_waiting(robots_, now, step);
-    look_again_at_what_waits(now);
+    review_waiting_changes(now);
   }
   return step;
 }
@@ -71,7 +71,7 @@ Step ServerNode::end_map(MapOfTask made, Timestamp now) {
   if (server_.has_news())
     timer_ = next_update(now);
   else
-    look_again_at_what_waits(now);
+    review_waiting_changes(now);
   const server::MapEstimate& map = server_.map();
   const auto accepted = std::ranges::count_if(map.closures, &server::JudgedClosure::accepted);
   const MapCounts counts{server_.state().revision, map.nodes.size(), static_cast<std::uint64_t>(accepted),

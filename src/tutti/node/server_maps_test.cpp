@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a server takes while it makes a map. The map is made when the test says so: no clock and no thread decides.
+// What a server takes while it makes a map. The map is made when the test asks for it: no clock and no thread decides.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,7 +27,7 @@ class MapBeingMade : public test::StoredServer {
     done(node_->tend(now_));
     task_ = node_->begin_map(now_);
   }
-  /// A submap of each robot, and what workers say of it.
+  /// A submap of each robot, and what workers find about it.
   void take_both(std::uint32_t index) {
     WorkerNode worker(bus::Endpoint::worker(0), verifier_, SubmapFrames::of(*store_));
     for (const ChainId& chain : {kAlpha, kBravo})
@@ -44,7 +44,7 @@ class MapBeingMade : public test::StoredServer {
   static std::vector<std::size_t> updates(const Step& step) {
     std::vector<std::size_t> out;
     for (const Event& event : step.events)
-      if (const auto* told = std::get_if<MapUpdated>(&event.what)) out.push_back(told->submaps);
+      if (const auto* reported = std::get_if<MapUpdated>(&event.what)) out.push_back(reported->submaps);
     return out;
   }
 
@@ -95,9 +95,9 @@ TEST_F(MapBeingMade, WhatComesMeanwhileIsInTheNextWhichIsOneOfTheWholeSet) {
 
 TEST_F(MapBeingMade, AServerThatIsKilledMeanwhileMakesItAgain) {
   take_both(4);
-  const auto told = read_map_meta(*store_).value();
-  EXPECT_TRUE(told->news);
-  EXPECT_EQ(told->revision, 0U);
+  const auto reported = read_map_meta(*store_).value();
+  EXPECT_TRUE(reported->news);
+  EXPECT_EQ(reported->revision, 0U);
   start({RobotId{0}, RobotId{1}}, {});
   EXPECT_EQ(updates(done(node_->on_timer(node_->next_timer().value()))), std::vector<std::size_t>{10});
   EXPECT_EQ(node_->map_server().state().revision, 1U);

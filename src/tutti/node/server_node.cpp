@@ -242,7 +242,7 @@ void ServerNode::tell_unread_rows(Timestamp now, Step& step) {
   }
 }
 
-/// A robot that nobody knows is told so too, and is none of the mission's for that.
+/// A robot that nobody knows learns so too, and is none of the mission's for that.
 void ServerNode::note_unread(SubmapId id, Timestamp now, Step& step) {
   Receipt* const receipt = receipt_of(id.chain.robot, now);
   if (receipt == nullptr) return;
@@ -259,7 +259,7 @@ void ServerNode::note_refused(SubmapId id, const bus::Envelope& envelope, const 
   send_receipt(*receipt, step);
 }
 
-/// What a worker asked for, of jobs that are out; what it does not get it asks for again. A copy without a frame says
+/// What a worker asked for, of jobs that are out; what it does not get it asks for again. A copy without a frame means
 /// that the map does not have it, or no job that is out needs it.
 void ServerNode::send_copies(const bus::Envelope& envelope, Timestamp now, Step& step) {
   if (envelope.from.role != bus::Endpoint::Role::worker) return refuse(envelope, "only workers get copies", now, step);

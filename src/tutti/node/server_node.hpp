@@ -54,9 +54,9 @@ struct ServerNodeConfig {
 };
 
 /// The server as a node: MapServer with its store and messages. It takes submaps, verdicts and operators' decisions,
-/// and gives receipts, jobs and proxy graphs. The store is the map (storage::map_schema()): submaps, verdicts and words
-/// as they came, and the outcome for all other pairs; everything else is computed from these. What was sent is never
-/// newer than what is stored, so a server that starts again on its own store keeps its epoch.
+/// and gives receipts, jobs and proxy graphs. The store is the map (storage::map_schema()): submaps, verdicts and
+/// decisions as they came, and the outcome for all other pairs; everything else is computed from these. What was sent
+/// is never newer than what is stored, so a server that starts again on its own store keeps its epoch.
 class ServerNode {
  public:
   /// On an empty store, begins a new map of this epoch, which must be larger than any before (server::MapServer);
@@ -72,9 +72,9 @@ class ServerNode {
   Step resume(Timestamp now);
   /// Takes a message that was sent to the server. The receipt then lists a submap that is refused for good as refused,
   /// and one of a version that cannot be read as unread. A second program with a name or number in use (RobotRegistry)
-  /// is told so in the receipt; its submaps are taken, but what is sent to the number is for the owner.
+  /// learns so from the receipt; its submaps are taken, but what is sent to the number is for the owner.
   Step receive(const bus::Envelope& envelope, Timestamp now);
-  /// Instead of receive(), for messages that the host does not pass on (program/host.hpp): tells and counts them as
+  /// Instead of receive(), for messages that the host does not pass on (program/host.hpp): reports and counts them as
   /// refused.
   Step put_aside(const bus::Envelope& envelope, const std::string& why, Timestamp now);
   /// When on_timer() is to be called next; nothing while there is no news and every job is answered. While a map is
@@ -97,7 +97,7 @@ class ServerNode {
   [[nodiscard]] std::uint64_t changes() const { return changes_; }
 
   [[nodiscard]] const server::MapServer& map_server() const { return server_; }
-  /// Those that robots have told.
+  /// Those that robots have reported.
   [[nodiscard]] std::map<RobotId, std::string> robot_names() const;
   /// False after a start until the first update; mission_status() then has the figures of the last update before the
   /// start.
@@ -109,7 +109,7 @@ class ServerNode {
              const ServerNodeConfig& config, std::uint64_t epoch, std::shared_ptr<SubmapFrames> frames,
              OpenedMap opened);
 
-  /// Tells and counts a refused message.
+  /// Reports and counts a refused message.
   void refuse(const bus::Envelope& envelope, const std::string& why, Timestamp now, Step& step);
   void note_refusal(bus::Endpoint::Role from, bus::MessageKind kind, const std::string& why);
   /// The robot joins the mission; false if it is in it already.
@@ -133,7 +133,7 @@ class ServerNode {
   void send_receipt(Receipt receipt, Step& step) const;
   /// The robot need not send the submap again before the server's next start, which may be of a newer version.
   void note_unread(SubmapId id, Timestamp now, Step& step);
-  /// Tells which rows of the store were left as they are.
+  /// Reports which rows of the store were left as they are.
   void tell_unread_rows(Timestamp now, Step& step);
   void receive_submap(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_verdicts(const bus::Envelope& envelope, Timestamp now, Step& step);
@@ -144,7 +144,7 @@ class ServerNode {
   /// True when a decision on this pair that was given later counts instead.
   Result<bool> take_decision(const bus::Envelope& envelope, const ClosureDecision& decision, Timestamp now, Step& step);
   void note_decision(const std::string& frame, const std::string& why);
-  /// Answers the words that are stored.
+  /// Answers the decisions that are stored.
   void recall_decisions();
   [[nodiscard]] server::ClosureNames closure_names() const;
   void send_copies(const bus::Envelope& envelope, Timestamp now, Step& step);
@@ -166,7 +166,7 @@ class ServerNode {
   /// A worker did not have the verifier for these pairs: they are asked again when a worker has it.
   void note_waiting(const std::vector<SubmapPair>& pairs, const std::string& why, Timestamp now, Step& step);
   void ask_waiting(Timestamp now, Step& step);
-  /// A worker says which methods it has.
+  /// A worker reports which methods it has.
   void receive_status_of_worker(std::uint32_t number, const NodeStatus& status, Timestamp now, Step& step);
   /// No worker could verify the pair this time: it is asked again later, or refused.
   void note_failed(const SubmapPair& pair, const std::string& why, Timestamp now, Verdicts& refused, Step& step);
@@ -177,7 +177,7 @@ class ServerNode {
   bool give_back(const SubmapPair& pair);
   void send_receipt(RobotId robot, Step& step) const;
   [[nodiscard]] bool is_due(const std::optional<Timestamp>& timer, Timestamp now) const;
-  void look_again_at_what_waits(Timestamp now);
+  void review_waiting_changes(Timestamp now);
   [[nodiscard]] Timestamp next_update(Timestamp now) const;
   /// Sets the timer when something new has come, and stores whether it has.
   void note_news(Timestamp now, bool before, Step& step);
@@ -190,7 +190,7 @@ class ServerNode {
   Receipts receipts_;
   AnsweredDecisions decisions_;
   RobotRegistry registry_;
-  std::map<std::string, UnreadRows> unread_rows_;  // by table, until they are told
+  std::map<std::string, UnreadRows> unread_rows_;  // by table, until they are reported
   WorkerRoster workers_;
   std::map<std::pair<bus::Endpoint::Role, bus::MessageKind>, MissionStatus::Refusals> refusals_;
   std::uint64_t start_ = 0;  // number of starts on this store; part of jobs' names

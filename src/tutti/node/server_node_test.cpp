@@ -37,7 +37,7 @@ class ServerNodeTest : public test::StoredServer {
     return pairs;
   }
   template <class What>
-  static std::size_t told(const Step& step) {
+  static std::size_t reported(const Step& step) {
     return static_cast<std::size_t>(
         std::ranges::count_if(step.events, [](const Event& e) { return std::holds_alternative<What>(e.what); }));
   }
@@ -46,7 +46,7 @@ class ServerNodeTest : public test::StoredServer {
     WorkerNode worker(Endpoint::worker(0), verifier_, SubmapFrames::of(*store_));
     for (const auto& job : of_kind(step, MessageKind::job))
       for (const auto& verdicts : worker.receive(job, now_).messages)
-        EXPECT_EQ(told<VerdictsTaken>(receive(verdicts)), taken);
+        EXPECT_EQ(reported<VerdictsTaken>(receive(verdicts)), taken);
   }
   void fill() {
     for (std::uint32_t i = 0; i < 4; ++i)
@@ -86,7 +86,7 @@ TEST_F(ServerNodeTest, SaysWhatItHasStoredAndAsksForTheNewPairs) {
   receive(test::submap(kAlpha, 0));
   receive(test::submap(kBravo, 0));
   const Step step = receive(test::submap(kAlpha, 2));
-  EXPECT_EQ(told<SubmapStored>(step), 1U);
+  EXPECT_EQ(reported<SubmapStored>(step), 1U);
   EXPECT_EQ(store_->tables().at("submaps").size(), 3U);
   const auto receipts = of_kind(step, MessageKind::receipt);
   ASSERT_EQ(receipts.size(), 1U);
@@ -109,7 +109,7 @@ TEST_F(ServerNodeTest, ASubmapThatComesAgainIsOnlyConfirmed) {
   EXPECT_TRUE(step.events.empty());
 }
 
-TEST_F(ServerNodeTest, ASubmapThatComesAgainBeforeItIsStoredIsOnItsWay) {
+TEST_F(ServerNodeTest, ASubmapThatComesAgainBeforeItIsStoredIsUnderWay) {
   const bus::Envelope first = test::envelope(test::submap(kAlpha, 0));
   bus::Envelope again = first;  // as a robot sends what it has sent to an earlier server
   again.id = message_id({kAlpha, 0}, 5);
@@ -135,7 +135,7 @@ TEST_F(ServerNodeTest, RefusesWhatIsNoGoodAndStoresNothingOfIt) {
   misplaced.kind = MessageKind::proxy_graph;
   for (const bus::Envelope& bad : {forged, stranger, garbage, other, misplaced}) {
     const Step step = receive(bad);
-    EXPECT_EQ(told<MessageRefused>(step), 1U);
+    EXPECT_EQ(reported<MessageRefused>(step), 1U);
     EXPECT_TRUE(step.messages.empty());
   }
   EXPECT_EQ(store_->tables(), before);
@@ -154,7 +154,7 @@ TEST_F(ServerNodeTest, UpdatesTheMapOnTimeAndOnlyWithNews) {
   ASSERT_EQ(graphs.size(), 2U);
   EXPECT_EQ(wire::decode_proxy_graph(*graphs[0].bytes)->graph.age(),
             (std::pair<std::uint64_t, std::uint64_t>(1001, 1)));
-  EXPECT_EQ(told<MapUpdated>(step), 1U);
+  EXPECT_EQ(reported<MapUpdated>(step), 1U);
   EXPECT_EQ(node_->next_timer(), std::nullopt);
   EXPECT_TRUE(done(node_->on_timer(now_)).messages.empty());
   receive(test::submap(kAlpha, 0));  // no news
@@ -256,7 +256,7 @@ TEST_F(ServerNodeTest, AsksAgainWhatNobodyAnswersEveryTimeLater) {
     now_ = now_ + wait_s;
     const Step again = done(node_->on_timer(now_));
     EXPECT_EQ(pairs_of(again), std::set<SubmapPair>{pair});
-    EXPECT_EQ(told<VerificationFailed>(again), 1U);
+    EXPECT_EQ(reported<VerificationFailed>(again), 1U);
     EXPECT_TRUE(of_kind(again, MessageKind::proxy_graph).empty());
     EXPECT_TRUE(ids.insert(of_kind(again, MessageKind::job)[0].id).second);  // or a broker would drop it
     EXPECT_EQ(node_->mission_status(now_).pending_jobs, 1U);
@@ -285,7 +285,7 @@ TEST_F(ServerNodeTest, AJobThatWaitsBehindOthersIsNotAskedAgain) {
   EXPECT_EQ(pairs_of(done(node_->on_timer(now_ + 100.0))), pairs_of(asked[2]));
 }
 
-TEST_F(ServerNodeTest, AnOperatorsWordIsStoredAndSurvivesEveryRestart) {
+TEST_F(ServerNodeTest, AnOperatorsDecisionIsStoredAndSurvivesEveryRestart) {
   fill();
   now_ = Timestamp{} + 20.0;
   done(node_->on_timer(now_));
@@ -295,7 +295,7 @@ TEST_F(ServerNodeTest, AnOperatorsWordIsStoredAndSurvivesEveryRestart) {
   const auto all = accepted();
   const SubmapPair pair{{kAlpha, 0}, {kBravo, 2}};
   const Step step = receive(test::envelope(ClosureDecision{"0/0-1/2", Wish::reject, "ada", 5}));
-  EXPECT_EQ(told<DecisionTaken>(step), 1U);
+  EXPECT_EQ(reported<DecisionTaken>(step), 1U);
   ASSERT_EQ(node_->next_timer(), Timestamp{} + 20.0);
   for (int start = 0; start < 2; ++start) {
     restart();
@@ -310,8 +310,8 @@ TEST_F(ServerNodeTest, AnOperatorsWordIsStoredAndSurvivesEveryRestart) {
   EXPECT_EQ(accepted(), all - 1);
 
   const auto before = store_->tables();  // late, and once more
-  EXPECT_EQ(told<DecisionTaken>(receive(test::envelope(ClosureDecision{"0/0-1/2", Wish::accept, "eve", 4}))), 0U);
-  EXPECT_EQ(told<DecisionTaken>(receive(test::envelope(ClosureDecision{"0/0-1/2", Wish::reject, "ada", 5}))), 0U);
+  EXPECT_EQ(reported<DecisionTaken>(receive(test::envelope(ClosureDecision{"0/0-1/2", Wish::accept, "eve", 4}))), 0U);
+  EXPECT_EQ(reported<DecisionTaken>(receive(test::envelope(ClosureDecision{"0/0-1/2", Wish::reject, "ada", 5}))), 0U);
   EXPECT_EQ(store_->tables(), before);
   receive(test::envelope(ClosureDecision{"1/2-0/0", Wish::withdraw, "ada", 6}));
   restart();
@@ -326,15 +326,15 @@ TEST_F(ServerNodeTest, NobodyElseHasAWordAndNotOnWhatIsNotThere) {
   for (const Endpoint from : {Endpoint::of(RobotId{0}), Endpoint::worker(0)}) {
     bus::Envelope forged = test::envelope(decision);
     forged.from = from;
-    EXPECT_EQ(told<MessageRefused>(receive(forged)), 1U);
+    EXPECT_EQ(reported<MessageRefused>(receive(forged)), 1U);
   }
   bus::Envelope garbage = test::envelope(decision);
   garbage.bytes = std::make_shared<const std::string>("garbage");
-  EXPECT_EQ(told<MessageRefused>(receive(garbage)), 1U);
+  EXPECT_EQ(reported<MessageRefused>(receive(garbage)), 1U);
   for (const char* closure : {"nobody/0-1/2", "0/0-1/99", "0/0", "0/0-0/0"})
-    EXPECT_EQ(told<MessageRefused>(receive(test::envelope(ClosureDecision{closure, Wish::reject, "ada", 5}))), 1U)
+    EXPECT_EQ(reported<MessageRefused>(receive(test::envelope(ClosureDecision{closure, Wish::reject, "ada", 5}))), 1U)
         << closure;
-  EXPECT_EQ(told<MessageRefused>(receive(test::envelope(ClosureDecision{"0/0-1/1", Wish::accept, "ada", 5}))),
+  EXPECT_EQ(reported<MessageRefused>(receive(test::envelope(ClosureDecision{"0/0-1/1", Wish::accept, "ada", 5}))),
             1U);  // no closure there
   EXPECT_EQ(store_->tables(), before);
 }
@@ -422,7 +422,7 @@ TEST_F(ServerNodeTest, WhatComesBeforeTheMapIsComputedIsInTheFirstOne) {
   EXPECT_EQ(of_kind(step, MessageKind::receipt).size(), 1U);
   EXPECT_EQ(again->next_timer(), Timestamp{} + 30.0);  // an update as any other
   const Step update = done(again->on_timer(*again->next_timer()));
-  EXPECT_EQ(told<MapUpdated>(update), 1U);
+  EXPECT_EQ(reported<MapUpdated>(update), 1U);
   EXPECT_EQ(of_kind(update, MessageKind::proxy_graph).size(), 2U);
   EXPECT_EQ(again->map_server().state().revision, node_->map_server().state().revision + 1);
   EXPECT_NE(find_node(again->map_server().map(), {kAlpha, 27}), nullptr);
@@ -442,7 +442,7 @@ TEST_F(ServerNodeTest, AStoreThatIsDamagedIsNoMap) {
   }
 }
 
-/// Says that odometry lost a metre in the middle.
+/// Finds that odometry lost a metre in the middle.
 class LostMetreVerifier final : public server::ClosureVerifier {
  public:
   [[nodiscard]] MethodId id() const override { return even_.id(); }
@@ -511,13 +511,13 @@ TEST_F(ChangedMap, IsSentAtOnceToRobotsThatDoNotWait) {
   EXPECT_EQ(outcomes(changed), std::vector<ChangeOutcome>{});
 }
 
-TEST_F(ChangedMap, IsSentAtOnceAfterAnOperatorsWord) {
+TEST_F(ChangedMap, IsSentAtOnceAfterAnOperatorsDecision) {
   reach("wait");
   const auto& verdicts = node_->map_server().state().verdicts;
   ASSERT_FALSE(verdicts.empty());
   const std::string name = server::ClosureNames({}, {kAlpha}).of(verdicts.begin()->first);
   const Step heard = receive(test::envelope(ClosureDecision{name, Wish::accept, "ada", 5}));
-  EXPECT_EQ(told<DecisionTaken>(heard), 1U);
+  EXPECT_EQ(reported<DecisionTaken>(heard), 1U);
   const Step changed = done(node_->on_timer(now_));
   EXPECT_EQ(of_kind(changed, MessageKind::proxy_graph).size(), 1U);
   EXPECT_EQ(outcomes(changed), std::vector<ChangeOutcome>{});

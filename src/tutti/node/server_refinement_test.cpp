@@ -192,11 +192,11 @@ TEST_F(ServerRefinement, ADistantWorkerGetsTheSubmapsFirst) {
   const bus::Envelope job = wait(10.0).at(0);
   WorkerNode distant(Endpoint::worker(5), verifier_, std::make_shared<FrameCache>(1U << 20U));
   distant.refine_with(refiner_);
-  std::vector<bus::Envelope> said = distant.receive(job, now_).messages;
-  ASSERT_EQ(said.size(), 1U);
+  std::vector<bus::Envelope> request = distant.receive(job, now_).messages;
+  ASSERT_EQ(request.size(), 1U);
   EXPECT_TRUE(distant.holds_job());
   std::optional<bus::Envelope> last;
-  for (const bus::Envelope& copy : receive(said[0]).messages)
+  for (const bus::Envelope& copy : receive(request[0]).messages)
     for (bus::Envelope& message : distant.receive(copy, now_).messages) last = std::move(message);
   ASSERT_TRUE(last.has_value());
   const auto near = wire::decode_refinement(*answer_of(*worker_, job).messages.at(0).bytes);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a ServerNode knows of the others, and says of the whole.
+// What a ServerNode knows of the others, and reports of the whole.
 #include <algorithm>
 #include <functional>
 #include <limits>
@@ -13,7 +13,7 @@
 namespace tutti::node {
 namespace {
 
-constexpr std::size_t kMostStrangersTold = 50;  // to viewers: the last heard
+constexpr std::size_t kMostStrangersShown = 50;  // to viewers: the last heard
 
 std::uint64_t count(const std::map<std::uint64_t, NumberSet>& sessions) {
   std::uint64_t all = 0;
@@ -22,7 +22,7 @@ std::uint64_t count(const std::map<std::uint64_t, NumberSet>& sessions) {
   return all;
 }
 
-/// How many refused submaps are the robot's: of numbers that it has used, by its own word or because a later one is in
+/// How many refused submaps are the robot's: of numbers that it has used, as it reports or because a later one is in
 /// the map. Others are garbage that anybody may have sent.
 std::uint64_t count_refused(const Receipt& receipt, const NodeStatus& status) {
   std::uint64_t all = 0;
@@ -30,7 +30,7 @@ std::uint64_t count_refused(const Receipt& receipt, const NodeStatus& status) {
     std::uint64_t used = 0;
     if (const auto stored = receipt.stored.find(session); stored != receipt.stored.end())
       for (const NumberSet::Interval& interval : stored->second.intervals()) used = interval.end;
-    if (session == status.session && !status.name.empty())  // older robots do not say it
+    if (session == status.session && !status.name.empty())  // older robots do not send it
       used = std::max(used, status.submaps.value_or(std::numeric_limits<std::uint64_t>::max()));
     for (const NumberSet::Interval& interval : numbers.intervals())
       all += std::min(interval.end, used) - std::min(interval.begin, used);
@@ -69,7 +69,7 @@ void ServerNode::receive_status_of_worker(std::uint32_t number, const NodeStatus
     ask_for_refinement(*refinements_.take_waiting(), now, 0, step);
 }
 
-/// It is told so, once.
+/// It learns so, once.
 void ServerNode::refuse_robot(const bus::Envelope& envelope, const NodeStatus& status, const std::string& why,
                               Timestamp now, Step& step) {
   Receipt* const receipt = receipt_of(*envelope.from.robot(), now);
@@ -84,9 +84,9 @@ void ServerNode::receive_status_of_robot(RobotId robot, const NodeStatus& status
   const auto before = registry_.owner(robot);
   const auto heard = registry_.hear(robot, status, now);
   if (heard.must_be_stored) step.writes.push_back({"meta", RobotRegistry::key(robot), registry_.row(robot)});
-  Receipt* const told = receipt_of(robot, now);
-  if (told == nullptr) return;
-  Receipt& receipt = *told;
+  Receipt* const known_receipt = receipt_of(robot, now);
+  if (known_receipt == nullptr) return;
+  Receipt& receipt = *known_receipt;
   const auto owner = registry_.owner(robot);
   const Receipt old = receipt;
   if (owner) receipt.owner_session = owner->session;
@@ -112,7 +112,7 @@ std::set<RobotId> ServerNode::strangers_there(Timestamp now) const {
       heard.emplace_back(*known.last_seen, robot);
   std::ranges::sort(heard, std::greater());
   std::set<RobotId> there;
-  for (std::size_t i = 0; i < std::min(heard.size(), kMostStrangersTold); ++i) there.insert(heard[i].second);
+  for (std::size_t i = 0; i < std::min(heard.size(), kMostStrangersShown); ++i) there.insert(heard[i].second);
   return there;
 }
 
@@ -140,11 +140,12 @@ MissionStatus ServerNode::mission_status(Timestamp now) const {
     if (out.robots.size() == MissionStatus::kMostRobots) break;
     MissionStatus::Robot& entry = out.robots.emplace_back();
     entry.robot = robot;
-    if (const Receipt* const told = receipts_.find(robot)) {
-      entry.submaps = count(told->stored);
+    if (const Receipt* const known_receipt = receipts_.find(robot)) {
+      entry.submaps = count(known_receipt->stored);
       const auto known = registry_.robots().find(robot);
-      entry.refused = count_refused(*told, known == registry_.robots().end() ? NodeStatus{} : known->second.status);
-      entry.unread = count(told->unread);
+      entry.refused =
+          count_refused(*known_receipt, known == registry_.robots().end() ? NodeStatus{} : known->second.status);
+      entry.unread = count(known_receipt->unread);
     }
     if (const auto found = registry_.robots().find(robot); found != registry_.robots().end()) {
       const RobotRegistry::Robot& known = found->second;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a ServerNode knows of robots and workers, and tells them and viewers.
+// What a ServerNode knows of robots and workers, and sends them and viewers.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -42,7 +42,7 @@ class ServerStatus : public testing::Test {
   Step hear(RobotId robot, const std::string& name, std::uint64_t session) {
     return receive(to_server(Endpoint::of(robot), {.name = name, .session = session, .start = 2}));
   }
-  /// The submap's number in what the robot is told.
+  /// The submap's number in what the robot is sent.
   Step send(const SubmapMessage& message, const std::string& id) {
     bus::Envelope envelope = test::envelope(message);
     envelope.id = id;
@@ -63,7 +63,7 @@ class ServerStatus : public testing::Test {
     return std::nullopt;
   }
   template <class What>
-  static std::size_t told(const Step& step) {
+  static std::size_t reported(const Step& step) {
     return static_cast<std::size_t>(
         std::ranges::count_if(step.events, [](const Event& e) { return std::holds_alternative<What>(e.what); }));
   }
@@ -77,7 +77,7 @@ class ServerStatus : public testing::Test {
   Timestamp now_ = Timestamp{} + 3.0;
 };
 
-TEST_F(ServerStatus, ARobotWhoseSubmapsWaitIsToldAgainWhatIsStored) {
+TEST_F(ServerStatus, ARobotWhoseSubmapsWaitIsSentAgainWhatIsStored) {
   const auto receipts = [&](std::uint64_t backlog) {
     const Step step = receive(
         to_server(Endpoint::of(kAlpha), {.name = "alpha", .session = 7, .start = 2, .backlog_submaps = backlog}));
@@ -147,11 +147,11 @@ TEST_F(ServerStatus, WorkersThatAreSilentAreForgottenRobotsAreNot) {
   EXPECT_EQ(mission.robots[0].last_seen, now_ - 400.0);
 }
 
-TEST_F(ServerStatus, ASecondRobotOfTheNameIsToldWhoIsThere) {
-  EXPECT_EQ(told<RobotJoined>(hear(kAlpha, "alpha", 7)), 1U);
+TEST_F(ServerStatus, ASecondRobotOfTheNameLearnsWhoIsThere) {
+  EXPECT_EQ(reported<RobotJoined>(hear(kAlpha, "alpha", 7)), 1U);
   EXPECT_EQ(receipt(kAlpha).owner_session, 7U);
   EXPECT_TRUE(hear(kAlpha, "alpha", 7).messages.empty());  // no news
-  EXPECT_EQ(told<RobotRefused>(hear(kAlpha, "alpha", 8)), 1U);
+  EXPECT_EQ(reported<RobotRefused>(hear(kAlpha, "alpha", 8)), 1U);
   EXPECT_EQ(receipt(kAlpha).owner_session, 7U);
   ASSERT_TRUE(receipt(kAlpha).conflict.has_value());
   EXPECT_EQ(receipt(kAlpha).conflict->session, 8U);
@@ -162,10 +162,10 @@ TEST_F(ServerStatus, ASecondRobotOfTheNameIsToldWhoIsThere) {
   EXPECT_EQ(node_->mission_status(now_).robots[0].status.session, 7U);
   EXPECT_FALSE(node_->mission_status(now_).robots[0].conflict.empty());
   EXPECT_EQ(node_->mission_status(now_).refusals.at(0).count, 2U);
-  EXPECT_EQ(told<RobotRefused>(hear(kStranger, "alpha", 9)), 1U);  // by its name
+  EXPECT_EQ(reported<RobotRefused>(hear(kStranger, "alpha", 9)), 1U);  // by its name
   EXPECT_EQ(receipt(kStranger).conflict->session, 9U);
   now_ = now_ + 31.0;
-  EXPECT_EQ(told<RobotJoined>(hear(kAlpha, "alpha", 8)), 1U);
+  EXPECT_EQ(reported<RobotJoined>(hear(kAlpha, "alpha", 8)), 1U);
   EXPECT_EQ(receipt(kAlpha).owner_session, 8U);
   EXPECT_FALSE(receipt(kAlpha).conflict.has_value());
 }
@@ -198,11 +198,11 @@ TEST_F(ServerStatus, NoOtherSessionTakesTheGraphOfTheNewestWhateverItsNumber) {
   EXPECT_EQ(graph_of(kAlpha), 10U);
 }
 
-TEST_F(ServerStatus, RobotsItWasNotToldOfAreTakenIfItIsOpen) {
+TEST_F(ServerStatus, RobotsThatItDoesNotKnowAreTakenIfItIsOpen) {
   hear(kStranger, "stranger", 7);
   receive(test::envelope(test::submap({kStranger, 7}, 0)));
   receive(test::envelope(test::submap({kStranger, 7}, 1)));
-  receive(test::envelope(test::submap({RobotId{78}, 3}, 0)));  // before it has said who it is
+  receive(test::envelope(test::submap({RobotId{78}, 3}, 0)));  // before it has sent who it is
   EXPECT_TRUE(receipt(kStranger).contains({{kStranger, 7}, 0}));
   EXPECT_EQ(graph_of(kStranger), 7U);
   EXPECT_EQ(node_->mission_status(now_).robots.size(), 3U);
@@ -218,18 +218,18 @@ TEST_F(ServerStatus, RobotsItWasNotToldOfAreTakenIfItIsOpen) {
 TEST_F(ServerStatus, AndRefusedIfItIsNot) {
   accepts_others_ = false;
   restart();
-  EXPECT_EQ(told<MessageRefused>(hear(kStranger, "stranger", 7)), 1U);
-  EXPECT_EQ(told<MessageRefused>(receive(test::envelope(test::submap({kStranger, 7}, 0)))), 1U);
+  EXPECT_EQ(reported<MessageRefused>(hear(kStranger, "stranger", 7)), 1U);
+  EXPECT_EQ(reported<MessageRefused>(receive(test::envelope(test::submap({kStranger, 7}, 0)))), 1U);
   ASSERT_TRUE(receipt(kStranger).conflict.has_value());
   EXPECT_NE(receipt(kStranger).conflict->why.find("none of the mission's"), std::string::npos);
-  EXPECT_TRUE(hear(kStranger, "stranger", 7).messages.empty());  // it has been told
+  EXPECT_TRUE(hear(kStranger, "stranger", 7).messages.empty());  // it has been sent
   EXPECT_EQ(node_->mission_status(now_).robots.size(), 1U);
   EXPECT_EQ(node_->mission_status(now_).refusals.size(), 2U);
   for (std::uint32_t i = 0; i < 1200; ++i) hear(RobotId{1000 + i}, "fake", 7);
   EXPECT_EQ(receipts_.size(), 1000U);  // the bus keeps each
   now_ = now_ + 61.0;
   hear(RobotId{90}, "late", 7);
-  EXPECT_TRUE(receipt(RobotId{90}).conflict.has_value());  // the others say nothing more
+  EXPECT_TRUE(receipt(RobotId{90}).conflict.has_value());  // the others send nothing more
 }
 
 TEST_F(ServerStatus, WhatItNeverTakesIsInTheReceiptAndSurvivesARestart) {
@@ -239,8 +239,9 @@ TEST_F(ServerStatus, WhatItNeverTakesIsInTheReceiptAndSurvivesARestart) {
   garbage.bytes = std::make_shared<const std::string>("TU garbage");
   SubmapMessage torn = test::submap(chain, 2);
   torn.submap.odometry[0].T_a_b.translation.x() += 5.0;
-  for (const bus::Envelope& bad : {garbage, test::envelope(torn)}) EXPECT_EQ(told<MessageRefused>(receive(bad)), 1U);
-  EXPECT_EQ(told<MessageRefused>(send(test::submap(chain, 3), "0/7/4")), 1U);  // not what it is called
+  for (const bus::Envelope& bad : {garbage, test::envelope(torn)})
+    EXPECT_EQ(reported<MessageRefused>(receive(bad)), 1U);
+  EXPECT_EQ(reported<MessageRefused>(send(test::submap(chain, 3), "0/7/4")), 1U);  // not what it is called
   const auto check = [&] {
     for (std::uint32_t i = 0; i < 6; ++i) {
       EXPECT_EQ(receipt(kAlpha).contains({chain, i}), i == 0) << i;
@@ -251,15 +252,15 @@ TEST_F(ServerStatus, WhatItNeverTakesIsInTheReceiptAndSurvivesARestart) {
   check();
   EXPECT_EQ(store_->tables().at("submaps").size(), 1U);
   EXPECT_EQ(node_->mission_status(now_).robots[0].refused, 0U);  // they may be anybody's
-  hear(kAlpha, "alpha", 7);                                      // an older robot, which does not say how many it made
+  hear(kAlpha, "alpha", 7);                                      // an older robot, which does not send how many it made
   EXPECT_EQ(node_->mission_status(now_).robots[0].refused, 3U);
   receipts_.clear();
   restart();
   check();
 }
 
-/// What is refused under numbers that the robot has not used is not the robot's, and is not told as that. It was told
-/// for ever.
+/// What is refused under numbers that the robot has not used is not the robot's, and is not reported as that. It was
+/// reported for ever.
 TEST_F(ServerStatus, GarbageUnderNumbersThatARobotNeverUsedIsNotTheRobots) {
   const ChainId chain{kAlpha, 7};
   receive(test::envelope(test::submap(chain, 0)));
@@ -290,14 +291,14 @@ TEST_F(ServerStatus, OfOneIdTheFirstContentStays) {
   receive(test::envelope(first));
   const auto submaps = store_->tables().at("submaps");
   const Step step = receive(test::envelope(other));
-  EXPECT_EQ(told<MessageRefused>(step), 1U);
+  EXPECT_EQ(reported<MessageRefused>(step), 1U);
   EXPECT_EQ(store_->tables().at("submaps"), submaps);
   restart();
   EXPECT_TRUE(receipt(kAlpha).refuses({chain, 0}, content_hash(*test::envelope(other).bytes)));  // so its robot knows
   EXPECT_FALSE(receipt(kAlpha).refuses({chain, 0}, content_hash(*test::envelope(first).bytes)));
   EXPECT_TRUE(receipt(kAlpha).contains({chain, 0}));  // it need not come once more
   EXPECT_FALSE(receipt(kAlpha).refuses({chain, 0}));
-  EXPECT_EQ(told<MessageRefused>(receive(test::envelope(first))), 0U);
+  EXPECT_EQ(reported<MessageRefused>(receive(test::envelope(first))), 0U);
 }
 
 TEST_F(ServerStatus, NobodysGarbageFillsTheReceipt) {
@@ -327,7 +328,7 @@ TEST_F(ServerStatus, WhoSendsGarbageUnderARobotsNextIdDoesNotRefuseItsSubmap) {
   restart();
   receive(garbage);
   EXPECT_FALSE(receipt(kAlpha).refuses(next.submap.id, content));
-  EXPECT_EQ(told<SubmapStored>(receive(test::envelope(next))), 1U);
+  EXPECT_EQ(reported<SubmapStored>(receive(test::envelope(next))), 1U);
   for (int start = 0; start < 2; ++start) {
     EXPECT_TRUE(receipt(kAlpha).contains(next.submap.id));
     EXPECT_FALSE(receipt(kAlpha).refuses(next.submap.id));  // nothing of it is lacking
@@ -337,13 +338,13 @@ TEST_F(ServerStatus, WhoSendsGarbageUnderARobotsNextIdDoesNotRefuseItsSubmap) {
 }
 
 /// As of a robot that was upgraded before its server.
-TEST_F(ServerStatus, ARobotThatNobodyKnowsIsToldOfAnUnreadOrRefusedSubmapAndIsNoneOfTheMissionsForIt) {
+TEST_F(ServerStatus, ARobotThatNobodyKnowsLearnsOfAnUnreadOrRefusedSubmapAndIsNoneOfTheMissionsForIt) {
   const auto before = store_->tables();
   bus::Envelope newer = test::envelope(test::submap({kStranger, 7}, 0));
   std::string frame = *newer.bytes;
   ++frame[2];  // its version
   newer.bytes = std::make_shared<const std::string>(frame);
-  EXPECT_EQ(told<MessageRefused>(receive(newer)), 1U);
+  EXPECT_EQ(reported<MessageRefused>(receive(newer)), 1U);
   bus::Envelope garbage = test::envelope(test::submap({kStranger, 7}, 1));
   garbage.bytes = std::make_shared<const std::string>("TU garbage");
   receive(garbage);
@@ -373,7 +374,7 @@ TEST_F(ServerStatus, StrangersLockNobodyOut) {
   EXPECT_LE(node_->mission_status(now_).robots.size(), 100U);
   EXPECT_TRUE(std::ranges::any_of(node_->mission_status(now_).robots,
                                   [](const auto& robot) { return robot.status.name == "real"; }));
-  EXPECT_EQ(told<SubmapStored>(receive(test::envelope(test::submap({kStranger, 7}, 0)))), 1U);
+  EXPECT_EQ(reported<SubmapStored>(receive(test::envelope(test::submap({kStranger, 7}, 0)))), 1U);
   EXPECT_TRUE(receipt(kStranger).contains({{kStranger, 7}, 0}));
   now_ = now_ + 100.0;
   EXPECT_EQ(node_->mission_status(now_).robots.size(), 2U);  // the others are forgotten

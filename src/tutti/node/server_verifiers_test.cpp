@@ -135,11 +135,11 @@ TEST_F(ServerVerifiers, WhatAWorkerCannotDoIsAskedAgainAtOnceWhereAnotherCan) {
 TEST_F(ServerVerifiers, AVerdictOfAnUnknownVerifierIsKeptButNotBelieved) {
   const MethodId of_old_programs{"", 3, 0};
   const bus::Envelope job = ask();
-  Verdicts said = wire::decode_verdicts(*worker(3, verifier_).receive(job, now_).messages.at(0).bytes).value();
-  said.verdicts.at(0).verifier = of_old_programs;
+  Verdicts sent = wire::decode_verdicts(*worker(3, verifier_).receive(job, now_).messages.at(0).bytes).value();
+  sent.verdicts.at(0).verifier = of_old_programs;
   const auto envelope = [&] {
-    return bus::Envelope{Endpoint::worker(3), Endpoint::server(), MessageKind::verdicts, said.job,
-                         std::make_shared<const std::string>(wire::encode(said))};
+    return bus::Envelope{Endpoint::worker(3), Endpoint::server(), MessageKind::verdicts, sent.job,
+                         std::make_shared<const std::string>(wire::encode(sent))};
   };
   const Step taken = receive(envelope());
   EXPECT_FALSE(has_closure());
@@ -159,10 +159,10 @@ TEST_F(ServerVerifiers, AVerdictOfAnUnknownVerifierIsKeptButNotBelieved) {
 TEST_F(ServerVerifiers, WhatWasSetAsideIsBelievedWhenItsVerifierIsTheServers) {
   const auto other = std::make_shared<test::EvenVerifier>("gap: 1\n");
   const bus::Envelope job = ask();
-  Verdicts said = wire::decode_verdicts(*worker(3, verifier_).receive(job, now_).messages.at(0).bytes).value();
-  said.verdicts.at(0).verifier = other->id();
-  receive({Endpoint::worker(3), Endpoint::server(), MessageKind::verdicts, said.job,
-           std::make_shared<const std::string>(wire::encode(said))});
+  Verdicts sent = wire::decode_verdicts(*worker(3, verifier_).receive(job, now_).messages.at(0).bytes).value();
+  sent.verdicts.at(0).verifier = other->id();
+  receive({Endpoint::worker(3), Endpoint::server(), MessageKind::verdicts, sent.job,
+           std::make_shared<const std::string>(wire::encode(sent))});
   EXPECT_FALSE(has_closure());
   EXPECT_TRUE(jobs(restart(other)).empty());
   ASSERT_TRUE(has_closure());

@@ -19,7 +19,7 @@ namespace tutti::node {
 struct Step {
   std::vector<storage::Write> writes;   ///< 1. To be committed in one transaction.
   std::vector<bus::Envelope> messages;  ///< 2. To be sent.
-  std::vector<Event> events;            ///< 3. To be told.
+  std::vector<Event> events;            ///< 3. To be reported.
 
   /// Appends what another input causes after this one.
   void add(Step other) {

@@ -52,14 +52,14 @@ TEST(Upgrade, WhatARobotSentBeforeTheServerWasUpgradedIsInTheMapAfterwards) {
 
 /// Robot up, server up, and both back, each of these orders; at the end both are up.
 TEST(Upgrade, NoOrderLosesASubmap) {
-  constexpr int kSteps = 3, kWays = 4;
-  for (int order = 0; order < kWays * kWays * kWays; ++order) {
+  constexpr int kSteps = 3, kCombinations = 4;
+  for (int order = 0; order < kCombinations * kCombinations * kCombinations; ++order) {
     SCOPED_TRACE(order);
     Site site(1e4);  // no map is needed
     site.walk(30);
-    for (int step = 0, left = order; step < kSteps; ++step, left /= kWays) {
+    for (int step = 0, left = order; step < kSteps; ++step, left /= kCombinations) {
       const bool up = left % 2 == 0;
-      if (left % kWays < 2)
+      if (left % kCombinations < 2)
         site.upgrade_robot(up);
       else
         site.upgrade_server(up);
@@ -117,7 +117,7 @@ TEST(Upgrade, AnOlderRobotSaysWhatItCannotReadAndGoesOn) {
 }
 
 /// As when a newer server has had the map, and an older one gets it back.
-TEST(Upgrade, RowsOfANewerVersionAreLeftAloneAndTold) {
+TEST(Upgrade, RowsOfANewerVersionAreLeftAloneAndReported) {
   const ChainId chain{RobotId{0}, 7};
   const auto verifier = std::make_shared<test::EvenVerifier>();
   storage::MemoryStore store(storage::map_schema());
@@ -150,13 +150,13 @@ TEST(Upgrade, RowsOfANewerVersionAreLeftAloneAndTold) {
 
   const auto server = open();
   const Step step = server->resume({});
-  std::size_t told = 0;
+  std::size_t reported = 0;
   for (const Event& event : step.events)
     if (const auto* refused = std::get_if<MessageRefused>(&event.what)) {
-      ++told;
+      ++reported;
       EXPECT_NE(refused->why.find("1 rows of the map's table"), std::string::npos) << refused->why;
     }
-  EXPECT_EQ(told, 5U);
+  EXPECT_EQ(reported, 5U);
   EXPECT_EQ(server->mission_status({}).refusals.size(), 5U);
   EXPECT_EQ(server->map_server().state().submaps.size(), 4U);
   for (const bus::Envelope& message : step.messages)
@@ -245,7 +245,7 @@ TEST(Upgrade, AnOlderWorkerLeavesAJobToAnother) {
   const auto leaves = [&](const Step& step) {
     EXPECT_EQ(step.events.size(), 1U);
     EXPECT_TRUE(step.messages.empty());
-    EXPECT_FALSE(worker.next_timer().has_value());  // nor does it say that it works on it
+    EXPECT_FALSE(worker.next_timer().has_value());  // nor does it report that it works on it
     return worker.holds_job();
   };
   EXPECT_TRUE(leaves(worker.receive(envelope(MessageKind::job, raised(wire::encode(job))), {})));

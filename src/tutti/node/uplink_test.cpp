@@ -112,7 +112,7 @@ RC_GTEST_PROP(Uplink, AfterAnyOutageAllArriveTheNewestFirstWithinTheBudget, ()) 
       if (sent.submap == id) sent_s.push_back(sent.time_s);
     RC_ASSERT(std::ranges::adjacent_find(sent_s, [](double a, double b) { return b < a + Uplink::kAgain_s; }) ==
               sent_s.end());
-    // It comes again only when it was sent again after it had left, as when an outage holds its receipt.
+    // It comes again only when it was sent again after it had left, as when an outage delays its receipt.
     const double left_s = times.front() - 0.75;  // latency and a step
     RC_ASSERT(times.size() <=
               1 + static_cast<std::size_t>(std::ranges::count_if(sent_s, [&](double s) { return s > left_s; })) -

@@ -148,7 +148,7 @@ void WorkerNode::decline(const RefinementJob& job, const std::string& why, bool 
 }
 
 void WorkerNode::receive_job(const bus::Envelope& envelope, Timestamp now, Step& step) {
-  TUTTI_CHECK(!held_ && !rests_until_, "a second job");
+  TUTTI_CHECK(!pending_ && !rests_until_, "a second job");
   auto job = decode(envelope);
   leaves_job_ = !job && job.error().code == ErrorCode::unsupported;
   if (!job) {
@@ -166,7 +166,7 @@ void WorkerNode::receive_job(const bus::Envelope& envelope, Timestamp now, Step&
     for (const SubmapId& id : submaps_of(*job))
       if (!cache_->contains(id)) missing.insert(id);
   if (missing.empty()) return answer(*job, now, step);
-  held_ = Held{.job = std::move(*job), .missing = std::move(missing), .asked = {}, .last_came = now};
+  pending_ = PendingJob{.job = std::move(*job), .missing = std::move(missing), .asked = {}, .last_came = now};
   ask(now, step);
 }
 
@@ -177,37 +177,37 @@ void WorkerNode::receive_copy(const bus::Envelope& envelope, Timestamp now, Step
   };
   auto copy = wire::decode_submap_copy(*envelope.bytes);
   if (!copy) return refuse(copy.error().message);
-  if (!held_ || !held_->missing.contains(copy->id)) return;  // it came twice
+  if (!pending_ || !pending_->missing.contains(copy->id)) return;  // it came twice
   if (copy->frame.empty()) {  // nobody's job: answered as failed, which makes room for the next
-    const Held held = *std::exchange(held_, std::nullopt);
+    const PendingJob pending = *std::exchange(pending_, std::nullopt);
     const std::string why = fmt::format("submap {} is not in the map", to_string(copy->id));
-    std::visit([&](const auto& job) { decline(job, why, false, step); }, held.job);
+    std::visit([&](const auto& job) { decline(job, why, false, step); }, pending.job);
     return;
   }
   const auto message = wire::decode_submap(copy->frame);
   if (!message && message.error().code == ErrorCode::unsupported) {
     leaves_job_ = true;
-    held_.reset();
+    pending_.reset();
   }
   if (!message) return refuse(message.error().message);
   if (message->submap.id != copy->id) return refuse("another submap than it says");
   cache_->put(copy->id, std::move(copy->frame));
-  held_->missing.erase(copy->id);
-  held_->asked.erase(copy->id);
-  held_->last_came = now;
-  if (!held_->missing.empty()) return ask(now, step);
-  const Held held = *std::exchange(held_, std::nullopt);
-  answer(held.job, now, step);
+  pending_->missing.erase(copy->id);
+  pending_->asked.erase(copy->id);
+  pending_->last_came = now;
+  if (!pending_->missing.empty()) return ask(now, step);
+  const PendingJob pending = *std::exchange(pending_, std::nullopt);
+  answer(pending.job, now, step);
   cache_->trim({});
 }
 
 void WorkerNode::ask(Timestamp now, Step& step) {
-  Held& held = *held_;
-  std::erase_if(held.asked, [&](const auto& asked) { return now - asked.second >= kAskAgain_s; });
+  PendingJob& pending = *pending_;
+  std::erase_if(pending.asked, [&](const auto& asked) { return now - asked.second >= kAskAgain_s; });
   SubmapRequest request;
-  for (const SubmapId& id : held.missing) {
-    if (held.asked.size() >= kMostAsked) break;
-    if (held.asked.emplace(id, now).second) request.submaps.push_back(id);
+  for (const SubmapId& id : pending.missing) {
+    if (pending.asked.size() >= kMostAsked) break;
+    if (pending.asked.emplace(id, now).second) request.submaps.push_back(id);
   }
   if (request.submaps.empty()) return;
   step.messages.push_back({self_,
@@ -215,14 +215,14 @@ void WorkerNode::ask(Timestamp now, Step& step) {
                            bus::MessageKind::submap_request,
                            {},
                            std::make_shared<const std::string>(wire::encode(request))});
-  cache_->trim(submaps_of(held.job));
+  cache_->trim(submaps_of(pending.job));
 }
 
 std::optional<Timestamp> WorkerNode::next_timer() const {
   const auto due = later_.next_due();
-  if (!held_) return due && rests_until_ ? std::min(due, rests_until_) : due ? due : rests_until_;
-  Timestamp next = std::min(held_->last_came + kPatience_s, due.value_or(kLastTimestamp));
-  for (const auto& [id, asked] : held_->asked) next = std::min(next, asked + kAskAgain_s);
+  if (!pending_) return due && rests_until_ ? std::min(due, rests_until_) : due ? due : rests_until_;
+  Timestamp next = std::min(pending_->last_came + kPatience_s, due.value_or(kLastTimestamp));
+  for (const auto& [id, asked] : pending_->asked) next = std::min(next, asked + kAskAgain_s);
   return next;
 }
 
@@ -230,13 +230,13 @@ Step WorkerNode::on_timer(Timestamp now) {
   Step step;
   if (rests_until_ && *rests_until_ <= now) rests_until_.reset();
   tell_later(now, step);
-  if (!held_) return step;
-  if (now - held_->last_came < kPatience_s) {
+  if (!pending_) return step;
+  if (now - pending_->last_came < kPatience_s) {
     ask(now, step);
     return step;
   }
-  const Held held = *std::exchange(held_, std::nullopt);
-  answer(held.job, now, step);  // without them: those pairs have failed
+  const PendingJob pending = *std::exchange(pending_, std::nullopt);
+  answer(pending.job, now, step);  // without them: those pairs have failed
   return step;
 }
 

@@ -24,7 +24,7 @@ namespace tutti::node {
 /// worker's own, or one made from the job's settings. A job that it cannot do goes back to the server, and the worker
 /// then pauses so that other workers get the job. It keeps nothing between jobs that it could not get again, except
 /// closures that become known later (LaterAnswers): a worker that ends forgets those of pairs that it has begun to
-/// answer. A worker that lacks submaps of a job asks the server for them, and holds the job until they are there.
+/// answer. A worker that lacks submaps of a job asks the server for them, and keeps the job until they are there.
 class WorkerNode {
  public:
   /// Calls its argument with 0 ... count - 1, in any order and possibly on several threads, and returns after the last
@@ -62,14 +62,14 @@ class WorkerNode {
   /// True while no further job may come: the last job is not answered, or the worker pauses, or the job (or a submap of
   /// it) is of a version that this program cannot read. In the last case the job is never answered and must be left to
   /// another worker.
-  [[nodiscard]] bool holds_job() const { return held_.has_value() || leaves_job_ || rests_until_.has_value(); }
-  /// When on_timer() is to be called next; nothing while no job is held and no closure is to become known.
+  [[nodiscard]] bool holds_job() const { return pending_.has_value() || leaves_job_ || rests_until_.has_value(); }
+  /// When on_timer() is to be called next; nothing while no job is pending and no closure is to become known.
   [[nodiscard]] std::optional<Timestamp> next_timer() const;
   Step on_timer(Timestamp now);
 
  private:
   using AnyJob = std::variant<Job, RefinementJob>;
-  struct Held {
+  struct PendingJob {
     AnyJob job;
     std::set<SubmapId> missing;
     std::map<SubmapId, Timestamp> asked;
@@ -107,7 +107,7 @@ class WorkerNode {
   std::shared_ptr<const server::VerifierMaker> maker_;
   std::shared_ptr<const server::ClosureVerifier> asked_verifier_;  // of the last job; likewise the refiner
   std::shared_ptr<const server::MapRefiner> asked_refiner_;
-  std::optional<Held> held_;
+  std::optional<PendingJob> pending_;
   double rest_s_ = kRest_s;
   std::optional<Timestamp> rests_until_;
   bool leaves_job_ = false;

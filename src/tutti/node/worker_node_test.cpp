@@ -120,16 +120,16 @@ TEST_F(WorkerNodeTest, AnswersWithEachClosureWhenItIsKnownAndTheJobWithTheLast) 
   const Step step = worker.receive(envelope(job), now);
   EXPECT_FALSE(worker.holds_job());
   ASSERT_EQ(step.messages.size(), 2U);  // the refusal, and what is known of submap 0
-  std::vector<Verdicts> told;
-  for (const bus::Envelope& message : step.messages) told.push_back(wire::decode_verdicts(*message.bytes).value());
-  EXPECT_NE(told[0].job, "1/0");
-  EXPECT_NE(told[1].job, "1/0");
+  std::vector<Verdicts> answers;
+  for (const bus::Envelope& message : step.messages) answers.push_back(wire::decode_verdicts(*message.bytes).value());
+  EXPECT_NE(answers[0].job, "1/0");
+  EXPECT_NE(answers[1].job, "1/0");
   EXPECT_NE(step.messages[0].id, step.messages[1].id);
-  ASSERT_EQ(told[0].verdicts.size(), 1U);
-  EXPECT_TRUE(told[0].verdicts[0].refusal.has_value());
-  ASSERT_EQ(told[1].verdicts.size(), 1U);
-  EXPECT_EQ(told[1].verdicts[0].pair, job.pairs[0]);
-  EXPECT_EQ(told[1].verdicts[0].closures.size(), 1U);
+  ASSERT_EQ(answers[0].verdicts.size(), 1U);
+  EXPECT_TRUE(answers[0].verdicts[0].refusal.has_value());
+  ASSERT_EQ(answers[1].verdicts.size(), 1U);
+  EXPECT_EQ(answers[1].verdicts[0].pair, job.pairs[0]);
+  EXPECT_EQ(answers[1].verdicts[0].closures.size(), 1U);
   ASSERT_EQ(worker.next_timer(), Timestamp{} + 5200.0);
   EXPECT_EQ(answer(worker.on_timer(*worker.next_timer())).verdicts.at(0).pair, job.pairs[2]);
   EXPECT_EQ(answer(worker.on_timer(Timestamp{} + 6000.0)).verdicts.at(0).closures.size(), 2U);

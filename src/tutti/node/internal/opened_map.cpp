@@ -60,7 +60,7 @@ Status OpenedMap::read_meta(const storage::TableStore& store) {
   return ok;
 }
 
-/// As MapServer::take() leaves it: the closures of earlier verifiers hold until this one has answered. A pair without
+/// As MapServer::take() leaves it: the closures of earlier verifiers count until this one has answered. A pair without
 /// both of its submaps, as in a map that was salvaged, is asked again when they come.
 void OpenedMap::add(ClosureVerdict verdict) {
   const SubmapPair pair = verdict.pair;

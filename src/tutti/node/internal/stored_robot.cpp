@@ -15,10 +15,10 @@ Result<std::uint64_t> newest_session(const storage::TableStore& store) {
   if (!row) return tl::unexpected(row.error());
   std::uint64_t newest = 0;
   if (const auto session = storage::numbers_of(row->value_or(""), 1)) newest = session->front();
-  const auto look = [&](std::string_view key, std::size_t) {
+  const auto take_session = [&](std::string_view key, std::size_t) {
     if (const auto numbers = storage::numbers_of(key, 3)) newest = std::max(newest, (*numbers)[1]);
   };
-  if (auto read = store.sizes(kOutbox, look); !read) return tl::unexpected(read.error());
+  if (auto read = store.sizes(kOutbox, take_session); !read) return tl::unexpected(read.error());
   return newest;
 }
 
