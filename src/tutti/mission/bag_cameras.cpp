@@ -34,19 +34,19 @@ bool is_wanted(const std::string& topic, const std::string& list) {
 }
 
 void take_imu(const BagIndex& index, const std::string& body, const RobotConfig& robot, BagRecording& out) {
-  const auto said = [&](const std::string& why) { out.notes.push_back("no IMU is used: " + why); };
+  const auto without_imu = [&](const std::string& why) { out.notes.push_back("no IMU is used: " + why); };
   const std::string& wanted = robot.topics.imu;
   if (index.imu.empty() && wanted.empty()) return;
   if (index.imu.size() > 1 && wanted.empty())
-    return said(fmt::format("{} topics have one; say which: --topic {}.imu={}", index.imu.size(), robot.name,
-                            index.imu.begin()->first));
+    return without_imu(fmt::format("{} topics have one; say which: --topic {}.imu={}", index.imu.size(), robot.name,
+                                   index.imu.begin()->first));
   const auto at = wanted.empty() ? index.imu.begin() : index.imu.find(wanted);
-  if (at == index.imu.end()) return said(fmt::format("'{}' is not in the bag", wanted));
+  if (at == index.imu.end()) return without_imu(fmt::format("'{}' is not in the bag", wanted));
   const auto& [topic, track] = *at;
   const auto T_body_imu = index.tree.find(body, track.frame);
-  if (!T_body_imu) return said(fmt::format("{}: no transform from '{}' to '{}'", topic, track.frame, body));
+  if (!T_body_imu) return without_imu(fmt::format("{}: no transform from '{}' to '{}'", topic, track.frame, body));
   if (const Status ok = bags::check_imu_place(*T_body_imu); !ok)
-    return said(fmt::format("{}: {}", topic, ok.error().message));
+    return without_imu(fmt::format("{}: {}", topic, ok.error().message));
   out.imu = track.samples;
   for (ImuSample& sample : out.imu) sample = bags::in_body(sample, *T_body_imu);
   out.notes.push_back(fmt::format("IMU of {} ({} samples, {} refused)", topic, out.imu.size(), track.refused.count));
@@ -56,7 +56,7 @@ std::string flag_of(const RobotConfig& robot, const char* kind) {
   return fmt::format("--topic {}.{}=", robot.name, kind);
 }
 
-/// The topics of depth to choose from; `why_not` says why there are none although there are some.
+/// The topics of depth to choose from; `why_not` is why there are none although there are some.
 std::vector<bags::ImageTopic> depths_of(const BagIndex& index, const RobotConfig& robot, std::string& why_not) {
   const std::string& wanted = robot.topics.depth;
   std::vector<bags::ImageTopic> out;
@@ -134,7 +134,7 @@ Result<DepthImage> read_depth(BagMessages& messages, const BagDepth& depth, cons
   });
 }
 
-/// What to say of it. Depth by another clock is not used.
+/// The note on it. Depth by another clock is not used.
 Result<std::string> add_depth(const BagDepth& depth, const std::shared_ptr<BagMessages>& messages,
                               const ImagesConfig& config, ImageStream& stream) {
   const auto sensor = depth_sensor(config.depth, bags::kDepthUnit_m);
@@ -204,8 +204,8 @@ Result<RobotImages> open_images(const BagRecording& bag, const Trajectory& odome
   const double offset_s = robot.images.time_offset_s;
   for (const ScanPlace& place : bag.cameras.front().images) stream.stamps.push_back(place.stamp + offset_s);
   stream.load = [messages, cameras = bag.cameras, most_s = tracking.max_stamp_difference_s](
-                    std::size_t moment, std::size_t camera) -> Result<Image> {
-    const Timestamp stamp = cameras.front().images.at(moment).stamp;
+                    std::size_t instant, std::size_t camera) -> Result<Image> {
+    const Timestamp stamp = cameras.front().images.at(instant).stamp;
     const std::vector<ScanPlace>& places = cameras.at(camera).images;
     const auto place = nearest_in_time(places, stamp, most_s, &ScanPlace::stamp);
     if (place == places.end()) return Image();
@@ -213,9 +213,9 @@ Result<RobotImages> open_images(const BagRecording& bag, const Trajectory& odome
   };
   std::string note;
   if (bag.depth) {
-    auto said = add_depth(*bag.depth, messages, robot.images, stream);
-    if (!said) return tl::unexpected(said.error());
-    note = std::move(*said);
+    auto added = add_depth(*bag.depth, messages, robot.images, stream);
+    if (!added) return tl::unexpected(added.error());
+    note = std::move(*added);
   }
   auto out = serve_images(std::move(stream), bag.imu, ImuNoise{}, robot.images, odometry, tracking);
   if (out) out->note += note;

@@ -122,8 +122,8 @@ class BagCameras : public testing::Test {
     return input->robots.front().recording;
   }
   void expect_note(const std::string& part) const { EXPECT_NE(notes_.find(part), std::string::npos) << notes_; }
-  static std::vector<std::uint16_t> first_two(const Recording& recording, std::size_t moment) {
-    const auto depth = recording.images->load_depth(moment);
+  static std::vector<std::uint16_t> first_two(const Recording& recording, std::size_t instant) {
+    const auto depth = recording.images->load_depth(instant);
     if (!depth || depth->empty()) return {};
     return {depth->value[0], depth->value[1]};
   }
@@ -170,7 +170,7 @@ TEST_F(BagCameras, CompressedDepthIsTakenAlike) {
   EXPECT_EQ(first_two(recording, 3), (FirstTwo{903, 903}));
 }
 
-/// A camera of 333 Hz has three images within 5 ms of a moment of the other's.
+/// A camera of 333 Hz has three images within 5 ms of a stamp of the other's.
 TEST_F(BagCameras, OfASecondCameraTheNearestImageIsTaken) {
   constexpr double kPeriod_s = 0.003, kOffset_s = 0.0005;
   const Recording recording = load({Depth{.name = "/second",
@@ -181,16 +181,16 @@ TEST_F(BagCameras, OfASecondCameraTheNearestImageIsTaken) {
                                    {"alpha.images=/camera/image_raw,/second/image_raw"});
   ASSERT_NE(recording.images, nullptr) << notes_;
   ASSERT_EQ(recording.images->cameras.size(), 2U);
-  for (std::size_t moment = 0; moment + 1 < kImages; ++moment) {
-    const auto image = recording.images->load(moment, 1);
+  for (std::size_t instant = 0; instant + 1 < kImages; ++instant) {
+    const auto image = recording.images->load(instant, 1);
     ASSERT_TRUE(image) << image.error().message;
-    ASSERT_FALSE(image->empty()) << moment;
-    const long nearest = std::lround((kImages_s * static_cast<double>(moment) - kOffset_s) / kPeriod_s);
-    EXPECT_EQ(image->grey.front(), nearest % 200) << moment;
+    ASSERT_FALSE(image->empty()) << instant;
+    const long nearest = std::lround((kImages_s * static_cast<double>(instant) - kOffset_s) / kPeriod_s);
+    EXPECT_EQ(image->grey.front(), nearest % 200) << instant;
   }
 }
 
-/// Depth of any kind is no second camera; what does not fit is said with what was expected.
+/// Depth of any kind is no second camera; what does not fit is reported with what was expected.
 TEST_F(BagCameras, DepthThatIsNotRegisteredIsSaid) {
   const std::vector<std::pair<Depth, std::string>> cases{
       {{.width = 80}, "/depth/image_raw: 80 x 120 pixels, expected 160 x 120 as of /camera/image_raw"},
@@ -264,7 +264,8 @@ TEST_F(BagCameras, WrongDepthImagesAreLeftOutOneByOne) {
                   "which another message has, too",
                   kStart.ns));
   expect_note("13 of them have depth");
-  for (std::size_t moment = 3; moment < 10; ++moment) EXPECT_EQ(first_two(recording, moment), FirstTwo{}) << moment;
+  for (std::size_t instant = 3; instant < 10; ++instant)
+    EXPECT_EQ(first_two(recording, instant), FirstTwo{}) << instant;
   EXPECT_EQ(first_two(recording, 10), (FirstTwo{0, 1010}));
   load({{.change = [](int, bags::RosImage& image) { image.step = 10; }}});
   expect_note(

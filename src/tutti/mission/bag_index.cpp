@@ -46,7 +46,7 @@ bags::StampOrder put_in_order(std::vector<Item>& items, std::vector<bags::Arriva
 
 void refuse(OdometryTrack& track, const Error& error) { track.refused.add(++track.messages, error.message); }
 
-/// An encoding that is not ROS's counts as CDR: then decoding says what it found instead.
+/// An encoding that is not ROS's counts as CDR: then decoding reports what it found instead.
 bags::RosEncoding encoding_of(const BagMessage& message) {
   return bags::to_encoding(message.channel->message_encoding).value_or(bags::RosEncoding::cdr);
 }
@@ -134,18 +134,18 @@ class Indexer {
     track.arrivals.push_back({cloud->header.stamp, message.log_time, track.messages});
   }
 
-  /// A receiver without a fix, or one that does not say how sure it is, is none that fails.
+  /// A receiver without a fix, or one without a covariance, is none that fails.
   static void take_fix(FixTrack& track, const BagMessage& message) {
     ++track.messages;
     const auto heard = bags::decode_nav_sat_fix(message.data, encoding_of(message));
     if (!heard) return track.refused.add(track.messages, heard.error().message);
-    const auto said = bags::to_fix(*heard);
-    if (!said) return track.refused.add(track.messages, said.error().message);
-    if (!*said) {
+    const auto decoded = bags::to_fix(*heard);
+    if (!decoded) return track.refused.add(track.messages, decoded.error().message);
+    if (!*decoded) {
       ++track.without;
       return;
     }
-    const auto& [fix, frame, is_stated] = **said;
+    const auto& [fix, frame, is_stated] = **decoded;
     if (track.fixes.empty()) track.frame = frame;
     track.unsure += is_stated ? 0 : 1;
     track.fixes.push_back(fix);
@@ -183,7 +183,7 @@ class Indexer {
     track.arrivals.push_back({stamp, message.log_time, track.messages});
   }
 
-  /// What can be told without decoding it.
+  /// What can be known without decoding it.
   static Status check_depth(const ImageTrack& track, const bags::RosImage& image) {
     if (auto ok = bags::check_like_first(bags::look_of(image), *track.seen.first); !ok) return ok;
     return bags::check_rows(image, bags::depth_bytes(image.encoding));

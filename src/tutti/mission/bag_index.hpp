@@ -84,7 +84,7 @@ struct FixTrack {
 };
 
 /// What a mission needs to know of a bag before it reads scans one by one. It has the poses of all topics that may be
-/// odometry, and of /tf the frames whose name says that they are.
+/// odometry, and of /tf the frames that are odometry by their name.
 struct BagIndex {
   std::map<std::string, OdometryTrack> odometry;  ///< nav_msgs/Odometry, by topic
   std::map<std::string, OdometryTrack> poses;     ///< geometry_msgs/PoseStamped, by topic

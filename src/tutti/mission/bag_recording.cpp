@@ -121,7 +121,7 @@ void doubt_place(const std::string& topic, const Pose3& T_body_sensor, std::vect
     notes.push_back(fmt::format("{}: the sensor is {}", topic, doubt));
 }
 
-/// When several topics have fixes, the user has to say which to take: mostly all but one are made of that one.
+/// When several topics have fixes, the user has to choose one: mostly all but one are made of that one.
 Status take_fixes(const BagIndex& index, const std::string& body, const RobotConfig& robot, BagRecording& out) {
   const std::string& wanted = robot.topics.fixes;
   std::vector<std::string> topics;
@@ -177,7 +177,7 @@ Status take_scans(const OdometryTrack& odometry, const std::string& topic, ScanT
     return odometry.poses.front().stamp <= scan.stamp && scan.stamp <= odometry.poses.back().stamp;
   };
   if (std::ranges::any_of(out.scans, inside)) return {};
-  // A bag whose log times are the stamps does not tell when a scan came: then the two's beginnings are compared.
+  // A bag whose log times are the stamps does not record when a scan came: then the two's beginnings are compared.
   const double ahead_s = out.scans.front().stamp - odometry.poses.front().stamp;
   return fail(ErrorCode::invalid,
               "{}: of its {} stamps, {} to {} ns, none is within the odometry's, {} to {} ns, which begin {:.1f} s "

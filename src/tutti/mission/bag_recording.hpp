@@ -50,11 +50,11 @@ struct BagRecording {
 /// odom and something, else geometry_msgs/PoseStamped; scans are bags::kScanTypes. When several topics would do,
 /// or `robot.topics` names one that does not exist, the error lists them. In a bag of several robots, what is in the
 /// robot's namespace counts (keep_robot()). The LiDAR's pose is `robot.T_body_lidar`,
-/// else from /tf_static (and frames of /tf that never move); having neither is an error that says what to do. Invalid
+/// else from /tf_static (and frames of /tf that never move); having neither is an error with advice. Invalid
 /// messages are left out and counted in the notes. With `with_images`, cameras are the image topics that show pictures,
 /// have a CameraInfo beside them, and have a pose on the body by the bag's transforms; depth is as bags::is_depth() and
 /// bags::choose_cameras() have it. The IMU must be in the body's origin. Sensors that lack any of this are not used,
-/// and the notes say so.
+/// and the notes list them.
 Result<BagRecording> read_bag(const std::filesystem::path& data, const RobotConfig& robot, bool with_images = false);
 
 /// The bag's scans, each read when it is asked for, so that at most one chunk of the bag is in memory. They are in the

@@ -133,7 +133,7 @@ TEST_F(Bags, ScansAreDeskewedByWhateverTimesPointsHave) {
   struct Case {
     CloudShape shape;
     bool absolute;
-    const char* said;
+    const char* noted;
   };
   const std::vector<Case> cases{
       {{}, false, "scans are taken as deskewed"},
@@ -145,17 +145,17 @@ TEST_F(Bags, ScansAreDeskewedByWhateverTimesPointsHave) {
        false,
        "'time_stamp' is taken as ms after"},
   };
-  for (const auto& [shape, absolute, said] : cases) {
+  for (const auto& [shape, absolute, noted] : cases) {
     write(robot(shape, absolute));
     const auto input = load();
     ASSERT_TRUE(input) << input.error().message;
-    EXPECT_NE(notes_of(*input).find(said), std::string::npos) << notes_of(*input);
+    EXPECT_NE(notes_of(*input).find(noted), std::string::npos) << notes_of(*input);
     EXPECT_EQ(input->robots.front().recording.scan_stamps.size(), kScans);
-    EXPECT_LT(error_of(*input), 1e-3) << said;
+    EXPECT_LT(error_of(*input), 1e-3) << noted;
   }
 }
 
-/// A Livox says the same in a message of its own, from ROS 2 and ROS 1: scans are equal to the bit.
+/// A Livox sends the same in a message of its own, from ROS 2 and ROS 1: scans are equal to the bit.
 TEST_F(Bags, ScansOfALivoxAreThoseOfACloudWithTheSamePointsAndTimes) {
   const auto scans_in = [&](const std::string& type, int how) {
     std::vector<Sample> samples{
@@ -221,9 +221,9 @@ TEST_F(Bags, FixesAreTakenWithTheirAntenna) {
   EXPECT_EQ(fixes[0].covariance.diagonal(), Eigen::Vector3d(4, 4, 9));
   EXPECT_EQ(fixes.back().covariance, unknown_fix_covariance());
   EXPECT_EQ(fixes.back().antenna, (Geodetic{46.5, 7.9, 19}));
-  for (const char* const said : {"18 fixes of /gnss/fix, antenna at [0.50 0.10 1.20] m", "1 messages without a fix",
-                                 "10 do not say how sure", "/gnss/fix: 1 of 20 messages refused"})
-    EXPECT_NE(notes_of(*input).find(said), std::string::npos) << said << "\n" << notes_of(*input);
+  for (const char* const noted : {"18 fixes of /gnss/fix, antenna at [0.50 0.10 1.20] m", "1 messages without a fix",
+                                  "10 do not say how sure", "/gnss/fix: 1 of 20 messages refused"})
+    EXPECT_NE(notes_of(*input).find(noted), std::string::npos) << noted << "\n" << notes_of(*input);
 
   write(samples_with({"/gnss/fix", "/gnss/filtered"}));
   const auto several = load();
@@ -232,8 +232,8 @@ TEST_F(Bags, FixesAreTakenWithTheirAntenna) {
   EXPECT_NE(notes_of(*several).find("--topic alpha.fixes=/gnss/filtered"), std::string::npos) << notes_of(*several);
   EXPECT_EQ(load({"alpha.fixes=/gnss/fix"})->robots.front().recording.fixes.size(), 18U);
   EXPECT_NE(problem({"alpha.fixes=/nothing"}).find("'/nothing' is not in the bag"), std::string::npos);
-  const auto told = load({"alpha.fixes=/gnss/fix"}, {"robots.0.antenna_m=[1,2,3]"});
-  EXPECT_EQ(told->robots.front().recording.fixes[0].p_body_antenna, Eigen::Vector3d(1, 2, 3));
+  const auto given = load({"alpha.fixes=/gnss/fix"}, {"robots.0.antenna_m=[1,2,3]"});
+  EXPECT_EQ(given->robots.front().recording.fixes[0].p_body_antenna, Eigen::Vector3d(1, 2, 3));
 }
 
 /// A file of fixes instead; of another clock it is refused.
@@ -350,7 +350,7 @@ TEST_F(Bags, OfABadBagWhatIsGoodIsTakenAndTheRestIsSaid) {
   clouds[4]->data = cloud_of(kStart + scan_time(2), "lidar", {{1, 2, 3}});  // jumps back
   clouds[5]->data = cloud_of(kStart + scan_time(5), "other", {{1, 2, 3}});
   clouds[6]->data = cloud(6, {.time_field = "time", .without = "z"});
-  clouds[7]->data = cloud(7, {.big = true, .time_field = "time"});  // a mixture: each says of itself how it is
+  clouds[7]->data = cloud(7, {.big = true, .time_field = "time"});  // a mixture: each describes its own fields
   samples.push_back(sample_of("/silent", kOdometry, kStart, ""));
   samples.pop_back();
   write(samples);

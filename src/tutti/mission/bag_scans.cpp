@@ -24,7 +24,7 @@ class BagScans final : public ScanSource {
         offset_s_(offset_s),
         odometry_(lidar::with_ends(odometry)) {}
 
-  Result<std::string> look_into(const RobotConfig& robot, const Trajectory& odometry) {
+  Result<std::string> learn_times(const RobotConfig& robot, const Trajectory& odometry) {
     const auto from = [&](Timestamp stamp) {
       return static_cast<std::size_t>(std::ranges::lower_bound(places_, stamp, {}, &ScanPlace::stamp) -
                                       places_.begin());
@@ -38,7 +38,7 @@ class BagScans final : public ScanSource {
       if (found) break;
     }
     if (!found) return in_context("not one of the first scans can be used, the first because", found.error());
-    // Half way a clock that starts with the odometry at 0 can be told from the time after the stamp.
+    // At half of the odometry, a clock that starts with it at 0 can be distinguished from the time after the stamp.
     const auto later = times_of(first + (last - first) / 2, robot);
     times_ = later ? *later : *found;
     return lidar::in_words(times_);
@@ -93,9 +93,9 @@ Result<std::shared_ptr<const ScanSource>> open_scans(const BagRecording& bag, co
   auto messages = BagMessages::open(bag.file);
   if (!messages) return tl::unexpected(messages.error());
   auto scans = std::make_shared<BagScans>(std::move(*messages), bag, odometry, robot.scan_time_offset_s);
-  auto words = scans->look_into(robot, odometry);
-  if (!words) return tl::unexpected(words.error());
-  note = std::move(*words);
+  auto description = scans->learn_times(robot, odometry);
+  if (!description) return tl::unexpected(description.error());
+  note = std::move(*description);
   return scans;
 }
 

@@ -20,23 +20,23 @@ namespace tutti::mission {
 namespace {
 
 constexpr RobotId kRobot{};
-constexpr double kNodesPerWay = 500.0;
+constexpr double kNodesPerTrajectory = 500.0;
 constexpr std::size_t kMostNodes = 2000;  // where B parts from A all the time
 constexpr double kLeastSpacing_m = 0.1;
 constexpr double kArm_m = 5.0;
 constexpr double kPartedSpacings = 2.0;    // nearer than that, the next node shows it
 constexpr double kWholeStep = 1.0 - 1e-6;  // poses that are just the spacing apart, but for rounding
 constexpr double kMargin = 0.9;            // of the tolerance: with the links B is nearer to A than that
-constexpr double kLeastStep_m = 0.01;      // of way, for the covariance of a motion: standing still is not exact
+constexpr double kLeastStep_m = 0.01;      // of distance, for the covariance of a motion: standing still is not exact
 
-/// A moment that both sides know.
+/// A time that both sides know.
 struct Node {
   std::size_t index = 0;  ///< B's pose.
   evaluation::PosePair pair;
-  double way_m = 0.0;  ///< Along A, from the first pair.
+  double along_m = 0.0;  ///< Along A, from the first pair.
 };
 
-/// Whether B moved otherwise than A since the last node by more than the way between nodes, as A may stand still
+/// Whether B moved otherwise than A since the last node by more than the distance between nodes, as A may stand still
 /// meanwhile; a rotation counts by how far it moves a point kArm_m away.
 bool parted(const Node& last, const Node& here, double spacing_m) {
   const Pose3 error = (last.pair.reference.inverse() * here.pair.reference).inverse() *
@@ -45,12 +45,12 @@ bool parted(const Node& last, const Node& here, double spacing_m) {
 }
 
 /// B's poses that have a partner, thinned: the first, the last, one every `spacing_m` along A, and one where B parted
-/// from A on the way there.
+/// from A before that.
 std::vector<Node> thin(const std::vector<Node>& all, double spacing_m) {
   std::vector<Node> out{all.front()};
   for (std::size_t i = 1; i + 1 < all.size(); ++i) {
-    const bool far =
-        all[i].way_m - out.back().way_m >= kWholeStep * spacing_m && all.back().way_m - all[i].way_m >= 0.5 * spacing_m;
+    const bool far = all[i].along_m - out.back().along_m >= kWholeStep * spacing_m &&
+                     all.back().along_m - all[i].along_m >= 0.5 * spacing_m;
     if (far || parted(out.back(), all[i], spacing_m)) out.push_back(all[i]);
   }
   out.push_back(all.back());
@@ -64,7 +64,7 @@ std::vector<Node> pair_up(const Trajectory& a, const Trajectory& b, const evalua
     while (b[index].stamp != pair.stamp) ++index;
     const double step_m =
         out.empty() ? 0.0 : (pair.reference.translation - out.back().pair.reference.translation).norm();
-    out.push_back({index, pair, out.empty() ? 0.0 : out.back().way_m + step_m});
+    out.push_back({index, pair, out.empty() ? 0.0 : out.back().along_m + step_m});
   }
   return out;
 }
@@ -74,10 +74,10 @@ RelativePose motion(const NamedTrajectory& b, const Node& from, const Node& to,
                     const CompareTrajectoriesConfig& config) {
   RelativePose out{from.pair.estimate.inverse() * to.pair.estimate, Matrix6d::Zero()};
   if (b.step_covariance.empty()) {
-    const double way_m = std::max(to.way_m - from.way_m, kLeastStep_m);
+    const double along_m = std::max(to.along_m - from.along_m, kLeastStep_m);
     const double rotation_rad = config.odometry_deg * kRadPerDeg;
-    out.covariance.diagonal().head<3>().setConstant(config.odometry_m * config.odometry_m * way_m);
-    out.covariance.diagonal().tail<3>().setConstant(rotation_rad * rotation_rad * way_m);
+    out.covariance.diagonal().head<3>().setConstant(config.odometry_m * config.odometry_m * along_m);
+    out.covariance.diagonal().tail<3>().setConstant(rotation_rad * rotation_rad * along_m);
     return out;
   }
   for (std::size_t k = from.index; k < to.index; ++k)
@@ -192,8 +192,9 @@ Result<TrajectoryComparison> compare_trajectories(const NamedTrajectory& a, cons
                 "{} of B's poses ha{} one of A at the same time, expected at least 2: A has {}; B has {}", all.size(),
                 all.size() == 1 ? "s" : "ve", span(a.poses), span(b.poses));
   TrajectoryComparison out{.name = b.name, .poses = b.poses.size(), .paired = all.size()};
-  out.way_m = all.back().way_m;
-  out.spacing_m = config.spacing_m > 0.0 ? config.spacing_m : std::max(out.way_m / kNodesPerWay, kLeastSpacing_m);
+  out.way_m = all.back().along_m;
+  out.spacing_m =
+      config.spacing_m > 0.0 ? config.spacing_m : std::max(out.way_m / kNodesPerTrajectory, kLeastSpacing_m);
   std::vector<Node> nodes = thin(all, out.spacing_m);
   while (config.spacing_m == 0.0 && nodes.size() > kMostNodes) nodes = thin(all, out.spacing_m *= 2.0);
   for (const Node& node : nodes) {

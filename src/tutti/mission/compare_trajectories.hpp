@@ -14,7 +14,7 @@
 #include "tutti/evaluation/discontinuity.hpp"
 #include "tutti/model/trajectory.hpp"
 
-/// Compares two trajectories of one body in the way in which a robot compares itself with the server's map: A takes the
+/// Compares two trajectories of one body as a robot compares itself with the server's map: A takes the
 /// place of the server, B that of the robot's odometry.
 namespace tutti::mission {
 
@@ -33,10 +33,10 @@ struct CompareTrajectoriesConfig {
   double tolerance_m = 0.05;                  ///< Standard deviation of A's positions, over segments of any length.
   double tolerance_deg = 0.5;                 ///< Standard deviation of A's rotations.
   /// Distance between nodes along A; they are closer where B departs from A by more than twice as much. 0: a 500th of
-  /// the way, at least 0.1 m.
+  /// the trajectory, at least 0.1 m.
   double spacing_m = 0.0;
   double odometry_m = 0.03;   ///< When B has no covariance: standard deviation of its motion over 1 m, which grows with
-  double odometry_deg = 0.3;  ///< the square root of the way.
+  double odometry_deg = 0.3;  ///< the square root of the distance.
   double false_alarm_rate = 0.01;
 };
 

@@ -11,8 +11,8 @@
 namespace tutti::mission {
 namespace compare_trajectories_test {
 
-/// Ten poses a second at 1 m/s on a slowly winding way.
-Trajectory way(double duration_s) {
+/// Ten poses a second at 1 m/s on a slowly winding trajectory.
+Trajectory winding(double duration_s) {
   Trajectory out;
   Pose3 pose;
   for (int i = 0; i <= static_cast<int>(10.0 * duration_s); ++i) {
@@ -36,7 +36,7 @@ Trajectory broken(const Trajectory& truth, std::size_t at, const Pose3& error, c
 double seconds_after_start(const Trajectory& truth, Timestamp stamp) { return stamp - truth.front().stamp; }
 
 TEST(CompareTrajectories, RigidMotionsAndNoiseWithinTheToleranceAgree) {
-  const Trajectory truth = way(120.0);
+  const Trajectory truth = winding(120.0);
   Rng rng(3);
   Trajectory b = broken(truth, 0, {}, test::random_pose(rng));
   for (auto& p : b) p.pose.translation += test::random_vector(rng, 0.003);
@@ -53,7 +53,7 @@ TEST(CompareTrajectories, RigidMotionsAndNoiseWithinTheToleranceAgree) {
 }
 
 TEST(CompareTrajectories, FindsAFailureWhereItIsAndFixesIt) {
-  const Trajectory truth = way(120.0);
+  const Trajectory truth = winding(120.0);
   Rng rng(4);
   const Trajectory b = broken(truth, 700, {so3_exp({0.0, 0.0, 0.3}), {1.0, 0.5, 0.0}}, test::random_pose(rng));
   const auto c = compare_trajectories({"", truth, {}}, {"", b, {}}, {});
@@ -75,7 +75,7 @@ TEST(CompareTrajectories, FindsAFailureWhereItIsAndFixesIt) {
 }
 
 TEST(CompareTrajectories, ABroadToleranceForgives) {
-  const Trajectory truth = way(120.0);
+  const Trajectory truth = winding(120.0);
   const Trajectory b = broken(truth, 700, {so3_exp({0.0, 0.0, 0.02}), {0.1, 0.0, 0.0}}, {});
   EXPECT_TRUE(compare_trajectories({"", truth, {}}, {"", b, {}}, {.tolerance_m = 0.01, .tolerance_deg = 0.1})
                   ->explanation.disagrees());
@@ -84,21 +84,21 @@ TEST(CompareTrajectories, ABroadToleranceForgives) {
 }
 
 TEST(CompareTrajectories, BsOwnCovarianceDecidesWhatIsAFailure) {
-  const Trajectory truth = way(60.0);
+  const Trajectory truth = winding(60.0);
   const Trajectory b = broken(truth, 300, {so3_exp({0.0, 0.0, 0.3}), {1.0, 0.0, 0.0}}, {});
   NamedTrajectory admitted{"", b, std::vector<Matrix6d>(b.size() - 1, 1e-6 * Matrix6d::Identity())};
   const auto silent = compare_trajectories({"", truth, {}}, admitted, {});
   ASSERT_TRUE(silent) << silent.error().message;
   ASSERT_FALSE(silent->explanation.origins.empty());
   EXPECT_TRUE(silent->explanation.origins[0].alert);
-  admitted.step_covariance[299] = Matrix6d::Identity();  // it says that it does not know
+  admitted.step_covariance[299] = Matrix6d::Identity();  // it is unknown
   const auto honest = compare_trajectories({"", truth, {}}, admitted, {});
   ASSERT_TRUE(honest);
   for (const auto& origin : honest->explanation.origins) EXPECT_FALSE(origin.alert);
 }
 
 TEST(CompareTrajectories, WhatBDoesWhileAStandsStillCounts) {
-  Trajectory stands = way(20.0);
+  Trajectory stands = winding(20.0);
   const std::size_t begin = stands.size();
   for (int i = 1; i <= 300; ++i) stands.push_back({stands.back().stamp + 0.1, stands.back().pose});
   const Trajectory still(stands.begin() + static_cast<std::ptrdiff_t>(begin), stands.end());
@@ -126,7 +126,7 @@ TEST(CompareTrajectories, WhatBDoesWhileAStandsStillCounts) {
   }
 }
 
-TEST(CompareTrajectories, ManyWaysBesideAStandingAStayFew) {
+TEST(CompareTrajectories, ManyMotionsBesideAStandingAStayFew) {
   Trajectory still;
   Trajectory far;
   for (int i = 0; i < 20'000; ++i) {  // two kilometres around a place that A never leaves
@@ -140,7 +140,7 @@ TEST(CompareTrajectories, ManyWaysBesideAStandingAStayFew) {
 }
 
 TEST(CompareTrajectories, RefusesWhatCannotBeCompared) {
-  const Trajectory truth = way(10.0);
+  const Trajectory truth = winding(10.0);
   Trajectory later = truth;
   for (auto& p : later) p.stamp = p.stamp + 1000.0;
   const auto never = compare_trajectories({"", truth, {}}, {"", later, {}}, {});

@@ -15,7 +15,7 @@
 namespace tutti::mission {
 
 inline constexpr double kRpeInterval_s = 1.0;
-inline constexpr double kRpeWay_m = 10.0;  ///< Along the reference.
+inline constexpr double kRpeDistance_m = 10.0;  ///< Along the reference.
 
 /// One robot after a mission: the agent that talked to the server, and the shadow agents that only listened.
 struct RobotOutcome {
@@ -29,10 +29,10 @@ struct RobotOutcome {
 
 /// These functions fill in what is measured at the end, in this order: the accuracy of every estimate; the final map,
 /// its closures and the transforms between robots; the clouds. Accuracy is the ATE after one rigid alignment (SE(3), no
-/// scale) and the RPE over 1 s and over 10 m, at keyframes, each with the share of the way on which it was scored; the
-/// discontinuity of every correction; and the server's joint accuracy over all robots of its largest component, with
-/// one alignment. Agreement is the ATE of a robot's estimate with the server's as the reference. Robots whose reference
-/// is not for scoring get no accuracy. `perfect` is the map of perfect_judge.hpp, or null.
+/// scale) and the RPE over 1 s and over 10 m, at keyframes, each with the share of the distance on which it was scored;
+/// the discontinuity of every correction; and the server's joint accuracy over all robots of its largest component,
+/// with one alignment. Agreement is the ATE of a robot's estimate with the server's as the reference. Robots whose
+/// reference is not for scoring get no accuracy. `perfect` is the map of perfect_judge.hpp, or null.
 void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapEstimate& map,
                      const server::MapEstimate* perfect, const evaluation::AssociationConfig& association,
                      MissionRecord& record);

@@ -136,7 +136,7 @@ void note_landmarks(const server::MapServer& server, MissionRecord& record) {
                            "to the survey are those of the odometry's landmarks.");
 }
 
-/// The joint map of the largest component against the survey, and the other way round.
+/// The joint map of the largest component against the survey, and vice versa.
 void measure_joint_cloud(const evaluation::CloudIndex& survey, MissionRecord& record) {
   ServerRecord& server = record.server;
   if (!server.T_reference_world) return;

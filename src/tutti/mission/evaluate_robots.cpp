@@ -18,13 +18,13 @@ namespace {
 struct Scoring {
   const MissionRecording& robot;
   const evaluation::AssociationConfig& association;
-  evaluation::KeyframeTrajectory way;
+  evaluation::KeyframeTrajectory trajectory;
 };
 
-/// The share of the robot's whole way that some of its keyframes stand for; of a robot that never moved, all.
+/// The share of the robot's whole distance that some of its keyframes stand for; of a robot that never moved, all.
 template <class Poses>
-double share_of(const evaluation::KeyframeTrajectory& way, const Poses& poses) {
-  return way.whole_m() > 0.0 ? way.part_m(poses) / way.whole_m() : 1.0;
+double share_of(const evaluation::KeyframeTrajectory& trajectory, const Poses& poses) {
+  return trajectory.whole_m() > 0.0 ? trajectory.part_m(poses) / trajectory.whole_m() : 1.0;
 }
 
 Accuracy accuracy_of(const Trajectory& estimate, const Scoring& scoring) {
@@ -34,13 +34,13 @@ Accuracy accuracy_of(const Trajectory& estimate, const Scoring& scoring) {
   if (const auto ate = evaluation::ate(pairs)) {
     out.rmse_m = ate->rmse_m;
     out.max_error_m = ate->max_m;
-    out.scored_share = share_of(scoring.way, pairs);
+    out.scored_share = share_of(scoring.trajectory, pairs);
   }
   if (const auto rpe = evaluation::rpe_over_time(pairs, kRpeInterval_s)) {
     out.rpe_m = rpe->rmse_m;
     out.rpe_deg = rpe->rmse_deg;
   }
-  if (const auto rpe = evaluation::rpe_over_distance(pairs, kRpeWay_m)) {
+  if (const auto rpe = evaluation::rpe_over_distance(pairs, kRpeDistance_m)) {
     out.rpe_10m_m = rpe->rmse_m;
     out.rpe_10m_deg = rpe->rmse_deg;
   }
@@ -112,7 +112,7 @@ void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapE
     out.keyframes = agent->second->keyframes().size();
     for (const Keyframe& k : agent->second->keyframes()) out.odometry.push_back({k.stamp, k.T_odom_body});
     const Scoring scoring{recording, association, evaluation::KeyframeTrajectory(robot.way(), out.odometry)};
-    out.distance_m = scoring.way.whole_m();
+    out.distance_m = scoring.trajectory.whole_m();
     auto [component, server_estimate, left_out] = read_server_estimate(map, components, out.id);
     out.component = component;
     out.server_estimate = std::move(server_estimate);
@@ -121,7 +121,7 @@ void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapE
           "{}: the server holds parts of its trajectory that nothing joins; {} of {} keyframes are not in the "
           "largest and left out of its figures",
           out.name, left_out, left_out + out.server_estimate.size()));
-    if (!out.server_estimate.empty()) out.mapped_share = share_of(scoring.way, out.server_estimate);
+    if (!out.server_estimate.empty()) out.mapped_share = share_of(scoring.trajectory, out.server_estimate);
     if (const auto factor = map.rotation_factors.find(out.id); factor != map.rotation_factors.end())
       out.rotation_factor = factor->second;
     if (recording.score_against_reference) out.reference = recording.recording.reference;

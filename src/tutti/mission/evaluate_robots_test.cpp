@@ -71,8 +71,8 @@ TEST_F(EvaluateRobots, AWholeChainIsScoredWhole) {
   EXPECT_DOUBLE_EQ(robot.mapped_share, 1.0);
 }
 
-// The first keyframes are a piece of their own: the rest is what counts.
-TEST_F(EvaluateRobots, TheLargestPieceIsScoredAndItsShareSaid) {
+// The first keyframes are a segment of their own: the rest is what counts.
+TEST_F(EvaluateRobots, TheLargestSegmentIsScoredAndItsShareReported) {
   put_elsewhere(0, 11);
   const RobotRecord& robot = evaluate();
   EXPECT_EQ(robot.component, 0U);
@@ -94,7 +94,7 @@ TEST_F(EvaluateRobots, KeyframesThatNeverCameAreNotScored) {
   EXPECT_DOUBLE_EQ(*robot.onboard.scored_share, 1.0);
 }
 
-TEST_F(EvaluateRobots, AReferenceOfHalfTheWayScoresHalf) {
+TEST_F(EvaluateRobots, AReferenceOfHalfTheDistanceScoresHalf) {
   recording_.recording.reference.resize(21);
   const RobotRecord& robot = evaluate();
   for (const auto& share :

@@ -25,11 +25,11 @@ void measure_joint_map(const std::vector<RobotOutcome>& robots, const server::Ma
   double scored_m = 0.0, whole_m = 0.0;
   for (std::size_t i = 0; i < robots.size(); ++i) {
     const MissionRecording& robot = *robots[i].recording;
-    const evaluation::KeyframeTrajectory way(robots[i].way(), record.robots[i].odometry);
-    whole_m += way.whole_m();
+    const evaluation::KeyframeTrajectory trajectory(robots[i].way(), record.robots[i].odometry);
+    whole_m += trajectory.whole_m();
     if (!robot.score_against_reference || record.robots[i].component != components.largest) continue;
     const auto pairs = evaluation::associate(record.robots[i].server_estimate, robot.recording.reference, association);
-    scored_m += way.part_m(pairs);
+    scored_m += trajectory.part_m(pairs);
     all.insert(all.end(), pairs.begin(), pairs.end());
   }
   if (const auto ate = evaluation::ate(all)) {
@@ -93,8 +93,9 @@ void relate_robots(const std::vector<RobotOutcome>& robots, const server::MapEst
       const auto T_b_world = odom_from_world(b.recording.robot, map, of_b->second);
       if (!T_a_world || !T_b_world) continue;
       TransformRecord transform{a.recording.name, b.recording.name, *T_a_world * T_b_world->inverse(), {}, {}};
-      const auto& way = b.recording.odometry;
-      const auto centre = evaluation::centroid({way.begin(), way.begin() + static_cast<long>(robots[j].replayed)});
+      const auto& trajectory = b.recording.odometry;
+      const auto centre =
+          evaluation::centroid({trajectory.begin(), trajectory.begin() + static_cast<long>(robots[j].replayed)});
       if (a.T_common_odom && b.T_common_odom && centre) {
         const auto error =
             evaluation::transform_error(transform.T_from_to, a.T_common_odom->inverse() * *b.T_common_odom, *centre);

@@ -100,7 +100,7 @@ TEST_F(EvaluateServer, AMapOfEverythingIsScoredWhole) {
   EXPECT_NEAR(record.robots[0].mapped_share, 1.0, 1e-9);
 }
 
-TEST_F(EvaluateServer, TheJointFigureSaysWhatPartOfAllWaysItIsScoredOn) {
+TEST_F(EvaluateServer, TheJointFigureHasTheShareOfAllDistancesItIsScoredOn) {
   add(30);
   add(60);
   const MissionRecord& record = evaluate();
@@ -110,7 +110,7 @@ TEST_F(EvaluateServer, TheJointFigureSaysWhatPartOfAllWaysItIsScoredOn) {
   EXPECT_TRUE(record.transforms.empty());
 }
 
-TEST_F(EvaluateServer, AGapNearTheStartLeavesTheLargerPiece) {
+TEST_F(EvaluateServer, AGapNearTheStartLeavesTheLargerSegment) {
   add(60, {1});
   const MissionRecord& record = evaluate();
   EXPECT_EQ(record.server.components, 2U);

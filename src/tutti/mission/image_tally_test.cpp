@@ -24,14 +24,14 @@ TEST(ImageTally, SaysNothingOfACameraThatShowsSomething) {
 
 TEST(ImageTally, SaysOnceThatACameraHasStopped) {
   ImageTally tally;
-  std::vector<std::string> told;
+  std::vector<std::string> notes;
   for (int i = 0; i < 100; ++i) {
     const bool seen = i < 40 || (i >= 60 && i < 80);
-    if (auto words = tally.add(kStart + 0.5 * i, seen ? kRich : std::vector<TrackedImage>())) told.push_back(*words);
+    if (auto note = tally.add(kStart + 0.5 * i, seen ? kRich : std::vector<TrackedImage>())) notes.push_back(*note);
   }
-  ASSERT_EQ(told.size(), 2U);
-  EXPECT_EQ(told[0], "the camera gives no images since 19.5 s after the start, for 5.5 s now");
-  EXPECT_EQ(told[1].find("the camera gives no images since 39.5 s"), 0U);
+  ASSERT_EQ(notes.size(), 2U);
+  EXPECT_EQ(notes[0], "the camera gives no images since 19.5 s after the start, for 5.5 s now");
+  EXPECT_EQ(notes[1].find("the camera gives no images since 39.5 s"), 0U);
   EXPECT_EQ(tally.notes(), (std::vector<std::string>{"no image at 40 of 100 keyframes; the longest gap is 10.5 s, from "
                                                      "19.5 s after the start on"}));
 }

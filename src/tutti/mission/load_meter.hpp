@@ -6,10 +6,10 @@
 
 namespace tutti::mission {
 
-/// Processor and number of threads in words, as far as the system tells.
+/// Processor and number of threads in words, as far as the system reports them.
 std::string machine_description();
 
-/// Largest resident memory of this process so far, in 10^6 bytes; 0 where the system does not tell.
+/// Largest resident memory of this process so far, in 10^6 bytes; 0 where the system does not report it.
 double peak_memory_mb();
 
 /// CPU time of the calling thread so far, in seconds.

@@ -83,7 +83,7 @@ struct DepthConfig {
 /// Where a robot's images, or tracks made from them, are: in a folder, a list, or submaps; or nowhere. Paths are
 /// relative to the --data folder.
 struct ImagesConfig {
-  std::string euroc_folder;                 ///< mav0, or the folder that holds it.
+  std::string euroc_folder;                 ///< mav0, or the folder that contains it.
   std::string list;                         ///< Needs `cameras`.
   std::string cameras;                      ///< Read by formats::read_cameras().
   std::vector<std::string> maplab_submaps;  ///< Consecutive folders; the odometry is from these, too.
@@ -118,7 +118,7 @@ struct ImagesConfig {
   [[nodiscard]] bool is_given() const { return has_files() || !maplab_submaps.empty(); }
 };
 
-/// Which of a bag's topics to use, where types alone do not tell.
+/// Which of a bag's topics to use, where types alone are ambiguous.
 struct BagTopicsConfig {
   std::string odometry;
   std::string scans;
@@ -175,7 +175,7 @@ struct RobotConfig {
   double scan_time_offset_s = 0.0;
   ImagesConfig images;
   std::string fixes;              ///< Read by formats::read_fixes(); empty: the fixes of the bag, if it has any.
-  std::vector<double> antenna_m;  ///< Empty: as the bag says, or at the body.
+  std::vector<double> antenna_m;  ///< Empty: as in the bag, or at the body.
   double start_s = 0.0;           ///< Mission time of the first sample.
   double from_share = 0.0;        ///< Part of the recording that is replayed.
   double to_share = 1.0;
@@ -294,7 +294,7 @@ std::vector<std::string> problems_of(const MissionConfig& config);
 /// Problems of robots' data with config.closures, in the same form; for missions whose closures the configured verifier
 /// finds.
 std::vector<std::string> problems_of_verifier(const MissionConfig& config);
-/// True if robots are from pose graphs. Every pose is a keyframe then, whatever agent.submap says.
+/// True if robots are from pose graphs. Every pose is a keyframe then, whatever agent.submap has.
 bool has_graphs(const MissionConfig& config);
 /// Why files cannot be named after a robot of this name; empty when they can.
 std::string problem_of_name(const std::string& name);

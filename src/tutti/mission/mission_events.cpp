@@ -16,13 +16,13 @@ void MissionEvents::take(const node::Event& event) {
   if (const auto* failed = std::get_if<node::RefinementFailed>(&event.what)) refusals_.push_back(failed->why);
   if (const auto* update = std::get_if<node::MapUpdated>(&event.what))
     updates_.push_back({static_cast<double>(event.time.ns) / 1e9, update->accepted, std::nullopt});
-  if (const auto* told = std::get_if<node::ChangeOfMind>(&event.what))
-    take(ChangeOfMindRecord{told->robot,
+  if (const auto* changed = std::get_if<node::ChangeOfMind>(&event.what))
+    take(ChangeOfMindRecord{changed->robot,
                             static_cast<double>(event.time.ns) / 1e9,
                             {},
-                            node::to_string(told->outcome),
-                            told->change,
-                            server::to_string(told->reason)});
+                            node::to_string(changed->outcome),
+                            changed->change,
+                            server::to_string(changed->reason)});
 }
 
 void MissionEvents::take(const ChangeOfMindRecord& change) {

@@ -34,7 +34,7 @@ namespace tutti::mission {
 
 struct ViewRecord;  // view_recorder.hpp
 
-/// A figure that was scored on a smaller share of the way is partial: it is shown, marked, and never a headline.
+/// A figure that was scored on a smaller share of the distance is partial: it is shown, marked, and never a headline.
 inline constexpr double kPartialBelow = 0.95;
 
 /// The accuracy of one estimate of one robot against the reference, after one rigid alignment (SE(3), no scale).
@@ -43,14 +43,14 @@ struct Accuracy {
   std::optional<double> max_error_m;  ///< ATE, largest.
   std::optional<double> rpe_m;        ///< RPE over MissionRecord::rpe_interval, root mean square of the translation.
   std::optional<double> rpe_deg;      ///< Likewise of the rotation angle.
-  std::optional<double> rpe_10m_m;    ///< RPE over a way of 10 m.
+  std::optional<double> rpe_10m_m;    ///< RPE over a distance of 10 m.
   std::optional<double> rpe_10m_deg;
-  /// The share of the whole replayed way on which these figures were scored, 0 to 1 (for the joint map: of all robots'
-  /// ways together). Nothing when nothing was scored.
+  /// The share of the whole replayed distance on which these figures were scored, 0 to 1 (for the joint map: of all
+  /// robots' together). Nothing when nothing was scored.
   std::optional<double> scored_share;
 };
 
-/// A constraint that a robot holds at the end of the mission, between two of its own keyframes.
+/// A constraint that a robot has at the end of the mission, between two of its own keyframes.
 struct ConstraintRecord {
   Timestamp from;
   Timestamp to;
@@ -61,10 +61,11 @@ struct ConstraintRecord {
 struct PolicyRecord {
   std::string name;
   Accuracy accuracy;
-  /// ATE of the corrected estimate with the server's as the reference, scored on RobotRecord::mapped_share of the way.
+  /// ATE of the corrected estimate with the server's as the reference, scored on RobotRecord::mapped_share of the
+  /// distance.
   std::optional<double> agreement_rmse_m;
   std::optional<evaluation::Discontinuity> discontinuity;  ///< How much it changes short motions of the raw odometry.
-  std::size_t constraints_added = 0;                       ///< Constraints held at the end of the mission.
+  std::size_t constraints_added = 0;                       ///< Constraints at the end of the mission.
   Trajectory corrected;                                    ///< T_map_body at keyframes.
   std::vector<ConstraintRecord> constraints;
 };
@@ -72,7 +73,7 @@ struct PolicyRecord {
 /// What one policy made of one broadcast.
 struct AnswerRecord {
   std::string policy;
-  std::size_t constraints = 0;   ///< Held after the broadcast.
+  std::size_t constraints = 0;   ///< After the broadcast.
   std::optional<double> rmse_m;  ///< The corrected estimate's; measured like UpdateRecord::onboard_rmse_m.
   template <class V>
   void describe(V& v) {
@@ -164,7 +165,7 @@ struct RobotRecord {
   std::uint32_t component = 0;  ///< Robots of one component share the server's world frame (map_components.hpp).
   Trajectory odometry;          ///< T_odom_body at keyframes.
   Trajectory server_estimate;   ///< T_world_body at the keyframes in `component`.
-  double mapped_share = 0.0;    ///< Share of its way, 0 to 1, that `server_estimate` covers.
+  double mapped_share = 0.0;    ///< Share of its distance, 0 to 1, that `server_estimate` covers.
   Trajectory reference;         ///< T_reference_body, one frame for all robots; empty when there is none.
   std::vector<UpdateRecord> updates;
   std::vector<consistency::Alert> alerts;               ///< Sorted by start.
@@ -331,14 +332,14 @@ struct ServerWorkRecord {
   std::size_t hypotheses = 0;       ///< Hypotheses of outlier rejection that were tried.
   std::size_t factorisations = 0;   ///< Factorisations of normal equations of poses.
   std::size_t sample_products = 0;  ///< Columns of samples times products with a graph's Laplacian.
-  std::size_t places_compared = 0;  ///< Pairs of what submaps look like from above.
+  std::size_t places_compared = 0;  ///< Pairs of submaps' appearances from above.
 };
 
 /// The cost of one refinement of the map.
 struct RefinementTiming {
   bool whole = false;
   std::size_t free_submaps = 0;
-  std::size_t submaps = 0;  ///< Including those that are held.
+  std::size_t submaps = 0;  ///< Including those that are fixed.
   double cpu_s = 0.0;
 };
 

@@ -80,7 +80,7 @@ TEST(Notes, ManyClosuresThatContradictTheMap) {
     return record.notes;
   };
   EXPECT_TRUE(notes(70, 30).empty());  // as many as wrong ones may be
-  EXPECT_TRUE(notes(0, 5).empty());    // too few to tell
+  EXPECT_TRUE(notes(0, 5).empty());    // too few to judge
   ASSERT_EQ(notes(10, 20).size(), 1U);
   EXPECT_NE(notes(10, 20).at(0).find("alpha with bravo: 20 of 30 closures contradict the map"), std::string::npos);
 }

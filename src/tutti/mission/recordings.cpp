@@ -129,12 +129,12 @@ Status check_bag(const RobotConfig& robot, const verifiers::VerifierKind& verifi
   const bool has = (verifier.uses_scans && loaded.recording.scans != nullptr) ||
                    (verifier.uses_images && loaded.recording.visual != nullptr);
   if (robot.bag.empty() || has) return {};
-  std::string said;
-  for (const std::string& text : loaded.notes) said += (said.empty() ? "" : "; ") + text;
+  std::string notes;
+  for (const std::string& text : loaded.notes) notes += (notes.empty() ? "" : "; ") + text;
   return fail(ErrorCode::invalid,
               "robot {}: {}; but closures.verifier is '{}', expected one that uses what is there (--set "
               "closures.verifier=..; {})",
-              robot.name, said, verifier.name, help_of(verifiers::verifier_kinds()));
+              robot.name, notes, verifier.name, help_of(verifiers::verifier_kinds()));
 }
 
 /// What a robot's odometry is from, where that has more than odometry.

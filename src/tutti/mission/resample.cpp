@@ -10,18 +10,20 @@ namespace tutti::mission {
 namespace {
 
 /// Between `k` and the sample after it, smoothly, as a body moves: interpolating in straight lines cuts off the corners
-/// of a way that is known every 0.4 s, by centimetres and a degree. Catmull and Rom's curve, by the pyramid of Barry
-/// and Goldman (SIGGRAPH 1988) with interpolations of poses.
-Pose3 smoothly(const Trajectory& way, std::size_t k, Timestamp stamp) {
+/// of a trajectory that is known every 0.4 s, by centimetres and a degree. Catmull and Rom's curve, by the pyramid of
+/// Barry and Goldman (SIGGRAPH 1988) with interpolations of poses.
+Pose3 smoothly(const Trajectory& trajectory, std::size_t k, Timestamp stamp) {
   const auto between = [&](const Pose3& a, const Pose3& b, std::size_t from, std::size_t to) {
-    return interpolate(a, b, (stamp - way[from].stamp) / (way[to].stamp - way[from].stamp));
+    return interpolate(a, b, (stamp - trajectory[from].stamp) / (trajectory[to].stamp - trajectory[from].stamp));
   };
-  const std::size_t first = k > 0 ? k - 1 : k, last = std::min(k + 2, way.size() - 1);
-  const Pose3 middle = between(way[k].pose, way[k + 1].pose, k, k + 1);
+  const std::size_t first = k > 0 ? k - 1 : k, last = std::min(k + 2, trajectory.size() - 1);
+  const Pose3 middle = between(trajectory[k].pose, trajectory[k + 1].pose, k, k + 1);
   const Pose3 before =
-      first == k ? middle : between(between(way[first].pose, way[k].pose, first, k), middle, first, k + 1);
+      first == k ? middle
+                 : between(between(trajectory[first].pose, trajectory[k].pose, first, k), middle, first, k + 1);
   const Pose3 after =
-      last == k + 1 ? middle : between(middle, between(way[k + 1].pose, way[last].pose, k + 1, last), k, last);
+      last == k + 1 ? middle
+                    : between(middle, between(trajectory[k + 1].pose, trajectory[last].pose, k + 1, last), k, last);
   return between(before, after, k, k + 1);
 }
 

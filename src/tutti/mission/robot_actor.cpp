@@ -130,13 +130,13 @@ void RobotActor::feed_sensors(Timestamp now) {
     const Timestamp stamp = scan && images ? std::min(*scan, *images) : scan ? *scan : *images;
     if (stamp > newest) return;
     const bool has_scan = scan == stamp, has_images = images == stamp;
-    if (stamp >= recording.odometry.front().stamp) feed_moment(stamp, has_scan, has_images, now);
+    if (stamp >= recording.odometry.front().stamp) feed_at(stamp, has_scan, has_images, now);
     if (has_scan) ++next_scan_;
     if (has_images) ++next_images_;
   }
 }
 
-void RobotActor::feed_moment(Timestamp stamp, bool has_scan, bool has_images, Timestamp now) {
+void RobotActor::feed_at(Timestamp stamp, bool has_scan, bool has_images, Timestamp now) {
   const robot::RobotAgent& agent = node_->agent();
   const bool wants_scan = has_scan && agent.wants_scan(stamp);
   const bool wants_images = has_images && agent.wants_images(stamp);
@@ -182,7 +182,7 @@ void RobotActor::tell_refused(const std::string& why, Timestamp now) {
   take(std::move(step));
 }
 
-/// All are counted; of a row of samples with errors the first is told.
+/// All are counted; of a row of samples with errors the first is reported.
 void RobotActor::refuse_images(const std::vector<Error>& errors, Timestamp now) {
   for (const Error& error : errors)
     if (std::exchange(images_fail_, true))

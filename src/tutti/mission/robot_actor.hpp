@@ -28,7 +28,7 @@ class Companions {
  public:
   virtual ~Companions() = default;
   virtual void add_odometry(const StampedPose& sample, const Matrix6d& covariance) = 0;
-  /// The robot's node has made a keyframe at a moment between two samples.
+  /// The robot's node has made a keyframe at a time between two samples.
   virtual void add_moment(Timestamp stamp) = 0;
   /// Called after the node has received the graph; `own` is the node's agent.
   virtual void receive(const ProxyGraphMessage& message, const robot::RobotAgent& own) = 0;
@@ -80,7 +80,7 @@ class RobotActor {
   /// Ends the last submap before the recording ends.
   void finish(Timestamp now) { take(node_->finish(now)); }
   void receive(const bus::Envelope& envelope, Timestamp now);
-  /// What the node has to send and tell since the last call.
+  /// What the node has to send and report since the last call.
   node::Step take_step() { return std::exchange(step_, {}); }
 
   [[nodiscard]] const MissionRecording& recording() const { return recording_; }
@@ -124,7 +124,7 @@ class RobotActor {
   void score(const Trajectory& map, UpdateRecord& update) const;
   /// Feeds sensor data up to the last odometry sample.
   void feed_sensors(Timestamp now);
-  void feed_moment(Timestamp stamp, bool has_scan, bool has_images, Timestamp now);
+  void feed_at(Timestamp stamp, bool has_scan, bool has_images, Timestamp now);
   void feed_scan(Timestamp now);
   void feed_images(Timestamp stamp, bool keyframe, Timestamp now);
   void feed_fixes(Timestamp now);

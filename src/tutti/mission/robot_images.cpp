@@ -18,17 +18,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Images that were tracked before, one moment per odometry sample.
+/// Images that were tracked before, one set per odometry sample.
 class ListedImages final : public VisualSource {
  public:
-  explicit ListedImages(std::vector<TrackedImages> moments) : moments_(std::move(moments)) {}
-  [[nodiscard]] TrackedImages images(std::size_t sample, bool) override { return moments_.at(sample); }
+  explicit ListedImages(std::vector<TrackedImages> instants) : instants_(std::move(instants)) {}
+  [[nodiscard]] TrackedImages images(std::size_t sample, bool) override { return instants_.at(sample); }
 
  private:
-  std::vector<TrackedImages> moments_;
+  std::vector<TrackedImages> instants_;
 };
 
-/// Stands for images that are not used: says why, once.
+/// Stands for images that are not used: reports why, once.
 class NoImages final : public VisualSource {
  public:
   explicit NoImages(Error why) : why_{std::move(why)} {}
@@ -130,11 +130,11 @@ Result<RobotImages> listed_images(const formats::MaplabRecording& maplab, const 
   auto imu = read_imu(config, data);
   if (!imu) return tl::unexpected(imu.error());
   const auto cameras = std::make_shared<const std::vector<Camera>>(maplab.cameras);
-  std::vector<TrackedImages> moments;
+  std::vector<TrackedImages> instants;
   for (std::size_t i = 0; i < samples.size(); ++i)
-    moments.push_back({samples[i].stamp, cameras, {maplab.images[first + i]}, {}, {}});
+    instants.push_back({samples[i].stamp, cameras, {maplab.images[first + i]}, {}, {}});
   const auto& [keyframes, keypoints, landmarks, joined, conflicts] = maplab.summary;
-  return RobotImages{.visual = std::make_shared<ListedImages>(std::move(moments)),
+  return RobotImages{.visual = std::make_shared<ListedImages>(std::move(instants)),
                      .imu = std::move(*imu),
                      .imu_noise = maplab.imu_noise,
                      .note = fmt::format("maplab submaps with {} keyframes, {} keypoints, {} good landmarks; {} "
@@ -184,14 +184,14 @@ Result<RobotImages> serve_images(ImageStream stream, std::vector<ImuSample> imu,
                                                       : "each of two cameras",
                          out.imu.empty() ? "no IMU" : "and an IMU");
   out.note += note_gaps(stream.stamps);
-  Trajectory moments;
+  Trajectory instants;
   if (config.own_stamps || typical_gap_s(stamps_of(odometry)) < kFaster * typical_gap_s(stream.stamps))
     for (const Timestamp stamp : stream.stamps)
-      if (const auto pose = pose_at(odometry, stamp)) moments.push_back({stamp, *pose});
-  out.stamps = stamps_of(moments);
-  if (!moments.empty()) out.note += ", at their own stamps";
+      if (const auto pose = pose_at(odometry, stamp)) instants.push_back({stamp, *pose});
+  out.stamps = stamps_of(instants);
+  if (!instants.empty()) out.note += ", at their own stamps";
   auto images = std::make_shared<const ImageStream>(stream);
-  auto source = visual::TrackingSource::open(std::move(stream), moments.empty() ? odometry : moments, tracking);
+  auto source = visual::TrackingSource::open(std::move(stream), instants.empty() ? odometry : instants, tracking);
   if (!source && source.error().code == ErrorCode::unsupported) return tl::unexpected(source.error());
   if (source) out.images = std::move(images);
   if (source)

@@ -40,7 +40,7 @@ Status check_depth_stamps(const std::vector<Timestamp>& images, const std::vecto
 /// Opens the images of config.euroc_folder or .list, for points to be tracked in them. Images at the stamps of odometry
 /// are used; all of them are when odometry is faster than they are, and with config.own_stamps. Fails, naming the file,
 /// when files are missing or invalid, or when none of the first five images can be read. Stamps that do not fit the
-/// odometry are no error: the source then has no images and says why, and the robot goes on with odometry alone.
+/// odometry are no error: the source then has no images and reports why, and the robot goes on with odometry alone.
 Result<RobotImages> open_images(const ImagesConfig& config, const std::filesystem::path& data,
                                 const Trajectory& odometry, const visual::TrackingConfig& tracking);
 

@@ -33,7 +33,7 @@ std::vector<Camera> small_stereo() {
   return {{model, {ahead, {0.0, 0.055, 0.0}}}, {model, {ahead, {0.0, -0.055, 0.0}}}};
 }
 
-/// The simulated hall, written as an ASL folder `hall` and as a list, and the true way as odometry.
+/// The simulated hall, written as an ASL folder `hall` and as a list, and the true trajectory as odometry.
 class RobotImages : public testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -81,9 +81,9 @@ class RobotImages : public testing::Test {
   MissionConfig config_;
 };
 
-bool has_note(const MissionRecord& record, const std::string& words) {
+bool has_note(const MissionRecord& record, const std::string& expected) {
   return std::ranges::any_of(record.notes,
-                             [&](const std::string& note) { return note.find(words) != std::string::npos; });
+                             [&](const std::string& note) { return note.find(expected) != std::string::npos; });
 }
 std::string all_notes(const MissionRecord& record) { return fmt::format("{}", fmt::join(record.notes, "\n")); }
 
@@ -104,8 +104,8 @@ TEST_F(RobotImages, AnEurocFolderBecomesSubmapsWithLandmarks) {
   }
 }
 
-/// The odometry is the true way; the calibration has the second camera 40 % too far from the first.
-TEST_F(RobotImages, ABaselineThatOdometryContradictsIsTold) {
+/// The odometry is the true trajectory; the calibration has the second camera 40 % too far from the first.
+TEST_F(RobotImages, ABaselineThatOdometryContradictsIsReported) {
   const fs::path wrong = folder() / "wrong";
   fs::copy(folder() / "hall", wrong, fs::copy_options::recursive);
   const fs::path sensor = wrong / "mav0/cam1/sensor.yaml";
@@ -122,7 +122,7 @@ TEST_F(RobotImages, ABaselineThatOdometryContradictsIsTold) {
 }
 
 /// The calibration has the second camera turned by 0.9 degrees about the upright axis, which bends depths.
-TEST_F(RobotImages, ASecondCameraThatIsTurnedIsTold) {
+TEST_F(RobotImages, ASecondCameraThatIsTurnedIsReported) {
   const fs::path wrong = folder() / "turned";
   fs::copy(folder() / "hall", wrong, fs::copy_options::recursive);
   const Camera second = small_stereo()[1];
@@ -187,12 +187,12 @@ TEST_F(RobotImages, AnRgbdCameraTellsDepthWithoutMoving) {
   EXPECT_LT(record.robots[0].images->reprojection_rms_px, 2.0);
 }
 
-TEST_F(RobotImages, DepthImagesThatAreNoneAreTold) {
+TEST_F(RobotImages, DepthImagesThatAreNoneAreReported) {
   auto& images = config_.robots[0].images;
   images = {.list = "list.csv", .cameras = "cameras.yaml", .depth = {.list = "depth.csv"}};
   const auto told = [&] { return all_notes(run()); };
-  const auto expect = [](const std::string& notes, const std::string& words) {
-    EXPECT_NE(notes.find(words), std::string::npos) << "'" << words << "' in:\n" << notes;
+  const auto expect = [](const std::string& notes, const std::string& expected) {
+    EXPECT_NE(notes.find(expected), std::string::npos) << "'" << expected << "' in:\n" << notes;
   };
   write_depth(folder(), 5000.0);
   images.depth.scale = 1000.0;

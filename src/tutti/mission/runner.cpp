@@ -44,7 +44,7 @@ class Pace {
   void wait_until(double time_s) const {
     if (rate_) std::this_thread::sleep_until(start_ + std::chrono::duration<double>(time_s / *rate_));
   }
-  /// Wall milliseconds since the moment that `time_s` stood for.
+  /// Wall milliseconds since the instant that `time_s` stood for.
   [[nodiscard]] double late_ms(double time_s) const {
     if (!rate_) return 0.0;
     return std::chrono::duration<double, std::milli>(Clock::now() - start_).count() - 1e3 * time_s / *rate_;
@@ -126,7 +126,7 @@ class MissionRun {
       if (auto ok = robot.actor->check_scans(); !ok) return ok;
     return {};
   }
-  /// The server's map, with the names that robots tell in statuses, which a mission in virtual time does not send.
+  /// The server's map, with the names that robots send in statuses, which a mission in virtual time does not have.
   [[nodiscard]] const storage::TableStore& named_map() {
     std::vector<storage::Write> rows;
     for (const MissionRecording& recording : recordings_) {
@@ -203,7 +203,7 @@ class MissionRun {
     for (Robot* robot : due) carry_out(*robot->port, robot->actor->take_step());
   }
 
-  /// All that is there at this moment, and what that makes others send: between server and worker it takes no time.
+  /// All that is there at this instant, and what that makes others send: between server and worker it takes no time.
   /// False: there was nothing.
   bool deliver() {
     bool any = false;
@@ -261,7 +261,7 @@ class MissionRun {
     return shown;
   }
 
-  /// As the server would know it if robots told their statuses, as programs do: virtual time's radio carries none, so
+  /// As the server would know it if robots sent their statuses, as programs do: virtual time's radio carries none, so
   /// that a mission's bytes are those of its map. A robot out of contact is as it was when that was lost.
   [[nodiscard]] MissionStatus status() {
     MissionStatus out = server_->mission_status(now());

@@ -33,32 +33,32 @@ Result<formats::TimedCloud> read(const fs::path& file) {
 
 }  // namespace
 
-ScanFolder::ScanFolder(fs::path folder, ScanMoments moments, const Trajectory& odometry)
-    : folder_(std::move(folder)), moments_(std::move(moments)) {
-  if (moments_.stamps.empty()) {
-    for (const StampedPose& sample : odometry) moments_.stamps.push_back(sample.stamp);
-    moments_.recorded = std::max(moments_.recorded, moments_.first + odometry.size());
+ScanFolder::ScanFolder(fs::path folder, ScanMoments times, const Trajectory& odometry)
+    : folder_(std::move(folder)), times_of_files_(std::move(times)) {
+  if (times_of_files_.stamps.empty()) {
+    for (const StampedPose& sample : odometry) times_of_files_.stamps.push_back(sample.stamp);
+    times_of_files_.recorded = std::max(times_of_files_.recorded, times_of_files_.first + odometry.size());
   } else {
-    moments_.first = 0;
-    moments_.recorded = moments_.stamps.size();
+    times_of_files_.first = 0;
+    times_of_files_.recorded = times_of_files_.stamps.size();
   }
   odometry_ = lidar::with_ends(odometry);
 }
 
-Result<std::shared_ptr<const ScanFolder>> ScanFolder::open(fs::path folder, ScanMoments moments,
+Result<std::shared_ptr<const ScanFolder>> ScanFolder::open(fs::path folder, ScanMoments times,
                                                            const Trajectory& odometry, const RobotConfig& robot) {
   std::error_code failure;
   if (!fs::is_directory(folder, failure)) return fail(ErrorCode::io, "{}: no such folder of scans", folder.string());
   const auto T_body_lidar = to_pose(robot.T_body_lidar);
   if (!T_body_lidar) return in_context("T_body_lidar", T_body_lidar.error());
-  const std::shared_ptr<ScanFolder> scans(new ScanFolder(std::move(folder), std::move(moments), odometry));
+  const std::shared_ptr<ScanFolder> scans(new ScanFolder(std::move(folder), std::move(times), odometry));
   scans->T_body_lidar_ = *T_body_lidar;
   if (auto ok = scans->check_numbers(); !ok) return tl::unexpected(ok.error());
-  if (auto ok = scans->look_into(robot); !ok) return tl::unexpected(ok.error());
+  if (auto ok = scans->learn_times(robot); !ok) return tl::unexpected(ok.error());
   return scans;
 }
 
-/// A file of no moment: then nobody knows whose the others are. They may be numbered from 1, or be of another
+/// A file without a time: then nobody knows whose the others are. They may be numbered from 1, or be of another
 /// recording.
 Status ScanFolder::check_numbers() const {
   std::error_code failure;
@@ -74,16 +74,16 @@ Status ScanFolder::check_numbers() const {
     highest = std::max(highest, number);
     has_zero = has_zero || number == 0;
   }
-  if (files == 0 || highest < moments_.recorded) return {};
+  if (files == 0 || highest < times_of_files_.recorded) return {};
   return fail(ErrorCode::invalid, "{}: scan {} belongs to no pose or stamp: there are {} of these, numbered from 0{}",
-              folder_.string(), stem_of(highest), moments_.recorded,
+              folder_.string(), stem_of(highest), times_of_files_.recorded,
               has_zero ? "" : fmt::format("; the {} scans are not: they begin with another number", files));
 }
 
-Status ScanFolder::look_into(const RobotConfig& robot) {
+Status ScanFolder::learn_times(const RobotConfig& robot) {
   Result<std::optional<lidar::PointTimes>> found = no_scans();
   std::size_t tried = 0;
-  for (std::size_t sample = 0; sample < moments_.stamps.size() && tried < kTriedFiles; ++sample) {
+  for (std::size_t sample = 0; sample < times_of_files_.stamps.size() && tried < kTriedFiles; ++sample) {
     if (!file_of(sample)) continue;
     auto times = times_of(sample, robot);
     if (times || tried++ == 0) found = std::move(times);
@@ -93,8 +93,9 @@ Status ScanFolder::look_into(const RobotConfig& robot) {
     return in_context(fmt::format("not one scan could be read: {} of {} tried failed, the first because", tried, tried),
                       found.error());
   if (!found) return tl::unexpected(found.error());
-  // Half way a clock that starts with the odometry at 0 can be told from the time since the sweep's begin.
-  const auto later = times_of(moments_.stamps.size() / 2, robot);
+  // At half of the odometry, a clock that starts with it at 0 can be distinguished from the time since the sweep's
+  // begin.
+  const auto later = times_of(times_of_files_.stamps.size() / 2, robot);
   times_ = later ? *later : *found;
   return {};
 }
@@ -104,19 +105,20 @@ Result<std::optional<lidar::PointTimes>> ScanFolder::times_of(std::size_t sample
   if (!file) return no_scans();
   const auto scan = read(*file);
   if (!scan) return tl::unexpected(scan.error());
-  auto times = lidar::find_point_times(*scan, moments_.stamps[sample], robot.scan_times_config());
+  auto times = lidar::find_point_times(*scan, times_of_files_.stamps[sample], robot.scan_times_config());
   if (!times) return in_context(file->string(), times.error());
   return times;
 }
 
 tl::unexpected<Error> ScanFolder::no_scans() const {
   return fail(ErrorCode::io, "{}: holds none of {}.pcd (or .bin) to {}.pcd, expected one per odometry pose or stamp",
-              folder_.string(), stem_of(moments_.first), stem_of(moments_.first + moments_.stamps.size() - 1));
+              folder_.string(), stem_of(times_of_files_.first),
+              stem_of(times_of_files_.first + times_of_files_.stamps.size() - 1));
 }
 
 std::optional<fs::path> ScanFolder::file_of(std::size_t sample) const {
   for (const char* extension : kExtensions) {
-    const fs::path file = folder_ / (stem_of(moments_.first + sample) + extension);
+    const fs::path file = folder_ / (stem_of(times_of_files_.first + sample) + extension);
     std::error_code failure;
     if (fs::exists(file, failure)) return file;
   }
@@ -126,10 +128,12 @@ std::optional<fs::path> ScanFolder::file_of(std::size_t sample) const {
 Result<std::optional<Scan>> ScanFolder::scan(std::size_t sample) const {
   const auto file = file_of(sample);
   if (!file)
-    return fail(ErrorCode::io, "{}.pcd (or .bin): is not there", (folder_ / stem_of(moments_.first + sample)).string());
+    return fail(ErrorCode::io, "{}.pcd (or .bin): is not there",
+                (folder_ / stem_of(times_of_files_.first + sample)).string());
   auto read_scan = read(*file);
   if (!read_scan) return tl::unexpected(read_scan.error());
-  auto scan = lidar::deskewed(std::move(*read_scan), moments_.stamps.at(sample), times_, T_body_lidar_, odometry_);
+  auto scan =
+      lidar::deskewed(std::move(*read_scan), times_of_files_.stamps.at(sample), times_, T_body_lidar_, odometry_);
   if (!scan) return in_context(file->string(), scan.error());
   return std::optional(std::move(*scan));
 }

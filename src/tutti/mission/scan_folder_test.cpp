@@ -166,17 +166,17 @@ TEST_F(Scans, NumberedFromOneOrOfNoPoseAreRefused) {
 }
 
 TEST_F(Scans, MayHaveStampsOfTheirOwn) {
-  ScanMoments moments;
+  ScanMoments times;
   for (int number = 0; number < 5; ++number) {
-    moments.stamps.push_back(odometry_[0].stamp + (0.213 + 0.13 * number));
+    times.stamps.push_back(odometry_[0].stamp + (0.213 + 0.13 * number));
     write_scan(number, 0.213 + 0.13 * number - kSweep_s, true);
   }
-  const auto scans = ScanFolder::open(folder_, moments, odometry_, robot_);
+  const auto scans = ScanFolder::open(folder_, times, odometry_, robot_);
   ASSERT_TRUE(scans) << scans.error().message;
   for (std::size_t i = 0; i < 5; ++i) {
     const auto scan = (*scans)->scan(i);
     ASSERT_TRUE(scan && *scan);
-    EXPECT_EQ((*scan)->stamp, moments.stamps[i]);
+    EXPECT_EQ((*scan)->stamp, times.stamps[i]);
     const Pose3 T = T_odom_body((*scan)->stamp - odometry_[0].stamp);
     for (std::size_t k = 0; k < kFixed.size(); ++k)
       EXPECT_LT((T * (*scan)->cloud->points[k].cast<double>() - kFixed[k]).norm(), 0.05);

@@ -21,7 +21,7 @@ constexpr double kPeriod_s = 0.05, kScanPeriod_s = 0.2;
 
 Pose3 at_x(double x, double z = 0.0) { return {Eigen::Quaterniond::Identity(), {x, 0.0, z}}; }
 
-/// What one robot says: odometry at 20 Hz along x for 10 s, scans at 5 Hz, and where its LiDAR is.
+/// What one robot sends: odometry at 20 Hz along x for 10 s, scans at 5 Hz, and where its LiDAR is.
 struct Robot {
   std::string topics;  ///< In front of its topics: "/alpha".
   std::string frames;  ///< In front of its frames: "alpha/".
@@ -75,7 +75,7 @@ class StrangerBags : public testing::Test {
 };
 
 /// With shared transforms and prefixed frames, and with transforms of their own that have the same frames.
-TEST_F(StrangerBags, TwoRobotsInOneAreToldApartByTheirNamespaces) {
+TEST_F(StrangerBags, TwoRobotsInOneAreDistinguishedByTheirNamespaces) {
   for (const bool is_shared : {true, false}) {
     Robot alpha{.topics = "/alpha"}, bravo{.topics = "/bravo", .speed_m_s = 2.0, .lidar_x_m = 0.7};
     for (Robot* robot : {&alpha, &bravo})

@@ -15,9 +15,9 @@ std::map<KeyframeId, Pose3> true_ends(std::span<const LoopClosure> closures, con
   std::map<KeyframeId, Pose3> out;
   for (const MissionRecording* robot : robots) {
     const auto& own = ends[robot->recording.robot];
-    Trajectory moments;
-    for (const auto& [stamp, id] : own) moments.push_back({stamp, {}});
-    for (const auto& pair : evaluation::associate(moments, robot->recording.reference, association))
+    Trajectory stamps;
+    for (const auto& [stamp, id] : own) stamps.push_back({stamp, {}});
+    for (const auto& pair : evaluation::associate(stamps, robot->recording.reference, association))
       out[own.at(pair.stamp)] = pair.reference;
   }
   return out;

@@ -12,8 +12,9 @@ std::optional<WorstMoment> worst_moment(std::span<const UpdateRecord> updates, c
   for (const UpdateRecord& update : updates) {
     const std::optional<double> rmse_m = rmse_of(update);
     if (!rmse_m || !update.onboard_rmse_m) continue;
-    const WorstMoment moment{update.time_s, *rmse_m, *update.onboard_rmse_m};
-    if (!worst || moment.rmse_m - moment.onboard_rmse_m > worst->rmse_m - worst->onboard_rmse_m) worst = moment;
+    const WorstMoment candidate{update.time_s, *rmse_m, *update.onboard_rmse_m};
+    if (!worst || candidate.rmse_m - candidate.onboard_rmse_m > worst->rmse_m - worst->onboard_rmse_m)
+      worst = candidate;
   }
   return worst;
 }

@@ -15,7 +15,7 @@ namespace compare_test {
 
 using nlohmann::json;
 
-/// A straight way of a metre a second; B parts from it after 40 s.
+/// A straight trajectory of a metre a second; B parts from it after 40 s.
 TrajectoryComparison example(bool disagrees) {
   TrajectoryComparison c{.name = "alpha", .poses = 205, .paired = 200, .spacing_m = 1.0, .way_m = 99.0};
   for (int i = 0; i < 100; ++i) {
@@ -55,8 +55,8 @@ CompareReport report(bool disagrees) {
   return {.a = "truth.tum", .b = "odometry & co.tum", .robots = {example(disagrees)}, .notes = {"A <note>."}};
 }
 
-void expect_in(const std::string& text, std::initializer_list<const char*> words) {
-  for (const char* word : words) EXPECT_NE(text.find(word), std::string::npos) << word << " in\n" << text;
+void expect_in(const std::string& text, std::initializer_list<const char*> all) {
+  for (const char* expected : all) EXPECT_NE(text.find(expected), std::string::npos) << expected << " in\n" << text;
 }
 
 TEST(ScaleSummaries, SayHowMuchWhereAndSinceWhen) {

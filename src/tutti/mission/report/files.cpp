@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What an earlier mission wrote here, as its report.json says, is not to be taken for this one's.
+/// What an earlier mission wrote here, by its report.json, is not to be taken for this one's.
 Status remove_former(const fs::path& out_dir) {
   const auto former = nlohmann::json::parse(read_file((out_dir / "report.json").string()).value_or(""), nullptr, false);
   if (!former.is_object() || !former.contains("files") || !former["files"].is_array()) return {};
@@ -51,7 +51,7 @@ Status write_trajectories(const MissionRecord& record, const fs::path& out_dir) 
   return {};
 }
 
-/// Vertex ids are positions in the graph; the side file says which robot and moment each one is.
+/// Vertex ids are positions in the graph; the side file has each one's robot and time.
 Status write_graph(const ServerRecord& server, const fs::path& out_dir) {
   if (auto status = formats::write_g2o((out_dir / "graph.g2o").string(), server.graph); !status) return status;
   std::vector<formats::VertexStamp> stamps;

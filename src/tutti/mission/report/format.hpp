@@ -14,7 +14,7 @@ namespace tutti::mission {
 
 /// Three decimals with the unit: "0.013 m"; "-" when not measured or not finite.
 std::string format_metres(std::optional<double> value_m);
-/// An error; in brackets, "(0.013 m)", when the share of the way that it was scored on makes it partial.
+/// An error; in brackets, "(0.013 m)", when the share of the distance that it was scored on makes it partial.
 std::string format_error(std::optional<double> value_m, std::optional<double> scored_share);
 /// Such as "100 %"; a partial share is rounded down, and "-" means that nothing was scored.
 std::string format_scored(std::optional<double> scored_share);

@@ -53,7 +53,7 @@ Json drift_json(const RobotRecord& robot) {
   return out;
 }
 
-/// The share of the way that the figures behind `prefix` were scored on, and what that makes of them.
+/// The share of the distance that the figures behind `prefix` were scored on, and what that makes of them.
 void add_scored(Json& out, const std::string& prefix, std::optional<double> share) {
   out[prefix + "scored_share"] = number(share);
   out[prefix + "partial"] = is_partial(share);

@@ -177,7 +177,7 @@ TEST(ReportJson, DriftIsInMissionTime) {
   EXPECT_DOUBLE_EQ(failed["error_rad"], 0.35);
 }
 
-TEST(ReportJson, SaysOnWhichShareOfTheWayEveryRmseWasScored) {
+TEST(ReportJson, StatesOnWhichShareOfTheDistanceEveryRmseWasScored) {
   MissionRecord record = test::example_record();
   record.robots[1].server.scored_share = record.robots[1].mapped_share = 0.07;
   record.server.joint.scored_share = 0.535;
@@ -231,7 +231,7 @@ TEST(ReportJson, IsTheSameWhateverTheClockSays) {
   EXPECT_NE(report_json(record), before);
 }
 
-TEST(ReportJson, OneRotationIsPrintedOneWay) {
+TEST(ReportJson, OneRotationIsAlwaysPrintedAlike) {
   MissionRecord record = test::example_record();
   const std::string before = report_json(record);
   auto& q = record.transforms[0].T_from_to.rotation;

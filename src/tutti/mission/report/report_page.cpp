@@ -32,7 +32,7 @@ Pose3 page_from_world(const MissionRecord& record, std::uint32_t component) {
   return found == record.view->T_upright_world.end() ? Pose3() : found->second;
 }
 
-/// Where its raw odometry alone puts the robot's submaps: moved as one rigid piece onto the map's frame.
+/// Where its raw odometry alone puts the robot's submaps: moved as one rigid body onto the map's frame.
 void add_odometry(const RobotRecord& robot, const Pose3& T_page_odom, const ViewRecord& view, Json& submaps) {
   for (const auto& [id, T_odom_submap] : view.T_odom_submap) {
     if (id.chain.robot != robot.id) continue;
@@ -63,7 +63,7 @@ void add_trajectory(const Whose& whose, const char* kind, const Points3d& points
                           {"points", std::move(all)}})});
 }
 
-/// One robot's estimates, moved as one rigid piece each onto the frame that the map is shown in.
+/// One robot's estimates, moved as one rigid body each onto the frame that the map is shown in.
 void add_trajectories(const MissionRecord& record, const RobotRecord& robot, Json& odometry,
                       std::vector<page::Message>& out) {
   const RobotGeometry geometry = robot_geometry(record, robot);

@@ -66,7 +66,7 @@ TEST(ReportText, PoliciesAreSideBySideOnlyWhereThereAreSeveral) {
   EXPECT_NE(corrected.find("  24  11.2 / 31.0"), std::string::npos) << text;
 }
 
-TEST(ReportText, TellsOfAlertsAndKinks) {
+TEST(ReportText, ReportsAlertsAndDiscontinuities) {
   MissionRecord record = test::example_record();
   const std::string text = report_text(record, "x");
   expect_readable(text);
