@@ -9,7 +9,7 @@ namespace closed_loop_test {
 
 using namespace test;
 
-/// 60 nodes, yaw drift of 0.3 degrees and 0.3 % of the distance: raw odometry some 0.7 m off.
+/// 60 nodes, yaw drift of 0.3 degrees per metre and a scale error of 0.3 %: raw odometry some 0.7 m off.
 Mission short_mission(std::uint64_t seed) {
   OdometryNoise noise{.translation_m = 0.02, .rotation_rad = 0.0018};
   noise.yaw_bias_rad = 0.3 * std::numbers::pi / 180.0;

@@ -8,7 +8,7 @@
 
 namespace tutti::evaluation {
 
-/// The poses of one body by both trajectories at one moment.
+/// The poses of one body by both trajectories at one time.
 struct PosePair {
   Timestamp stamp;  ///< The estimate's.
   Pose3 estimate;   ///< T_estimate_body

@@ -170,7 +170,7 @@ TEST(Agreement, OnlyEqualStampsCount) {
     const auto ns = static_cast<std::int64_t>(i) * 1000;
     a.push_back({{ns}, {Eigen::Quaterniond::Identity(), positions[i]}});
     b.push_back({{ns}, T * a.back().pose});
-    b.push_back({{ns + 1}, {Eigen::Quaterniond::Identity(), {99, 99, 99}}});  // 1 ns away is another moment
+    b.push_back({{ns + 1}, {Eigen::Quaterniond::Identity(), {99, 99, 99}}});  // 1 ns away is another time
   }
   const auto result = agreement(a, b);
   ASSERT_TRUE(result);

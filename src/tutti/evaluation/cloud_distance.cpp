@@ -20,7 +20,7 @@ constexpr std::size_t kNeighbours = 8;     // the point itself included
 constexpr double kFlat = 0.05;             // smallest over middle eigenvalue of their scatter
 constexpr std::size_t kLeastOfAPlane = 4;  // any three points are flat
 
-/// What a point and its neighbours say about the surface there.
+/// What a point and its neighbours determine about the surface there.
 struct Patch {
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< Zero: not flat.
   float offset = 0.0F;                               ///< normal . x = offset on the plane.
@@ -41,7 +41,7 @@ Patch fit_patch(const std::vector<Eigen::Vector3f>& points, const Eigen::Vector3
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
   solver.computeDirect(scatter);
   const Eigen::Vector3d spread = solver.eigenvalues();
-  // On one line a plane could stand any way.
+  // On one line a plane could have any tilt.
   if (!(spread[0] <= kFlat * spread[1]) || !(spread[1] >= kFlat * spread[2])) return {};
   const Eigen::Vector3d normal = solver.eigenvectors().col(0).normalized();
   return {normal.cast<float>(), static_cast<float>(normal.dot(mean)), (points[neighbours.back()] - point).norm()};

@@ -5,14 +5,14 @@
 
 namespace tutti::evaluation {
 
-KeyframeTrajectory::KeyframeTrajectory(std::span<const StampedPose> way, const Trajectory& keyframes) {
+KeyframeTrajectory::KeyframeTrajectory(std::span<const StampedPose> trajectory, const Trajectory& keyframes) {
   std::vector<double> length_m{0.0};  // up to each pose
-  for (std::size_t i = 1; i < way.size(); ++i)
-    length_m.push_back(length_m.back() + (way[i].pose.translation - way[i - 1].pose.translation).norm());
+  for (std::size_t i = 1; i < trajectory.size(); ++i)
+    length_m.push_back(length_m.back() + (trajectory[i].pose.translation - trajectory[i - 1].pose.translation).norm());
   whole_m_ = length_m.back();
   const auto up_to = [&](Timestamp stamp) {
-    const auto next = std::ranges::lower_bound(way, stamp, {}, &StampedPose::stamp);
-    return next == way.end() ? whole_m_ : length_m[static_cast<std::size_t>(next - way.begin())];
+    const auto next = std::ranges::lower_bound(trajectory, stamp, {}, &StampedPose::stamp);
+    return next == trajectory.end() ? whole_m_ : length_m[static_cast<std::size_t>(next - trajectory.begin())];
   };
   double from_m = 0.0;
   for (std::size_t k = 0; k < keyframes.size(); ++k) {

@@ -8,13 +8,13 @@
 
 namespace tutti::evaluation {
 
-/// The length of a trajectory, divided among keyframes on it, so that one can say for what share of the way something
-/// holds. A keyframe stands for the way from half way to the keyframe before it until half way to the one after it; the
-/// first and the last one also stand for all that lies before and after.
+/// The length of a trajectory, divided among keyframes on it, so that one can state on what share of the distance
+/// something is true. A keyframe stands for the distance from halfway to the keyframe before it until halfway to the
+/// one after it; the first and the last one also stand for all that lies before and after.
 class KeyframeTrajectory {
  public:
-  /// `way`: all poses of the trajectory; `keyframes`: poses at some of its stamps. Both by increasing stamps.
-  KeyframeTrajectory(std::span<const StampedPose> way, const Trajectory& keyframes);
+  /// `trajectory`: all its poses; `keyframes`: poses at some of its stamps. Both by increasing stamps.
+  KeyframeTrajectory(std::span<const StampedPose> trajectory, const Trajectory& keyframes);
 
   /// Length of the trajectory, also when there are no keyframes.
   [[nodiscard]] double whole_m() const { return whole_m_; }
@@ -27,7 +27,7 @@ class KeyframeTrajectory {
     for (const auto& pose : poses) {
       while (share != shares_.end() && share->stamp < pose.stamp) ++share;
       if (share == shares_.end()) break;
-      if (share->stamp == pose.stamp) sum_m += share->way_m;
+      if (share->stamp == pose.stamp) sum_m += share->distance_m;
     }
     return sum_m;
   }
@@ -35,7 +35,7 @@ class KeyframeTrajectory {
  private:
   struct Share {
     Timestamp stamp;
-    double way_m = 0.0;
+    double distance_m = 0.0;
   };
   std::vector<Share> shares_;
   double whole_m_ = 0.0;

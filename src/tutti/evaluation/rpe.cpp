@@ -12,7 +12,7 @@
 namespace tutti::evaluation {
 namespace {
 
-/// E over all i, where `abscissa` says how far along pair i is (ns or m), without decreasing; j is the first pair at
+/// E over all i, where `abscissa` is how far along pair i is (ns or m), without decreasing; j is the first pair at
 /// least `least` after i, and none when that is more than `most`.
 template <class T>
 std::optional<RpeResult> rpe(std::span<const PosePair> pairs, const std::vector<T>& abscissa, T least, T most) {
@@ -52,7 +52,7 @@ std::optional<RpeResult> rpe_over_time(std::span<const PosePair> pairs, double d
 }
 
 std::optional<RpeResult> rpe_over_distance(std::span<const PosePair> pairs, double delta_m) {
-  constexpr double kRounding = 1e-9;  // of the interval: the way is a sum
+  constexpr double kRounding = 1e-9;  // of the interval: the distance is a sum
   TUTTI_CHECK(delta_m > 0.0, "delta_m = {}", delta_m);
   std::vector<double> metres;
   for (std::size_t i = 0; i < pairs.size(); ++i)

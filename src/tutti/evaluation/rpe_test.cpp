@@ -88,7 +88,7 @@ TEST(Rpe, RoundingOfTimesAddsNoSample) {
   }
 }
 
-TEST(Rpe, RoundingOfTheWayAddsNoSample) {
+TEST(Rpe, RoundingOfTheDistanceAddsNoSample) {
   std::vector<PosePair> pairs;
   for (int i = 0; i < 4000; ++i) pairs.push_back({{i * kSecond}, at_x(0.101 * i), at_x(0.1 * i)});
   const auto ten_metres = rpe_over_distance(pairs, 10.0);

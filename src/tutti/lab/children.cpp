@@ -18,7 +18,7 @@ namespace tutti::lab {
 namespace {
 
 constexpr auto kPolitely = std::chrono::seconds(30);
-constexpr auto kLookForEnd = std::chrono::milliseconds(20);
+constexpr auto kPollForEnd = std::chrono::milliseconds(20);
 
 std::string end_of(const std::filesystem::path& output) {
   constexpr std::size_t kTail = 1000;
@@ -28,9 +28,9 @@ std::string end_of(const std::filesystem::path& output) {
 
 }  // namespace
 
-Status Children::start(const std::string& name, std::vector<std::string> words, const std::filesystem::path& output) {
+Status Children::start(const std::string& name, std::vector<std::string> command, const std::filesystem::path& output) {
   std::vector<char*> arguments;
-  for (std::string& word : words) arguments.push_back(word.data());
+  for (std::string& argument : command) arguments.push_back(argument.data());
   arguments.push_back(nullptr);
   posix_spawn_file_actions_t files;
   posix_spawn_file_actions_init(&files);
@@ -44,7 +44,7 @@ Status Children::start(const std::string& name, std::vector<std::string> words, 
   const int error = posix_spawn(&pid, arguments[0], &files, &attributes, arguments.data(), environ);
   posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&files);
-  if (error != 0) return fail(ErrorCode::io, "{}: cannot be started: {}", words[0], std::strerror(error));
+  if (error != 0) return fail(ErrorCode::io, "{}: cannot be started: {}", command[0], std::strerror(error));
   running_[name] = {pid, output};
   return {};
 }
@@ -72,7 +72,7 @@ void Children::stop(const std::vector<std::string>& names) {
     if (child == running_.end()) continue;
     while (waitpid(child->second.pid, nullptr, WNOHANG) == 0) {
       if (std::chrono::steady_clock::now() > end) kill(child->second.pid, SIGKILL);
-      std::this_thread::sleep_for(kLookForEnd);
+      std::this_thread::sleep_for(kPollForEnd);
     }
     running_.erase(child);
   }

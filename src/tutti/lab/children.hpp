@@ -21,8 +21,8 @@ class Children {
   Children(const Children&) = delete;
   Children& operator=(const Children&) = delete;
 
-  /// Starts a program. `words` are the program and its arguments; its output goes to the file `output`.
-  Status start(const std::string& name, std::vector<std::string> words, const std::filesystem::path& output);
+  /// Starts a program. `command` is the program and its arguments; its output goes to the file `output`.
+  Status start(const std::string& name, std::vector<std::string> command, const std::filesystem::path& output);
   /// Fails when a program has ended, with the end of its output.
   Status check();
   /// Sends SIGTERM, then SIGKILL to those still running after 30 s. Returns when they have ended.

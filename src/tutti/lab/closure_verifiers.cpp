@@ -19,7 +19,7 @@ namespace tutti::lab {
 
 namespace {
 
-/// The keyframe next to a moment within this robot's submap; neighbouring submaps share no moment.
+/// The keyframe next to a time within this robot's submap; neighbouring submaps share no time.
 const Keyframe* keyframe_at(const Submap& submap, RobotId robot, Timestamp stamp) {
   const auto& keyframes = submap.keyframes;
   if (submap.id.chain.robot != robot || stamp < keyframes.front().stamp || keyframes.back().stamp <= stamp)
@@ -62,7 +62,7 @@ namespace {
 
 std::vector<PlantedClosure> planted_closures(const std::vector<PlantedClosureConfig>& configs,
                                              const std::vector<mission::MissionRecording>& recordings) {
-  const auto moment = [&](const std::string& name, double time_s) {
+  const auto robot_and_stamp = [&](const std::string& name, double time_s) {
     const auto found =
         std::ranges::find(recordings, name, [](const mission::MissionRecording& r) { return r.recording.name; });
     TUTTI_CHECK(found != recordings.end(), "no robot is called '{}'", name);
@@ -70,8 +70,9 @@ std::vector<PlantedClosure> planted_closures(const std::vector<PlantedClosureCon
   };
   std::vector<PlantedClosure> out;
   for (const PlantedClosureConfig& config : configs) {
-    const auto [robot, stamp] = moment(config.robot, config.at_s);
-    const auto [other, other_stamp] = moment(config.other.empty() ? config.robot : config.other, config.other_at_s);
+    const auto [robot, stamp] = robot_and_stamp(config.robot, config.at_s);
+    const auto [other, other_stamp] =
+        robot_and_stamp(config.other.empty() ? config.robot : config.other, config.other_at_s);
     const Pose3 error{so3_exp(config.yaw_deg * kRadPerDeg * Eigen::Vector3d::UnitZ()),
                       {config.ahead_m, config.left_m, 0.0}};
     out.push_back({robot, stamp, other, other_stamp, error});

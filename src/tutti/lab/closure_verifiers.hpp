@@ -23,8 +23,8 @@ struct PlantedClosure {
 };
 
 /// For recordings without sensor data: closures from true relative poses, with noise and a share of wrong ones. For the
-/// two submaps that contain the moments of a planted closure it gives that one instead: between the keyframes nearest
-/// to these moments, the true relative pose with the given error, and the covariance of right ones.
+/// two submaps that contain the times of a planted closure it gives that one instead: between the keyframes nearest to
+/// these times, the true relative pose with the given error, and the covariance of right ones.
 class ReferenceClosureVerifier final : public server::ClosureVerifier {
  public:
   ReferenceClosureVerifier(std::map<RobotId, Trajectory> reference, const simulation::ReferenceClosureConfig& config,

@@ -31,7 +31,7 @@ using program::Json, program::kEnded;
 
 namespace fs = std::filesystem;
 
-/// What went wrong, by what robots have told: one line of a kind with a count and the first case.
+/// What went wrong, by what robots have reported: one line of a kind with a count and the first case.
 class Troubles {
  public:
   void take(const Json& event) {
@@ -111,7 +111,7 @@ Status take(const Json& event, const std::string& name, Robot& robot) try {
   return fail(ErrorCode::parse, "event {}: {}", event.dump(), error.what());
 }
 
-/// What a player has scored, beside what the robot said of the same update.
+/// What a player has scored, beside what the robot reported of the same update.
 Status take_score(const Json& event, Robot& robot) {
   if (event.value("event", "") != kUpdateScored) return {};
   auto score = update_of(event);
@@ -125,7 +125,7 @@ Status take_score(const Json& event, Robot& robot) {
   return {};
 }
 
-/// What the robot would say of the last map, once more: its own odometry against it, whatever it has corrected.
+/// What the robot would report of the last map, once more: its own odometry against it, whatever it has corrected.
 consistency::Explanation explain_again(const mission::RobotActor& actor, const MissionConfig& config,
                                        const ProxyGraph& map) {
   robot::AgentState state = actor.node().agent().state();
@@ -174,7 +174,7 @@ Result<Robot> read_robot(const MissionConfig& config, const mission::MissionReco
   return robot;
 }
 
-/// The server's course: what it told. `gone`: files of it that are not there any more.
+/// The server's course: what it reported. `gone`: files of it that are not there any more.
 Result<mission::MissionEvents> read_course(const fs::path& folder, std::uint64_t& gone) {
   mission::MissionEvents course;
   std::set<std::string> failed;  // pairs that could not be verified are tried again and again

@@ -66,9 +66,9 @@ simulation::FlownRecording simulate(const simulation::HallMissionConfig& config)
 Submaps replayed(simulation::FlownRecording flown) {
   mission::MissionRecording recording{.recording = std::move(flown.recording)};
   if (!flown.images.stamps.empty()) {
-    Trajectory moments;  // of images
-    for (const Timestamp stamp : flown.images.stamps) moments.push_back({stamp, {}});
-    recording.recording.visual = visual::TrackingSource::open(std::move(flown.images), moments, {}).value();
+    Trajectory stamps;  // of images
+    for (const Timestamp stamp : flown.images.stamps) stamps.push_back({stamp, {}});
+    recording.recording.visual = visual::TrackingSource::open(std::move(flown.images), stamps, {}).value();
   }
   const storage::MemoryStore store{storage::robot_schema()};
   const evaluation::AssociationConfig association;
@@ -103,9 +103,9 @@ class Fed {
     host_ = std::make_unique<Host>(std::move(parts), clock_, *log_);
     EXPECT_TRUE(host_->open());
     session_->connect(0);
-    say(test::hello(test::sensors(sensors)));
+    send(test::hello(test::sensors(sensors)));
   }
-  void say(const std::string& bytes) { session_->receive(0, bytes); }
+  void send(const std::string& bytes) { session_->receive(0, bytes); }
   void work() {
     for (int i = 0; i < 2; ++i, wall_s_ += 0.02) {
       host_->turn();
@@ -160,31 +160,32 @@ intake::FedImages images_of(const ImageStream& stream, std::size_t moment, bool 
   return out;
 }
 
-/// What the driver of a robot with these sensors says, in the order in which it happens.
+/// What the driver of a robot with these sensors sends, in the order in which it happens.
 Submaps fed(const simulation::FlownRecording& flown, bool as_files) {
   const Recording& recording = flown.recording;
   Fed robot(sensors_of(flown));
   std::size_t imu = 0, scan = 0, images = 0, fix = 0;
   for (std::size_t i = 0; i < recording.odometry.size(); ++i) {
     const Timestamp now = recording.odometry[i].stamp;
-    robot.say(test::odometry(recording.odometry[i], i == 0 ? Matrix6d::Zero() : recording.increment_covariance[i - 1]));
+    robot.send(
+        test::odometry(recording.odometry[i], i == 0 ? Matrix6d::Zero() : recording.increment_covariance[i - 1]));
     std::vector<ImuSample> samples;
     while (imu < recording.imu.size() && (imu == 0 || recording.imu[imu - 1].stamp < now))
       samples.push_back(recording.imu[imu++]);
-    if (!samples.empty()) robot.say(test::imu(samples));
+    if (!samples.empty()) robot.send(test::imu(samples));
     for (; fix < recording.fixes.size() && recording.fixes[fix].stamp <= now; ++fix)
-      robot.say(test::fix(recording.fixes[fix]));
+      robot.send(test::fix(recording.fixes[fix]));
     const auto scan_is_due = [&] {
       return moment(recording, recording.scan_stamps, scan).value_or(kLastTimestamp) <= now;
     };
     for (; recording.scans && scan_is_due(); ++scan)
-      if (const auto seen = *recording.scans->scan(scan)) robot.say(test::scan(*seen));
+      if (const auto seen = *recording.scans->scan(scan)) robot.send(test::scan(*seen));
     for (; images < flown.images.stamps.size() && flown.images.stamps[images] <= now; ++images)
       if (flown.images.stamps[images] >= recording.odometry.front().stamp)
-        robot.say(test::images(images_of(flown.images, images, as_files)));
+        robot.send(test::images(images_of(flown.images, images, as_files)));
     robot.work();
   }
-  robot.say(test::end_of_recording());
+  robot.send(test::end_of_recording());
   const Submaps out = robot.submaps();
   EXPECT_TRUE(robot.refused().empty()) << robot.refused().front();
   return out;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Robots of a simulated mission are fed through their live feeds, and what the feeds say is held against the truth.
+// Robots of a simulated mission are fed through their live feeds, and what the feeds send is compared with the truth.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -37,7 +37,7 @@ struct Fed {
   std::size_t next = 0;
 };
 
-/// What the corrections of a mission said, against the truth.
+/// The corrections of a mission, against the truth.
 struct Tally {
   std::size_t samples = 0, corrected = 0, jumps = 0, outside = 0, met = 0;
   double nees = 0.0, corrected_nees = 0.0;
@@ -74,7 +74,7 @@ class Mission {
   }
 
   Tally run() {
-    const Trajectory& clock = recordings_[0].recording.odometry;  // all robots walk at one rate from one moment on
+    const Trajectory& clock = recordings_[0].recording.odometry;  // all robots walk at one rate from one time on
     for (std::size_t i = 0; i < clock.size(); ++i) {
       const Timestamp now = clock[i].stamp;
       for (std::size_t r = 0; r < fed_.size(); ++r) feed(r, now);
@@ -104,10 +104,10 @@ class Mission {
     for (const bus::Envelope& message : fed.target.take_sent()) carry_out(server_->receive(message, now));
   }
 
-  void note(std::size_t r, std::size_t i, const v1::Feed::Correction& said, const Pose3& before, bool announced) {
+  void note(std::size_t r, std::size_t i, const v1::Feed::Correction& correction, const Pose3& before, bool announced) {
     const Recording& recording = recordings_[r].recording;
     const Pose3& T_odom_body = recording.odometry[i].pose;
-    const Pose3 T_map_body = test::read(said.t_map_body()), T_map_odom = test::read(said.t_map_odom());
+    const Pose3 T_map_body = test::read(correction.t_map_body()), T_map_odom = test::read(correction.t_map_odom());
     ASSERT_LT(local(T_map_body, T_map_odom * T_odom_body).norm(), 1e-9);
     if (i > 0 && !announced) {
       const double dt_s = recording.odometry[i].stamp - recording.odometry[i - 1].stamp;
@@ -116,7 +116,7 @@ class Mission {
     shown_[r] = T_map_odom;
     if (i == 0) return;
     Matrix6d covariance;
-    for (int k = 0; k < 36; ++k) covariance(k / 6, k % 6) = said.t_map_odom_covariance(k);
+    for (int k = 0; k < 36; ++k) covariance(k / 6, k % 6) = correction.t_map_odom_covariance(k);
     const Matrix6d back = adjoint(T_odom_body.inverse());
     const Matrix6d of_body = back * covariance * back.transpose();
     // `map` begins where `odom` does.

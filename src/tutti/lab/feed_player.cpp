@@ -56,7 +56,7 @@ class Player {
   void note_stored(const std::optional<Timestamp>& stored);
   Status wait_for_robot(const std::atomic<bool>& stop);
   [[nodiscard]] std::optional<intake::FedImages> images(std::size_t moment, Timestamp stamp) const;
-  void score(const program::FeedTrajectory& way);
+  void score(const program::FeedTrajectory& trajectory);
 
   const FeedPlayerOptions& options_;
   const MissionConfig& config_;
@@ -78,8 +78,8 @@ Status Player::connect(const std::atomic<bool>& stop) {
                                       !options_.scores.empty());
     if (client) {
       client_ = std::move(*client);
-      return hear_until(stop, [&](const program::FromRobot& said) {
-        const auto* welcome = std::get_if<program::FeedWelcome>(&said);
+      return hear_until(stop, [&](const program::FromRobot& message) {
+        const auto* welcome = std::get_if<program::FeedWelcome>(&message);
         if (welcome != nullptr) known_ = welcome->newest;
         return welcome != nullptr;
       });
@@ -92,13 +92,13 @@ Status Player::connect(const std::atomic<bool>& stop) {
 template <class IsIt>
 Status Player::hear_until(const std::atomic<bool>& stop, const IsIt& is_it) {
   while (!stop) {
-    const auto said = client_->hear(kWait_ms);
-    if (!said) return tl::unexpected(said.error());
-    if (!*said) continue;
-    if (const auto* way = std::get_if<program::FeedTrajectory>(&**said)) score(*way);
-    if (const auto* over = std::get_if<program::FeedOver>(&**said))
+    const auto message = client_->hear(kWait_ms);
+    if (!message) return tl::unexpected(message.error());
+    if (!*message) continue;
+    if (const auto* trajectory = std::get_if<program::FeedTrajectory>(&**message)) score(*trajectory);
+    if (const auto* over = std::get_if<program::FeedOver>(&**message))
       return fail(ErrorCode::io, "the robot has ended the connection: {}", over->why);
-    if (is_it(**said)) return {};
+    if (is_it(**message)) return {};
   }
   return fail(ErrorCode::io, "stopped");
 }
@@ -120,8 +120,8 @@ Status Player::wait_for_robot(const std::atomic<bool>& stop) {
   while (is_behind() && !stop) {
     std::this_thread::sleep_for(std::chrono::milliseconds(kWait_ms / 5));
     if (Status ok = client_->say_time(); !ok) return ok;
-    const Status heard = hear_until(stop, [&](const program::FromRobot& said) {
-      const auto* progress = std::get_if<program::FeedProgress>(&said);
+    const Status heard = hear_until(stop, [&](const program::FromRobot& message) {
+      const auto* progress = std::get_if<program::FeedProgress>(&message);
       if (progress != nullptr) note_stored(progress->stored);
       return progress != nullptr;
     });
@@ -138,13 +138,13 @@ Status Player::say_sample(std::size_t i, const std::atomic<bool>& stop) {
   if (Status ok = wait_for_robot(stop); !ok) return ok;
   if (Status ok = client_->say(node::OdometrySample{stamp, pose, covariance}); !ok) return ok;
   note_said(stamp, 0);
-  return hear_until(stop, [&](const program::FromRobot& said) {
-    if (const auto* answer = std::get_if<program::FeedAnswer>(&said)) {
+  return hear_until(stop, [&](const program::FromRobot& message) {
+    if (const auto* answer = std::get_if<program::FeedAnswer>(&message)) {
       wants_scan_ = answer->wants_scan;
       note_stored(answer->stored);
       return answer->stamp == stamp;
     }
-    const auto* refused = std::get_if<program::FeedRefusal>(&said);
+    const auto* refused = std::get_if<program::FeedRefusal>(&message);
     return refused != nullptr && refused->stamp == stamp;
   });
 }
@@ -220,22 +220,22 @@ std::optional<intake::FedImages> Player::images(std::size_t moment, Timestamp st
 }
 
 /// As RobotActor does: how far every estimate is from the reference at the map's nodes.
-void Player::score(const program::FeedTrajectory& way) {
+void Player::score(const program::FeedTrajectory& trajectory) {
   if (!scores_) return;
   const Recording& recording = robot_.recording;
   Trajectory truth, odometry;
   if (robot_.score_against_reference)
-    for (const auto& pair : evaluation::associate(way.map, recording.reference, config_.association))
+    for (const auto& pair : evaluation::associate(trajectory.map, recording.reference, config_.association))
       truth.push_back({pair.stamp, pair.reference});
-  for (const StampedPose& keyframe : way.corrected)
+  for (const StampedPose& keyframe : trajectory.corrected)
     if (const auto pose = pose_at(recording.odometry, keyframe.stamp)) odometry.push_back({keyframe.stamp, *pose});
   const auto rmse = [&](const Trajectory& estimate) -> std::optional<double> {
     const auto error = evaluation::agreement(estimate, truth);
     return error ? std::optional(error->rmse_m) : std::nullopt;
   };
   mission::UpdateRecord update{
-      .revision = way.map_age.second, .onboard_rmse_m = rmse(odometry), .server_rmse_m = rmse(way.map)};
-  update.answers.push_back({config_.agent.policy.name, way.constraints, rmse(way.corrected)});
+      .revision = trajectory.map_age.second, .onboard_rmse_m = rmse(odometry), .server_rmse_m = rmse(trajectory.map)};
+  update.answers.push_back({config_.agent.policy.name, trajectory.constraints, rmse(trajectory.corrected)});
   scores_->write(to_json(update));
 }
 
@@ -267,11 +267,13 @@ Status Player::play(const std::atomic<bool>& stop) {
   }
   if (Status ok = client_->say_end(); !ok) return ok;
   const bool stays = scores_ != nullptr;
-  const Status heard = hear_until(
-      stop, [&](const program::FromRobot& said) { return !stays && std::holds_alternative<program::FeedEnd>(said); });
+  const Status heard = hear_until(stop, [&](const program::FromRobot& message) {
+    return !stays && std::holds_alternative<program::FeedEnd>(message);
+  });
   if (!stop) return heard;
-  for (auto said = client_->hear(kWait_ms); said && *said; said = client_->hear(kWait_ms))  // the last map's
-    if (const auto* way = std::get_if<program::FeedTrajectory>(&**said)) score(*way);
+  for (auto message = client_->hear(kWait_ms); message && *message;
+       message = client_->hear(kWait_ms))  // the last map's
+    if (const auto* trajectory = std::get_if<program::FeedTrajectory>(&**message)) score(*trajectory);
   return {};
 }
 

@@ -42,7 +42,7 @@ double worst(const mission::MissionRecord& record) {
   return out;
 }
 
-/// One fix in five is 30 m off. The whole way: receiver, robot, message, server, file, report.
+/// One fix in five is 30 m off. The whole path of a fix: receiver, robot, message, server, file, report.
 TEST(FixesMission, RobotsThatNeverMeetAreJoined) {
   const Ended apart = run({"server.map.georeference.mode=off"}), joined = run({});
   EXPECT_EQ(apart.record.server.components, 2U);

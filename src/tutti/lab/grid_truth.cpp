@@ -19,11 +19,11 @@ namespace {
 
 using grids::OccupancyGrid;
 
-std::size_t place_of(OccupancyGrid::Cell said) {
-  return said == OccupancyGrid::free ? 0 : said == OccupancyGrid::occupied ? 1 : 2;
+std::size_t place_of(OccupancyGrid::Cell claimed) {
+  return claimed == OccupancyGrid::free ? 0 : claimed == OccupancyGrid::occupied ? 1 : 2;
 }
 
-/// The ground below the robots' true ways, by the squares that hold it.
+/// The ground below the robots' true trajectories, by the squares that contain it.
 class TrueGround {
  public:
   TrueGround(const std::vector<Recording>& robots, const simulation::FreeSpace& space, double near_m)
@@ -41,7 +41,7 @@ class TrueGround {
       }
     }
   }
-  /// Nothing: no way is near.
+  /// Nothing: no trajectory is near.
   [[nodiscard]] std::optional<double> at(const Eigen::Vector2d& place) const {
     std::optional<double> out;
     double nearest = near_m_;
@@ -80,7 +80,7 @@ TrueCell true_cell(const simulation::FreeSpace& space, const Eigen::Vector2d& ce
   return any_free ? TrueCell::free : TrueCell::rock;
 }
 
-/// T_reference_world that lays the map's keyframes onto the true poses best, with what they look at: a straight way
+/// T_reference_world that lays the map's keyframes onto the true poses best, with what they see: a straight trajectory
 /// alone would leave the tilt open.
 Pose3 align(const server::MapEstimate& map, const std::vector<Recording>& robots) {
   std::vector<Eigen::Vector3d> real, mapped;
@@ -100,8 +100,8 @@ Pose3 align(const server::MapEstimate& map, const std::vector<Recording>& robots
 
 }  // namespace
 
-std::size_t GridScore::of(OccupancyGrid::Cell said, TrueCell real) const {
-  return cells[place_of(said)][static_cast<std::size_t>(real)];
+std::size_t GridScore::of(OccupancyGrid::Cell claimed, TrueCell real) const {
+  return cells[place_of(claimed)][static_cast<std::size_t>(real)];
 }
 
 Result<GridScore> score_grid(const grids::MapGrid& made, const grids::GridConfig& config,
@@ -114,7 +114,7 @@ Result<GridScore> score_grid(const grids::MapGrid& made, const grids::GridConfig
   const simulation::FreeSpace space(world->network, mission.simulation.surface, Rng(seed).fork("surface"));
   const TrueGround ground(world->recordings, space, near_m);
   const Pose3 T_reference_level = align(map, world->recordings) * made.T_level_world.inverse();
-  double height = 0.0;  // of the ways: both frames are level but for what alignment leaves
+  double height = 0.0;  // of the trajectories: both frames are level but for what alignment leaves
   for (const auto& node : map.nodes) height += (made.T_level_world * node.T_world_body.translation).z();
   height /= static_cast<double>(std::max<std::size_t>(1, map.nodes.size()));
   GridScore out;
@@ -126,10 +126,11 @@ Result<GridScore> score_grid(const grids::MapGrid& made, const grids::GridConfig
       const Eigen::Vector2d place = (T_reference_level * Eigen::Vector3d(at.x(), at.y(), height)).head<2>();
       const auto floor = ground.at(place);
       if (!floor) continue;
-      const OccupancyGrid::Cell said = grid.at(x, y);
+      const OccupancyGrid::Cell claimed = grid.at(x, y);
       const TrueCell real = true_cell(space, place, half_m, *floor, config);
-      ++out.cells[place_of(said)][static_cast<std::size_t>(real)];
-      if (said == OccupancyGrid::occupied && true_cell(space, place, 3.0 * half_m, *floor, config) == TrueCell::surface)
+      ++out.cells[place_of(claimed)][static_cast<std::size_t>(real)];
+      if (claimed == OccupancyGrid::occupied &&
+          true_cell(space, place, 3.0 * half_m, *floor, config) == TrueCell::surface)
         ++out.occupied_near_surface;
     }
   return out;

@@ -20,16 +20,16 @@ enum class TrueCell : std::uint8_t {
   rock      ///< All of it is inside one.
 };
 
-/// How many cells are what they are said to be, counted near the robots' way.
+/// How many cells are what the grid has them as, counted near the robots' trajectories.
 struct GridScore {
-  static constexpr std::size_t kSaid = 3;                 ///< What the grid says: free, occupied or unknown,
-  std::array<std::array<std::size_t, 3>, kSaid> cells{};  ///< then what is true (TrueCell).
-  std::size_t occupied_near_surface = 0;  ///< Cells said to be occupied that have a surface in or beside them.
-  [[nodiscard]] std::size_t of(grids::OccupancyGrid::Cell said, TrueCell real) const;
+  static constexpr std::size_t kGridStates = 3;                 ///< In the grid: free, occupied or unknown,
+  std::array<std::array<std::size_t, 3>, kGridStates> cells{};  ///< then what is true (TrueCell).
+  std::size_t occupied_near_surface = 0;  ///< Cells occupied in the grid that have a surface in or beside them.
+  [[nodiscard]] std::size_t of(grids::OccupancyGrid::Cell claimed, TrueCell real) const;
 };
 
-/// Examines every `stride`-th cell in both directions whose centre is within `near_m` of a robot's true way. The grid
-/// is aligned with the truth by one rigid motion, fitted to the map's keyframes and the robots' true poses.
+/// Examines every `stride`-th cell in both directions whose centre is within `near_m` of a robot's true trajectory. The
+/// grid is aligned with the truth by one rigid motion, fitted to the map's keyframes and the robots' true poses.
 Result<GridScore> score_grid(const grids::MapGrid& made, const grids::GridConfig& config,
                              const server::MapEstimate& map, const MissionConfig& mission, std::uint64_t seed,
                              double near_m = 3.0, std::size_t stride = 1);

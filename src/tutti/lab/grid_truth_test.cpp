@@ -37,8 +37,9 @@ TEST(GridTruth, AMapToDriveOnIsTheWorld) {
   ASSERT_TRUE(record) << record.error().message;
   const auto score = score_grid(*made, {}, *map, config, 1);
   ASSERT_TRUE(score) << score.error().message;
-  const auto total = [&](OccupancyGrid::Cell said) {
-    return score->of(said, TrueCell::free) + score->of(said, TrueCell::surface) + score->of(said, TrueCell::rock);
+  const auto total = [&](OccupancyGrid::Cell claimed) {
+    return score->of(claimed, TrueCell::free) + score->of(claimed, TrueCell::surface) +
+           score->of(claimed, TrueCell::rock);
   };
   const std::size_t said_free = total(OccupancyGrid::free), said_occupied = total(OccupancyGrid::occupied);
   EXPECT_GT(said_free, 2000U);

@@ -11,7 +11,7 @@
 
 namespace tutti::lab {
 
-/// Simulates every robot of the mission, or reads its recording and changes it as the mission says. `data` is the
+/// Simulates every robot of the mission, or reads its recording and changes it by the mission's settings. `data` is the
 /// --data folder (empty for simulated robots). Fails when a recording cannot be read, or a planted closure names a
 /// robot that the mission does not have.
 Result<mission::MissionInput> load_input(const MissionConfig& config, const std::filesystem::path& data,

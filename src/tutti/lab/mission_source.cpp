@@ -105,7 +105,7 @@ Result<program::WorkerSettings> worker_settings(const MissionSource& source) {
 
 namespace {
 
-/// What the file says of the robot's messages, if it is a robot with a recording.
+/// What the file has on the robot's messages, if it is a robot with a recording.
 Status tell_sensors(const MissionConfig& config, program::RobotOptions& options) {
   const auto robot = std::ranges::find(config.robots, options.name, &mission::RobotConfig::name);
   if (config.source != "recordings" || robot == config.robots.end()) return {};

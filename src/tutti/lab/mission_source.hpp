@@ -29,8 +29,8 @@ struct MissionSource {
 /// Loads the mission; with the defaults of all settings when there is none.
 Result<MissionConfig> load(const MissionSource& source);
 
-/// The mission's name on the bus: the one in `source`, else the file's, else the default of programs that are told
-/// none. Fails when it cannot be a name on a bus.
+/// The mission's name on the bus: the one in `source`, else the file's, else the default of programs that get none.
+/// Fails when it cannot be a name on a bus.
 Result<std::string> name_on_bus(const MissionSource& source, const MissionConfig& config);
 /// True if somebody chose that name.
 bool is_named(const MissionSource& source);

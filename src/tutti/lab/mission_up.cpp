@@ -26,14 +26,14 @@ namespace {
 namespace fs = std::filesystem;
 using SteadyClock = std::chrono::steady_clock;
 
-constexpr auto kLookAgain = std::chrono::milliseconds(200);
+constexpr auto kPollEvery = std::chrono::milliseconds(200);
 constexpr auto kServerStarts = std::chrono::seconds(120);
 constexpr const char* kWatcher = "watcher";  // this program, on a bus with rights
 
 std::string worker_name(int number) { return fmt::format("worker{}", number + 1); }
 
-/// The server knows all that is to be known of the robots' submaps, and every robot has heard it: a robot says that it
-/// has finished and that everything is stored only after it was.
+/// The server knows all that is to be known of the robots' submaps, and every robot has heard it: a robot reports that
+/// it has finished and that everything is stored only after it was.
 bool is_over(const MissionStatus& status, const std::vector<std::string>& names) {
   if (status.has_news || status.pending_jobs > 0) return false;
   return std::ranges::all_of(names, [&](const std::string& name) {
@@ -72,11 +72,11 @@ class MissionUp {
 
  private:
   /// `member`: whose credential it gets, if the bus has rights; empty: nobody's.
-  [[nodiscard]] std::vector<std::string> words(const std::string& command, const std::string& member,
-                                               const fs::path& folder, bool replays) const;
+  [[nodiscard]] std::vector<std::string> command_line(const std::string& command, const std::string& member,
+                                                      const fs::path& folder, bool replays) const;
   Status make_credentials();
   Status start_server(const std::atomic<bool>& stop);
-  void tell(const MissionStatus& status) const;
+  void report(const MissionStatus& status) const;
 
   const MissionUpOptions& options_;
   MissionConfig config_;
@@ -92,9 +92,9 @@ class MissionUp {
   double wall_s_ = 0.0;
 };
 
-/// What all programs are told.
-std::vector<std::string> MissionUp::words(const std::string& command, const std::string& member, const fs::path& folder,
-                                          bool replays) const {
+/// The command line that all programs get.
+std::vector<std::string> MissionUp::command_line(const std::string& command, const std::string& member,
+                                                 const fs::path& folder, bool replays) const {
   const MissionSource& mission = options_.mission;
   std::vector<std::string> out{options_.program.string(), command, mission.file, "--seed",
                                std::to_string(mission.seed)};
@@ -135,7 +135,7 @@ Status MissionUp::start_server(const std::atomic<bool>& stop) {
   fs::create_directories(state_, error);
   if (error) return fail(ErrorCode::io, "{}: cannot be made: {}", state_.string(), error.message());
   if (Status made = make_credentials(); !made) return made;
-  auto server = words("server", "", state_ / "server", true);
+  auto server = command_line("server", "", state_ / "server", true);
   if (pki_) server.insert(server.end(), {"--pki", (state_ / "pki").string()});
   server.insert(server.end(), {"--threads", std::to_string(options_.workers > 0 ? 0 : options_.threads)});
   if (!options_.view.empty()) server.insert(server.end(), {"--view", options_.view});
@@ -150,7 +150,7 @@ Status MissionUp::start_server(const std::atomic<bool>& stop) {
     const std::size_t begin = text.find("--bus ");
     const std::size_t end = text.find(' ', begin == std::string::npos ? begin : begin + 6);
     if (begin != std::string::npos && end != std::string::npos) bus_ = text.substr(begin + 6, end - begin - 6);
-    std::this_thread::sleep_for(kLookAgain / 10);
+    std::this_thread::sleep_for(kPollEvery / 10);
   }
   return {};
 }
@@ -163,18 +163,18 @@ Status MissionUp::start(const std::atomic<bool>& stop) {
   if (Status started = start_server(stop); !started) return started;
   for (int i = 0; i < options_.workers; ++i) {
     const std::string name = worker_name(i);
-    auto worker = words("worker", name, {}, false);
+    auto worker = command_line("worker", name, {}, false);
     worker.insert(worker.end(), {"--threads", std::to_string(options_.threads)});
     if (Status started = children_.start(name, worker, state_ / (name + ".out")); !started) return started;
   }
   for (const std::string& name : names_) {
     const std::string feed = (sockets_.path / name).string();
-    auto robot = words("robot", name, state_ / "robots" / name, true);
+    auto robot = command_line("robot", name, state_ / "robots" / name, true);
     robot.insert(robot.end(), {"--name", name, "--stay", "--session", "0"});
     if (!replays_.contains(name)) robot.insert(robot.end(), {"--feed", feed});
     if (Status started = children_.start("robot " + name, robot, state_ / (name + ".out")); !started) return started;
     if (replays_.contains(name)) continue;
-    auto player = words("mission", "", {}, true);
+    auto player = command_line("mission", "", {}, true);
     player.insert(player.begin() + 2, "play");
     player.insert(player.end(), {"--name", name, "--feed", feed, "--scores", (state_ / "players" / name).string()});
     const fs::path output = state_ / (name + "_player.out");
@@ -197,17 +197,17 @@ Status MissionUp::watch(const std::atomic<bool>& stop) {
     for (const bus::Received& message : (*port)->receive()) {
       const auto status = wire::decode_mission_status(*message.envelope.bytes);
       if (!status) return tl::unexpected(status.error());
-      tell(*status);
+      report(*status);
       if (is_over(*status, names_)) return {};
     }
     if (Status runs = children_.check(); !runs) return runs;
     if (stop)
       return fail(ErrorCode::io, "stopped before the mission was over; what is there lies in {}", state_.string());
-    std::this_thread::sleep_for(kLookAgain);
+    std::this_thread::sleep_for(kPollEvery);
   }
 }
 
-void MissionUp::tell(const MissionStatus& status) const {
+void MissionUp::report(const MissionStatus& status) const {
   if (!options_.progress) return;
   std::uint64_t backlog = 0;
   for (const MissionStatus::Robot& robot : status.robots) backlog += robot.status.backlog_submaps;
@@ -219,7 +219,7 @@ void MissionUp::tell(const MissionStatus& status) const {
                   status.closures, status.components));
 }
 
-/// The server last: it still takes what the others say.
+/// The server last: it still takes what the others send.
 void MissionUp::end() {
   wall_s_ = std::chrono::duration<double>(SteadyClock::now() - begin_).count();
   std::vector<std::string> others, players;

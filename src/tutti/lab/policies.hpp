@@ -18,7 +18,7 @@ namespace tutti::lab {
 class BudgetedPolicy : public consistency::ConstraintPolicy {
  public:
   explicit BudgetedPolicy(std::size_t budget) : budget_(budget) {}
-  /// Sets how many constraints the robot may hold after the next update.
+  /// Sets how many constraints the robot may keep after the next update.
   void set_budget(std::size_t constraints) { budget_ = constraints; }
 
  protected:

@@ -121,7 +121,7 @@ Scene bent_scene(std::size_t length, std::size_t at_node, double turn_rad) {
 TEST(Skeleton, TakesNothingWhenTheRawChainAgrees) {
   const auto selection = Scene(80).choose(SkeletonPolicy());
   EXPECT_TRUE(selection.constraints.empty());
-  EXPECT_TRUE(selection.replaces_all);  // and gives up what it held
+  EXPECT_TRUE(selection.replaces_all);  // and gives up what it kept
 }
 
 TEST(Skeleton, LinksAreAChainFromTheFirstNodeToTheLast) {
@@ -163,7 +163,7 @@ consistency::test::LoopConfig by(const ConstraintPolicy& policy) {
   return out;
 }
 
-/// 60 nodes, yaw drift of 0.3 degrees and 0.3 % of the way per metre: raw odometry some 0.7 m off.
+/// 60 nodes, yaw drift of 0.3 degrees per metre and a scale error of 0.3 %: raw odometry some 0.7 m off.
 consistency::test::Mission short_mission(std::uint64_t seed) {
   consistency::test::OdometryNoise noise{.translation_m = 0.02, .rotation_rad = 0.0018};
   noise.yaw_bias_rad = 0.3 * std::numbers::pi / 180.0;

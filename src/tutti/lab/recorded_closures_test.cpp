@@ -54,7 +54,7 @@ TEST(RecordedClosures, JoinTheSubmapsOfTheirKeyframesInTheOrderOfArrival) {
   ASSERT_EQ(verdict.closures.size(), 2U);
   EXPECT_EQ(verdict.closures[0].from, (KeyframeId{RobotId{0}, 6}));
   EXPECT_EQ(verdict.closures[0].to, (KeyframeId{RobotId{1}, 2}));
-  EXPECT_EQ(verdict.closures[0].measurement.T_a_b.translation.x(), -90.0);  // it leads the other way round
+  EXPECT_EQ(verdict.closures[0].measurement.T_a_b.translation.x(), -90.0);  // it leads in the opposite direction
   EXPECT_EQ(verifier.known_at(submap(0, 1), submap(1, 0)), (std::vector{at(90), at(300)}));
   for (const auto& [first, second] : {std::pair(submap(0, 0), submap(1, 0)), {submap(0, 1), submap(1, 1)}}) {
     EXPECT_FALSE(verifier.is_candidate(first, second));

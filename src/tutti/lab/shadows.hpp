@@ -12,7 +12,7 @@
 namespace tutti::lab {
 
 /// Shadows: agents that hear the broadcasts of a robot and follow other policies than it, and that nobody hears. A
-/// policy with a budget gets as many constraints as `spectral` holds after the same broadcast.
+/// policy with a budget gets as many constraints as `spectral` has after the same broadcast.
 class Shadows final : public mission::Companions {
  public:
   /// `policies` are those that run beside the robot's own, config.policy.name. An unknown one throws.

@@ -24,7 +24,7 @@ estimation::OnboardSmoother make_smoother(const TimeChain& chain) {
   return smoother;
 }
 
-/// The robot's own chain with every joint held where the server has it: between two joints the smoother spreads the
+/// The robot's own chain with every joint fixed where the server has it: between two joints the smoother spreads the
 /// end error along the odometry by its covariance.
 std::vector<Pose3> spread(estimation::OnboardSmoother& smoother, const TimeChain& chain,
                           const std::vector<std::size_t>& joints) {

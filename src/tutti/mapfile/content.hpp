@@ -16,7 +16,7 @@
 /// Reads a map's file that no server has open, recomputes its estimate, and stores operators' decisions in it.
 namespace tutti::mapfile {
 
-/// What a map's store holds, except for the submaps' payloads.
+/// What a map's store contains, except for the submaps' payloads.
 struct Content {
   node::MapMeta meta;
   std::optional<node::MapCounts> counts;  ///< Counts of the last update.
@@ -60,7 +60,7 @@ Result<std::unique_ptr<storage::TableStore>> open(const std::filesystem::path& f
 Result<std::unique_ptr<storage::TableStore>> open_copy(const std::filesystem::path& file);
 
 /// Stores an operator's decision, which the server that opens the map next follows. On an error nothing is stored: the
-/// closure's name or submaps are unknown, there is no closure to accept, or a decision that was given later holds.
+/// closure's name or submaps are unknown, there is no closure to accept, or there is a later decision.
 Status put_decision(storage::TableStore& map, const ClosureDecision& decision);
 
 }  // namespace tutti::mapfile

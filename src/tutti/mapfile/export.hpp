@@ -32,7 +32,7 @@ struct JointCloud {
 Result<JointCloud> joint_cloud(const storage::TableStore& store, const Content& content,
                                const server::MapEstimate& map);
 
-/// What a PLY file in the map's world says of its frame, and of that of the map's grids.
+/// What a PLY file in the map's world states of its frame, and of that of the map's grids.
 std::vector<std::string> world_comments(const Pose3& T_level_world);
 
 struct ExportedCloud {

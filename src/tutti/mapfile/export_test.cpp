@@ -77,7 +77,7 @@ TEST_F(Export, GraphTrajectoriesAndCloudAreThoseOfTheServersMap) {
   for (const Eigen::Vector3f& point : points->points)
     nearest = std::min(nearest, (point.cast<double>() - expected).norm());
   EXPECT_LT(nearest, 0.15);  // a voxel, and the wire's rounding
-  // It says how it lies to grids of the map.
+  // It states how it lies to grids of the map.
   const std::string text = read_file((folder_ / "map.ply").string()).value();
   const Pose3 T_level_world = level_frame(map, node->component);
   EXPECT_NE(text.find("\ncomment frame: the map's world\ncomment " + in_words(T_level_world)), std::string::npos);

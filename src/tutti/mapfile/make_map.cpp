@@ -18,7 +18,7 @@ namespace tutti::mapfile {
 namespace fs = std::filesystem;
 namespace {
 
-/// Not in the place of a file that somebody else has made meanwhile, where the file system can tell.
+/// Not in the place of a file that somebody else has made meanwhile, where the file system can detect it.
 bool take_name(const fs::path& part, const fs::path& out) {
   if (::renameat2(AT_FDCWD, part.c_str(), AT_FDCWD, out.c_str(), RENAME_NOREPLACE) == 0) return true;
   return errno == EINVAL && ::rename(part.c_str(), out.c_str()) == 0;

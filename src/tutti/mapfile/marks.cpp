@@ -41,14 +41,14 @@ Status check(const MapMark& mark, const std::string& photo, std::size_t known) {
 }
 
 /// The pose that a mark hangs on, and where it is from there.
-struct Held {
+struct Attached {
   std::uint64_t number;
   std::size_t node;
   Eigen::Vector3d lever;  ///< In that node's frame.
 };
 
-std::vector<Held> held(const MarkSet& marks, const Content& content, const server::MapEstimate& map) {
-  std::vector<Held> out;
+std::vector<Attached> attached(const MarkSet& marks, const Content& content, const server::MapEstimate& map) {
+  std::vector<Attached> out;
   for (const auto& [number, mark] : marks) {
     const auto submap = content.submaps.find(mark.submap);
     if (submap == content.submaps.end()) continue;
@@ -135,11 +135,11 @@ Status remove_mark(storage::TableStore& map, std::uint64_t number) {
 }
 
 std::vector<PlacedMark> place_marks(const MarkSet& marks, const Content& content, const server::MapEstimate& map) {
-  const std::vector<Held> all = held(marks, content, map);
+  const std::vector<Attached> all = attached(marks, content, map);
   if (all.empty()) return {};
   const auto reference = references(map);
   std::vector<estimation::JointPosterior::Pair> pairs;
-  for (const Held& one : all) pairs.emplace_back(reference.at(map.nodes[one.node].component), one.node);
+  for (const Attached& one : all) pairs.emplace_back(reference.at(map.nodes[one.node].component), one.node);
   const PoseGraph graph = server::graph_on_earth(map);
   const auto covariances = server::posterior_of(map, graph, pairs)->relative_covariances();
   std::vector<PlacedMark> out;

@@ -42,7 +42,7 @@ struct PlacedMark {
 /// By number; marks whose submaps are not in the map are left out.
 std::vector<PlacedMark> place_marks(const MarkSet& marks, const Content& content, const server::MapEstimate& map);
 
-/// A table of all marks (docs/operating.md says what its columns are), and their photos beside it as NAME_NUMBER.jpg or
+/// A table of all marks (docs/operating.md describes its columns), and their photos beside it as NAME_NUMBER.jpg or
 /// .png.
 struct ExportedMarks {
   std::size_t marks = 0;

@@ -25,7 +25,7 @@ using storage::TableStore, storage::Write;
 /// What becomes of a row of `b` when there is another one in `a`: the bytes that are taken.
 using Choose = std::function<Result<std::string>(std::string_view key, std::string a, std::string b)>;
 
-/// Rows that say something of one map alone: what became of it, and refinements and places, which join_refinements()
+/// Rows that are about one map alone: what became of it, and refinements and places, which join_refinements()
 /// and join_places() put.
 bool is_of_one_map(const std::string& table, std::string_view key) {
   return table == map_tables::kMeta &&

@@ -13,13 +13,13 @@ struct Merged {
   std::size_t shared = 0;  ///< Submaps that are in both maps.
 };
 
-/// Puts what two maps hold into an empty third: submaps, verdicts, answers and words with their bytes unchanged,
+/// Puts what two maps contain into an empty third: submaps, verdicts, answers and decisions with their bytes unchanged,
 /// refinements as ones of parts of the joint map. The server that opens the third map looks for closures between the
 /// two, and robots follow it, because its epoch is larger than both. Robots keep their numbers, so it is an error that
 /// names them when one number is two robots' (by name, where both maps know it), when one name has two numbers, or when
 /// a submap is in both maps with different content. Where both have a verdict on a pair: by two versions of one
 /// verifier, the newer version's is taken, by the same version a refusal, otherwise the first map's. The later of two
-/// words is taken, and the first map's settings.
+/// decisions is taken, and the first map's settings.
 Result<Merged> merge(const storage::TableStore& a, const storage::TableStore& b, storage::TableStore& out);
 
 /// As above, with files. `out` must not exist; it appears whole or not at all.

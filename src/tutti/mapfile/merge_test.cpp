@@ -124,7 +124,7 @@ TEST(Merge, ASubmapWithTwoContentsIsRefusedByName) {
   EXPECT_NE(merged.error().message.find("submap 0:5/0 "), std::string::npos) << merged.error().message;
 }
 
-TEST(Merge, TheLaterWordHoldsWhicheverMapItIsIn) {
+TEST(Merge, TheLaterDecisionCountsWhicheverMapItIsIn) {
   const auto a = map_of({{kAlpha, 5}}), b = map_of({{kAlpha, 5}});
   const Content content = read(*a).value();
   const std::string name = closures(content, estimate(content)).front().name;

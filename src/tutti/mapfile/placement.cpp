@@ -55,7 +55,7 @@ Pose3 level_frame(const server::MapEstimate& map, std::uint32_t component) {
 }
 
 Pose3 upright_frame(const server::MapEstimate& map, std::uint32_t component) {
-  constexpr double kKnown = 0.8;  // bodies that tilt in all directions do not say what is up
+  constexpr double kKnown = 0.8;  // bodies that tilt in all directions do not determine what is up
   const Eigen::Vector3d up = mean_up(map, component);
   if (up.norm() < kKnown) return {};
   Eigen::Index axis = 2;

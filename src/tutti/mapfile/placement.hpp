@@ -28,7 +28,7 @@ Pose3 level_frame(const server::MapEstimate& map, std::uint32_t component);
 /// T_upright_world: the rotation by quarter turns that comes nearest to level_frame(), which small changes of the map
 /// do not change; the identity, unless its robots' frames are a camera's or it stands on its side.
 Pose3 upright_frame(const server::MapEstimate& map, std::uint32_t component);
-/// How files in either frame say it, in one line.
+/// How files in either frame state it, in one line.
 std::string in_words(const Pose3& T_level_world);
 
 }  // namespace tutti::mapfile

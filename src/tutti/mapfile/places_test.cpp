@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A map's file where the server chose pairs by what places look like.
+// A map's file where the server chose pairs by places' appearance.
 #include <gtest/gtest.h>
 
 #include "support/mapfile/small_map.hpp"

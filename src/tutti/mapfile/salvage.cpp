@@ -66,7 +66,7 @@ std::string table_of(std::string_view from, std::string_view key) {
   return std::string(from == kArchive && !node::submap_of_key(key) ? kMeta : from);
 }
 
-/// So that the robot begins a session that nobody has begun before, and says why.
+/// So that the robot begins a session that nobody has begun before, and reports why.
 Status note_lost(storage::TableStore& robot, const std::string& why, std::uint64_t now_ns) {
   using namespace node::robot_tables;  // NOLINT
   const auto row = robot.read(kMeta, kSession);

@@ -24,10 +24,10 @@ struct Salvaged {
 /// A server that opens the new map gets the missing submaps from the robots again, as far as they still have them. From
 /// a robot's store its submaps are taken first, and what it knows of itself; its state is not, so that the robot which
 /// opens the new store begins a session, later than `now_ns` (since the Unix epoch) and than all that the store knows,
-/// and says why.
+/// and reports why.
 Result<Salvaged> salvage(const std::filesystem::path& in, const std::filesystem::path& out, std::uint64_t now_ns);
 
-/// The same of what must be a robot's store. `why` is what the robot will say.
+/// The same of what must be a robot's store. `why` is what the robot will report.
 Result<Salvaged> salvage_robot(const std::filesystem::path& in, const std::filesystem::path& out,
                                const std::string& why, std::uint64_t now_ns);
 

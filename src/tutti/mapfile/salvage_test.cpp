@@ -108,7 +108,7 @@ TEST_F(SalvagedMap, OfNoBytesIsRefused) {
 }
 
 /// SQLite's own words are of two lines: "*** in database main ***" and what it is.
-TEST_F(SalvagedMap, WithADamagedPageIsToldInOneLine) {
+TEST_F(SalvagedMap, WithADamagedPageIsReportedInOneLine) {
   std::string damaged = read_file(map_.string()).value();
   const std::size_t pages = damaged.size() / 4096;
   for (std::size_t page = 2; page < pages; page += 2) damaged.replace(4096 * page, 4096, 4096, '\x55');

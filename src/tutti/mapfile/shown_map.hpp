@@ -10,11 +10,11 @@
 
 namespace tutti::mapfile {
 
-/// A map as a server has it at one moment; its clouds are in the server's store.
+/// A map as a server has it at one time; its clouds are in the server's store.
 struct ShownMap {
   std::uint64_t revision = 0;
   Timestamp time;   ///< Mission time.
-  Content content;  ///< Submaps with the sizes of their payloads only, names, verdicts with closures, words.
+  Content content;  ///< Submaps with the sizes of their payloads only, names, verdicts with closures, decisions.
   server::MapEstimate map;
   ProxyGraph broadcast;  ///< The last proxy graph; empty: there was none yet.
 };

@@ -30,7 +30,7 @@ struct WhyNotJoined {
   std::vector<NearMiss> nearest;                  ///< The nearest first, at most `most`.
 };
 
-/// Looks through the answers that a map's store keeps, between all sessions of two robots. Errors: a robot that the map
+/// Reads the answers that a map's store keeps, between all sessions of two robots. Errors: a robot that the map
 /// does not have, twice the same, or a row that cannot be read.
 Result<WhyNotJoined> why_not_joined(const storage::TableStore& store, const Content& content,
                                     const server::MapEstimate& map, const std::string& robot, const std::string& other,

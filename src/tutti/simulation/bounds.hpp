@@ -6,7 +6,7 @@
 namespace tutti::simulation {
 
 inline constexpr double kLongest_s = 7.0 * 86400.0;
-inline constexpr double kFarthest_m = 1e6;       ///< Limit on ways, moves and errors.
+inline constexpr double kFarthest_m = 1e6;       ///< Limit on distances, moves and errors.
 inline constexpr double kLargestRoom_m = 100.0;  ///< Limit on widths and heights of corridors.
 
 }  // namespace tutti::simulation

@@ -59,7 +59,7 @@ struct Bvh::Builder {
     return out;
   }
 
-  /// Reorders the items of a range and says where its second half begins: half of the packets' triangles, by where
+  /// Reorders the items of a range and returns where its second half begins: half of the packets' triangles, by where
   /// their centres lie along the axis on which these spread most.
   std::uint32_t halve(const Range& range) {
     Bounds centres;
@@ -101,7 +101,7 @@ struct Bvh::Builder {
 
   /// ~index of the packet of up to kWidth triangles.
   std::int32_t pack(const Range& range) {
-    Packet packet{};  // Lanes left over hold triangles without area, which nothing hits.
+    Packet packet{};  // Lanes left over have triangles without area, which nothing hits.
     std::fill_n(packet.triangle, kWidth, kNone);
     for (std::uint32_t i = 0; i < range.size(); ++i) {
       const std::uint32_t triangle = items[range.begin + i].triangle;

@@ -40,7 +40,7 @@ Truth crossing(const TriangleMesh& mesh, std::size_t triangle, const Eigen::Vect
   Eigen::Matrix3d columns;
   columns << corner(1) - corner(0), corner(2) - corner(0), -d.cast<double>();
   const double sine = std::abs(columns.col(0).normalized().cross(columns.col(1).normalized()).dot(d.cast<double>()));
-  if (!(sine > 1e-2 * d.norm())) return {};  // Too nearly parallel or thin to say.
+  if (!(sine > 1e-2 * d.norm())) return {};  // Too nearly parallel or thin to decide.
   const Eigen::Vector3d x = columns.inverse() * (o.cast<double>() - corner(0));
   return {x.z(), std::min({x.x(), x.y(), 1.0 - x.x() - x.y()})};
 }

@@ -95,15 +95,15 @@ ImageStream simulate_images(std::shared_ptr<const HallScene> scene, const std::v
   if (depth) {
     out.depth = *depth;
     out.load_depth = [first = simulated.front(), truth, T_body_camera = cameras.front().T_body_camera, sensor = *depth,
-                      rng](std::size_t moment) -> Result<DepthImage> {
-      return first.depth(truth.at(moment).pose * T_body_camera, sensor, rng.fork("depth").fork(moment));
+                      rng](std::size_t instant) -> Result<DepthImage> {
+      return first.depth(truth.at(instant).pose * T_body_camera, sensor, rng.fork("depth").fork(instant));
     };
   }
   out.load = [simulated = std::move(simulated), truth = std::move(truth), cameras, rng](
-                 std::size_t moment, std::size_t camera) -> Result<Image> {
-    const Pose3 T_world_camera = truth.at(moment).pose * cameras.at(camera).T_body_camera;
-    return simulated[camera].image(T_world_camera, truth[moment].stamp - truth.front().stamp,
-                                   rng.fork(camera).fork(moment));
+                 std::size_t instant, std::size_t camera) -> Result<Image> {
+    const Pose3 T_world_camera = truth.at(instant).pose * cameras.at(camera).T_body_camera;
+    return simulated[camera].image(T_world_camera, truth[instant].stamp - truth.front().stamp,
+                                   rng.fork(camera).fork(instant));
   };
   return out;
 }

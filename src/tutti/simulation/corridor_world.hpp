@@ -30,9 +30,9 @@ struct CorridorWorldConfig {
   }
 };
 
-/// What a corridor looks like. rough: there is something to see everywhere; featureless: straight, smooth and empty, so
-/// a sensor cannot tell the position along it; office: flat walls, doors and corners; open: under the sky, with almost
-/// nothing to see.
+/// The appearance of a corridor. rough: there is something to see everywhere; featureless: straight, smooth and empty,
+/// so a sensor cannot determine the position along it; office: flat walls, doors and corners; open: under the sky, with
+/// almost nothing to see.
 enum class CorridorKind { rough, featureless, office, open };
 
 /// A straight corridor between two junctions.

@@ -21,8 +21,8 @@ struct DegradeConfig {
   }
 };
 
-/// Scales every step, and turns it about the z axis of the odometry frame by the yaw drift of the way so far. Roll and
-/// pitch keep their values, and so does the first pose.
+/// Scales every step, and turns it about the z axis of the odometry frame by the yaw drift of the distance so far. Roll
+/// and pitch keep their values, and so does the first pose.
 Trajectory degrade_odometry(const Trajectory& odometry, const DegradeConfig& config);
 
 /// Draws a frame: any yaw, a tilt of up to `max_tilt_deg` about a horizontal axis, and a shift of up to `max_shift_m`

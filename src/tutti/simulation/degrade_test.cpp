@@ -39,7 +39,7 @@ RC_GTEST_PROP(DegradeOdometry, NothingAskedNothingChanged, ()) {
   for (std::size_t k = 0; k < odometry.size(); ++k) RC_ASSERT(local(odometry[k].pose, degraded[k].pose).norm() < 1e-12);
 }
 
-RC_GTEST_PROP(DegradeOdometry, ScalesTheWayAndTurnsByTheDistance, ()) {
+RC_GTEST_PROP(DegradeOdometry, ScalesTheLengthAndTurnsByTheDistance, ()) {
   const Trajectory odometry = any_odometry();
   const DegradeConfig config{.yaw_deg_per_m = *rc::gen::element(-0.5, 0.3, 2.0),
                              .scale_percent = *rc::gen::element(-1.0, 0.0, 0.3)};

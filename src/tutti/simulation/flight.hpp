@@ -32,7 +32,7 @@ struct FlightConfig {
   }
 };
 
-/// The state of a smooth motion at one moment.
+/// The state of a smooth motion at one time.
 struct Motion {
   Pose3 T_world_body;                                          ///< Body frame: x ahead, z up.
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();          ///< m/s, world frame.

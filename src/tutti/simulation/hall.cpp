@@ -18,7 +18,7 @@ float patch(std::uint64_t texture, int x, int y) {
   return static_cast<float>(mixed(place ^ texture) >> 40U) * 0x1p-24F - 0.5F;
 }
 
-/// std::floor of a number that an int can hold; without SSE 4.1 that is a function of the C library.
+/// std::floor of a number that fits an int; without SSE 4.1 that is a function of the C library.
 int floor_of(float x) {
   const int towards_zero = static_cast<int>(x);
   return towards_zero - (x < static_cast<float>(towards_zero) ? 1 : 0);

@@ -11,7 +11,7 @@
 
 namespace tutti::simulation {
 
-/// A hall with boxes along its walls and in its middle, and a free way between them (flight.hpp).
+/// A hall with boxes along its walls and in its middle, and a free passage between them (flight.hpp).
 struct HallConfig {
   double length_m = 20.0;
   double width_m = 14.0;

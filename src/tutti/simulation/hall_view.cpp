@@ -42,7 +42,7 @@ struct Tile {
 };
 
 /// A rectangle in the camera frame: a ray d meets its plane at t = to_plane / (normal . d), there the share
-/// a0 + t (a . d) of the way along one side and b0 + t (b . d) along the other.
+/// a0 + t (a . d) along one side and b0 + t (b . d) along the other.
 struct Rectangle {
   Eigen::Vector3f normal, a, b, centre;
   float to_plane, a0, b0, radius_m;

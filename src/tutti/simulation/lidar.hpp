@@ -67,7 +67,7 @@ struct LidarChoice {
 };
 
 /// One sweep that begins 1 / rate_hz before `end`, of the configuration's pattern.
-/// `truth` (T_reference_body, in the frame of `surface`) is interpolated at every firing; Scan::age_s tells its time.
+/// `truth` (T_reference_body, in the frame of `surface`) is interpolated at every firing; Scan::age_s has its time.
 /// Nothing when `truth` does not cover the sweep.
 std::optional<Scan> simulate_sweep(const Bvh& surface, const Trajectory& truth, Timestamp end,
                                    const LidarConfig& config, Rng rng);

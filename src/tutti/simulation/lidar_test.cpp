@@ -114,7 +114,7 @@ TEST(Lidar, EveryModelCanBeChosenAndThinned) {
   }
 }
 
-TEST(Lidar, ARosetteLooksEverywhereButNeverTheSameWayTwice) {
+TEST(Lidar, ARosetteLooksEverywhereButNeverInTheSameDirectionTwice) {
   const LidarConfig config = ideal("rosette");
   const ScanPattern& pattern = scan_pattern(config.pattern);
   ASSERT_EQ(pattern.firings(config), 5000U);

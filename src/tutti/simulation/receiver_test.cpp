@@ -33,11 +33,11 @@ TEST(Receiver, SaysWhereTheAntennaIs) {
   EXPECT_EQ(fixes[3].p_body_antenna, Eigen::Vector3d(0.5, 1, 2));
 }
 
-TEST(Receiver, ErrsAsItIsTold) {
-  const Trajectory way = straight(20'000);
+TEST(Receiver, ErrsAsConfigured) {
+  const Trajectory trajectory = straight(20'000);
   const auto errors = [&](const ReceiverConfig& config) {
     std::vector<Eigen::Vector3d> out;
-    for (const PositionFix& fix : simulate_fixes(way, config, kPlace, Rng(1)))
+    for (const PositionFix& fix : simulate_fixes(trajectory, config, kPlace, Rng(1)))
       out.push_back(in_truth(fix) - Eigen::Vector3d(fix.stamp - Timestamp{0}, 0, 0));
     return out;
   };

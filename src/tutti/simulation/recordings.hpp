@@ -25,7 +25,7 @@ struct SimulatedRobotConfig {
   std::string name;  ///< Empty: "alpha", "bravo", ... by position in the list.
   int copies = 1;
   double start_s = 0.0;
-  std::optional<int> start_junction;  ///< Where it starts; none: far from the others. A route says so, too.
+  std::optional<int> start_junction;  ///< Where it starts; none: far from the others. A route has one, too.
   WalkConfig walk;
   OdometryNoiseConfig odometry;
   template <class V>

@@ -53,7 +53,7 @@ TEST(SimulateRecordings, CopiesAreRobotsOfTheirOwn) {
   EXPECT_EQ(problem_with(config), "simulation.robots.3: name 'alpha' is taken");
 }
 
-TEST(SimulateRecordings, StartsWhereAndWhenItIsTold) {
+TEST(SimulateRecordings, StartsWhereAndWhenConfigured) {
   SimulationConfig config = short_walks(2);
   config.robots[1].start_s = 12.5;
   config.robots[1].start_junction = 7;

@@ -194,7 +194,7 @@ RC_GTEST_PROP(ReferenceClosures, DependOnThePairOnly, ()) {
 }
 
 TEST(ReferenceClosures, GateHeadingAndTime) {
-  // There and back again on one line: 50 s out, 50 s back, facing the other way.
+  // There and back again on one line: 50 s out, 50 s back, facing the opposite direction.
   Trajectory line;
   for (int k = 0; k <= 100; ++k) {
     const double x = k <= 50 ? k : 100 - k;

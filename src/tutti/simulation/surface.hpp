@@ -17,7 +17,7 @@ inline constexpr double kHeight_m = 2.8;  ///< Rough and featureless corridors'.
 inline constexpr double kOfficeHeight_m = 2.6;
 inline constexpr double kRoofMargin_m = 4.0;  ///< Distance from the outermost open corridors to the roof's edge.
 
-/// What the walls of a world look like. Widths and heights are those of the smooth shape.
+/// The appearance of a world's walls. Widths and heights are those of the smooth shape.
 struct SurfaceConfig {
   double cell_m = 0.25;
   double body_height_m = 0.55;

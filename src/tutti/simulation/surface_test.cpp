@@ -192,9 +192,9 @@ TEST(Surface, NothingIsAboveTheRoof) {
 TEST(Surface, TheDoorToTheRoofIsOpen) {
   const Place& place = terrace();
   const Eigen::Vector3d office = place.world.junctions[4], roof = place.world.junctions[10];
-  const Eigen::Vector3d way = roof + 3.0 * (roof - office).normalized() - office;
-  const auto hit = place.bvh.cast(office.cast<float>(), way.normalized().cast<float>(), 60.0F);
-  EXPECT_TRUE(!hit || hit->distance > way.norm());
+  const Eigen::Vector3d ray = roof + 3.0 * (roof - office).normalized() - office;
+  const auto hit = place.bvh.cast(office.cast<float>(), ray.normalized().cast<float>(), 60.0F);
+  EXPECT_TRUE(!hit || hit->distance > ray.norm());
 }
 
 TEST(Surface, SameSeedSameSurface) {

@@ -158,18 +158,18 @@ std::vector<double> draw_speeds(const WalkConfig& config, std::size_t samples, i
   return speeds;
 }
 
-/// Can be computed: in memory, and step by step along the way.
+/// Can be computed: in memory, and step by step along the trajectory.
 Status check_size(const WalkConfig& config) {
   constexpr double kMostPoses = 5e6;
   const double poses = config.duration_s * config.rate_hz;
   if (poses > kMostPoses)
     return fail(ErrorCode::configuration, "walk: duration_s {} at rate_hz {} makes {:.3g} poses, expected at most {:g}",
                 config.duration_s, config.rate_hz, poses, kMostPoses);
-  const double way_m = config.length_m > 0.0 ? config.length_m : config.duration_s * config.max_speed_mps;
-  if (way_m > kFarthest_m)
+  const double distance_m = config.length_m > 0.0 ? config.length_m : config.duration_s * config.max_speed_mps;
+  if (distance_m > kFarthest_m)
     return fail(ErrorCode::configuration,
                 "walk: duration_s {} at max_speed_mps {} makes {:.3g} m, expected at most {:g}", config.duration_s,
-                config.max_speed_mps, way_m, kFarthest_m);
+                config.max_speed_mps, distance_m, kFarthest_m);
   return {};
 }
 
@@ -183,7 +183,7 @@ double width_of(const CorridorWorld& world, const std::vector<int>& route) {
   return box.sizes().maxCoeff();
 }
 
-/// The point that the robot steers to must be somewhere on its way.
+/// The point that the robot steers to must be somewhere on its trajectory.
 Status check_lookahead(const CorridorWorld& world, const WalkConfig& config) {
   const double most_m = 0.5 * width_of(world, config.route);
   if (config.lookahead_m < most_m) return {};

@@ -22,14 +22,14 @@ void join(CorridorWorld& world, std::size_t a, std::size_t b, CorridorKind kind)
   world.corridors.push_back({a, b, (world.junctions[b] - world.junctions[a]).norm(), kind});
 }
 
-std::size_t pieces(double length) {
+std::size_t segments(double length) {
   return static_cast<std::size_t>(std::max(1L, std::lround(length / kJunctionSpacing)));
 }
 
 /// Junctions from `from` to just before `to`, evenly spaced but for the jitter.
 void add_side(CorridorWorld& world, const Eigen::Vector3d& from, const Eigen::Vector3d& to, double jitter, Rng& rng) {
   const double length = (to - from).norm();
-  const std::size_t count = pieces(length);
+  const std::size_t count = segments(length);
   for (std::size_t i = 0; i < count; ++i) {
     const double moved = i == 0 ? 0.0 : rng.uniform(-jitter, jitter);
     world.junctions.push_back(from +
@@ -67,7 +67,7 @@ CorridorWorld make_tunnel(const WorldConfig& config, Rng rng) {
 CorridorWorld make_terrace(const WorldConfig& config, Rng rng) {
   CorridorWorld world;
   const double length = config.office_length_m, width = config.office_width_m;
-  const std::size_t along = pieces(length), across = pieces(width);
+  const std::size_t along = segments(length), across = segments(width);
   const Eigen::Vector3d corners[] = {{0, 0, 0}, {length, 0, 0}, {length, width, 0}, {0, width, 0}};
   for (std::size_t side = 0; side < 4; ++side)
     add_side(world, corners[side], corners[(side + 1) % 4], kJunctionJitter, rng);

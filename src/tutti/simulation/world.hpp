@@ -28,7 +28,7 @@ struct WorldKind {
 };
 const std::vector<WorldKind>& world_kinds();
 
-/// Which world robots walk in; each field says for which `kind` it is.
+/// Which world robots walk in; each field's text names the `kind` that it is for.
 struct WorldConfig {
   std::string kind = "tunnel";
   CorridorWorldConfig network;      ///< tunnel

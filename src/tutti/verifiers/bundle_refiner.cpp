@@ -43,28 +43,28 @@ RefinementCounts counts_of(const bundle::RefinedMap& refined) {
           .rms_after_px = refined.rms_after_px};
 }
 
-/// Says for every robot how many of its IMU factors were held back, and why, by the worst of them.
+/// Reports for every robot how many of its IMU factors were left out, and why, by the worst of them.
 void remark_on_imu(const std::vector<bundle::ImuRun>& runs, std::vector<RefinementRemark>& out) {
-  struct Held {
+  struct LeftOut {
     std::size_t factors = 0, all = 0;
     bundle::ImuRun worst;
   };
-  std::map<RobotId, Held> by_robot;
+  std::map<RobotId, LeftOut> by_robot;
   for (const bundle::ImuRun& run : runs) {
-    Held& held = by_robot[run.chain.robot];
-    held.all += run.factors;
+    LeftOut& left_out = by_robot[run.chain.robot];
+    left_out.all += run.factors;
     if (!run.is_held_back) continue;
-    held.factors += run.factors;
-    if (run.factors > held.worst.factors) held.worst = run;
+    left_out.factors += run.factors;
+    if (run.factors > left_out.worst.factors) left_out.worst = run;
   }
-  for (const auto& [robot, held] : by_robot) {
-    if (held.factors == 0) continue;
+  for (const auto& [robot, left_out] : by_robot) {
+    if (left_out.factors == 0) continue;
     out.push_back(
-        {robot,
-         fmt::format("{} of {} IMU factors are held back: motion tells the accelerometer's bias to "
-                     "{:.2f} m/s^2, and with them the trajectory is {:.3f} times as long as odometry and "
-                     "images have it to {:.3f}",
-                     held.factors, held.all, held.worst.bias_sigma_mps2, held.worst.scale, held.worst.scale_sigma)});
+        {robot, fmt::format("{} of {} IMU factors are held back: motion tells the accelerometer's bias to "
+                            "{:.2f} m/s^2, and with them the trajectory is {:.3f} times as long as odometry and "
+                            "images have it to {:.3f}",
+                            left_out.factors, left_out.all, left_out.worst.bias_sigma_mps2, left_out.worst.scale,
+                            left_out.worst.scale_sigma)});
   }
 }
 

@@ -16,7 +16,7 @@
 namespace tutti::verifiers {
 
 /// Keeps the features of the newest submaps that fit into a budget of bytes; F is their type, and bytes_of(const F&), a
-/// function beside it, tells their size. Every new submap is compared with all others in turn; keeping the last used
+/// function beside it, is their size. Every new submap is compared with all others in turn; keeping the last used
 /// features would hardly ever help, while the newest submaps' features are found every time. May be called from several
 /// threads.
 template <class F>

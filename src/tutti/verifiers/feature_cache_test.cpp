@@ -20,7 +20,7 @@ namespace feature_cache_test {
 
 constexpr SubmapId id_of(std::uint32_t index) { return {RobotId{index % 3}, index / 3}; }
 
-/// Features that say whose they are, of `cells` wall cells.
+/// Features that name whose they are, of `cells` wall cells.
 FeatureCache<lidar::SubmapFeatures>::Features features_of(SubmapId id, std::size_t cells = 100) {
   lidar::SubmapFeatures features{.id = id};
   features.view.walls.resize(cells);

@@ -26,7 +26,7 @@ std::string settings_of(const VerifierConfig& config);
 std::string settings_of(const bundle::RefinementConfig& config);
 
 /// Makes verifiers and refiners of sensor data from such texts. Other verifiers need a reference or a mission, which no
-/// text holds.
+/// text contains.
 class SensorVerifierMaker final : public server::VerifierMaker {
  public:
   /// `feature_cache_mb` is for each verifier made (VerifierConfig).

@@ -93,9 +93,9 @@ TEST(VerifierMaker, EverySettingIsOfAVerifierOrOfNone) {
 
 TEST(VerifierMaker, SaysWhatIsMissing) {
   const SensorVerifierMaker maker(100.0);
-  const auto expect = [](const auto& made, const std::string& word) {
+  const auto expect = [](const auto& made, const std::string& expected) {
     ASSERT_FALSE(made.has_value());
-    EXPECT_NE(made.error().message.find(word), std::string::npos) << made.error().message;
+    EXPECT_NE(made.error().message.find(expected), std::string::npos) << made.error().message;
   };
   const auto lidar = make_verifier(config_of("lidar"));
   expect(maker.verifier(lidar->id(), ""), "mission");

@@ -69,7 +69,7 @@ Result<LidarClosureVerifier::Look> LidarClosureVerifier::look(const Submap& firs
   if (!T_first_second) seen = lidar::verify_pair(**a, **b, config_);
   const bool is_aligned = T_first_second || seen.overlap > 0.0;
   if (is_aligned && !seen.accepted) {
-    std::optional<Refusal> refusal = seen.refusal;  // also a rival, which the second look does not look for
+    std::optional<Refusal> refusal = seen.refusal;  // also a rival, which the second comparison does not search
     seen = lidar::verify_near(**a, **b, T_first_second.value_or(seen.T_a_b), config_);
     if (!T_first_second && refusal) seen.refusal = refusal;
   }
@@ -164,7 +164,7 @@ Result<ClosureVerdict> JointClosureVerifier::verify(const Submap& first, const S
     if (!verdict) return verdict;
     std::ranges::move(verdict->closures, std::back_inserter(out.closures));
     std::ranges::move(verdict->evidence, std::back_inserter(out.evidence));
-    // "Too small" only says that a submap has no payload of this kind: any other reason takes its place.
+    // "Too small" only means that a submap has no payload of this kind: any other reason takes its place.
     if (!out.refusal || out.refusal->reason == RefusalReason::too_small) out.refusal = verdict->refusal;
   }
   if (!out.closures.empty()) out.refusal.reset();
@@ -183,7 +183,8 @@ Result<JointClosureVerifier::Look> JointClosureVerifier::look(const Submap& firs
   return out;
 }
 
-/// What one verifier alone says as that verifier says it; several parts after kJoined, and the length of each, as text.
+/// What one verifier alone finds as that verifier words it; several parts after kJoined, and the length of each, as
+/// text.
 std::string JointClosureVerifier::place_of(const Submap& submap) const {
   const PayloadSize size = payload_size(submap);
   std::vector<std::string> parts;

@@ -78,7 +78,7 @@ class VisualClosureVerifier final : public server::ClosureVerifier {
 
 /// Combines several verifiers, one per kind of payload: each pair is compared by every verifier that can. Robots with
 /// different sensors are joined through robots that carry both kinds. A place is what every verifier that can compare
-/// its submap says of it; each ranks by its own part, as the sensor of its number. A place that one of them cannot
+/// its submap computes of it; each ranks by its own part, as the sensor of its number. A place that one of them cannot
 /// describe is unknown.
 class JointClosureVerifier final : public server::ClosureVerifier {
  public:

@@ -105,7 +105,7 @@ TEST(LidarClosureVerifier, FindsTheSameWhateverItKeeps) {
   }
 }
 
-TEST(SensorVerifiers, SayWhatAPlaceLooksLikeFromAbove) {
+TEST(SensorVerifiers, DescribeThePlacesAppearanceFromAbove) {
   Rooms rooms(2);
   Submap seen = rooms.submaps[0];
   seen.cloud = rooms.store.cloud(seen.id).value();
@@ -130,7 +130,7 @@ TEST(SensorVerifiers, SayWhatAPlaceLooksLikeFromAbove) {
   images->frames.emplace_back();
   images->frames.back().observations.emplace_back();
   seen.visual = images;
-  EXPECT_EQ(joint.place_of(seen), "");  // cameras may find closures, and too few landmarks say where
+  EXPECT_EQ(joint.place_of(seen), "");  // cameras may find closures, and too few landmarks determine where
   EXPECT_EQ(visual->place_of(seen), "");
   EXPECT_EQ(joint.place_of({.id = seen.id}), "");
 }
@@ -160,7 +160,7 @@ TEST(SensorVerifiers, SayWhatCamerasSawWhereTheyAreTheOnlySensor) {
   EXPECT_GT(likeness[0].value, 5 * likeness[1].value);
 }
 
-TEST(SensorVerifiers, SayHowAlikePlacesLookToEachSensorThatShowsBoth) {
+TEST(SensorVerifiers, RankPlacesBySimilarityToEachSensorThatShowsBoth) {
   using visual::test::fly, visual::test::make_submap, visual::test::stereo_cameras, visual::test::textured_room;
   using Likeness = server::ClosureVerifier::Likeness;
   const auto lidar = std::make_shared<LidarClosureVerifier>(lidar::LidarClosureConfig{}, 1, kMuch);
