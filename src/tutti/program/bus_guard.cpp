@@ -27,7 +27,7 @@ Result<BusGuard> BusGuard::open(const std::filesystem::path& folder, const std::
   return guard;
 }
 
-/// While it is being changed, what was there before holds.
+/// While it is being changed, the state before counts.
 std::vector<std::string> BusGuard::look(const std::string& now) {
   std::vector<std::string> lines;
   const auto there = pki::Pki::open(folder_);

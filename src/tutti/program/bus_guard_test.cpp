@@ -65,9 +65,9 @@ TEST_F(BusGuardTest, WhoseCertificateHasExpiredHasNoRightsUntilItIsRenewed) {
   const std::string until = pki.members().back().until;
   EXPECT_TRUE(guard.look(until).empty());
   EXPECT_TRUE(has("bravo"));
-  const auto said = guard.look(until + "x");  // a moment later
-  ASSERT_EQ(said.size(), 1U);
-  EXPECT_NE(said.front().find("robot bravo has expired (" + until), std::string::npos) << said.front();
+  const auto lines = guard.look(until + "x");  // just after
+  ASSERT_EQ(lines.size(), 1U);
+  EXPECT_NE(lines.front().find("robot bravo has expired (" + until), std::string::npos) << lines.front();
   EXPECT_FALSE(has("bravo"));
   EXPECT_TRUE(has("alpha"));
   EXPECT_TRUE(guard.look(until + "x").empty()) << "said once";

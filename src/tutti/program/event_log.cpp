@@ -62,8 +62,8 @@ std::optional<std::uint64_t> files_before(const fs::path& file) {
 
 spdlog::level::level_enum of_spdlog(Level level) { return kLevels.at(static_cast<std::size_t>(level)).second; }
 
-/// What an event says, for programs and for people, and how much it matters to these.
-struct Told {
+/// An event as reported to programs and to people, and how much it matters to these.
+struct EventReport {
   Json json;
   std::string sentence;
   Level level = Level::info;
@@ -75,17 +75,17 @@ std::string name_of(const bus::Endpoint& end) {
   return fmt::format("{} {}", name(end.role), end.number);
 }
 
-Told tell(const node::SubmapStored& stored) {
+EventReport report_of(const node::SubmapStored& stored) {
   return {{{"event", "submap_stored"}, {"submap", to_string(stored.id)}},
           fmt::format("submap {} stored", to_string(stored.id)),
           Level::debug};
 }
-Told tell(const node::VerdictsTaken& taken) {
+EventReport report_of(const node::VerdictsTaken& taken) {
   return {{{"event", "verdicts_taken"}, {"job", taken.job}, {"pairs", taken.pairs}},
           fmt::format("job {}: {} pairs verified", taken.job, taken.pairs),
           Level::debug};
 }
-Told tell(const node::DecisionTaken& taken) {
+EventReport report_of(const node::DecisionTaken& taken) {
   return {{{"event", "word_taken"},
            {"first", to_string(taken.pair.first)},
            {"second", to_string(taken.pair.second)},
@@ -93,7 +93,7 @@ Told tell(const node::DecisionTaken& taken) {
           fmt::format("an operator's decision on the closures between submaps {} and {}: {}",
                       to_string(taken.pair.first), to_string(taken.pair.second), to_string(taken.wish))};
 }
-Told tell(const node::VerificationFailed& failed) {
+EventReport report_of(const node::VerificationFailed& failed) {
   const std::string pair = to_string(failed.pair.first) + " and " + to_string(failed.pair.second);
   return {{{"event", "verification_failed"},
            {"first", to_string(failed.pair.first)},
@@ -104,7 +104,7 @@ Told tell(const node::VerificationFailed& failed) {
                       failed.given_up ? "are given up" : "will be asked again", failed.why),
           Level::warning};
 }
-Told tell(const node::RefinementTaken& taken) {
+EventReport report_of(const node::RefinementTaken& taken) {
   std::string remarks;
   for (const RefinementRemark& remark : taken.remarks)
     remarks += fmt::format("; robot {}: {}", remark.robot.value, remark.text);
@@ -117,7 +117,7 @@ Told tell(const node::RefinementTaken& taken) {
           fmt::format("{} of map revision {} was refined: {} steps{}", taken.whole ? "all" : "a part", taken.revision,
                       taken.steps, remarks)};
 }
-Told tell(const node::RefinementFailed& failed) {
+EventReport report_of(const node::RefinementFailed& failed) {
   return {{{"event", "refinement_failed"},
            {"revision", failed.revision},
            {"why", failed.why},
@@ -126,30 +126,30 @@ Told tell(const node::RefinementFailed& failed) {
                       failed.given_up ? "is given up" : "will be tried again", failed.why),
           Level::warning};
 }
-Told tell(const node::MapUpdated& map) {
+EventReport report_of(const node::MapUpdated& map) {
   return {{{"event", "map_updated"}, {"revision", map.revision}, {"submaps", map.submaps}, {"accepted", map.accepted}},
           fmt::format("map revision {}: {} submaps, {} closures", map.revision, map.submaps, map.accepted)};
 }
-Told tell(const node::ChangeOfMind& told) {
-  const consistency::MapChange& change = told.change;
-  const std::string reason = server::to_string(told.reason);
+EventReport report_of(const node::ChangeOfMind& report) {
+  const consistency::MapChange& change = report.change;
+  const std::string reason = server::to_string(report.reason);
   const std::string what = fmt::format(
       "the map's change of mind about robot {} ({:.2f} m, {:.1f} degrees, {:.1f} times what it allowed for)",
-      told.robot.value, change.translation_m, change.rotation_rad * 180.0 / std::numbers::pi, change.significance);
-  const bool waits = told.outcome == node::ChangeOutcome::waits;
+      report.robot.value, change.translation_m, change.rotation_rad * 180.0 / std::numbers::pi, change.significance);
+  const bool waits = report.outcome == node::ChangeOutcome::waits;
   Json json{{"event", "change_of_mind"},
-            {"robot", told.robot.value},
-            {"outcome", to_string(told.outcome)},
+            {"robot", report.robot.value},
+            {"outcome", to_string(report.outcome)},
             {"reason", reason}};
   json.update(json_of_fields(change));
-  return {std::move(json),
-          waits
-              ? fmt::format("{} waits for another update: {}", what, reason)
-              : fmt::format("{} {}", what,
-                            told.outcome == node::ChangeOutcome::stands ? "stands, and is followed" : "is gone again"),
-          waits ? Level::warning : Level::info};
+  return {
+      std::move(json),
+      waits ? fmt::format("{} waits for another update: {}", what, reason)
+            : fmt::format("{} {}", what,
+                          report.outcome == node::ChangeOutcome::stands ? "stands, and is followed" : "is gone again"),
+      waits ? Level::warning : Level::info};
 }
-Told tell(const node::RobotUpdated& robot) {
+EventReport report_of(const node::RobotUpdated& robot) {
   const robot::UpdateSummary& update = robot.summary;
   Json origins = Json::array();
   for (const consistency::SuspectedOrigin& origin : update.explanation.origins)
@@ -165,7 +165,7 @@ Told tell(const node::RobotUpdated& robot) {
           fmt::format("heard map revision {}: {} nodes compared, {} constraints held", update.revision,
                       update.synchronised, update.constraints)};
 }
-Told tell(const node::MessageRefused& refused) {
+EventReport report_of(const node::MessageRefused& refused) {
   return {{{"event", "message_refused"},
            {"from", name_of(refused.from)},
            {"kind", wire::name(refused.kind)},
@@ -173,42 +173,42 @@ Told tell(const node::MessageRefused& refused) {
           fmt::format("a {} from {} was refused: {}", wire::name(refused.kind), name_of(refused.from), refused.why),
           Level::warning};
 }
-Told tell(const node::RobotJoined& joined) {
+EventReport report_of(const node::RobotJoined& joined) {
   return {
       {{"event", "robot_joined"}, {"robot", joined.robot.value}, {"name", joined.name}, {"session", joined.session}},
       fmt::format("robot {} ({}) is here, session {}", joined.robot.value, joined.name, joined.session)};
 }
-Told tell(const node::RobotRefused& refused) {
+EventReport report_of(const node::RobotRefused& refused) {
   return {
       {{"event", "robot_refused"}, {"robot", refused.robot.value}, {"session", refused.session}, {"why", refused.why}},
       fmt::format("robot {}, session {}, is refused: {}", refused.robot.value, refused.session, refused.why),
       Level::warning};
 }
-Told tell(const node::StateLost& lost) {
+EventReport report_of(const node::StateLost& lost) {
   return {{{"event", "state_lost"}, {"robot", lost.robot.value}, {"session", lost.session}, {"why", lost.why}},
           fmt::format("what was stored of this robot cannot be read; it is set aside, and session {} is begun; submaps "
                       "that wait are kept: {}",
                       lost.session, lost.why),
           Level::warning};
 }
-Told tell(const node::SessionBegun& begun) {
+EventReport report_of(const node::SessionBegun& begun) {
   return {{{"event", "session_begun"}, {"robot", begun.robot.value}, {"session", begun.session}, {"why", begun.why}},
           fmt::format("robot {} begins session {}, submaps that wait are kept: {}", begun.robot.value, begun.session,
                       begun.why),
           Level::warning};
 }
-Told tell(const node::SubmapsForgotten& forgotten) {
+EventReport report_of(const node::SubmapsForgotten& forgotten) {
   return {{{"event", "submaps_forgotten"}, {"robot", forgotten.robot.value}, {"submaps", forgotten.submaps}},
           fmt::format("the server's map is another than before and lacks {} submaps that it had: they are sent again",
                       forgotten.submaps),
           Level::warning};
 }
-Told tell(const node::SampleRefused& refused) {
+EventReport report_of(const node::SampleRefused& refused) {
   return {{{"event", "sample_refused"}, {"robot", refused.robot.value}, {"why", refused.why}},
           "an odometry sample was refused: " + refused.why,
           Level::warning};
 }
-Told tell(const node::OdometryJumped& jumped) {
+EventReport report_of(const node::OdometryJumped& jumped) {
   const robot::OdometryJump& jump = jumped.jump;
   return {{{"event", "odometry_jumped"},
            {"robot", jumped.robot.value},
@@ -220,12 +220,12 @@ Told tell(const node::OdometryJumped& jumped) {
                       jumped.robot.value, to_string(jump)),
           Level::warning};
 }
-Told tell(const node::ScanRefused& refused) {
+EventReport report_of(const node::ScanRefused& refused) {
   return {{{"event", "scan_refused"}, {"robot", refused.robot.value}, {"why", refused.why}},
           "a scan was refused: " + refused.why,
           Level::warning};
 }
-Told tell(const node::SensorMissing& missing) {
+EventReport report_of(const node::SensorMissing& missing) {
   return {{{"event", "sensor_missing"},
            {"robot", missing.robot.value},
            {"sensor", missing.sensor},
@@ -237,27 +237,27 @@ Told tell(const node::SensorMissing& missing) {
                             missing.sensor == "scan" ? "scans" : missing.sensor),
           missing.keyframes > 0 ? Level::warning : Level::info};
 }
-Told tell(const node::FixRefused& refused) {
+EventReport report_of(const node::FixRefused& refused) {
   return {{{"event", "fix_refused"}, {"robot", refused.robot.value}, {"why", refused.why}},
           "a fix was refused: " + refused.why,
           Level::warning};
 }
-Told tell(const node::ImagesRefused& refused) {
+EventReport report_of(const node::ImagesRefused& refused) {
   return {{{"event", "images_refused"}, {"robot", refused.robot.value}, {"why", refused.why}},
           "images were refused: " + refused.why,
           Level::warning};
 }
 
-Told tell_event(const node::Event& event) {
-  Told told = std::visit([](const auto& what) { return tell(what); }, event.what);
+EventReport report_of_event(const node::Event& event) {
+  EventReport report = std::visit([](const auto& what) { return report_of(what); }, event.what);
   Json json{{"time_s", static_cast<double>(event.time.ns) * 1e-9}};
-  json.update(told.json);
-  told.json = std::move(json);
-  return told;
+  json.update(report.json);
+  report.json = std::move(json);
+  return report;
 }
 
 /// The kind of an event that others can cause as often as they like; empty: another event. Who it was is not in it:
-/// they can say that, too.
+/// they can forge that, too.
 std::string throttled_kind(const node::Event& event) {
   if (const auto* refused = std::get_if<node::MessageRefused>(&event.what))
     return fmt::format("message {} {}", name(refused->from.role), wire::name(refused->kind));
@@ -276,13 +276,13 @@ double steady_s() { return std::chrono::duration<double>(std::chrono::steady_clo
 
 }  // namespace
 
-Result<Level> level_of(const std::string& word) {
+Result<Level> level_of(const std::string& name) {
   for (std::size_t i = 0; i < kLevels.size(); ++i)
-    if (word == kLevels.at(i).first) return static_cast<Level>(i);
-  return fail(ErrorCode::configuration, "log level '{}', expected debug, info, warning or error", word);
+    if (name == kLevels.at(i).first) return static_cast<Level>(i);
+  return fail(ErrorCode::configuration, "log level '{}', expected debug, info, warning or error", name);
 }
 
-Json to_json(const node::Event& event) { return tell_event(event).json; }
+Json to_json(const node::Event& event) { return report_of_event(event).json; }
 
 std::unique_ptr<EventLog> EventLog::on_console(const std::string& name, Level console) {
   std::unique_ptr<EventLog> log(new EventLog());
@@ -326,17 +326,17 @@ void EventLog::append(const std::string& line) {
 }
 
 void EventLog::write(const node::Event& event) {
-  Told told = tell_event(event);
+  EventReport report = report_of_event(event);
   if (const std::string kind = throttled_kind(event); !kind.empty()) {
     const std::scoped_lock guard(mutex_);
     const Throttle::Verdict verdict = throttle_.ask(kind, steady_s());
     if (!verdict.passes) return;
-    if (verdict.left_out > 0) told.json["left_out"] = verdict.left_out;
-    if (verdict.left_out > 0) told.sentence += fmt::format(" (and {} more of the kind before)", verdict.left_out);
+    if (verdict.left_out > 0) report.json["left_out"] = verdict.left_out;
+    if (verdict.left_out > 0) report.sentence += fmt::format(" (and {} more of the kind before)", verdict.left_out);
   }
-  write(told.json);
+  write(report.json);
   const std::scoped_lock guard(mutex_);
-  people(told.level, told.sentence);
+  people(report.level, report.sentence);
 }
 
 void EventLog::write(const Json& line) {

@@ -24,15 +24,15 @@ namespace tutti::program {
 using Json = nlohmann::ordered_json;
 
 enum class Level { debug, info, warning, error };
-/// The level called "debug", "info", "warning" or "error"; fails with any other word.
+/// The level called "debug", "info", "warning" or "error"; fails with any other name.
 Result<Level> level_of(const std::string& word);
 
 /// The event as JSON: "time_s", then "event" (what happened, in one word), then its fields.
 Json to_json(const node::Event& event);
 
-/// Writes what a program tells: events for other programs in FOLDER/events.jsonl, one JSON object per line; sentences
+/// Writes what a program reports: events for other programs in FOLDER/events.jsonl, one JSON object per line; sentences
 /// for people in FOLDER/log.txt and, from `console` on, on stderr. Both files are begun anew when they are full, and
-/// one older file of each is kept; a later file of events says in its first line how many were before it. May be called
+/// one older file of each is kept; a later file of events has in its first line how many were before it. May be called
 /// from any thread.
 ///
 /// What cannot be written, for example because the disk is full, is lost, and the program goes on. Events that others

@@ -35,18 +35,19 @@ Result<DepthImage> decoded_depth(const intake::EncodedImage& image, const Camera
 }  // namespace
 
 TrackedImages FedCamera::see(const intake::FedImages& images, bool keyframe) {
-  constexpr std::int64_t kNsPerMoment = 1'000'000;  // numbers that grow across restarts, at up to 1,000 images a second
-  const auto moment = static_cast<std::uint64_t>(std::max<std::int64_t>(images.stamp.ns, 0) / kNsPerMoment);
+  constexpr std::int64_t kNsPerInstant =
+      1'000'000;  // numbers that grow across restarts, at up to 1,000 images a second
+  const auto instant = static_cast<std::uint64_t>(std::max<std::int64_t>(images.stamp.ns, 0) / kNsPerInstant);
   if (images.sensors != sensors_) {
     sensors_ = images.sensors;
     auto made = visual::ImageTracker::make(sensors_->cameras, sensors_->depth, config_);
     tracker_ = made ? std::move(*made) : nullptr;
-    if (tracker_) tracker_->restart(moment);
+    if (tracker_) tracker_->restart(instant);
     if (!made) errors_.push_back(made.error());
   }
   TrackedImages out{.stamp = images.stamp, .cameras = nullptr, .images = {}};
   if (!tracker_) return out;
-  visual::SeenImages seen{.stamp = images.stamp, .moment = moment, .images = {}};
+  visual::SeenImages seen{.stamp = images.stamp, .moment = instant, .images = {}};
   seen.images.resize(sensors_->cameras.size(), Image());
   for (const intake::EncodedImage& image : images.images)
     seen.images.at(image.camera) = decoded(image, sensors_->cameras[image.camera].model, images.stamp);

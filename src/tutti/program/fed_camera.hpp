@@ -16,7 +16,7 @@ class FedCamera {
   explicit FedCamera(const visual::TrackerConfig& config) : config_(config) {}
 
   /// Tracks points in the next images, of which raw ones must have their camera's size (intake::check_images()); at a
-  /// keyframe descriptors are computed. Empty when there is nothing to track; take_errors() says why.
+  /// keyframe descriptors are computed. Empty when there is nothing to track; take_errors() has the reason.
   TrackedImages see(const intake::FedImages& images, bool keyframe);
   /// The errors since the last call.
   std::vector<Error> take_errors() { return std::exchange(errors_, {}); }

@@ -14,12 +14,12 @@
 namespace tutti::program {
 
 /// The robot's end of a live feed: takes the inputs that wait at the front, in order; lets the host carry out the steps
-/// that the robot makes of them; and tells the front what the robot knows. It is destroyed with its node, while the
-/// front stays: inputs that the front still holds go to the next node.
+/// that the robot makes of them; and reports to the front what the robot knows. It is destroyed with its node, while
+/// the front stays: inputs that the front still has go to the next node.
 class FedRobot {
  public:
   static constexpr double kLongest_s = 0.05;  ///< Longest work at a time, unless one input takes longer.
-  static constexpr double kPublish_s = 0.05;  ///< The front is told at least this often while the robot is behind.
+  static constexpr double kPublish_s = 0.05;  ///< The front gets news at least this often while the robot is behind.
 
   /// All arguments must outlive it.
   FedRobot(FeedFront& front, LiveRobot& robot, Host& host, const Clock& clock, RobotView view,

@@ -112,10 +112,10 @@ TEST_F(FedRobotTest, AFullDiskCostsTheMapAndNeverThePose) {
   wall_s_ += Host::kReopen_s;
   turns(10);  // and it tries again, in vain
   feed(300, 350);
-  const FeedState said = front_->state();
-  EXPECT_EQ(said.newest->stamp, kOdometry[349].stamp);
-  EXPECT_EQ(said.stored, kOdometry[99].stamp);
-  EXPECT_GT(said.covariance(0, 0), 0.0);
+  const FeedState state = front_->state();
+  EXPECT_EQ(state.newest->stamp, kOdometry[349].stamp);
+  EXPECT_EQ(state.stored, kOdometry[99].stamp);
+  EXPECT_GT(state.covariance(0, 0), 0.0);
   disk_.full = false;
   wall_s_ += Host::kReopen_s;
   turns(100);

@@ -63,7 +63,7 @@ Status Host::open_parts() {
 }
 
 void Host::close() {
-  node_.reset();  // which may hold the port
+  node_.reset();  // which may use the port
   port_.reset();
   said_ = {};
   said_bytes_ = 0;
@@ -81,7 +81,7 @@ void Host::reopen() {
   if (pause_s_ == 0.0) trouble_.clear();
 }
 
-/// Told, and counted.
+/// Reported, and counted.
 void Host::note_thrown(const std::string& by, const std::string& what) {
   ++thrown_;
   last_thrown_ = fmt::format("{}: {}", by, what);
@@ -120,7 +120,7 @@ bool Host::hand_in(const bus::Received& message) {
                          "program will try it again",
                          hash, PutAside::kMostThrows));
   }
-  if (carry_out()) close();  // what was said before it holds
+  if (carry_out()) close();  // what was sent before it counts
   return false;
 }
 
@@ -171,7 +171,7 @@ double Host::turn() {
   const double wall_s = clock_.wall_s();
   if (wall_s >= second_s_) {
     second_s_ = wall_s + 1.0;
-    look_at_link();
+    check_link();
     if (parts_.each_second) parts_.each_second();
     if (std::exchange(starts_anew_, false)) close();
   }
@@ -248,18 +248,18 @@ Status Host::carry_out_said() {
   return fail(ErrorCode::invalid, "{}", trouble_);
 }
 
-Status Host::store_and_send(Answer said) {
-  TUTTI_CHECK(parts_.store != nullptr || said.step.writes.empty(), "writes without a store");
-  if (!said.step.writes.empty())
-    if (const Status committed = parts_.store->commit(said.step.writes); !committed) {
+Status Host::store_and_send(Answer answer) {
+  TUTTI_CHECK(parts_.store != nullptr || answer.step.writes.empty(), "writes without a store");
+  if (!answer.step.writes.empty())
+    if (const Status committed = parts_.store->commit(answer.step.writes); !committed) {
       trouble_ = fmt::format("cannot store anything, tries again every {} s: {}", kReopen_s, committed.error().message);
       log_.say(Level::error, trouble_);
       return fail(ErrorCode::io, "{}", trouble_);
     }
-  std::ranges::move(said.step.messages, std::back_inserter(waiting_));
+  std::ranges::move(answer.step.messages, std::back_inserter(waiting_));
   send_waiting();
-  for (const node::Event& event : said.step.events) log_.write(event);
-  for (const std::uint64_t ticket : said.done) port_->acknowledge(ticket);
+  for (const node::Event& event : answer.step.events) log_.write(event);
+  for (const std::uint64_t ticket : answer.done) port_->acknowledge(ticket);
   return {};
 }
 
@@ -294,7 +294,7 @@ void Host::count(bool sent, const bus::Envelope& message) {
   traffic.largest = std::max<std::uint64_t>(traffic.largest, message.bytes->size());
 }
 
-void Host::look_at_link() {
+void Host::check_link() {
   const auto state = link();
   if (!state) return;
   for (const auto& [level, sentence] : link_.look(*state, clock_.wall_s())) log_.say(level, sentence);
@@ -304,7 +304,7 @@ std::optional<bus::LinkState> Host::link() const { return port_ ? std::optional(
 
 std::string Host::all_trouble() const {
   if (parts_.trouble)
-    if (std::string said = parts_.trouble(); !said.empty()) return said;
+    if (std::string known = parts_.trouble(); !known.empty()) return known;
   return trouble_.empty() ? link_.trouble() : trouble_;
 }
 

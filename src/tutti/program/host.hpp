@@ -47,7 +47,7 @@ class Hosted {
   virtual void wait(double wall_s);
   /// The last step before the host ends.
   virtual Answer end() { return {}; }
-  /// Called every kReport_s; returns what others are told about the node.
+  /// Called every kReport_s; returns what others learn about the node.
   virtual Answer report(Timestamp /*now*/) { return {}; }
   /// The node's state for STATE/status.json; its field "line" is for the console.
   [[nodiscard]] virtual Json status(Timestamp now) const = 0;
@@ -66,7 +66,7 @@ struct Traffic {
 /// committed, the node is destroyed and made again from its store, every few seconds until it works; its inputs come
 /// again, because none was acknowledged. A host uses one thread.
 ///
-/// When a node throws, which is a defect of ours, the program goes on: the node is made again in the same way, because
+/// When a node throws, which is a defect of ours, the program goes on: the node is made again alike, because
 /// its state is unknown. A message that has made it throw PutAside::kMostThrows times is put aside; a job is left to
 /// the bus, which gives it to other workers. Work that throws is tried again after growing pauses, while messages are
 /// still taken.
@@ -92,7 +92,7 @@ class Host {
     std::string table_aside = {};
     /// Version of the program; another version tries messages again that this one has put aside.
     std::string version = {};
-    /// Says what the program knows to be wrong, which goes before what the host sees of it; may be empty.
+    /// What the program knows to be wrong, which goes before what the host sees of it; may be empty.
     std::function<std::string()> trouble = {};
   };
   Host(Parts parts, const Clock& clock, EventLog& log)
@@ -122,7 +122,8 @@ class Host {
   [[nodiscard]] const TrafficTable& traffic() const { return traffic_; }
   /// The state of the port; nothing when there is none.
   [[nodiscard]] std::optional<bus::LinkState> link() const;
-  /// Everything that is wrong comes to this: what the program says, else trouble(), else the link. Empty: nothing is.
+  /// Everything that is wrong comes to this: what the program reports, else trouble(), else the link. Empty: nothing
+  /// is.
   [[nodiscard]] std::string all_trouble() const;
   /// The port and the node are made anew at the next turn.
   void start_anew() { starts_anew_ = true; }
@@ -140,12 +141,12 @@ class Host {
   void note_thrown(const std::string& by, const std::string& what);
   [[nodiscard]] bool carry_out();
   Status carry_out_said();
-  Status store_and_send(Answer said);
+  Status store_and_send(Answer answer);
   void send_waiting();
   void close();
   void reopen();
   void tell_status();
-  void look_at_link();
+  void check_link();
   void count(bool sent, const bus::Envelope& message);
 
   Parts parts_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a host tells of its link, and how it begins anew.
+// What a host reports of its link, and how it begins anew.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -59,10 +59,10 @@ TEST_F(HostLinkTest, WhatTheProgramKnowsGoesBeforeWhatTheLinkLooksLike) {
   EXPECT_EQ(host_.all_trouble(), trouble_);
   EXPECT_EQ(Json::parse(read_file(file_.string()).value()).value("trouble", ""), trouble_);
   trouble_.clear();
-  EXPECT_EQ(host_.all_trouble(), "");  // of a link that is away for a moment
+  EXPECT_EQ(host_.all_trouble(), "");  // of a link that is away for a short time
 }
 
-TEST_F(HostLinkTest, BeginsAnewWhenItIsTold) {
+TEST_F(HostLinkTest, BeginsAnewWhenAsked) {
   EXPECT_EQ(opened_, 1);
   host_.start_anew();
   host_.turn();

@@ -19,7 +19,7 @@ namespace host_test {
 using bus::Endpoint;
 using bus::MessageKind;
 
-/// What happened, in order, as all of the parts below tell it.
+/// What happened, in order, as all of the parts below note it.
 using Diary = std::vector<std::string>;
 
 class DiaryStore final : public test::FullDisk {
@@ -130,14 +130,14 @@ class HostTest : public testing::Test {
   /// Turns, with time to be made again in between.
   Diary turns(int count) {
     for (int i = 0; i < count; ++i, wall_s_ += 1.01 * Host::kReopen_s) host_->turn();
-    return said();
+    return take_diary();
   }
   [[nodiscard]] std::size_t rows_aside() const {
     std::size_t rows = 0;
     EXPECT_TRUE(store_.scan("meta", "aside/", [&](auto, auto) { return ++rows > 0; }).has_value());
     return rows;
   }
-  Diary said() { return std::exchange(diary_, {}); }
+  Diary take_diary() { return std::exchange(diary_, {}); }
 
   double wall_s_ = 0.0;
   Clock clock_{2.0, 0.0, [this] { return wall_s_; }};
@@ -152,9 +152,9 @@ class HostTest : public testing::Test {
 TEST_F(HostTest, CommitsThenSendsThenAcknowledges) {
   mail_.owed = {{1, letter(MessageKind::submap, "a")}, {2, letter(MessageKind::submap, "b")}};
   ASSERT_TRUE(host_->open().has_value());
-  EXPECT_EQ(said(), Diary{"send hello"});
+  EXPECT_EQ(take_diary(), Diary{"send hello"});
   host_->turn();
-  EXPECT_EQ(said(), (Diary{"commit 2", "send a", "send b", "acknowledge 1", "acknowledge 2", "send report"}));
+  EXPECT_EQ(take_diary(), (Diary{"commit 2", "send a", "send b", "acknowledge 1", "acknowledge 2", "send report"}));
   EXPECT_EQ(host_->traffic().at({false, MessageKind::submap}).messages, 2U);
   EXPECT_EQ(host_->traffic().at({true, MessageKind::job}).bytes, std::string("helloab").size());
 }
@@ -164,12 +164,12 @@ TEST_F(HostTest, WorksWhenItIsTimeAndNotBefore) {
   host_->turn();
   wall_s_ = 4.99;  // mission time 9.98
   EXPECT_NEAR(host_->turn(), 0.01, 1e-6);
-  EXPECT_EQ(std::ranges::count(said(), "send work"), 0);
+  EXPECT_EQ(std::ranges::count(take_diary(), "send work"), 0);
   wall_s_ = 5.0;
   host_->turn();
-  EXPECT_EQ(std::ranges::count(said(), "send work"), 1);
+  EXPECT_EQ(std::ranges::count(take_diary(), "send work"), 1);
   host_->turn();
-  EXPECT_EQ(std::ranges::count(said(), "send work"), 0);
+  EXPECT_EQ(std::ranges::count(take_diary(), "send work"), 0);
 }
 
 TEST_F(HostTest, ManySlowMessagesDoNotKeepItFromItsWork) {
@@ -178,16 +178,16 @@ TEST_F(HostTest, ManySlowMessagesDoNotKeepItFromItsWork) {
   host_ = host("1");
   ASSERT_TRUE(host_->open().has_value());
   wall_s_ = 100.0;
-  said();
+  take_diary();
   EXPECT_EQ(host_->turn(), 0.0);  // there is more to take
-  const Diary first = said();
+  const Diary first = take_diary();
   EXPECT_EQ(std::ranges::count(first, "send work"), 1);
   EXPECT_EQ(std::ranges::count(first, "acknowledge 3"), 1);
   EXPECT_EQ(std::ranges::count(first, "acknowledge 4"), 0);
   for (int i = 0; i < 20 && host_->turn() == 0.0; ++i) {
   }
   EXPECT_TRUE(mail_.owed.empty());
-  const Diary rest = said();
+  const Diary rest = take_diary();
   EXPECT_EQ(std::ranges::count(rest, "acknowledge 3"), 0);
   EXPECT_EQ(std::ranges::count(rest, "acknowledge 30"), 1);
 }
@@ -201,7 +201,7 @@ TEST_F(HostTest, MessagesThatWaitComeAgainWhenTheNodeIsMadeAnew) {
   store_.full = true;
   host_->turn();
   store_.full = false;
-  said();
+  take_diary();
   turns(8);
   EXPECT_TRUE(mail_.owed.empty());
   std::size_t rows = 0;
@@ -214,9 +214,9 @@ TEST_F(HostTest, WhatCannotBeCommittedIsNeitherSentNorAcknowledgedAndComesAgain)
   mail_.owed = {{7, letter(MessageKind::submap, "a")}};
   store_.full = true;
   ASSERT_TRUE(host_->open().has_value());  // a port that has the letter
-  said();
+  take_diary();
   host_->turn();
-  EXPECT_EQ(said(), Diary{});
+  EXPECT_EQ(take_diary(), Diary{});
   EXPECT_EQ(host_->hosted(), nullptr);
   wall_s_ += 0.9 * Host::kReopen_s;
   store_.full = false;
@@ -225,7 +225,7 @@ TEST_F(HostTest, WhatCannotBeCommittedIsNeitherSentNorAcknowledgedAndComesAgain)
   wall_s_ += 0.2 * Host::kReopen_s;
   host_->turn();  // opens
   host_->turn();
-  const Diary after = said();
+  const Diary after = take_diary();
   EXPECT_EQ((Diary{after.begin(), after.begin() + 4}), (Diary{"send hello", "commit 1", "send a", "acknowledge 7"}));
   EXPECT_TRUE(mail_.owed.empty());
   EXPECT_EQ(*store_.read("rows", "7").value(), "a");
@@ -238,12 +238,12 @@ TEST_F(HostTest, WhatThePortRefusesWaitsInItsOrder) {
            .refuses = true};
   ASSERT_TRUE(host_->open().has_value());
   host_->turn();
-  said();
+  take_diary();
   host_->turn();
-  EXPECT_EQ(said(), Diary{});
+  EXPECT_EQ(take_diary(), Diary{});
   mail_.refuses = false;
   host_->turn();
-  EXPECT_EQ(said(), (Diary{"send hello", "send a", "send b"}));  // the report is too old by now
+  EXPECT_EQ(take_diary(), (Diary{"send hello", "send a", "send b"}));  // the report is too old by now
 }
 
 TEST_F(HostTest, WhatCanNeverBeSentDoesNotWait) {
@@ -251,9 +251,9 @@ TEST_F(HostTest, WhatCanNeverBeSentDoesNotWait) {
   ASSERT_TRUE(host_->open().has_value());
   host_->turn();
   mail_.refuses = false;
-  said();
+  take_diary();
   host_->turn();
-  EXPECT_EQ(said(), Diary{});
+  EXPECT_EQ(take_diary(), Diary{});
 }
 
 TEST_F(HostTest, AMessageThatMakesTheNodeThrowIsPutAsideAndAllElseGoesOn) {
@@ -261,7 +261,7 @@ TEST_F(HostTest, AMessageThatMakesTheNodeThrowIsPutAsideAndAllElseGoesOn) {
                 {2, letter(MessageKind::submap, "poison")},
                 {3, letter(MessageKind::submap, "b")}};
   ASSERT_TRUE(host_->open().has_value());
-  EXPECT_EQ(turns(1), (Diary{"send hello", "commit 1", "send a", "acknowledge 1"}));  // what came before it holds
+  EXPECT_EQ(turns(1), (Diary{"send hello", "commit 1", "send a", "acknowledge 1"}));  // what came before it counts
   EXPECT_EQ(host_->hosted(), nullptr);                                                // nobody knows how it stands
   EXPECT_EQ(rows_aside(), 0U);
   for (unsigned throws = 1; throws < PutAside::kMostThrows; ++throws) turns(2);  // is made again; throws again
@@ -317,12 +317,12 @@ TEST_F(HostTest, WorkThatThrowsWaitsLongerEveryTimeWhileMessagesAreTaken) {
     if (was_there && host_->hosted() == nullptr) ++tries;
   }
   EXPECT_GE(tries, 4U);
-  EXPECT_LE(tries, 6U);                                                              // after 6, 12, 24, 48, 96 s
-  EXPECT_EQ(static_cast<std::size_t>(std::ranges::count(said(), "send a")), tries);  // whenever it is made again
+  EXPECT_LE(tries, 6U);                                                                    // after 6, 12, 24, 48, 96 s
+  EXPECT_EQ(static_cast<std::size_t>(std::ranges::count(take_diary(), "send a")), tries);  // whenever it is made again
   EXPECT_NE(host_->trouble().find("cannot work"), std::string::npos) << host_->trouble();
   Postman::work_throws = false;
   for (int i = 0; i < 200; ++i, wall_s_ += 1.0) host_->turn();
-  EXPECT_GT(std::ranges::count(said(), "send work"), 0);
+  EXPECT_GT(std::ranges::count(take_diary(), "send work"), 0);
   EXPECT_EQ(host_->trouble(), "");
 }
 
@@ -416,7 +416,7 @@ TEST_F(HostTest, AServerWhoseVerifierThrowsOnOneSubmapMapsTheOthers) {
   EXPECT_EQ(store.tables().at("submaps").size(), 3U);
 }
 
-TEST_F(HostTest, ItsLastWordsAreStored) {
+TEST_F(HostTest, ItsLastMessagesAreStored) {
   mail_.owed = {{1, letter(MessageKind::submap, "a")}};
   ASSERT_TRUE(host_->open().has_value());
   host_->turn();
@@ -433,15 +433,15 @@ TEST_F(HostTest, CarriesOutWhatIsSaidWhileItWaitsUntilThatCannotBeStored) {
     return host_->carry_out({.writes = {{"rows", text, text}}, .messages = {letter(MessageKind::job, text)}});
   };
   waits_ = [&] {
-    said();
+    take_diary();
     EXPECT_TRUE(carry_out("a").has_value());
-    EXPECT_EQ(said(), (Diary{"commit 1", "send a"}));
+    EXPECT_EQ(take_diary(), (Diary{"commit 1", "send a"}));
     store_.full = true;
     EXPECT_FALSE(carry_out("b").has_value());
     store_.full = false;
     EXPECT_FALSE(carry_out("c").has_value());  // may rest on b
     EXPECT_NE(host_->hosted(), nullptr);       // it is in the middle of wait()
-    EXPECT_EQ(said(), Diary{});
+    EXPECT_EQ(take_diary(), Diary{});
     stop = true;
   };
   ASSERT_TRUE(host_->open().has_value());
@@ -449,7 +449,7 @@ TEST_F(HostTest, CarriesOutWhatIsSaidWhileItWaitsUntilThatCannotBeStored) {
   EXPECT_EQ(host_->hosted(), nullptr);
   wall_s_ += Host::kReopen_s;
   host_->turn();
-  EXPECT_EQ(said(), Diary{"send hello"});
+  EXPECT_EQ(take_diary(), Diary{"send hello"});
   EXPECT_TRUE(carry_out("d").has_value());
 }
 

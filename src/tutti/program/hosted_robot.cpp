@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kLongestWork_s = 0.05;  // then it listens again
 constexpr std::size_t kBehind = 1'000;   // samples and scans that wait: 5 s at 200 Hz
-constexpr double kStarts_s = 15.0;       // so long a second program of this robot ends when it is told so
+constexpr double kStarts_s = 15.0;       // so long a second program of this robot ends when it learns so
 
 }  // namespace
 
@@ -27,7 +27,7 @@ Answer HostedRobot::receive(const bus::Received& message, Timestamp now) {
   driver_->receive(message.envelope, now);
   for (const Json& note : driver_->take_notes()) log_.write(note);
   note_conflict();
-  Answer out = said({message.ticket});
+  Answer out = answer_for({message.ticket});
   const bool has_updated = std::ranges::any_of(out.step.events, [](const node::Event& event) {
     const auto* update = std::get_if<node::RobotUpdated>(&event.what);
     return update != nullptr && update->summary.synchronised > 0;
@@ -38,7 +38,7 @@ Answer HostedRobot::receive(const bus::Received& message, Timestamp now) {
   return out;
 }
 
-/// Who has just started ends; who maps goes on, whatever others say.
+/// Who has just started ends; who maps goes on, whatever others report.
 void HostedRobot::note_conflict() {
   const auto& conflict = driver_->node().conflict();
   if (!conflict || warned_) return;
@@ -74,7 +74,7 @@ Answer HostedRobot::work(Timestamp now) {
       break;
     }
   }
-  return said();
+  return answer_for();
 }
 
 /// What the feed refuses, the node never hears of.

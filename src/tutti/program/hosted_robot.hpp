@@ -40,7 +40,7 @@ class HostedRobot final : public Hosted {
 
   Answer start(Timestamp now) override {
     driver_->resume(now);
-    return said();
+    return answer_for();
   }
   Answer receive(const bus::Received& message, Timestamp now) override;
   [[nodiscard]] std::optional<Timestamp> next_work() const override;
@@ -49,7 +49,7 @@ class HostedRobot final : public Hosted {
   Answer end() override {
     if (fed_) fed_->end();
     driver_->store_all();
-    return said();
+    return answer_for();
   }
   Answer report(Timestamp now) override;
   [[nodiscard]] bool finished() const override;
@@ -62,7 +62,7 @@ class HostedRobot final : public Hosted {
   [[nodiscard]] NodeStatus node_status(Timestamp now) const;
 
  private:
-  Answer said(std::vector<std::uint64_t> done = {}) {
+  Answer answer_for(std::vector<std::uint64_t> done = {}) {
     Answer out{driver_->take_step(), std::move(done)};
     if (fed_) fed_->note(out.step);
     return out;

@@ -42,7 +42,7 @@ Answer HostedServer::work(Timestamp now) {
   if (auto task = node_->begin_map(now))
     making_ = std::async(std::launch::async,
                          [make = make_map_, task = std::move(*task)]() mutable { return make(std::move(task)); });
-  if (node_->changes() != told_changes_) answer.step.messages.push_back(mission_status(now));
+  if (node_->changes() != reported_changes_) answer.step.messages.push_back(mission_status(now));
   return counted(std::move(answer));
 }
 
@@ -62,7 +62,7 @@ void HostedServer::wait(double wall_s) {
 }
 
 bus::Envelope HostedServer::mission_status(Timestamp now) {
-  told_changes_ = node_->changes();
+  reported_changes_ = node_->changes();
   MissionStatus status = node_->mission_status(now);
   status.version = version_;
   status.wall_ns = static_cast<std::int64_t>(wall_clock_ns());

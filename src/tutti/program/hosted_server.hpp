@@ -24,7 +24,7 @@ class HostedServer final : public Hosted {
   /// Called on the second thread; what it throws is thrown by work().
   using MakeMap = std::function<node::MapOfTask(node::MapTask)>;
 
-  /// `map` is the node's store; `trouble` says what is wrong with the program. `is_over`: the mission is another
+  /// `map` is the node's store; `trouble` is what is wrong with the program. `is_over`: the mission is another
   /// server's. All must outlive this.
   HostedServer(std::unique_ptr<node::ServerNode> node, const storage::TableStore& map, std::string version,
                std::function<std::string()> trouble, const bool& is_over,
@@ -69,9 +69,9 @@ class HostedServer final : public Hosted {
   MakeMap make_map_;
   RadioCount radio_;
   std::vector<AskedDecision> asked_;
-  /// Answers to words whose step is being carried out.
+  /// Answers to decisions whose step is being carried out.
   std::vector<std::pair<std::promise<std::string>, std::string>> answers_;
-  std::uint64_t told_changes_ = 0;
+  std::uint64_t reported_changes_ = 0;
   std::uint64_t asked_decisions_ = 0;    // so many so far
   std::future<node::MapOfTask> making_;  // valid while a map is made; its destructor waits
 };

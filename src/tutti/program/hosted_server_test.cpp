@@ -112,7 +112,7 @@ TEST_F(HostedServerTest, AMapThatIsBeingMadeIsSentBeforeItEnds) {
   EXPECT_EQ(sent(MessageKind::proxy_graph), 1U);
 }
 
-TEST_F(HostedServerTest, WhatMakingAMapThrowsIsToldAndTriedAgainWhileSubmapsAreTaken) {
+TEST_F(HostedServerTest, WhatMakingAMapThrowsIsReportedAndTriedAgainWhileSubmapsAreTaken) {
   std::atomic<int> tries = 0;
   const auto server = host([&](node::MapTask task) {
     if (++tries == 1) throw std::logic_error("no map");

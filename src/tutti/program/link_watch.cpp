@@ -19,19 +19,19 @@ std::string why_of(const bus::LinkState& state) {
 }  // namespace
 
 std::vector<LinkWatch::Said> LinkWatch::look(const bus::LinkState& state, double wall_s) {
-  std::vector<Said> said;
-  const auto say = [&](Level level, std::string sentence) { said.push_back({level, std::move(sentence)}); };
+  std::vector<Said> out;
+  const auto say = [&](Level level, std::string sentence) { out.push_back({level, std::move(sentence)}); };
   trouble_.clear();
   const std::string why = why_of(state);
   if (!state.connected) {
     if (!gone_since_s_) gone_since_s_ = wall_s;
     const double gone_s = wall_s - *gone_since_s_;
-    if (gone_s < kPatience_s) return said;
+    if (gone_s < kPatience_s) return out;
     trouble_ = fmt::format("no link to the bus {} for {:.0f} s{}", state.url, gone_s, why);
     if (!std::exchange(said_gone_, true))
       say(Level::warning, fmt::format("{} the bus {}{}; goes on without, and tries again and again",
                                       was_there_ ? "lost its link to" : "cannot reach", state.url, why));
-    return said;
+    return out;
   }
   if (std::exchange(said_gone_, false))
     say(Level::info,
@@ -44,20 +44,20 @@ std::vector<LinkWatch::Said> LinkWatch::look(const bus::LinkState& state, double
   if (is_in_vain)
     trouble_ = fmt::format("jobs were given to workers {} times since one was last answered, each of them at least {}",
                            state.given_in_vain, bus::LinkState::kGivenInVain);
-  if (is_in_vain && !said_in_vain_) say(Level::error, trouble_);
-  if (!is_in_vain && said_in_vain_) say(Level::info, "jobs are answered again");
-  said_in_vain_ = is_in_vain;
+  if (is_in_vain && !reported_in_vain_) say(Level::error, trouble_);
+  if (!is_in_vain && reported_in_vain_) say(Level::info, "jobs are answered again");
+  reported_in_vain_ = is_in_vain;
   if (!state.denied.empty()) {
     trouble_ = fmt::format("the bus {} does not allow this program what it needs: {}", state.url, state.denied);
-    if (std::exchange(said_denied_, state.denied) != state.denied) say(Level::error, trouble_);
+    if (std::exchange(reported_denied_, state.denied) != state.denied) say(Level::error, trouble_);
   } else if (state.unconfirmed_s > kStores_s) {
     trouble_ = fmt::format("the bus {} is there and has stored nothing for {:.0f} s: its disk may be full{}", state.url,
                            state.unconfirmed_s, state.last_error.empty() ? "" : " (last error" + why + ")");
-    if (!std::exchange(said_full_, true)) say(Level::error, trouble_);
-  } else if (std::exchange(said_full_, false)) {
+    if (!std::exchange(reported_full_, true)) say(Level::error, trouble_);
+  } else if (std::exchange(reported_full_, false)) {
     say(Level::info, fmt::format("the bus {} stores again", state.url));
   }
-  return said;
+  return out;
 }
 
 bool AnewWatch::connects_anew(bool is_in_vain, bool holds_job, double wall_s) {

@@ -31,9 +31,9 @@ class LinkWatch {
   std::optional<double> gone_since_s_;
   bool was_there_ = false;
   bool said_gone_ = false;
-  bool said_full_ = false;
-  bool said_in_vain_ = false;
-  std::string said_denied_;
+  bool reported_full_ = false;
+  bool reported_in_vain_ = false;
+  std::string reported_denied_;
   std::uint64_t made_anew_ = 0;
   std::string trouble_;
 };

@@ -13,33 +13,33 @@ TEST(LinkWatch, SaysOnceThatThereIsNoLinkAndThatItIsBack) {
   bus::LinkState state{.url = "nats://base:4222", .last_error = "connecting: no server"};
   for (int s = 0; s < 5; ++s) EXPECT_TRUE(watch.look(state, s).empty()) << s;
   EXPECT_EQ(watch.trouble(), "");
-  auto said = watch.look(state, 5);
-  ASSERT_EQ(said.size(), 1U);
-  EXPECT_EQ(said[0].level, Level::warning);
-  EXPECT_TRUE(has(said[0].sentence, "cannot reach the bus nats://base:4222: connecting: no server"))
-      << said[0].sentence;
+  auto lines = watch.look(state, 5);
+  ASSERT_EQ(lines.size(), 1U);
+  EXPECT_EQ(lines[0].level, Level::warning);
+  EXPECT_TRUE(has(lines[0].sentence, "cannot reach the bus nats://base:4222: connecting: no server"))
+      << lines[0].sentence;
   EXPECT_TRUE(watch.look(state, 50).empty());
   EXPECT_TRUE(has(watch.trouble(), "for 50 s")) << watch.trouble();
   state.connected = true;
-  said = watch.look(state, 60);
-  ASSERT_EQ(said.size(), 1U);
-  EXPECT_TRUE(has(said[0].sentence, "is there, after 60 s")) << said[0].sentence;
+  lines = watch.look(state, 60);
+  ASSERT_EQ(lines.size(), 1U);
+  EXPECT_TRUE(has(lines[0].sentence, "is there, after 60 s")) << lines[0].sentence;
   EXPECT_EQ(watch.trouble(), "");
   state.connected = false;
   watch.look(state, 70);
-  said = watch.look(state, 76);
-  ASSERT_EQ(said.size(), 1U);
-  EXPECT_TRUE(has(said[0].sentence, "lost its link to the bus")) << said[0].sentence;
+  lines = watch.look(state, 76);
+  ASSERT_EQ(lines.size(), 1U);
+  EXPECT_TRUE(has(lines[0].sentence, "lost its link to the bus")) << lines[0].sentence;
 }
 
 TEST(LinkWatch, TheAddressOfTheBusIsSaidOnce) {
   LinkWatch watch;
   const bus::LinkState state{.url = "nats://base:4222", .last_error = "nats://base:4222: connecting: no server"};
   watch.look(state, 0);
-  const auto said = watch.look(state, 5);
-  ASSERT_EQ(said.size(), 1U);
-  EXPECT_TRUE(has(said[0].sentence, "cannot reach the bus nats://base:4222: connecting: no server"))
-      << said[0].sentence;
+  const auto lines = watch.look(state, 5);
+  ASSERT_EQ(lines.size(), 1U);
+  EXPECT_TRUE(has(lines[0].sentence, "cannot reach the bus nats://base:4222: connecting: no server"))
+      << lines[0].sentence;
 }
 
 TEST(AnewWatch, ConnectsAnIdleWorkerAnewOnceAMinute) {
@@ -66,10 +66,10 @@ TEST(LinkWatch, ABusThatStoresNothingIsSaidToBeFull) {
   bus::LinkState state{.url = "nats://base:4222", .connected = true, .unconfirmed_s = 20.0};
   EXPECT_TRUE(watch.look(state, 0).empty());
   state.unconfirmed_s = 26.0;
-  auto said = watch.look(state, 6);
-  ASSERT_EQ(said.size(), 1U);
-  EXPECT_EQ(said[0].level, Level::error);
-  EXPECT_TRUE(has(said[0].sentence, "its disk may be full")) << said[0].sentence;
+  auto lines = watch.look(state, 6);
+  ASSERT_EQ(lines.size(), 1U);
+  EXPECT_EQ(lines[0].level, Level::error);
+  EXPECT_TRUE(has(lines[0].sentence, "its disk may be full")) << lines[0].sentence;
   state.unconfirmed_s = 40.0;
   EXPECT_TRUE(watch.look(state, 20).empty());
   EXPECT_TRUE(has(watch.trouble(), "nothing for 40 s")) << watch.trouble();
@@ -78,18 +78,18 @@ TEST(LinkWatch, ABusThatStoresNothingIsSaidToBeFull) {
   EXPECT_EQ(watch.trouble(), "");
   state.streams_made_anew = 4;
   state.last_error = "the bus had lost all";
-  said = watch.look(state, 22);
-  ASSERT_EQ(said.size(), 1U);
-  EXPECT_EQ(said[0].sentence, "the bus had lost all");
+  lines = watch.look(state, 22);
+  ASSERT_EQ(lines.size(), 1U);
+  EXPECT_EQ(lines[0].sentence, "the bus had lost all");
   EXPECT_TRUE(watch.look(state, 23).empty());
 }
 
 TEST(LinkWatch, JobsGivenInVainAndWhatTheBusDoesNotAllowAreAlerts) {
   LinkWatch watch;
   bus::LinkState state{.url = "nats://base:4222", .connected = true, .given_in_vain = 60};
-  auto said = watch.look(state, 0);
-  ASSERT_EQ(said.size(), 1U);
-  EXPECT_EQ(said[0].level, Level::error);
+  auto lines = watch.look(state, 0);
+  ASSERT_EQ(lines.size(), 1U);
+  EXPECT_EQ(lines[0].level, Level::error);
   EXPECT_TRUE(has(watch.trouble(), "given to workers 60 times")) << watch.trouble();
   EXPECT_TRUE(watch.look(state, 1).empty());
   state.given_in_vain = 0;
@@ -97,9 +97,9 @@ TEST(LinkWatch, JobsGivenInVainAndWhatTheBusDoesNotAllowAreAlerts) {
   EXPECT_EQ(watch.trouble(), "");
   state.denied = "Permissions Violation for Publish to \"mission.m.robot.3.submap\"";
   state.unconfirmed_s = 60.0;  // and its disk is not full
-  said = watch.look(state, 3);
-  ASSERT_EQ(said.size(), 1U);
-  EXPECT_EQ(said[0].level, Level::error);
+  lines = watch.look(state, 3);
+  ASSERT_EQ(lines.size(), 1U);
+  EXPECT_EQ(lines[0].level, Level::error);
   EXPECT_TRUE(has(watch.trouble(), "mission.m.robot.3.submap")) << watch.trouble();
   EXPECT_TRUE(watch.look(state, 4).empty());
 }

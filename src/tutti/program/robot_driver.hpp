@@ -64,7 +64,7 @@ class LiveRobot final : public RobotDriver {
   void add_images(const TrackedImages& images, Timestamp now) { take(node_->add_images(images, now)); }
   void add_fix(const PositionFix& fix, Timestamp now) { take(node_->add_fix(fix, now)); }
   void begin_session(const std::string& why, Timestamp now) { take(node_->begin_session(why, now)); }
-  /// Tells what became of samples before they reached the node.
+  /// Reports what became of samples before they reached the node.
   void tell(Timestamp now, const node::ImagesRefused& what) { step_.tell(now, what); }
   void expect_sensors(bool scans, bool images) { node_->expect_sensors(scans, images); }
 

@@ -77,13 +77,13 @@ class RobotProgram {
   std::optional<StateFolder> folder_;
   std::unique_ptr<EventLog> log_;
   std::unique_ptr<storage::TableStore> store_;
-  std::unique_ptr<bus::MissionLease> lease_;  // not its own: it looks for the server's
-  std::string alone_;                         // as it was told last
+  std::unique_ptr<bus::MissionLease> lease_;  // not its own: it finds the server's
+  std::string alone_;                         // as it was reported last
   std::optional<Clock> clock_;
   std::unique_ptr<LiveFeed> feed_;  // null: it replays
   std::shared_ptr<void> feeder_;    // RobotOptions::beside_feed
-  FeedFront::Load load_;            // as it was told last
-  bool odometry_refused_ = false;   // as it was told last
+  FeedFront::Load load_;            // as it was reported last
+  bool odometry_refused_ = false;   // as it was reported last
   std::optional<Host> host_;
 };
 
@@ -207,7 +207,7 @@ Status RobotProgram::start() {
                             .version = options_.version},
                 *clock_, *log_);
   if (Status opened = open_feed((*driver)->node()); !opened) return opened;
-  // On a full disk there is no map, but clients are told where they are.
+  // On a full disk there is no map, but clients learn where they are.
   if (Status opened = host_->open(); !opened && !(feed_ && host_->tries_again())) return opened;
   log_->say(Level::info, fmt::format("robot {} runs in {}, bus {}, {}, {}", robot_.value, folder_->path().string(),
                                      bus::without_credentials(options_.bus.url),

@@ -25,7 +25,7 @@ namespace tutti::program {
 
 inline constexpr const char* kEnded = "ended";  ///< The program's last event, which has its traffic and status.
 
-/// What a robot is told about its mission.
+/// What a robot's command line gives about its mission.
 struct RobotSettings {
   std::string mission;              ///< Its name on the bus (bus::check_mission_name).
   std::vector<std::string> robots;  ///< By number; empty: unknown.

@@ -42,7 +42,7 @@ class RobotStoreTest : public testing::Test {
     damaged.replace(at, bytes, bytes, '\x55');
     ASSERT_TRUE(write_file(file_.string(), damaged));
   }
-  /// Starts the robot; its session, its backlog, and what it says when it begins.
+  /// Starts the robot; its session, its backlog, and what it reports when it begins.
   struct Started {
     std::uint64_t session = 0;
     std::size_t backlog = 0;
@@ -74,7 +74,7 @@ TEST_F(RobotStoreTest, AWholeOneIsOpened) {
 }
 
 /// Any page, the first, or all from the middle on, or nothing left: the robot goes on, with what waits as far as it can
-/// be read, and says so.
+/// be read, and reports it.
 TEST_F(RobotStoreTest, ADamagedOneIsSetAsideAndTheRobotGoesOnInANewSession) {
   std::size_t kept_all = 0;
   const std::size_t pages = whole_.size() / kPage;

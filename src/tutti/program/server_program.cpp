@@ -51,7 +51,7 @@ class OwnWorker {
                  };
                  return std::make_unique<HostedWorker>(kSelf, version, make, threads, port, stop_);
                },
-               .each_second = [this] { look_whether_in_vain(); },
+               .each_second = [this] { check_whether_in_vain(); },
                .status_file = {}},
               clock, log),
         clock_(clock),
@@ -72,7 +72,7 @@ class OwnWorker {
 
  private:
   /// This thread is not at a job when this is called.
-  void look_whether_in_vain() {
+  void check_whether_in_vain() {
     const auto* worker = dynamic_cast<const HostedWorker*>(host_.hosted());
     if (worker == nullptr || !anew_.connects_anew(is_in_vain_, worker->holds_job(), clock_.wall_s())) return;
     log_.say(Level::error, "jobs are given to workers in vain, and its own one has none: connects that one anew");
@@ -139,7 +139,7 @@ bus::LeaseHolder holder_of(const StateFolder& folder) {
           .mark = bus::process_mark(any_incarnation())};
 }
 
-/// All that a running server holds, in the order in which it is made.
+/// All that a running server has, in the order in which it is made.
 class ServerProgram {
  public:
   explicit ServerProgram(const ServerOptions& options) : options_(options) {}

@@ -10,8 +10,8 @@
 
 namespace tutti::program {
 
-/// The folder of one server or robot, which holds everything that it knows and is not shared with a second program. The
-/// file `owner` in it says whose it is, and since when.
+/// The folder of one server or robot, which has everything that it knows and is not shared with a second program. The
+/// file `owner` in it states whose it is, and since when.
 class StateFolder {
  public:
   /// Opens the folder, and makes it if it is missing. Also sets the program's umask, so that files made from then on

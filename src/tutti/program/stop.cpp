@@ -30,7 +30,7 @@ void stop_on_signals() {
   sigemptyset(&action.sa_mask);
   sigaction(SIGTERM, &action, nullptr);
   sigaction(SIGINT, &action, nullptr);
-  // A file that may not grow is a full disk, which is for who writes to say.
+  // A file that may not grow is a full disk, which is for who writes to report.
   static_cast<void>(std::signal(SIGXFSZ, SIG_IGN));
 }
 

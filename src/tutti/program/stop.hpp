@@ -5,16 +5,16 @@
 
 namespace tutti::program {
 
-/// True after the first SIGTERM or SIGINT, in a program that has called stop_on_signals(). Loops look at it between
+/// True after the first SIGTERM or SIGINT, in a program that has called stop_on_signals(). Loops check it between
 /// steps.
 const std::atomic<bool>& stop_asked();
 /// Makes SIGTERM and SIGINT set stop_asked(). A second signal ends the program at once, which is safe because what is
-/// stored is whole at any moment. SIGXFSZ (a file may not grow) no longer ends the program.
+/// stored is whole at any time. SIGXFSZ (a file may not grow) no longer ends the program.
 void stop_on_signals();
 /// This program gets SIGTERM when its parent, the process with this number, ends or has ended.
 void end_with_parent(int parent);
 
-/// Tells systemd, if it started this program, "READY=1", "STOPPING=1" or "STATUS=...".
+/// Notifies systemd, if it started this program, "READY=1", "STOPPING=1" or "STATUS=...".
 void tell_service_manager(const char* state);
 
 }  // namespace tutti::program

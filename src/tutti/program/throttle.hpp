@@ -8,7 +8,7 @@
 namespace tutti::program {
 
 /// Limits log lines that strangers can cause at will: per kind, kBurst lines may come at once, then one every
-/// kPeriod_s, which says how many were left out.
+/// kPeriod_s, which states how many were left out.
 class Throttle {
  public:
   static constexpr double kBurst = 20.0;

@@ -46,7 +46,7 @@ HostedWorker::HostedWorker(bus::Endpoint self, std::string version, const Make& 
   node_.set_clock([] { return static_cast<std::int64_t>(wall_clock_ns()); });
 }
 
-/// The port is this thread's: it says that work goes on while others do it.
+/// The port is this thread's: it reports that work goes on while others do it.
 void HostedWorker::for_each(std::size_t count, const std::function<void(std::size_t)>& call) {
   auto done = std::async(std::launch::async, [&] {
     verifiers::for_each_parallel(count, threads_, [&](std::size_t i) {

@@ -14,7 +14,7 @@
 
 namespace tutti::program {
 
-/// What a worker is told about its mission.
+/// What a worker's command line gives about its mission.
 struct WorkerSettings {
   std::string mission;  ///< Its name on the bus; empty: the mission that has a server there.
   VerifierSettings verifiers;
@@ -37,8 +37,8 @@ struct WorkerOptions {
 /// Runs a worker until `stop`. Any number of workers may run, on any machine.
 Status run_worker(const WorkerOptions& options, const std::atomic<bool>& stop);
 
-/// A worker as its host sees it. While it has a job, it tells the bus so every few seconds. When `stop` becomes true it
-/// abandons its job, which another worker then gets.
+/// A worker as its host sees it. While it has a job, it reports that to the bus every few seconds. When `stop` becomes
+/// true it abandons its job, which another worker then gets.
 class HostedWorker final : public Hosted {
  public:
   using Make = std::function<node::WorkerNode(node::WorkerNode::ForEach)>;
@@ -55,7 +55,7 @@ class HostedWorker final : public Hosted {
 
  private:
   void for_each(std::size_t count, const std::function<void(std::size_t)>& call);
-  /// Calls `step` of the node, and acknowledges the job when the node no longer holds one.
+  /// Calls `step` of the node, and acknowledges the job when the node no longer has one.
   template <class F>
   Answer carry_on(F&& step);
 

@@ -69,7 +69,7 @@ Result<LidarClosureVerifier::Look> LidarClosureVerifier::look(const Submap& firs
   if (!T_first_second) seen = lidar::verify_pair(**a, **b, config_);
   const bool is_aligned = T_first_second || seen.overlap > 0.0;
   if (is_aligned && !seen.accepted) {
-    std::optional<Refusal> refusal = seen.refusal;  // also a rival, which the second comparison does not search
+    std::optional<Refusal> refusal = seen.refusal;  // also a rival, which the second comparison does not test for
     seen = lidar::verify_near(**a, **b, T_first_second.value_or(seen.T_a_b), config_);
     if (!T_first_second && refusal) seen.refusal = refusal;
   }

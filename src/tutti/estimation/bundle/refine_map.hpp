@@ -30,7 +30,7 @@ struct RefinementConfig {
 struct RefinementInput {
   /// Any robots' submaps; one without a visual payload contributes its odometry alone.
   std::vector<PosedSubmap> submaps;
-  /// Pairs tied by accepted closures, in which guided_matches() searches common landmarks.
+  /// Pairs tied by accepted closures, in which guided_matches() finds common landmarks.
   std::vector<SubmapPair> closed;
   std::vector<LandmarkMatch> matches;  ///< Further landmarks that are known to be common.
 };

@@ -65,7 +65,7 @@ Camera read(const v1::Feed::Camera& in) {
   return out;
 }
 
-double or_default(double said, double otherwise) { return said == 0.0 ? otherwise : said; }
+double or_default(double value, double otherwise) { return value == 0.0 ? otherwise : value; }
 
 Result<intake::FeedSensors> read(const v1::Feed::Sensors& in) {
   intake::FeedSensors out{.scans = in.scans(), .cameras = {}, .depth = {}, .imu = {}};
@@ -165,7 +165,7 @@ FromClient read(v1::Feed::Images& in) {
   return out;
 }
 
-/// What it says is checked where it is taken (check_fix()).
+/// Its values are checked where it is taken (check_fix()).
 FromClient read(const v1::Feed::Fix& in) {
   PositionFix out{.stamp = {in.stamp_ns()}, .antenna = {in.latitude_deg(), in.longitude_deg(), in.height_m()}};
   const auto& numbers = in.covariance_m2();

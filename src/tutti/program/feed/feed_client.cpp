@@ -81,9 +81,9 @@ Result<std::optional<FromRobot>> FeedClient::hear(int timeout_ms) {
     if (!payload) return tl::unexpected(payload.error());
     unread_.erase(0, unread_.size() - left.size());
     if (*payload) {
-      auto said = decode_from_robot(**payload);
-      if (!said) return tl::unexpected(said.error());
-      return std::move(*said);
+      auto message = decode_from_robot(**payload);
+      if (!message) return tl::unexpected(message.error());
+      return std::move(*message);
     }
     pollfd ready{.fd = file_, .events = POLLIN, .revents = 0};
     if (poll(&ready, 1, timeout_ms) <= 0) return std::nullopt;

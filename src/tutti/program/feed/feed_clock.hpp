@@ -19,10 +19,10 @@ class FeedClock {
   static constexpr double kSame_s = 0.05;
   static constexpr double kLeast_s = 10.0;  ///< No drift is reported before the clock was observed for this long.
 
-  /// Takes what Hello says of the client's clock, which arrived at `robot_now`. False when the offset is out of range;
+  /// Takes the client's clock as in Hello, which arrived at `robot_now`. False when the offset is out of range;
   /// nothing has changed then.
   bool begin(std::optional<std::int64_t> offset_ns, std::optional<std::int64_t> client_now_ns, Timestamp robot_now);
-  /// Measures the offset again from what the client's clock says now, and returns it; nothing when it is out of range.
+  /// Measures the offset again from what the client's clock shows now, and returns it; nothing when it is out of range.
   std::optional<std::int64_t> check(std::int64_t client_now_ns, Timestamp robot_now);
 
   [[nodiscard]] How how() const { return how_; }

@@ -17,7 +17,7 @@ TEST(FeedClock, IsTheRobotsUnlessSaidOtherwise) {
   ASSERT_TRUE(clock.begin(std::nullopt, std::nullopt, kNow));
   EXPECT_EQ(clock.how(), FeedClock::How::same);
   EXPECT_EQ(clock.to_robot({42}), Timestamp{42});
-  EXPECT_EQ(clock.check(kNow.ns - 5, kNow), 5);  // told, and not used
+  EXPECT_EQ(clock.check(kNow.ns - 5, kNow), 5);  // reported, and not used
   EXPECT_EQ(clock.offset_ns(), 0);
 }
 
@@ -29,7 +29,7 @@ TEST(FeedClock, OfThreeHoursOffIsMeasured) {
   EXPECT_EQ(clock.to_robot({kNow.ns - 3 * kHour + 7}), Timestamp{kNow.ns + 7});
 }
 
-TEST(FeedClock, ThatDriftsKeepsItsOffsetAndIsToldByHowMuch) {
+TEST(FeedClock, ThatDriftsKeepsItsOffsetAndLearnsByHowMuch) {
   FeedClock clock;
   ASSERT_TRUE(clock.begin(std::nullopt, kNow.ns, kNow));
   EXPECT_FALSE(clock.drift_ppm());

@@ -135,14 +135,15 @@ std::string time_answer_frame(std::int64_t client_now_ns, Timestamp robot_now, s
   return framed(message);
 }
 
-std::optional<std::string> trajectory_frame(const FeedTrajectory& way, std::int64_t offset_ns) {
+std::optional<std::string> trajectory_frame(const FeedTrajectory& trajectory, std::int64_t offset_ns) {
   constexpr std::size_t kMostBytesPerPose = 70;
-  if ((way.corrected.size() + way.map.size() + 1) * kMostBytesPerPose > kMaxFeedBytes) return std::nullopt;
+  if ((trajectory.corrected.size() + trajectory.map.size() + 1) * kMostBytesPerPose > kMaxFeedBytes)
+    return std::nullopt;
   v1::Feed message;
   auto& out = *message.mutable_way();
-  out.set_map_epoch(way.map_age.first);
-  out.set_map_revision(way.map_age.second);
-  out.set_constraints(way.constraints);
+  out.set_map_epoch(trajectory.map_age.first);
+  out.set_map_revision(trajectory.map_age.second);
+  out.set_constraints(trajectory.constraints);
   const auto add = [&](const Trajectory& poses, auto& stamps, auto& numbers) {
     for (const auto& [stamp, pose] : poses) {
       stamps.Add(told(stamp, offset_ns));
@@ -150,8 +151,8 @@ std::optional<std::string> trajectory_frame(const FeedTrajectory& way, std::int6
       for (const double x : pose.rotation.coeffs()) numbers.Add(x);  // x y z w
     }
   };
-  add(way.corrected, *out.mutable_stamp_ns(), *out.mutable_t_map_body());
-  add(way.map, *out.mutable_map_stamp_ns(), *out.mutable_t_world_body());
+  add(trajectory.corrected, *out.mutable_stamp_ns(), *out.mutable_t_map_body());
+  add(trajectory.map, *out.mutable_map_stamp_ns(), *out.mutable_t_world_body());
   return framed(message);
 }
 

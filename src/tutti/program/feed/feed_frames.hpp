@@ -29,7 +29,7 @@ inline constexpr std::size_t kMaxHelloBytes = 64U << 10U;
 inline constexpr const char* kFromClient[] = {"hello", "odometry", "scan", "end_of_recording", "images",
                                               "imu",   "time",     "fix",  "health",           "raw"};
 
-/// Assembles frames from bytes as they arrive. Holds at most one incomplete frame.
+/// Assembles frames from bytes as they arrive. Keeps at most one incomplete frame.
 class FrameReader {
  public:
   /// Removes from the front of `bytes` what the next frame needs, and returns the frame's message once it is complete
@@ -43,7 +43,7 @@ class FrameReader {
   std::string header_, payload_;
 };
 
-/// How a client's raw messages of ROS are read and answered; what it does not say is as the robot's mission file has
+/// How a client's raw messages of ROS are read and answered; what it does not state is as the robot's mission file has
 /// it.
 struct FeedRos {
   std::vector<std::string> images;  ///< Topics of one camera or two.
@@ -52,7 +52,7 @@ struct FeedRos {
   std::optional<Pose3> T_body_lidar;
   std::optional<Eigen::Vector3d> p_body_antenna;
   bool scans_deskewed = false;
-  std::string odometry_frames;  ///< IntakeConfig::odometry_frames; clients in other processes cannot say it.
+  std::string odometry_frames;  ///< IntakeConfig::odometry_frames; clients in other processes cannot send it.
   std::string body_frame, odom_frame, map_frame;
   std::optional<robot::OdometryCovarianceConfig> covariance;
   double tolerance_s = 0.0;  ///< By which map -> odom is dated ahead.
@@ -65,10 +65,10 @@ struct FeedHello {
   std::uint32_t version = 0;
   std::string client;
   bool listens_only = false;
-  Result<intake::FeedSensors> sensors = intake::FeedSensors{};  ///< An error says why such sensors cannot be.
+  Result<intake::FeedSensors> sensors = intake::FeedSensors{};  ///< An error is why such sensors cannot be.
   /// Nanoseconds, to be added to the client's stamps; or the client's time now.
   std::optional<std::int64_t> clock_offset_ns = {}, clock_now_ns = {};
-  Result<std::optional<FeedRos>> ros = std::nullopt;  ///< An error says why these cannot be.
+  Result<std::optional<FeedRos>> ros = std::nullopt;  ///< An error is why these cannot be.
   bool wants_trajectory = false;                      ///< Asks for a FeedWay after every update of the map.
 };
 struct FeedEnd {};
@@ -84,7 +84,7 @@ struct BadSample {
   Timestamp stamp;
   std::string why;
 };
-/// What a client may say.
+/// What a client may send.
 using FromClient = std::variant<FeedHello, node::OdometrySample, Scan, FeedEnd, intake::FedImages,
                                 std::vector<ImuSample>, FeedTime, PositionFix, Health, FeedRaw, FeedUnknown, BadSample>;
 /// Decodes untrusted bytes; an error when they are no message of the protocol.
@@ -105,8 +105,8 @@ std::string situation_frame(const FeedState& state, std::int64_t offset_ns);
 std::string refused_frame(Timestamp stamp, const std::string& why, std::int64_t offset_ns);
 std::string time_answer_frame(std::int64_t client_now_ns, Timestamp robot_now, std::int64_t offset_ns,
                               std::int64_t measured_ns, const std::optional<Timestamp>& stored);
-/// Nothing when the way is too long for one message.
-std::optional<std::string> trajectory_frame(const FeedTrajectory& way, std::int64_t offset_ns);
+/// Nothing when the trajectory is too long for one message.
+std::optional<std::string> trajectory_frame(const FeedTrajectory& trajectory, std::int64_t offset_ns);
 std::string raw_frame(const FeedRaw& raw);
 std::string note_frame(const std::string& text);
 std::string ended_frame();

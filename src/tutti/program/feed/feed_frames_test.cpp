@@ -72,9 +72,9 @@ TEST(FeedFrames, NothingIsPrintedOfTextThatIsNone) {
 TEST(FeedFrames, SayWhatAClientSays) {
   Matrix6d covariance = Matrix6d::Random();
   const Pose3 pose{Eigen::Quaterniond(0.5, 0.5, -0.5, 0.5), {1, 2, 3}};
-  const std::string said = test::odometry({{-7}, pose}, covariance);
-  EXPECT_EQ(test::messages(said).at(0).odometry().increment_covariance(1), covariance(0, 1));
-  const auto sample = decode_from_client(said.substr(4));
+  const std::string bytes = test::odometry({{-7}, pose}, covariance);
+  EXPECT_EQ(test::messages(bytes).at(0).odometry().increment_covariance(1), covariance(0, 1));
+  const auto sample = decode_from_client(bytes.substr(4));
   const auto& odometry = std::get<node::OdometrySample>(*sample);
   EXPECT_EQ(odometry.stamp.ns, -7);
   EXPECT_EQ(odometry.T_odom_body, pose);
@@ -99,12 +99,12 @@ TEST(FeedFrames, SamplesThatNoRobotCanTakeSayWhy) {
   cut.mutable_scan()->add_xyz(1.0F);
   for (int i = 0; i < 3; ++i) ages.mutable_scan()->add_xyz(1.0F);
   for (int i = 0; i < 2; ++i) ages.mutable_scan()->add_age_s(0.1F);
-  for (const auto& [message, word] : {std::pair(no_pose, "T_odom_body"), std::pair(no_covariance, "of 1 numbers"),
-                                      std::pair(cut, "1 coordinates"), std::pair(ages, "2 ages")}) {
+  for (const auto& [message, expected] : {std::pair(no_pose, "T_odom_body"), std::pair(no_covariance, "of 1 numbers"),
+                                          std::pair(cut, "1 coordinates"), std::pair(ages, "2 ages")}) {
     const auto decoded = decode_from_client(message.SerializeAsString());
     ASSERT_TRUE(decoded.has_value());
-    ASSERT_TRUE(std::holds_alternative<BadSample>(*decoded)) << word;
-    EXPECT_NE(std::get<BadSample>(*decoded).why.find(word), std::string::npos) << std::get<BadSample>(*decoded).why;
+    ASSERT_TRUE(std::holds_alternative<BadSample>(*decoded)) << expected;
+    EXPECT_NE(std::get<BadSample>(*decoded).why.find(expected), std::string::npos) << std::get<BadSample>(*decoded).why;
   }
   v1::Feed from_robot, hello;
   from_robot.mutable_welcome();

@@ -28,7 +28,7 @@ std::size_t image_bytes_of(const FeedInput& input) {
 
 bool is_odometry(const FeedInput& input) { return std::holds_alternative<node::OdometrySample>(input); }
 
-/// One sample that says what both did. Both were taken, so both are usable.
+/// One sample with the motion of both. Both were taken, so both are usable.
 node::OdometrySample joined(const node::OdometrySample& first, const node::OdometrySample& second) {
   const auto usable = [](const node::OdometrySample& sample) {
     return robot::usable_step({}, sample.stamp, sample.T_odom_body, sample.increment_covariance).value();
@@ -87,7 +87,7 @@ Status FeedFront::take(const node::OdometrySample& sample) {
   return {};
 }
 
-/// Until the robot has begun its new session, nothing that it says is about what is fed now.
+/// Until the robot has begun its new session, nothing that it reports is about what is fed now.
 void FeedFront::begin_anew(std::string why) {
   release_images(true);
   push(FeedAnew{std::move(why)});
@@ -222,16 +222,17 @@ bool FeedFront::wants_trajectory() const {
   return wants_trajectory_;
 }
 
-void FeedFront::say(FeedTrajectory way) {
+void FeedFront::say(FeedTrajectory trajectory) {
   const std::scoped_lock lock(mutex_);
-  ways_.push_back(std::move(way));
-  if (ways_.size() > kWays) ways_.pop_front();
+  trajectories_.push_back(std::move(trajectory));
+  if (trajectories_.size() > kWays) trajectories_.pop_front();
 }
 
 std::vector<FeedTrajectory> FeedFront::take_trajectories() {
   const std::scoped_lock lock(mutex_);
-  std::vector<FeedTrajectory> out(std::make_move_iterator(ways_.begin()), std::make_move_iterator(ways_.end()));
-  ways_.clear();
+  std::vector<FeedTrajectory> out(std::make_move_iterator(trajectories_.begin()),
+                                  std::make_move_iterator(trajectories_.end()));
+  trajectories_.clear();
   return out;
 }
 
@@ -320,7 +321,7 @@ void FeedFront::publish(FeedState robot) {
   const std::scoped_lock lock(mutex_);
   if (anew_ > 0) return;
   const bool is_same = robot.chain == robot_.chain;
-  // One that was made again says nothing until it has caught up.
+  // One that was made again reports nothing until it has caught up.
   if (is_same && robot_.newest && (!robot.newest || robot.newest->stamp < robot_.newest->stamp)) return;
   robot_ = std::move(robot);
   localiser_.correct(robot_.watch, robot_.covariance);

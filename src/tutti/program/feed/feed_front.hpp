@@ -37,8 +37,8 @@ Timestamp stamp_of(const FeedInput& input);
 /// order for the robot, which merges, packs, stores and updates behind. Only take() blocks.
 ///
 /// The queue is bounded. When the robot falls behind, scans are refused first; then neighbouring odometry samples are
-/// joined, so that the way becomes coarser but stays whole. An alert says either. Inputs that the robot has taken are
-/// kept until they are stored, and are handed out again when the robot had to be made anew from its store.
+/// joined, so that the trajectory becomes coarser but stays whole. An alert reports either. Inputs that the robot has
+/// taken are kept until they are stored, and are handed out again when the robot had to be made anew from its store.
 ///
 /// Images wait until odometry and the IMU have reached their stamp, so that the robot knows where it was then; of IMU
 /// samples the newest are kept for the images that need them.
@@ -71,7 +71,7 @@ class FeedFront final : public FeedTarget {
 
   // For the robot.
   /// The next input, or nothing when none came within `wall_s` of wall time. Until note_heard() it counts as being
-  /// worked on, so that an input that makes the robot fail can be told.
+  /// worked on, so that an input that makes the robot fail can be found.
   std::optional<FeedInput> take(double wall_s);
   void note_heard();
   /// What inputs from now on come from; never null.
@@ -85,13 +85,13 @@ class FeedFront final : public FeedTarget {
   /// The robot was made again from its store, whose newest sample is `stored`: inputs taken after that are handed out
   /// again.
   void begin_again(const std::optional<Timestamp>& stored);
-  /// Tells the client that an input already accepted was refused by the robot.
+  /// Reports to the client that an input already accepted was refused by the robot.
   void refuse(Timestamp stamp, std::string why);
   /// Sets what the robot knows now; ignored while a robot made again has not caught up with what it knew before.
   void publish(FeedState robot);
   [[nodiscard]] bool wants_trajectory() const;
-  /// Queues a way for the client; only the newest kWays wait.
-  void say(FeedTrajectory way);
+  /// Queues a trajectory for the client; only the newest kWays wait.
+  void say(FeedTrajectory trajectory);
   static constexpr std::size_t kWays = 4;
   /// What the robot's body reported last, unless that is older than kHealthLasts.
   [[nodiscard]] Health health() const;
@@ -110,14 +110,14 @@ class FeedFront final : public FeedTarget {
   struct Load {
     std::size_t waiting = 0;                             ///< Inputs that the robot has not taken yet.
     std::size_t scans_left_out = 0, samples_joined = 0;  ///< Since the robot had last caught up.
-    std::size_t images_left_out = 0;                     ///< Moments of images, since the robot had last caught up.
+    std::size_t images_left_out = 0;                     ///< Sets of images, since the robot had last caught up.
     friend bool operator==(const Load&, const Load&) = default;
   };
   [[nodiscard]] Load load() const;
   /// More is waiting, or not stored yet, than should be fed where nothing may be left out: less than half of the
   /// limits.
   [[nodiscard]] bool is_filling() const;
-  /// Totals since the front was made; images are counted as moments.
+  /// Totals since the front was made; images are counted as sets of one time.
   struct Figures {
     std::uint64_t images = 0, images_left_out = 0, imu = 0, imu_left_out = 0, fixes = 0, fixes_left_out = 0;
     std::size_t image_bytes = 0;  ///< Bytes of the images that wait now.
@@ -172,7 +172,7 @@ class FeedFront final : public FeedTarget {
   std::set<Timestamp> jumps_;  // samples before which odometry has jumped
   Timestamp behind_since_;
   bool wants_trajectory_ = false;
-  std::deque<FeedTrajectory> ways_;
+  std::deque<FeedTrajectory> trajectories_;
   Health health_;
   std::chrono::steady_clock::time_point health_came_;
   decltype(FeedState::status) status_;

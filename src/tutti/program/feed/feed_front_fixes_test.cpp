@@ -52,8 +52,8 @@ TEST(FeedFrontFixes, GarbageIsRefusedAtOnceAndOdometryGoesOn) {
   test::NodeTarget robot;
   FeedFront front(robot.state(), {});
   const auto expect = [&](const PositionFix& of, const std::string& part) {
-    const std::string said = why(front.add_fix(of));
-    EXPECT_NE(said.find(part), std::string::npos) << part << ": " << said;
+    const std::string refusal = why(front.add_fix(of));
+    EXPECT_NE(refusal.find(part), std::string::npos) << part << ": " << refusal;
   };
   expect(fix(kOdometry[0].stamp), "no odometry within 1 s before");
   ASSERT_TRUE(front.add_odometry(sample(0)));
@@ -132,9 +132,9 @@ TEST(FeedFrontFixes, OfARobotThatIsBehindTheyAreLeftOutBeforeOdometryIs) {
   for (std::size_t i = 0; i < kOdometry.size(); ++i) {
     ASSERT_TRUE(front.add_odometry(sample(i)));
     for (int k = 0; k < 5; ++k) {
-      const std::string said = why(front.add_fix(fix(kOdometry[i].stamp + 0.1 * k)));
-      if (said.empty()) continue;
-      EXPECT_EQ(said.find("the map is behind: "), 0U) << said;
+      const std::string refusal = why(front.add_fix(fix(kOdometry[i].stamp + 0.1 * k)));
+      if (refusal.empty()) continue;
+      EXPECT_EQ(refusal.find("the map is behind: "), 0U) << refusal;
       ++refused;
     }
     ASSERT_LE(front.load().waiting, 40U);

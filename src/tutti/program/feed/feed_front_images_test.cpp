@@ -11,7 +11,7 @@
 namespace tutti::program {
 namespace feed_front_images_test {
 
-using Moment = std::shared_ptr<const intake::FedImages>;
+using ImageSet = std::shared_ptr<const intake::FedImages>;
 const Trajectory kOdometry = robot::test::drifting_odometry(20);
 
 node::OdometrySample sample(std::size_t i) {
@@ -35,11 +35,11 @@ char next(FeedFront& front) {
   if (!input) return ' ';
   front.note_heard();
   return std::holds_alternative<node::OdometrySample>(*input) ? 'o'
-         : std::holds_alternative<Moment>(*input)             ? 'i'
+         : std::holds_alternative<ImageSet>(*input)           ? 'i'
                                                               : 's';
 }
 
-/// The lock that odometry's answer needs is held for no copy of what a moment has.
+/// The lock that odometry's answer needs is held for no copy of what an image set has.
 TEST(FeedFrontImages, AreNotCopied) {
   FeedFront front(test::NodeTarget().state(), {});
   front.set_sensors(eyes());
@@ -51,14 +51,14 @@ TEST(FeedFrontImages, AreNotCopied) {
   EXPECT_TRUE(front.add_images(std::move(fed)));
   EXPECT_TRUE(front.add_imu(imu(kOdometry[0].stamp)));
   const auto taken = front.take(0.0);
-  ASSERT_TRUE(taken && std::holds_alternative<Moment>(*taken));
-  EXPECT_EQ(std::get<Moment>(*taken)->images[0].bytes.data(), bytes);
+  ASSERT_TRUE(taken && std::holds_alternative<ImageSet>(*taken));
+  EXPECT_EQ(std::get<ImageSet>(*taken)->images[0].bytes.data(), bytes);
   front.note_heard();
   front.begin_again(kOdometry[0].stamp);  // the robot fails, and is handed them again
   EXPECT_EQ(next(front), 's');
   const auto again = front.take(0.0);
-  ASSERT_TRUE(again && std::holds_alternative<Moment>(*again));
-  EXPECT_EQ(std::get<Moment>(*again)->images[0].bytes.data(), bytes);
+  ASSERT_TRUE(again && std::holds_alternative<ImageSet>(*again));
+  EXPECT_EQ(std::get<ImageSet>(*again)->images[0].bytes.data(), bytes);
 }
 
 TEST(FeedFrontImages, ImagesComeWhenOdometryAndTheImuHaveReachedThem) {

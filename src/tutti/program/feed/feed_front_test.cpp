@@ -64,12 +64,12 @@ TEST(FeedFront, AnswersWhatTheRobotWouldHaveAnsweredWhileItIsBehind) {
   for (std::size_t i = 0; i < 300; ++i) {
     ASSERT_TRUE(behind.front.add_odometry(sample(i)));
     ASSERT_TRUE(other.add_odometry(sample(i)));
-    const FeedState said = behind.front.state(), expected = other.state();
-    ASSERT_EQ(said.newest->stamp, expected.newest->stamp);
-    ASSERT_LT(local(said.newest->pose, expected.newest->pose).norm(), 1e-12) << i;
-    ASSERT_TRUE(said.covariance.isApprox(expected.covariance, 1e-9)) << i;
-    ASSERT_TRUE(said.wants_scan || !expected.wants_scan) << i;
-    ASSERT_TRUE(said.alerts.empty());
+    const FeedState state = behind.front.state(), expected = other.state();
+    ASSERT_EQ(state.newest->stamp, expected.newest->stamp);
+    ASSERT_LT(local(state.newest->pose, expected.newest->pose).norm(), 1e-12) << i;
+    ASSERT_TRUE(state.covariance.isApprox(expected.covariance, 1e-9)) << i;
+    ASSERT_TRUE(state.wants_scan || !expected.wants_scan) << i;
+    ASSERT_TRUE(state.alerts.empty());
     ASSERT_TRUE(give_scan(behind.front, i, 7));
     ASSERT_TRUE(give_scan(other, i, 7));
     if (i % 50 == 20) behind.work(15);
@@ -92,12 +92,12 @@ TEST(FeedFront, SeesWhereOdometryJumpsAsTheRobotDoes) {
     fed.T_odom_body = T_fed_odom * fed.T_odom_body;
     ASSERT_TRUE(behind.front.add_odometry(fed));
     ASSERT_TRUE(other.add_odometry(fed));
-    const FeedState said = behind.front.state(), expected = other.state();
-    ASSERT_EQ(said.newest, expected.newest) << i;
-    ASSERT_LT(local(said.T_odom_fed, expected.T_odom_fed).norm(), 1e-9) << i;
-    ASSERT_LT(local(said.T_map_odom, expected.T_map_odom).norm(), 1e-9) << i;
-    ASSERT_TRUE(said.covariance.isApprox(expected.covariance, 1e-9)) << i;
-    ASSERT_TRUE(said.wants_scan || !expected.wants_scan) << i;
+    const FeedState state = behind.front.state(), expected = other.state();
+    ASSERT_EQ(state.newest, expected.newest) << i;
+    ASSERT_LT(local(state.T_odom_fed, expected.T_odom_fed).norm(), 1e-9) << i;
+    ASSERT_LT(local(state.T_map_odom, expected.T_map_odom).norm(), 1e-9) << i;
+    ASSERT_TRUE(state.covariance.isApprox(expected.covariance, 1e-9)) << i;
+    ASSERT_TRUE(state.wants_scan || !expected.wants_scan) << i;
     if (i % 41 == 0) behind.work(30);
   }
   ASSERT_GT(behind.front.state().T_odom_fed.translation.norm(), 100.0);
@@ -136,12 +136,12 @@ TEST(FeedFront, CarriesOnFromTheLastCorrection) {
   const Pose3 T_map_odom = behind.robot.node().agent().T_map_odom();
   ASSERT_GT(local(T_map_odom, Pose3{}).norm(), 0.1);
   behind.front.publish(behind.robot.state());
-  const FeedState said = behind.front.state();
-  EXPECT_EQ(said.T_map_odom, T_map_odom);
-  EXPECT_EQ(said.newest->stamp, kOdometry[199].stamp);
-  EXPECT_GT(said.covariance(0, 0), behind.robot.state().covariance(0, 0));
+  const FeedState state = behind.front.state();
+  EXPECT_EQ(state.T_map_odom, T_map_odom);
+  EXPECT_EQ(state.newest->stamp, kOdometry[199].stamp);
+  EXPECT_GT(state.covariance(0, 0), behind.robot.state().covariance(0, 0));
   behind.work();
-  EXPECT_TRUE(behind.front.state().covariance.isApprox(said.covariance, 1e-9));
+  EXPECT_TRUE(behind.front.state().covariance.isApprox(state.covariance, 1e-9));
 }
 
 TEST(FeedFront, RefusesWhatTheRobotWouldRefuseAtOnce) {
@@ -165,7 +165,7 @@ TEST(FeedFront, RefusesWhatTheRobotWouldRefuseAtOnce) {
   EXPECT_EQ(behind.work(), 1U);
 }
 
-TEST(FeedFront, WhatIsTooMuchCostsTheMapNotTheWay) {
+TEST(FeedFront, WhatIsTooMuchCostsTheMapNotTheTrajectory) {
   Behind behind({.inputs = 50, .scan_bytes = 3 * 120});
   std::size_t refused = 0;
   for (std::size_t i = 0; i < 300; ++i) {
@@ -178,15 +178,15 @@ TEST(FeedFront, WhatIsTooMuchCostsTheMapNotTheWay) {
   }
   EXPECT_EQ(refused, 297U);
   EXPECT_EQ(behind.front.load().scans_left_out, 297U);
-  const FeedState said = behind.front.state();
-  ASSERT_EQ(said.alerts.size(), 1U);
-  EXPECT_NE(said.alerts[0].text.find("odometry is taken together"), std::string::npos) << said.alerts[0].text;
+  const FeedState state = behind.front.state();
+  ASSERT_EQ(state.alerts.size(), 1U);
+  EXPECT_NE(state.alerts[0].text.find("odometry is taken together"), std::string::npos) << state.alerts[0].text;
   EXPECT_GT(behind.work(), 25U);
   const FeedState caught_up = behind.front.state();
   EXPECT_TRUE(caught_up.alerts.empty());
-  EXPECT_EQ(caught_up.newest->stamp, said.newest->stamp);
-  EXPECT_LT(local(caught_up.newest->pose, said.newest->pose).norm(), 1e-12);
-  EXPECT_TRUE(caught_up.covariance.isApprox(said.covariance, 1e-6));  // what was taken together says the same
+  EXPECT_EQ(caught_up.newest->stamp, state.newest->stamp);
+  EXPECT_LT(local(caught_up.newest->pose, state.newest->pose).norm(), 1e-12);
+  EXPECT_TRUE(caught_up.covariance.isApprox(state.covariance, 1e-6));  // what was taken together gives the same
   EXPECT_EQ(behind.robot.node().agent().newest_sample(), kOdometry[299].stamp);
 }
 
@@ -203,7 +203,7 @@ TEST(FeedFront, FillsUpUntilAllIsStored) {
   EXPECT_FALSE(behind.front.is_filling());
 }
 
-TEST(FeedFront, OfALongTimeTheWholeWayStaysEvenly) {
+TEST(FeedFront, OfALongTimeTheWholeTrajectoryStaysEvenly) {
   FeedFront front(test::NodeTarget().state(), {.inputs = 100});
   for (std::size_t i = 0; i < kOdometry.size() * 20; ++i)
     ASSERT_TRUE(front.add_odometry({Timestamp{} + 0.005 * static_cast<double>(i), {}, 1e-9 * Matrix6d::Identity()}));

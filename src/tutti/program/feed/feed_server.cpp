@@ -33,7 +33,7 @@ double steady_s() { return std::chrono::duration<double>(std::chrono::steady_clo
 bool would_wait() { return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR; }
 
 /// A file left there by a program that was killed goes; an error when it is in use or no socket.
-Status make_way(const std::string& path, const sockaddr_un& address) {
+Status free_path(const std::string& path, const sockaddr_un& address) {
   struct stat found {};
   if (lstat(path.c_str(), &found) != 0) return {};
   if (!S_ISSOCK(found.st_mode)) return fail(ErrorCode::io, "{}: exists and is no socket", path);
@@ -65,7 +65,7 @@ Result<std::unique_ptr<FeedServer>> FeedServer::listen(const std::string& path, 
     return fail(ErrorCode::io, "'{}': a socket's path has 1 to {} bytes, this one {}", path,
                 sizeof address.sun_path - 1, path.size());
   std::memcpy(address.sun_path, path.c_str(), path.size() + 1);
-  if (auto ok = make_way(path, address); !ok) return tl::unexpected(ok.error());
+  if (auto ok = free_path(path, address); !ok) return tl::unexpected(ok.error());
   const int listener = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   const auto failed = [&](const char* what) {
     const int why = errno;
@@ -127,7 +127,7 @@ void FeedServer::finish(const Waiting& waiting) {
     const int file = files[i + 1].fd;
     const bool is_gone = (ready & (POLLERR | POLLHUP | POLLNVAL)) != 0;
     if ((ready & POLLIN) != 0 ? read_from(clients[i], file) : !is_gone) continue;
-    // One that has said all it has to say may still read.
+    // One that has sent all it has to send may still read.
     silent_.insert(clients[i]);
     if (!is_gone && session_.waits_for_end(clients[i])) continue;
     static_cast<void>(write_to(clients[i], file));

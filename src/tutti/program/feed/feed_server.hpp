@@ -69,7 +69,7 @@ class FeedServer {
   FeedSettings settings_;
   FeedSession session_;
   std::map<FeedSession::Client, int> files_;
-  std::set<FeedSession::Client> silent_;  // they have said all they have to say
+  std::set<FeedSession::Client> silent_;  // they have sent all they have to send
   FeedSession::Client next_ = 0;
 };
 

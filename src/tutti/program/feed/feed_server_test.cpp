@@ -37,8 +37,8 @@ class FeedServerTest : public testing::Test {
   }
   /// What the server answers to this, when it has done all it can.
   std::vector<v1::Feed> say(int file, const std::string& bytes) {
-    const ssize_t said = bytes.empty() ? 0 : send(file, bytes.data(), bytes.size(), MSG_NOSIGNAL);
-    EXPECT_EQ(said, static_cast<ssize_t>(bytes.size()));
+    const ssize_t sent = bytes.empty() ? 0 : send(file, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    EXPECT_EQ(sent, static_cast<ssize_t>(bytes.size()));
     std::string heard;
     for (int round = 0; round < 20; ++round) {
       server_->serve(0);
@@ -99,14 +99,14 @@ TEST_F(FeedServerTest, AClientThatNeverReadsHoldsUpNobody) {
   EXPECT_EQ(say(feeder, test::hello()).size(), 2U);
   const int one_more = connect(), too_many = connect();
   std::size_t answers = 0;
-  Trajectory way = robot::test::fine_odometry(400);  // 4,000 corrections of 600 bytes
-  for (std::size_t i = 0; i < way.size(); i += 10) {
+  Trajectory trajectory = robot::test::fine_odometry(400);  // 4,000 corrections of 600 bytes
+  for (std::size_t i = 0; i < trajectory.size(); i += 10) {
     std::string bytes;
-    for (std::size_t k = i; k < std::min(i + 10, way.size()); ++k)
-      bytes += test::odometry(way[k], robot::test::kStepCovariance);
+    for (std::size_t k = i; k < std::min(i + 10, trajectory.size()); ++k)
+      bytes += test::odometry(trajectory[k], robot::test::kStepCovariance);
     for (const auto& answer : say(feeder, bytes)) answers += answer.has_correction() ? 1 : 0;
   }
-  EXPECT_EQ(answers, way.size());
+  EXPECT_EQ(answers, trajectory.size());
   EXPECT_EQ(server_->clients(), 3U);
   EXPECT_GT(say(sleeper, "").back().correction().dropped(), 0U);
   for (const int file : {feeder, sleeper, one_more, too_many}) close(file);

@@ -187,7 +187,7 @@ void FeedSession::take_odometry(Client client, const node::OdometrySample& sampl
   if (answer.jump) broadcast([&](std::int64_t offset_ns) { return jump_frame(state, *answer.jump, offset_ns); });
   for (auto& [number, listener] : clients_)
     if (listener.greeted) put(listener, correction_frame(state, answer, listener.dropped, offset_ns(number)), true);
-  if (ros_) tell_ros(client, state, answer);
+  if (ros_) send_to_ros(client, state, answer);
   refresh();
 }
 
@@ -201,11 +201,11 @@ void FeedSession::refresh() {
   for (const FeedRefusal& refusal : target_.take_refusals())
     if (feeder_) refuse(*feeder_, refusal.stamp, refusal.why);
   answer_end();
-  for (const FeedTrajectory& way : target_.take_trajectories()) {
-    if (ros_) tell_ros(way);
+  for (const FeedTrajectory& trajectory : target_.take_trajectories()) {
+    if (ros_) send_to_ros(trajectory);
     for (auto& [number, listener] : clients_)
       if (listener.wants_trajectory)
-        if (auto frame = trajectory_frame(way, offset_ns(number))) put(listener, std::move(*frame), true);
+        if (auto frame = trajectory_frame(trajectory, offset_ns(number))) put(listener, std::move(*frame), true);
   }
   const FeedState state = this->state();
   if (ros_)

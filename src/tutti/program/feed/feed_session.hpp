@@ -21,7 +21,7 @@ namespace tutti::program {
 
 /// The live feed of one robot, without sockets: takes bytes from clients and gives bytes for them. One client feeds,
 /// the others listen. A client that does not read holds up nobody: beyond FeedSettings::max_queue_kb it loses its
-/// oldest corrections (and is told how many); when the messages that must not be dropped alone exceed that, it is
+/// oldest corrections (and learns how many); when the messages that must not be dropped alone exceed that, it is
 /// disconnected. Incomplete frames take at most kMaxFeedBytes for the client that feeds, and kMaxHelloBytes for each
 /// other one.
 class FeedSession {
@@ -30,7 +30,7 @@ class FeedSession {
   /// Returns the robot's time, since the Unix epoch.
   using Now = std::function<Timestamp()>;
   /// `target` must outlive the session. Corrections start from the target's T_map_odom at this time.
-  /// Raw messages are read as `sensors` says, unless their client says otherwise.
+  /// Raw messages are read as in `sensors`, unless their client states otherwise.
   FeedSession(
       FeedTarget& target, const FeedSettings& settings, Now now = [] { return Timestamp{}; },
       intake::SensorConfig sensors = {});
@@ -40,23 +40,23 @@ class FeedSession {
   void disconnect(Client client);
   /// Handles every message that `bytes` complete.
   void receive(Client client, std::string_view bytes);
-  // For a client of this process (LocalClient), which says values.
+  // For a client of this process (LocalClient), which passes values.
   void say(Client client, const FeedHello& hello) { greet(client, hello); }
   void say(Client client, FeedEnd end) { take(client, end); }
   void say(Client client, const intake::RawMessage& raw) {
     last_.bytes += raw.bytes.size();
     take_raw(client, raw);
   }
-  /// What reads the raw messages of the client that feeds; null for one that feeds none. After it is told something,
+  /// What reads the raw messages of the client that feeds; null for one that feeds none. After it has got something,
   /// take_due() is to be called.
   [[nodiscard]] RosClient* ros() { return ros_.get(); }
   /// Takes the inputs that are due of the raw messages so far.
   void take_due(Client client);
-  /// Ends connections in which a frame has begun, or the last words wait, and nothing goes on for kMostPause_s. To be
-  /// called now and then; `wall_s` is of a clock that never goes back.
+  /// Ends connections in which a frame has begun, or the last messages wait, and nothing goes on for kMostPause_s. To
+  /// be called now and then; `wall_s` is of a clock that never goes back.
   void close_stalled(double wall_s);
   static constexpr double kMostPause_s = 60.0;
-  /// To be called when the robot may have heard or done something: tells clients what has changed for them.
+  /// To be called when the robot may have heard or done something: reports to clients what has changed for them.
   void refresh();
 
   /// The bytes to write to this client next; empty when there are none.
@@ -116,8 +116,8 @@ class FeedSession {
   // For a client that feeds raw messages: feed_session_ros.cpp.
   Status begin_ros(const FeedHello& hello);
   void take_raw(Client client, const intake::RawMessage& raw);
-  void tell_ros(Client client, const FeedState& state, const SmoothMap::Answer& answer);
-  void tell_ros(FeedTrajectory way);
+  void send_to_ros(Client client, const FeedState& state, const SmoothMap::Answer& answer);
+  void send_to_ros(FeedTrajectory trajectory);
   [[nodiscard]] Timestamp by_client(Timestamp stamp) const;
   /// The target's, with what this session knows itself.
   [[nodiscard]] FeedState state() const;
@@ -134,8 +134,8 @@ class FeedSession {
   Now now_;
   const intake::SensorConfig of_mission_;
   std::unique_ptr<RosClient> ros_;     ///< Belongs to the client that feeds, if raw messages.
-  intake::FeedSensors sensors_;        ///< As the target was told them last,
-  std::optional<FeedRos> sensors_of_;  ///< by a client that said this.
+  intake::FeedSensors sensors_;        ///< As the target got them last,
+  std::optional<FeedRos> sensors_of_;  ///< by a client that sent this.
 };
 
 }  // namespace tutti::program

@@ -16,7 +16,7 @@ FeedState FeedSession::state() const {
   return out;
 }
 
-/// Cameras of raw messages are known only once these have told them: until then those of the client before count, if it
+/// Cameras of raw messages are known only once these have come: until then those of the client before count, if it
 /// named the same topics.
 Status FeedSession::begin_ros(const FeedHello& hello) {
   if (!hello.ros) return tl::unexpected(hello.ros.error());
@@ -65,7 +65,7 @@ void FeedSession::take_due(Client client) {
   for (const std::string& note : ros_->intake().take_notes()) put(connection, note_frame(note));
 }
 
-void FeedSession::tell_ros(Client client, const FeedState& state, const SmoothMap::Answer& answer) {
+void FeedSession::send_to_ros(Client client, const FeedState& state, const SmoothMap::Answer& answer) {
   const FeedAnswer told{.stamp = by_client(state.newest->stamp),
                         .wants_scan = state.wants_scan,
                         .T_map_body = answer.T_map_odom * state.newest->pose,
@@ -76,9 +76,9 @@ void FeedSession::tell_ros(Client client, const FeedState& state, const SmoothMa
   for (const FeedRaw& raw : ros_->hear(told, state.newest->pose)) put(clients_.at(client), raw_frame(raw), true);
 }
 
-void FeedSession::tell_ros(FeedTrajectory way) {
-  for (StampedPose& at : way.corrected) at.stamp = by_client(at.stamp);
-  ros_->hear(way);
+void FeedSession::send_to_ros(FeedTrajectory trajectory) {
+  for (StampedPose& at : trajectory.corrected) at.stamp = by_client(at.stamp);
+  ros_->hear(trajectory);
 }
 
 }  // namespace tutti::program

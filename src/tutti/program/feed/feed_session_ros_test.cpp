@@ -68,7 +68,7 @@ TEST_F(FeedSessionRos, OdometryIsAnsweredAsEverAndAsMessagesToPublish) {
   EXPECT_FALSE(path[0].raw().data().empty());
 }
 
-TEST_F(FeedSessionRos, TheClientSaysFramesAndToleranceAndIsToldByItsOwnClock) {
+TEST_F(FeedSessionRos, TheClientStatesFramesAndToleranceAndIsAnsweredByItsOwnClock) {
   constexpr std::int64_t kOffset = 5 * kSecond;
   Feed::Ros ros;
   ros.set_map_frame("world");
@@ -101,7 +101,7 @@ TEST_F(FeedSessionRos, EverySensorReachesTheRobot) {
              raw("imu", "sensor_msgs/msg/Imu", imu(kStart)) + raw("fix", "sensor_msgs/msg/NavSatFix", fix(kStart)) +
              raw("points", "sensor_msgs/msg/PointCloud2", points(kStart + kPeriod, kAtOnce, "lidar")) +
              raw("battery_state", "sensor_msgs/msg/BatteryState", bags::test::battery_state(24.5F, 0.5F)));
-  const auto said = say(1, odometry_at(1) + odometry_at(7));
+  const auto answers = say(1, odometry_at(1) + odometry_at(7));
   EXPECT_EQ(target_.sensors.cameras.size(), 1U);
   EXPECT_TRUE(target_.sensors.imu && target_.sensors.scans);
   EXPECT_EQ(target_.seen, std::vector<Timestamp>{{kStart + kPeriod}});
@@ -110,7 +110,7 @@ TEST_F(FeedSessionRos, EverySensorReachesTheRobot) {
   EXPECT_EQ(target_.fixes.size(), 1U);
   EXPECT_EQ(target_.health, (Health{.battery_v = 24.5F, .battery_percent = 50.0}));
   session_.refresh();
-  for (const Feed& one : said) EXPECT_NE(one.what_case(), Feed::kRefused) << one.refused().why();
+  for (const Feed& one : answers) EXPECT_NE(one.what_case(), Feed::kRefused) << one.refused().why();
 
   // Greeted anew, the same client's cameras are known already; another's are not.
   session_.disconnect(1);
@@ -123,30 +123,30 @@ TEST_F(FeedSessionRos, EverySensorReachesTheRobot) {
 
 TEST_F(FeedSessionRos, WhatIsNotTakenIsSaidAndTheConnectionStays) {
   begin();
-  for (const auto& [bytes, word] :
+  for (const auto& [bytes, expected] :
        {std::pair(raw("odom", "nav_msgs/msg/Odometry", "abc"), "odom: "),
         std::pair(raw("chatter", "std_msgs/msg/String", ""), "chatter: messages of type 'std_msgs/msg/String'"),
         std::pair(raw_frame({"odom", "nav_msgs/msg/Odometry", "json", ""}), "odom: ")}) {
     const auto answer = say(1, bytes);
     ASSERT_EQ(kinds(answer), std::vector{Feed::kRefused});
-    EXPECT_EQ(answer[0].refused().why().substr(0, std::string(word).size()), word);
+    EXPECT_EQ(answer[0].refused().why().substr(0, std::string(expected).size()), expected);
   }
   EXPECT_EQ(say(1, odometry_at(0)).size(), 4U);
   EXPECT_FALSE(session_.is_over(1));
   session_.disconnect(1);
-  join(2);  // which said nothing of ROS
+  join(2);  // which sent nothing of ROS
   const auto answer = say(2, odometry_at(1));
   ASSERT_EQ(kinds(answer), std::vector{Feed::kRefused});
   EXPECT_NE(answer[0].refused().why().find("Hello.ros"), std::string::npos);
 }
 
 TEST_F(FeedSessionRos, WhatCannotBeSaidOfRosEndsTheConnection) {
-  const auto refused = [&](const auto& spoil, const std::string& word) {
+  const auto refused = [&](const auto& spoil, const std::string& expected) {
     Feed::Ros ros;
     spoil(ros);
     const auto answer = begin(ros);
-    ASSERT_EQ(answer.size(), 1U) << word;
-    EXPECT_NE(answer[0].closed().why().find(word), std::string::npos) << answer[0].closed().why();
+    ASSERT_EQ(answer.size(), 1U) << expected;
+    EXPECT_NE(answer[0].closed().why().find(expected), std::string::npos) << answer[0].closed().why();
     session_.disconnect(1);
   };
   refused([](auto& ros) { ros.set_depth("d"); }, "depth is of 'd'");
@@ -162,19 +162,19 @@ TEST_F(FeedSessionRos, WhatCannotBeSaidOfRosEndsTheConnection) {
   EXPECT_FALSE(session_.has_feeder());
 }
 
-TEST_F(FeedSessionRos, TheEndWaitsForNothingAndTeamMatesAreTold) {
+TEST_F(FeedSessionRos, TheEndWaitsForNothingAndTeamMatesAreSent) {
   begin();
   say(1, odometry_at(0));
   target_.known.team_mates = {{RobotId{2}, "bravo", {7}, Pose3{}}};
   session_.refresh();
-  const auto told = read(1);
-  ASSERT_EQ(told.size(), 3U);
-  EXPECT_EQ(told[0].raw().topic(), "team_mates");
-  EXPECT_EQ(told[1].raw().topic(), "team_mates/bravo/pose");
+  const auto news = read(1);
+  ASSERT_EQ(news.size(), 3U);
+  EXPECT_EQ(news[0].raw().topic(), "team_mates");
+  EXPECT_EQ(news[1].raw().topic(), "team_mates/bravo/pose");
   EXPECT_EQ(kinds(say(1, test::end_of_recording())), std::vector{Feed::kEnded});
 }
 
-/// A client that asks for the whole trajectory may be told more than its queue holds, as nothing else waits.
+/// A client that asks for the whole trajectory may be sent more than its queue holds, as nothing else waits.
 TEST_F(FeedSessionRos, ALongPathEndsNoConnection) {
   begin();
   for (int i = 0; i < 200; ++i) say(1, odometry_at(i));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Images, IMU samples, position fixes and clocks, as clients of a live feed say them.
+// Images, IMU samples, position fixes and clocks, as clients of a live feed send them.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -53,10 +53,10 @@ TEST_F(FeedSessionSensors, TakesImagesAndImuAndRefusesThemByName) {
                                                              {test::images(depth), "depth"},
                                                              {test::framed(strange), "encoding"},
                                                              {test::framed(half), "numbers of the gyro"}};
-  for (const auto& [bytes, word] : all) {
+  for (const auto& [bytes, expected] : all) {
     const auto answer = say(1, bytes);
-    ASSERT_EQ(answer.size(), 1U) << word;
-    EXPECT_NE(answer[0].refused().why().find(word), std::string::npos) << answer[0].refused().why();
+    ASSERT_EQ(answer.size(), 1U) << expected;
+    EXPECT_NE(answer[0].refused().why().find(expected), std::string::npos) << answer[0].refused().why();
   }
   EXPECT_EQ(target_.seen.size(), 1U);
   EXPECT_EQ(say(1, sample(20)).size(), 1U);  // the connection stays
@@ -75,16 +75,16 @@ TEST_F(FeedSessionSensors, WhatTheBodyReportsReachesTheRobotOrIsRefusedByName) {
   EXPECT_EQ(target_.health, (Health{.battery_v = 24.5}));
 }
 
-TEST_F(FeedSessionSensors, WhatTheRobotReportsIsToldWhenItChanges) {
+TEST_F(FeedSessionSensors, WhatTheRobotReportsIsSentWhenItChanges) {
   join(1);
   target_.known.status = std::make_shared<const decltype(FeedState::status)::element_type>(
       decltype(FeedState::status)::element_type{{"keyframes", "7"}, {"battery_percent", "50"}});
   session_.refresh();
-  const auto told = read(1);
-  ASSERT_EQ(told.size(), 1U);
-  ASSERT_EQ(told[0].situation().status_size(), 2);
-  EXPECT_EQ(told[0].situation().status(1).name(), "battery_percent");
-  EXPECT_EQ(told[0].situation().status(1).text(), "50");
+  const auto heard = read(1);
+  ASSERT_EQ(heard.size(), 1U);
+  ASSERT_EQ(heard[0].situation().status_size(), 2);
+  EXPECT_EQ(heard[0].situation().status(1).name(), "battery_percent");
+  EXPECT_EQ(heard[0].situation().status(1).text(), "50");
   session_.refresh();
   EXPECT_TRUE(read(1).empty());
 }
@@ -97,14 +97,14 @@ TEST_F(FeedSessionSensors, ImagesOfWhomNobodySetUpACamera) {
   EXPECT_EQ(answer[0].refused().stamp_ns(), 5);
 }
 
-TEST_F(FeedSessionSensors, SensorsThatCannotBeAreToldAndEndTheConnection) {
-  const auto refused = [&](const auto& spoil, const std::string& word) {
+TEST_F(FeedSessionSensors, SensorsThatCannotBeAreReportedAndEndTheConnection) {
+  const auto refused = [&](const auto& spoil, const std::string& expected) {
     v1::Feed::Sensors sensors = test::sensors(one_camera());
     spoil(sensors);
     session_.connect(1);
     const auto answer = say(1, test::hello(sensors));
-    ASSERT_EQ(answer.size(), 1U) << word;
-    EXPECT_NE(answer[0].closed().why().find(word), std::string::npos) << answer[0].closed().why();
+    ASSERT_EQ(answer.size(), 1U) << expected;
+    EXPECT_NE(answer[0].closed().why().find(expected), std::string::npos) << answer[0].closed().why();
     session_.disconnect(1);
   };
   refused([](auto& s) { s.mutable_camera(0)->set_kind(static_cast<Feed::Camera::Kind>(9)); }, "kind (9)");
@@ -125,7 +125,7 @@ TEST_F(FeedSessionSensors, FixesComeAsTheyWereSaid) {
   PositionFix fix{.stamp = {5}, .antenna = {46.5, -7.9, 612.5}, .p_body_antenna = {0.3, 0.1, 1.2}};
   fix.covariance << 2.0, 0.5, 0.1, 0.5, 3.0, 0.2, 0.1, 0.2, 9.0;
   EXPECT_TRUE(say(1, test::fix(fix)).empty());  // as of scans nothing is answered
-  Feed brief;                                   // a receiver that says no more than where it is
+  Feed brief;                                   // a receiver that sends no more than where it is
   brief.mutable_fix()->set_stamp_ns(6);
   brief.mutable_fix()->set_latitude_deg(46.5);
   EXPECT_TRUE(say(1, test::framed(brief)).empty());
@@ -205,11 +205,11 @@ TEST_F(FeedSessionSensors, AClockThatIsNotTheRobots) {
   now_ = now_ + 100.0;
   Feed time;
   time.mutable_time()->set_clock_now_ns(now_.ns - kOff + 20'000'000);  // 20 ms faster by now
-  const auto told = say(1, test::framed(time));
-  ASSERT_EQ(told.size(), 1U);
-  EXPECT_EQ(told[0].time_answer().robot_now_ns(), now_.ns);
-  EXPECT_EQ(told[0].time_answer().clock_offset_ns(), kOff);
-  EXPECT_EQ(told[0].time_answer().measured_offset_ns(), kOff - 20'000'000);
+  const auto heard = say(1, test::framed(time));
+  ASSERT_EQ(heard.size(), 1U);
+  EXPECT_EQ(heard[0].time_answer().robot_now_ns(), now_.ns);
+  EXPECT_EQ(heard[0].time_answer().clock_offset_ns(), kOff);
+  EXPECT_EQ(heard[0].time_answer().measured_offset_ns(), kOff - 20'000'000);
   EXPECT_NEAR(*session_.feeder().clock.drift_ppm(), 200.0, 1e-6);
   session_.disconnect(1);
   session_.connect(1);

@@ -62,7 +62,7 @@ TEST_F(FeedSessionTest, SaysWhereTheClientsOdometryIsAfterItBeganAnew) {
   EXPECT_NE(answer[0].jump().why().find("began anew"), std::string::npos);
   EXPECT_NEAR(answer[1].correction().t_map_body().x(), 20.0, 1e-9);
   EXPECT_NEAR(answer[1].correction().t_map_odom().x(), 20.0, 1e-9);
-  EXPECT_EQ(feed(300, 0.1).size(), 1U);  // told once
+  EXPECT_EQ(feed(300, 0.1).size(), 1U);  // reported once
 }
 
 TEST_F(FeedSessionTest, RefusesWhatIsNoGoodAndGoesOn) {
@@ -139,7 +139,7 @@ TEST_F(FeedSessionTest, OneFeedsAndManyListen) {
   EXPECT_NE(say(2, sample(11))[0].closed().why().find("only listens"), std::string::npos);
   session_.connect(4);
   EXPECT_NE(say(4, test::hello())[0].closed().why().find("another client feeds"), std::string::npos);
-  // It comes again where it stood, and what it says again is refused.
+  // It comes again where it stood, and what it sends again is refused.
   session_.disconnect(1);
   session_.connect(5);
   const auto greeting = say(5, test::hello());
@@ -159,9 +159,9 @@ TEST_F(FeedSessionTest, TellsWhatChangesOnce) {
   session_.refresh();
   session_.refresh();
   for (const FeedSession::Client client : {1U, 2U}) {
-    const auto told = read(client);
-    ASSERT_EQ(told.size(), 1U);
-    const Feed::Situation& situation = told[0].situation();
+    const auto heard = read(client);
+    ASSERT_EQ(heard.size(), 1U);
+    const Feed::Situation& situation = heard[0].situation();
     EXPECT_TRUE(situation.in_map());
     EXPECT_EQ(situation.component(), 3U);
     ASSERT_EQ(situation.team_mate_size(), 2);
@@ -241,7 +241,7 @@ std::string beginning_of_frame(std::size_t size, std::size_t there) {
 TEST_F(FeedSessionTest, OnlyWhoFeedsMayHoldALargeFrame) {
   join(0);
   join(1, true);
-  session_.connect(2);  // says no Hello
+  session_.connect(2);  // sends no Hello
   const std::string begin = beginning_of_frame(kMaxFeedBytes, 1'000), small = beginning_of_frame(kMaxHelloBytes, 1'000);
   EXPECT_TRUE(say(0, begin).empty());
   for (const FeedSession::Client client : {1, 2}) {

@@ -7,7 +7,7 @@
 
 namespace tutti::program {
 
-/// How a live feed smooths corrections, and how much it does for slow or many clients; `describe` says what each means.
+/// How a live feed smooths corrections, and how much it does for slow or many clients; `describe` explains each.
 struct FeedSettings {
   double blend_m_per_s = 0.2;
   double blend_deg_per_s = 2.0;

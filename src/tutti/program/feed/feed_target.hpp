@@ -29,7 +29,7 @@ struct TeamMate {
   friend bool operator==(const TeamMate&, const TeamMate&) = default;
 };
 
-/// Tells of a segment of odometry where localisation failed or the map is wrong, or of a sensor that is not heard.
+/// Reports a segment of odometry where localisation failed or the map is wrong, or a sensor without data.
 struct FeedAlert {
   std::string text;
   Timestamp since;        ///< The newest sample when the alert was first raised.
@@ -37,7 +37,7 @@ struct FeedAlert {
   friend bool operator==(const FeedAlert&, const FeedAlert&) = default;
 };
 
-/// What a robot knows, as its live feed tells it.
+/// What a robot knows, as its live feed reports it.
 struct FeedState {
   ChainId chain;
   std::string name;
@@ -56,12 +56,12 @@ struct FeedState {
   /// the state is copied for every odometry sample.
   std::shared_ptr<const std::vector<std::pair<std::string, std::string>>> status;
   std::optional<Timestamp> stored;    ///< The newest sample that a kill would not lose.
-  robot::NextKeyframe next_keyframe;  ///< Tells at which later sample a scan would be wanted.
+  robot::NextKeyframe next_keyframe;  ///< Determines at which later sample a scan would be wanted.
   robot::OdometryWatch watch;         ///< RobotAgent::watch()
   bool ended = false;                 ///< The client has ended the recording, and everything before that is stored.
 };
 
-/// The robot's way and what the map says of it, as of one update of the map.
+/// The robot's trajectory and the map's estimate of it, as of one update of the map.
 struct FeedTrajectory {
   std::pair<std::uint64_t, std::uint64_t> map_age;  ///< ProxyGraph::age()
   std::size_t constraints = 0;                      ///< RobotAgent::ledger()
@@ -79,7 +79,7 @@ struct FeedRefusal {
 class FeedTarget {
  public:
   virtual ~FeedTarget() = default;
-  /// An error says why the sample was refused; nothing has changed then.
+  /// An error is why the sample was refused; nothing has changed then.
   virtual Status add_odometry(const node::OdometrySample& sample) = 0;
   virtual Status add_scan(const Scan& scan) = 0;
   /// Sets what the client's later inputs come from.
@@ -91,17 +91,17 @@ class FeedTarget {
   virtual Status add_imu(const std::vector<ImuSample>& samples) {
     return fail(ErrorCode::unsupported, "{} IMU samples: this robot takes none", samples.size());
   }
-  /// An error means that the fix was left out, and says why.
+  /// An error means that the fix was left out, and why.
   virtual Status add_fix(const PositionFix& fix) {
     return fail(ErrorCode::unsupported, "fix at {} ns: this robot takes none", fix.stamp.ns);
   }
   /// What the robot's body reports of itself.
   virtual void set_health(const Health& /*health*/) {}
-  /// Ends the recording; FeedState::ended tells when that is done.
+  /// Ends the recording; FeedState::ended shows when that is done.
   virtual Status finish() = 0;
   /// From now on take_ways() has something to return.
   virtual void want_trajectory() {}
-  /// The ways since the last call, as far as they were kept.
+  /// The trajectories since the last call, as far as they were kept.
   virtual std::vector<FeedTrajectory> take_trajectories() { return {}; }
   /// The refusals since the last call.
   virtual std::vector<FeedRefusal> take_refusals() { return {}; }

@@ -18,27 +18,27 @@ Trajectory trajectory(const Stamps& stamps, const Numbers& numbers) {
   return out;
 }
 
-Pose3 pose(const v1::Feed::Pose& said) {
-  return {Eigen::Quaterniond(said.qw(), said.qx(), said.qy(), said.qz()), {said.x(), said.y(), said.z()}};
+Pose3 pose(const v1::Feed::Pose& in) {
+  return {Eigen::Quaterniond(in.qw(), in.qx(), in.qy(), in.qz()), {in.x(), in.y(), in.z()}};
 }
 
-FeedAnswer answer(const v1::Feed::Correction& said) {
-  FeedAnswer out{.stamp = {said.stamp_ns()},
-                 .wants_scan = said.wants_scan(),
-                 .stored = said.has_stored() ? std::optional(Timestamp{said.stored_stamp_ns()}) : std::nullopt,
-                 .T_map_body = pose(said.t_map_body()),
-                 .T_map_odom = pose(said.t_map_odom()),
-                 .map_age = {said.map_epoch(), said.map_revision()},
-                 .in_map = said.in_map()};
-  for (int i = 0; i < std::min(36, said.t_map_odom_covariance_size()); ++i)
-    out.covariance(i / 6, i % 6) = said.t_map_odom_covariance(i);
+FeedAnswer answer(const v1::Feed::Correction& in) {
+  FeedAnswer out{.stamp = {in.stamp_ns()},
+                 .wants_scan = in.wants_scan(),
+                 .stored = in.has_stored() ? std::optional(Timestamp{in.stored_stamp_ns()}) : std::nullopt,
+                 .T_map_body = pose(in.t_map_body()),
+                 .T_map_odom = pose(in.t_map_odom()),
+                 .map_age = {in.map_epoch(), in.map_revision()},
+                 .in_map = in.in_map()};
+  for (int i = 0; i < std::min(36, in.t_map_odom_covariance_size()); ++i)
+    out.covariance(i / 6, i % 6) = in.t_map_odom_covariance(i);
   return out;
 }
 
-FeedSituation situation(const v1::Feed::Situation& said) {
+FeedSituation situation(const v1::Feed::Situation& in) {
   FeedSituation out;
-  for (const auto& alert : said.alert()) out.alerts.push_back(alert.text());
-  for (const auto& value : said.status()) out.status.emplace_back(value.name(), value.text());
+  for (const auto& alert : in.alert()) out.alerts.push_back(alert.text());
+  for (const auto& value : in.status()) out.status.emplace_back(value.name(), value.text());
   return out;
 }
 
@@ -57,17 +57,17 @@ FromRobot read(const v1::Feed& message) {
     case v1::Feed::kSituation:
       return situation(message.situation());
     case v1::Feed::kTimeAnswer: {
-      const auto& said = message.time_answer();
-      return FeedProgress{said.has_stored() ? std::optional(Timestamp{said.stored_stamp_ns()}) : std::nullopt};
+      const auto& in = message.time_answer();
+      return FeedProgress{in.has_stored() ? std::optional(Timestamp{in.stored_stamp_ns()}) : std::nullopt};
     }
     case v1::Feed::kRefused:
       return FeedRefusal{{message.refused().stamp_ns()}, message.refused().why()};
     case v1::Feed::kWay: {
-      const auto& way = message.way();
-      return FeedTrajectory{{way.map_epoch(), way.map_revision()},
-                            way.constraints(),
-                            trajectory(way.stamp_ns(), way.t_map_body()),
-                            trajectory(way.map_stamp_ns(), way.t_world_body())};
+      const auto& trajectory_in = message.way();
+      return FeedTrajectory{{trajectory_in.map_epoch(), trajectory_in.map_revision()},
+                            trajectory_in.constraints(),
+                            trajectory(trajectory_in.stamp_ns(), trajectory_in.t_map_body()),
+                            trajectory(trajectory_in.map_stamp_ns(), trajectory_in.t_world_body())};
     }
     case v1::Feed::kEnded:
       return FeedEnd{};

@@ -8,7 +8,7 @@
 namespace tutti::program {
 namespace {
 
-constexpr int kWait_ms = 20;  // then it says what the robot has to say
+constexpr int kWait_ms = 20;  // then it sends what the robot has to send
 constexpr std::chrono::milliseconds kListensAgain{500};
 
 }  // namespace
@@ -36,7 +36,7 @@ Status LiveFeed::listen() {
 
 void LiveFeed::run(const std::stop_token& stop) {
   while (!stop.stop_requested()) serve(kWait_ms);
-  for (int i = 0; i < 2; ++i) serve(0);  // what is still to be said
+  for (int i = 0; i < 2; ++i) serve(0);  // what is still to be sent
 }
 
 void LiveFeed::serve(int wait_ms) {
@@ -54,7 +54,7 @@ void LiveFeed::serve(int wait_ms) {
     if (!server_ || number != server_number_) return;  // it has thrown meanwhile
     if (is_ready) server_->finish(waiting);
     is_fed_ = server_->session().has_feeder();
-    const std::scoped_lock told(told_mutex_);
+    const std::scoped_lock report_lock(report_mutex_);
     feeder_ = server_->session().feeder();
   } catch (const std::exception& error) {
     forget_server(error.what());
@@ -78,17 +78,17 @@ bool LiveFeed::use(std::uint64_t& last, const std::function<void(FeedServer&)>& 
 void LiveFeed::forget_server(const char* why) {
   is_fed_ = false;
   server_.reset();
-  const std::scoped_lock lock(told_mutex_);
+  const std::scoped_lock lock(report_mutex_);
   thrown_ = why;
 }
 
 FeedSession::Feeder LiveFeed::feeder() const {
-  const std::scoped_lock lock(told_mutex_);
+  const std::scoped_lock lock(report_mutex_);
   return feeder_;
 }
 
 std::string LiveFeed::take_thrown() {
-  const std::scoped_lock lock(told_mutex_);
+  const std::scoped_lock lock(report_mutex_);
   return std::exchange(thrown_, {});
 }
 

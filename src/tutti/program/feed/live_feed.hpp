@@ -58,7 +58,7 @@ class LiveFeed {
   std::unique_ptr<FeedServer> server_;
   std::uint64_t server_number_ = 0;
   std::atomic<bool> is_fed_ = false;
-  mutable std::mutex told_mutex_;  // guards what follows
+  mutable std::mutex report_mutex_;  // guards what follows
   std::string thrown_;
   FeedSession::Feeder feeder_;
   std::jthread thread_;

@@ -25,7 +25,7 @@ namespace live_feed_test {
 
 constexpr int kSamples = 300;
 
-/// Says bytes to the feed, and waits for what is said to that.
+/// Sends bytes to the feed, and waits for the answers.
 class Client {
  public:
   explicit Client(const std::string& path) : file_(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
@@ -124,7 +124,7 @@ TEST(LiveFeed, AnswersWhileTheRobotIsStuck) {
 /// Through the socket: one stamp in the future costs that one sample, and a clock that goes back a second or two.
 TEST(LiveFeed, OutlivesStampsInTheFutureAndAClockThatGoesBack) {
   for (const double rate : {1.0, 200.0}) {
-    const Trajectory way = robot::test::drifting_odometry(1700);
+    const Trajectory trajectory = robot::test::drifting_odometry(1700);
     const std::string path = path_of("live_feed_clock_");
     test::NodeTarget robot;
     std::unique_ptr<LiveFeed> feed = opened(path, robot);
@@ -144,14 +144,14 @@ TEST(LiveFeed, OutlivesStampsInTheFutureAndAClockThatGoesBack) {
     std::string alerts;
     std::size_t next = 0;
     const auto is_taken = [&](Timestamp stamp) {
-      client.say(test::odometry({stamp, way[next++].pose}, robot::test::kStepCovariance));
+      client.say(test::odometry({stamp, trajectory[next++].pose}, robot::test::kStepCovariance));
       while (true) {
-        const v1::Feed said = client.hear();
-        for (const auto& alert : said.situation().alert()) alerts += alert.text() + "\n";
-        if (said.has_correction() || said.has_refused()) return said.has_correction();
+        const v1::Feed heard = client.hear();
+        for (const auto& alert : heard.situation().alert()) alerts += alert.text() + "\n";
+        if (heard.has_correction() || heard.has_refused()) return heard.has_correction();
       }
     };
-    const Timestamp start = way[0].stamp;
+    const Timestamp start = trajectory[0].stamp;
     const auto seconds = [&](double from_s, double for_s) {
       int taken = 0;
       for (int i = 0; i < for_s * rate; ++i) taken += is_taken(start + (from_s + i / rate)) ? 1 : 0;
@@ -176,8 +176,8 @@ TEST(LiveFeed, OutlivesStampsInTheFutureAndAClockThatGoesBack) {
   }
 }
 
-/// The way that a robot corrects comes to who asked for it, to the bit.
-TEST(LiveFeed, TellsTheCorrectedWayToAFeedClient) {
+/// The trajectory that a robot corrects comes to who asked for it, to the bit.
+TEST(LiveFeed, SendsTheCorrectedTrajectoryToAFeedClient) {
   const std::string path = path_of("live_feed_way_");
   test::NodeTarget robot;
   std::unique_ptr<LiveFeed> feed = opened(path, robot);
@@ -187,28 +187,29 @@ TEST(LiveFeed, TellsTheCorrectedWayToAFeedClient) {
   ASSERT_TRUE(client.has_value()) << client.error().message;
   const auto hear = [&] {
     while (true) {
-      const auto said = (*client)->hear(10'000);
-      if (!said || !*said) return FromRobot{FeedOther{}};
-      if (!std::holds_alternative<FeedOther>(**said) && !std::holds_alternative<FeedSituation>(**said)) return **said;
+      const auto heard = (*client)->hear(10'000);
+      if (!heard || !*heard) return FromRobot{FeedOther{}};
+      if (!std::holds_alternative<FeedOther>(**heard) && !std::holds_alternative<FeedSituation>(**heard))
+        return **heard;
     }
   };
   EXPECT_EQ(std::get<FeedWelcome>(hear()).robot, "alpha");
   EXPECT_TRUE(feed->front().wants_trajectory());
-  const Trajectory way = robot::test::drifting_odometry(30);
-  feed->front().say({{2, 7}, 5, way, {way[3], way[9]}});
+  const Trajectory trajectory = robot::test::drifting_odometry(30);
+  feed->front().say({{2, 7}, 5, trajectory, {trajectory[3], trajectory[9]}});
   const auto heard = std::get<FeedTrajectory>(hear());
   EXPECT_EQ(heard.map_age, (std::pair<std::uint64_t, std::uint64_t>{2, 7}));
   EXPECT_EQ(heard.constraints, 5U);
-  EXPECT_EQ(heard.corrected, way);
-  EXPECT_EQ(heard.map, (Trajectory{way[3], way[9]}));
-  EXPECT_TRUE((*client)->say(node::OdometrySample{way[0].stamp, way[0].pose, Matrix6d::Zero()}));
-  EXPECT_EQ(std::get<FeedAnswer>(hear()).stamp, way[0].stamp);
+  EXPECT_EQ(heard.corrected, trajectory);
+  EXPECT_EQ(heard.map, (Trajectory{trajectory[3], trajectory[9]}));
+  EXPECT_TRUE((*client)->say(node::OdometrySample{trajectory[0].stamp, trajectory[0].pose, Matrix6d::Zero()}));
+  EXPECT_EQ(std::get<FeedAnswer>(hear()).stamp, trajectory[0].stamp);
   EXPECT_TRUE(other.hear().has_welcome());
   EXPECT_TRUE(other.hear().has_situation());
-  EXPECT_TRUE(other.hear().has_correction());  // and no way
+  EXPECT_TRUE(other.hear().has_correction());  // and no trajectory
 }
 
-/// What a robot program that ends has still to say is said.
+/// What a robot program that ends has still to send is sent.
 TEST(LiveFeed, SaysTheEndBeforeItGoes) {
   const Trajectory odometry = robot::test::drifting_odometry(3);
   const std::string path = path_of("live_feed_end_");
@@ -242,9 +243,9 @@ intake::RawMessage odometry_at(int i, std::string& bytes) {
   return {"/odom", "nav_msgs/msg/Odometry", "cdr", bytes};
 }
 template <class Kind>
-int count(const std::vector<FromRobot>& said) {
+int count(const std::vector<FromRobot>& heard) {
   return static_cast<int>(
-      std::ranges::count_if(said, [](const auto& one) { return std::holds_alternative<Kind>(one); }));
+      std::ranges::count_if(heard, [](const auto& one) { return std::holds_alternative<Kind>(one); }));
 }
 
 /// In the robot's process, without the socket: answered at once, while others listen at the socket.
@@ -262,10 +263,10 @@ TEST(LocalClient, FeedsInMemoryAndOthersListen) {
   std::string bytes;
   for (int i = 0; i < 10; ++i) {
     (*client)->say(odometry_at(i, bytes));
-    const auto said = (*client)->hear().value();
-    EXPECT_EQ(count<FeedAnswer>(said), 1);
-    EXPECT_EQ(count<FeedRaw>(said), 2);  // transform and pose
-    EXPECT_EQ(count<FeedNote>(said), i == 0 ? 1 : 0);
+    const auto heard = (*client)->hear().value();
+    EXPECT_EQ(count<FeedAnswer>(heard), 1);
+    EXPECT_EQ(count<FeedRaw>(heard), 2);  // transform and pose
+    EXPECT_EQ(count<FeedNote>(heard), i == 0 ? 1 : 0);
   }
   for (int i = 0; i < 10;) i += listener.hear().has_correction() ? 1 : 0;
   (*client)->say({"/odom", "nav_msgs/msg/Odometry", "cdr", "nonsense"});

@@ -60,9 +60,9 @@ Result<std::vector<FromRobot>> LocalClient::hear() {
   FrameReader reader;
   for (std::string_view left = bytes; !left.empty();) {
     const auto payload = reader.take(left);  // whole frames of our own
-    auto said = decode_from_robot(payload.value().value());
-    if (!said) return tl::unexpected(said.error());
-    out.push_back(std::move(*said));
+    auto message = decode_from_robot(payload.value().value());
+    if (!message) return tl::unexpected(message.error());
+    out.push_back(std::move(*message));
   }
   return out;
 }

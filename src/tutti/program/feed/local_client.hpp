@@ -12,11 +12,11 @@
 
 namespace tutti::program {
 
-/// A client of a live feed in the robot's own process: what it says is taken at once, and copied nowhere. Not for
+/// A client of a live feed in the robot's own process: what it sends is taken at once, and copied nowhere. Not for
 /// several threads at a time.
 class LocalClient {
  public:
-  /// `feed` must outlive the client. Fails when it takes no clients just then; when it refuses this one, hear() says
+  /// `feed` must outlive the client. Fails when it takes no clients just then; when it refuses this one, hear() reports
   /// why.
   static Result<std::unique_ptr<LocalClient>> join(LiveFeed& feed, const FeedHello& hello);
   ~LocalClient();
@@ -27,7 +27,7 @@ class LocalClient {
   void say(FeedEnd end);
   /// Uses what reads the messages of this client, then takes the inputs that are due.
   void use_intake(const std::function<void(intake::SensorIntake&)>& work);
-  /// What the robot has said since the last call. An error when the connection has ended.
+  /// What the robot has sent since the last call. An error when the connection has ended.
   Result<std::vector<FromRobot>> hear();
 
  private:

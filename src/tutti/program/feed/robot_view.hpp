@@ -12,7 +12,7 @@
 
 namespace tutti::program {
 
-/// Collects from a robot's node and its events what a live feed tells of the robot.
+/// Collects from a robot's node and its events what a live feed reports of the robot.
 class RobotView {
  public:
   /// `names`: of the other robots, as far as they are known.

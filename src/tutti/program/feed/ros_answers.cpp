@@ -46,10 +46,10 @@ void RosAnswers::hear(const FeedAnswer& answer, const Pose3& T_odom_body) {
   if (tail_.size() > kLongestTail) tail_.pop_front();
 }
 
-void RosAnswers::hear(const FeedTrajectory& way) {
-  way_ = way.corrected;
-  if (way_.empty()) return;
-  while (!tail_.empty() && tail_.front().stamp <= way_.back().stamp) tail_.pop_front();
+void RosAnswers::hear(const FeedTrajectory& trajectory) {
+  trajectory_ = trajectory.corrected;
+  if (trajectory_.empty()) return;
+  while (!tail_.empty() && tail_.front().stamp <= trajectory_.back().stamp) tail_.pop_front();
 }
 
 std::optional<std::string> RosAnswers::transform() {
@@ -75,7 +75,7 @@ std::string RosAnswers::path() const {
     out.poses.push_back({{stamp, map_}, bags::to_ros(T_map_body)});
     out.header.stamp = stamp;
   };
-  for (const auto& [stamp, pose] : way_) add(stamp, pose);
+  for (const auto& [stamp, pose] : trajectory_) add(stamp, pose);
   for (const auto& [stamp, pose] : tail_) add(stamp, (last_ ? last_->T_map_odom : Pose3{}) * pose);
   return bags::encode(out);
 }

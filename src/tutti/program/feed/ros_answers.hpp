@@ -24,7 +24,7 @@ class RosAnswers {
   RosAnswers(const std::string& odom, const std::string& map, double tolerance_s);
 
   void hear(const FeedAnswer& answer, const Pose3& T_odom_body);
-  void hear(const FeedTrajectory& way);
+  void hear(const FeedTrajectory& trajectory);
   void hear(std::vector<TeamMate> team_mates) { team_mates_ = std::move(team_mates); }
 
   /// TFMessage with map -> odom as of the last answer; nothing when that stamp was published already, because tf2 warns
@@ -32,7 +32,7 @@ class RosAnswers {
   std::optional<std::string> transform();
   /// PoseWithCovarianceStamped: where the body is on the map.
   [[nodiscard]] std::string pose() const;
-  /// Path: the way as the map corrects it, followed by the odometry since.
+  /// Path: the trajectory as the map corrects it, followed by the odometry since.
   [[nodiscard]] std::string path() const;
   /// MarkerArray of the team-mates whose place is known.
   [[nodiscard]] std::string team_mates() const;
@@ -46,8 +46,8 @@ class RosAnswers {
   double tolerance_s_;
   std::optional<FeedAnswer> last_;
   std::optional<Timestamp> said_;
-  Trajectory way_;                ///< T_map_body
-  std::deque<StampedPose> tail_;  ///< T_odom_body since the end of way_.
+  Trajectory trajectory_;         ///< T_map_body
+  std::deque<StampedPose> tail_;  ///< T_odom_body since the end of trajectory_.
   std::vector<TeamMate> team_mates_;
 };
 

@@ -20,12 +20,12 @@ TEST(RosAnswers, MapToOdomIsSaidOnceForEachStamp) {
   EXPECT_EQ(answers.map_frame(), "r1/map");
   EXPECT_FALSE(answers.transform());
   answers.hear(answer(1'000'000'000, {}), {});
-  const auto said = bags::decode_tf(answers.transform().value()).value();
-  ASSERT_EQ(said.size(), 1U);
-  EXPECT_EQ(said[0].header.frame_id, "r1/map");
-  EXPECT_EQ(said[0].child_frame_id, "r1/odom");
-  EXPECT_EQ(said[0].header.stamp.ns, 1'100'000'000);
-  EXPECT_EQ(said[0].translation, kMapOdom.translation);
+  const auto sent = bags::decode_tf(answers.transform().value()).value();
+  ASSERT_EQ(sent.size(), 1U);
+  EXPECT_EQ(sent[0].header.frame_id, "r1/map");
+  EXPECT_EQ(sent[0].child_frame_id, "r1/odom");
+  EXPECT_EQ(sent[0].header.stamp.ns, 1'100'000'000);
+  EXPECT_EQ(sent[0].translation, kMapOdom.translation);
   EXPECT_FALSE(answers.transform());
   answers.hear(answer(999'999'999, {}), {});
   EXPECT_FALSE(answers.transform());
@@ -37,7 +37,7 @@ TEST(RosAnswers, FramesAreMadeOfOdometrys) {
   EXPECT_EQ(RosAnswers("r1/odom", "world", 0.0).map_frame(), "world");
 }
 
-/// Small turns and shifts of T_map_odom, as many as there are, move the body as the covariance says.
+/// Small turns and shifts of T_map_odom, as many as there are, move the body by the covariance.
 TEST(RosAnswers, TheCovarianceIsThatOfTheBodyAboutTheMapsAxes) {
   const Pose3 T_odom_body{Eigen::Quaterniond(Eigen::AngleAxisd(1.0, Eigen::Vector3d(1, 2, 3).normalized())),
                           {10, -4, 2}};
@@ -50,21 +50,21 @@ TEST(RosAnswers, TheCovarianceIsThatOfTheBodyAboutTheMapsAxes) {
     Vector6d expected;
     const Eigen::AngleAxisd turn(moved.rotation * T_map_body.rotation.conjugate());
     expected << moved.translation - T_map_body.translation, turn.angle() * turn.axis();
-    const auto said = ros_covariance(step * step.transpose(), kMapOdom, T_map_body);
+    const auto sent = ros_covariance(step * step.transpose(), kMapOdom, T_map_body);
     for (int i = 0; i < 6; ++i)
       for (int j = 0; j < 6; ++j)
-        EXPECT_NEAR(said[static_cast<std::size_t>(6 * i + j)], expected[i] * expected[j], 1e-16) << k << i << j;
+        EXPECT_NEAR(sent[static_cast<std::size_t>(6 * i + j)], expected[i] * expected[j], 1e-16) << k << i << j;
   }
 }
 
-TEST(RosAnswers, ThePathIsTheCorrectedWayAndOdometrySince) {
+TEST(RosAnswers, ThePathIsTheCorrectedTrajectoryAndOdometrySince) {
   RosAnswers answers("odom", "", 0.0);
   const auto at = [](double x) { return Pose3{Eigen::Quaterniond::Identity(), {x, 0, 0}}; };
   for (int i = 0; i < 10; ++i) answers.hear(answer(i, at(i)), at(i));
   answers.hear(
       FeedTrajectory{.map_age = {1, 1}, .constraints = 1, .corrected = {{{0}, at(50)}, {{4}, at(54)}}, .map = {}});
   const std::string path = answers.path();
-  // header (8, "map"), count, then of each a header, seven numbers: 2 of the way, 5 to 9 of odometry
+  // header (8, "map"), count, then of each a header, seven numbers: 2 of the trajectory, 5 to 9 of odometry
   constexpr std::size_t kHead = 4 + 8 + 4 + 4 + 4, kPose = 8 + 4 + 4 + 56;
   EXPECT_NEAR(static_cast<double>(path.size()), static_cast<double>(kHead + 7 * kPose), 16.0);
 }

@@ -52,7 +52,7 @@ std::vector<FeedRaw> RosClient::hear(const FeedAnswer& answer, const Pose3& T_od
     if (frames)
       intake_.note(fmt::format("odometry comes: {} -> {}; map -> odom is {} -> {}", plain_text(frames->odom, kLongest),
                                plain_text(frames->body, kLongest), answers_->map_frame(), odom));
-    if (way_) answers_->hear(*way_);
+    if (trajectory_) answers_->hear(*trajectory_);
     answers_->hear(team_mates_);
   }
   answers_->hear(answer, T_odom_body);
@@ -62,9 +62,9 @@ std::vector<FeedRaw> RosClient::hear(const FeedAnswer& answer, const Pose3& T_od
   return out;
 }
 
-void RosClient::hear(const FeedTrajectory& way) {
-  way_ = way;
-  if (answers_) answers_->hear(way);
+void RosClient::hear(const FeedTrajectory& trajectory) {
+  trajectory_ = trajectory;
+  if (answers_) answers_->hear(trajectory);
 }
 
 std::vector<FeedRaw> RosClient::hear(const std::vector<TeamMate>& team_mates) {

@@ -19,7 +19,7 @@ class RosClient {
   /// The type of message by which a client asks for path().
   static constexpr const char* kPathType = "nav_msgs/msg/Path";
 
-  /// What `ros` does not say is as `of_mission` says. `newest` is the newest sample that the robot has. Fails when the
+  /// What `ros` leaves open is as in `of_mission`. `newest` is the newest sample that the robot has. Fails when the
   /// topics that it names cannot be those of a robot's cameras.
   static Result<std::unique_ptr<RosClient>> make(intake::SensorConfig of_mission, FeedRos ros,
                                                  const std::optional<Timestamp>& newest);
@@ -30,13 +30,13 @@ class RosClient {
   Result<std::optional<intake::Input>> next() { return intake_.next(wants_scan_); }
   [[nodiscard]] intake::SensorIntake& intake() { return intake_; }
   [[nodiscard]] const intake::SensorIntake& intake() const { return intake_; }
-  /// Tells whether this client, which comes after `before`, has the same cameras and IMU.
+  /// Whether this client, which comes after `before`, has the same cameras and IMU.
   [[nodiscard]] bool has_sensors_of(const FeedRos& before) const;
   [[nodiscard]] const FeedRos& said() const { return said_; }
 
   /// What the client is to publish: where the robot is, as transform and pose.
   std::vector<FeedRaw> hear(const FeedAnswer& answer, const Pose3& T_odom_body);
-  void hear(const FeedTrajectory& way);
+  void hear(const FeedTrajectory& trajectory);
   /// The team-mates, if they are others than before.
   std::vector<FeedRaw> hear(const std::vector<TeamMate>& team_mates);
   /// The whole trajectory; nothing before there is any, and when it is too long for a message.
@@ -48,7 +48,7 @@ class RosClient {
   FeedRos said_;
   intake::SensorIntake intake_;
   std::optional<RosAnswers> answers_;
-  std::optional<FeedTrajectory> way_;  ///< Heard before there was any odometry.
+  std::optional<FeedTrajectory> trajectory_;  ///< Heard before there was any odometry.
   std::vector<TeamMate> team_mates_;
   bool wants_scan_ = false;
 };

@@ -10,7 +10,7 @@
 namespace tutti::program {
 
 /// Turns a robot's corrections into ones that it can drive by: T_map_odom follows the robot's own at a limited speed,
-/// or jumps and says so. The speed is measured at the body, because far from the origin of `odom` a small turn of
+/// or jumps and reports it. The speed is measured at the body, because far from the origin of `odom` a small turn of
 /// T_map_odom moves the body by metres.
 class SmoothMap {
  public:

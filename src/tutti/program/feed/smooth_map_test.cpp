@@ -57,7 +57,7 @@ RC_GTEST_PROP(SmoothMap, MovesNoFasterThanItMayOrSaysSo, ()) {
   RC_ASSERT((jumps > 0) == (correction_m > 1.0) || correction_m == 0.3);
 }
 
-TEST(SmoothMap, ArrivesInTheTimeThatTheWayTakes) {
+TEST(SmoothMap, ArrivesInTheTimeThatTheDistanceTakes) {
   const FeedSettings settings{.blend_m_per_s = 0.2};
   SmoothMap map(settings, {});
   Pose3 target;

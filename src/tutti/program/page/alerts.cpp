@@ -36,8 +36,8 @@ Alert robot_alert(const MissionStatus::Robot& robot, const char* kind, const cha
 }
 
 /// When the robot was last heard is known, so that is when this began.
-void look_at_silence(const MissionStatus& status, const MissionStatus::Robot& robot, double limit_s,
-                     std::vector<Alert>& out) {
+void check_silence(const MissionStatus& status, const MissionStatus::Robot& robot, double limit_s,
+                   std::vector<Alert>& out) {
   if (robot.status.finished) return;
   if (!robot.last_seen) {
     out.push_back(robot_alert(robot, "unseen", "info", "not heard since the server started",
@@ -52,9 +52,9 @@ void look_at_silence(const MissionStatus& status, const MissionStatus::Robot& ro
   out.push_back(std::move(alert));
 }
 
-void look_at_robot(const MissionStatus& status, const MissionStatus::Robot& robot, double silent_s,
-                   std::vector<Alert>& out) {
-  look_at_silence(status, robot, silent_s, out);
+void check_robot(const MissionStatus& status, const MissionStatus::Robot& robot, double silent_s,
+                 std::vector<Alert>& out) {
+  check_silence(status, robot, silent_s, out);
   const NodeStatus& own = robot.status;
   const bool is_heard = robot.last_seen && status.time - *robot.last_seen < silent_s;
   if (!robot.conflict.empty())
@@ -137,7 +137,7 @@ std::vector<Alert> Alerts::of_status(const MissionStatus& status) {
   if (status.pending_jobs > kManyWaitingJobs)
     out.push_back(server_alert("jobs", "info", fmt::format("{} jobs wait for workers", status.pending_jobs),
                                "Closures come late. Start more workers (tutti worker)."));
-  for (const MissionStatus::Robot& robot : status.robots) look_at_robot(status, robot, silent_s_, out);
+  for (const MissionStatus::Robot& robot : status.robots) check_robot(status, robot, silent_s_, out);
   return dated(std::move(out), status_since_, status.time - Timestamp{});
 }
 

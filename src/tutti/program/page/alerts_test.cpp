@@ -49,7 +49,7 @@ TEST(Alerts, AMissionThatIsPlayedFasterWaitsAsMuchLonger) {
   EXPECT_EQ(silent_after_s(0.5), silent_after_s(1.0)) << "played slowly, statuses come as often";
 }
 
-TEST(Alerts, EveryTroubleIsToldWithWhenItBegan) {
+TEST(Alerts, EveryTroubleIsReportedWithWhenItBegan) {
   Alerts alerts;
   MissionStatus status = status_at(100.0, 99.0);
   MissionStatus::Robot& robot = status.robots.front();

@@ -25,15 +25,15 @@ std::string base64(const std::string& bytes) {
 
 std::optional<std::string> bytes_of_base64(const std::string& text) {
   std::string out;
-  unsigned held = 0, bits = 0;
+  unsigned pending = 0, bits = 0;
   for (const char letter : text) {
     if (letter == '=') break;
     const std::size_t value = kLetters.find(letter);
     if (value == std::string_view::npos) return std::nullopt;
-    held = ((held << 6U) | static_cast<unsigned>(value)) & 0xFFFFU;
+    pending = ((pending << 6U) | static_cast<unsigned>(value)) & 0xFFFFU;
     if (bits += 6; bits < 8) continue;
     bits -= 8;
-    out += static_cast<char>((held >> bits) & 0xFFU);
+    out += static_cast<char>((pending >> bits) & 0xFFU);
   }
   return out;
 }

@@ -12,7 +12,7 @@
 
 namespace tutti::page {
 
-/// What the page is told: a key, and its value as JSON; "null": there is no such thing any more. A later message of a
+/// What the page is sent: a key, and its value as JSON; "null": there is no such thing any more. A later message of a
 /// key replaces the earlier one, so a page that comes late needs the last of each. docs/page.md lists the keys.
 struct Message {
   std::string key;
@@ -27,7 +27,7 @@ std::string to_json(const Message& message);
 /// The last message of each key, in the order in which they came. Memory is bounded by what there is to show.
 class Board {
  public:
-  /// Takes the message, unless its value is what the board has; says whether.
+  /// Takes the message, unless its value is what the board has; returns whether.
   bool put(Message message);
   /// Takes the messages of all keys that begin with `prefix`: keys that are on the board and not among these end.
   void put_all(std::string_view prefix, std::vector<Message> messages, double time_s);

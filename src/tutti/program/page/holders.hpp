@@ -13,7 +13,7 @@ namespace tutti::page {
 /// nobody from anything, is stored nowhere, and ends by itself.
 class Holders {
  public:
-  static constexpr double kHold_s = 30.0;       ///< Pages say it again every 10 s.
+  static constexpr double kHold_s = 30.0;       ///< Pages send it again every 10 s.
   static constexpr std::size_t kMost = 100;     ///< People at a time.
   static constexpr std::size_t kLongest = 200;  ///< Bytes of a key.
 

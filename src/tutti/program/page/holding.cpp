@@ -13,10 +13,10 @@
 namespace tutti::page {
 namespace {
 
-/// With more parts than these nothing is said of any: the count takes a flow through all of them for each.
+/// With more parts than these nothing is computed for any: the count takes a flow through all of them for each.
 constexpr std::size_t kMostParts = 300;
 
-/// Submaps of one session without a gap are one part, which odometry holds together.
+/// Submaps of one session without a gap are one part, which odometry joins.
 struct Parts {
   std::map<SubmapId, std::size_t> of_submap;
   std::vector<std::size_t> submaps;  // how many

@@ -28,7 +28,7 @@ std::optional<std::string> bytes_of_data(const std::string& url) {
   return bytes_of_base64(url.substr(comma + kBase64.size()));
 }
 
-/// Nothing: the answer says why.
+/// Nothing: the answer has the reason.
 std::optional<MapMark> mark_of(const Site& site, const Visitor& visitor, const Json& body, Response& response) {
   const auto refuse = [&](int status, const std::string& why) {
     say(response, status, why);

@@ -28,9 +28,9 @@ std::map<std::string, json> only_marks(const std::map<std::string, json>& all) {
 TEST_F(Marks, AreThereForWhoComesLateAndAfterARestart) {
   start();
   events_with_map();
-  const auto [status, said] = ask(client(), "/api/mark", a_mark());
-  ASSERT_EQ(status, 200) << said;
-  const std::string id = said.at("id");
+  const auto [status, answer] = ask(client(), "/api/mark", a_mark());
+  ASSERT_EQ(status, 200) << answer;
+  const std::string id = answer.at("id");
   const auto before = only_marks(events());
   ASSERT_EQ(before.size(), 1U);
   const json& mark = before.at("mark/" + id);
@@ -54,14 +54,14 @@ TEST_F(Marks, APhotoIsWhatItsBytesSay) {
   for (const auto& [bytes, type] : {std::pair{kJpeg, "image/jpeg"}, {kPng, "image/png"}}) {
     json with_photo = a_mark("");
     with_photo["photo"] = data_url(bytes, "text/html");  // a type that it claims
-    const auto [status, said] = ask(client(), "/api/mark", with_photo);
-    ASSERT_EQ(status, 200) << said;
-    const std::string path = events().at("mark/" + said.at("id").get<std::string>()).at("photo");
+    const auto [status, answer] = ask(client(), "/api/mark", with_photo);
+    ASSERT_EQ(status, 200) << answer;
+    const std::string path = events().at("mark/" + answer.at("id").get<std::string>()).at("photo");
     const auto photo = client().Get(path);
     EXPECT_EQ(photo->body, bytes);
     EXPECT_EQ(photo->get_header_value("Content-Type"), type);
     EXPECT_EQ(photo->get_header_value("X-Content-Type-Options"), "nosniff");
-    ask(client(), "/api/unmark", {{"id", said.at("id")}});
+    ask(client(), "/api/unmark", {{"id", answer.at("id")}});
     EXPECT_EQ(client().Get(path)->status, 404);
   }
   EXPECT_EQ(client().Get("/api/photo/99999999999999999999")->status, 404) << "no number";
@@ -71,12 +71,12 @@ TEST_F(Marks, APhotoIsWhatItsBytesSay) {
 TEST_F(Marks, WhatIsNoneIsRefusedWithASentence) {
   start();
   events_with_map();
-  const auto refused = [&](const char* key, const json& value, const char* word) {
+  const auto refused = [&](const char* key, const json& value, const char* expected) {
     json bad = a_mark();
     bad[key] = value;
-    const auto [status, said] = ask(client(), "/api/mark", bad);
+    const auto [status, answer] = ask(client(), "/api/mark", bad);
     EXPECT_TRUE(status == 400 || status == 404) << status << " " << key;
-    EXPECT_NE(said.value("error", "").find(word), std::string::npos) << key << ": " << said;
+    EXPECT_NE(answer.value("error", "").find(expected), std::string::npos) << key << ": " << answer;
   };
   refused("submap", "9/9", "submap");
   refused("submap", 7, "");
@@ -102,9 +102,9 @@ TEST_F(Marks, AreAsManyAsAMapMayHave) {
   }
   start();
   events_with_map();
-  const auto [status, said] = ask(client(), "/api/mark", a_mark());
+  const auto [status, answer] = ask(client(), "/api/mark", a_mark());
   EXPECT_EQ(status, 400);
-  EXPECT_NE(said.value("error", "").find("500 marks"), std::string::npos) << said;
+  EXPECT_NE(answer.value("error", "").find("500 marks"), std::string::npos) << answer;
 }
 
 TEST_F(Marks, AreAnOperatorsAloneAndCarryTheProvedName) {
@@ -119,13 +119,13 @@ TEST_F(Marks, AreAnOperatorsAloneAndCarryTheProvedName) {
   mark["photo"] = data_url(kPng);
   EXPECT_EQ(ask(client(), "/api/mark", mark).first, 401);
   EXPECT_EQ(ask(client(), "/api/mark", mark, ours(vera)).first, 403);
-  const auto [status, said] = ask(client(), "/api/mark", mark, ours(anna));
-  ASSERT_EQ(status, 200) << said;
-  const json stored = events({{"Cookie", vera}}).at("mark/" + said.at("id").get<std::string>());
+  const auto [status, answer] = ask(client(), "/api/mark", mark, ours(anna));
+  ASSERT_EQ(status, 200) << answer;
+  const json stored = events({{"Cookie", vera}}).at("mark/" + answer.at("id").get<std::string>());
   EXPECT_EQ(stored.at("by"), "anna") << "whatever the page says";
   EXPECT_EQ(client().Get(stored.at("photo").get<std::string>())->status, 401);
   EXPECT_EQ(client().Get(stored.at("photo").get<std::string>(), {{"Cookie", vera}})->status, 200);
-  EXPECT_EQ(ask(client(), "/api/unmark", {{"id", said.at("id")}}, ours(vera)).first, 403);
+  EXPECT_EQ(ask(client(), "/api/unmark", {{"id", answer.at("id")}}, ours(vera)).first, 403);
 }
 
 }  // namespace mark_routes_test

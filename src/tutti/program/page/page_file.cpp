@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::string_view kPlace = R"(<script type="application/json" id="tutti-mission">)";
 
-/// JSON that a page can hold: no text in it ends the script.
+/// JSON that a page can contain: no text in it ends the script.
 void append_escaped(const std::string& json, std::string& out) {
   for (std::size_t i = 0; i < json.size(); ++i) {
     if (json[i] == '<')

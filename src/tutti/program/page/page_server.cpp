@@ -70,7 +70,7 @@ struct CertificateFiles {
     const auto& own = *static_cast<const CertificateFiles*>(files);
     if (SSL_use_certificate_chain_file(connection, own.certificate.c_str()) == 1)
       static_cast<void>(SSL_use_PrivateKey_file(connection, own.key.c_str(), SSL_FILETYPE_PEM));
-    ERR_clear_error();  // without files, what it began with holds
+    ERR_clear_error();  // without files, it keeps what it began with
     return 1;
   }
 };

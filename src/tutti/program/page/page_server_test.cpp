@@ -69,14 +69,14 @@ TEST_F(PageServer, ADecisionIsTheServersToTakeOrNot) {
   EXPECT_EQ(decisions_.front().second, "");
 }
 
-TEST_F(PageServer, TwoSubmapsAreLookedAtAndAClosureIsAddedByHand) {
+TEST_F(PageServer, TwoSubmapsAreComparedAndAClosureIsAddedByHand) {
   start();
   json closure;
   for (const auto& [key, value] : events_with_map())
     if (key.starts_with("closure/alpha") && key.find("bravo") != std::string::npos && value.at("state") == "accepted")
       closure = value;
   ASSERT_FALSE(closure.is_null());
-  // Asked for the other way round.
+  // Asked for in the opposite order.
   const auto [status, seen] = ask(client(), "/api/register", {{"from", closure.at("to")}, {"to", closure.at("from")}});
   ASSERT_EQ(status, 200) << seen;
   EXPECT_TRUE(seen.at("found"));
@@ -130,7 +130,7 @@ TEST_F(PageServer, TheMapWithAClosureIsShownAndNothingIsStored) {
   EXPECT_EQ(ask(client(), "/api/change", {{"look", "x"}}).first, 400);
 }
 
-TEST_F(PageServer, WhoLooksAtWhatIsToldToAll) {
+TEST_F(PageServer, WhoInspectsWhatIsSentToAll) {
   start();
   EXPECT_EQ(ask(client(), "/api/hold", {{"what", "robot/1"}, {"by", "anna"}}).first, 200);
   EXPECT_EQ(events().at("held"), json::parse(R"([{"by":"anna","what":"robot/1"}])"));
@@ -140,7 +140,7 @@ TEST_F(PageServer, WhoLooksAtWhatIsToldToAll) {
   EXPECT_EQ(events().at("held"), json::array());
 }
 
-TEST_F(PageServer, WhatCannotBeLookedAtIsSaid) {
+TEST_F(PageServer, WhatCannotBeInspectedIsReported) {
   start();
   events_with_map();
   const std::string first = to_string(map_->content.submaps.begin()->first);

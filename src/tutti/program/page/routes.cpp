@@ -158,7 +158,7 @@ class Routes {
     if (give(visitor, body, std::move(decision), response)) say(response, Json{{"name", seen->name}});
   }
 
-  /// Who looks at what; nothing waits for it.
+  /// Who inspects what; nothing waits for it.
   void hold(const Visitor& visitor, const Json& body, Response& response) {
     const std::string by = name_of(visitor, body), what = body.value("what", "");
     const double now_s = program::Clock::steady_s();
@@ -189,7 +189,7 @@ class Routes {
     say(response, out);
   }
 
-  /// Hands the operator's decision to the server; false: the answer says why it is not stored.
+  /// Hands the operator's decision to the server; false: the answer is why it is not stored.
   bool give(const Visitor& visitor, const Json& body, ClosureDecision decision, Response& response) {
     decision.by = plain_text(body.value("by", ""));
     decision.given_ns = static_cast<std::int64_t>(program::wall_clock_ns());

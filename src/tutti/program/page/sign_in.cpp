@@ -33,9 +33,9 @@ std::string SignIn::nonce(double now_s) {
   return out;
 }
 
-void SignIn::look(double now_s) {
+void SignIn::refresh(double now_s) {
   if (looked_s_ && now_s - *looked_s_ < kLookAgain_s) return;
-  if (const auto there = pki::Pki::open(pki_)) {  // while it is being changed, what was there before holds
+  if (const auto there = pki::Pki::open(pki_)) {  // while it is being changed, the state before counts
     const std::string now = utc_text(static_cast<std::int64_t>(program::wall_clock_ns()));
     members_.clear();
     for (const pki::Member& one : there->members())
@@ -45,7 +45,7 @@ void SignIn::look(double now_s) {
 }
 
 const pki::Member* SignIn::member(const std::string& key, double now_s) {
-  look(now_s);
+  refresh(now_s);
   const auto found = members_.find(key);
   return found == members_.end() ? nullptr : &found->second;
 }
@@ -85,7 +85,7 @@ Visitor SignIn::visitor(const std::string& token, double now_s) {
 
 Visitor SignIn::visitor(const pki::CertificateHolder& holder, double now_s) {
   const std::scoped_lock lock(mutex_);
-  look(now_s);
+  refresh(now_s);
   for (const auto& [key, one] : members_)
     if (is_for_people(one.user) && to_string(one.user) == holder.name && one.until == holder.until)
       return {one.user.name, true, false};

@@ -51,9 +51,9 @@ class SignIn {
     std::string key;
     double until_s = 0.0;
   };
-  /// Members with this key who are not revoked, as the folder said within the last second.
+  /// Members with this key who are not revoked, as in the folder within the last second.
   const pki::Member* member(const std::string& key, double now_s);
-  void look(double now_s);
+  void refresh(double now_s);
 
   std::filesystem::path pki_;
   std::mutex mutex_;

@@ -23,7 +23,7 @@ namespace tutti::page {
 /// wall clock, so a mission that is played `rate` times as fast waits as much longer.
 constexpr double silent_after_s(double rate) { return 10.0 * std::max(1.0, rate); }
 
-/// What the page is told first.
+/// What the page is sent first.
 struct Mission {
   std::string name;
   std::string description;
@@ -143,7 +143,7 @@ std::string evidence_text(const std::vector<Refusal>& evidence);
 
 /// The least number of accepted closures (pairs of submaps) without which a submap would no longer be joined to the
 /// part of its component with the most submaps; nothing for that part itself. Odometry of one session without a gap
-/// holds without closures. 1: it hangs on one closure.
+/// joins without closures. 1: it hangs on one closure.
 std::map<SubmapId, std::size_t> closures_holding(const server::SubmapSet& submaps, const server::MapEstimate& map);
 
 }  // namespace tutti::page

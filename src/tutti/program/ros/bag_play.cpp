@@ -33,7 +33,7 @@ void sleep_s(double wall_s) { std::this_thread::sleep_for(std::chrono::duration<
 
 bool is_of_all(const std::string& topic) { return topic == "/tf" || topic == "/tf_static" || topic == "/clock"; }
 
-/// ROS's publishers of what is said once offer it to who comes late.
+/// ROS's publishers of what is sent once offer it to who comes late.
 Qos qos_of(const bags::BagChannel& channel) {
   if (channel.topic.ends_with("/tf_static")) return kStaticTfQos;
   if (channel.type == "nav_msgs/msg/OccupancyGrid" || channel.topic.ends_with("/robot_description")) return kLatchedQos;
@@ -155,7 +155,7 @@ class Player {
 
   Status wait_for_subscribers() {
     const Clock::time_point begin = Clock::now();
-    double told_s = 0.0;
+    double reported_s = 0.0;
     std::set<std::string> missing;
     for (const std::string& topic : options_.wait_for) {
       const auto whole = resolve(topic, "");
@@ -168,9 +168,9 @@ class Player {
     while (!stop_) {
       std::erase_if(missing, [this](const std::string& topic) { return writers_.at(topic)->readers() > 0; });
       if (missing.empty()) return {};
-      if (const double now_s = seconds_since(begin); now_s - told_s > kTellsAgain_s) {
+      if (const double now_s = seconds_since(begin); now_s - reported_s > kTellsAgain_s) {
         options_.say(fmt::format("nobody subscribes {} yet", fmt::join(missing, ", ")));
-        told_s = now_s;
+        reported_s = now_s;
       }
       sleep_s(kLongestSleep_s / 5);
     }

@@ -22,7 +22,7 @@ struct BagPlayOptions {
   double delay_s = 1.0;  ///< Wall time before the first message, in which subscribers discover the topics.
   double rate = 1.0;     ///< Speed, as a multiple of real time.
   bool clock = false;    ///< Also publish /clock, 40 times per second of wall time.
-  std::function<void(const std::string&)> say;  ///< Told what is left out, and what the player waits for.
+  std::function<void(const std::string&)> say;  ///< Gets what is left out, and what the player waits for.
 };
 
 struct BagPlayed {

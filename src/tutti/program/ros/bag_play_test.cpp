@@ -114,7 +114,7 @@ TEST_F(BagPlay, WhatCannotBePublishedIsLeftOutAndSaid) {
     EXPECT_NE(said_.find(part), std::string::npos) << part << "\n" << said_;
 }
 
-TEST_F(BagPlay, StopsWhenItIsToldTo) {
+TEST_F(BagPlay, StopsWhenAsked) {
   std::jthread stopper([this] {
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
     stop_ = true;

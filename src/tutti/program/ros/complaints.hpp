@@ -17,7 +17,7 @@ namespace tutti::ros {
 class Complaints {
  public:
   explicit Complaints(std::function<void(program::Level, const std::string&)> say) : say_(std::move(say)) {}
-  /// Notes an error; `what` says where it was, such as a topic. Nothing when `status` is none.
+  /// Notes an error; `what` is where it was, such as a topic. Nothing when `status` is none.
   void add(const std::string& what, const Status& status);
   /// Those since the last call, at most five, the newest last.
   std::vector<std::string> take();

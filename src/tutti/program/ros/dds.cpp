@@ -21,7 +21,7 @@ constexpr std::string_view kTopicPrefix = "rt/";
 constexpr std::string_view kTypeMiddle = "::msg::dds_::";
 constexpr std::uint32_t kDiscovered = 256;  // publications that are read at a time
 constexpr std::uint32_t kTaken = 64;        // messages
-/// Loopback may not have multicast, so programs look for each other at the ports of the first hundred.
+/// Loopback may not have multicast, so programs find each other at the ports of the first hundred.
 constexpr const char* kLoopback =
     "<General><Interfaces><NetworkInterface address='127.0.0.1'/></Interfaces><AllowMulticast>false</AllowMulticast>"
     "</General><Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>99</"
@@ -64,8 +64,8 @@ QosPointer to_dds(const Qos& qos, const std::string& type_hash) {
     dds_qset_durability_service(out.get(), 0, history, depth, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED,
                                 DDS_LENGTH_UNLIMITED);
   if (!type_hash.empty()) {
-    const std::string said = "typehash=" + type_hash + ";";
-    dds_qset_userdata(out.get(), said.data(), said.size());
+    const std::string user_data = "typehash=" + type_hash + ";";
+    dds_qset_userdata(out.get(), user_data.data(), user_data.size());
   }
   return out;
 }
@@ -103,10 +103,10 @@ Status open_on_loopback(std::uint32_t domain) {
   if (made == DDS_RETCODE_PRECONDITION_NOT_MET) return {};
   if (made < 0) return failure(made, fmt::format("domain {} on loopback", domain));
   // Cyclone sends from 127.0.0.1 then, but receives at every address of the machine.
-  Status held = internal::hold_to_loopback(internal::sockets_of(domain));
-  if (held) return {};
+  Status bound = internal::hold_to_loopback(internal::sockets_of(domain));
+  if (bound) return {};
   dds_delete(made);
-  return in_context(fmt::format("DDS: domain {} on loopback", domain), held.error());
+  return in_context(fmt::format("DDS: domain {} on loopback", domain), bound.error());
 }
 
 dds_duration_t duration(double wall_s) { return static_cast<dds_duration_t>(std::llround(wall_s * 1e9)); }
@@ -202,7 +202,7 @@ Result<std::shared_ptr<Participant>> Participant::open(std::uint32_t domain, Rea
   if (reach == Reach::this_machine)
     if (Status ok = open_on_loopback(domain); !ok) return tl::unexpected(ok.error());
   const QosPointer qos(dds_create_qos());
-  constexpr std::string_view kEnclave = "enclave=/;";  // as ROS's own participants say
+  constexpr std::string_view kEnclave = "enclave=/;";  // as ROS's own participants send it
   dds_qset_userdata(qos.get(), kEnclave.data(), kEnclave.size());
   const dds_entity_t entity = dds_create_participant(domain, qos.get(), nullptr);
   if (entity < 0)
@@ -235,7 +235,7 @@ Result<std::unique_ptr<Writer>> Participant::writer(const std::string& topic_nam
   const auto made = topic(topic_name, type, of);
   if (!made) return tl::unexpected(made.error());
   const dds_entity_t entity = dds_create_writer(entity_, *made, to_dds(qos, type_hash).get(), nullptr);
-  dds_delete(*made);  // the writer holds it
+  dds_delete(*made);  // the writer keeps it
   if (entity < 0) return failure(entity, "publisher of " + topic_name);
   return std::unique_ptr<Writer>(new Writer(shared_from_this(), entity, of));
 }

@@ -16,7 +16,7 @@ Status resolve(intake::ImagesConfig& config, const std::string& name_space);
 
 /// Published topics that may be the robot's cameras and their depth, in the order of their names: those that `config`
 /// names, or all that have a CameraInfo beside them (of which a compressed topic counts only where there is no
-/// other). Which is which tell their messages. Where one camera is named, the others may be its depth. None while those
+/// other). Their messages show which is which. Where one camera is named, the others may be its depth. None while those
 /// that are named are not all published; an error when two cameras that are named are one.
 Result<std::vector<intake::CameraTopics>> find_images(std::span<const Publication> published,
                                                       const intake::ImagesConfig& config);

@@ -76,7 +76,7 @@ TEST(ImageTopics, DepthIsFoundAmongTheOthersOrNamed) {
   config.with_depth = false;
   EXPECT_EQ(names(find_images(published, config)), std::vector<std::string>{"/r/color/image_raw"});
   config.images = {};
-  EXPECT_EQ(names(find_images(published, config)), both);  // which is the camera say their messages
+  EXPECT_EQ(names(find_images(published, config)), both);  // their messages show which is the camera
 }
 
 }  // namespace image_topics_test

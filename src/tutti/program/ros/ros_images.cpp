@@ -14,7 +14,7 @@
 namespace tutti::ros {
 namespace {
 
-constexpr double kLook_s = 0.5;  // what is published together is discovered together
+constexpr double kCheck_s = 0.5;  // what is published together is discovered together
 
 /// "sensor_msgs/msg/Image and CompressedImage that are published: /a, /b"
 std::string images_of(const std::vector<Publication>& published) {
@@ -35,7 +35,7 @@ RosImages::RosImages(Options options, std::shared_ptr<Participant> participant, 
 
 void RosImages::look(program::LocalClient& client) {
   const double now_s = program::Clock::steady_s();
-  if (now_s - looked_s_ < kLook_s) return;
+  if (now_s - looked_s_ < kCheck_s) return;
   looked_s_ = now_s;
   if (readers_.empty())
     find(client, now_s);
@@ -77,7 +77,7 @@ Status RosImages::subscribe(const std::vector<intake::CameraTopics>& topics, con
     readers.push_back(std::move(*made));
     return {};
   };
-  constexpr int kImagesDepth = 10, kImuDepth = 2000;  // how long this thread may be held up
+  constexpr int kImagesDepth = 10, kImuDepth = 2000;  // how long this thread may be blocked
   for (const intake::CameraTopics& topic : topics) {
     if (Status ok = add(topic.info, bags::kCameraInfoType, kImagesDepth); !ok) return ok;
     const char* const type = topic.is_compressed ? bags::kCompressedType : bags::kImageType;

@@ -20,19 +20,19 @@ class RosImages {
   struct Options {
     intake::ImagesConfig config;
     bool lossless = false;  ///< RosRobotOptions::lossless
-    /// After so long without cameras, or without what they need, `say` is told so.
+    /// After so long without cameras, or without what they need, `say` gets a line on it.
     double patience_s = 5.0;
     std::function<void(program::Level, const std::string&)> say;
   };
   /// `complaints` must live as long as this.
   RosImages(Options options, std::shared_ptr<Participant> participant, Complaints& complaints);
 
-  /// Looks for topics, until cameras are subscribed, and tells the robot which they are; after that, which of them it
+  /// Finds topics, until cameras are subscribed, and informs the robot which they are; after that, which of them it
   /// uses. To be called often.
   void look(program::LocalClient& client);
   /// Visits everything that is subscribed.
   void take(const std::function<void(Reader&)>& take) const;
-  /// The robot must be told again.
+  /// The robot must be informed again.
   void begin_again() { readers_.clear(); }
 
  private:

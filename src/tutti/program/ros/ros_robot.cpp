@@ -29,7 +29,7 @@ constexpr double kWait_s = 0.02;
 constexpr double kJoinsAgain_s = 0.1;
 constexpr double kEachSecond_s = 1.0;
 // Where nothing may be lost:
-constexpr int kSilentTurns = 50;     // after so many in a row without a message, a second, no sensor says more
+constexpr int kSilentTurns = 50;     // after so many in a row without a message, a second, no sensor sends more
 constexpr std::size_t kAtOnce = 20;  // messages of a topic: the robot may be behind
 
 Qos in_qos(bool lossless, int depth) { return {.reliable = lossless, .latched = false, .depth = lossless ? 0 : depth}; }
@@ -66,10 +66,10 @@ class Robot final : public RosRobot {
   void look_for_odometry();
   void publish_diagnostics();
 
-  // What a robot says, by kind.
+  // What a robot sends, by kind.
   void note(const program::FeedAnswer& answer);
   void note(const program::FeedRaw& message) { topics_.publish(message); }
-  void note(const program::FeedNote& said) { options_.say(Level::info, said.text); }
+  void note(const program::FeedNote& message) { options_.say(Level::info, message.text); }
   void note(const program::FeedSituation& situation) { situation_ = situation; }
   void note(const program::FeedRefusal& refused) { complain("the robot refuses", ErrorCode::invalid, refused.why); }
   void note(const program::FeedOver& over) { complain("the robot ends the connection", ErrorCode::io, over.why); }
@@ -138,7 +138,7 @@ Status Robot::subscribe() {
     out = std::move(*made);
     return {};
   };
-  constexpr int kOdometryDepth = 1000, kFixesDepth = 100;  // how long this thread may be held up
+  constexpr int kOdometryDepth = 1000, kFixesDepth = 100;  // how long this thread may be blocked
   const Qos tf = by_tf() && options_.lossless ? in_qos(true, 0) : kTfQos;
   if (Status ok = make(tf_static_, "/tf_static", bags::kTfType, kStaticTfQos); !ok) return ok;
   if (Status ok = make(tf_, "/tf", bags::kTfType, tf); !ok) return ok;
@@ -156,9 +156,9 @@ Status Robot::subscribe() {
 }
 
 /// A reader hears messages of one type only, and scans come in several: while nobody publishes what this one hears, it
-/// gives way to one of the type that somebody does.
+/// is replaced by one of the type that somebody does.
 Status Robot::subscribe_points() {
-  constexpr int kDepth = 10;  // how long this thread may be held up
+  constexpr int kDepth = 10;  // how long this thread may be blocked
   if (options_.points.empty() || (points_ && points_->writers() > 0)) return {};
   const auto name = resolve(options_.points, options_.name_space);
   std::string type = points_ ? points_->type() : std::string(bags::kScanTypes.front().name);
@@ -249,7 +249,7 @@ void Robot::hold_odometry(bool holds) {
   client_->use_intake([&](intake::SensorIntake& intake) { intake.hold_odometry(holds && points_, holds && images_); });
 }
 
-/// What waits when nothing more comes goes without. Turns are counted and not seconds: a thread that was held up has
+/// What waits when nothing more comes goes without. Turns are counted and not seconds: a thread that was blocked has
 /// messages before it. What comes afterwards waits as before.
 void Robot::release_odometry() {
   silent_turns_ = is_silent_turn_ ? silent_turns_ + 1 : 0;
@@ -274,7 +274,7 @@ void Robot::hear() {
     options_.say(Level::debug, all.error().message);
     return client_.reset();
   }
-  for (const program::FromRobot& said : *all) std::visit([this](const auto& what) { note(what); }, said);
+  for (const program::FromRobot& message : *all) std::visit([this](const auto& what) { note(what); }, message);
 }
 
 void Robot::note(const program::FeedAnswer& answer) {

@@ -28,7 +28,7 @@ struct RosRobotOptions {
   /// the robot when it is behind, and holds odometry back until the scans before it have arrived.
   bool lossless = false;
   double end_after_s = 0.0;  ///< The recording has ended after so long without odometry; 0: never.
-  double patience_s = 5.0;   ///< After so long without odometry, `say` is told so.
+  double patience_s = 5.0;   ///< After so long without odometry, `say` gets a line on it.
   std::string who;           ///< Name and version of this program, for /diagnostics.
   std::function<void(program::Level, const std::string&)> say;
 };

@@ -88,7 +88,7 @@ TEST_F(RosRobots, IsFedByTopicsAndAnswersOnTopics) {
   const auto camera = publisher("/alpha/image_raw", bags::kImageType),
              info = publisher("/alpha/camera_info", bags::kCameraInfoType);
   std::size_t scans = 0, samples = 0, fixes = 0, transforms = 0, poses = 0;
-  const auto look = [&] {
+  const auto read_all = [&] {
     while (const auto input = feed_->front().take(0.0)) {
       samples += std::holds_alternative<node::OdometrySample>(*input) ? 1 : 0;
       scans += std::holds_alternative<Scan>(*input) ? 1 : 0;
@@ -110,13 +110,13 @@ TEST_F(RosRobots, IsFedByTopicsAndAnswersOnTopics) {
     ASSERT_TRUE(receiver->write(fix(stamp, "alpha/gnss")));
     ASSERT_TRUE(odom->write(odometry(stamp, 0.1 * static_cast<double>(i), "alpha/odom", "alpha/base_link")));
     ASSERT_TRUE(::tutti::test::within(kPatience_s, [&] {
-      look();
+      read_all();
       return transforms == i + 1;
     }));
   }
   EXPECT_TRUE(::tutti::test::within(kPatience_s,
                                     [&] {
-                                      look();
+                                      read_all();
                                       return samples == kSamples && poses == kSamples && scans == kSamples &&
                                              fixes == kSamples;
                                     }))
@@ -178,7 +178,7 @@ TEST_F(RosRobots, ImagesAndImuAreFedOnceTheirPlaceIsKnown) {
   const auto still = publisher("/tf_static", kTf, kStaticTfQos);
   ASSERT_TRUE(is_heard(*odom) && is_heard(*camera) && is_heard(*info) && is_heard(*imu)) << said();
   std::size_t samples = 0, images = 0, sensors = 0;
-  const auto look = [&] {
+  const auto read_all = [&] {
     while (const auto input = feed_->front().take(0.0)) {
       samples += std::holds_alternative<node::OdometrySample>(*input) ? 1 : 0;
       if (const auto* taken = std::get_if<std::shared_ptr<const intake::FedImages>>(&*input)) {
@@ -198,7 +198,7 @@ TEST_F(RosRobots, ImagesAndImuAreFedOnceTheirPlaceIsKnown) {
       EXPECT_TRUE(imu->write(intake::test::imu(stamp)) &&
                   camera->write(bags::encode(intake::test::grey_image(stamp))) &&
                   info->write(bags::encode(intake::test::calibration())) && odom->write(odometry(stamp)));
-      look();
+      read_all();
       return done();
     });
   };
@@ -267,7 +267,7 @@ TEST_F(RosRobots, PublishersThatAreNotReliableAreSaid) {
       << said();
 }
 
-/// Where nothing may be lost, what a sensor says of a moment may come after its odometry, also as the first that is
+/// Where nothing may be lost, what a sensor sends of a time may come after its odometry, also as the first that is
 /// heard at all. Once nothing more comes, odometry waits no longer.
 TEST_F(RosRobots, OdometryWaitsForTheScansOfItsTime) {
   start({.lossless = true});

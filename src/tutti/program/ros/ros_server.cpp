@@ -100,16 +100,17 @@ class Viewer final : public program::MapViewer {
     const bags::RosHeader header{{static_cast<std::int64_t>(program::wall_clock_ns())}, options_.frame};
     const auto grid = grids::grid_of_map(map_, map.content, map.map, options_.grid);
     const auto points = grids::voxels_of_map(map_, map.content, map.map, options_.voxel_m, options_.grid.grid.mate_m);
-    std::string said;
-    const auto tell = [&](const Status& ok) {
-      if (!ok) said += (said.empty() ? "" : "; ") + ok.error().message;
+    std::string problems;
+    const auto note_problem = [&](const Status& ok) {
+      if (!ok) problems += (problems.empty() ? "" : "; ") + ok.error().message;
     };
-    tell(grid ? grid_->write(encode_grid(grid->grid, header)) : tl::unexpected(grid.error()));
+    note_problem(grid ? grid_->write(encode_grid(grid->grid, header)) : tl::unexpected(grid.error()));
     const Pose3 T_level_world = grid ? grid->T_level_world : Pose3{};
-    tell(points ? points_->write(encode_points(*points, T_level_world, header)) : tl::unexpected(points.error()));
-    if (said != said_ && !said.empty())
-      options_.say(Level::warning, fmt::format("map revision {} is not shown whole: {}", map.revision, said));
-    said_ = said;
+    note_problem(points ? points_->write(encode_points(*points, T_level_world, header))
+                        : tl::unexpected(points.error()));
+    if (problems != problems_ && !problems.empty())
+      options_.say(Level::warning, fmt::format("map revision {} is not shown whole: {}", map.revision, problems));
+    problems_ = problems;
     const double now_s = Clock::steady_s(), took_s = now_s - begin_s;
     not_before_s_ = std::max(begin_s + options_.period_s, now_s + kRestPerWork * took_s);
   }
@@ -122,7 +123,7 @@ class Viewer final : public program::MapViewer {
   std::mutex mutex_;  // of next_
   std::condition_variable_any changed_;
   std::shared_ptr<const mapfile::ShownMap> next_;
-  std::string said_;
+  std::string problems_;
   std::jthread thread_;
 };
 

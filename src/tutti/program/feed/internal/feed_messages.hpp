@@ -13,7 +13,7 @@ namespace tutti::program::internal {
 void write(const Pose3& T, v1::Feed::Pose& out);
 void write(const intake::FeedSensors& sensors, v1::Feed::Sensors& out);
 
-/// What a client says.
+/// What a client sends.
 v1::Feed message_of(const node::OdometrySample& sample);
 v1::Feed message_of(const Scan& scan);
 v1::Feed message_of(const intake::FedImages& images);

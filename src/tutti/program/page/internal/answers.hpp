@@ -21,7 +21,7 @@ using Json = nlohmann::ordered_json;
 /// An error, in a sentence.
 void say(Response& response, int status, const std::string& error);
 void say(Response& response, const Json& json);
-/// Whose decision or mark it is: what a credential proves, whatever the page says.
+/// Whose decision or mark it is: what a credential proves, whatever the page claims.
 std::string name_of(const Visitor& visitor, const Json& body);
 
 }  // namespace tutti::page

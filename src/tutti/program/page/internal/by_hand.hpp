@@ -22,14 +22,14 @@ class ByHand {
   struct Seen {
     std::shared_ptr<const mapfile::ShownMap> map;
     SubmapPair pair;
-    bool is_turned = false;  ///< The page has asked for them the other way round.
+    bool is_turned = false;  ///< The page has asked for them in the opposite order.
     std::string name;
     server::ClosureVerifier::Look look;
   };
-  /// Nothing: the answer says why.
+  /// Nothing: the answer has the reason.
   std::optional<Seen> look_at(const Json& body, Response& response);
 
-  /// Looks at two submaps.
+  /// Compares two submaps.
   void look(const Json& body, Response& response);
   /// The map as it would be with a closure that was looked at.
   void change(const Json& body, Response& response);

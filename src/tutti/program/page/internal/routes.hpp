@@ -27,7 +27,7 @@ namespace tutti::page {
 /// Decisions on their way from the page's threads to the server's.
 class DecisionInbox {
  public:
-  /// The server's answer will be in the future: why the word is not stored, or empty. Nothing when too many wait.
+  /// The server's answer will be in the future: why the decision is not stored, or empty. Nothing when too many wait.
   std::optional<std::future<std::string>> ask(ClosureDecision decision, std::string proved_name) {
     const std::scoped_lock lock(mutex_);
     if (asked_.size() >= kMost) return std::nullopt;
@@ -63,7 +63,7 @@ class LastMap {
   std::shared_ptr<const mapfile::ShownMap> map_;
 };
 
-/// Who holds what, for several threads.
+/// Who inspects what, for several threads.
 class HeldThings {
  public:
   template <class Call>

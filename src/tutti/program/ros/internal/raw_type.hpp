@@ -9,7 +9,7 @@ struct ddsi_serdata;
 struct ddsi_sertype;
 
 /// A DDS type of which Cyclone knows the name alone: its samples are bytes, which nobody but our own decoders
-/// (bags/ros_messages.hpp) looks into. So one decoder, with every length checked, serves bags and DDS, and a bag's
+/// (bags/ros_messages.hpp) decodes. So one decoder, with every length checked, serves bags and DDS, and a bag's
 /// topics can be played whatever they are of.
 namespace tutti::ros::internal {
 
