@@ -166,7 +166,7 @@ const BagChannel* BagFiles::own(const BagChannel* channel) {
 Result<std::optional<BagMessage>> BagFiles::taken(BagMessage message) {
   message.channel = own(message.channel);
   message.position.file = static_cast<std::uint32_t>(file_);
-  // No CDR begins so: rosbag2 says in metadata.yaml that messages are packed,
+  // No CDR begins so: rosbag2 states in metadata.yaml that messages are packed,
   // but that may be missing.
   if (message.channel->message_encoding == "cdr" && message.data.starts_with(internal::kZstdMagic)) {
     auto data = internal::unpack_message(message.data);

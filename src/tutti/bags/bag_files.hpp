@@ -20,7 +20,7 @@ namespace tutti::bags {
 class BagFiles final : public BagReader {
  public:
   /// At least one file. Fails when there is only one file and it cannot be opened. `notes` and `stated_messages` are
-  /// what the folder says, to be handed out by the functions of these names.
+  /// from the folder's metadata, to be handed out by the functions of these names.
   static Result<std::unique_ptr<BagReader>> open(std::vector<std::string> files, std::vector<std::string> notes,
                                                  std::optional<std::uint64_t> stated_messages);
 

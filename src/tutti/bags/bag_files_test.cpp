@@ -123,7 +123,7 @@ TEST_F(BagFolders, WithoutABagAreRefused) {
   EXPECT_EQ(open_bag((folder_ / "none").string()).error().code, ErrorCode::io);
 }
 
-/// The recorder was killed, a disk is going: pages that are there are read, or it is said why not.
+/// The recorder was killed, a disk is going: pages that are there are read, or the error is why not.
 TEST_F(BagFolders, SqliteFilesCutAnywhereAreSurvived) {
   std::vector<Sample> many = samples();
   for (Sample& sample : many) sample.data.append(3000, 'y');

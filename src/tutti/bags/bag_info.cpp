@@ -32,7 +32,7 @@ std::string frames_of(const RosOdometry& message) {
 std::string frames_of(const auto& message) { return message.header.frame_id; }
 
 /// What the first message of a topic shows.
-void look_at_first(TopicInfo& topic, const BagMessage& message) {
+void note_first(TopicInfo& topic, const BagMessage& message) {
   const auto encoding = to_encoding(message.channel->message_encoding);
   const auto decoded = encoding ? decode_message(topic.type, message.data, *encoding)
                                 : Result<RosMessage>(tl::unexpected(encoding.error()));
@@ -46,8 +46,8 @@ void look_at_first(TopicInfo& topic, const BagMessage& message) {
   if (const auto* const info = std::get_if<RosCameraInfo>(&*decoded)) topic.calibration = *info;
 }
 
-void look_at(TopicInfo& topic, const BagMessage& message) {
-  if (topic.count++ == 0 && topic.use != Use::nothing) look_at_first(topic, message);
+void note_message(TopicInfo& topic, const BagMessage& message) {
+  if (topic.count++ == 0 && topic.use != Use::nothing) note_first(topic, message);
   topic.first = std::min(topic.first, message.log_time);
   topic.last = std::max(topic.last, message.log_time);
 }
@@ -157,7 +157,7 @@ BagInfo inspect(BagReader& bag) {
     if (!*message) break;
     TopicInfo*& topic = of_channel[(*message)->channel];
     if (!topic) topic = &topic_of(*(*message)->channel);
-    look_at(*topic, **message);
+    note_message(*topic, **message);
     if (topic->use == Use::transforms) add_transforms(trees, out.robots, **message);
     ++out.messages;
   }

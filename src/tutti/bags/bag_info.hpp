@@ -40,7 +40,7 @@ struct BagInfo {
 BagInfo inspect(BagReader& bag);
 
 /// What Tutti would take from the bag, for people, a line per kind of input: "odometry     /odom (odom -> base_link)".
-/// All topics of a kind are named; where a kind is missing the line says what that means. A topic of depth is named
+/// All topics of a kind are named; where a kind is missing the line states what that means. A topic of depth is named
 /// with its camera, or with why it has none.
 std::vector<std::string> uses(const BagInfo& info);
 

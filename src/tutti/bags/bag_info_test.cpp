@@ -92,28 +92,28 @@ TEST(BagInfo, DepthIsNoCameraAndItsOwnIsNamed) {
     info.k = {500, 0, 320, 0, 500, 240, 0, 0, 1};
     if (has_info) add(name + "/camera_info", "sensor_msgs/msg/CameraInfo", encode(info));
   };
-  const auto said = [&](const char* row) {
+  const auto row_of = [&](const char* row) {
     for (const std::string& line : uses(info_of(data)))
       if (line.starts_with(row)) return line;
     return std::string("nothing");
   };
   add_images("/color", "mono8", 640, true);
-  EXPECT_EQ(said("depth"), "nothing");
+  EXPECT_EQ(row_of("depth"), "nothing");
   add_images("/raw", "32FC1", 320, true);
   add_images("/bare", "16UC1", 640, false);
-  EXPECT_EQ(said("images"), "images       /color/image_raw (optical)");
+  EXPECT_EQ(row_of("images"), "images       /color/image_raw (optical)");
   EXPECT_EQ(
-      said("depth"),
+      row_of("depth"),
       "depth        /bare/image_raw (optical, 16UC1, 640 x 480, no CameraInfo); /raw/image_raw (optical, 32FC1, 320 "
       "x 480); no depth is used: none is registered to /color/image_raw: /raw/image_raw: 320 x 480 "
       "pixels, expected 640 x 480 as of /color/image_raw");
   add_images("/aligned", "16UC1", 640, true);
-  EXPECT_TRUE(said("depth").ends_with("; /aligned/image_raw goes with /color/image_raw")) << said("depth");
+  EXPECT_TRUE(row_of("depth").ends_with("; /aligned/image_raw goes with /color/image_raw")) << row_of("depth");
   add_images("/second", "16UC1", 640, true);
   EXPECT_TRUE(
-      said("depth").ends_with("2 topics are registered to /color/image_raw, /aligned/image_raw and "
-                              "/second/image_raw; say which: tutti run --topic NAME.depth=/aligned/image_raw"))
-      << said("depth");
+      row_of("depth").ends_with("2 topics are registered to /color/image_raw, /aligned/image_raw and "
+                                "/second/image_raw; say which: tutti run --topic NAME.depth=/aligned/image_raw"))
+      << row_of("depth");
 }
 
 TEST(BagInfo, RobotsAreNamedAndSoAreTheContradictionsOfTheirTransforms) {
@@ -141,7 +141,7 @@ TEST(BagInfo, WithoutOdometryThatIsSaid) {
   EXPECT_EQ(uses(info_of(kMagic)).at(0), "odometry     missing: without odometry nothing can be made of this bag");
 }
 
-/// What the SOURCES file of shared/data/mcap says.
+/// As in the SOURCES file of shared/data/mcap.
 TEST(BagInfo, RealBagsHaveTheCountsOfTheirSources) {
   TUTTI_REQUIRE_SHARED("data/mcap");
   const std::map<std::string, std::uint64_t> of_file{

@@ -16,7 +16,7 @@ namespace tutti::bags {
 
 struct BagChannel {
   std::string topic;
-  std::string type;  ///< Message type in ROS 2's words, "nav_msgs/msg/Odometry"; empty if the file does not say.
+  std::string type;  ///< Message type in ROS 2's words, "nav_msgs/msg/Odometry"; empty if the file does not have it.
   std::string message_encoding;  ///< "cdr", or "ros1"
   friend auto operator<=>(const BagChannel&, const BagChannel&) = default;
 };
@@ -63,7 +63,7 @@ class BagReader {
   BagReader& operator=(BagReader&&) = default;
 };
 
-/// Opens a file (MCAP, SQLite as rosbag2 writes it, or a ROS 1 bag, told apart by their first bytes; each may be
+/// Opens a file (MCAP, SQLite as rosbag2 writes it, or a ROS 1 bag, distinguished by their first bytes; each may be
 /// compressed as a whole by zstd) or a folder of rosbag2 with one or several such files, with or without metadata.yaml.
 /// Messages that are compressed one by one (rosbag2's compression_mode MESSAGE) come out decompressed. A file that is
 /// compressed as a whole is decompressed into the system's folder for temporary files, one file at a time.

@@ -15,8 +15,8 @@ namespace tutti::bags {
 /// Whether a subscriber that comes late gets the last message (latched, as of /tf_static and maps) or not.
 enum class Durability { volatile_, latched };
 
-/// Writes ROS 2 messages into one MCAP file as rosbag2 does: a topic's record comes with its first message and says its
-/// type, the type's definition and the definition's hash. Errors are those of McapWriter.
+/// Writes ROS 2 messages into one MCAP file as rosbag2 does: a topic's record comes with its first message and states
+/// its type, the type's definition and the definition's hash. Errors are those of McapWriter.
 class RosWriter {
  public:
   struct Topic {
@@ -33,7 +33,7 @@ class RosWriter {
   /// have one type (checked).
   Status write(const std::string& topic, const std::string& type, Timestamp stamp, std::string_view cdr,
                Durability durability = Durability::volatile_);
-  /// Writes data that is no ROS message: `json`, an object as `schema` (JSON Schema) says. Foxglove and PlotJuggler
+  /// Writes data that is no ROS message: `json`, an object of `schema` (JSON Schema). Foxglove and PlotJuggler
   /// show it.
   Status write_json(const std::string& topic, const std::string& type, const std::string& schema, Timestamp stamp,
                     std::string_view json);

@@ -16,7 +16,7 @@ namespace tutti::bags {
 
 /// The intrinsics of the unrectified images (K and D; R and P are not read). Models: plumb_bob (4 or 5 numbers),
 /// rational_polynomial (8), equidistant or fisheye (4), double_sphere (2); no numbers mean no distortion. Other models
-/// and binned images are errors that say what was expected.
+/// and binned images are errors that name what was expected.
 Result<CameraModel> to_camera(const RosCameraInfo& message);
 
 /// The image as grey values: mono8 and 8UC1 as they are; rgb8, bgr8, rgba8, bgra8 and 8UC3 by their luminance; in a

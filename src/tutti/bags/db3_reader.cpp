@@ -45,7 +45,7 @@ Result<Db3Reader> Db3Reader::open(const std::string& path, std::int64_t most_byt
   if (const auto file = open_file(path); !file) return tl::unexpected(file.error());
   std::error_code failure;
   // What a recorder has left in a log beside the file belongs to it. SQLite reads a write-ahead log only where it may
-  // write beside it, and takes back what a journal holds only where it may write the file itself, which nobody here
+  // write beside it, and takes back what a journal contains only where it may write the file itself, which nobody here
   // does. A file without either is read without a trace.
   const auto has = [&](const char* end) {
     const auto size = std::filesystem::file_size(path + end, failure);

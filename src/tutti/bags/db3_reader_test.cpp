@@ -52,7 +52,7 @@ TEST_F(Db3, AMessageThatIsTooLongIsOneError) {
   EXPECT_EQ(read_all(Db3Reader::open(file_).value()).sizes.size(), 3U);
 }
 
-/// A file of a few kB can say that its messages are a thousand million zeros each.
+/// A file of a few kB can claim that its messages are a thousand million zeros each.
 TEST_F(Db3, WhatAFileComputesIsBoundedToo) {
   test::write_db3(file_, {{"/a", "pkg/msg/A", 1, "x"}});
   change(

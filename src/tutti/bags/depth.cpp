@@ -47,7 +47,7 @@ DepthImage converted(const RosImage& message, const ToMm& to_mm) {
   return out;
 }
 
-/// What the header chunk says that a PNG file begins with.
+/// The header chunk that a PNG file begins with.
 struct PngHeader {
   std::uint32_t width = 0, height = 0;
   bool is_grey16 = false;

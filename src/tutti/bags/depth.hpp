@@ -10,12 +10,12 @@
 #include "tutti/formats/image_file.hpp"
 #include "tutti/model/image.hpp"
 
-/// Depth images of ROS (REP 118), and how to tell them from a camera's.
+/// Depth images of ROS (REP 118), and how to distinguish them from a camera's.
 namespace tutti::bags {
 
 inline constexpr double kDepthUnit_m = 0.001;  ///< Unit of what to_depth() returns.
 
-/// What a message says of its image before it is decoded.
+/// What a message has on its image before it is decoded.
 struct ImageLook {
   std::string encoding, frame;
   std::uint32_t width_px = 0, height_px = 0;  ///< 0: of a file other than PNG.

@@ -32,7 +32,7 @@ RosImage image(const char* encoding, std::uint32_t width, std::uint32_t height, 
   return {.height = height, .width = width, .encoding = encoding, .step = step, .data = data};
 }
 
-TEST(BagDepth, IsToldByTheEncoding) {
+TEST(BagDepth, IsKnownByTheEncoding) {
   for (const char* const encoding : {"16UC1", "32FC1"}) EXPECT_TRUE(is_depth("/camera/image_raw", encoding));
   for (const char* const encoding : {"mono8", "rgb8", "8UC1", "16UC3", "jpeg", "", "mono16"})
     EXPECT_FALSE(is_depth("/camera/image_raw", encoding)) << encoding;

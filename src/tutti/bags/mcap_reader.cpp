@@ -53,7 +53,7 @@ Status McapReader::start() {
   if (magic != kMagic)
     return fail(ErrorCode::parse, "{}: byte 0: is no MCAP file, expected 89 'MCAP0' 0d 0a", file_.name());
   offset_ = defined_until_ = kMagic.size();
-  look_at_summary();
+  read_summary_notes();
   all_defined_ = summary_ && channels_.size() >= summary_->channels;
   return {};
 }
@@ -75,7 +75,7 @@ void McapReader::end(std::string note) {
 }
 
 /// Messages do not need the summary: one that is not there, or broken, is only noted.
-void McapReader::look_at_summary() {
+void McapReader::read_summary_notes() {
   const std::uint64_t tail = kRecordHeadBytes + kFooterBytes + kMagic.size();
   if (file_.size() < kMagic.size() + tail) return;
   std::string magic, footer;
@@ -361,7 +361,7 @@ Result<std::optional<BagMessage>> McapReader::next_of_file() {
   if (record->opcode != kChunk) return take(*record, record_);
   if (auto ok = enter_chunk(*record, cut); !ok) return tl::unexpected(ok.error());
   record_.clear();
-  record_.shrink_to_fit();  // the packed chunk is not held beside the unpacked one
+  record_.shrink_to_fit();  // the packed chunk is not kept beside the unpacked one
   return std::nullopt;
 }
 

@@ -20,7 +20,7 @@
 /// Reads MCAP files (https://mcap.dev/spec), which rosbag2 records since ROS 2 Iron.
 namespace tutti::bags {
 
-/// What the file's own statistics say.
+/// The file's own statistics.
 struct McapSummary {
   std::uint64_t messages = 0;
   std::uint32_t channels = 0;
@@ -30,10 +30,10 @@ struct McapSummary {
 };
 
 /// Reads files with or without chunks and with or without a summary. A chunk whose CRC does not match is an error. A
-/// file that is cut off is read up to the last whole message, also within its last chunk, and a note says so. Errors
-/// name byte and record. A record that cannot be costs what follows in its chunk, as nothing says where the next one
-/// begins. When records are well formed and wrong, as messages of an unknown channel are, the first of each channel
-/// or schema and chunk is an error, and the others are passed over.
+/// file that is cut off is read up to the last whole message, also within its last chunk, and a note reports it. Errors
+/// name byte and record. A record that cannot be costs what follows in its chunk, as nothing marks where the next one
+/// begins. When records are well formed and wrong, as messages of an unknown channel are, the first of each channel or
+/// schema and chunk is an error, and the others are passed over.
 class McapReader final : public BagReader {
  public:
   static Result<McapReader> open(const std::string& path);
@@ -62,7 +62,7 @@ class McapReader final : public BagReader {
   explicit McapReader(internal::FileBytes file) : file_(std::move(file)) {}
   static Result<McapReader> open(Result<internal::FileBytes> file);
   Status start();
-  void look_at_summary();
+  void read_summary_notes();
   Status read_summary(std::uint64_t begin, std::uint64_t end);
   Result<Record> record_at(std::uint64_t offset);
   Result<std::optional<BagMessage>> next_of_file();

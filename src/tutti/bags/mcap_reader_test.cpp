@@ -92,7 +92,7 @@ TEST_P(McapFiles, CutAnywhereKeepWhatIsBeforeTheCut) {
   EXPECT_EQ(most, all.size());
 }
 
-/// Also where only what stands before them says what they are.
+/// Also where only what stands before them defines what they are.
 TEST_P(McapFiles, MessagesAreComeBackTo) {
   const std::string whole = bag(GetParam());
   for (const std::size_t size : {whole.size(), whole.size() - 100}) {

@@ -75,7 +75,7 @@ TEST(McapWriter, WhatWasNotClosedIsReadUpToItsLastChunk) {
   EXPECT_EQ(read_all(reader).size(), 8U);  // two chunks; the first has the schema and the channels, too
 }
 
-/// Every index entry leads to the message that it says; every CRC is that of the bytes it is of.
+/// Every index entry leads to the message that it names; every CRC is that of the bytes it is of.
 TEST(McapWriter, IndexAndChecksumsAreOfWhatIsThere) {
   const std::vector<Entry> entries{{1, 30, "first"}, {2, 10, "second"}, {1, 20, "third"}};
   const std::string bytes = written(entries, {.zstd = false, .chunk_bytes = 1'000});

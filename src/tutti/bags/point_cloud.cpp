@@ -60,7 +60,7 @@ Result<RosPointField> field_of(const RosPointCloud& message, std::string_view na
   return *at;
 }
 
-/// Bytes of a row. Many drivers do not care what they say of a single row.
+/// Bytes of a row. Many drivers do not care what they state of a single row.
 Result<std::uint64_t> row_bytes(const RosPointCloud& message) {
   const std::uint64_t row = std::uint64_t{message.width} * message.point_step;
   if (message.height > 1 && message.row_step < row)

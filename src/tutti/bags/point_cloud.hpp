@@ -16,7 +16,7 @@ namespace tutti::bags {
 /// Points in the message's frame, m, and the unchanged times of the first field that formats::is_time_field() accepts
 /// (int32, uint32, float32 or float64). x, y, z are float32 or float64 at any offset, in either byte order; rows may be
 /// padded; points with a coordinate or a time that is not finite are left out, and so are those at 0, 0, 0, as which
-/// drivers of Livox and Ouster write beams without an echo. Errors say which field is missing, of another type or
+/// drivers of Livox and Ouster write beams without an echo. Errors name which field is missing, of another type or
 /// beyond its point, or how many bytes were expected.
 Result<formats::TimedCloud> to_timed_cloud(const RosPointCloud& message);
 

@@ -22,10 +22,10 @@ using FindTransform = std::function<std::optional<Pose3>(const std::string& a, c
 
 /// Fails unless the pixels of `depth` are those of `camera`: its images have the same size; its CameraInfo, where there
 /// is one, has the same matrix, each of fx, fy, cx and cy within 1 px; and its frame is the camera's, or one at the
-/// same place by the transforms, within 1 mm and 1 mrad. The error says value and expected value.
+/// same place by the transforms, within 1 mm and 1 mrad. The error has value and expected value.
 Status check_registered(const ImageTopic& depth, const ImageTopic& camera, const FindTransform& find);
 
-/// What was said of the topics to use, and how to say it.
+/// What was configured for the topics to use, and how to configure it.
 struct CameraWishes {
   bool are_named = false;   ///< The cameras; otherwise they were found by type.
   int most_cameras = 2;     ///< 1: of two cameras only the first is used.
@@ -41,7 +41,7 @@ struct CameraChoice {
 
 /// Uses one or two cameras; of all topics a first message has been seen. Where they were not named and a topic of depth
 /// is registered to one of them alone, this one is used, with its depth; where to several, or where there are more than
-/// two cameras, the error says which there are and the flag that decides. Depth is used with one camera, if exactly one
+/// two cameras, the error lists them and the flag that decides. Depth is used with one camera, if exactly one
 /// topic is registered to it.
 Result<CameraChoice> choose_cameras(std::span<const ImageTopic> cameras, std::span<const ImageTopic> depths,
                                     const CameraWishes& wishes, const FindTransform& find);

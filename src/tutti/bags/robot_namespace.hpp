@@ -22,7 +22,7 @@ bool is_static_tf(std::string_view topic);
 /// odometry.
 struct RobotNamespace {
   std::set<std::string> all;  ///< Namespaces of robots.
-  std::string own;            ///< Empty: the bag does not tell its robots apart, or this robot is none of them.
+  std::string own;            ///< Empty: the bag does not distinguish its robots, or this robot is none of them.
 
   /// True of names in the own namespace.
   [[nodiscard]] bool has(std::string_view name) const { return !own.empty() && namespace_of(name) == own; }

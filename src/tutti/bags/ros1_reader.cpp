@@ -22,7 +22,7 @@ std::string type_of_ros2(const std::string& type) {
   return slash == std::string::npos ? type : type.substr(0, slash) + "/msg" + type.substr(slash);
 }
 
-/// Calls `take(name, value)` for each field of a header; says what is wrong.
+/// Calls `take(name, value)` for each field of a header; reports what is wrong.
 template <class Take>
 std::optional<std::string> for_fields(std::string_view header, const Take& take) {
   Cursor cursor(header);
@@ -138,7 +138,7 @@ Result<Ros1Reader::Record> Ros1Reader::parse_header(std::string_view header, con
 }
 
 /// The file's next record; its data is in data_ unless nobody wants it. Nothing at the end. When the file ends within a
-/// record, cut_ is set and a note says so.
+/// record, cut_ is set and a note reports it.
 Result<std::optional<Ros1Reader::Record>> Ros1Reader::next_record() {
   const BagPosition position{.at = offset_};
   const auto cut_off = [&](std::string_view what, std::uint64_t wants, std::uint64_t left) {
@@ -233,7 +233,7 @@ Status Ros1Reader::enter_chunk(const Record& record) {
                                       std::exchange(chunk_, {}));
   if (!chunk) return fail_at(record.position, chunk.error().code, "chunk: {}", chunk.error().message);
   data_.clear();
-  data_.shrink_to_fit();  // the packed chunk is not held beside the unpacked one
+  data_.shrink_to_fit();  // the packed chunk is not kept beside the unpacked one
   chunk_ = std::move(*chunk);
   chunk_at_ = 0;
   chunk_offset_ = record.position.at;
@@ -289,7 +289,7 @@ Result<std::optional<BagMessage>> Ros1Reader::next() {
 }
 
 Status Ros1Reader::seek(const BagPosition& position) {
-  if (!all_defined_) {  // what stands before the message may say what it is: all is read once
+  if (!all_defined_) {  // what stands before the message may define what it is: all is read once
     while (true)
       if (const auto message = next(); message && !*message) break;
     all_defined_ = true;

@@ -20,8 +20,8 @@ namespace tutti::bags {
 
 /// Reads ROS 1 bags, format 2.0 (http://wiki.ros.org/Bags/Format/2.0), with chunks compressed by bz2, lz4 or not at
 /// all. Types get ROS 2's names. A bag that was never closed, or is cut off, is read up to the last whole message, also
-/// within its last chunk, and a note says so. Errors name the byte. A record that cannot be costs what follows in its
-/// chunk. When records are well formed and wrong, as messages of an unknown connection are, the first of each
+/// within its last chunk, and a note reports it. Errors name the byte. A record that cannot be costs what follows in
+/// its chunk. When records are well formed and wrong, as messages of an unknown connection are, the first of each
 /// connection and chunk is an error, and the others are passed over.
 class Ros1Reader final : public BagReader {
  public:
@@ -39,7 +39,7 @@ class Ros1Reader final : public BagReader {
 
  private:
   enum class Op : std::uint8_t { message = 2, bag_header, index, chunk, chunk_info, connection };
-  /// What a record's header says; fields that it lacks stay zero.
+  /// What a record's header has; fields that it lacks stay zero.
   struct Record {
     Op op{};
     std::uint32_t connection = 0;

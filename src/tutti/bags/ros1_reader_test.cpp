@@ -149,13 +149,13 @@ TEST(Ros1, ARealRosbagReadsWhatTestsWrite) {
     write_bytes(path, ros1_bag(samples(), compression, 4));
     FILE* const pipe = popen(fmt::format("{} '{}' 2>&1", command, path).c_str(), "r");
     ASSERT_NE(pipe, nullptr);
-    std::string said(10'000, '\0');
-    said.resize(fread(said.data(), 1, said.size(), pipe));
-    EXPECT_EQ(pclose(pipe), 0) << said;
+    std::string output(10'000, '\0');
+    output.resize(fread(output.data(), 1, output.size(), pipe));
+    EXPECT_EQ(pclose(pipe), 0) << output;
     for (const std::string& line :
          {fmt::format("compression: +{} \\[3/3 chunks", compression), std::string("messages: +9\n"),
           std::string("/a +6 msgs +: pkg/A"), std::string("/b +3 msgs +: pkg/B")})
-      EXPECT_TRUE(std::regex_search(said, std::regex(line))) << line << "\n" << said;
+      EXPECT_TRUE(std::regex_search(output, std::regex(line))) << line << "\n" << output;
   }
   std::filesystem::remove(path);
 }

@@ -127,7 +127,7 @@ struct Field {
   std::string type;  ///< One element's.
   std::string name;
   std::optional<std::uint64_t> length;  ///< An array's,
-  bool is_sequence = false;             ///< or it has as many as it says.
+  bool is_sequence = false;             ///< or it has as many as it states.
 };
 
 std::vector<Field> parse(std::string_view name) {

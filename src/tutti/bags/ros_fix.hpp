@@ -12,7 +12,7 @@ namespace tutti::bags {
 
 /// A position fix as a receiver's message states it.
 struct ReceivedFix {
-  PositionFix fix;  ///< The antenna is set to the body's origin, because the message does not tell where it is mounted.
+  PositionFix fix;  ///< The antenna is set to the body's origin, because the message does not have where it is mounted.
   std::string frame;       ///< Frame of the antenna, by frame_name().
   bool is_stated = false;  ///< The message states a covariance; otherwise fix.covariance is unknown_fix_covariance().
 };

@@ -46,7 +46,7 @@ TEST(RosFix, OfUnknownSurenessIsTakenAsUnsure) {
   }
 }
 
-TEST(RosFix, OfAReceiverWithoutOneIsNoneAndGarbageIsToldApart) {
+TEST(RosFix, OfAReceiverWithoutOneIsNoneAndGarbageIsDistinguished) {
   RosNavSatFix none = message(), nowhere = message(), skewed = message();
   none.status = -1;
   none.latitude_deg = nowhere.latitude_deg = std::numeric_limits<double>::quiet_NaN();

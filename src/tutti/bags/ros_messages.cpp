@@ -25,7 +25,7 @@ std::string text(Cursor& in, std::string_view what) {
   return std::string(bytes);
 }
 
-/// How many elements follow; no memory is taken for more than the bytes that are left can hold.
+/// How many elements follow; no memory is taken for more than the bytes that are left can contain.
 std::uint32_t sequence(Cursor& in, std::size_t least_bytes, std::string_view what) {
   const auto count = in.number<std::uint32_t>(what);
   if (count <= in.left() / least_bytes) return count;

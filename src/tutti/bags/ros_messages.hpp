@@ -123,7 +123,7 @@ struct RosPoseStamped {
   RosPose pose;
 };
 
-/// Each takes all bytes of one message, for CDR with the 4-byte encapsulation header. Errors say type, byte (counted
+/// Each takes all bytes of one message, for CDR with the 4-byte encapsulation header. Errors have type, byte (counted
 /// behind that header) and what was expected. Bytes may not be left over, except for up to three of padding in CDR.
 Result<RosOdometry> decode_odometry(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
 Result<std::vector<RosTransform>> decode_tf(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
@@ -140,7 +140,7 @@ Result<RosPoseStamped> decode_pose_stamped(std::string_view bytes, RosEncoding e
 /// the same time into header.stamp.
 Result<RosPointCloud> decode_livox(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
 
-/// The types of messages that hold the scan of a LiDAR.
+/// The types of messages that contain the scan of a LiDAR.
 struct ScanType {
   std::string_view name;
   Result<RosPointCloud> (*decode)(std::string_view bytes, RosEncoding encoding);

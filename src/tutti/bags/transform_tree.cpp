@@ -61,12 +61,12 @@ Status TransformTree::take(const RosTransform& transform, bool is_static) {
   const auto pose = to_pose(transform.translation, transform.rotation);
   const std::string parent = frame_name(transform.header.frame_id), child = frame_name(transform.child_frame_id);
   if (!pose) return in_context(fmt::format("transform {:.80} -> {:.80}", parent, child), pose.error());
-  const Joint said{parent, *pose, is_static};
-  const auto [at, is_new] = joints_.try_emplace(child, said);
+  const Joint joint{parent, *pose, is_static};
+  const auto [at, is_new] = joints_.try_emplace(child, joint);
   if (is_new) return {};
   if (!is_static && (at->second.parent != parent || !is_same(at->second.T_parent_child, *pose)))
     at->second.moves = true;
-  return check_agrees(child, at->second, said);
+  return check_agrees(child, at->second, joint);
 }
 
 /// Numbers are those of transforms that do not move: the others have new ones in each message.

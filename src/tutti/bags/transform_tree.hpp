@@ -17,7 +17,7 @@ namespace tutti::bags {
 std::string frame_name(const std::string& frame);
 
 /// A pose from a message: finite, within kMaxCoordinate_m, with a quaternion of norm 1 within 0.001, which is
-/// normalised. Errors say the value.
+/// normalised. Errors have the value.
 Result<Pose3> to_pose(const Eigen::Vector3d& translation, const Eigen::Quaterniond& rotation);
 
 /// Doubts a sensor that is more than 10 m away from the body: "800.0 m from .., as if in millimetres"; else empty.

@@ -11,7 +11,7 @@ namespace {
 
 double exceeded(double value, double degrees) { return Eigen::numext::igammac(0.5 * degrees, 0.5 * value); }
 
-/// The value at which a condition that holds below it and not above it ends.
+/// The value up to which a condition is true, which is false above it.
 template <class IsBelow>
 double bisect(double degrees, IsBelow is_below) {
   double low = 0.0;

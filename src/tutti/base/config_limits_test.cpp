@@ -48,7 +48,7 @@ TEST(ConfigLimits, LongValuesDoNotUnfold) {
 }
 
 /// 100,000 took 3.5 s, and as many lines.
-TEST(ConfigLimits, OfManyUnknownKeysTheFirstAreTold) {
+TEST(ConfigLimits, OfManyUnknownKeysTheFirstAreReported) {
   std::string text;
   for (int i = 0; i < 10'000; ++i) text += fmt::format("unknown_{}: 1\n", i);
   Few few;

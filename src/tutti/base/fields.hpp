@@ -29,7 +29,7 @@
 ///
 /// Types: bool, integers, double, std::string, enums with a range, Timestamp, RobotId, Pose3, Matrix6d (symmetric),
 /// structs with such a list, std::optional and std::vector of all these, and NumberSets by session (std::map).
-/// A struct that says `using InColumns = void;` and has scalars only is coded in columns where it is in a list: of each
+/// A struct that has `using InColumns = void;` and has scalars only is coded in columns where it is in a list: of each
 /// of its fields all values, side by side.
 namespace tutti {
 
@@ -49,7 +49,7 @@ struct FieldRule {
   bool always = false;   ///< On the wire also with its default; a pose or covariance must be there.
   bool is_flat = false;  ///< JSON has the fields of this struct beside those of its owner.
   /// On the wire the fields of this struct, or the columns of this list, are beside those of their owner, with this
-  /// field's number added to theirs; this number itself says whether an optional one is there.
+  /// field's number added to theirs; this number itself is whether an optional one is there.
   bool is_spread = false;
   const char* column = "";  ///< Heading in tables for people; empty: in none.
 };

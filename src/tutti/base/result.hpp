@@ -19,7 +19,7 @@ enum class ErrorCode {
   configuration,  ///< A setting is unknown or out of range.
 };
 
-/// Failure of the outside world. The message says what, where, the value, and what was expected.
+/// Failure of the outside world. The message has what, where, the value, and what was expected.
 struct Error {
   ErrorCode code = ErrorCode::invalid;
   std::string message;

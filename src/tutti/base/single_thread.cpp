@@ -25,7 +25,7 @@ int get_levels() {
   return get != nullptr ? get() : 1;
 }
 
-/// OpenBLAS's number of threads, and how many hold it at 1.
+/// OpenBLAS's number of threads, and how many keep it at 1.
 class BlasThreads {
  public:
   void hold() {

@@ -11,7 +11,7 @@
 namespace tutti {
 
 /// Nanoseconds since the Unix epoch, signed, so that differences never wrap. Subtract first, convert to seconds after:
-/// a double holds a time since the epoch only to about 256 ns.
+/// a double has a time since the epoch only to about 256 ns.
 struct Timestamp {
   std::int64_t ns = 0;
   friend auto operator<=>(const Timestamp&, const Timestamp&) = default;

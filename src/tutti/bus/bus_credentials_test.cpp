@@ -35,7 +35,7 @@ TEST(BusCredentialsTest, WhatIsWrittenIsRead) {
   EXPECT_EQ(to_string(*alpha().known), "robot alpha");
 }
 
-/// And errors never say what is in it.
+/// And errors never show what is in it.
 TEST(BusCredentialsTest, AFileThatLacksALineIsRefused) {
   const std::string whole = credentials_text(alpha());
   for (std::size_t begin = whole.find('\n') + 1; begin < whole.size();) {

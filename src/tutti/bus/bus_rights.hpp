@@ -30,7 +30,7 @@ struct KeyedUser {
 };
 /// The blocks `authorization` and `accounts` of nats-server's configuration: these users of one mission with their
 /// rights. Streams are in an account that only the server's own user is in. Members have another one, from which what
-/// they may publish passes, and nothing else: whoever publishes or asks says where the bus answers, the bus does not
+/// they may publish passes, and nothing else: whoever publishes or asks chooses where the bus answers, the bus does not
 /// check that subject against their rights, and an empty answer at `$JS.API.STREAM.DELETE.X` removes a stream.
 std::string authorization(const std::string& mission, const std::vector<KeyedUser>& users);
 

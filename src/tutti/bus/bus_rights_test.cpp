@@ -36,13 +36,13 @@ TEST(BusRightsTest, ARobotWritesAsItselfAndReadsWhatIsItsOwn) {
 }
 
 TEST(BusRightsTest, AnOperatorDecidesUnderOneName) {
-  const Envelope word{Endpoint::viewer(1), Endpoint::server(), MessageKind::decision, "id", {}, "anna"};
-  EXPECT_TRUE(may(kAnna, BusRight::To::publish, subject_of("cave", word)));
-  EXPECT_EQ(address_of(subject_of("cave", word))->user, "anna");
+  const Envelope decision{Endpoint::viewer(1), Endpoint::server(), MessageKind::decision, "id", {}, "anna"};
+  EXPECT_TRUE(may(kAnna, BusRight::To::publish, subject_of("cave", decision)));
+  EXPECT_EQ(address_of(subject_of("cave", decision))->user, "anna");
   for (const BusRight& right : bus_rights()) {
-    const bool is_word = std::string(right.subject).ends_with(".word");
-    EXPECT_EQ(is_word, std::string(right.subject).find("{name}") != std::string::npos) << right.subject;
-    EXPECT_TRUE(!is_word || right.role == BusRole::operates) << right.subject;
+    const bool is_decision = std::string(right.subject).ends_with(".word");
+    EXPECT_EQ(is_decision, std::string(right.subject).find("{name}") != std::string::npos) << right.subject;
+    EXPECT_TRUE(!is_decision || right.role == BusRole::operates) << right.subject;
   }
 }
 

@@ -16,7 +16,7 @@ namespace tutti::bus {
 using wire::MessageKind;
 
 /// Who sends or receives: the server; a robot; a worker, which verifies loop closures and refines maps for the server;
-/// or a viewer, which shows the mission and passes on an operator's words.
+/// or a viewer, which shows the mission and passes on an operator's decisions.
 struct Endpoint {
   enum class Role : std::uint8_t { server, robot, worker, viewer };
   Role role = Role::server;
@@ -39,7 +39,7 @@ struct Endpoint {
   friend auto operator<=>(const Endpoint&, const Endpoint&) = default;
 };
 
-/// A message on its way. Robots never write to robots.
+/// A message in transit. Robots never write to robots.
 struct Envelope {
   Endpoint from;
   Endpoint to;

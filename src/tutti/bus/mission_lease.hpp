@@ -22,7 +22,7 @@ struct LeaseTimes {
   double lease_s = 30.0;      ///< The bus drops a lease so long after it was renewed.
   double renew_s = 3.0;       ///< A holder renews its lease.
   double unrenewed_s = 10.0;  ///< A lease that was not renewed for so long is that of a server that has ended.
-  double look_s = 10.0;       ///< A program that only looks does so, until its mission has a server;
+  double look_s = 10.0;       ///< A program that only reads does so, until its mission has a server;
   double rest_s = 300.0;      ///< then it pauses.
 };
 
@@ -34,7 +34,7 @@ struct LeaseTimes {
 /// back when that one is not renewed. A thread of its own talks to the bus; all functions may be called by any thread.
 class MissionLease {
  public:
-  /// With `self`, takes and renews the lease of where.mission for it. Without, only looks. Does not wait for the bus;
+  /// With `self`, takes and renews the lease of where.mission for it. Without, only reads. Does not wait for the bus;
   /// errors are those of the options.
   static Result<std::unique_ptr<MissionLease>> open(const BusOptions& where, std::optional<LeaseHolder> self,
                                                     const LeaseTimes& times = {});
@@ -44,7 +44,7 @@ class MissionLease {
 
   struct State {
     bool has_looked = false;                      ///< The bus has been looked at, at least once.
-    bool held = false;                            ///< The lease was held by `self` at the last look.
+    bool held = false;                            ///< The lease was held by `self` at the last check.
     std::string waits;                            ///< Why it is not known yet who has it; empty when it is.
     std::map<std::string, LeaseHolder> missions;  ///< By mission. The own mission alone, if somebody else serves it;
                                                   ///< otherwise, without `self`, all missions that are served.
@@ -58,7 +58,7 @@ class MissionLease {
   [[nodiscard]] State state() const;
   /// state(), as soon as the bus has been looked at and it is known who has the lease, or after `wall_s` at the latest.
   [[nodiscard]] State wait(double wall_s) const;
-  /// An error while `self` does not hold the lease, which says why: the bus cannot be reached or refuses, or who has
+  /// An error while `self` does not hold the lease, with the reason: the bus cannot be reached or refuses, or who has
   /// it.
   [[nodiscard]] Status check_held() const;
   /// For people, why no server is heard: this mission has none on the bus, but others have. Empty when that is not so.
@@ -70,7 +70,7 @@ class MissionLease {
   void run();
   /// Takes or renews the lease, or reads the others'.
   Status look(LeaseBoard& board);
-  /// Whether the lease is to be written; otherwise state_ says who has it.
+  /// Whether the lease is to be written; otherwise state_ has who has it.
   bool may_take(const std::optional<LeaseHolder>& there, std::uint64_t revision);
   void give_up(LeaseBoard& board) const;
 
@@ -94,14 +94,14 @@ class MissionLease {
   std::thread thread_;
 };
 
-/// How long programs look for a server before they give up: a bus that has lost its disk has no leases until its
+/// How long programs wait for a server before they give up: a bus that has lost its disk has no leases until its
 /// servers have reconnected and renewed theirs (LeaseTimes::renew_s).
 inline constexpr double kLookForServer_s = 10.0;
 
 /// where.mission, or when that is empty that of its credential, if it has one of `tutti pki`, or the mission that is
 /// served on the bus. Waits at most `wall_s` for a lease;
 /// then, and when kDefaultMission is among several served ones, it is that, because servers of older versions have no
-/// lease. An error when several other missions are served. `say`, if given, is told once what is waited for, when that
+/// lease. An error when several other missions are served. `say`, if given, gets once what is waited for, when that
 /// takes long.
 Result<std::string> served_mission(const BusOptions& where, double wall_s,
                                    const std::function<void(const std::string&)>& say = {});

@@ -57,7 +57,7 @@ class MissionLeases : public testing::TestWithParam<test::PortImplementation> {
   }
   static constexpr LeaseTimes kQuick{.lease_s = 4.0, .renew_s = 0.2, .unrenewed_s = 1.0, .look_s = 0.5, .rest_s = 60.0};
 
-  /// Until it says so, or for half a minute.
+  /// Until it is true, or for half a minute.
   template <class Condition>
   static bool comes(Condition&& condition) {
     const auto end = std::chrono::steady_clock::now() + 30s;
@@ -170,7 +170,7 @@ TEST_P(MissionLeases, AHolderTakesBackALeaseThatNobodyRenews) {
   EXPECT_TRUE(lease->state().held);
 }
 
-TEST_P(MissionLeases, AHolderGivesWayToALeaseThatIsRenewed) {
+TEST_P(MissionLeases, AHolderYieldsToALeaseThatIsRenewed) {
   const auto lease = open("alps", holder("/var/lib/a", 17));
   ASSERT_TRUE(lease->wait(10.0).held);
   const auto renewed = [&] {
@@ -199,7 +199,7 @@ TEST_P(MissionLeasesOverNats, GoToAnotherServerWhenTheFirstIsOutOfReach) {
   EXPECT_EQ(first->state().server_of("alps")->state, "/var/lib/b");
 }
 
-TEST_P(MissionLeases, AreSeenByWhoLooks) {
+TEST_P(MissionLeases, AreSeenByWhoReads) {
   EXPECT_EQ(served_mission({.url = url_, .mission = ""}, 0.3).value(), "tutti");  // nobody is there
   const auto alps = open("alps", holder("/var/lib/a", 17));
   ASSERT_TRUE(alps->wait(10.0).held);

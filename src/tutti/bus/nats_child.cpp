@@ -34,9 +34,9 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 constexpr auto kWaitForPort = std::chrono::seconds(2);
-constexpr auto kLookAgain = std::chrono::milliseconds(3);
+constexpr auto kPollEvery = std::chrono::milliseconds(3);
 constexpr auto kPolitely = std::chrono::seconds(3);      // then it is killed
-constexpr auto kOthersMayEnd = std::chrono::seconds(2);  // the nats-server of a killed process ends a moment later
+constexpr auto kOthersMayEnd = std::chrono::seconds(2);  // the nats-server of a killed process ends a little later
 constexpr std::uintmax_t kMostLog = 8U << 20U;           // then it begins again: strangers make it grow
 constexpr const char* kConfiguration = "configuration";  // in its folder
 constexpr const char* kElsewhere = "/usr/sbin/nats-server";
@@ -64,7 +64,7 @@ jetstream {{ store_dir: "{}", max_mem: 64MB, max_file: {} }}
                      listen_at, folder.string(), (folder / "js").string(), options.max_store_bytes, options.rights);
 }
 
-/// The last lines that say that something is wrong, or the last ones.
+/// The last lines that report that something is wrong, or the last ones.
 std::string complaint_of(const fs::path& log) {
   const std::string text = read_file(log.string()).value_or("");
   if (const std::size_t fatal = text.rfind("[FTL]"); fatal != std::string::npos)
@@ -98,8 +98,8 @@ bool is_ready(const std::string& url, const NatsChildOptions& child) {
 class NatsChild::Process {
  public:
   Process(const std::string& program, const fs::path& configuration, int log, int lock) : log_{log} {
-    std::vector<std::string> words{program, "-c", configuration.string()};
-    thread_ = std::thread([this, words = std::move(words), lock]() mutable { run(words, lock); });
+    std::vector<std::string> command{program, "-c", configuration.string()};
+    thread_ = std::thread([this, command = std::move(command), lock]() mutable { run(command, lock); });
     std::unique_lock guard(mutex_);
     changed_.wait(guard, [&] { return pid_ >= 0 || failure_ != 0; });
   }
@@ -131,9 +131,9 @@ class NatsChild::Process {
   }
 
  private:
-  void run(std::vector<std::string>& words, int lock) {
+  void run(std::vector<std::string>& command, int lock) {
     std::vector<char*> arguments;
-    for (std::string& word : words) arguments.push_back(word.data());
+    for (std::string& argument : command) arguments.push_back(argument.data());
     arguments.push_back(nullptr);
     int errors[2] = {-1, -1};
     if (pipe2(errors, O_CLOEXEC) != 0) return report(-1, errno);
@@ -206,7 +206,7 @@ Status NatsChild::lock_folder() {
     if (Clock::now() > end)
       return fail(ErrorCode::io, "{}: another nats-server has this folder: two would destroy its messages",
                   folder_.string());
-    std::this_thread::sleep_for(kLookAgain);
+    std::this_thread::sleep_for(kPollEvery);
   }
   return {};
 }
@@ -236,7 +236,7 @@ Status NatsChild::wait_until_ready() {
     if (Clock::now() > end)
       return fail(ErrorCode::io, "nats-server: not ready after {} s: {} ({})", options_.start_timeout_s,
                   complaint_of(log), log);
-    std::this_thread::sleep_for(kLookAgain);
+    std::this_thread::sleep_for(kPollEvery);
   }
 }
 
@@ -291,8 +291,8 @@ Result<std::unique_ptr<NatsChild>> NatsChild::start(const fs::path& folder, cons
 }
 
 /// Where it was the last time: others know it by that address, so one that is still ending is waited for. Otherwise
-/// below the ports that systems give to clients: there a client that looks for a bus which is gone can connect to
-/// itself, and hold its port.
+/// below the ports that systems give to clients: there a client that searches a bus which is gone can connect to
+/// itself, and keep its port.
 Status NatsChild::launch_anywhere() {
   constexpr int kFirst = 20000, kPorts = 10000, kTries = 10;
   const int last = std::atoi(read_file((folder_ / "port").string()).value_or("0").c_str());
@@ -300,7 +300,7 @@ Status NatsChild::launch_anywhere() {
   Status launched = fail(ErrorCode::io, "nats-server: no port yet");
   while (last != 0 && !launched && Clock::now() < end) {
     launched = launch(last);
-    if (!launched) std::this_thread::sleep_for(10 * kLookAgain);
+    if (!launched) std::this_thread::sleep_for(10 * kPollEvery);
   }
   for (int i = 0; i < kTries && !launched; ++i) launched = launch(kFirst + (7 * getpid() + i) % kPorts);
   return launched;

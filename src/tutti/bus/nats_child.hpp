@@ -41,11 +41,11 @@ struct NatsChildOptions {
 };
 
 /// A nats-server with JetStream as a child process. The child ends with this process, however this one ends. Its folder
-/// holds its configuration, messages and log, and is locked, so that one nats-server has it at a time.
+/// has its configuration, messages and log, and is locked, so that one nats-server has it at a time.
 class NatsChild {
  public:
   /// Returns when the child takes messages. Makes the folder if it is missing. Errors: not installed, the port is
-  /// taken, another nats-server has the folder, too little disk, or what the child's log says.
+  /// taken, another nats-server has the folder, too little disk, or what the child's log reports.
   static Result<std::unique_ptr<NatsChild>> start(const std::filesystem::path& folder,
                                                   const NatsChildOptions& options = {});
   /// Stops the child, by SIGINT and after 3 s by SIGKILL.
@@ -58,7 +58,7 @@ class NatsChild {
   [[nodiscard]] bool running() const;
   /// To be called about once a second: starts a child that has ended again, at the same address, stops it for as
   /// long as less than half of min_free_bytes are free, and gives it its rights when they have changed, which cuts off
-  /// those who have none any more. An error says why it is not running now, or has not got its rights.
+  /// those who have none any more. An error is why it is not running now, or has not got its rights.
   Status tend();
   /// From the next tend() on.
   void set_rights(std::string rights) { options_.rights = std::move(rights); }

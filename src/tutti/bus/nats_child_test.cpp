@@ -73,7 +73,7 @@ TEST_F(NatsChildTest, StartsOnAFreePortOfThisMachineAndStopsWithItsOwner) {
   EXPECT_EQ(read_file((folder_ / "log").string()).value().find("[ERR]"), std::string::npos);
   child = start();
   ASSERT_NE(child, nullptr);
-  EXPECT_EQ(child->url(), url);  // where robots look for it
+  EXPECT_EQ(child->url(), url);  // where robots expect it
 }
 
 TEST_F(NatsChildTest, WhoKillsItGetsItAgainAtTheSameAddress) {
@@ -91,7 +91,7 @@ TEST_F(NatsChildTest, WhoKillsItGetsItAgainAtTheSameAddress) {
   EXPECT_TRUE(child->tend());
 }
 
-TEST_F(NatsChildTest, SaysWhatIsInTheWay) {
+TEST_F(NatsChildTest, ReportsWhatPreventsIt) {
   expect_says(refusal({.program = "nats-server-of-nobody"}), {"nats-server-of-nobody: not installed"});
   expect_says(refusal({.host = "0.0.0.0"}), {"0.0.0.0", "TLS"});
   expect_says(refusal({.min_free_bytes = std::uint64_t{1} << 60U}), {folder_.c_str(), "bytes are free"});

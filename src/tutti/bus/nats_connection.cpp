@@ -95,7 +95,7 @@ std::uint64_t NatsConnection::reconnects() const {
   return reconnects;
 }
 
-/// nats-server does not answer what it refuses; it says so on the connection, which libnats remembers as its last
+/// nats-server does not answer what it refuses; it reports that on the connection, which libnats remembers as its last
 /// error.
 std::string NatsConnection::denied() const {
   const char* text = nullptr;
@@ -276,43 +276,43 @@ Result<bool> NatsConnection::has_stream(const std::string& stream) const {
   return true;
 }
 
-/// Between two equal looks at the stream the consumer's numbers are of the same moment.
-Result<std::optional<NatsConnection::Look>> NatsConnection::look_at(const std::string& stream,
-                                                                    const std::string& consumer) const {
+/// Between two equal states of the stream the consumer's numbers are of the same time.
+Result<std::optional<NatsConnection::StreamState>> NatsConnection::read_state(const std::string& stream,
+                                                                              const std::string& consumer) const {
   jsErrCode code{};
-  const auto look = [&]() -> Result<NatsOwned<jsStreamInfo>> {
+  const auto stream_info = [&]() -> Result<NatsOwned<jsStreamInfo>> {
     jsStreamInfo* info = nullptr;
     const natsStatus status = js_GetStreamInfo(&info, streams_, stream.c_str(), nullptr, &code);
     if (status != NATS_OK) return failure(status, "stream " + stream, code);
     return NatsOwned<jsStreamInfo>(info);
   };
-  const auto before = look();
+  const auto before = stream_info();
   if (!before) return tl::unexpected(before.error());
   jsConsumerInfo* info = nullptr;
   const natsStatus status = js_GetConsumerInfo(&info, streams_, stream.c_str(), consumer.c_str(), nullptr, &code);
   const NatsOwned<jsConsumerInfo> owned(status == NATS_OK ? info : nullptr);
   if (status == NATS_NOT_FOUND) return std::nullopt;
   if (status != NATS_OK) return failure(status, "consumer of " + stream, code);
-  const auto after = look();
+  const auto after = stream_info();
   if (!after) return tl::unexpected(after.error());
   const jsStreamState &a = (*before)->State, &b = (*after)->State;
   if (a.Msgs != b.Msgs || a.LastSeq != b.LastSeq || a.FirstSeq != b.FirstSeq) return std::nullopt;
   const auto given = static_cast<std::uint64_t>(info->NumAckPending);
-  return Look{.first = a.FirstSeq,
-              .messages = a.Msgs,
-              .pending = info->NumPending,
-              .given = given,
-              .deliveries = info->Delivered.Consumer,
-              .gone = a.LastSeq - std::min(a.LastSeq, a.Msgs),
-              .done_up_to = given == 0 ? info->Delivered.Stream : info->AckFloor.Stream,
-              .asked = info->NumWaiting > 0};
+  return StreamState{.first = a.FirstSeq,
+                     .messages = a.Msgs,
+                     .pending = info->NumPending,
+                     .given = given,
+                     .deliveries = info->Delivered.Consumer,
+                     .gone = a.LastSeq - std::min(a.LastSeq, a.Msgs),
+                     .done_up_to = given == 0 ? info->Delivered.Stream : info->AckFloor.Stream,
+                     .asked = info->NumWaiting > 0};
 }
 
 /// One by one: a purge takes what is given for acknowledged (nats-server 2.9.10).
-Status NatsConnection::remove_done(const std::string& stream, const Look& look,
+Status NatsConnection::remove_done(const std::string& stream, const StreamState& state,
                                    const std::function<void(natsMsg*)>& take) const {
-  const std::uint64_t end = std::min(look.done_up_to, look.first + kMostRemoved);
-  for (std::uint64_t sequence = look.first; sequence <= end; ++sequence) {
+  const std::uint64_t end = std::min(state.done_up_to, state.first + kMostRemoved);
+  for (std::uint64_t sequence = state.first; sequence <= end; ++sequence) {
     jsErrCode code{};
     natsMsg* found = nullptr;
     natsStatus status = js_GetMsg(&found, streams_, stream.c_str(), sequence, nullptr, &code);

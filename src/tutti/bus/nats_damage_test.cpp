@@ -181,7 +181,7 @@ TEST_F(NatsDamage, AJobThatEndsEveryWorkerComesBackAndTheOthersStay) {
   EXPECT_EQ(hub->state().streams_made_anew, 0U) << hub->state().last_error;
 }
 
-/// A server that takes nothing for a while, and messages that come faster than it looks, are no damage.
+/// A server that takes nothing for a while, and messages that come faster than it reads, are no damage.
 TEST_F(NatsDamage, NothingIsMendedThatIsWhole) {
   NatsNetwork network;
   BusOptions options = network.options(kServer);

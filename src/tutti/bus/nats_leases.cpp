@@ -30,7 +30,7 @@ class NatsLeases final : public LeaseBoard {
  public:
   explicit NatsLeases(BusOptions where) : where_(std::move(where)) {}
 
-  /// Who has a credential and is no server may look at the lease of its mission alone, and without the bucket.
+  /// Who has a credential and is no server may read the lease of its mission alone, and without the bucket.
   Result<std::optional<Value>> read(const std::string& mission) override {
     if (is_member()) {
       if (Status done = connect(); !done) return tl::unexpected(done.error());

@@ -38,12 +38,12 @@ constexpr std::array<HandshakeEnd, 8> kHandshakeEnds{{
 
 std::string what_of(std::string_view complaint) {
   constexpr std::size_t kLongest = 200;
-  const std::string said = plain_text(complaint, kLongest);
-  if (complaint.starts_with("authentication error")) return "has no key that may come in (" + said + ")";
-  if (!complaint.starts_with("TLS handshake error")) return said;
+  const std::string text = plain_text(complaint, kLongest);
+  if (complaint.starts_with("authentication error")) return "has no key that may come in (" + text + ")";
+  if (!complaint.starts_with("TLS handshake error")) return text;
   const auto* const known = std::ranges::find_if(
       kHandshakeEnds, [&](const HandshakeEnd& end) { return complaint.find(end.go) != std::string_view::npos; });
-  return known == kHandshakeEnds.end() ? said : fmt::format("{} ({})", known->plain, said);
+  return known == kHandshakeEnds.end() ? text : fmt::format("{} ({})", known->plain, text);
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ TEST(NatsLogTest, SaysWhoWasRefusedWhat) {
 }
 
 /// What nats-server writes is Go's: whom it concerns does not know what a bad record MAC is.
-TEST(NatsLogTest, SaysInPlainWordsWhyNobodyWasLetIn) {
+TEST(NatsLogTest, ExplainsPlainlyWhyNobodyWasLetIn) {
   const std::vector<std::pair<std::string, std::string>> ends{
       {"local error: tls: bad record MAC", "showed no certificate of this mission"},
       {"tls: failed to verify certificate: x509: certificate signed by unknown authority", "another authority"},
@@ -37,9 +37,9 @@ TEST(NatsLogTest, SaysInPlainWordsWhyNobodyWasLetIn) {
        "has expired"},
       {"tls: first record does not look like a TLS handshake", "does not speak TLS"},
       {"read tcp 127.0.0.1:4222->127.0.0.1:40000: i/o timeout", "in time"}};
-  for (const auto& [end, words] : ends) {
+  for (const auto& [end, expected] : ends) {
     const std::string what = refusal(kBegin + "TLS handshake error: " + end).what;
-    EXPECT_NE(what.find(words), std::string::npos) << what;
+    EXPECT_NE(what.find(expected), std::string::npos) << what;
     EXPECT_NE(what.find(end), std::string::npos) << what;
   }
   const std::string unknown = "TLS handshake error: something of tomorrow";

@@ -190,7 +190,7 @@ bool JetStreamPort::acknowledge_one(const NatsConnection& connection) {
   for (const std::string& reply : next->replies)
     if (done) done = connection.acknowledge(reply);
   if (!done) note(done.error().message);
-  if (!done && ++tries_[next->ticket] < kAcknowledgeTries) return false;  // what is not told at all comes again
+  if (!done && ++tries_[next->ticket] < kAcknowledgeTries) return false;  // what is not acknowledged at all comes again
   tries_.erase(next->ticket);
   const std::scoped_lock guard(mutex_);
   inbox_.forget(next->ticket);
@@ -267,7 +267,7 @@ void JetStreamPort::make_stream_anew(const NatsConnection& connection) {
   changed_.notify_all();
 }
 
-/// What was said last is on its way, how a robot has ended above all. What was acknowledged is so on the bus; what was
+/// What was sent last is in transit, how a robot has ended above all. What was acknowledged is so on the bus; what was
 /// not comes to the next one at once, not after a time-out.
 void JetStreamPort::say_farewell() {
   const auto present = session();

@@ -94,7 +94,7 @@ TEST_F(NatsPortTest, KilledAndStartedAgainTheBusLosesNothing) {
   EXPECT_GE(robot->state().reconnects, 3U);
 }
 
-/// A robot's last status says that it has finished: without it operators would look for it.
+/// A robot's last status reports that it has finished: without it operators would search for it.
 TEST_F(NatsPortTest, WhatIsSaidLastIsHeardThoughThePortGoesAtOnce) {
   NatsNetwork network;
   const auto hub = network.open(kServer);
@@ -129,7 +129,7 @@ TEST_F(NatsPortTest, OverALinkThatBreaksAgainAndAgainNothingIsLost) {
     for (const Received& received : robot->receive()) heard = *received.envelope.bytes;
   };
   EXPECT_TRUE(within(20.0, [&] { return go_on(), receiver.heard() > 3; }));
-  network.relay().hold(true);  // out of range, and nobody is told
+  network.relay().hold(true);  // out of range, and nobody learns of it
   within(1.0, [&] { return go_on(), false; });
   network.relay().hold(false);
   EXPECT_TRUE(within(20.0, [&] { return go_on(), receiver.heard() > 10; }));
@@ -182,7 +182,7 @@ TEST_F(NatsPortTest, ABusThatIsFullTakesTheRestWhenThereIsRoom) {
   EXPECT_EQ(receiver.again(), 0);
 }
 
-TEST_F(NatsPortTest, AMissionForWhichTheBusHasNoRoomIsToldWhatToDo) {
+TEST_F(NatsPortTest, AMissionForWhichTheBusHasNoRoomLearnsWhatToDo) {
   NatsNetwork network;  // 256 MB, of which mission "test" has set 176 aside
   BusOptions options = network.options(kServer);
   options.mission = "other";
@@ -190,9 +190,9 @@ TEST_F(NatsPortTest, AMissionForWhichTheBusHasNoRoomIsToldWhatToDo) {
     const auto refused = open_port(kServer, options);
     ASSERT_TRUE(refused.has_value());
     EXPECT_TRUE(within(10.0, [&] { return !(*refused)->state().last_error.empty(); }));
-    for (const char* word : {"SUBMAPS_other", "128 MB", "max_file", "nats stream rm"})
-      EXPECT_NE((*refused)->state().last_error.find(word), std::string::npos)
-          << word << " in " << (*refused)->state().last_error;
+    for (const char* expected : {"SUBMAPS_other", "128 MB", "max_file", "nats stream rm"})
+      EXPECT_NE((*refused)->state().last_error.find(expected), std::string::npos)
+          << expected << " in " << (*refused)->state().last_error;
     EXPECT_FALSE((*refused)->state().connected);
   }
   options.max_stream_bytes = 32U << 20U;
@@ -209,18 +209,18 @@ TEST_F(NatsPortTest, HoldsNoMoreThanItMayAndTheRestStaysOnTheBus) {
   ASSERT_TRUE(hub.has_value());
   for (int i = 0; i < 100; ++i) ASSERT_TRUE(send_submap(*robot, std::to_string(i), std::string(50'000, 'x')));
   EXPECT_TRUE(within(10.0, [&] { return robot->state().waiting_messages == 0; }));
-  std::vector<Received> held;
+  std::vector<Received> taken;
   within(0.5, [&] {
-    for (Received& received : (*hub)->receive()) held.push_back(std::move(received));
+    for (Received& received : (*hub)->receive()) taken.push_back(std::move(received));
     return false;
   });
-  EXPECT_GE(held.size(), 10U);
-  EXPECT_LE(held.size(), 10U + 32U);
+  EXPECT_GE(taken.size(), 10U);
+  EXPECT_LE(taken.size(), 10U + 32U);
   std::size_t heard = 0;
   EXPECT_TRUE(within(10.0, [&] {
-    for (const Received& received : held) (*hub)->acknowledge(received.ticket);
-    heard += held.size();
-    held = (*hub)->receive();
+    for (const Received& received : taken) (*hub)->acknowledge(received.ticket);
+    heard += taken.size();
+    taken = (*hub)->receive();
     return heard == 100;
   }));
 }
@@ -230,10 +230,10 @@ TEST(NatsPortOwner, DISABLED_AcknowledgesNothing) {
   const auto hub =
       open_port(kServer, {.url = std::getenv("TUTTI_NATS_URL"), .mission = "test", .max_stream_bytes = 128U << 20U});
   ASSERT_TRUE(hub.has_value());
-  const int told = std::atoi(std::getenv("TUTTI_NATS_PIPE"));
+  const int pipe_end = std::atoi(std::getenv("TUTTI_NATS_PIPE"));
   while (true)
     for (const Received& received : (*hub)->receive())
-      if (write(told, received.envelope.id.data(), 1) != 1) return;
+      if (write(pipe_end, received.envelope.id.data(), 1) != 1) return;
 }
 
 TEST_F(NatsPortTest, WhatAKilledServerHadNotAcknowledgedComesAtOnceToTheNext) {
@@ -263,7 +263,7 @@ TEST_F(NatsPortTest, WhatAKilledServerHadNotAcknowledgedComesAtOnceToTheNext) {
   EXPECT_TRUE(within(5.0, [&] { return receiver.take(*hub), receiver.heard() == 5; }));  // not after the bus's 30 s
 }
 
-TEST_F(NatsPortTest, GarbageIsCountedAndInNobodysWay) {
+TEST_F(NatsPortTest, GarbageIsCountedAndBlocksNobody) {
   NatsNetwork network;
   const auto hub = network.open(kServer);
   const auto robot = network.open(kRobot);
@@ -332,7 +332,7 @@ TEST_F(NatsPortTest, OrphanPartsStopNobody) {
   EXPECT_TRUE(within(10.0, [&] { return receiver.take(*hub), receiver.heard() == 1; })) << hub->state().last_error;
 }
 
-TEST_F(NatsPortTest, WhoUsesARobotsIdsBeforeItDoesIsNotInItsWay) {
+TEST_F(NatsPortTest, WhoUsesARobotsIdsBeforeItDoesDoesNotBlockIt) {
   NatsNetwork network;
   const auto hub = network.open(kServer);
   const auto robot = network.open(kRobot);

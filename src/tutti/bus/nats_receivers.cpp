@@ -23,7 +23,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::int64_t kListen_ms = 200;
 constexpr int kBatch = 32;
-constexpr auto kLookForStrange = std::chrono::milliseconds(500);
+constexpr auto kCheckForStrange = std::chrono::milliseconds(500);
 
 void drop_all(natsSubscription* subscription) {
   natsMsg* heard = nullptr;
@@ -32,7 +32,7 @@ void drop_all(natsSubscription* subscription) {
 
 }  // namespace
 
-/// To the end of the port: `make` something of the present connection, and `step` with it until that says false, or
+/// To the end of the port: `make` something of the present connection, and `step` with it until that returns false, or
 /// the connection is another one.
 template <class Make, class Step>
 void JetStreamPort::keep(Make make, Step step) {
@@ -61,7 +61,7 @@ void JetStreamPort::hear_confirmations() {
          natsMsg* heard = nullptr;
          const natsStatus status = natsSubscription_NextMsg(&heard, confirmations, kListen_ms);
          const NatsOwned<natsMsg> message(heard);
-         if (status == NATS_NO_RESPONDERS) {  // of libnats, which does not say to what
+         if (status == NATS_NO_RESPONDERS) {  // of libnats, which does not report to what
            const std::scoped_lock guard(mutex_);
            outbox_.refuse_all(Clock::now());
            last_error_ = "the bus has no stream for this mission: has its server been there?";
@@ -136,22 +136,23 @@ void JetStreamPort::watch() {
     if (there && !*there) strand(stream);
     return there && *there;
   };
-  const auto look_at = [&](const std::string& stream, const std::string& consumer, const NatsConnection& connection) {
+  const auto check_stream = [&](const std::string& stream, const std::string& consumer,
+                                const NatsConnection& connection) {
     if (!is_there(stream, connection)) return;
-    const auto look = connection.look_at(stream, consumer);
-    if (!look) return note(look.error().message);
+    const auto state = connection.read_state(stream, consumer);
+    if (!state) return note(state.error().message);
     Watched& watched = all[stream];
-    if (!*look && stream == jobs) static_cast<void>(connection.add_consumer(stream, consumer));  // it may be gone
-    if (!*look) return;
-    const bool is_left = (*look)->messages > (*look)->pending + (*look)->given;
-    const bool is_held_back = (*look)->pending > 0 && (*look)->asked && (*look)->deliveries == watched.deliveries &&
-                              (*look)->given < kMostUnacknowledged && !(stream != jobs && is_full());
-    watched.deliveries = (*look)->deliveries;
-    if ((*look)->gone != watched.gone || (*look)->given == 0 || watched.deliveries < watched.deliveries_then) {
-      watched.gone = (*look)->gone;
-      watched.deliveries_then = watched.deliveries - std::min(watched.deliveries, (*look)->given);
+    if (!*state && stream == jobs) static_cast<void>(connection.add_consumer(stream, consumer));  // it may be gone
+    if (!*state) return;
+    const bool is_left = (*state)->messages > (*state)->pending + (*state)->given;
+    const bool is_held_back = (*state)->pending > 0 && (*state)->asked && (*state)->deliveries == watched.deliveries &&
+                              (*state)->given < kMostUnacknowledged && !(stream != jobs && is_full());
+    watched.deliveries = (*state)->deliveries;
+    if ((*state)->gone != watched.gone || (*state)->given == 0 || watched.deliveries < watched.deliveries_then) {
+      watched.gone = (*state)->gone;
+      watched.deliveries_then = watched.deliveries - std::min(watched.deliveries, (*state)->given);
     }
-    if (stream == jobs) note_given((*look)->given, watched.deliveries - watched.deliveries_then);
+    if (stream == jobs) note_given((*state)->given, watched.deliveries - watched.deliveries_then);
     if (!is_left && !is_held_back) {
       watched.since.reset();
       watched.removed = false;
@@ -161,12 +162,12 @@ void JetStreamPort::watch() {
     if (Clock::now() - *watched.since < std::chrono::duration<double>(options_.stranded_s)) return;
     if (stream == jobs && is_left && !watched.removed) {
       std::uint64_t removed = 0;
-      const Status done = connection.remove_done(stream, **look, [&](natsMsg* message) {
+      const Status done = connection.remove_done(stream, **state, [&](natsMsg* message) {
         ++removed;
         put_returned(message);
       });
       if (!done) return note(done.error().message);
-      watched.removed = removed > 0 || (*look)->given == 0;  // or a job before these is being worked on
+      watched.removed = removed > 0 || (*state)->given == 0;  // or a job before these is being worked on
       if (watched.removed) watched.since = Clock::now();
       return;
     }
@@ -177,9 +178,9 @@ void JetStreamPort::watch() {
   keep([](Session& /*present*/) { return Result<bool>(true); },
        [&](bool /*made*/, Session& present) {
          if (present.connection->connected()) {
-           look_at(submap_stream(options_.mission), "server", *present.connection);
-           look_at(verdict_stream(options_.mission), "server", *present.connection);
-           look_at(jobs, "workers", *present.connection);
+           check_stream(submap_stream(options_.mission), "server", *present.connection);
+           check_stream(verdict_stream(options_.mission), "server", *present.connection);
+           check_stream(jobs, "workers", *present.connection);
            is_there(retained_stream(options_.mission), *present.connection);
          }
          return pause(std::chrono::duration<double>(options_.stranded_s / 4));
@@ -196,7 +197,7 @@ void JetStreamPort::keep_jobs_ours() {
   };
   keep([](Session& /*present*/) { return Result<bool>(true); },
        [&](bool /*made*/, Session& present) {
-         if (!present.connection->connected() || is_stranded(jobs)) return pause(kLookForStrange);
+         if (!present.connection->connected() || is_stranded(jobs)) return pause(kCheckForStrange);
          std::uint64_t removed = 0;
          const auto end = present.connection->remove_strange(jobs, looked, ours, removed);
          const bool is_more = end && removed > 0;
@@ -206,7 +207,7 @@ void JetStreamPort::keep_jobs_ours() {
            const std::scoped_lock guard(mutex_);
            strange_jobs_ += removed;
          }
-         return is_more ? !stopping_ : pause(kLookForStrange);
+         return is_more ? !stopping_ : pause(kCheckForStrange);
        });
 }
 

@@ -40,9 +40,9 @@ struct LinkState {
   std::string last_error = {};
 };
 
-/// Connects one endpoint to the others; an endpoint has one port at a time. bus/delivery.hpp says what is guaranteed
-/// for each kind of message. A port is used by one thread. port_conformance_test.cpp holds every implementation to this
-/// contract.
+/// Connects one endpoint to the others; an endpoint has one port at a time. bus/delivery.hpp states what is guaranteed
+/// for each kind of message. A port is used by one thread. port_conformance_test.cpp checks every implementation
+/// against this contract.
 class Port {
  public:
   /// A message that was received and not acknowledged comes again at once to the next port of this endpoint, a job to
@@ -58,11 +58,11 @@ class Port {
   /// acknowledged. A job that has ended every worker that had it may come back to the server, from any_worker(), and
   /// then nobody gets it any more.
   [[nodiscard]] virtual std::vector<Received> receive() = 0;
-  /// Says that the receiver has done, and stored, all that the message asks for, so that it does not come again. Not
+  /// Reports that the receiver has done, and stored, all that the message asks for, so that it does not come again. Not
   /// needed, but allowed, for messages that are retained or best effort. A worker stores nothing: its acknowledgement
   /// leaves after all that it has sent before.
   virtual void acknowledge(std::uint64_t ticket) = 0;
-  /// Says that work on this message goes on. If a worker does not call this every few seconds during
+  /// Reports that work on this message goes on. If a worker does not call this every few seconds during
   /// a long job, another worker gets the job, too.
   virtual void still_busy(std::uint64_t ticket) = 0;
   /// A port whose link cannot be lost is always connected.

@@ -41,8 +41,8 @@ class PortConformance : public ::testing::TestWithParam<test::PortImplementation
     const MessageKind kind = id == "b" ? MessageKind::refinement_job : MessageKind::job;  // of one queue
     send(port, server, Endpoint::any_worker(), kind, id, "job " + id);
   }
-  /// Until nothing more comes. What is expected may need many moments on a busy machine; if it was said that nothing
-  /// is, a few must pass.
+  /// Until nothing more comes. What is expected may need many rounds on a busy machine; if nothing is expected, a few
+  /// must pass.
   std::vector<Received> receive(Port& port, const std::function<bool(const std::vector<Received>&)>& is_enough,
                                 int patience = 50) {
     std::vector<Received> all;
@@ -57,7 +57,7 @@ class PortConformance : public ::testing::TestWithParam<test::PortImplementation
   std::vector<Received> receive(Port& port, std::size_t expected) {
     return receive(port, [&](const auto& all) { return all.size() >= expected; });
   }
-  /// What comes within a few moments, if anything does.
+  /// What comes within a few rounds, if anything does.
   std::vector<Received> receive(Port& port) {
     return receive(
         port, [](const auto& all) { return !all.empty(); }, 5);
@@ -109,7 +109,7 @@ TEST_P(PortConformance, AMessageArrivesAsItWasSent) {
   EXPECT_TRUE(receive(*robot).empty());
 }
 
-TEST_P(PortConformance, AnOperatorsWordWaitsForTheServer) {
+TEST_P(PortConformance, AnOperatorsDecisionWaitsForTheServer) {
   const Endpoint viewer = Endpoint::viewer(7);
   const auto port = network->connect(viewer);
   send(*port, viewer, server, MessageKind::decision, "accept/5/1", "word");
@@ -241,10 +241,10 @@ TEST_P(PortConformance, AWorkerHasOneJobAtATimeAndLeavesItToOthersWhenItEnds) {
   const auto hub = network->connect(server);
   auto one = network->connect(first);
   for (const char* id : {"a", "b"}) send_job(*hub, id);
-  const auto held = receive(*one, 1);
-  ASSERT_EQ(held.size(), 1U);
-  EXPECT_EQ(held[0].envelope.kind, MessageKind::job);
-  one->still_busy(held[0].ticket);
+  const auto taken = receive(*one, 1);
+  ASSERT_EQ(taken.size(), 1U);
+  EXPECT_EQ(taken[0].envelope.kind, MessageKind::job);
+  one->still_busy(taken[0].ticket);
   EXPECT_TRUE(receive(*one).empty());
   const auto two = network->connect(second);
   Messages done = take(*two, 1);

@@ -110,29 +110,31 @@ void SimulatedRadio::send(Timestamp now, Envelope sent) {
   ++statistics.published;
   statistics.published_bytes += message.bytes->size();
   statistics.largest_message = std::max<std::uint64_t>(statistics.largest_message, message.bytes->size());
-  Direction& way = direction(message.from, message.to);
+  Direction& channel = direction(message.from, message.to);
   if (only_latest_counts(message.kind))
-    statistics.superseded += std::erase_if(way.queue, [&](const Waiting& w) { return w.message.kind == message.kind; });
+    statistics.superseded +=
+        std::erase_if(channel.queue, [&](const Waiting& w) { return w.message.kind == message.kind; });
   const auto is_same = [&](const Waiting& w) { return w.message.kind == message.kind && w.message.id == message.id; };
-  if (delivery_of(message.kind) == Delivery::durable && !message.id.empty() && std::ranges::any_of(way.queue, is_same))
+  if (delivery_of(message.kind) == Delivery::durable && !message.id.empty() &&
+      std::ranges::any_of(channel.queue, is_same))
     return;
-  if (way.queue.size() >= static_cast<std::size_t>(way.link.queue_messages)) {
-    ++statistics_of(way.queue.front().message).dropped;
-    way.queue.pop_front();
+  if (channel.queue.size() >= static_cast<std::size_t>(channel.link.queue_messages)) {
+    ++statistics_of(channel.queue.front().message).dropped;
+    channel.queue.pop_front();
   }
-  way.queue.push_back({sent_[message.kind]++, message});
+  channel.queue.push_back({sent_[message.kind]++, message});
   advance(now);
 }
 
-Timestamp SimulatedRadio::transmission_start(const Direction& way) const {
-  return in_contact(way.link, start_, std::max(way.free_at, way.queue.front().message.sent));
+Timestamp SimulatedRadio::transmission_start(const Direction& channel) const {
+  return in_contact(channel.link, start_, std::max(channel.free_at, channel.queue.front().message.sent));
 }
 
 /// Sends the front of the queue.
-void SimulatedRadio::transmit(Direction& way, Timestamp start) {
-  const LinkConfig& link = way.link;
-  const Waiting front = std::move(way.queue.front());
-  way.queue.pop_front();
+void SimulatedRadio::transmit(Direction& channel, Timestamp start) {
+  const LinkConfig& link = channel.link;
+  const Waiting front = std::move(channel.queue.front());
+  channel.queue.pop_front();
   Arrival message = front.message;
   TopicStatistics& statistics = statistics_of(message);
 
@@ -145,29 +147,29 @@ void SimulatedRadio::transmit(Direction& way, Timestamp start) {
   }
   const auto size = static_cast<double>(message.bytes->size());
   const double airtime_s = link.bandwidth_bytes_per_s > 0.0 ? attempts * size / link.bandwidth_bytes_per_s : 0.0;
-  way.free_at = after_airtime(link, start_, start, airtime_s);
+  channel.free_at = after_airtime(link, start_, start, airtime_s);
   statistics.transmitted_bytes += static_cast<std::uint64_t>(attempts) * message.bytes->size();
   if (!arrives) {
     ++statistics.lost;
     return;
   }
   const double retransmissions_s =
-      (attempts - 1) * link.retransmit_s + wait_of_repetitions(link, start_, way.free_at, attempts - 1);
+      (attempts - 1) * link.retransmit_s + wait_of_repetitions(link, start_, channel.free_at, attempts - 1);
   const int copies = rng.bernoulli(link.duplicate) ? 2 : 1;
   for (int copy = 0; copy < copies; ++copy) {
-    message.arrived = way.free_at + (retransmissions_s + link.latency_s + rng.uniform(0.0, 1.0) * link.jitter_s);
-    if (link.in_order) message.arrived = std::max(message.arrived, way.last_arrival);
-    way.last_arrival = std::max(way.last_arrival, message.arrived);
+    message.arrived = channel.free_at + (retransmissions_s + link.latency_s + rng.uniform(0.0, 1.0) * link.jitter_s);
+    if (link.in_order) message.arrived = std::max(message.arrived, channel.last_arrival);
+    channel.last_arrival = std::max(channel.last_arrival, message.arrived);
     in_flight_.emplace(std::pair{message.arrived, message.number}, message);
   }
 }
 
 void SimulatedRadio::advance(Timestamp now) {
-  for (auto& [ends, way] : directions_)
-    while (!way.queue.empty()) {
-      const Timestamp start = transmission_start(way);
+  for (auto& [ends, channel] : directions_)
+    while (!channel.queue.empty()) {
+      const Timestamp start = transmission_start(channel);
       if (start > now) break;
-      transmit(way, start);
+      transmit(channel, start);
     }
 }
 
@@ -191,22 +193,22 @@ std::optional<Timestamp> SimulatedRadio::next_delivery() const {
     if (t < kLastTimestamp) next = next ? std::min(*next, t) : t;
   };
   if (!in_flight_.empty()) consider(in_flight_.begin()->first.first);
-  for (const auto& [ends, way] : directions_)
-    if (!way.queue.empty()) consider(transmission_start(way));
+  for (const auto& [ends, channel] : directions_)
+    if (!channel.queue.empty()) consider(transmission_start(channel));
   return next;
 }
 
 void SimulatedRadio::forget_waiting(Endpoint from) {
-  for (auto& [ends, way] : directions_)
-    if (ends.first == from) way.queue.clear();
+  for (auto& [ends, channel] : directions_)
+    if (ends.first == from) channel.queue.clear();
 }
 
 std::map<SimulatedRadio::Topic, std::size_t> SimulatedRadio::undelivered() const {
   std::map<Topic, std::size_t> count;
   const auto add = [&](const Envelope& message) { ++count[{message.from, message.to, message.kind}]; };
   for (const auto& [arrival, message] : in_flight_) add(message);
-  for (const auto& [ends, way] : directions_)
-    for (const Waiting& waiting : way.queue) add(waiting.message);
+  for (const auto& [ends, channel] : directions_)
+    for (const Waiting& waiting : channel.queue) add(waiting.message);
   return count;
 }
 

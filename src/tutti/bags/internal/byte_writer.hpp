@@ -14,7 +14,7 @@
 
 namespace tutti::bags::internal {
 
-/// The other way round of Cursor, little endian alone: puts numbers and strings one behind the other.
+/// The inverse of Cursor, little endian alone: puts numbers and strings one behind the other.
 class ByteWriter {
  public:
   using Layout = Cursor::Layout;

@@ -23,10 +23,10 @@ constexpr std::size_t kFirstBytes = std::size_t{1} << 16;
 struct Progress {
   std::size_t taken = 0, written = 0;
   bool ended = false;           ///< The compressed frame is complete.
-  const char* error = nullptr;  ///< As the library says it.
+  const char* error = nullptr;  ///< In the library's words.
 };
 
-/// `step(in, out, room)` unpacks some of `in`. A chunk that is cut off gives as much as what is there holds.
+/// `step(in, out, room)` unpacks some of `in`. A chunk that is cut off gives as much as what is there contains.
 template <class Step>
 Result<std::string> unpack(std::string_view packed, std::uint64_t size, bool cut, std::string out, const char* name,
                            const Step& step) {
@@ -39,7 +39,7 @@ Result<std::string> unpack(std::string_view packed, std::uint64_t size, bool cut
   std::size_t filled = 0;
   bool ended = false;
   while (true) {
-    // One byte more than expected, so that a frame that holds more is seen.
+    // One byte more than expected, so that a frame that contains more is seen.
     if (filled == out.size()) out.resize(std::min<std::uint64_t>(wanted + 1, std::max(kFirstBytes, 2 * out.size())));
     const Progress now = step(packed, out.data() + filled, out.size() - filled);
     if (now.error && !cut) return fail(ErrorCode::parse, "{}: {}, after {} of {} bytes", name, now.error, filled, size);

@@ -10,7 +10,7 @@
 
 namespace tutti::bags::internal {
 
-/// How much of a chunk is taken into memory at most, by its own word; and of a message.
+/// How much of a chunk is taken into memory at most, by its stated size; and of a message.
 inline constexpr std::uint64_t kMaxChunkBytes = std::uint64_t{1} << 30;
 inline constexpr std::uint64_t kMaxMessageBytes = std::uint64_t{256} << 20;
 
@@ -23,13 +23,13 @@ constexpr std::uint64_t most_unpacked(std::uint64_t packed, std::uint64_t little
 /// What MCAP calls CRC32: that of zlib and PNG, polynomial 0xedb88320. `before`: of the bytes in front of these.
 std::uint32_t crc32(std::string_view bytes, std::uint32_t before = 0);
 
-/// One zstd frame that says its size.
+/// One zstd frame that states its size.
 std::string pack_zstd(std::string_view bytes);
 
 /// Unpacks the records of a chunk: compression "" (none), "zstd", "lz4" (its frame format) or "bz2" (ROS 1's), `size`
 /// bytes unpacked. Memory grows with what really comes out, so that a length that lies costs nothing, and not beyond
-/// most_unpacked(). A chunk that is `cut` off gives what comes out before the cut. The error says what was
-/// expected. `memory` is used again, whatever is in it: to take it from the system anew costs more than to unpack.
+/// most_unpacked(). A chunk that is `cut` off gives what comes out before the cut. The error names what was expected.
+/// `memory` is used again, whatever is in it: to take it from the system anew costs more than to unpack.
 Result<std::string> unpack_chunk(std::string_view packed, std::string_view compression, std::uint64_t size, bool cut,
                                  std::string memory = {});
 

@@ -15,7 +15,7 @@
 namespace tutti::bags::internal {
 
 /// Takes numbers and strings from bytes of outside, one after the other, each length checked against what is left.
-/// After the first thing that is not there, `error()` says what it was, and all that is taken is zero or empty.
+/// After the first thing that is not there, `error()` names it, and all that is taken is zero or empty.
 class Cursor {
  public:
   enum class Order { little, big };

@@ -12,7 +12,7 @@ namespace tutti::bags::internal {
 
 inline constexpr std::string_view kZstdMagic = "\x28\xb5\x2f\xfd";
 
-/// What a file that is packed by zstd holds, in a file among the system's temporary ones, which is gone with this.
+/// What a file that is packed by zstd contains, in a file among the system's temporary ones, which is gone with this.
 class PackedFile {
  public:
   /// Piece by piece. What comes out of a file that is cut off before the cut is kept. More than
@@ -28,7 +28,7 @@ class PackedFile {
   std::string path_;
 };
 
-/// A message that rosbag2 packed by itself: one frame of zstd's that says its size.
+/// A message that rosbag2 packed by itself: one frame of zstd's that states its size.
 Result<std::string> unpack_message(std::string_view packed);
 
 }  // namespace tutti::bags::internal

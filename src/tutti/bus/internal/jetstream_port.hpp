@@ -49,7 +49,7 @@ class JetStreamPort final : public Port {
   bool send_one(const NatsConnection& connection);
   bool acknowledge_one(const NatsConnection& connection);
   void say_farewell();
-  /// Only this thread calls it: no acknowledgement is on its way to a stream that is being made anew.
+  /// Only this thread calls it: no acknowledgement is in transit to a stream that is being made anew.
   void make_stream_anew(const NatsConnection& connection);
 
   // The receivers' threads.
@@ -103,9 +103,9 @@ class JetStreamPort final : public Port {
   std::shared_ptr<Session> session_;
   Outbox outbox_;
   Inbox inbox_;
-  std::vector<std::string> busy_;                ///< Where work is said to go on.
+  std::vector<std::string> busy_;                ///< Where work is reported to go on.
   std::map<MessageKind, std::string> retained_;  ///< What was last given.
-  /// What was last sent, of the server's: a bus that has lost it is told again.
+  /// What was last sent, of the server's: a bus that has lost it gets it again.
   std::map<std::pair<Endpoint, MessageKind>, Envelope> retained_sent_;
   std::string stranded_;  ///< The stream to be made anew; "": none.
   std::uint64_t streams_made_anew_ = 0;

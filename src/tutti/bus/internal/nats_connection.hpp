@@ -40,8 +40,8 @@ inline constexpr std::uint64_t kMostUnacknowledged = 65'536;
 /// Null: libnats does not take them. `credentials` must outlive the connection.
 NatsOwned<natsOptions> make_options(const BusUrl& url, const BusCredentials& credentials, const std::string& name);
 
-/// " (what to change)" of one whom natsConnection_Connect() has just told, on this thread, that it does not come in;
-/// empty: the status says all that is known.
+/// " (what to change)" of one whom natsConnection_Connect() has just refused, on this thread;
+/// empty: the status is all that is known.
 std::string why_not_let_in(natsStatus status, const BusUrl& url, const BusCredentials& credentials);
 
 class NatsConnection {
@@ -69,7 +69,7 @@ class NatsConnection {
   /// The server's consumer of a stream, anew: whatever is not acknowledged comes at once.
   [[nodiscard]] Status renew_consumer(const std::string& stream, const std::string& consumer) const;
   /// What a stream has, and what its consumer is to get of it.
-  struct Look {
+  struct StreamState {
     std::uint64_t first = 0;       ///< Sequence in the stream.
     std::uint64_t messages = 0;    ///< In the stream.
     std::uint64_t pending = 0;     ///< Those to be given for the first time;
@@ -82,14 +82,15 @@ class NatsConnection {
   [[nodiscard]] bool has_jetstream() const;
   /// False: a bus that has lost its store. An error: it does not answer.
   [[nodiscard]] Result<bool> has_stream(const std::string& stream) const;
-  /// Nothing: there is no consumer, or the stream does not hold still for long enough.
-  [[nodiscard]] Result<std::optional<Look>> look_at(const std::string& stream, const std::string& consumer) const;
+  /// Nothing: there is no consumer, or the stream does not stay unchanged for long enough.
+  [[nodiscard]] Result<std::optional<StreamState>> read_state(const std::string& stream,
+                                                              const std::string& consumer) const;
   /// Removes messages that are given to nobody any more, each after `take` has had it.
-  [[nodiscard]] Status remove_done(const std::string& stream, const Look& look,
+  [[nodiscard]] Status remove_done(const std::string& stream, const StreamState& state,
                                    const std::function<void(natsMsg*)>& take) const;
   [[nodiscard]] Status remove_stream(const std::string& stream) const;
-  /// Looks at what is in a stream behind sequence `after`, so many messages at a time, and removes those whose id
-  /// (Nats-Msg-Id) is not `ours`. Returns up to which sequence it has looked; `removed` grows.
+  /// Reads what is in a stream behind sequence `after`, so many messages at a time, and removes those whose id
+  /// (Nats-Msg-Id) is not `ours`. Returns up to which sequence it has read; `removed` grows.
   [[nodiscard]] Result<std::uint64_t> remove_strange(const std::string& stream, std::uint64_t after,
                                                      const std::function<bool(std::string_view)>& ours,
                                                      std::uint64_t& removed) const;
@@ -107,7 +108,7 @@ class NatsConnection {
   /// The value retained at this subject; nothing if there is none, or one that is_of_another_subject().
   [[nodiscard]] Result<std::optional<std::string>> retained(const std::string& bucket,
                                                             const std::string& subject) const;
-  /// The message is acknowledged, and the bus has said so.
+  /// The message is acknowledged, and the bus has confirmed it.
   [[nodiscard]] Status acknowledge(const std::string& reply) const;
   /// Not waiting for an answer; `id` and `answer_to` may be empty.
   [[nodiscard]] Status publish(const std::string& subject, const std::string& answer_to, const std::string& id,

@@ -38,7 +38,7 @@ class Inbox {
   explicit Inbox(Endpoint self) : self_(self) {}
 
   /// A part of a durable message or a job; `reply`: where the bus awaits its acknowledgement. False: it does not fit to
-  /// the parts that came before, or the whole is not what its id says. `user`: Envelope::user.
+  /// the parts that came before, or the whole does not fit its id. `user`: Envelope::user.
   bool add_part(Endpoint from, const Part& part, std::string_view bytes, std::string reply, Time now = {},
                 const std::string& user = {});
   /// In the place of one of its kind that is not taken yet.
@@ -51,19 +51,19 @@ class Inbox {
 
   std::vector<Received> take();
   void acknowledge(std::uint64_t ticket);
-  /// Where the bus is to be told that work on the message goes on.
+  /// Where the bus is to learn that work on the message goes on.
   [[nodiscard]] std::vector<std::string> replies_of(std::uint64_t ticket) const;
 
   struct Acknowledgement {
     std::uint64_t ticket = 0;
     std::vector<std::string> replies;
   };
-  /// The oldest that the bus has not been told.
+  /// The oldest that the bus does not know.
   [[nodiscard]] std::optional<Acknowledgement> next_acknowledgement() const;
   /// What was acknowledged where is void: the bus has lost its stream of these. Parts of messages that are not whole
-  /// are forgotten; whole ones are still to be acknowledged, and nobody is told.
+  /// are forgotten; whole ones are still to be acknowledged, and nobody learns of it.
   void forget_stream(MessageKind kind);
-  /// The bus knows, or cannot be told and will send the message again: it is forgotten here.
+  /// The bus knows, or cannot be reached and will send the message again: it is forgotten here.
   void forget(std::uint64_t ticket);
   /// Where messages that came again although they are acknowledged are to be acknowledged once more.
   [[nodiscard]] std::vector<std::string> take_strays() { return std::exchange(strays_, {}); }
@@ -71,7 +71,7 @@ class Inbox {
   /// Everything that is not acknowledged, whole or not.
   [[nodiscard]] std::vector<std::string> unacknowledged() const;
 
-  /// Whole messages that the bus was not told to forget.
+  /// Whole messages that are not acknowledged to the bus.
   [[nodiscard]] std::uint64_t held_bytes() const { return held_bytes_; }
   [[nodiscard]] std::size_t held_messages() const { return held_.size(); }
   /// Messages so far that never became whole.

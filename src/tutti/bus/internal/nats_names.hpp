@@ -28,7 +28,7 @@ std::string subject_of(const std::string& mission, const Envelope& envelope);
 /// "proxy_graph"
 std::string word_of(MessageKind kind);
 
-/// What a subject of ours says of its message; nothing when it is none of a robot, a worker or the viewers.
+/// What a subject of ours has on its message; nothing when it is none of a robot, a worker or the viewers.
 struct Address {
   Endpoint end;  ///< Who sent it, or of retained ones to whom.
   MessageKind kind = MessageKind::submap;
@@ -37,13 +37,13 @@ struct Address {
 std::optional<Address> address_of(std::string_view subject);
 
 /// Which part of which message. NATS stores one message of an id only: "submap/3/1700000000/4/h00c0ffee00c0ffee/0.2" is
-/// the first of two. The content is in it, so that another message with this id is not in the way of the right one.
+/// the first of two. The content is in it, so that another message with this id does not block the right one.
 struct Part {
   MessageKind kind = MessageKind::submap;
   std::string id;
   std::uint32_t index = 0;
   std::uint32_t count = 1;
-  std::optional<std::uint64_t> content;  ///< content_hash() of the whole; older programs do not say it.
+  std::optional<std::uint64_t> content;  ///< content_hash() of the whole; older programs do not send it.
   friend bool operator==(const Part&, const Part&) = default;
 };
 std::string to_string(const Part& part);
@@ -51,7 +51,7 @@ std::optional<Part> part_of(std::string_view text);
 /// The only part of a message that is not cut.
 Part whole_part(const Envelope& envelope);
 
-/// The parts of one message on their way in: in any order, any of them again.
+/// The parts of one message as they come in: in any order, any of them again.
 class Assembly {
  public:
   /// False: the message has another number of parts, and this one is not taken.

@@ -17,7 +17,7 @@
 
 namespace tutti::bus {
 
-/// What a port has to send, in parts, until the bus has confirmed each. It has no clock: callers say what time it is.
+/// What a port has to send, in parts, until the bus has confirmed each. It has no clock: callers pass the time.
 class Outbox {
  public:
   using Time = std::chrono::steady_clock::time_point;

@@ -12,8 +12,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kListen(200);   // then the bus gives nothing for a request any more
-constexpr int kMostUnanswered = 3;                  // a bus that does not know the consumer says nothing
-constexpr std::chrono::milliseconds kIsLost(1000);  // and so much later it will not say so any more, either
+constexpr int kMostUnanswered = 3;                  // a bus that does not know the consumer answers nothing
+constexpr std::chrono::milliseconds kIsLost(1000);  // and so much later it will not report that any more, either
 
 }  // namespace
 
@@ -54,20 +54,20 @@ NatsPull::Next NatsPull::next(int batch) {
   const natsStatus status = natsSubscription_NextMsg(&heard, subscription_, kListen.count());
   NatsOwned<natsMsg> message(heard);
   if (status == NATS_TIMEOUT) {
-    // Nats-server 2.9 does not always say that a request has run out when it has given some of what was asked for.
+    // Nats-server 2.9 does not always report that a request has run out when it has given some of what was asked for.
     if (std::exchange(partly_, false)) left_ = 0;
     return {};
   }
   if (status != NATS_OK) return {State::lost, {}};
   unanswered_ = 0;
-  if (std::string_view(natsMsg_GetSubject(heard)).starts_with(inbox_)) return {told(heard), {}};
+  if (std::string_view(natsMsg_GetSubject(heard)).starts_with(inbox_)) return {state_of(heard), {}};
   if (left_ > 0) --left_;
   partly_ = true;
   return {State::message, std::move(message)};
 }
 
 /// 404 and 408: there is no more; other numbers: the consumer is gone, or the bus is going.
-NatsPull::State NatsPull::told(natsMsg* message) {
+NatsPull::State NatsPull::state_of(natsMsg* message) {
   const bool is_of_last =
       std::string_view(natsMsg_GetSubject(message)).substr(inbox_.size() + 1) == std::to_string(requests_);
   if (is_of_last) left_ = 0;

@@ -34,8 +34,8 @@ class NatsPull {
 
  private:
   [[nodiscard]] bool ask(int batch);
-  /// What the bus says of a request instead of a message.
-  [[nodiscard]] State told(natsMsg* message);
+  /// What the bus answers to a request instead of a message.
+  [[nodiscard]] State state_of(natsMsg* message);
 
   std::shared_ptr<NatsConnection> connection_;
   std::string ask_;  ///< Where to.

@@ -12,7 +12,7 @@
 
 namespace tutti::lidar {
 
-/// A piece of wall seen from above; level frame, relative to BirdsEyeView::centre.
+/// A part of wall seen from above; level frame, relative to BirdsEyeView::centre.
 struct WallCell {
   Eigen::Vector2f position;  ///< m
   Eigen::Vector2f normal;    ///< Mean horizontal normal of the cell's points, times the root of their number.
@@ -23,7 +23,7 @@ struct WallCell {
 using FloorPatch = std::tuple<int, int, bool>;
 FloorPatch floor_patch(const Eigen::Vector2f& position, bool faces_up, double cell_m);
 
-/// A piece of floor (its normal points up) or ceiling.
+/// A part of floor (its normal points up) or ceiling.
 struct FloorCell {
   Eigen::Vector2f position;  ///< m, level frame, relative to BirdsEyeView::centre.
   float height;              ///< m, level frame.
@@ -42,7 +42,7 @@ struct BirdsEyeView {
 /// `cell_m` and layers of 0.25 m. `cloud` is in the submap frame.
 BirdsEyeView make_view(const OrientedCloud& cloud, const Eigen::Quaterniond& R_level_submap, double cell_m);
 
-/// False for a view that shows hardly any walls and thus says nothing.
+/// False for a view that shows hardly any walls and thus has no information.
 bool has_enough_walls(const BirdsEyeView& view);
 
 /// At most `count` directions in [0, pi), rad, that most wall faces or face away from, most first. They turn with the

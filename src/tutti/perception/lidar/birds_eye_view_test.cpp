@@ -18,13 +18,13 @@ using namespace test;
 /// Between two directions that are the same after half a turn.
 double apart_deg(double a, double b) { return std::abs(std::remainder(a - b, std::numbers::pi)) / kRadPerDeg; }
 
-SubmapFeatures look(const Walk& walk, std::uint64_t seed) {
+SubmapFeatures features_of(const Walk& walk, std::uint64_t seed) {
   return extract_features(make_submap({RobotId{0}, 0}, furnished_room(), walk, Rng(seed)), {});
 }
 
 TEST(WallDirections, areThoseOfTheRoomWhateverTheYaw) {
   for (const double yaw_deg : {0.0, 1.0, 44.0, 45.5, 90.0, 137.0, 179.9}) {
-    const auto directions = wall_directions(look({.yaw_rad = yaw_deg * kRadPerDeg}, 1).view, 2);
+    const auto directions = wall_directions(features_of({.yaw_rad = yaw_deg * kRadPerDeg}, 1).view, 2);
     ASSERT_EQ(directions.size(), 2U);
     for (const double direction : directions) {
       EXPECT_GE(direction, 0.0);
@@ -44,7 +44,7 @@ TEST(WallDirections, noneWithoutWalls) {
 }
 
 TEST(TurnViews, wavelengthsCountAlikeAndTogetherOne) {
-  const auto features = look({.yaw_rad = 1.0}, 2);
+  const auto features = features_of({.yaw_rad = 1.0}, 2);
   ASSERT_EQ(features.turned_views->size(), 2U);
   for (const TurnedView& view : *features.turned_views) {
     const auto size = [&](int row, int column) { return std::abs(view.spectrum(row, column)); };

@@ -84,7 +84,7 @@ std::vector<Peak> select_distinct(std::vector<Peak> peaks, const CandidateConfig
 /// without any.
 double find_height(const BirdsEyeView& a, const BirdsEyeView& b, const Peak& peak, double cell_m) {
   constexpr float kBin = 0.1F;
-  constexpr int kZero = 200;  // bin of difference 0: up to 20 m either way
+  constexpr int kZero = 200;  // bin of difference 0: up to 20 m in either direction
   std::array<float, 2 * kZero> votes{};
   const Eigen::Matrix2f R = Eigen::Rotation2Df(static_cast<float>(peak.yaw)).toRotationMatrix();
   const Eigen::Vector2f shift = peak.shift.cast<float>();

@@ -37,7 +37,7 @@ inline constexpr double kDistinct_m = 2.0;     ///< or by this distance: the reg
 /// Search for the rough relative pose by correlating views from above.
 struct CandidateConfig {
   double cell_m = 0.8;  ///< Cell of the 64 x 64 view from above.
-  /// Wall directions of each submap; each of one is laid on each of the other, either way round.
+  /// Wall directions of each submap; each of one is laid on each of the other, in either direction.
   int wall_directions = 2;
   int max_guesses = 3;  ///< Limit on the rough alignments that are registered.
   template <class V>
@@ -59,7 +59,7 @@ struct LidarClosureConfig {
   CandidateConfig candidates;
   RegistrationConfig registration;
   double min_overlap = 0.3;  ///< Least mean overlap of both directions.
-  /// Between the middle keyframes of the two submaps; closures from farther apart say little.
+  /// Between the middle keyframes of the two submaps; closures from farther apart add little.
   double max_viewpoint_distance_m = 25.0;
   double max_misfit = 1.4;          ///< Largest ratio of the residuals to what noise, roughness and odometry explain.
   double max_plane_rmse_m = 0.085;  ///< Point to plane, over the overlap.

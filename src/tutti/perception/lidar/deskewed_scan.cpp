@@ -14,17 +14,17 @@
 namespace tutti::lidar {
 namespace {
 
-/// Poses that go on from the first of a trajectory, away from the others, as these went on for a moment: for as long as
-/// a point may be from its pose.
+/// Poses that go on from the first of a trajectory, away from the others, as these went on for a short time: for as
+/// long as a point may be from its pose.
 template <class Samples>
 Trajectory gone_on(const Samples& samples) {
-  constexpr double kMoment_s = 0.01;
+  constexpr double kShortTime_s = 0.01;
   StampedPose from = *samples.begin();
-  const auto far = [&](const StampedPose& other) { return std::abs(other.stamp - from.stamp) >= kMoment_s; };
+  const auto far = [&](const StampedPose& other) { return std::abs(other.stamp - from.stamp) >= kShortTime_s; };
   const auto found = std::find_if(samples.begin(), samples.end(), far);
   const StampedPose& other = found == samples.end() ? *std::prev(found) : *found;
   const double step_s =
-      std::copysign(std::max(kMoment_s, std::abs(from.stamp - other.stamp)), from.stamp - other.stamp);
+      std::copysign(std::max(kShortTime_s, std::abs(from.stamp - other.stamp)), from.stamp - other.stamp);
   const Pose3 step = other.pose.inverse() * from.pose;
   Trajectory out;
   for (double reached_s = 0.0; reached_s < kLongestAge_s; reached_s += std::abs(step_s)) {

@@ -29,7 +29,7 @@ class NeighbourIndex {
                                      std::int32_t guess = kNone) const;
   /// Writes the indices of the nearest points, at most out.size(), nearest first; returns how many there are.
   std::size_t nearest_k(const Eigen::Vector3f& query, std::span<std::int32_t> out) const;
-  [[nodiscard]] std::size_t bytes() const;  ///< Memory held.
+  [[nodiscard]] std::size_t bytes() const;  ///< Memory used.
 
  private:
   struct Tree;

@@ -73,7 +73,7 @@ template <int lanes>
 }
 
 /// conj(B(k)) - i conj(B(-k)), from which highest() makes the correlation with b and with b turned by half.
-[[gnu::always_inline]] inline void both_ways(const char* bytes, Spectrum& out) {
+[[gnu::always_inline]] inline void both_directions(const char* bytes, Spectrum& out) {
   Spectrum b, mirrored;
   read_view(bytes, b);
   mirror(b.re, mirrored.re);
@@ -231,7 +231,7 @@ struct alignas(64) PlaceViews::View {
   Part sum_re, sum_im;                // Re A + Im M, Im A + Re M
   Part difference_re, difference_im;  // Re A - Im M, Im A - Re M
 
-  /// The correlation with the view of both_ways(), as correlate_both() of candidates.cpp: its spectrum is
+  /// The correlation with the view of both_directions(), as correlate_both() of candidates.cpp: its spectrum is
   /// A U - i M conj(U).
   template <int lanes>
   [[gnu::always_inline]] inline float highest(const Spectrum& u) const {
@@ -262,7 +262,7 @@ struct alignas(64) PlaceViews::View {
     float best = 0.0F;
     for (std::size_t at = 0; at + kViewBytes <= others.size(); at += kViewBytes) {
       Spectrum u;
-      both_ways(others.data() + at, u);
+      both_directions(others.data() + at, u);
       for (const View& view : views) best = std::max(best, view.highest<lanes>(u));
     }
     return best;

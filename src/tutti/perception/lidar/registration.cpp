@@ -168,7 +168,7 @@ Matrix6d residual_covariance(const Matrix6d& H, std::span<const Vector6d> terms)
   return variance * cholesky.solve(Matrix6d::Identity());
 }
 
-/// Root of the largest ratio u^T R u / u^T S u over all directions u. Directions with hardly any surface say nothing.
+/// Root of the largest ratio u^T R u / u^T S u over all directions u. Directions with hardly any surface are ignored.
 double worst_ratio(const Eigen::Matrix3d& R, const Eigen::Matrix3d& S, std::size_t count) {
   constexpr double kLeastRoughness = 0.01, kLeastShare = 0.01;  // m; of the points
   const double least = kLeastShare * kLeastRoughness * kLeastRoughness * static_cast<double>(count);

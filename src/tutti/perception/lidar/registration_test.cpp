@@ -50,11 +50,11 @@ TEST(RegisterClouds, misfitIsAboutOneAtTheTruthAndLargeOff) {
   const auto right = register_clouds(a, b, truth, {});
   EXPECT_GT(right.misfit, 0.5);
   EXPECT_LT(right.misfit, 1.3);
-  RegistrationConfig look;  // where it stands: one step that cannot go far
-  look.levels = {{0.01, 4000, 1}};
+  RegistrationConfig fixed;  // where it stands: one step that cannot go far
+  fixed.levels = {{0.01, 4000, 1}};
   Vector6d off = Vector6d::Zero();
   off[1] = 0.15;
-  EXPECT_GT(register_clouds(a, b, retract(truth, off), look).misfit, 2.0);
+  EXPECT_GT(register_clouds(a, b, retract(truth, off), fixed).misfit, 2.0);
   auto unknown = a;
   unknown.roughness = nullptr;
   EXPECT_EQ(register_clouds(unknown, b, truth, {}).misfit, 0.0);

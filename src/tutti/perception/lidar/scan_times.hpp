@@ -13,13 +13,13 @@
 /// sweep's begin, until its end or by a clock, without saying which; but a sweep is short, so the numbers show it.
 namespace tutti::lidar {
 
-/// Limits on a sweep's duration; they tell units apart that differ by a factor of a thousand.
+/// Limits on a sweep's duration; they distinguish units that differ by a factor of a thousand.
 inline constexpr double kShortestSweep_s = 0.001;
 inline constexpr double kLongestSweep_s = 0.5;
 /// No point is measured farther in time from its scan's pose than this, before or after it.
 inline constexpr double kLongestAge_s = 1.0;
 
-/// What a mission file says of a robot's scans: robots[].scans_deskewed (auto, yes, no), scan_time_unit (auto, s, ms,
+/// What a mission file has on a robot's scans: robots[].scans_deskewed (auto, yes, no), scan_time_unit (auto, s, ms,
 /// us, ns) and scan_pose_at (end, begin).
 struct ScanTimesConfig {
   std::string deskewed = "auto";

@@ -49,7 +49,7 @@ Eigen::Vector3d find_up(const Submap& submap, std::span<const Pose3> poses, std:
 
 /// What the points may be off by where two submaps of one place lie on each other: what they are off by within one
 /// cloud, and how far the odometry's rotation may have bent it. Not its translation: that is uncertain along corridors
-/// without features, where the few points that say how far along one is must not be excused.
+/// without features, where the few points that determine how far along one is must not be excused.
 std::vector<float> expected_residuals(const OrientedCloud& cloud, const Middle& middle,
                                       const RegistrationConfig& config) {
   std::vector<float> out = self_residuals(cloud, config);
@@ -65,10 +65,10 @@ std::vector<float> expected_residuals(const OrientedCloud& cloud, const Middle& 
   return out;
 }
 
-/// Panoramas from viewpoints evenly spread along the way.
-std::shared_ptr<const std::vector<DepthPanorama>> look_around(const OrientedCloud& cloud,
-                                                              std::span<const Eigen::Vector3f> viewpoints,
-                                                              const LidarClosureConfig& config) {
+/// Panoramas from viewpoints evenly spread along the trajectory.
+std::shared_ptr<const std::vector<DepthPanorama>> render_panoramas(const OrientedCloud& cloud,
+                                                                   std::span<const Eigen::Vector3f> viewpoints,
+                                                                   const LidarClosureConfig& config) {
   auto panoramas = std::make_shared<std::vector<DepthPanorama>>();
   constexpr std::size_t kViews = 5;
   for (std::size_t k = 0; k < kViews; ++k)
@@ -77,7 +77,7 @@ std::shared_ptr<const std::vector<DepthPanorama>> look_around(const OrientedClou
   return panoramas;
 }
 
-/// The part of a submap's features that says how it looks from above.
+/// The part of a submap's features that describes its appearance from above.
 struct SeenFromAbove {
   std::optional<Refusal> refusal;  ///< Why the submap is not usable; nothing else is there then.
   std::vector<Eigen::Vector3f> viewpoints;
@@ -116,7 +116,7 @@ SubmapFeatures extract_features(const Submap& submap, const LidarClosureConfig& 
   features.R_level_submap = seen.R_level_submap;
   features.view = std::move(seen.view);
   features.turned_views = std::make_shared<const std::vector<TurnedView>>(turn_views(features.view, config.candidates));
-  features.panoramas = look_around(features.cloud, seen.viewpoints, config);
+  features.panoramas = render_panoramas(features.cloud, seen.viewpoints, config);
   features.usable = true;
   return features;
 }

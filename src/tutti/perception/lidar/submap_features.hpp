@@ -29,7 +29,7 @@ struct SubmapFeatures {
   std::shared_ptr<const Bend> bend;
   BirdsEyeView view;
   std::shared_ptr<const std::vector<TurnedView>> turned_views;
-  std::shared_ptr<const std::vector<DepthPanorama>> panoramas;  ///< Submap frame, from viewpoints along the way.
+  std::shared_ptr<const std::vector<DepthPanorama>> panoramas;  ///< Submap frame, from viewpoints along the trajectory.
 };
 
 /// Computes the features; pure and deterministic. A submap that is too short, too small or without a cloud has usable =
@@ -40,7 +40,7 @@ SubmapFeatures extract_features(const Submap& submap, const LidarClosureConfig& 
 /// walls.
 std::vector<TurnedView> views_from_above(const Submap& submap, const LidarClosureConfig& config);
 
-/// Memory held in bytes, with what copies share.
+/// Memory used in bytes, with what copies share.
 std::size_t bytes_of(const SubmapFeatures& features);
 
 }  // namespace tutti::lidar

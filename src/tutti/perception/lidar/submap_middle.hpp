@@ -10,7 +10,7 @@ namespace tutti::lidar {
 
 /// The middle keyframe of a submap, where a rigid fit of a bent submap errs least, and its uncertainty against the
 /// submap's cloud as a whole. The middle is by count, because keyframes come with new views and the cloud is made of
-/// these: with 0.3 deg/m of drift the median error there is 6.4 cm, half way by distance 7.4 cm, by time 8.3 cm.
+/// these: with 0.3 deg/m of drift the median error there is 6.4 cm, halfway by distance 7.4 cm, by time 8.3 cm.
 struct Middle {
   std::size_t index = 0;
   Pose3 T_submap_keyframe;

@@ -29,7 +29,7 @@ Trajectory drive(const Eigen::Vector3d& speed, const Eigen::Vector3d& turn, cons
   return out;
 }
 
-/// Fixed points seen from where the body was at each moment of the sweep.
+/// Fixed points seen from where the body was at each time of the sweep.
 Scan sweep(const std::vector<Eigen::Vector3d>& fixed, Timestamp stamp, double sweep_s, const Eigen::Vector3d& speed,
            const Eigen::Vector3d& turn) {
   auto cloud = std::make_shared<PointCloud>();

@@ -15,18 +15,18 @@ namespace tutti::lidar {
 namespace {
 
 constexpr double kDegPerRad = 180.0 / std::numbers::pi;
-const RegistrationLevel kScreening{1.0, 200, 8};  // first look at every rough alignment, with few points
-constexpr double kEarlyOverlap = 0.6;           // of min_overlap: with less after a look or the coarse levels, given up
-constexpr double kScreeningMisfit = 2.0;        // of max_misfit: with more after the first look, given up
-constexpr double kCoarseMisfit = 1.5;           // of max_misfit: with more after the coarse levels, given up
-constexpr double kVisibilityMargin_m = 0.5;     // a point this much nearer than the surface seen behind it contradicts
-constexpr int kVisibilityPoints = 2000;         // of each submap, evenly spread
-constexpr std::size_t kBendPoints = 500;        // of b, evenly spread, to see from where the overlap was seen
-constexpr double kMaxSlidRatio = 0.65;          // of an alignment slid along the direction constrained least
+const RegistrationLevel kScreening{1.0, 200, 8};  // first check of every rough alignment, with few points
+constexpr double kEarlyOverlap = 0.6;        // of min_overlap: with less after a check or the coarse levels, given up
+constexpr double kScreeningMisfit = 2.0;     // of max_misfit: with more after the first check, given up
+constexpr double kCoarseMisfit = 1.5;        // of max_misfit: with more after the coarse levels, given up
+constexpr double kVisibilityMargin_m = 0.5;  // a point this much nearer than the surface seen behind it contradicts
+constexpr int kVisibilityPoints = 2000;      // of each submap, evenly spread
+constexpr std::size_t kBendPoints = 500;     // of b, evenly spread, to see from where the overlap was seen
+constexpr double kMaxSlidRatio = 0.65;       // of an alignment slid along the direction constrained least
 constexpr double kMaxForwardBackward_m = 0.05;  // between a-to-b and b-to-a, at the centre of the overlap
 constexpr double kMaxForwardBackward_deg = 0.5;
 
-/// Share of the points in view, both ways, that stand in space the other submap looked through.
+/// Share of the points in view, in both directions, that stand in space the other submap looked through.
 double contradiction(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_a_b) {
   const auto margin = static_cast<float>(kVisibilityMargin_m);
   const VisibilityCount ab = count_visible(*a.panoramas, b.cloud, T_a_b, kVisibilityPoints, margin);
@@ -56,7 +56,7 @@ bool is_hopeless(const RegistrationResult& result, double misfit_factor, const L
   return result.overlap < kEarlyOverlap * config.min_overlap || result.misfit > misfit_factor * config.max_misfit;
 }
 
-/// A rough alignment that a first look finds worth a registration, improved by it.
+/// A rough alignment that a first check finds worth a registration, improved by it.
 std::optional<Pose3> screen(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_a_b,
                             const LidarClosureConfig& config) {
   const auto result = register_clouds(a.cloud, b.cloud, T_a_b, with_levels(config.registration, {kScreening}));
@@ -122,16 +122,16 @@ double best_slid_quality(const SubmapFeatures& a, const SubmapFeatures& b, const
   return best;
 }
 
-/// How far refine() goes: to the end, or no farther than one way whose plane RMSE is too large, whatever the other way
-/// says.
+/// How far refine() goes: to the end, or no farther than one direction whose plane RMSE is too large, whatever the
+/// other direction gives.
 enum class Effort { whole, until_refused };
 
-/// Registers one way, then the other way from where that ended, and takes the middle.
+/// Registers in one direction, then in the other from where that ended, and takes the middle.
 void refine(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_init, const LidarClosureConfig& config,
             Effort effort, PairVerification& out, Eigen::Vector3d& weakest_b) {
   const RegistrationLevel finest = config.registration.levels.back();
   RegistrationLevel first = finest;
-  first.max_points = std::max(first.max_points / 4, 10);  // most of the way is as good with fewer points
+  first.max_points = std::max(first.max_points / 4, 10);  // most of it is as good with fewer points
   const RegistrationConfig fine = with_levels(config.registration, {finest});
   const RegistrationResult forward =
       register_clouds(a.cloud, b.cloud, T_init, with_levels(config.registration, {first, finest}));
@@ -146,7 +146,7 @@ void refine(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_ini
   const Vector6d gap = local(forward.T_target_source, turned.T_a_b);
   weakest_b = forward.weakest_source;
   out.T_a_b = retract(forward.T_target_source, 0.5 * gap);
-  // What the two ways disagree by is uncertainty, too.
+  // What the two directions disagree by is uncertainty, too.
   out.covariance = 0.5 * (forward.covariance + turned.covariance) + 0.25 * gap * gap.transpose();
   out.overlap = 0.5 * (forward.overlap + backward.overlap);
   out.plane_rmse_m = std::max(forward.plane_rmse_m, backward.plane_rmse_m);
@@ -219,7 +219,7 @@ PairVerification verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, c
   out.viewpoint_distance_m = viewpoint_distance(a, b, out.T_a_b);
   if (ranked.size() > 1 && ranked[0].quality > 0.0) out.rival_ratio = ranked[1].quality / ranked[0].quality;
   if (const Refusal rival{RefusalReason::ambiguous, out.rival_ratio, config.max_rival_ratio}; misses(rival)) {
-    out.refusal = rival;  // whatever the finest level would say of the best, as with most pairs where rooms are alike
+    out.refusal = rival;  // whatever the finest level would find of the best, as with most pairs where rooms are alike
     return out;
   }
   Eigen::Vector3d weakest_b;
@@ -227,7 +227,7 @@ PairVerification verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, c
   if (out.plane_rmse_m <= config.max_plane_rmse_m) out.contradiction = contradiction(a, b, out.T_a_b);
   out.viewpoint_distance_m = viewpoint_distance(a, b, out.T_a_b);
   out.refusal = why_refused(out, config);
-  if (!out.refusal) {  // worth another look
+  if (!out.refusal) {  // worth another check
     const double slid = best_slid_quality(a, b, out.T_a_b, weakest_b, config);
     out.slid_ratio = slid / ranked.front().quality;
     out.refusal = why_refused(out, config);

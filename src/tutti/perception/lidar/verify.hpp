@@ -43,8 +43,8 @@ struct PairVerification {
 /// verify_pair(b, a) is exactly the inverse. config.registration.levels must not be empty.
 PairVerification verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, const LidarClosureConfig& config);
 
-/// For somebody who says where the two submaps lie to each other: what verify_pair() measures, of the alignment that
-/// registration reaches from `T_a_b`, without a look for rivals. Evidence and covariance are there also when a gate
+/// For an operator who gives the relative pose of the two submaps: what verify_pair() measures, of the alignment that
+/// registration reaches from `T_a_b`, without a check for rivals. Evidence and covariance are there also when a gate
 /// refuses it; `accepted` then is false. Nothing of the two in reach of each other: no alignment.
 PairVerification verify_near(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_a_b,
                              const LidarClosureConfig& config);

@@ -161,8 +161,8 @@ SubmapFeatures see_with_patches(SubmapId id, Walk walk, double edge_m, std::uint
   return extract_features(submap, kConfig);
 }
 
-// However many neighbours err alike, their residuals tell how sure the closure is: normalised squared errors between 3
-// and 9, where 6 is exact.
+// However many neighbours err alike, their residuals measure how sure the closure is: normalised squared errors between
+// 3 and 9, where 6 is exact.
 TEST(VerifyPair, covarianceIsHonestHoweverManyNeighboursErrAlike) {
   LidarClosureConfig config;
   config.max_rival_ratio = 1.0;  // how sure, not whether

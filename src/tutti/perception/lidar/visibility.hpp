@@ -19,7 +19,7 @@ class DepthPanorama {
   /// Distance, m, at which the view towards `point` ends; 0 where nothing was seen in that direction.
   [[nodiscard]] float depth_towards(const Eigen::Vector3f& point) const;
   [[nodiscard]] const Eigen::Vector3f& viewpoint() const { return viewpoint_; }
-  [[nodiscard]] std::size_t bytes() const {  ///< Memory held.
+  [[nodiscard]] std::size_t bytes() const {  ///< Memory used.
     return sizeof *this + depth_cm_.capacity() * sizeof(std::uint16_t);
   }
 

@@ -24,8 +24,8 @@ struct RangeLimits {
 
 /// Centroid of the points in every cubic voxel of side `voxel_m` (> 0) of a grid through the origin, in Morton order of
 /// the voxels. The result, to the bit, does not depend on the order of the input. Points that are not finite, or more
-/// than 2^20 voxels away from the origin along an axis, are skipped; first_skipped() says beforehand whether there are
-/// any.
+/// than 2^20 voxels away from the origin along an axis, are skipped; first_skipped() returns beforehand whether there
+/// are any.
 PointCloud voxel_downsample(const PointCloud& cloud, double voxel_m);
 
 /// The first point that voxel_downsample() skips; null when it keeps all.

@@ -20,7 +20,7 @@ struct Case {
 };
 
 /// Points 1.5 to 5 m ahead, known to sigma_m along the axis of the first camera and to a tenth of that across it.
-Case look(int n, double noise_px, double sigma_m, Rng& rng, std::uint32_t camera = 0) {
+Case case_of(int n, double noise_px, double sigma_m, Rng& rng, std::uint32_t camera = 0) {
   Case out{.T_map_body = tutti::test::random_pose(rng, 3.0)};
   const Eigen::Matrix3d R_map_camera = (out.T_map_body * kCameras[camera].T_body_camera).rotation.toRotationMatrix();
   const Eigen::Vector3d sigma{0.1 * sigma_m, 0.1 * sigma_m, sigma_m};
@@ -47,7 +47,7 @@ void add_outliers(int n, Case& out, Rng& rng) {
 TEST(AbsolutePose, findsThePoseAmongTwiceAsManyOutliers) {
   Rng rng(1);
   for (int i = 0; i < 20; ++i) {
-    Case c = look(30, 0.5, 0.0, rng);
+    Case c = case_of(30, 0.5, 0.0, rng);
     add_outliers(60, c, rng);
     const auto pose = absolute_pose(c.sightings, kCameras, kConfig, rng.fork(7));
     ASSERT_TRUE(pose.has_value());
@@ -64,7 +64,7 @@ double mean_chi2(double noise_px, double sigma_m) {
   double sum = 0.0;
   const int n = 300;
   for (int i = 0; i < n; ++i) {
-    const Case c = look(40, noise_px, sigma_m, rng);
+    const Case c = case_of(40, noise_px, sigma_m, rng);
     const auto pose = absolute_pose(c.sightings, kCameras, {.max_reprojection_px = 10.0}, rng.fork(7));
     EXPECT_TRUE(pose.has_value());
     if (!pose) return 0.0;
@@ -83,9 +83,9 @@ TEST(AbsolutePose, covarianceIsWhatTheErrorsAre) {  // 6, and what Cauchy's loss
 
 TEST(AbsolutePose, sightingsOfTheOtherCameraCount) {
   Rng rng(3);
-  Case c = look(20, 0.3, 0.0, rng);
+  Case c = case_of(20, 0.3, 0.0, rng);
   const auto one = absolute_pose(c.sightings, kCameras, kConfig, rng.fork(7));
-  Case other = look(20, 0.3, 0.0, rng, 1);
+  Case other = case_of(20, 0.3, 0.0, rng, 1);
   for (Sighting& s : other.sightings) s.point = c.T_map_body * (other.T_map_body.inverse() * s.point);
   c.sightings.insert(c.sightings.end(), other.sightings.begin(), other.sightings.end());
   const auto both = absolute_pose(c.sightings, kCameras, kConfig, rng.fork(7));
@@ -97,10 +97,10 @@ TEST(AbsolutePose, sightingsOfTheOtherCameraCount) {
 
 TEST(AbsolutePose, nothingComesOfFewOrUnrelatedSightings) {
   Rng rng(4);
-  Case c = look(3, 0.3, 0.0, rng);
+  Case c = case_of(3, 0.3, 0.0, rng);
   EXPECT_FALSE(absolute_pose(c.sightings, kCameras, kConfig, rng));
   EXPECT_FALSE(absolute_pose({}, kCameras, kConfig, rng));
-  c = look(30, 0.3, 0.0, rng);
+  c = case_of(30, 0.3, 0.0, rng);
   for (Sighting& s : c.sightings) s.pixel = {rng.uniform(20.0, 730.0), rng.uniform(20.0, 460.0)};
   const auto pose = absolute_pose(c.sightings, kCameras, kConfig, rng.fork(7));
   EXPECT_TRUE(!pose || pose->inliers.size() < 8);
@@ -110,7 +110,7 @@ TEST(AbsolutePose, nothingComesOfFewOrUnrelatedSightings) {
 
 TEST(AbsolutePose, dependsOnTheSeedAlone) {
   Rng rng(5);
-  Case c = look(20, 0.5, 0.0, rng);
+  Case c = case_of(20, 0.5, 0.0, rng);
   add_outliers(60, c, rng);
   const auto one = absolute_pose(c.sightings, kCameras, kConfig, Rng(9)),
              other = absolute_pose(c.sightings, kCameras, kConfig, Rng(9));

@@ -11,7 +11,7 @@
 namespace tutti::visual {
 namespace {
 
-constexpr std::size_t kFew = 10;  // pairs, of which nothing is said
+constexpr std::size_t kFew = 10;  // pairs, from which nothing is concluded
 
 }  // namespace
 

@@ -24,7 +24,7 @@ class ClockCheck {
  public:
   static constexpr double kPair_s = 0.4;      ///< Least time between the images of a pair.
   static constexpr std::size_t kPairs = 60;   ///< Pairs that are enough; further images are ignored.
-  static constexpr double kLargest_s = 0.5;   ///< Offsets are searched up to this one, either way,
+  static constexpr double kLargest_s = 0.5;   ///< Offsets are searched up to this one, in either direction,
   static constexpr double kStep_s = 0.02;     ///< in these steps.
   static constexpr double kConvincing = 0.6;  ///< An answer must reduce the mean error to this share.
 
@@ -33,11 +33,11 @@ class ClockCheck {
   void add(Timestamp stamp, const TrackedImage& image);
   [[nodiscard]] std::size_t pairs() const { return pairs_.size(); }
   /// What to add to the images' stamps, s, where this makes them fit the odometry far better; no value where they fit
-  /// as they are or do not tell.
+  /// as they are or do not determine it.
   [[nodiscard]] std::optional<double> offset_s(const Trajectory& odometry) const;
   /// By how much the camera seems to be turned about its optical axis against Camera::T_body_camera, 90, 180 or 270
   /// degrees, where this fits the odometry far better; no value where the camera fits as stated or the motion does not
-  /// tell, as straight ahead along the axis.
+  /// determine it, as straight ahead along the axis.
   [[nodiscard]] std::optional<int> roll_deg(const Trajectory& odometry) const;
 
  private:

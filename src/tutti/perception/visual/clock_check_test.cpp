@@ -60,7 +60,7 @@ TEST(ClockCheck, SaysNothingWhereThereIsNoneOrNothingTells) {
   EXPECT_EQ(watched(0.0).pairs(), 40U);
   EXPECT_FALSE(watched(0.0).offset_s(odometry()).has_value());
   EXPECT_FALSE(watched(0.01).offset_s(odometry()).has_value());
-  EXPECT_FALSE(watched(0.2, false).offset_s(odometry(false)).has_value());  // straight on, one moment is as any other
+  EXPECT_FALSE(watched(0.2, false).offset_s(odometry(false)).has_value());  // straight on, one time is as any other
   EXPECT_FALSE(watched(0.2).offset_s({}).has_value());
   EXPECT_FALSE(ClockCheck(kCamera).offset_s(odometry()).has_value());
 }

@@ -31,14 +31,14 @@ Status check_depth_size(const DepthImage& depth, const Camera& first);
 TrackedImage view_by_depth(TrackedImage& image, const DepthImage& depth, const DepthSensor& sensor, const Camera& first,
                            const Camera& by_depth, std::uint64_t next_track);
 
-/// Checks that a robot's first depth images hold usable depths.
+/// Checks that a robot's first depth images have usable depths.
 class DepthWatch {
  public:
   static constexpr int kImages = 5;
   /// Share of the pixels that must have one; walls beyond the sensor's range are no fault.
   static constexpr double kLeastShare = 0.05;
-  /// What is wrong, told once, after kImages images: nearly all pixels are without depth, or the numbers are no depths
-  /// in units of DepthSensor::unit_m. Otherwise no value.
+  /// What is wrong, reported once, after kImages images: nearly all pixels are without depth, or the numbers are no
+  /// depths in units of DepthSensor::unit_m. Otherwise no value.
   std::optional<std::string> add(const DepthImage& depth, const DepthSensor& sensor);
 
  private:

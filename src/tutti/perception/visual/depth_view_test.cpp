@@ -35,7 +35,7 @@ TrackedImage keypoints() {
   return out;
 }
 
-TEST(DepthView, OneLookTellsWhereAPointIs) {
+TEST(DepthView, OneViewDeterminesWhereAPointIs) {
   TrackedImage image = keypoints();
   image.keypoints[3].track = 7;
   const Camera by_depth = depth_camera(kFirst, kSensor, kSigma_px);
@@ -55,14 +55,14 @@ TEST(DepthView, OneLookTellsWhereAPointIs) {
     const Eigen::Vector3d seen = kFirst.T_body_camera.inverse() * point->position;
     const double z_m = 1.0 + 3.0 * image.keypoints[i].pixel.x() / 640.0;
     EXPECT_NEAR(seen.z(), z_m, 2e-3);
-    // What is said of the depth is what the sensor says of it, within what a second view of the pixel adds.
+    // The uncertainty of the depth is the sensor's, within what a second view of the pixel adds.
     const Eigen::Matrix3d covariance = point_information(views, point->position).inverse();
     const Eigen::Vector3d axis = kFirst.T_body_camera.rotation * Eigen::Vector3d::UnitZ();
     EXPECT_NEAR(std::sqrt(axis.dot(covariance * axis)), 0.0014 * z_m * z_m, 0.35 * 0.0014 * z_m * z_m);
   }
 }
 
-TEST(DepthView, ErrorsOfDepthAreCoveredByWhatIsSaid) {
+TEST(DepthView, ErrorsOfDepthAreCoveredByTheirCovariance) {
   Rng rng(3);
   const Camera by_depth = depth_camera(kFirst, kSensor, kSigma_px);
   double chi2 = 0.0;

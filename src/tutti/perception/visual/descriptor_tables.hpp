@@ -35,7 +35,7 @@ class DescriptorTables {
   /// there are any.
   bool mark_near(std::span<const std::uint64_t> query, const TableKeys& keys, const Descriptors& rows,
                  std::uint32_t most, std::vector<bool>& near) const;
-  [[nodiscard]] std::size_t bytes() const;  ///< Memory held beside the object itself.
+  [[nodiscard]] std::size_t bytes() const;  ///< Memory used beside the object itself.
 
  private:
   struct Table {
@@ -43,7 +43,7 @@ class DescriptorTables {
     std::vector<std::uint32_t> first;    // of each word of `taken` its first entry; and the end
     std::vector<std::uint32_t> entries;  // by key: 64 times the row, and which bit of its word the key is
   };
-  /// Calls is_enough(row) for rows that share a key with the query, some more than once, until it says so.
+  /// Calls is_enough(row) for rows that share a key with the query, some more than once, until it returns true.
   template <class F>
   bool any(const TableKeys& keys, const F& is_enough) const;
   std::array<Table, kTables> tables_;

@@ -9,7 +9,7 @@
 
 namespace tutti::visual {
 
-/// An observation of an image that looks like a landmark of another submap, the map.
+/// An observation of an image that resembles a landmark of another submap, the map.
 struct Match {
   std::uint32_t observation = 0;  ///< Index into QueryFrame::observations.
   std::uint32_t landmark = 0;
@@ -20,7 +20,7 @@ struct Match {
 int count_near(const QueryKeyframe& keyframe, const SubmapFeatures& query, const SubmapFeatures& map,
                const VisualClosureConfig& config, int enough);
 
-/// The landmarks of the map that a keyframe's observations look like.
+/// The landmarks of the map that a keyframe's observations resemble.
 struct Votes {
   std::vector<std::vector<Match>> matches;  ///< Per image of the keyframe.
   int landmarks = 0;                        ///< Different landmarks among the matches.
@@ -29,7 +29,7 @@ struct Votes {
 };
 
 /// As match(), for the observations alone that count_near() counts: about half of the matches at a true place, for a
-/// tenth of the work at others. Points of another place that look alike by chance (corners of windows) are scattered
+/// tenth of the work at others. Points of another place that are similar by chance (corners of windows) are scattered
 /// over the map; points that are seen again were seen together before.
 Votes votes(const QueryKeyframe& keyframe, const SubmapFeatures& query, const SubmapFeatures& map,
             const VisualClosureConfig& config);

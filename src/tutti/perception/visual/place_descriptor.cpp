@@ -22,8 +22,8 @@ constexpr std::size_t kMostWords = 8;
 /// it is not.
 constexpr double kAlike = 0.16;
 
-/// A landmark with descriptors: rows of its first view that has one and of the last, between which it looks most unlike
-/// itself.
+/// A landmark with descriptors: rows of its first view that has one and of the last, between which its appearance
+/// changes most.
 struct SeenLandmark {
   std::uint32_t first_row = kNoIndex, last_row = kNoIndex;
   std::uint32_t keyframes = 0, newest = kNoIndex;  ///< How many saw it, and the last of them.

@@ -22,7 +22,7 @@ std::string place_of(const std::vector<RoomPoint>& room, const Flight& flight, s
   return describe_place(seen_from(room, flight, number), kConfig);
 }
 
-/// The same wall from nearer and the other way.
+/// The same wall from nearer and the opposite direction.
 const Flight kBack{.from = {4.6, 2.6, 1.5}, .to = {2.4, 2.4, 1.4}, .yaw_rad = 1.7, .keyframes = 8};
 /// The wall behind.
 const Flight kBehind{.yaw_rad = -1.5, .turn_rad = 0.0};

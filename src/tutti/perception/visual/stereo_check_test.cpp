@@ -15,14 +15,14 @@ const Camera kSecond{kModel, {so3_exp({0.01, -0.02, 0.015}), {0.11, 0.001, -0.00
 
 /// Points 1 to 20 m away, each seen with `sigma_px`, one in ten elsewhere; the calibration has the second camera
 /// turned.
-std::optional<StereoTurn> look(const Eigen::Vector3d& turn_rad, std::uint64_t seed, int points = 1500,
-                               double sigma_px = 0.3, double focal = 1.0) {
+std::optional<StereoTurn> turn_between(const Eigen::Vector3d& turn_rad, std::uint64_t seed, int points = 1500,
+                                       double sigma_px = 0.3, double focal = 1.0) {
   Rng rng(seed);
-  Camera told = kSecond;
-  told.model.fx *= focal;
-  told.model.fy *= focal;
-  told.T_body_camera.rotation = kSecond.T_body_camera.rotation * so3_exp(-turn_rad);
-  StereoCheck check(kFirst, told);
+  Camera given = kSecond;
+  given.model.fx *= focal;
+  given.model.fy *= focal;
+  given.T_body_camera.rotation = kSecond.T_body_camera.rotation * so3_exp(-turn_rad);
+  StereoCheck check(kFirst, given);
   TrackedImage first, second;
   const auto noisy = [&](const Eigen::Vector2d& pixel, double sigma) {
     return Eigen::Vector2d(pixel + Eigen::Vector2d(rng.normal(sigma), rng.normal(sigma))).cast<float>().eval();
@@ -44,7 +44,7 @@ TEST(StereoCheck, MeasuresATurnAboutAnyAxis) {
   for (std::uint64_t seed = 0; seed < 12; ++seed) {
     const Eigen::Vector3d turn =
         Eigen::Vector3d::Unit(static_cast<int>(seed % 3)) * (seed % 2 == 0 ? 0.9 : -3.0) * kRadPerDeg;
-    const auto found = look(turn, seed);
+    const auto found = turn_between(turn, seed);
     ASSERT_TRUE(found.has_value());
     EXPECT_TRUE(found->is_wrong && (found->is_turned || seed % 2 == 0)) << seed << ' ' << found->told_px;
     EXPECT_LT(found->turned_px, 0.5);
@@ -60,12 +60,13 @@ TEST(StereoCheck, MeasuresATurnAboutAnyAxis) {
 
 TEST(StereoCheck, ARightCalibrationIsBelieved) {
   for (std::uint64_t seed = 0; seed < 12; ++seed)
-    EXPECT_FALSE(look(Eigen::Vector3d::Constant(seed % 2 == 0 ? 0.0 : 0.05 * kRadPerDeg), seed)->is_wrong) << seed;
-  EXPECT_FALSE(look({0.0, 0.9 * kRadPerDeg, 0.0}, 1, 100).has_value());
+    EXPECT_FALSE(turn_between(Eigen::Vector3d::Constant(seed % 2 == 0 ? 0.0 : 0.05 * kRadPerDeg), seed)->is_wrong)
+        << seed;
+  EXPECT_FALSE(turn_between({0.0, 0.9 * kRadPerDeg, 0.0}, 1, 100).has_value());
 }
 
 TEST(StereoCheck, AWrongFocalLengthIsNoTurn) {
-  const auto found = look({0.0, 0.0, 0.0}, 1, 1500, 0.3, 1.03);
+  const auto found = turn_between({0.0, 0.0, 0.0}, 1, 1500, 0.3, 1.03);
   EXPECT_TRUE(found->is_wrong && !found->is_turned) << found->told_px << ' ' << found->turned_px;
 }
 

@@ -36,7 +36,7 @@ SegmentCovariance odometry_of(const Submap& submap) {
   return {poses, steps};
 }
 
-/// The shape that the views give it, in the size that whoever triangulated it says.
+/// The shape that the views give it, in the size that whoever triangulated it states.
 MappedPoint map_point(const Landmark& landmark, const std::vector<View>& views) {
   MappedPoint out{landmark.position.cast<double>(), Eigen::Matrix3d::Identity()};
   const double variance = static_cast<double>(landmark.sigma_m) * landmark.sigma_m;

@@ -59,7 +59,7 @@ struct SubmapFeatures {
 /// where there is one, and its indices valid, as wire::decode_submap() checks.
 SubmapFeatures extract_features(const Submap& submap, const VisualClosureConfig& config);
 
-/// Memory held, in bytes.
+/// Memory used, in bytes.
 std::size_t bytes_of(const SubmapFeatures& features);
 
 }  // namespace tutti::visual

@@ -18,7 +18,7 @@
 namespace tutti::visual {
 namespace {
 
-constexpr int kTogether = 3;  // landmarks that look familiar, by one keyframe: with fewer there is no place
+constexpr int kTogether = 3;  // landmarks that are similar, by one keyframe: with fewer there is no place
 
 using Evidence = std::vector<Refusal>;
 
@@ -50,8 +50,8 @@ SeenMap seen_by(const QueryKeyframe& keyframe, const std::vector<std::vector<Mat
   return out;
 }
 
-SeenMap look_up(const QueryKeyframe& keyframe, const SubmapFeatures& query, const SubmapFeatures& map,
-                const VisualClosureConfig& config, VerificationWork& work) {
+SeenMap find_seen(const QueryKeyframe& keyframe, const SubmapFeatures& query, const SubmapFeatures& map,
+                  const VisualClosureConfig& config, VerificationWork& work) {
   std::vector<std::vector<Match>> matches;
   for (const QueryFrame& image : keyframe.frames) {
     matches.push_back(match(image, query.descriptors, map, config));
@@ -125,9 +125,9 @@ LoopClosure closure_to(const QueryKeyframe& to, const SubmapFeatures& query, con
 /// Votes first: is it worth to compare a keyframe with all of the map? If not, how many landmarks of it looked
 /// familiar, as far as that was asked: fewer than config.min_matches. Each question costs more than the one before and
 /// is asked of what that left; what is asked for leaves room for the matches that votes() does not see.
-std::optional<double> why_not_look(const QueryKeyframe& keyframe, const SubmapFeatures& query,
-                                   const SubmapFeatures& map, const VisualClosureConfig& config, const Rng& rng,
-                                   VerificationWork& work) {
+std::optional<double> why_not_tried(const QueryKeyframe& keyframe, const SubmapFeatures& query,
+                                    const SubmapFeatures& map, const VisualClosureConfig& config, const Rng& rng,
+                                    VerificationWork& work) {
   const int near_enough = (config.min_matches + 1) / 2;
   if (const int near = count_near(keyframe, query, map, config, near_enough); near < near_enough) return near;
   const Votes voted = votes(keyframe, query, map, config);
@@ -151,12 +151,12 @@ Localised localise(const QueryKeyframe& keyframe, const SubmapFeatures& query, c
     return misses(out.gates.back());
   };
   ++work.keyframes;
-  if (const auto familiar = why_not_look(keyframe, query, map, config, rng, work)) {
+  if (const auto familiar = why_not_tried(keyframe, query, map, config, rng, work)) {
     out.gates.push_back({too_few_matches, *familiar, static_cast<double>(config.min_matches)});
     return out;
   }
   ++work.looked_at;
-  const SeenMap seen = look_up(keyframe, query, map, config, work);
+  const SeenMap seen = find_seen(keyframe, query, map, config, work);
   if (missed(too_few_matches, static_cast<double>(seen.sightings.size()), config.min_matches)) return out;
   const auto pose = absolute_pose(seen.sightings, query.cameras, config.pose, rng,
                                   static_cast<std::size_t>(config.min_matches), &work.samples);
@@ -184,7 +184,7 @@ void weaken(Evidence& evidence, const Evidence& other) {
     if (progress({other[i]}) < progress({evidence[i]})) evidence[i] = other[i];
 }
 
-/// Between two keyframes, which may have found each other both ways, the surer one.
+/// Between two keyframes, which may have found each other in both directions, the surer one.
 void keep_surest(std::map<std::pair<KeyframeId, KeyframeId>, LoopClosure>& closures, const LoopClosure& closure) {
   const auto [at, fresh] = closures.try_emplace({closure.from, closure.to}, closure);
   if (!fresh && closure.measurement.covariance.trace() < at->second.measurement.covariance.trace())
@@ -229,7 +229,7 @@ ClosureVerdict verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, con
   std::map<std::pair<KeyframeId, KeyframeId>, LoopClosure> closures;
   Evidence farthest{{RefusalReason::too_few_matches, 0.0, static_cast<double>(config.min_matches)}};
   VerificationWork counted;
-  const auto look_for = [&](const SubmapFeatures& query, const SubmapFeatures& map, bool forwards) {
+  const auto compare = [&](const SubmapFeatures& query, const SubmapFeatures& map, bool forwards) {
     for (const QueryKeyframe& keyframe : query.keyframes) {
       auto found = localise(keyframe, query, map, config, rng.fork(packed(query.id.chain, keyframe.index)), counted);
       if (!found.closure) {
@@ -242,8 +242,8 @@ ClosureVerdict verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, con
       keep_surest(closures, closure);
     }
   };
-  look_for(b, a, true);
-  look_for(a, b, false);
+  compare(b, a, true);
+  compare(a, b, false);
   if (work != nullptr) *work += counted;
   for (const auto& [ends, closure] : closures) verdict.closures.push_back(closure);
   if (closures.empty()) verdict.refusal = farthest.back();

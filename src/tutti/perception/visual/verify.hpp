@@ -29,7 +29,7 @@ bool is_candidate(const Submap& first, const Submap& second, std::uint32_t min_s
                   const VisualClosureConfig& config);
 
 /// Decides from the two submaps alone which keyframes of one see landmarks of the other, and from where. A keyframe is
-/// tried when enough of its observations look like landmarks of the other submap, some of them seen together there
+/// tried when enough of its observations resemble landmarks of the other submap, some of them seen together there
 /// (votes()); then it is matched with all of that submap's landmarks (match()) and localised among them
 /// (absolute_pose()). A closure joins it with the keyframe that saw most of these landmarks. It is believed for how
 /// certain its position is and over how much of an image its inliers are spread, not for their number, because many

@@ -19,7 +19,7 @@ const VisualClosureConfig kConfig;
 const SubmapId kA{RobotId{0}, 0}, kB{RobotId{1}, 0};
 
 const Flight kFlightA;
-/// Later, from nearer, the other way; 100 numbers its keyframes.
+/// Later, from nearer, in the opposite direction; 100 numbers its keyframes.
 const Flight kFlightB{.from = {4.6, 2.6, 1.5},
                       .to = {2.4, 2.4, 1.4},
                       .yaw_rad = 1.7,
@@ -104,7 +104,7 @@ RefusalReason reason(const ClosureVerdict& verdict) {
   return verdict.refusal ? verdict.refusal->reason : RefusalReason::other;
 }
 
-TEST(VerifyVisualPair, theFirstLookMissesNoKeyframeThatMatches) {
+TEST(VerifyVisualPair, theFirstCheckMissesNoKeyframeThatMatches) {
   const auto features = [](SubmapId id, const Flight& flight, const std::vector<RoomPoint>& room) {
     return extract_features(see(id, flight, room), kConfig);
   };
@@ -157,7 +157,7 @@ TEST(VerifyVisualPair, votesRefuseAPlaceOfTheSameWordsForLessThanHalfOfTheWork) 
   add(map, elsewhere);
   EXPECT_TRUE(verify_pair(map, elsewhere, kConfig, &nothing).closures.empty());
   EXPECT_EQ(nothing.keyframes, map.keyframes.size() + elsewhere.keyframes.size());
-  EXPECT_EQ(looks_alike, nothing.keyframes);  // so that a first look alone refuses none
+  EXPECT_EQ(looks_alike, nothing.keyframes);  // so that a first check alone refuses none
   EXPECT_EQ(nothing.looked_at, 0U);
   EXPECT_LT(nothing.distances, all_distances / 2);
 }

@@ -35,7 +35,7 @@ ImageTracker::ImageTracker(std::vector<Camera> cameras, std::optional<DepthSenso
       cameras_(std::make_shared<const std::vector<Camera>>(with_depth(of_images_, depth, config))),
       tracker_(of_images_, config) {}
 
-void ImageTracker::restart(std::uint64_t moment) { tracker_.restart((moment << kNumberBits) + 1); }
+void ImageTracker::restart(std::uint64_t instant) { tracker_.restart((instant << kNumberBits) + 1); }
 
 std::vector<TrackedImage> ImageTracker::track(const SeenImages& seen, bool keyframe) {
   std::vector<Image> images;

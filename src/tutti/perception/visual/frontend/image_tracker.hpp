@@ -15,7 +15,7 @@
 
 namespace tutti::visual {
 
-/// The images of a robot's cameras at one moment.
+/// The images of a robot's cameras at one time.
 struct SeenImages {
   Timestamp stamp;
   std::uint64_t moment = 0;           ///< Larger than that of all images before; track numbers are derived from it.
@@ -23,7 +23,7 @@ struct SeenImages {
   std::function<Result<DepthImage>()> load_depth = {};  ///< Called at keyframes; empty without depth.
 };
 
-/// Follows points through the images of a robot, live or recorded, one moment after the other.
+/// Follows points through the images of a robot, live or recorded, one time after the other.
 class ImageTracker {
  public:
   /// One or two cameras, or one with depth, that check_camera() accepts. Errors: other cameras, or a program built
@@ -33,8 +33,8 @@ class ImageTracker {
   /// VisualTracker::track(), and at a keyframe the view by depth (view_by_depth()). Each image that cannot be read or
   /// has another size adds an error to take_errors(); without the first camera's image nothing is returned.
   std::vector<TrackedImage> track(const SeenImages& seen, bool keyframe);
-  /// Forgets all tracks. The next images are of `moment`, and new tracks have other numbers than all before.
-  void restart(std::uint64_t moment);
+  /// Forgets all tracks. The next images are of `instant`, and new tracks have other numbers than all before.
+  void restart(std::uint64_t instant);
   /// The cameras that returned images refer to: those of make(), and with depth the virtual one (depth_camera()).
   [[nodiscard]] const std::shared_ptr<const std::vector<Camera>>& cameras() const { return cameras_; }
   /// Errors since the last call.

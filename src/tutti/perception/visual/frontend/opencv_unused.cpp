@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // For programs with OpenCV's static libraries inside: what these name, and nothing here uses. OpenGL's functions are
-// not to be had, as OpenCV may be told at run time anyway; with its own library come drivers and LLVM, 290 MB. The
+// not to be had, as OpenCV may learn at run time anyway; with its own library come drivers and LLVM, 290 MB. The
 // others are of the module calib3d, for a function that OpenCV keeps for old programs.
 #include <opencv2/core.hpp>
 

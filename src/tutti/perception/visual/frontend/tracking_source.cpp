@@ -24,7 +24,7 @@ std::size_t nearest(const std::vector<Timestamp>& stamps, Timestamp stamp) {
 }
 
 /// Are most samples within the stream images' stamps, or most images within the odometry samples'?
-/// Where not, what the motion in the images says of their clock (ClockCheck::offset_s) is asked for.
+/// Where not, the offset of their clock by the motion in the images (ClockCheck::offset_s) is asked for.
 Status check_stamps(const std::vector<Timestamp>& stamps, const Trajectory& odometry, double tolerance_s,
                     const std::function<std::optional<double>()>& by_motion) {
   if (stamps.empty() || odometry.empty())
@@ -78,10 +78,10 @@ std::optional<double> watched_offset_s(const ImageStream& stream, const Trajecto
   const std::vector<Camera> first(1, stream.cameras.front());
   VisualTracker tracker(first, config);
   ClockCheck clock(first.front());
-  for (std::size_t moment = 0; moment < stream.stamps.size() && clock.pairs() < ClockCheck::kPairs; ++moment) {
-    const Timestamp stamp = stream.stamps[moment];
+  for (std::size_t instant = 0; instant < stream.stamps.size() && clock.pairs() < ClockCheck::kPairs; ++instant) {
+    const Timestamp stamp = stream.stamps[instant];
     if (stamp < odometry.front().stamp || stamp > odometry.back().stamp) continue;
-    const auto image = stream.load(moment, 0);
+    const auto image = stream.load(instant, 0);
     if (!image || !check_sizes({&*image, 1}, first)) continue;
     const auto tracked = tracker.track({&*image, 1}, false);
     if (!tracked.empty()) clock.add(stamp, tracked.front());
@@ -89,30 +89,30 @@ std::optional<double> watched_offset_s(const ImageStream& stream, const Trajecto
   return clock.offset_s(odometry);
 }
 
-/// What both cameras see at a few moments spread over the recording, wherever the calibration expects it.
+/// What both cameras see at a few times spread over the recording, wherever the calibration expects it.
 std::optional<StereoTurn> watched_turn(const ImageStream& stream, const Trajectory& odometry, TrackerConfig config) {
-  constexpr std::size_t kMoments = 12;
+  constexpr std::size_t kInstants = 12;
   constexpr double kWide_rad = 0.06;  // a turn of more is no slip, and points are not found where they are looked for
   config.epipolar_px = kWide_rad * stream.cameras[1].model.fx;
   VisualTracker tracker(stream.cameras, config);
   StereoCheck check(stream.cameras[0], stream.cameras[1]);
   const auto begin = nearest(stream.stamps, odometry.front().stamp),
              end = nearest(stream.stamps, odometry.back().stamp);
-  for (std::size_t i = 0; i < kMoments; ++i) {
-    const std::size_t moment = begin + i * (end - begin) / (kMoments - 1);
-    const auto first = stream.load(moment, 0), second = stream.load(moment, 1);
+  for (std::size_t i = 0; i < kInstants; ++i) {
+    const std::size_t instant = begin + i * (end - begin) / (kInstants - 1);
+    const auto first = stream.load(instant, 0), second = stream.load(instant, 1);
     if (!first || !second || first->empty() || second->empty()) continue;
     const std::vector<Image> images{*first, *second};
     if (!check_sizes(images, stream.cameras)) continue;
     tracker.restart(0);
     const auto tracked = tracker.track(images, false);
     check.add(tracked[0], tracked[1]);
-    if (end - begin < kMoments && moment == end) break;
+    if (end - begin < kInstants && instant == end) break;
   }
   return check.turn();
 }
 
-/// Takes the second camera away, or turns it, where the images contradict its calibration: what to say then.
+/// Takes the second camera away, or turns it, where the images contradict its calibration: what to report then.
 std::optional<Error> judge_turn(ImageStream& stream, const Trajectory& odometry, const TrackingConfig& config) {
   const auto turn = watched_turn(stream, odometry, config.tracker);
   if (!turn || !turn->is_wrong) return std::nullopt;
@@ -171,20 +171,20 @@ TrackedImages TrackingSource::images(std::size_t sample, bool keyframe) {
   TUTTI_CHECK(sample < odometry_.size(), "sample {} of {}", sample, odometry_.size());
   const Timestamp stamp = odometry_[sample].stamp;
   TrackedImages out{.stamp = stamp, .cameras = tracker_->cameras(), .images = {}};
-  const std::size_t moment = nearest(stream_.stamps, stamp);
-  // Images on the way from the last sample carry the tracks; those before a first one have nothing to tell.
+  const std::size_t instant = nearest(stream_.stamps, stamp);
+  // Images since the last sample carry the tracks; those before a first one are not needed.
   const bool follows = sample > 0 && sample == next_sample_;
-  if (!follows && moment >= next_moment_) {
-    next_moment_ = moment;
-    tracker_->restart(moment);
+  if (!follows && instant >= next_instant_) {
+    next_instant_ = instant;
+    tracker_->restart(instant);
   }
   next_sample_ = std::max(next_sample_, sample + 1);
-  for (; next_moment_ < moment && stream_.stamps[next_moment_] < stamp; ++next_moment_)
-    static_cast<void>(track(next_moment_, false));
-  const bool is_of_sample = std::abs(stream_.stamps[moment] - stamp) <= config_.max_stamp_difference_s;
-  if (!is_of_sample || moment < next_moment_) return out;
-  next_moment_ = moment + 1;
-  out.images = track(moment, keyframe);
+  for (; next_instant_ < instant && stream_.stamps[next_instant_] < stamp; ++next_instant_)
+    static_cast<void>(track(next_instant_, false));
+  const bool is_of_sample = std::abs(stream_.stamps[instant] - stamp) <= config_.max_stamp_difference_s;
+  if (!is_of_sample || instant < next_instant_) return out;
+  next_instant_ = instant + 1;
+  out.images = track(instant, keyframe);
   if (sample + 1 == odometry_.size() || clock_.pairs() == ClockCheck::kPairs) check_clock();
   return out;
 }
@@ -204,11 +204,11 @@ void TrackingSource::check_clock() {
                                    *roll_deg)});
 }
 
-std::vector<TrackedImage> TrackingSource::track(std::size_t moment, bool keyframe) {
-  SeenImages seen{.stamp = stream_.stamps[moment], .moment = moment, .images = {}};
+std::vector<TrackedImage> TrackingSource::track(std::size_t instant, bool keyframe) {
+  SeenImages seen{.stamp = stream_.stamps[instant], .moment = instant, .images = {}};
   for (std::size_t camera = 0; camera < stream_.cameras.size(); ++camera)
-    seen.images.push_back(stream_.load(moment, camera));
-  if (stream_.load_depth) seen.load_depth = [&] { return stream_.load_depth(moment); };
+    seen.images.push_back(stream_.load(instant, camera));
+  if (stream_.load_depth) seen.load_depth = [&] { return stream_.load_depth(instant); };
   auto tracked = tracker_->track(seen, keyframe);
   for (Error& error : tracker_->take_errors()) errors_.push_back(std::move(error));
   if (!tracked.empty()) clock_.add(seen.stamp, tracked.front());

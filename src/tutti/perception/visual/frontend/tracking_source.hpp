@@ -33,12 +33,12 @@ struct TrackingConfig {
 
 /// Follows points through all images of a recorded stream and returns those of the odometry's samples. Samples are
 /// asked for one after the other; after a jump forward (a restart) tracks begin anew, and a sample that is asked for
-/// again has no images. take_errors() also tells, once, of images that are not stamped by the odometry's clock, a
+/// again has no images. take_errors() also reports, once, images that are not stamped by the odometry's clock, a
 /// camera turned about its optical axis (ClockCheck), or a second camera turned against the first (StereoCheck).
 class TrackingSource : public VisualSource {
  public:
-  /// Fails when the stream's stamps do not match those of the odometry. The error says by how much they differ, by the
-  /// motion in the images where it tells; stamps alone know the offset only up to multiples of the time between images.
+  /// Fails when the stream's stamps do not match those of the odometry. The error has by how much they differ, by the
+  /// motion in the images where it shows; stamps alone know the offset only up to multiples of the time between images.
   /// Fails also as ImageTracker::make() does.
   static Result<std::shared_ptr<TrackingSource>> open(ImageStream stream, Trajectory odometry,
                                                       const TrackingConfig& config);
@@ -50,7 +50,7 @@ class TrackingSource : public VisualSource {
   TrackingSource(ImageStream stream, Trajectory odometry, const TrackingConfig& config,
                  std::unique_ptr<ImageTracker> tracker);
   void check_clock();
-  [[nodiscard]] std::vector<TrackedImage> track(std::size_t moment, bool keyframe);
+  [[nodiscard]] std::vector<TrackedImage> track(std::size_t instant, bool keyframe);
 
   ImageStream stream_;
   Trajectory odometry_;
@@ -58,7 +58,7 @@ class TrackingSource : public VisualSource {
   std::unique_ptr<ImageTracker> tracker_;
   ClockCheck clock_;
   bool clock_checked_ = false;
-  std::size_t next_moment_ = 0, next_sample_ = 0;
+  std::size_t next_instant_ = 0, next_sample_ = 0;
   std::vector<Error> errors_;
 };
 

@@ -17,12 +17,12 @@ Camera camera() {
 }
 
 /// Images every 50 ms, past a wall.
-ImageStream wall(std::size_t moments, double offset_s = 0.0) {
+ImageStream wall(std::size_t instants, double offset_s = 0.0) {
   ImageStream out{.cameras = {camera()}, .stamps = {}, .load = {}};
-  for (std::size_t i = 0; i < moments; ++i)
+  for (std::size_t i = 0; i < instants; ++i)
     out.stamps.push_back(Timestamp{1'000'000'000} + (0.05 * static_cast<double>(i) + offset_s));
-  out.load = [](std::size_t moment, std::size_t) -> Result<Image> {
-    return blocks(kWidth, kHeight, 4 * static_cast<int>(moment));
+  out.load = [](std::size_t instant, std::size_t) -> Result<Image> {
+    return blocks(kWidth, kHeight, 4 * static_cast<int>(instant));
   };
   return out;
 }
@@ -66,9 +66,9 @@ TEST(TrackingSource, ServesTheImagesOfSamplesAndFollowsThroughAll) {
 TEST(TrackingSource, ARestartBeginsInTheMiddle) {
   ImageStream stream = wall(41);
   std::vector<std::size_t> read;
-  stream.load = [&](std::size_t moment, std::size_t) -> Result<Image> {
-    read.push_back(moment);
-    return blocks(kWidth, kHeight, 4 * static_cast<int>(moment));
+  stream.load = [&](std::size_t instant, std::size_t) -> Result<Image> {
+    read.push_back(instant);
+    return blocks(kWidth, kHeight, 4 * static_cast<int>(instant));
   };
   const auto source = TrackingSource::open(stream, straight(11, 0.2), {}).value();
   const auto first = tracks(source->images(5, true).images.at(0));
@@ -82,12 +82,12 @@ TEST(TrackingSource, ARestartBeginsInTheMiddle) {
 
 TEST(TrackingSource, ABadImageIsLostAloneAndNamed) {
   ImageStream stream = wall(41);
-  stream.load = [](std::size_t moment, std::size_t) -> Result<Image> {
-    if (moment == 8) return fail(ErrorCode::parse, "frame_8.png: damaged");
-    if (moment == 9) return fail(ErrorCode::io, "frame_9.png: missing");
-    if (moment == 16) return Image(64, 64);
-    if (moment == 24) return Image();  // none was taken
-    return blocks(kWidth, kHeight, 4 * static_cast<int>(moment));
+  stream.load = [](std::size_t instant, std::size_t) -> Result<Image> {
+    if (instant == 8) return fail(ErrorCode::parse, "frame_8.png: damaged");
+    if (instant == 9) return fail(ErrorCode::io, "frame_9.png: missing");
+    if (instant == 16) return Image(64, 64);
+    if (instant == 24) return Image();  // none was taken
+    return blocks(kWidth, kHeight, 4 * static_cast<int>(instant));
   };
   const auto source = TrackingSource::open(stream, straight(11, 0.2), {}).value();
   const auto before = tracks(source->images(1, false).images.at(0));

@@ -40,7 +40,7 @@ struct TrackerConfig {
   }
 };
 
-/// Follows points from image to image of one camera, or of two that are exposed at the same moment, the second of which
+/// Follows points from image to image of one camera, or of two that are exposed at the same time, the second of which
 /// sees the same points. Images that are without texture, blurred or wrongly exposed give fewer points or none. Track
 /// numbers are never used again.
 class VisualTracker {

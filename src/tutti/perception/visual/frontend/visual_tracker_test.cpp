@@ -114,7 +114,7 @@ TEST(VisualTracker, TheSecondCameraSeesTheSamePoints) {
   EXPECT_EQ(track(tracker, {blocks(kWidth, kHeight, 6), Image()}).size(), 1U);
   EXPECT_EQ(track(tracker, {blocks(kWidth, kHeight, 12), blocks(kWidth, kHeight, 32)}).size(), 2U);
 
-  // Side by side, says the calibration, and one is above the other: no two views agree with it.
+  // Side by side, by the calibration, and one is above the other: no two views agree with it.
   Camera above = camera();
   above.T_body_camera.translation = {0.0, 0.1, 0.0};
   VisualTracker wrong_tracker({camera(), above}, {});

@@ -25,7 +25,7 @@ struct Flow {
   std::vector<std::uint8_t> found;
 };
 
-/// One way, from the `levels`th halving on.
+/// In one direction, from the `levels`th halving on.
 Flow flow(const Pyramid& from, const Pyramid& to, const std::vector<cv::Point2f>& points,
           std::vector<cv::Point2f> guess, int window_px, int levels) {
   constexpr int kIterations = 12;
@@ -48,7 +48,7 @@ std::vector<cv::Point2f> to_opencv(std::span<const Eigen::Vector2f> points) {
 }  // namespace
 
 void keep_opencv_to_one_thread() {
-  [[maybe_unused]] static const bool said = [] {
+  [[maybe_unused]] static const bool is_set = [] {
     cv::setNumThreads(1);
     return true;
   }();

@@ -12,7 +12,7 @@
 
 namespace tutti::visual::internal {
 
-/// OpenCV works in the threads that call it, and starts none. Said once and for all: with TBB below it,
+/// OpenCV works in the threads that call it, and starts none. Set once and for all: with TBB below it,
 /// cv::setNumThreads() from two threads at a time crashes.
 void keep_opencv_to_one_thread();
 
