@@ -33,7 +33,7 @@ inline void take_credentials(const std::string& file, bus::BusOptions& options) 
 inline constexpr const char* kBusHelp = "The bus, as the server prints it";
 inline constexpr const char* kBusInsecureHelp = "Use a bus on another machine without TLS";
 
-/// Adds --bus, which is returned, --insecure and --credentials. When the command's words are all read, the URL is
+/// Adds --bus, which is returned, --insecure and --credentials. When the command line is all read, the URL is
 /// without credentials and these are taken.
 inline CLI::Option* add_bus_options(CLI::App& command, bus::BusOptions& options, const std::string& help = kBusHelp,
                                     const std::string& insecure_help = kBusInsecureHelp) {

@@ -26,18 +26,19 @@ std::vector<const CLI::App*> shown_commands(const CLI::App& app) {
       [](const CLI::App* command) { return !command->get_name().empty() && !command->get_group().empty(); });
 }
 
-NamedCommand named_command(const CLI::App& program, std::span<const std::string> words) {
+NamedCommand named_command(const CLI::App& program, std::span<const std::string> line) {
   NamedCommand out{.command = &program, .path = program.get_name(), .no_command = {}};
-  for (const std::string& word : words) {
+  for (const std::string& argument : line) {
     const auto commands = shown_commands(*out.command);
-    if (commands.empty() || word.starts_with('-')) break;
-    const auto found = std::ranges::find(commands, word, [](const CLI::App* command) { return command->get_name(); });
+    if (commands.empty() || argument.starts_with('-')) break;
+    const auto found =
+        std::ranges::find(commands, argument, [](const CLI::App* command) { return command->get_name(); });
     if (found == commands.end()) {
-      out.no_command = word;
+      out.no_command = argument;
       break;
     }
     out.command = *found;
-    out.path += " " + word;
+    out.path += " " + argument;
   }
   return out;
 }
@@ -63,10 +64,10 @@ void add_help_and_version_commands(CLI::App& program, int& exit_code) {
     exit_code = 0;
   });
   CLI::App* help = program.add_subcommand("help", "What --help says of the program, or of a command");
-  const auto words = std::make_shared<std::vector<std::string>>();
-  help->add_option("command", *words, "As it is typed, e.g. map export")->type_name("COMMAND");
-  help->callback([&program, words, &exit_code] {
-    const NamedCommand named = named_command(program, *words);
+  const auto line = std::make_shared<std::vector<std::string>>();
+  help->add_option("command", *line, "As it is typed, e.g. map export")->type_name("COMMAND");
+  help->callback([&program, line, &exit_code] {
+    const NamedCommand named = named_command(program, *line);
     if (!named.no_command.empty()) {
       fmt::print(stderr, "tutti help: {}\n", no_such_command(named));
       exit_code = 2;

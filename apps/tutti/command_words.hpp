@@ -9,20 +9,20 @@ namespace CLI {
 class App;
 }
 
-/// The program's table of commands, as a person's words meet it.
+/// The program's table of commands, as a person's command line meets it.
 namespace tutti::app {
 
 /// The commands below `app` that --help lists, in its order.
 std::vector<const CLI::App*> shown_commands(const CLI::App& app);
 
-/// The command that words name.
+/// The command that a command line names.
 struct NamedCommand {
   const CLI::App* command = nullptr;
   std::string path;        ///< "tutti map closure"
-  std::string no_command;  ///< The first word that is none although only a command can be there; empty: all fit.
+  std::string no_command;  ///< The first argument that is none although only a command can be there; empty: all fit.
 };
-/// Follows the words down to the first that is an option, or an argument of a command.
-NamedCommand named_command(const CLI::App& program, std::span<const std::string> words);
+/// Follows the arguments down to the first that is an option, or an argument of a command.
+NamedCommand named_command(const CLI::App& program, std::span<const std::string> line);
 /// "'expotr' is no command of tutti; did you mean 'tutti export'?"
 std::string no_such_command(const NamedCommand& named);
 

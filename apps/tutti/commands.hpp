@@ -5,7 +5,7 @@ namespace CLI {
 class App;
 }
 
-/// The subcommands of `tutti`; each --help says what it does. A command that ran sets `exit_code` to 0; to 1, with a
+/// The subcommands of `tutti`; each --help explains it. A command that ran sets `exit_code` to 0; to 1, with a
 /// message on stderr, when it failed; to 2 when usage or configuration is wrong. `app` and `exit_code` must outlive the
 /// parsing.
 namespace tutti::app {

@@ -83,7 +83,7 @@ Result<std::vector<formats::VertexStamp>> vertex_stamps(const std::string& path,
   return out;
 }
 
-/// Covariance of the motion from one vertex to another as an edge between them, either way round, states it.
+/// Covariance of the motion from one vertex to another as an edge between them, in either direction, states it.
 std::optional<Matrix6d> motion_covariance(const std::map<std::pair<std::size_t, std::size_t>, std::size_t>& edge_of,
                                           const PoseGraph& graph, std::size_t from, std::size_t to) {
   for (const bool forward : {true, false}) {

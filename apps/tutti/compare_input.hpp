@@ -30,7 +30,7 @@ struct CompareSource {
 
 /// Loads both sides. A graph x.g2o gets stamps and robots from x_stamps.csv beside it; without that file, from the
 /// other side, if that is a graph of the same vertices; or, when neither side has times, vertex n counts as one robot's
-/// pose at n seconds. Notes say so. A graph without times beside anything else fails. A graph's edges give the
+/// pose at n seconds. Notes report it. A graph without times beside anything else fails. A graph's edges give the
 /// covariance of each motion when every pose has an edge to the next.
 Result<std::pair<CompareSide, CompareSide>> load_sides(const CompareSource& a, const CompareSource& b);
 

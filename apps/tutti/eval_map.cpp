@@ -23,7 +23,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// How the refinement went; the distances then hold after it.
+/// How the refinement went; the distances are then those after it.
 struct Refinement {
   double moved_m = 0.0;  ///< The centre of the map.
   double turned_deg = 0.0;

@@ -25,7 +25,7 @@ struct ExportOptions {
   std::string input;
   bool live = false;
   std::vector<std::string> outputs;
-  std::map<std::string_view, std::string> by_name;  ///< What the options say that name a format.
+  std::map<std::string_view, std::string> by_name;  ///< The options that name a format.
   exports::FormatSettings settings;
 };
 
@@ -80,9 +80,9 @@ Status export_all(const ExportOptions& options) {
   }
   for (const auto& [format, file] : *wanted) {
     if (auto made = make_folder_of(file); !made) return made;
-    const auto said = is_folder ? format->of_run(options.input, file) : format->of_map(map, options.settings, file);
-    if (!said) return tl::unexpected(said.error());
-    fmt::print("{}\n", *said);
+    const auto report = is_folder ? format->of_run(options.input, file) : format->of_map(map, options.settings, file);
+    if (!report) return tl::unexpected(report.error());
+    fmt::print("{}\n", *report);
   }
   return {};
 }

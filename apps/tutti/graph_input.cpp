@@ -122,7 +122,7 @@ struct Robots {
   std::vector<std::string> names;
 };
 
-Result<Robots> told_by_ranges(const GraphSource& source, const formats::G2oFile& file) {
+Result<Robots> robots_by_ranges(const GraphSource& source, const formats::G2oFile& file) {
   if (!std::ranges::is_sorted(source.robots, std::less_equal<>()))
     return fail(ErrorCode::configuration, "--robots: {} do not increase, expected each robot's first vertex",
                 fmt::join(source.robots, ","));
@@ -137,7 +137,7 @@ Result<Robots> told_by_ranges(const GraphSource& source, const formats::G2oFile&
   return out;
 }
 
-Robots told_by_letters(const formats::G2oFile& file) {
+Robots robots_by_letters(const formats::G2oFile& file) {
   Robots out;
   for (const std::int64_t id : file.vertex_ids) {
     const std::string name(1, *letter_of(id));
@@ -147,7 +147,7 @@ Robots told_by_letters(const formats::G2oFile& file) {
   return out;
 }
 
-Result<Robots> told_by_gaps(const GraphSource& source, const formats::G2oFile& file) {
+Result<Robots> robots_by_gaps(const GraphSource& source, const formats::G2oFile& file) {
   std::vector<bool> joined(file.vertex_ids.size(), false);
   for (const PoseGraphEdge& edge : file.graph.edges)
     if (const auto [a, b] = std::minmax(edge.from, edge.to); b == a + 1) joined[b] = true;
@@ -211,14 +211,14 @@ Result<Plain> read_plain(const std::string& path, Wanted wanted) {
   return out;
 }
 
-/// An edge by the names of its ends and where it says that the second one is, to the millimetre.
+/// An edge by the names of its ends and where it has the second one, to the millimetre.
 using EdgeKey = std::tuple<std::string, std::string, long, long, long>;
 EdgeKey key_of(const std::vector<std::string>& names, const PoseGraphEdge& edge) {
   const Eigen::Vector3d mm = 1e3 * edge.T_from_to.translation;
   return {names[edge.from], names[edge.to], std::lround(mm.x()), std::lround(mm.y()), std::lround(mm.z())};
 }
 
-/// Every component where its first held vertex, or else its first one, is in the file.
+/// Every component where its first fixed vertex, or else its first one, is in the file.
 Status put_in_place(const NamedGraph& graph, server::MapEstimate& map) {
   std::map<std::uint32_t, std::size_t> anchors;
   for (std::size_t v = 0; v < map.nodes.size(); ++v) {
@@ -252,9 +252,9 @@ Result<NamedGraph> name_graph(const GraphSource& source, const formats::G2oFile&
   const bool has_letters = std::ranges::all_of(file.vertex_ids, [](auto id) { return letter_of(id).has_value(); });
   Robots robots;
   if (!source.robots.empty()) {
-    auto told = told_by_ranges(source, file);
-    if (!told) return tl::unexpected(told.error());
-    robots = std::move(*told);
+    auto found = robots_by_ranges(source, file);
+    if (!found) return tl::unexpected(found.error());
+    robots = std::move(*found);
     out.robots_from = "--robots";
   } else if (!stamps.empty()) {
     std::map<RobotId, std::uint32_t> number;
@@ -266,12 +266,12 @@ Result<NamedGraph> name_graph(const GraphSource& source, const formats::G2oFile&
     for (const std::int64_t id : file.vertex_ids) robots.of.push_back(number.at(stamps.at(id).keyframe.chain.robot));
     out.robots_from = formats::stamps_beside(source.path);
   } else if (has_letters) {
-    robots = told_by_letters(file);
+    robots = robots_by_letters(file);
     out.robots_from = "symbol keys of the vertices";
   } else {
-    auto told = told_by_gaps(source, file);
-    if (!told) return tl::unexpected(told.error());
-    robots = std::move(*told);
+    auto found = robots_by_gaps(source, file);
+    if (!found) return tl::unexpected(found.error());
+    robots = std::move(*found);
     out.robots_from = "gaps in odometry";
   }
   out.robot_names = std::move(robots.names);

@@ -19,7 +19,7 @@ namespace tutti::app {
 /// Which file to read, and what is known beside it.
 struct GraphSource {
   std::string path;
-  std::vector<std::int64_t> robots;  ///< For g2o: the first vertex id of each robot; empty: as the file tells.
+  std::vector<std::int64_t> robots;  ///< For g2o: the first vertex id of each robot; empty: as in the file.
   std::string truth;                 ///< A file whose vertices are the truth, "none", or empty: PyFG's own truth.
   std::string right;  ///< A file without the wrong closures; empty: *_no_outliers beside the graph, if there is one.
 };
@@ -35,7 +35,7 @@ struct NamedGraph {
   bool has_poses = true;                   ///< False: the file lacks poses of vertices, which are the identity here.
   bool is_2d = false;
   std::size_t replaced = 0;  ///< Number of information or covariance matrices that were not positive semidefinite.
-  std::string robots_from;   ///< For people: how robots were told apart,
+  std::string robots_from;   ///< For people: how robots were distinguished,
   std::string stamps_from;   ///< and where the times are from.
 };
 
@@ -45,16 +45,16 @@ struct GraphTruth {
   std::vector<bool> right;                  ///< Per edge, whether it is right; empty: unknown.
 };
 
-/// Reads a graph. Robots in g2o files are told apart by source.robots, by IN_stamps.csv beside the file, or by GTSAM's
-/// symbol keys (letter << 56 | number); failing these, a robot begins where no edge joins a vertex to the one before
-/// it. Times are from IN_stamps.csv, or from PyFG's vertices or odometry edges, if they increase along every robot;
-/// otherwise the n-th vertex of a robot counts as at n seconds. Fails when the file cannot be read.
+/// Reads a graph. Robots in g2o files are distinguished by source.robots, by IN_stamps.csv beside the file, or by
+/// GTSAM's symbol keys (letter << 56 | number); failing these, a robot begins where no edge joins a vertex to the one
+/// before it. Times are from IN_stamps.csv, or from PyFG's vertices or odometry edges, if they increase along every
+/// robot; otherwise the n-th vertex of a robot counts as at n seconds. Fails when the file cannot be read.
 Result<NamedGraph> read_graph(const GraphSource& source);
 /// The same for a g2o graph that was read already; `stamps` are those of IN_stamps.csv, or empty.
 Result<NamedGraph> name_graph(const GraphSource& source, const formats::G2oFile& file,
                               std::span<const formats::VertexStamp> stamps);
-/// The server's map of the graph (server::judge_graph). Each component is placed so that its first held vertex, or else
-/// its first vertex, is where the file has it. Fails when the graph cannot be solved, or a component has several
+/// The server's map of the graph (server::judge_graph). Each component is placed so that its first fixed vertex, or
+/// else its first vertex, is where the file has it. Fails when the graph cannot be solved, or a component has several
 /// vertices with FIX lines.
 Result<server::JudgedGraph> judge(const NamedGraph& graph, const std::string& path);
 /// Reads the truth that `source` names; empty when there is none. Fails when a file cannot be read or does not fit the

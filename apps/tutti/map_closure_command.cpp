@@ -78,7 +78,7 @@ void print(const mapfile::ClosureFit& fit) {
     fmt::print("off the map  nothing ties its two ends\n");
 }
 
-/// Who says what of it, and what was measured.
+/// What each verifier and operator found of it, and what was measured.
 void print_origin(const mapfile::ClosureInfo& info) {
   if (info.decision)
     fmt::print("decision     {}{} at {}\n", to_string(info.decision->wish),
@@ -147,7 +147,7 @@ Status send(const ClosureOptions& options, const ClosureDecision& decision) {
   if (!port) return tl::unexpected(port.error());
   node::DecisionSender sender(self, decision);
   const auto begin = std::chrono::steady_clock::now();
-  std::string said;
+  std::string reported;
   for (;; std::this_thread::sleep_for(std::chrono::milliseconds(20))) {
     const double now_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     if (const auto answer = heard_answer(**port, sender))
@@ -161,15 +161,15 @@ Status send(const ClosureOptions& options, const ClosureDecision& decision) {
                   "{}: the bus has the decision, but the server has not confirmed it within {} s; give it again if "
                   "`tutti map closure show` does not know it later",
                   where.url, options.wait_s);
-    if (now_s > kSaySoon_s && std::exchange(said, waits_for(state)) != waits_for(state))
-      say_waiting(fmt::format("{}, at most {:g} s", said, options.wait_s));
+    if (now_s > kSaySoon_s && std::exchange(reported, waits_for(state)) != waits_for(state))
+      say_waiting(fmt::format("{}, at most {:g} s", reported, options.wait_s));
     if (state.waiting_messages > 0) continue;  // it has not left yet
     if (const auto envelope = sender.due(now_s))
       if (auto sent = (*port)->send(*envelope); !sent) return sent;
   }
 }
 
-int say(const ClosureOptions& options, Wish wish) {
+int decide(const ClosureOptions& options, Wish wish) {
   if (options.map.empty() == options.bus.url.empty())
     return complain(kCommand, "expected a map's file, or --bus URL of the server that has it open", 2);
   const auto now = std::chrono::system_clock::now().time_since_epoch();
@@ -203,7 +203,7 @@ void add_decision(CLI::App& command, Wish wish, const std::string& help, int& ex
   add_mission_name(*decision, options->bus.mission, kServedMission);
   add_number(*decision, "--wait", options->wait_s, "How long to say it again until the server has answered", "S");
   decision->add_option("--by", options->by, "Who says so, for the record.")->type_name("NAME")->capture_default_str();
-  decision->callback([options, wish, &exit_code] { exit_code = say(*options, wish); });
+  decision->callback([options, wish, &exit_code] { exit_code = decide(*options, wish); });
 }
 
 }  // namespace

@@ -30,7 +30,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// As storage/sqlite_store.cpp marks its files; what kind of store it is, opening it tells.
+/// As storage/sqlite_store.cpp marks its files; what kind of store it is, opening it shows.
 bool looks_like_ours(const fs::path& file) {
   std::string head(72, '\0');
   std::ifstream(file, std::ios::binary).read(head.data(), static_cast<std::streamsize>(head.size()));

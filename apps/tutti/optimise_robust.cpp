@@ -27,7 +27,7 @@ using nlohmann::ordered_json;
 using server::JudgedEdge;
 
 /// Against the truth: RMSE of positions after one alignment of all robots of the largest component, and of each robot
-/// by itself; and how many closures were told apart.
+/// by itself; and how many closures were classified right.
 struct Score {
   std::optional<evaluation::AteResult> joint;
   std::size_t robots_in_joint = 0;
@@ -118,7 +118,7 @@ Status write_graph(const std::string& path, const NamedGraph& graph, const serve
   return formats::write_pyfg(path, file);
 }
 
-/// The times that `tutti compare` looks for beside a graph.
+/// The times that `tutti compare` reads beside a graph.
 Status write_stamps(const std::string& path, const NamedGraph& graph, const server::MapEstimate& map) {
   std::vector<formats::VertexStamp> stamps;
   for (std::size_t v = 0; v < map.nodes.size(); ++v)
@@ -128,11 +128,11 @@ Status write_stamps(const std::string& path, const NamedGraph& graph, const serv
 
 Status write_trajectories(const std::string& folder, const NamedGraph& graph, const server::MapEstimate& map) {
   if (auto made = make_folder(folder); !made) return made;
-  std::vector<Trajectory> ways(graph.robot_names.size());
-  for (const auto& node : map.nodes) ways[robot_of(node)].push_back({node.stamp, node.T_world_body});
-  for (std::size_t r = 0; r < ways.size(); ++r)
-    if (auto written =
-            formats::write_tum((std::filesystem::path(folder) / (graph.robot_names[r] + ".tum")).string(), ways[r]);
+  std::vector<Trajectory> trajectories(graph.robot_names.size());
+  for (const auto& node : map.nodes) trajectories[robot_of(node)].push_back({node.stamp, node.T_world_body});
+  for (std::size_t r = 0; r < trajectories.size(); ++r)
+    if (auto written = formats::write_tum((std::filesystem::path(folder) / (graph.robot_names[r] + ".tum")).string(),
+                                          trajectories[r]);
         !written)
       return written;
   return {};

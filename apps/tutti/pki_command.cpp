@@ -86,9 +86,9 @@ Status list(const PkiOptions& options) {
 }
 
 /// One command of `tutti pki`, with the options that all have.
-CLI::App* add_one(CLI::App& app, const char* word, const char* help, const std::shared_ptr<PkiOptions>& options,
+CLI::App* add_one(CLI::App& app, const char* command_name, const char* help, const std::shared_ptr<PkiOptions>& options,
                   int& exit_code, std::function<Status(const PkiOptions&)> run) {
-  CLI::App* command = app.add_subcommand(word, help);
+  CLI::App* command = app.add_subcommand(command_name, help);
   command->add_option("--pki", options->folder, "The folder with the authority and all credentials")
       ->type_name("DIR")
       ->capture_default_str();
@@ -105,8 +105,8 @@ void add_days(CLI::App& command, int& days) {
 
 void add_member(CLI::App& app, BusRole role, const char* help, int& exit_code) {
   const auto options = std::make_shared<PkiOptions>();
-  const std::string word = std::string("add-") + name(role);
-  CLI::App* command = add_one(app, word.c_str(), help, options, exit_code,
+  const std::string command_name = std::string("add-") + name(role);
+  CLI::App* command = add_one(app, command_name.c_str(), help, options, exit_code,
                               [role](const PkiOptions& given) { return add(given, role); });
   command->add_option("name", options->name, "Nobody else's: letters, digits, '-' and '_'")
       ->type_name("NAME")

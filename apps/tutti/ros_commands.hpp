@@ -13,7 +13,7 @@ struct RobotOptions;
 struct ServerOptions;
 }  // namespace tutti::program
 
-/// The parts of the command line that need TUTTI_BUILD_ROS; without it each of them says so and fails.
+/// The parts of the command line that need TUTTI_BUILD_ROS; without it each of them reports that and fails.
 namespace tutti::app {
 
 /// Adds `tutti bag play`.

@@ -40,7 +40,7 @@ double since(Clock::time_point t) { return std::chrono::duration<double>(Clock::
 class View {
  public:
   /// Whether there is something new.
-  bool look(bus::Port& port) {
+  bool update(bus::Port& port) {
     bool is_new = false;
     for (const bus::Received& received : port.receive()) {
       auto decoded = wire::decode_mission_status(*received.envelope.bytes);
@@ -57,8 +57,8 @@ class View {
   }
   [[nodiscard]] const std::optional<MissionStatus>& status() const { return status_; }
   [[nodiscard]] const std::string& problem() const { return problem_; }
-  /// For how long the server has said nothing. The first status may be an old one that the bus has kept: its age is
-  /// what the clocks on the walls say, until a second one comes.
+  /// For how long the server has sent nothing. The first status may be an old one that the bus has kept: its age is by
+  /// the wall clocks, until a second one comes.
   [[nodiscard]] double silent_s() const {
     if (!status_) return 0.0;
     const auto now = std::chrono::system_clock::now().time_since_epoch();
@@ -94,11 +94,11 @@ void show(const View& view, const StatusOptions& options) {
 }
 
 /// Until something is to be seen, or it is clear that nothing is. The exit code.
-int look_once(bus::Port& port, View& view, const StatusOptions& options) {
+int show_once(bus::Port& port, View& view, const StatusOptions& options) {
   bool connected = false;
   for (const auto begin = Clock::now(); since(begin) < options.wait_s && !view.is_there();
        std::this_thread::sleep_for(std::chrono::milliseconds(20))) {
-    view.look(port);
+    view.update(port);
     connected = connected || port.state().connected;
   }
   if (view.status()) {
@@ -114,9 +114,9 @@ int look_once(bus::Port& port, View& view, const StatusOptions& options) {
 }
 
 int watch(bus::Port& port, View& view, const StatusOptions& options) {
-  if (const int code = look_once(port, view, options); code != 0 && !view.status()) return code;
+  if (const int code = show_once(port, view, options); code != 0 && !view.status()) return code;
   for (auto shown = Clock::now();; std::this_thread::sleep_for(std::chrono::milliseconds(50))) {
-    if (!view.look(port) && since(shown) < kFresh_s) continue;  // of a silent server, how long it is silent
+    if (!view.update(port) && since(shown) < kFresh_s) continue;  // of a silent server, how long it is silent
     show(view, options);
     shown = Clock::now();
   }
@@ -130,7 +130,7 @@ int run(const StatusOptions& options) {
   auto port = bus::open_port(bus::Endpoint::viewer(static_cast<std::uint32_t>(getpid())), where);
   if (!port) return complain("status", port.error().message, 2);
   View view;
-  return options.watch ? watch(**port, view, options) : look_once(**port, view, options);
+  return options.watch ? watch(**port, view, options) : show_once(**port, view, options);
 }
 
 }  // namespace

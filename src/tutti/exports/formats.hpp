@@ -44,8 +44,8 @@ struct FormatSettings {
   }
 };
 
-/// A row of the table of formats. Both functions write `out`, maybe with files beside it, and return what is to be said
-/// about it, one or more lines. An error of code `configuration` is one of the settings.
+/// A row of the table of formats. Both functions write `out`, maybe with files beside it, and return the report on it,
+/// one or more lines. An error of code `configuration` is one of the settings.
 struct Format {
   std::string_view name;    ///< The option --NAME writes this format, whatever the path ends in.
   std::string_view ending;  ///< How a path ends that is to be written in this format; "/": it is a folder.

@@ -61,9 +61,9 @@ TEST_F(Formats, EveryFormatIsFoundByItsEndingAndWritesTheMap) {
     const std::string out = file("map") + std::string(format.ending);
     ASSERT_TRUE(format_of(out)) << out;
     EXPECT_EQ((*format_of(out))->name, format.name);
-    const auto said = format.of_map(map, {}, out);
-    ASSERT_TRUE(said) << format.name << ": " << said.error().message;
-    EXPECT_TRUE(said->starts_with(out)) << *said;
+    const auto report = format.of_map(map, {}, out);
+    ASSERT_TRUE(report) << format.name << ": " << report.error().message;
+    EXPECT_TRUE(report->starts_with(out)) << *report;
     EXPECT_TRUE(fs::exists(out)) << out;
     EXPECT_FALSE(fs::is_empty(out)) << out;
   }
@@ -81,7 +81,7 @@ TEST_F(Formats, NamesEndingsAndOptionsAreTheirs) {
   }
 }
 
-TEST_F(Formats, AnUnknownEndingIsToldAllThatAreKnown) {
+TEST_F(Formats, AnUnknownEndingListsAllThatAreKnown) {
   for (const char* path : {"map.laz", "map", "", "ply"}) {
     const auto format = format_of(path);
     ASSERT_FALSE(format) << path;
@@ -110,9 +110,9 @@ TEST_F(Formats, WhatAMissionsFolderHasIsTheSameFile) {
   for (const Format& format : all_formats()) {
     const std::string out = file("again") + std::string(format.ending);
     if (format.of_run == nullptr) continue;
-    const auto said = format.of_run(run, out);
-    ASSERT_TRUE(said) << format.name << ": " << said.error().message;
-    EXPECT_TRUE(said->starts_with(out)) << *said;
+    const auto report = format.of_run(run, out);
+    ASSERT_TRUE(report) << format.name << ": " << report.error().message;
+    EXPECT_TRUE(report->starts_with(out)) << *report;
     const auto nothing = format.of_run(folder_ / "none", out);
     ASSERT_FALSE(nothing) << format.name;
     EXPECT_NE(nothing.error().message.find("none"), std::string::npos) << nothing.error().message;
@@ -135,9 +135,9 @@ TEST_F(Formats, SettingsThatContradictEachOtherAreUsage) {
   const MapSource map = small_map();
   FormatSettings upside_down;
   upside_down.grid.grid.low_m = 2.0;
-  const auto said = format_of("x.yaml").value()->of_map(map, upside_down, file("x.yaml"));
-  ASSERT_FALSE(said);
-  EXPECT_EQ(said.error().code, ErrorCode::configuration);
+  const auto report = format_of("x.yaml").value()->of_map(map, upside_down, file("x.yaml"));
+  ASSERT_FALSE(report);
+  EXPECT_EQ(report.error().code, ErrorCode::configuration);
 }
 
 }  // namespace formats_test

@@ -24,13 +24,14 @@ class Worlds {
   std::uint32_t largest_;
 };
 
-void add_ways(const server::MapEstimate& map, const server::ClosureNames& names, const Worlds& worlds, Scene& out) {
+void add_trajectories(const server::MapEstimate& map, const server::ClosureNames& names, const Worlds& worlds,
+                      Scene& out) {
   // A chain whose submaps are missing in between may lie in several components.
-  std::map<std::pair<ChainId, std::uint32_t>, std::vector<std::size_t>> pieces;
+  std::map<std::pair<ChainId, std::uint32_t>, std::vector<std::size_t>> segments;
   for (std::size_t i = 0; i < map.nodes.size(); ++i)
-    pieces[{map.nodes[i].id.chain, map.nodes[i].component}].push_back(i);
+    segments[{map.nodes[i].id.chain, map.nodes[i].component}].push_back(i);
   std::map<ChainId, int> count;
-  for (const auto& [key, nodes] : pieces) {
+  for (const auto& [key, nodes] : segments) {
     const auto& [chain, component] = key;
     const int number = ++count[chain];
     const std::string name = ros_name(names.of(chain)) + (number > 1 ? fmt::format("_piece_{}", number) : "");
@@ -79,7 +80,7 @@ Result<Scene> scene_of_map(const storage::TableStore& store, const mapfile::Cont
   Scene out;
   const Worlds worlds(map);
   const server::ClosureNames names = content.closure_names();
-  add_ways(map, names, worlds, out);
+  add_trajectories(map, names, worlds, out);
   add_closures(content, map, worlds, out);
   auto joint = mapfile::joint_cloud(store, content, map);
   if (!joint) return tl::unexpected(joint.error());

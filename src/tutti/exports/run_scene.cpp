@@ -125,13 +125,14 @@ class Run {
       std::string file = name.get<std::string>();  // as tutti run names it
       std::ranges::replace_if(
           file, [](char c) { return std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '-' && c != '_'; }, '_');
-      for (const auto& [way, what] : {std::pair{&robot.onboard, "onboard"}, std::pair{&robot.corrected, "corrected"},
-                                      std::pair{&robot.server, "server"}, std::pair{&robot.reference, "reference"}}) {
+      for (const auto& [trajectory, what] :
+           {std::pair{&robot.onboard, "onboard"}, std::pair{&robot.corrected, "corrected"},
+            std::pair{&robot.server, "server"}, std::pair{&robot.reference, "reference"}}) {
         const std::string path = (folder_ / (file + "_" + what + ".tum")).string();
         if (!fs::exists(path)) continue;
         auto read = formats::read_trajectory(path, "tum");
         if (!read) return tl::unexpected(read.error());
-        *way = std::move(*read);
+        *trajectory = std::move(*read);
       }
       if (!robot.onboard.empty()) robot.first = robot.onboard.front().stamp;
       const double start_s = number(row, "start_s");
@@ -146,8 +147,8 @@ class Run {
     if (!earliest_s)
       return fail(ErrorCode::invalid, "{}: no ROBOT_onboard.tum, expected what tutti run writes", folder_.string());
     for (Robot& robot : robots_)
-      for (Trajectory* way : {&robot.onboard, &robot.corrected, &robot.server, &robot.reference})
-        for (StampedPose& sample : *way) sample.stamp = at(robot.start_s + (sample.stamp - robot.first));
+      for (Trajectory* trajectory : {&robot.onboard, &robot.corrected, &robot.server, &robot.reference})
+        for (StampedPose& sample : *trajectory) sample.stamp = at(robot.start_s + (sample.stamp - robot.first));
     return {};
   }
 
@@ -171,9 +172,10 @@ class Run {
   /// From raw odometry, and from its correction, to the server's trajectory, each after one rigid alignment.
   void add_distances(const Robot& robot) {
     std::map<Timestamp, std::vector<std::pair<std::string, double>>> rows;
-    for (const auto& [way, name] : {std::pair{&robot.onboard, "onboard_m"}, std::pair{&robot.corrected, "corrected_m"}})
-      if (const auto T = align(robot.server, *way))
-        for (const auto& [server, own] : at_equal_stamps(robot.server, *way))
+    for (const auto& [trajectory, name] :
+         {std::pair{&robot.onboard, "onboard_m"}, std::pair{&robot.corrected, "corrected_m"}})
+      if (const auto T = align(robot.server, *trajectory))
+        for (const auto& [server, own] : at_equal_stamps(robot.server, *trajectory))
           rows[server->stamp].emplace_back(name, (server->pose.translation - *T * own->pose.translation).norm());
     for (auto& [stamp, row] : rows) out_.numbers.push_back({robot.name + "/to_server", stamp, std::move(row)});
   }
@@ -187,7 +189,7 @@ class Run {
                               {{"aligned_rmse_m", number(explanation, "aligned_rmse_m")},
                                {"expected_rmse_m", number(explanation, "expected_rmse_m")},
                                {"direction_significance", number(explanation, "direction_significance")}}});
-    const auto tell = [&](const Json& origin, bool is_alert) {
+    const auto add_origin = [&](const Json& origin, bool is_alert) {
       const Eigen::Vector3d place = vector(origin, "place_m");
       out_.alerts.push_back(
           {at(number(origin, is_alert ? "known_since_s" : "until_s")),
@@ -202,9 +204,9 @@ class Run {
             {"significance", fmt::format("{:.2f}", number(origin, "significance"))}}});
     };
     for (const Json& origin : member(explanation, "suspected_origins"))
-      if (member(origin, "until_s").is_number()) tell(origin, false);
+      if (member(origin, "until_s").is_number()) add_origin(origin, false);
     for (const Json& alert : member(rows_[i], "alerts"))
-      if (member(alert, "known_since_s").is_number()) tell(alert, true);
+      if (member(alert, "known_since_s").is_number()) add_origin(alert, true);
   }
 
   Status add_cloud(const std::string& name, const std::string& frame) {

@@ -81,7 +81,7 @@ class Messages {
       }
   }
 
-  /// The origin of enu, and where on the earth a way leads.
+  /// The origin of enu, and where on the earth a trajectory leads.
   void add_earth() {
     if (!scene_.earth) return;
     const Scene::Earth& earth = *scene_.earth;
@@ -157,7 +157,7 @@ class Messages {
     return out;
   }
 
-  /// The schema says what the first message of its type has.
+  /// The schema is of what the first message of its type has.
   void add_json(const std::string& topic, const std::string& type, Timestamp stamp, const ordered_json& json) {
     std::string& schema = schemas_[type];
     if (schema.empty()) {

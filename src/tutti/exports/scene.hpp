@@ -51,7 +51,7 @@ struct Scene {
     std::string name, message;
     std::vector<std::pair<std::string, std::string>> values;
   };
-  /// Numbers that belong to a moment; all of one topic have the same names.
+  /// Numbers that belong to a time; all of one topic have the same names.
   struct Numbers {
     std::string topic;
     Timestamp stamp;
@@ -80,7 +80,7 @@ struct WrittenScene {
   std::size_t messages = 0, topics = 0;
 };
 
-/// Writes an MCAP file that Foxglove, Rerun and PlotJuggler open. What holds all the time (trajectories as
+/// Writes an MCAP file that Foxglove, Rerun and PlotJuggler open. What is true all the time (trajectories as
 /// nav_msgs/Path, clouds, closures as lines of one MarkerArray per state, /tf_static, the origin of `enu`) is written
 /// at the first stamp; what moves (/tf, each trajectory once more as PoseStamped and, in the earth's frame, as
 /// NavSatFix, numbers and closures as JSON, alerts in /diagnostics) at its own. If there are stamps before 1970, all

@@ -22,11 +22,11 @@ Pose3 at(double x) { return {Eigen::Quaterniond::Identity(), {x, 0.0, 0.0}}; }
 /// One of everything, between `first` and a second later.
 Scene scene(Timestamp first) {
   const Timestamp later = first + 1.0;
-  const Trajectory way{{first, at(1.0)}, {later, at(2.0)}};
+  const Trajectory trajectory{{first, at(1.0)}, {later, at(2.0)}};
   Scene out;
-  out.tracks.push_back({"alpha/server", "world", way});
+  out.tracks.push_back({"alpha/server", "world", trajectory});
   out.still.push_back({"world", "alpha/map", at(5.0)});
-  out.motions.push_back({"alpha/map", "alpha/odom", way});
+  out.motions.push_back({"alpha/map", "alpha/odom", trajectory});
   out.clouds.push_back({"map", "world", {{{1.0F, 2.0F, 3.0F}, {4.0F, 5.0F, 6.0F}}}});
   out.closures.push_back(
       {"alpha/0-bravo/1", "accepted", "", true, "world", later, {1, 0, 0}, {2, 0, 0}, {{"off_m", 0.5}}});

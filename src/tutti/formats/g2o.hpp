@@ -49,7 +49,7 @@ Result<G2oFile> read_g2o(const std::string& path);
 Result<G2oFile> parse_g2o_edges(std::string_view text, const std::string& name);
 Result<G2oFile> read_g2o_edges(const std::string& path);
 
-/// Text with VERTEX lines, whatever has_vertices says, and one FIX line per fixed vertex. SE(3) reads back bit for bit.
+/// Text with VERTEX lines, whatever has_vertices is, and one FIX line per fixed vertex. SE(3) reads back bit for bit.
 /// With is_2d only the planar part is written, as SE(2), exact but for the rounding of the angle.
 std::string to_g2o(const G2oFile& file);
 Status write_g2o(const std::string& path, const G2oFile& file);

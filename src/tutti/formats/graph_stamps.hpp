@@ -11,8 +11,8 @@
 #include "tutti/base/result.hpp"
 #include "tutti/base/timestamp.hpp"
 
-/// Reads and writes the csv that a mission writes beside graph.g2o, which says which keyframe each vertex is and when
-/// it was taken: `id,robot,keyframe,stamp_ns` (docs/report.md). Sessions are not in the file: keyframes are read as of
+/// Reads and writes the csv that a mission writes beside graph.g2o, with the keyframe that each vertex is and when it
+/// was taken: `id,robot,keyframe,stamp_ns` (docs/report.md). Sessions are not in the file: keyframes are read as of
 /// session 0.
 namespace tutti::formats {
 

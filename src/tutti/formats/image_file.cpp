@@ -18,7 +18,7 @@
 namespace tutti::formats {
 namespace {
 
-constexpr std::int64_t kMaxPixels = 100'000'000;  ///< A damaged header must not make us allocate what it says.
+constexpr std::int64_t kMaxPixels = 100'000'000;  ///< A damaged header must not make us allocate what it claims.
 
 Status check_size(std::int64_t width, std::int64_t height, const std::string& name, ExpectedSize expected) {
   if (expected.width_px > 0 && (width != expected.width_px || height != expected.height_px))
@@ -148,9 +148,10 @@ ImageStream stream_images(std::vector<CameraImages> cameras, double max_differen
   ImageStream out;
   for (const CameraImages& camera : cameras) out.cameras.push_back(camera.camera);
   for (const ImageFile& file : cameras[0].images) out.stamps.push_back(file.stamp);
-  out.load = [cameras = std::move(cameras), max_difference_s](std::size_t moment, std::size_t camera) -> Result<Image> {
+  out.load = [cameras = std::move(cameras), max_difference_s](std::size_t instant,
+                                                              std::size_t camera) -> Result<Image> {
     const std::vector<ImageFile>& files = cameras.at(camera).images;
-    const auto file = nearest_in_time(files, cameras[0].images.at(moment).stamp, max_difference_s, &ImageFile::stamp);
+    const auto file = nearest_in_time(files, cameras[0].images.at(instant).stamp, max_difference_s, &ImageFile::stamp);
     return file == files.end() ? Image() : read_image(file->path);
   };
   return out;
@@ -158,16 +159,16 @@ ImageStream stream_images(std::vector<CameraImages> cameras, double max_differen
 
 std::size_t add_depth(ImageStream& stream, const std::vector<Timestamp>& stamps, const LoadDepth& load,
                       const DepthSensor& sensor, double max_difference_s) {
-  std::map<std::size_t, std::size_t> of_moment;
-  for (std::size_t moment = 0; moment < stream.stamps.size(); ++moment)
-    if (const auto at = nearest_in_time(stamps, stream.stamps[moment], max_difference_s, std::identity());
+  std::map<std::size_t, std::size_t> of_instant;
+  for (std::size_t instant = 0; instant < stream.stamps.size(); ++instant)
+    if (const auto at = nearest_in_time(stamps, stream.stamps[instant], max_difference_s, std::identity());
         at != stamps.end())
-      of_moment.emplace(moment, static_cast<std::size_t>(at - stamps.begin()));
+      of_instant.emplace(instant, static_cast<std::size_t>(at - stamps.begin()));
   stream.depth = sensor;
-  const std::size_t found = of_moment.size();
-  stream.load_depth = [of_moment = std::move(of_moment), load](std::size_t moment) -> Result<DepthImage> {
-    const auto at = of_moment.find(moment);
-    return at == of_moment.end() ? DepthImage() : load(at->second);
+  const std::size_t found = of_instant.size();
+  stream.load_depth = [of_instant = std::move(of_instant), load](std::size_t instant) -> Result<DepthImage> {
+    const auto at = of_instant.find(instant);
+    return at == of_instant.end() ? DepthImage() : load(at->second);
   };
   return found;
 }

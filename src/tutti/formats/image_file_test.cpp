@@ -98,7 +98,7 @@ TEST(ImageFile, WhatIsNoImageIsNamed) {
   ASSERT_FALSE(text.has_value());
   EXPECT_EQ(text.error().message, "a.png: neither a PNG nor a JPEG image (5 bytes)");
 
-  // 2^31 - 1 pixels square, says the header: refused before anything is allocated.
+  // 2^31 - 1 pixels square, by the header: refused before anything is allocated.
   std::string huge("\x89PNG\r\n\x1a\n\0\0\0\rIHDR\x7f\xff\xff\xff\x7f\xff\xff\xff\x08\0\0\0\0", 29);
   EXPECT_FALSE(decode_image(huge, "huge.png").has_value());
 }
@@ -114,7 +114,7 @@ TEST(ImageFile, AStreamReadsTheImagesOfAMoment) {
   for (int i = 1; i <= 4; ++i) add(0, 0.1 * i, i);
   add(1, 0.096, 10);  // the next one is nearer
   add(1, 0.101, 11);  // a millisecond later,
-  add(1, 0.299, 13);  // before; and none at the second and fourth moments
+  add(1, 0.299, 13);  // before; and none at the second and fourth stamps
   add(1, 0.450, 14);
   const ImageStream stream = stream_images(cameras);
   ASSERT_EQ(stream.stamps.size(), 4U);

@@ -130,7 +130,7 @@ Result<internal::Semidefinite> jrl_covariance(const JrlValue& value) {
   return nearest;
 }
 
-/// What the document says, before vertices have their places.
+/// What the document contains, before vertices have their places.
 class JrlReader {
  public:
   Status read(const JrlValue& document);

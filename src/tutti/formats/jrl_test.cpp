@@ -96,18 +96,18 @@ std::string replaced(std::string text, const std::string& what, const std::strin
 
 TEST(Jrl, SaysWhatIsWrongAndWhere) {
   const std::string good = jrl_files::to_jrl(fleet());
-  const auto says = [&](const std::string& text, const std::string& expected) {
+  const auto expect_error = [&](const std::string& text, const std::string& expected) {
     const auto result = parse_jrl(text, "g.jrl");
     const std::string message = result ? "no error" : result.error().message;
     EXPECT_NE(message.find(expected), std::string::npos) << message;
   };
   const auto says_of = [&](const std::string& what, const std::string& by, const std::string& expected) {
-    says(replaced(good, what, by), expected);
+    expect_error(replaced(good, what, by), expected);
   };
-  says("{", "g.jrl: is no JSON");
-  says("{}", "has no 'measurements'");
-  says(R"({"measurements": {}})", "no poses");
-  says(R"({"measurements": 7})", "is a number, expected a list");
+  expect_error("{", "g.jrl: is no JSON");
+  expect_error("{}", "has no 'measurements'");
+  expect_error(R"({"measurements": {}})", "no poses");
+  expect_error(R"({"measurements": 7})", "is a number, expected a list");
   says_of("\"measurements\": [", "\"measurements\": [[],", "measurements['a'][0].measurements[0]: has no 'type'");
   says_of("BetweenFactorPose3", "RangeFactorPose3", "type is 'RangeFactorPose3', expected BetweenFactorPose3");
   const std::string a0 = fmt::format("{}", jrl_files::jrl_key({'a', 0})),
@@ -123,7 +123,7 @@ TEST(Jrl, SaysWhatIsWrongAndWhere) {
   PyfgFile stray = fleet();
   stray.vertices.push_back({{'b', 77}, {}, {}, {}});
   stray.edges.push_back({stray.edges.back().stamp, 0, 6, stray.edges.back().measurement});
-  says(jrl_files::to_jrl(stray), "a closure from a0 to b77: no odometry, prior or ground truth names b77");
+  expect_error(jrl_files::to_jrl(stray), "a closure from a0 to b77: no odometry, prior or ground truth names b77");
 }
 
 TEST(Jrl, ListsWithinListsNeedNoStack) {
@@ -140,7 +140,7 @@ RC_GTEST_PROP(Jrl, SurvivesDamage, ()) {
   if (!file) RC_ASSERT(file.error().message.starts_with("g.jrl: "));
 }
 
-TEST(Jrl, IsToldByHowItBegins) {
+TEST(Jrl, IsKnownByHowItBegins) {
   EXPECT_TRUE(looks_like_jrl("\n {\"name\": 1}"));
   EXPECT_FALSE(looks_like_jrl(to_pyfg(fleet())));
   EXPECT_FALSE(looks_like_pyfg(jrl_files::to_jrl(fleet())));

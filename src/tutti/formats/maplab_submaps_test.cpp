@@ -97,7 +97,7 @@ class MaplabSubmaps : public ::testing::Test {
     ASSERT_NE(at, std::string::npos) << what;
     write(relative, text.replace(at, what.size(), by));
   }
-  /// What is said once a file is changed; it is put back.
+  /// The error once a file is changed; it is put back.
   std::string error_with(const std::string& relative, const std::string& what, const std::string& by) const {
     const std::string before = read_file(path(relative)).value();
     write_changed(relative, what, by);

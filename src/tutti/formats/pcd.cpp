@@ -118,7 +118,7 @@ Result<internal::RecordLayout> layout_of(const Header& header, const std::string
   return layout;
 }
 
-/// The records of a compressed file, which holds two sizes and then all values of one field after those of another.
+/// The records of a compressed file, which has two sizes and then all values of one field after those of another.
 Result<std::string> decompress(std::string_view data, std::size_t count, const Header& header,
                                const internal::RecordLayout& layout, const std::string& name) {
   std::array<std::uint32_t, 2> sizes{};  // compressed, decompressed
@@ -154,7 +154,7 @@ Result<internal::Records> read_records(LineReader& line, std::size_t count, cons
     return records;
   }
   if (header.data == "binary") {
-    // Divided, not multiplied: the header may say anything.
+    // Divided, not multiplied: the header may state anything.
     if (line.rest().size() / layout.stride < count)
       return fail(ErrorCode::parse, "{}: {} bytes of data, expected {} points of {} bytes", line.name(),
                   line.rest().size(), count, layout.stride);

@@ -77,21 +77,22 @@ std::string message_of(const std::string& text) {
 
 TEST(Pyfg, SaysWhatIsWrong) {
   const std::string vertex = fmt::format("VERTEX_SE3:QUAT 0 A0 {}\n", kUnit);
-  const auto says = [&](const std::string& text, const std::string& expected) {
+  const auto expect_error = [&](const std::string& text, const std::string& expected) {
     EXPECT_NE(message_of(text).find(expected), std::string::npos) << text << "\n" << message_of(text);
   };
-  says("", "no VERTEX_SE3:QUAT line");
-  says(vertex + vertex, "vertex A0 comes twice");
-  says(vertex + "EDGE_RANGE 0 A0 L0 1 1\n", "g.pyfg:2: tag is 'EDGE_RANGE'");
-  says(vertex + fmt::format("EDGE_SE3:QUAT 0 A0 A1 {} {}\n", kUnit, kCovariance), "g.pyfg:2: names vertex A1");
-  says(vertex + fmt::format("EDGE_SE3:QUAT 0 A0 A0 {} {}\n", kUnit, kCovariance), "vertex A0 to itself");
-  says(vertex + fmt::format("EDGE_SE3:QUAT 0 A0 A1 {} {}\n", kUnit, "1"), "row has 12 columns, expected 32");
+  expect_error("", "no VERTEX_SE3:QUAT line");
+  expect_error(vertex + vertex, "vertex A0 comes twice");
+  expect_error(vertex + "EDGE_RANGE 0 A0 L0 1 1\n", "g.pyfg:2: tag is 'EDGE_RANGE'");
+  expect_error(vertex + fmt::format("EDGE_SE3:QUAT 0 A0 A1 {} {}\n", kUnit, kCovariance), "g.pyfg:2: names vertex A1");
+  expect_error(vertex + fmt::format("EDGE_SE3:QUAT 0 A0 A0 {} {}\n", kUnit, kCovariance), "vertex A0 to itself");
+  expect_error(vertex + fmt::format("EDGE_SE3:QUAT 0 A0 A1 {} {}\n", kUnit, "1"), "row has 12 columns, expected 32");
   for (const char* bad : {"A", "12", "A-1", "A+1", "A1x"})
-    says(fmt::format("VERTEX_SE3:QUAT 0 {} {}\n", bad, kUnit), "expected a letter and a number");
-  says(fmt::format("VERTEX_SE3:QUAT now A0 {}\n", kUnit), "stamp is 'now'");
-  says("VERTEX_SE3:QUAT 0 A0 0 0 0 0 0 0 2\n", "quaternion has norm 2");
+    expect_error(fmt::format("VERTEX_SE3:QUAT 0 {} {}\n", bad, kUnit), "expected a letter and a number");
+  expect_error(fmt::format("VERTEX_SE3:QUAT now A0 {}\n", kUnit), "stamp is 'now'");
+  expect_error("VERTEX_SE3:QUAT 0 A0 0 0 0 0 0 0 2\n", "quaternion has norm 2");
   const std::string negative = "-1 0 0 0 0 0 -1 0 0 0 0 -1 0 0 0 -1 0 0 -1 0 -1";
-  says(vertex + fmt::format("VERTEX_SE3:QUAT:PRIOR 0 A0 {} {}\n", kUnit, negative), "eigenvalues of the covariance");
+  expect_error(vertex + fmt::format("VERTEX_SE3:QUAT:PRIOR 0 A0 {} {}\n", kUnit, negative),
+               "eigenvalues of the covariance");
 }
 
 TEST(Pyfg, WithoutVerticesHasThoseOfItsOdometry) {

@@ -18,7 +18,7 @@ std::string_view recognise(std::string_view text) {
   return blanks.next() && blanks.columns().size() == 12 ? "kitti" : "tum";
 }
 
-/// Beside what append() takes: a pose whose stamp does not follow, if somebody is told.
+/// Beside what append() takes: a pose whose stamp does not follow, if somebody gets the list.
 Status append_or_leave(const internal::LineReader& line, Trajectory& trajectory, const StampedPose& pose,
                        std::vector<Error>* left_out) {
   const bool follows = trajectory.empty() || pose.stamp > trajectory.back().stamp;
@@ -145,13 +145,13 @@ Status write_kitti_poses(const std::string& path, const Trajectory& trajectory) 
 Result<Trajectory> read_trajectory(const std::string& path, std::string_view format, double kitti_rate_hz,
                                    std::vector<Error>* left_out) {
   return read_file(path).and_then([&](const std::string& text) -> Result<Trajectory> {
-    const std::string_view looks = recognise(text), is = format == "auto" ? looks : format;
+    const std::string_view guess = recognise(text), is = format == "auto" ? guess : format;
     auto read = is == "euroc"   ? read_euroc(text, path, left_out)
                 : is == "kitti" ? parse_kitti_poses(text, path, kitti_rate_hz, {})
                                 : parse_tum(text, path, left_out);
-    if (read || is == looks || looks == "tum") return read;
+    if (read || is == guess || guess == "tum") return read;
     return fail(read.error().code, "{}; it is read as {}, and looks like {}: state format: {}", read.error().message,
-                is, looks, looks);
+                is, guess, guess);
   });
 }
 

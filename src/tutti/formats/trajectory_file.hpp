@@ -35,8 +35,9 @@ Result<Trajectory> parse_kitti_poses(std::string_view text, const std::string& n
 std::string to_kitti_poses(const Trajectory& trajectory);
 Status write_kitti_poses(const std::string& path, const Trajectory& trajectory);
 
-/// `format`: tum, euroc, kitti (stamps k / kitti_rate_hz), or auto, which looks at the first row that is not a comment:
-/// commas mean EuRoC csv, 12 columns KITTI, anything else TUM. `left_out`: as in parse_tum(), for TUM and EuRoC.
+/// `format`: tum, euroc, kitti (stamps k / kitti_rate_hz), or auto, which decides by the first row that is not a
+/// comment: commas mean EuRoC csv, 12 columns KITTI, anything else TUM. `left_out`: as in parse_tum(), for TUM and
+/// EuRoC.
 Result<Trajectory> read_trajectory(const std::string& path, std::string_view format = "auto",
                                    double kitti_rate_hz = 10.0, std::vector<Error>* left_out = nullptr);
 

@@ -94,7 +94,7 @@ RC_GTEST_PROP(AlignPoints, OnePointIsOnlyATranslation, (std::uint64_t seed)) {
   RC_ASSERT(pose_near(repeated, T_a_b, 1e-8));
 }
 
-RC_GTEST_PROP(AlignPoints, ALineIsTurnedTheShortWay, (std::uint64_t seed)) {
+RC_GTEST_PROP(AlignPoints, ALineIsTurnedByTheSmallerAngle, (std::uint64_t seed)) {
   Rng rng(seed);
   const Eigen::Vector3d direction_a = test::random_direction(rng);
   const Eigen::Vector3d direction_b = test::random_direction(rng);

@@ -35,7 +35,7 @@ struct CameraModel {
 std::size_t distortion_numbers(CameraKind kind);
 
 /// Accepts a camera whose size and focal lengths are positive and whose numbers are finite and in the range that the
-/// formula allows. Errors: unsupported (unknown kind), invalid (all else); they say the value.
+/// formula allows. Errors: unsupported (unknown kind), invalid (all else); they have the value.
 Status check_camera(const CameraModel& camera);
 
 /// The pixel that sees a point (camera frame, m), also one outside of the image; no value when no pixel sees the point,

@@ -107,7 +107,7 @@ RC_GTEST_PROP(Camera, NoPixelSeesTwoDirections, (std::uint64_t seed)) {
     if (!pixel || pixel->norm() > 1e9) continue;
     const double sharpness = (jacobian * jacobian.transpose()).determinant() / std::pow(camera.fx, 4);
     const auto back = unproject(camera, *pixel);
-    RC_ASSERT(back.has_value() || sharpness < 1e-4);  // at a fold there is a last moment
+    RC_ASSERT(back.has_value() || sharpness < 1e-4);  // at a fold there is a last radius
     if (back && sharpness > 1e-4) RC_ASSERT(matrix_near(*back, direction, 1e-9));
   }
 }

@@ -6,7 +6,7 @@
 
 namespace tutti {
 
-/// Standard deviations of one odometry step that stand for "unknown": a step that is less certain tells nothing.
+/// Standard deviations of one odometry step that stand for "unknown": a step that is less certain is no information.
 inline constexpr double kUnknownTranslation_m = 100.0;
 inline constexpr double kUnknownRotation_rad = 3.0;
 

@@ -45,7 +45,7 @@ Matrix6d adjoint(const Pose3& T);
 /// Ad(T_b_c^-1)^T + cov(T_b_c).
 Matrix6d compound_covariance(const Pose3& T_b_c, const Matrix6d& cov_a_b, const Matrix6d& cov_b_c);
 
-/// The pose at the share alpha in [0, 1] of the way from a to b: straight in translation, shortest arc in rotation.
+/// The pose at the share alpha in [0, 1] from a to b: straight in translation, shortest arc in rotation.
 Pose3 interpolate(const Pose3& a, const Pose3& b, double alpha);
 double rotation_angle(const Pose3& T);  ///< rad, in [0, pi].
 

@@ -144,7 +144,7 @@ RC_GTEST_PROP(Pose3, InterpolationMovesEvenlyAlongTheShortestArc, (std::uint64_t
   RC_ASSERT(pose_near(interpolate(a, b, 0.0), a, 1e-14));
   RC_ASSERT(pose_near(interpolate(a, b, 1.0), b, 1e-13));
   const double whole = rotation_angle(a.inverse() * b);
-  RC_PRE(whole < kPi - 1e-3);  // at pi both ways round are shortest
+  RC_PRE(whole < kPi - 1e-3);  // at pi both directions are shortest
   for (const double alpha : {0.25, 0.5, 0.9}) {
     const Pose3 between = interpolate(a, b, alpha);
     RC_ASSERT(std::abs(rotation_angle(a.inverse() * between) - alpha * whole) < 1e-9);

@@ -28,7 +28,7 @@ RC_GTEST_PROP(Rays, ThroughAPointMeetThere, ()) {
   RC_ASSERT((*met - point).norm() < 1e-6);
 }
 
-TEST(Rays, TwoThatPassEachOtherMeetHalfWay) {
+TEST(Rays, TwoThatPassEachOtherMeetHalfway) {
   const std::vector<Ray> rays{{{0.0, 0.0, 1.0}, Eigen::Vector3d::UnitX()}, {{0.0, 0.0, 3.0}, Eigen::Vector3d::UnitY()}};
   EXPECT_LT((*nearest_point(rays) - Eigen::Vector3d(0.0, 0.0, 2.0)).norm(), 1e-12);
   EXPECT_NEAR(largest_angle(rays), std::acos(0.0), 1e-12);

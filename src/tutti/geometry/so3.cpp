@@ -34,7 +34,7 @@ Eigen::Quaterniond so3_exp(const Eigen::Vector3d& theta) {
 }
 
 Eigen::Vector3d so3_log(const Eigen::Quaterniond& q) {
-  const double sign = q.w() < 0.0 ? -1.0 : 1.0;  // the shorter way round
+  const double sign = q.w() < 0.0 ? -1.0 : 1.0;  // the smaller angle
   const Eigen::Vector3d v = sign * q.vec();
   const double w = sign * q.w();
   const double n = v.norm();

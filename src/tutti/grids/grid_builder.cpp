@@ -55,7 +55,8 @@ GridBuilder::Index GridBuilder::index_of(double x, double y) const {
 
 bool GridBuilder::is_inside(Index at) const { return at.x >= 0 && at.y >= 0 && at.x < width_ && at.y < height_; }
 
-/// From the cells of the ways outwards, as far as anything is used: a cell takes the nearest of its neighbours' places.
+/// From the cells of the trajectories outwards, as far as anything is used: a cell takes the nearest of its neighbours'
+/// places.
 void GridBuilder::spread_ground(const std::vector<Ground>& ground) {
   constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
   std::vector<std::uint32_t> nearest(hits_.size(), kNone);
@@ -89,10 +90,10 @@ bool GridBuilder::is_in_slab(Index at, double z) const {
   return height >= config_.low_m && height <= config_.high_m;  // of no ground: no
 }
 
-void GridBuilder::mark(std::vector<std::uint32_t>& said, std::vector<std::uint16_t>& votes, Index at) {
+void GridBuilder::mark(std::vector<std::uint32_t>& marked_by, std::vector<std::uint16_t>& votes, Index at) {
   const std::size_t cell = flat(at);
-  if (said[cell] == submap_) return;
-  said[cell] = submap_;
+  if (marked_by[cell] == submap_) return;
+  marked_by[cell] = submap_;
   if (votes[cell] < kMostVotes) ++votes[cell];
 }
 
@@ -112,9 +113,9 @@ void GridBuilder::mark_trajectory(const Trajectory& way) {
   for (std::size_t i = 0; i < way.size(); ++i) {
     const Eigen::Vector3d& from = way[i > 0 ? i - 1 : 0].pose.translation;
     const Eigen::Vector3d step = way[i].pose.translation - from;
-    const int pieces = std::max(1, static_cast<int>(step.norm() / config_.resolution_m));
-    for (int piece = 1; piece <= pieces; ++piece) {
-      const Eigen::Vector3d place = from + step * piece / pieces;
+    const int steps = std::max(1, static_cast<int>(step.norm() / config_.resolution_m));
+    for (int k = 1; k <= steps; ++k) {
+      const Eigen::Vector3d place = from + step * k / steps;
       const Index middle = index_of(place.x(), place.y());
       for (int dy = -reach; dy <= reach; ++dy)
         for (int dx = -reach; dx <= reach; ++dx)

@@ -45,8 +45,8 @@ class GridBuilder {
   /// `ground`: points below all robots' trajectories, at least one. A grid of more than 4e8 cells is an error.
   static Result<GridBuilder> create(const GridConfig& config, const std::vector<Ground>& ground);
   void add(const LevelSubmap& submap);
-  /// The grid of all submaps so far: a cell is occupied where at least one in three votes says so, free where there are
-  /// other votes, and unknown elsewhere.
+  /// The grid of all submaps so far: a cell is occupied where at least one in three votes is for that, free where there
+  /// are other votes, and unknown elsewhere.
   [[nodiscard]] OccupancyGrid grid() const;
 
  private:
@@ -63,9 +63,9 @@ class GridBuilder {
   [[nodiscard]] bool is_in_slab(Index at, double z) const;
   template <class Visit>
   void around(const Eigen::Vector3d& point, const Visit& visit) const;
-  void mark_trajectory(const Trajectory& way);
+  void mark_trajectory(const Trajectory& trajectory);
   void mark_ray(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
-  void mark(std::vector<std::uint32_t>& said, std::vector<std::uint16_t>& votes, Index at);
+  void mark(std::vector<std::uint32_t>& marked_by, std::vector<std::uint16_t>& votes, Index at);
 
   GridConfig config_;
   Eigen::Vector2d origin_ = Eigen::Vector2d::Zero();

@@ -81,11 +81,11 @@ TEST(GridBuilder, ARoomIsFreeWithinItsWallsAndUnknownBehindThem) {
   expect_the_room(grid_of(room([](double) { return 7.0; })));
 }
 
-TEST(GridBuilder, TheGroundIsThatBelowTheWay) {
+TEST(GridBuilder, TheGroundIsThatBelowTheTrajectory) {
   expect_the_room(grid_of(room([](double x) { return 0.06 * x; })));  // 0.6 m of slope are no wall
 }
 
-TEST(GridBuilder, RaysEndAtWhatStandsInTheirWay) {
+TEST(GridBuilder, RaysEndAtWhatBlocksThem) {
   LevelSubmap submap = room([](double) { return 0.0; });
   // Something behind the wall, as another pose may have seen it through a door: not from the pose nearest to it.
   for (double z = 0.1; z < 1.5; z += 0.1) submap.points.emplace_back(0.0F, 6.0F, static_cast<float>(z));

@@ -24,11 +24,11 @@ class MapPart {
         component_(mapfile::component_to_show(content, map)),
         T_level_world_(mapfile::level_frame(map, component_)) {
     for (const auto& node : map.nodes)
-      if (node.component == component_) ways_[node.id.chain].push_back({node.stamp, node.T_world_body});
+      if (node.component == component_) trajectories_[node.id.chain].push_back({node.stamp, node.T_world_body});
   }
 
   [[nodiscard]] const Pose3& T_level_world() const { return T_level_world_; }
-  [[nodiscard]] const std::map<ChainId, Trajectory>& ways() const { return ways_; }
+  [[nodiscard]] const std::map<ChainId, Trajectory>& trajectories() const { return trajectories_; }
   [[nodiscard]] std::size_t left_out() const { return left_out_; }
 
   /// `visit(chain, submap)` with every submap that has a cloud, in the frame that T_frame_world maps to.
@@ -59,14 +59,14 @@ class MapPart {
     const Eigen::Isometry3d T(T_frame_submap.matrix());
     for (const Eigen::Vector3f& point : cloud.points) out.points.push_back((T * point.cast<double>()).cast<float>());
     const Timestamp from = submap.keyframes.front().stamp, until = submap.keyframes.back().stamp;
-    for (const auto& [chain, way] : ways_) {
+    for (const auto& [chain, trajectory] : trajectories_) {
       if (chain.robot == submap.id.chain.robot) continue;
       // With one keyframe before and one behind, as the time may lie between two.
-      auto first = std::ranges::lower_bound(way, from, {}, &StampedPose::stamp);
-      auto last = std::ranges::upper_bound(way, until, {}, &StampedPose::stamp);
-      if (first == way.end() || last == way.begin()) continue;
-      if (first != way.begin()) --first;
-      if (last != way.end()) ++last;
+      auto first = std::ranges::lower_bound(trajectory, from, {}, &StampedPose::stamp);
+      auto last = std::ranges::upper_bound(trajectory, until, {}, &StampedPose::stamp);
+      if (first == trajectory.end() || last == trajectory.begin()) continue;
+      if (first != trajectory.begin()) --first;
+      if (last != trajectory.end()) ++last;
       for (; first != last; ++first) out.mates.push_back(T_frame_world * first->pose.translation);
     }
     return out;
@@ -77,7 +77,7 @@ class MapPart {
   std::shared_ptr<node::SubmapFrames> clouds_;
   std::uint32_t component_;
   Pose3 T_level_world_;
-  std::map<ChainId, Trajectory> ways_;
+  std::map<ChainId, Trajectory> trajectories_;
   std::size_t left_out_ = 0;
 };
 
@@ -120,7 +120,7 @@ class Below {
 Result<std::map<ChainId, double>> body_heights(MapPart& part, const MapGridConfig& config) {
   std::map<ChainId, double> out;
   if (config.body_height_m) {
-    for (const auto& [chain, way] : part.ways()) out[chain] = *config.body_height_m;
+    for (const auto& [chain, trajectory] : part.trajectories()) out[chain] = *config.body_height_m;
     return out;
   }
   std::map<ChainId, Below> below;
@@ -145,9 +145,9 @@ Result<MapGrid> grid_of_map(const storage::TableStore& store, const mapfile::Con
   if (!heights) return tl::unexpected(heights.error());
   out.body_height_m = std::move(*heights);
   std::vector<Ground> ground;
-  for (const auto& [chain, way] : part.ways())
+  for (const auto& [chain, trajectory] : part.trajectories())
     if (const auto height = out.body_height_m.find(chain); height != out.body_height_m.end())
-      for (const StampedPose& pose : way)
+      for (const StampedPose& pose : trajectory)
         ground.push_back(out.T_level_world * pose.pose.translation - Eigen::Vector3d(0.0, 0.0, height->second));
   auto builder = GridBuilder::create(config.grid, ground);
   if (!builder) return tl::unexpected(builder.error());

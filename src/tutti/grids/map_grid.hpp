@@ -27,7 +27,7 @@ struct MapGrid {
 };
 
 /// The occupancy grid of the component that mapfile::component_to_show() names, in a level frame with the origin of its
-/// world: up is the mean z axis of the robots' bodies. Unless config.body_height_m says it, the height of a session's
+/// world: up is the mean z axis of the robots' bodies. Unless config.body_height_m states it, the height of a session's
 /// body above the ground is the depth below the body at which most of its points within 4 m are. The grid is made from
 /// the submaps at their present poses, so a new one follows every optimisation. Other robots' bodies are cut out of a
 /// submap's cloud within `mate_m` of where they were while it was recorded, which takes stamps of one clock. Errors:

@@ -17,12 +17,12 @@ struct ImagesConfig {
   std::string within = "/";               ///< How the namespace's topics begin, "/alpha/"; set by resolve().
   int most_cameras = 2;                   ///< RobotConfig::images.most_cameras
   double time_offset_s = 0.0;             ///< Added to the images' stamps gives the odometry's time.
-  double most_difference_s = 0.005;       ///< Between the stamps of two cameras' images of one moment.
+  double most_difference_s = 0.005;       ///< Between the stamps of two cameras' images of one time.
   DepthSensor depth_sensor = {};          ///< Its unit is not read: ROS's depth is in millimetres or metres.
   double most_depth_difference_s = 0.02;  ///< Between the stamps of an image and of its depth.
 };
 
-/// What a topic of images was said to be.
+/// What a topic of images was configured to be.
 enum class Wish { nothing, camera, depth };
 
 /// A topic of images, and that of its CameraInfo.

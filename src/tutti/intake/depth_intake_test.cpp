@@ -28,7 +28,7 @@ struct DepthRobot : CameraRobot {
 TEST(DepthIntake, DepthIsNeverACameraAndIsFedBesideIt) {
   DepthRobot robot({kDepth, kLeft});
   EXPECT_EQ(robot.add(0, depth_image(kStart)), "");
-  EXPECT_TRUE(robot.sensors().cameras.empty());  // the other has said nothing
+  EXPECT_TRUE(robot.sensors().cameras.empty());  // the other has sent nothing
   EXPECT_EQ(robot.add(1, grey_image(kStart)), "");
   const FeedSensors sensors = robot.sensors();
   ASSERT_EQ(sensors.cameras.size(), 1U);

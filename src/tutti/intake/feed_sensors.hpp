@@ -39,7 +39,7 @@ struct EncodedImage {
   std::string bytes;
 };
 
-/// The images of all cameras at one moment.
+/// The images of all cameras at one time.
 struct FedImages {
   Timestamp stamp;
   std::vector<EncodedImage> images;

@@ -82,44 +82,50 @@ Status ImagesIntake::add_image(std::size_t topic, std::string_view bytes, Encodi
     const auto message = bags::decode_compressed_image(bytes, encoding);
     if (!message) return tl::unexpected(message.error());
     if (message->data.empty()) return fail(ErrorCode::invalid, "an image of no bytes, expected a PNG or JPEG file");
-    const bags::ImageLook look = bags::look_of(*message);
-    if (bags::is_depth(of.topics.images, of.seen.first.value_or(look).encoding)) return add_depth(of, look, *message);
-    if (!of.seen.first) of.seen.first = look;
+    const bags::ImageLook appearance = bags::look_of(*message);
+    if (bags::is_depth(of.topics.images, of.seen.first.value_or(appearance).encoding))
+      return add_depth(of, appearance, *message);
+    if (!of.seen.first) of.seen.first = appearance;
     return push(of, message->header, {{}, {0, false, std::string(message->data)}});
   }
   const auto message = bags::decode_image(bytes, encoding);
   if (!message) return tl::unexpected(message.error());
-  const bags::ImageLook look = bags::look_of(*message);
-  if (bags::is_depth(of.topics.images, of.seen.first.value_or(look).encoding)) return add_depth(of, look, *message);
+  const bags::ImageLook appearance = bags::look_of(*message);
+  if (bags::is_depth(of.topics.images, of.seen.first.value_or(appearance).encoding))
+    return add_depth(of, appearance, *message);
   const auto image = bags::to_image(*message);
-  if (!of.seen.first && (image || !bags::is_picture(look.encoding))) of.seen.first = look;
+  if (!of.seen.first && (image || !bags::is_picture(appearance.encoding))) of.seen.first = appearance;
   if (!image) return tl::unexpected(image.error());
   return push(of, message->header,
               {{}, {0, true, std::string(image->grey.begin(), image->grey.end())}, message->width, message->height});
 }
 
-Status ImagesIntake::add_depth(OneTopic& topic, const bags::ImageLook& look, const bags::RosImage& message) {
+Status ImagesIntake::add_depth(OneTopic& topic, const bags::ImageLook& appearance, const bags::RosImage& message) {
   const auto named = [&](const Error& error) {
     return in_context(fmt::format("depth at {} ns", message.header.stamp.ns), error);
   };
-  if (auto ok = bags::check_like_first(look, topic.seen.first.value_or(look)); !ok) return named(ok.error());
+  if (auto ok = bags::check_like_first(appearance, topic.seen.first.value_or(appearance)); !ok)
+    return named(ok.error());
   const auto depth = bags::to_depth(message);
   if (!depth) return named(depth.error());
-  if (!topic.seen.first) topic.seen.first = look;
-  return push(topic, message.header, {{}, {0, true, to_bytes(*depth)}, look.width_px, look.height_px});
+  if (!topic.seen.first) topic.seen.first = appearance;
+  return push(topic, message.header, {{}, {0, true, to_bytes(*depth)}, appearance.width_px, appearance.height_px});
 }
 
 /// The file, which depth_of() or the robot decodes, once its size is known to be a camera's.
-Status ImagesIntake::add_depth(OneTopic& topic, const bags::ImageLook& look, const bags::RosCompressedImage& message) {
+Status ImagesIntake::add_depth(OneTopic& topic, const bags::ImageLook& appearance,
+                               const bags::RosCompressedImage& message) {
   const auto named = [&](const Error& error) {
     return in_context(fmt::format("depth at {} ns", message.header.stamp.ns), error);
   };
-  if (auto ok = bags::check_like_first(look, topic.seen.first.value_or(look)); !ok) return named(ok.error());
+  if (auto ok = bags::check_like_first(appearance, topic.seen.first.value_or(appearance)); !ok)
+    return named(ok.error());
   if (bags::png_of(message.data).empty())
     return named({ErrorCode::unsupported,
                   fmt::format("format '{:.60}', expected a PNG image as compressedDepth has", message.format)});
-  if (!topic.seen.first) topic.seen.first = look;
-  return push(topic, message.header, {{}, {0, false, std::string(message.data)}, look.width_px, look.height_px});
+  if (!topic.seen.first) topic.seen.first = appearance;
+  return push(topic, message.header,
+              {{}, {0, false, std::string(message.data)}, appearance.width_px, appearance.height_px});
 }
 
 Status ImagesIntake::push(OneTopic& topic, const bags::RosHeader& header, Waiting waiting) {
@@ -305,23 +311,23 @@ bool ImagesIntake::reaches(Timestamp stamp) const {
 }
 
 /// The nearest of the second camera's images that have arrived.
-std::optional<EncodedImage> ImagesIntake::second_of(Timestamp moment) {
+std::optional<EncodedImage> ImagesIntake::second_of(Timestamp instant) {
   if (cameras_.size() < 2) return std::nullopt;
   OneTopic& of = topics_[cameras_.back()];
-  of.drop_before(moment - config_.most_difference_s);
-  const auto at = nearest_in_time(of.waiting, moment, config_.most_difference_s, &Waiting::stamp);
+  of.drop_before(instant - config_.most_difference_s);
+  const auto at = nearest_in_time(of.waiting, instant, config_.most_difference_s, &Waiting::stamp);
   if (at == of.waiting.end()) return std::nullopt;
   of.drop_before(at->stamp);
   return of.pop().image;
 }
 
 /// The nearest of the depth images that have arrived; it may be the next image's, too.
-Result<std::optional<EncodedImage>> ImagesIntake::depth_of(Timestamp moment) {
+Result<std::optional<EncodedImage>> ImagesIntake::depth_of(Timestamp instant) {
   std::optional<EncodedImage> none;
   if (!depth_) return none;
   OneTopic& of = topics_[*depth_];
-  of.drop_before(moment - config_.most_depth_difference_s);
-  const auto at = nearest_in_time(of.waiting, moment, config_.most_depth_difference_s, &Waiting::stamp);
+  of.drop_before(instant - config_.most_depth_difference_s);
+  const auto at = nearest_in_time(of.waiting, instant, config_.most_depth_difference_s, &Waiting::stamp);
   if (at == of.waiting.end()) return none;
   if (at->image.is_raw) return std::optional(at->image);
   if (of.seen.first->encoding != "32FC1")
@@ -344,20 +350,22 @@ Result<std::optional<FedImages>> ImagesIntake::next_images(Timestamp stamp, bool
   OneTopic& camera = topics_[cameras_.front()];
   while (!camera.waiting.empty() && odometry_.is_before_all(camera.waiting.front().stamp)) camera.pop();
   if (camera.waiting.empty() || camera.waiting.front().stamp > stamp) return none;
-  const Timestamp moment = camera.waiting.front().stamp;
-  if (stamp - moment > kLatest_s) {
+  const Timestamp instant = camera.waiting.front().stamp;
+  if (stamp - instant > kLatest_s) {
     camera.pop();
     return fail(ErrorCode::invalid, "image at {} ns comes {:.1f} s after odometry of its time, expected at most {} s",
-                moment.ns, stamp - moment, kLatest_s);
+                instant.ns, stamp - instant, kLatest_s);
   }
-  const bool is_patient = !is_last && stamp - moment < kPatience_s;
-  const auto may_come = [&](const OneTopic& topic) { return is_patient && !(topic.newest && *topic.newest >= moment); };
+  const bool is_patient = !is_last && stamp - instant < kPatience_s;
+  const auto may_come = [&](const OneTopic& topic) {
+    return is_patient && !(topic.newest && *topic.newest >= instant);
+  };
   if ((cameras_.size() > 1 && may_come(topics_[cameras_.back()])) || (depth_ && may_come(topics_[*depth_])))
     return none;
-  std::optional<EncodedImage> other = second_of(moment);
-  auto depth = depth_of(moment);
+  std::optional<EncodedImage> other = second_of(instant);
+  auto depth = depth_of(instant);
   if (!depth) return tl::unexpected(depth.error());
-  FedImages out{.stamp = moment, .images = {}, .depth = std::move(*depth)};
+  FedImages out{.stamp = instant, .images = {}, .depth = std::move(*depth)};
   out.images.push_back(camera.pop().image);
   if (!other) return std::optional(std::move(out));
   other->camera = 1;

@@ -21,14 +21,14 @@
 namespace tutti::intake {
 
 /// Turns images and IMU samples of ROS 2 into inputs of a robot's live feed, as mission/bag_cameras.cpp does of a bag.
-/// Which topics are cameras and which is their depth is chosen once each has said what it shows. Raw images become grey
-/// here, raw depth millimetres; compressed ones stay as they are where the robot can decode them. Bytes are untrusted:
-/// an error says what is wrong with a message, which then has no effect.
+/// Which topics are cameras and which is their depth is chosen once the first image of each has come. Raw images become
+/// grey here, raw depth millimetres; compressed ones stay as they are where the robot can decode them. Bytes are
+/// untrusted: an error is what is wrong with a message, which then has no effect.
 class ImagesIntake {
  public:
   using Encoding = bags::RosEncoding;
   static constexpr double kLatest_s = 0.5;               ///< Behind odometry; the robot takes none later.
-  static constexpr double kPatience_s = 0.3;             ///< By odometry, for the second camera's image of a moment.
+  static constexpr double kPatience_s = 0.3;             ///< By odometry, for the second camera's image of a time.
   static constexpr double kAhead_s = 0.5;                ///< IMU samples may be that far ahead of odometry.
   static constexpr std::size_t kMostBytes = 48U << 20U;  ///< Images that wait for odometry, before the oldest go.
   static constexpr std::size_t kMostSamples = 20'000;    ///< IMU samples that wait, before the oldest go.
@@ -43,11 +43,11 @@ class ImagesIntake {
   Status add_image(std::size_t topic, std::string_view bytes, Encoding encoding = Encoding::cdr);
   Status add_imu(std::string_view bytes, Encoding encoding = Encoding::cdr);
 
-  /// Chooses cameras and depth by bags::choose_cameras(), once every topic has said what it shows, and calibration and
-  /// place of the cameras are known; `is_late`: topics that nobody named and that have said nothing are left out. False
-  /// while something is missing; an error when it cannot be chosen, which says how to choose.
+  /// Chooses cameras and depth by bags::choose_cameras(), once the first image of every topic has come, and calibration
+  /// and place of the cameras are known; `is_late`: topics that nobody named and that have sent nothing are left out.
+  /// False while something is missing; an error when it cannot be chosen, which explains how to choose.
   Result<bool> choose(bool is_late);
-  /// Any topic has said what it shows.
+  /// The first image of any topic has come.
   [[nodiscard]] bool has_any_image() const;
   [[nodiscard]] bool is_chosen() const { return !cameras_.empty(); }
   /// Messages of this topic are of use: before the choice of all.
@@ -97,15 +97,15 @@ class ImagesIntake {
   using Numbers = std::vector<std::size_t>;
   Status push(OneTopic& topic, const bags::RosHeader& header, Waiting waiting);
   [[nodiscard]] std::size_t most_bytes() const;  ///< That a topic's images may take.
-  Status add_depth(OneTopic& topic, const bags::ImageLook& look, const bags::RosImage& message);
-  Status add_depth(OneTopic& topic, const bags::ImageLook& look, const bags::RosCompressedImage& message);
+  Status add_depth(OneTopic& topic, const bags::ImageLook& appearance, const bags::RosImage& message);
+  Status add_depth(OneTopic& topic, const bags::ImageLook& appearance, const bags::RosCompressedImage& message);
   static Status check_size(const OneTopic& topic, const Waiting& waiting);
   /// Nothing while a topic must be waited for.
   Result<std::optional<std::pair<Numbers, Numbers>>> cameras_and_depths(bool is_late) const;
   [[nodiscard]] Result<Camera> place(const OneTopic& camera) const;
   [[nodiscard]] Result<Pose3> imu_place() const;
-  std::optional<EncodedImage> second_of(Timestamp moment);
-  Result<std::optional<EncodedImage>> depth_of(Timestamp moment);
+  std::optional<EncodedImage> second_of(Timestamp instant);
+  Result<std::optional<EncodedImage>> depth_of(Timestamp instant);
 
   ImagesConfig config_;
   std::vector<OneTopic> topics_;

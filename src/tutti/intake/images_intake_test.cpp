@@ -73,7 +73,7 @@ TEST(ImagesIntake, TwoCamerasAreFedTogetherOrTheFirstAlone) {
   robot.go(0);
   for (std::size_t camera : {0U, 1U}) ASSERT_TRUE(robot.images.add_info(camera, bags::encode(calibration())));
   add(1, kStart - kPeriod / 2);
-  EXPECT_TRUE(robot.sensors().cameras.empty());  // the first has said nothing
+  EXPECT_TRUE(robot.sensors().cameras.empty());  // the first has sent nothing
   add(0, kStart);
   EXPECT_EQ(robot.sensors().cameras.size(), 2U);
   EXPECT_FALSE(robot.images.next_images({kStart}).value());  // the second's may come
@@ -83,7 +83,7 @@ TEST(ImagesIntake, TwoCamerasAreFedTogetherOrTheFirstAlone) {
   ASSERT_EQ(both->images.size(), 2U);
   EXPECT_EQ(both->images[1].camera, 1U);
   add(0, kStart + kPeriod);
-  add(1, kStart + 2 * kPeriod);  // the second's of that moment is lost
+  add(1, kStart + 2 * kPeriod);  // the second's of that time is lost
   EXPECT_EQ(robot.images.next_images(robot.go(1)).value()->images.size(), 1U);
   add(0, kStart + 2 * kPeriod);
   EXPECT_EQ(robot.images.next_images(robot.go(2)).value()->images.size(), 2U);
@@ -91,14 +91,14 @@ TEST(ImagesIntake, TwoCamerasAreFedTogetherOrTheFirstAlone) {
   EXPECT_FALSE(robot.images.next_images(robot.go(5)).value());
   EXPECT_EQ(robot.images.next_images(robot.go(6)).value()->images.size(), 1U);  // the second has ended
 
-  const std::int64_t moment = kStart + 7 * kPeriod;
-  add(0, moment);
-  add(1, moment - 3'000'000);
+  const std::int64_t instant = kStart + 7 * kPeriod;
+  add(0, instant);
+  add(1, instant - 3'000'000);
   EXPECT_FALSE(robot.images.next_images(robot.go(7)).value());  // a nearer one may come
-  bags::RosImage image = grey_image(moment + 1'000'000);
+  bags::RosImage image = grey_image(instant + 1'000'000);
   image.data = "ABCDEFGHIJKL";
   ASSERT_TRUE(robot.images.add_image(1, bags::encode(image)));
-  add(1, moment + 4'000'000);
+  add(1, instant + 4'000'000);
   const auto nearest = robot.images.next_images(robot.go(7)).value();
   ASSERT_TRUE(nearest && nearest->images.size() == 2U);
   EXPECT_EQ(nearest->images[1].bytes, "ABCDEFGHIJKL");

@@ -65,12 +65,12 @@ Status RosIntake::take_odometry(std::string_view bytes, Encoding encoding) {
 
 Status RosIntake::add_sample(Timestamp stamp, const Pose3& T_odom_body, const std::string& odom,
                              const std::string& body) {
-  const OdometryFrames said{bags::frame_name(odom), bags::frame_name(body)};
-  if (!frames_) frames_ = said;
-  if (said.odom != frames_->odom || said.body != frames_->body)
+  const OdometryFrames stated{bags::frame_name(odom), bags::frame_name(body)};
+  if (!frames_) frames_ = stated;
+  if (stated.odom != frames_->odom || stated.body != frames_->body)
     return fail(ErrorCode::invalid,
-                "frames '{}' -> '{}', expected '{}' -> '{}' as of the first message: two publishers?", plain(said.odom),
-                plain(said.body), plain(frames_->odom), plain(frames_->body));
+                "frames '{}' -> '{}', expected '{}' -> '{}' as of the first message: two publishers?",
+                plain(stated.odom), plain(stated.body), plain(frames_->odom), plain(frames_->body));
   const std::optional<Timestamp> newest = stamps_.newest();
   const bool is_said_again = !config_.odometry_frames.empty() && newest && stamp == *newest;  // as many do on /tf
   if (is_said_again) return {};
@@ -100,7 +100,7 @@ Status RosIntake::add_sample(Timestamp stamp, const Pose3& T_odom_body, const st
   return {};
 }
 
-/// What the robot has and who feeds says again, before anything new: the way to the next sample is known then.
+/// What the robot has and who feeds sends again, before anything new: the motion to the next sample is known then.
 bool RosIntake::is_history(const StampedPose& sample) {
   const bool is_again = known_ && counts_.odometry == 0 && sample.stamp <= *known_ &&
                         *known_ - sample.stamp <= kHistory_s &&

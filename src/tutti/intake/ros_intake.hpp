@@ -50,8 +50,8 @@ struct OdometryFrames {
 
 /// Turns messages of ROS 2 into inputs of a robot's live feed: odometry samples with the covariance of their
 /// increments, scans in the body frame with the motion of their sweeps removed, and position fixes with their antenna's
-/// place, in the same way as from a bag (mission/bag_recording.hpp). It needs neither a clock nor DDS. Bytes are
-/// untrusted: an error says what is wrong with a message, which then has no effect.
+/// place, as from a bag (mission/bag_recording.hpp). It needs neither a clock nor DDS. Bytes are untrusted: an error is
+/// what is wrong with a message, which then has no effect.
 class RosIntake {
  public:
   using Encoding = bags::RosEncoding;
@@ -63,8 +63,8 @@ class RosIntake {
   explicit RosIntake(IntakeConfig config) : config_(std::move(config)) {}
 
   /// The robot already has everything up to `newest` (FeedWelcome::newest): samples that wait and are older are
-  /// dropped, and the first step after it gets a large covariance when nobody has observed the way there. A new intake
-  /// may be told odometry up to `newest` again, of at most kHistory_s: how the body moved.
+  /// dropped, and the first step after it gets a large covariance when nobody has observed the motion there. A new
+  /// intake may get odometry up to `newest` again, of at most kHistory_s: how the body moved.
   void begin_behind(const std::optional<Timestamp>& newest);
 
   /// Stamps are judged as by the robot (StampWatch): what it would refuse is refused here. Where the clock began anew,
@@ -83,13 +83,13 @@ class RosIntake {
   /// The next odometry sample to feed, in order of arrival. With `wait_for_scans` it is held back until a scan with its
   /// stamp or a later one has arrived.
   std::optional<node::OdometrySample> next_odometry(bool wait_for_scans);
-  /// The next scan that can be fed, because the way up to the newest sample that next_odometry() returned covers its
+  /// The next scan that can be fed, because the motion up to the newest sample that next_odometry() returned covers its
   /// sweep. Nothing when none is due; an error when the scan is left out. When the scan is not wanted it is skipped,
   /// which costs nothing.
   Result<std::optional<Scan>> next_scan(bool is_wanted);
 
-  /// The next fix whose stamp next_odometry() has reached; nothing when there is none. Where nothing tells the
-  /// antenna's pose, the fix is taken as of the body's origin, and take_note() says so.
+  /// The next fix whose stamp next_odometry() has reached; nothing when there is none. Where the antenna's pose is
+  /// unknown, the fix is taken as of the body's origin, and take_note() reports it.
   std::optional<PositionFix> next_fix();
 
   [[nodiscard]] const std::optional<OdometryFrames>& frames() const { return frames_; }
@@ -154,8 +154,8 @@ class RosIntake {
   std::deque<bags::ReceivedFix> fixes_;
   std::optional<Timestamp> newest_scan_, newest_fix_, known_;
   std::optional<StampedPose> last_;  ///< The sample fed last.
-  bool unseen_ = false;              ///< Nobody has observed the way to the next sample.
-  bool is_unsure_ = false;           ///< A fix did not say how sure it is.
+  bool unseen_ = false;              ///< Nobody has observed the motion to the next sample.
+  bool is_unsure_ = false;           ///< A fix came without covariance.
   std::string how_, how_fixed_, note_;
   Counts counts_;
 };

@@ -16,7 +16,7 @@ using test::fix, test::kAtOnce, test::kPeriod, test::kStart, test::kSweepAfter, 
 
 std::string why(const Status& status) { return status ? "" : status.error().message; }
 
-/// All that is ready, one after the other as the robot is told.
+/// All that is ready, one after the other as the robot gets it.
 struct Fed {
   std::vector<node::OdometrySample> samples;
   std::vector<Scan> scans;
@@ -200,7 +200,7 @@ TEST(RosIntake, OdometryMayBeTwoFramesOfTf) {
   for (int i = 0; i < 3; ++i) {
     const Pose3 T{Eigen::Quaterniond::Identity(), {0.1 * i, 0, 0}};
     ASSERT_TRUE(intake.add_tf(transform(kStart + i * kPeriod, "odom", "base_link", T), false));
-    ASSERT_TRUE(intake.add_tf(transform(kStart + i * kPeriod, "odom", "base_link", T), false));  // said again
+    ASSERT_TRUE(intake.add_tf(transform(kStart + i * kPeriod, "odom", "base_link", T), false));  // sent again
     ASSERT_TRUE(intake.add_tf(transform(kStart + i * kPeriod, "base_link", "wheel", T), false));
   }
   EXPECT_EQ(feed(intake).samples.size(), 3U);
@@ -218,7 +218,7 @@ TEST(RosIntake, WhereNothingMayBeLostOdometryWaitsForScans) {
   EXPECT_EQ(feed(intake, false).samples.size(), 1U);
 }
 
-TEST(RosIntake, WhatTheRobotHasIsPassedOverAndTheWaySinceIsUnseen) {
+TEST(RosIntake, WhatTheRobotHasIsPassedOverAndTheMotionSinceIsUnseen) {
   RosIntake intake({});
   intake.begin_behind(Timestamp{kStart + kPeriod + 1});
   for (int i = 0; i < 4; ++i) ASSERT_TRUE(intake.add_odometry(odometry(kStart + i * kPeriod)));
@@ -266,11 +266,11 @@ TEST(RosIntake, ALidarWithAClockOfItsOwnIsSaidAndAligned) {
                       .T_body_lidar = {},
                       .p_body_antenna = {}});
     std::size_t scans = 0;
-    std::string said;
+    std::string errors;
     for (int i = 0; i < 20; ++i) {
       ASSERT_TRUE(intake.add_odometry(odometry(kStart + i * kPeriod, 1.0 * i)));
       if (i < 5) continue;
-      said = why(intake.add_points(points(kStart + i * kPeriod + kAhead, kSweepBefore)));
+      errors = why(intake.add_points(points(kStart + i * kPeriod + kAhead, kSweepBefore)));
       for (const Scan& scan : feed(intake).scans) {
         EXPECT_EQ(scan.stamp.ns, kStart + i * kPeriod);
         EXPECT_NEAR(scan.cloud->points[0].x(), 5.0 - 1.0, 1e-4);
@@ -278,8 +278,8 @@ TEST(RosIntake, ALidarWithAClockOfItsOwnIsSaidAndAligned) {
       }
     }
     EXPECT_EQ(scans, offset_s == 0.0 ? 0U : 15U);
-    EXPECT_EQ(said.find("to align them: robots[].scan_time_offset_s=-37)") != std::string::npos, offset_s == 0.0)
-        << said;
+    EXPECT_EQ(errors.find("to align them: robots[].scan_time_offset_s=-37)") != std::string::npos, offset_s == 0.0)
+        << errors;
   }
 }
 
@@ -335,8 +335,8 @@ TEST(RosIntake, AClockThatGoesBackIsFedAsTheRobotIsToSeeIt) {
 TEST(RosIntake, WhatIsWrongIsSaid) {
   RosIntake intake({});
   ASSERT_TRUE(intake.add_odometry(odometry(kStart)));
-  const auto expect = [](const std::string& said, const std::string& part) {
-    EXPECT_NE(said.find(part), std::string::npos) << said;
+  const auto expect = [](const std::string& errors, const std::string& part) {
+    EXPECT_NE(errors.find(part), std::string::npos) << errors;
   };
   expect(why(intake.add_odometry(odometry(kStart))), "expected after 1700000000000000000 ns: two publishers");
   expect(why(intake.add_odometry(odometry(kStart + 1, 0.0, "map"))),
@@ -362,10 +362,10 @@ TEST(RosIntake, WhatIsWrongIsSaid) {
 
 TEST(RosIntake, FramesOfStrangersHaveAnEnd) {
   RosIntake intake({});
-  std::string said;
+  std::string errors;
   for (std::size_t i = 0; i <= RosIntake::kMostFrames; ++i)
-    said += why(intake.add_tf(transform(0, "world", fmt::format("frame_{}", i), {}), false));
-  EXPECT_EQ(said, "frame 'frame_1000' is one more than 1000");
+    errors += why(intake.add_tf(transform(0, "world", fmt::format("frame_{}", i), {}), false));
+  EXPECT_EQ(errors, "frame 'frame_1000' is one more than 1000");
 }
 
 TEST(RosIntake, ScansAndFixesWithoutOdometryHaveAnEnd) {

@@ -15,7 +15,7 @@
 namespace tutti::intake {
 namespace {
 
-constexpr double kLook_s = 0.5;  // between two looks for what is missing, by odometry's time
+constexpr double kCheck_s = 0.5;  // between two checks for what is missing, by odometry's time
 
 bool is_compressed(const std::string& topic) {
   return topic.ends_with("/compressed") || topic.ends_with("/compressedDepth");  // as image_transport names them
@@ -116,7 +116,7 @@ Status SensorIntake::add(const RawMessage& message) {
                 plain_text(message.type, 80), fmt::join(types, ", "));
   }
   const Status taken = row->take(*this, message, *encoding);
-  look(row->is_of_sensors);
+  check_missing(row->is_of_sensors);
   return taken ? taken : in_context(topic, taken.error());
 }
 
@@ -144,11 +144,11 @@ Status SensorIntake::take_battery(std::string_view bytes, bags::RosEncoding enco
 }
 
 /// What can be known of cameras and IMU now; while nothing new is to be expected, not at every message.
-void SensorIntake::look(bool is_new) {
+void SensorIntake::check_missing(bool is_new) {
   if (!images_) return;
   if (!images_->is_chosen()) choose();
   if (!images_) return;
-  const bool is_early = looked_ && fed_ && *fed_ >= *looked_ && *fed_ - *looked_ < kLook_s;
+  const bool is_early = looked_ && fed_ && *fed_ >= *looked_ && *fed_ - *looked_ < kCheck_s;
   const bool is_complete = missing_.empty() && !sensors_.cameras.empty();
   if (is_early && (is_complete || !is_new)) return;
   looked_ = fed_;

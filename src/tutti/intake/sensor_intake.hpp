@@ -42,7 +42,7 @@ Result<std::vector<CameraTopics>> named_topics(const ImagesConfig& config);
 
 /// Turns a robot's messages of ROS into its inputs: (topic, type, encoding, bytes) -> Input, by one table of types and
 /// one set of rules for clocks, transforms, cameras and depth (RosIntake, ImagesIntake). It waits for what belongs
-/// together, needs no clock, and says what it makes of the messages. Bytes are untrusted: an error says what is wrong
+/// together, needs no clock, and reports what it makes of the messages. Bytes are untrusted: an error is what is wrong
 /// with a message, which then has no effect.
 class SensorIntake {
  public:
@@ -65,7 +65,7 @@ class SensorIntake {
   }
   /// Messages on this topic of a camera are of use: before it is known which of them are, of all.
   [[nodiscard]] bool wants(std::string_view topic) const;
-  /// Images are taken, or may be: what their topics say allows it.
+  /// Images are taken, or may be: what their topics send allows it.
   [[nodiscard]] bool may_see() const { return images_.has_value(); }
   /// Nothing more comes that would be worth waiting for.
   void end() { is_last_ = true; }
@@ -74,9 +74,9 @@ class SensorIntake {
   [[nodiscard]] const FeedSensors& sensors() const { return sensors_; }
   /// Why no images, depth or IMU are used; empty while nothing is missing.
   [[nodiscard]] const std::string& missing() const { return missing_; }
-  /// How messages are read, said once after each change: points' times, places of antennas, cameras.
+  /// How messages are read, reported once after each change: points' times, places of antennas, cameras.
   std::vector<std::string> take_notes() { return std::exchange(notes_, {}); }
-  /// Adds what is to be said, unless it is empty.
+  /// Adds a note, unless it is empty.
   void note(std::string text) {
     if (!text.empty()) notes_.push_back(std::move(text));
   }
@@ -88,7 +88,7 @@ class SensorIntake {
   static std::span<const Row> rows();
   Status take_camera(std::string_view topic, std::string_view bytes, bags::RosEncoding encoding, bool is_info);
   Status take_battery(std::string_view bytes, bags::RosEncoding encoding);
-  void look(bool is_new);
+  void check_missing(bool is_new);
   void choose();
   Result<std::optional<Input>> next_beside(bool wants_scan);
   [[nodiscard]] bool waits_for_images() const;

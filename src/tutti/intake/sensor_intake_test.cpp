@@ -23,7 +23,7 @@ struct Letters {
   std::vector<FedImages> images;
   void operator()(const node::OdometrySample& sample) { out += 'o', samples.push_back(sample); }
   void operator()(const Scan&) { out += 's'; }
-  void operator()(const FedImages& moment) { out += 'p', images.push_back(moment); }
+  void operator()(const FedImages& images_then) { out += 'p', images.push_back(images_then); }
   void operator()(const std::vector<ImuSample>&) { out += 'i'; }
   void operator()(const PositionFix&) { out += 'f'; }
   void operator()(const Health&) { out += 'h'; }
@@ -210,7 +210,7 @@ TEST_F(SensorIntakeTest, OdometryThatIsSaidAgainTellsHowTheBodyMoved) {
   EXPECT_EQ(add("points", kPoints, points(kStart + 11 * kPeriod, kSweepBefore)), "");
   EXPECT_EQ(due(), "s");
 
-  SensorIntake other{{}};  // which is not told
+  SensorIntake other{{}};  // which does not get it
   other.odometry().begin_behind(Timestamp{kStart});
   EXPECT_TRUE(other.add({"odom", kOdometry, "cdr", odometry(kStart + kPeriod)}));
   const auto first = other.next(true).value();

@@ -13,12 +13,12 @@
 
 namespace tutti {
 
-/// What an operator says of the closures between two submaps, which outranks the server's own judgement. The numbers
+/// What an operator decides on the closures between two submaps, which outranks the server's own judgement. The numbers
 /// are sent and stored, so they never change.
 enum class Wish : std::uint8_t {
   accept = 1,   ///< The closures are right: they are in the map, with their covariance, whatever contradicts them.
   reject = 2,   ///< The closures are wrong: they never enter the map.
-  withdraw = 3  ///< The operator takes an earlier word back: the server judges.
+  withdraw = 3  ///< The operator takes an earlier decision back: the server judges.
 };
 
 constexpr const char* to_string(Wish wish) {
@@ -27,9 +27,9 @@ constexpr const char* to_string(Wish wish) {
 
 /// An operator's decision on the closures between two submaps.
 struct ClosureDecision {
-  std::string closure;  ///< Name of the pair (server/closure_names.hpp) at the time the word was given.
+  std::string closure;  ///< Name of the pair (server/closure_names.hpp) at the time of the decision.
   Wish wish = Wish::withdraw;
-  std::string by;             ///< Who said it, for people; may be empty.
+  std::string by;             ///< Who decided, for people; may be empty.
   std::int64_t given_ns = 0;  ///< When, since the Unix epoch.
   /// With `accept`: a closure that the operator has added, beside those that were found; at most one.
   std::vector<LoopClosure> by_hand = {};
@@ -54,17 +54,17 @@ inline ClosureDecision with_sessions(ClosureDecision decision, const SubmapPair&
   return decision;
 }
 
-/// True if word `a` counts and not `b`, both being on one pair: the later one counts. Words given at the same time are
-/// ordered by their other fields, so that the outcome does not depend on the order of arrival.
+/// True if decision `a` counts and not `b`, both being on one pair: the later one counts. Decisions of the same time
+/// are ordered by their other fields, so that the outcome does not depend on the order of arrival.
 inline bool holds_over(const ClosureDecision& a, const ClosureDecision& b) {
   return std::tie(a.given_ns, a.wish, a.by, a.closure) > std::tie(b.given_ns, b.wish, b.by, b.closure);
 }
 
-/// The word that counts for each pair. Withdrawals are kept too, so that an older word which arrives late cannot come
-/// into force again.
+/// The decision that counts for each pair. Withdrawals are kept too, so that an older decision which arrives late
+/// cannot come into force again.
 using DecisionSet = std::map<SubmapPair, ClosureDecision>;
 
-/// True if the word that counts for `pair` is `wish`.
+/// True if the decision that counts for `pair` is `wish`.
 inline bool says(const DecisionSet& decisions, const SubmapPair& pair, Wish wish) {
   const auto found = decisions.find(pair);
   return found != decisions.end() && found->second.wish == wish;

@@ -23,15 +23,15 @@ struct DepthSensor {
 };
 
 /// The images of one robot, loaded on demand from files or rendered by a simulated camera. All its cameras are exposed
-/// at the same moments.
+/// at the same times.
 struct ImageStream {
   std::vector<Camera> cameras;
   std::vector<Timestamp> stamps;  ///< Strictly increasing.
-  /// Loads the image of one camera at `stamps[moment]`; an empty image when the camera took none. Calls may be in any
+  /// Loads the image of one camera at `stamps[instant]`; an empty image when the camera took none. Calls may be in any
   /// order.
-  std::function<Result<Image>(std::size_t moment, std::size_t camera)> load;
+  std::function<Result<Image>(std::size_t instant, std::size_t camera)> load;
   /// Loads the depth image aligned with the first camera's image; an empty one when there was none. Not set: no depth.
-  std::function<Result<DepthImage>(std::size_t moment)> load_depth = {};
+  std::function<Result<DepthImage>(std::size_t instant)> load_depth = {};
   DepthSensor depth = {};
 };
 

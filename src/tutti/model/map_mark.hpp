@@ -12,16 +12,16 @@
 
 namespace tutti {
 
-/// What somebody has written on the map: a place in a submap, so that it moves with the map, and words.
+/// What somebody has written on the map: a place in a submap, so that it moves with the map, and a text.
 struct MapMark {
-  static constexpr std::size_t kMostBytes = 2'000;           ///< The words may have so many,
+  static constexpr std::size_t kMostBytes = 2'000;           ///< The text may have so many,
   static constexpr std::size_t kMostPhotoBytes = 1U << 20U;  ///< and the photo, which is kept beside it.
   static constexpr double kFarthest_m = 1'000.0;             ///< From the submap's first keyframe.
 
   SubmapId submap;
   Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< In the submap's frame, m.
   std::string words;                             ///< UTF-8, any; may be empty.
-  std::string by;                                ///< Who said it, for people; may be empty.
+  std::string by;                                ///< Who wrote it, for people; may be empty.
   std::int64_t given_ns = 0;                     ///< When, since the Unix epoch.
   std::string photo_type;                        ///< "image/jpeg" or "image/png"; empty: there is no photo.
   template <class V>

@@ -12,10 +12,10 @@
 namespace tutti {
 
 /// Identifies a method, which is a closure verifier or a map refiner. Methods with equal ids compute the same from the
-/// same submaps, on any machine. Ids that differ say nothing about which method is better.
+/// same submaps, on any machine. Ids that differ do not tell which method is better.
 struct MethodId {
   static constexpr FieldRule kName{.text = FieldRule::Text::word, .at_most = 64};
-  std::string name;  ///< "lidar", "visual", ...; empty when a program did not say.
+  std::string name;  ///< "lidar", "visual", ...; empty when a program did not send it.
   /// Version of the code; a commit that changes what the method computes raises it by hand.
   std::uint32_t version = 0;
   std::uint64_t settings = 0;  ///< settings_hash() of its settings; 0: any, or unknown.

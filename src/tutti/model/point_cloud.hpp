@@ -15,7 +15,7 @@ struct PointCloud {
   friend bool operator==(const PointCloud&, const PointCloud&) = default;
 };
 
-/// One sweep of a range sensor, which ends at `stamp`. Every point is in the body frame at the moment at which it was
+/// One sweep of a range sensor, which ends at `stamp`. Every point is in the body frame at the time at which it was
 /// measured, `age_s` before the stamp; without ages all points are in the body frame at the stamp (undistorted). Clouds
 /// are large and immutable, so they are shared.
 struct Scan {

@@ -84,8 +84,8 @@ struct KnownDirection {
 };
 
 /// How sure the server is of the shape of one chain's trajectory (docs/math.md): the standard deviations of its errors
-/// in the wavelets of the chain's own proximity graph, and along the directions that closures determine. Also says
-/// which part of the shape depends on a single closure that odometry contradicts.
+/// in the wavelets of the chain's own proximity graph, and along the directions that closures determine. Also has which
+/// part of the shape depends on a single closure that odometry contradicts.
 struct ChainUncertainty {
   static constexpr std::size_t kBlock = 10;  ///< Nodes that share one sigma.
   /// Number of evenly spread nodes that directions refer to; fewer on short chains.
@@ -133,7 +133,7 @@ struct ProxyGraph {
   bool reduced = false;
   std::vector<ProxyEdge> edges;
   std::vector<EliminatedNode> eliminated;  ///< Sorted by (chain, stamp).
-  /// Sorted by chain; of chains that are missing the server does not say how sure it is.
+  /// Sorted by chain; of chains that are missing the server sends no uncertainty.
   std::vector<ChainUncertainty> uncertainties;
   std::vector<LastSeen> last_seen;  ///< Sorted by chain, at most one per robot; the chain is in `components`.
   friend bool operator==(const ProxyGraph&, const ProxyGraph&) = default;
@@ -149,7 +149,7 @@ inline std::span<const ProxyNode> nodes_of(const ProxyGraph& graph, const ChainI
   return {first, last};
 }
 
-/// How sure the server is of this chain; null when it does not say.
+/// How sure the server is of this chain; null when it has not sent it.
 inline const ChainUncertainty* uncertainty_of(const ProxyGraph& graph, const ChainId& chain) {
   const auto found = std::ranges::find(graph.uncertainties, chain, &ChainUncertainty::chain);
   return found == graph.uncertainties.end() ? nullptr : &*found;

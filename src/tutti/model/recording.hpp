@@ -22,16 +22,16 @@ namespace tutti {
 class ScanSource {
  public:
   virtual ~ScanSource() = default;
-  /// The sweep that ends at moment number `sample` (moment() of Recording::scan_stamps); nothing when there is none.
+  /// The sweep that ends at stamp number `sample` (moment() of Recording::scan_stamps); nothing when there is none.
   [[nodiscard]] virtual Result<std::optional<Scan>> scan(std::size_t sample) const = 0;
 };
 
 /// The tracked images of a recording, from a file or from a tracker run over images. A source is stateful because of
-/// its tracks: one thread must ask for moments in increasing order.
+/// its tracks: one thread must ask for stamps in increasing order.
 class VisualSource {
  public:
   virtual ~VisualSource() = default;
-  /// The images taken at moment number `sample` (moment() of Recording::image_stamps), with their stamp; empty when
+  /// The images taken at stamp number `sample` (moment() of Recording::image_stamps), with their stamp; empty when
   /// there are none. Descriptors, which cost most, are computed only for a `keyframe`. After starting in the middle,
   /// tracks have other numbers than a run from the beginning would give them.
   [[nodiscard]] virtual TrackedImages images(std::size_t sample, bool keyframe) = 0;
@@ -61,7 +61,7 @@ struct Recording {
   std::shared_ptr<VisualSource> visual;     ///< Null when there is no camera.
   /// The images in which `visual` tracks points; null when it has other sources.
   std::shared_ptr<const ImageStream> images;
-  /// Moments of scans and of images, increasing; when empty, they are the stamps of odometry.
+  /// Stamps of scans and of images, increasing; when empty, they are the stamps of odometry.
   std::vector<Timestamp> scan_stamps, image_stamps;
   std::vector<ImuSample> imu;  ///< Increasing stamps; empty when there is no IMU.
   ImuNoise imu_noise;
@@ -69,7 +69,7 @@ struct Recording {
   std::vector<DriftOrigin> drift_origins;  ///< In time order; empty when unknown.
 };
 
-/// The stamp of moment number `i` of scans or images (`stamps` is Recording::scan_stamps or image_stamps); nothing
+/// Stamp number `i` of scans or images (`stamps` is Recording::scan_stamps or image_stamps); nothing
 /// after the last.
 inline std::optional<Timestamp> moment(const Recording& recording, const std::vector<Timestamp>& stamps,
                                        std::size_t i) {

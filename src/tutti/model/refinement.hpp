@@ -19,7 +19,7 @@ namespace tutti {
 struct RefinementJob {
   struct Part {
     SubmapId submap;
-    bool is_free = true;              ///< False: its keyframes keep their poses, and hold the others in place.
+    bool is_free = true;              ///< False: its keyframes keep their poses, and constrain the others.
     std::vector<Pose3> T_world_body;  ///< Per keyframe of the submap.
     friend bool operator==(const Part&, const Part&) = default;
   };

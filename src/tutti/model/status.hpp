@@ -33,10 +33,10 @@ struct Health {
 /// From a robot or worker to the server, every two seconds: a sign of life and the state. Fields that a role does not
 /// have are 0.
 struct NodeStatus {
-  std::string name;                   ///< 1 to 64 letters, digits, '_' and '-'.
-  std::uint64_t session = 0;          ///< A robot's session.
-  std::uint64_t start = 0;            ///< How often a robot has started on its store; tells two of its programs apart.
-  std::string version;                ///< Version of its program.
+  std::string name;           ///< 1 to 64 letters, digits, '_' and '-'.
+  std::uint64_t session = 0;  ///< A robot's session.
+  std::uint64_t start = 0;    ///< How often a robot has started on its store; distinguishes two of its programs.
+  std::string version;        ///< Version of its program.
   std::uint64_t backlog_submaps = 0;  ///< Submaps that the server is not known to have stored.
   std::uint64_t backlog_bytes = 0;
   std::uint64_t heard_epoch = 0;  ///< Epoch of the newest proxy graph that it heard.
@@ -128,10 +128,10 @@ struct MissionStatus {
     friend bool operator==(const Refusals&, const Refusals&) = default;
   };
 
-  /// The server's answer to an operator's ClosureWord: the word is stored, unless a later one replaces it.
+  /// The server's answer to an operator's ClosureDecision: the decision is stored, unless a later one replaces it.
   struct Decision {
     std::uint64_t content = 0;  ///< content_hash() of its frame.
-    std::string why;            ///< Why the word is not stored; empty: it is.
+    std::string why;            ///< Why the decision is not stored; empty: it is.
     template <class V>
     void describe(V& v) {
       v.field(1, "content", content, {.fixed = true});
@@ -161,8 +161,8 @@ struct MissionStatus {
   /// Pairs with closures of other verifiers, which stay in the map until the present verifier has answered.
   std::uint64_t former_pairs = 0;
   std::uint64_t waiting = 0;        ///< Pairs and refinements that no present worker can compute,
-  std::string why_waiting;          ///< and what the last worker that tried said.
-  std::vector<Decision> decisions;  ///< The latest words.
+  std::string why_waiting;          ///< and what the last worker that tried reported.
+  std::vector<Decision> decisions;  ///< The latest decisions.
   template <class V>
   void describe(V& v) {
     v.field(1, "time", time);

@@ -15,7 +15,7 @@
 
 namespace tutti {
 
-/// A keyframe: a moment of a robot's run that has a node in the server's map.
+/// A keyframe: a time of a robot's run that has a node in the server's map.
 struct Keyframe {
   std::uint32_t index = 0;  ///< KeyframeId::index
   Timestamp stamp;

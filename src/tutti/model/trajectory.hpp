@@ -8,7 +8,7 @@
 
 namespace tutti {
 
-/// A pose at a moment.
+/// A pose at a time.
 struct StampedPose {
   Timestamp stamp;
   Pose3 pose;  ///< T_frame_body; the owner of the trajectory names the frame.

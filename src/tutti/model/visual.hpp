@@ -94,7 +94,7 @@ std::vector<ImuSample> imu_over(const Samples& samples, Timestamp from, Timestam
   return first < last ? std::vector<ImuSample>(first, last) : std::vector<ImuSample>();
 }
 
-/// The images of all cameras at one moment.
+/// The images of all cameras at one time.
 struct TrackedImages {
   Timestamp stamp;
   std::shared_ptr<const std::vector<Camera>> cameras;  ///< Never null, and the same for all images of a robot.

@@ -20,7 +20,7 @@ Result<bus::Certificate> make_certificate(const bus::Certificate& authority, con
                                           int days);
 /// "2027-01-31 12:00:00 UTC", until when a certificate is valid.
 Result<std::string> valid_until(const std::string& certificate);
-/// Whose a certificate is, as make_certificate() was told, and until when it is valid. Who signed it is for the TLS
+/// Whose a certificate is, as given to make_certificate(), and until when it is valid. Who signed it is for the TLS
 /// connection to check.
 struct CertificateHolder {
   std::string name, until;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What members and strangers try that is not theirs to do, on a real bus: nothing of it arrives, each attempt is in
-// what the bus says, and those who belong go on.
+// what the bus reports, and those who belong go on.
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
@@ -32,7 +32,7 @@ using bus::MessageKind;
 using test::bytes;
 using test::within;
 
-/// One that connects, and says what it likes or nothing.
+/// One that connects, and sends what it likes or nothing.
 class Stranger {
  public:
   explicit Stranger(int port) : file_(socket(AF_INET, SOCK_STREAM, 0)) {
@@ -102,7 +102,7 @@ class Intruders : public test::PkiBus {
     EXPECT_TRUE(opened.has_value()) << opened.error().message;
     return opened ? *opened : nullptr;
   }
-  /// Publishes to these subjects, or subscribes to them, and expects the bus to refuse each, and to say who it was.
+  /// Publishes to these subjects, or subscribes to them, and expects the bus to refuse each, and to report who it was.
   void expect_refused(const bus::BusCredentials& who, const std::string& verb,
                       const std::vector<std::string>& subjects) {
     const auto connection = connect(who);
@@ -115,15 +115,15 @@ class Intruders : public test::PkiBus {
                             : connection->subscribe(subject).has_value());
     }
     connection->flush();
-    std::set<std::string> said;
+    std::set<std::string> reported;
     within(10.0, [&] {
       for (const bus::BusRefusal& refusal : rights_refused()) {
         EXPECT_EQ(refusal.key, who.key.open) << refusal.what;
-        said.insert(refusal.what);
+        reported.insert(refusal.what);
       }
-      return said.size() >= expected.size();
+      return reported.size() >= expected.size();
     });
-    EXPECT_EQ(said, expected);
+    EXPECT_EQ(reported, expected);
     EXPECT_NE(connection->denied(), "");
   }
   [[nodiscard]] int port() const { return std::atoi(child_->url().substr(child_->url().rfind(':') + 1).c_str()); }
@@ -188,7 +188,7 @@ TEST_F(Intruders, AViewerDoesNotDecideAndAnOperatorOnlyUnderOneName) {
   expect_all_is_well();
 }
 
-/// A robot that says once more what it has said, or under the id of another's: of one id the bus takes one.
+/// A robot that sends once more what it has sent, or under the id of another's: of one id the bus takes one.
 TEST_F(Intruders, WhatIsReplayedArrivesOnce) {
   const auto connection = connect(alpha_);
   const bus::Envelope submap{Endpoint::of(RobotId{3}), Endpoint::server(), MessageKind::submap, "3/1/1", bytes("own")};
@@ -199,14 +199,14 @@ TEST_F(Intruders, WhatIsReplayedArrivesOnce) {
   expect_all_is_well();
 }
 
-/// Whoever asks the bus says where it answers, and it does not check that subject against their rights. No answer to a
-/// member reaches the server's streams, and none is taken for a word of the server or another member.
-TEST_F(Intruders, WhatTheBusAnswersIsNobodysWord) {
-  const auto tell = [&](RobotId robot, MessageKind kind, const std::string& text) {
+/// Whoever asks the bus chooses where it answers, and it does not check that subject against their rights. No answer to
+/// a member reaches the server's streams, and none is taken for a message of the server or another member.
+TEST_F(Intruders, WhatTheBusAnswersIsNobodysMessage) {
+  const auto send_text = [&](RobotId robot, MessageKind kind, const std::string& text) {
     ASSERT_TRUE(hub_->send({Endpoint::server(), Endpoint::of(robot), kind, "", bytes(text)}));
   };
-  tell(RobotId{3}, MessageKind::proxy_graph, "of 3");
-  tell(RobotId{4}, MessageKind::proxy_graph, "of 4");
+  send_text(RobotId{3}, MessageKind::proxy_graph, "of 3");
+  send_text(RobotId{4}, MessageKind::proxy_graph, "of 4");
   ASSERT_EQ(heard(*robot_, 1).size(), 1U);  // it listens
   const auto connection = connect(alpha_);
   const std::string value = "$KV.GRAPH_cave.robot.3.", ask = "$JS.API.DIRECT.GET.KV_GRAPH_cave." + value;
@@ -218,9 +218,9 @@ TEST_F(Intruders, WhatTheBusAnswersIsNobodysWord) {
   EXPECT_TRUE(within(10.0, [&] { return robot_->state().last_error.find("another subject") != std::string::npos; }))
       << robot_->state().last_error;
   EXPECT_TRUE(robot_->receive().empty());
-  // That nothing is there is said with no bytes, which the bus's own subjects take for a request; that a submap is
-  // stored is said with its number, up to which they would remove what is stored.
-  tell(RobotId{4}, MessageKind::receipt, "receipt");
+  // That nothing is there is answered with no bytes, which the bus's own subjects take for a request; that a submap is
+  // stored is answered with its number, up to which they would remove what is stored.
+  send_text(RobotId{4}, MessageKind::receipt, "receipt");
   const bus::Envelope submap{Endpoint::of(RobotId{3}), Endpoint::server(), MessageKind::submap, "3/1/1", bytes("own")};
   std::size_t sent = 0;
   for (const auto* list : {&kOfTheServerAlone, &kOfOthers})
@@ -236,9 +236,9 @@ TEST_F(Intruders, WhatTheBusAnswersIsNobodysWord) {
   EXPECT_EQ(std::ranges::count(came, "own", [](const bus::Envelope& one) { return *one.bytes; }), sent - 1);
   EXPECT_EQ(heard(*robot_, 1).size(), 1U);
   expect_all_is_well();
-  std::set<std::string> said;
-  for (const bus::BusRefusal& refusal : rights_refused()) said.insert(refusal.what);
-  EXPECT_EQ(said, std::set<std::string>{"be answered at $JS.ACK.SUBMAPS_cave.server.1.1.1.1.0"});
+  std::set<std::string> reported;
+  for (const bus::BusRefusal& refusal : rights_refused()) reported.insert(refusal.what);
+  EXPECT_EQ(reported, std::set<std::string>{"be answered at $JS.ACK.SUBMAPS_cave.server.1.1.1.1.0"});
   const auto base = connect(credentials("server"));
   for (const char* stream : {"SUBMAPS_cave", "VERDICTS_cave", "JOBS_cave", "KV_GRAPH_cave"})
     EXPECT_TRUE(base->has_stream(stream).value()) << stream;
@@ -262,33 +262,33 @@ TEST_F(Intruders, WhoSpeaksSlowlyHoldsUpNobody) {
   EXPECT_EQ(robot_->state().reconnects, 0U);
 }
 
-/// 10 MB of garbage, and 500 who say nothing, before and after the bus's first line: it closes them all in time.
+/// 10 MB of garbage, and 500 who send nothing, before and after the bus's first line: it closes them all in time.
 TEST_F(Intruders, GarbageAndSilenceEndAtTheDoor) {
   std::vector<std::unique_ptr<Stranger>> silent;
   for (int i = 0; i < 500; ++i) silent.push_back(std::make_unique<Stranger>(port()));
   Rng random(1);
-  std::size_t said = 0, refused = 0;
-  while (said < 10U << 20U) {
+  std::size_t sent = 0, refused = 0;
+  while (sent < 10U << 20U) {
     const Stranger one(port());
     ASSERT_TRUE(one.connected());
     std::string text(256U << 10U, '\0');
     for (char& letter : text) letter = static_cast<char>(random.index(256));
     if (!one.say(text)) ++refused;
-    said += text.size();
+    sent += text.size();
   }
   expect_all_is_well();
   EXPECT_TRUE(within(30.0, [&] {
     std::erase_if(silent, [](const auto& one) { return one->is_closed(); });
     return silent.empty();
   })) << silent.size();
-  std::size_t told = 0;
+  std::size_t refused_so_far = 0;
   within(10.0, [&] {
     const auto refusals = child_->take_refusals();
     for (const bus::BusRefusal& refusal : refusals.all) EXPECT_EQ(refusal.key, "");
-    told += refusals.all.size() + refusals.more;
-    return told >= 540;
+    refused_so_far += refusals.all.size() + refusals.more;
+    return refused_so_far >= 540;
   });
-  EXPECT_GE(told, 540U) << "500 silent ones and 40 with garbage";
+  EXPECT_GE(refused_so_far, 540U) << "500 silent ones and 40 with garbage";
   EXPECT_EQ(robot_->state().reconnects, 0U);
   EXPECT_EQ(hub_->state().reconnects, 0U);
 }

@@ -31,12 +31,12 @@ constexpr std::string_view kLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZ234567";  // of
 /// Without padding.
 std::string base32(const std::vector<std::uint8_t>& bytes) {
   std::string out;
-  unsigned held = 0, bits = 0;
+  unsigned pending = 0, bits = 0;
   for (const std::uint8_t byte : bytes) {
-    held = (held << 8U) | byte;
-    for (bits += 8; bits >= 5; bits -= 5) out += kLetters[(held >> (bits - 5)) & 31U];
+    pending = (pending << 8U) | byte;
+    for (bits += 8; bits >= 5; bits -= 5) out += kLetters[(pending >> (bits - 5)) & 31U];
   }
-  if (bits > 0) out += kLetters[(held << (5 - bits)) & 31U];
+  if (bits > 0) out += kLetters[(pending << (5 - bits)) & 31U];
   return out;
 }
 
@@ -59,14 +59,14 @@ bus::NatsKey encode_nats_key(const Ed25519& open, const Ed25519& secret) {
 
 std::optional<Ed25519> decode_open_key(const std::string& text) {
   std::vector<std::uint8_t> bytes;
-  unsigned held = 0, bits = 0;
+  unsigned pending = 0, bits = 0;
   for (const char letter : text) {
     const std::size_t value = kLetters.find(letter);
     if (value == std::string_view::npos) return std::nullopt;
-    held = ((held << 5U) | static_cast<unsigned>(value)) & 0xFFFFU;
+    pending = ((pending << 5U) | static_cast<unsigned>(value)) & 0xFFFFU;
     if (bits += 5; bits < 8) continue;
     bits -= 8;
-    bytes.push_back(static_cast<std::uint8_t>((held >> bits) & 0xFFU));
+    bytes.push_back(static_cast<std::uint8_t>((pending >> bits) & 0xFFU));
   }
   Ed25519 open{};
   if (bytes.size() != 1 + open.size() + 2 || bytes.front() != kUser) return std::nullopt;

@@ -147,7 +147,7 @@ Status Pki::read() {
   return {};
 }
 
-/// Its file has all who are not revoked: whoever includes it cannot tell the time.
+/// Its file has all who are not revoked: whoever includes it does not know the time.
 Status Pki::write() const {
   std::string text = fmt::format("{}\n{}\n", kFirstLine, mission_);
   for (const Member& member : members_) text += line_of(member);

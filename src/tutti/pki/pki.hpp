@@ -29,7 +29,7 @@ struct Member {
 inline constexpr int kAuthorityDays = 3650;
 inline constexpr int kDays = 397;
 
-/// A folder that says who may use the bus of one mission: an authority and the bus's certificate, a credential for each
+/// A folder with who may use the bus of one mission: an authority and the bus's certificate, a credential for each
 /// member, and the configuration of nats-server with everyone's rights (bus/bus_rights.hpp). All files are this user's
 /// alone. Whatever changes it writes the configuration anew; a server that runs with the folder follows within two
 /// seconds (program::BusGuard). Processes change it one after the other.

@@ -63,8 +63,8 @@ TEST_F(PkiTest, EverybodyDoesWhatTheyAreFor) {
   EXPECT_EQ(heard(*robot, 1).size(), 1U);
   ASSERT_TRUE(hub->send({Endpoint::server(), Endpoint::all_viewers(), MessageKind::mission_status, "", bytes("all")}));
   EXPECT_EQ(heard(*desk, 1).size() + heard(*screen, 1).size(), 2U);
-  const auto look = bus::MissionLease::open(options(vera), std::nullopt).value();
-  EXPECT_NE(look->wait(10.0).server_of("cave"), nullptr) << look->state().last_error;
+  const auto lookup = bus::MissionLease::open(options(vera), std::nullopt).value();
+  EXPECT_NE(lookup->wait(10.0).server_of("cave"), nullptr) << lookup->state().last_error;
   for (const auto* port : {&hub, &robot, &helper, &own, &desk, &screen}) EXPECT_EQ((*port)->state().denied, "");
   const auto refusals = rights_refused();
   EXPECT_TRUE(refusals.empty()) << refusals.front().what;
@@ -101,7 +101,7 @@ TEST_F(PkiTest, WhoseCertificateExpiresWhileConnectedIsCutOff) {
   const std::string end = pki_->members()[1].until;
   tend(end);
   EXPECT_TRUE(late->state().connected);
-  tend(end + "x");  // a moment later
+  tend(end + "x");  // just after
   EXPECT_TRUE(within(10.0, [&] { return !late->state().connected; }));
   EXPECT_TRUE(within(10.0, [&] {
     return late->state().last_error.find("does not know the key of robot alpha") != std::string::npos;
@@ -180,7 +180,7 @@ TEST_F(PkiTest, WhoHasNoCertificateOfOursIsNotLetIn) {
   for (const bus::BusRefusal& refusal : refusals.all) EXPECT_EQ(refusal.key, "");
 }
 
-/// A bus without rights: who expects TLS is told so, not that something is not available.
+/// A bus without rights: who expects TLS learns so, not that something is not available.
 TEST_F(PkiTest, ABusWithoutTlsSaysSoToWhoExpectsIt) {
   const auto open_bus = bus::NatsChild::start(folder_ / "open", {.max_store_bytes = 256U << 20U, .min_free_bytes = 0});
   ASSERT_TRUE(open_bus.has_value()) << open_bus.error().message;

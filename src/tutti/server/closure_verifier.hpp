@@ -68,7 +68,8 @@ class ClosureVerifier {
     std::vector<Refusal> evidence;    ///< Every gate's value and limit, as far as they were measured.
   };
   /// The same question from somebody who may know better: with `T_first_second` (of the two submap frames) the
-  /// alignment nearest to it. Expensive, and no verdict: its closure is an operator's to keep (ClosureWord::by_hand).
+  /// alignment nearest to it. Expensive, and no verdict: its closure is an operator's to keep
+  /// (ClosureDecision::by_hand).
   [[nodiscard]] virtual Result<Look> look(const Submap& first, const Submap& second, const PayloadStore& payloads,
                                           const std::optional<Pose3>& /*T_first_second*/) const {
     auto verdict = verify(first, second, payloads);

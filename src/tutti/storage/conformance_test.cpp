@@ -152,7 +152,7 @@ TEST_P(Conformance, AScanEndsWhereTheVisitorSaysSo) {
     return key != "b";
   }));
   EXPECT_EQ(seen, "ab");
-  put({{"apples", "b", std::nullopt}});  // not in the way of what follows
+  put({{"apples", "b", std::nullopt}});  // does not block what follows
   EXPECT_EQ(rows("apples").size(), 2U);
 }
 
@@ -187,7 +187,7 @@ TEST_P(Conformance, AVisitorThatCallsTheStoreIsABugAndThatThrowsEndsTheScan) {
   EXPECT_EQ(rows("apples"), (std::vector<Row>{{"a", "2"}}));
 }
 
-/// Any history of commits and restarts leaves what a map of maps holds.
+/// Any history of commits and restarts leaves what a map of maps contains.
 TEST_P(Conformance, BehavesAsAMapOfMaps) {
   const auto property = [&] {
     place_.reset();

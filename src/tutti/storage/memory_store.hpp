@@ -10,7 +10,7 @@
 
 namespace tutti::storage {
 
-/// A store in memory: what it holds survives the node that writes to it, but not the process.
+/// A store in memory: its content survives the node that writes to it, but not the process.
 class MemoryStore final : public TableStore {
  public:
   using Rows = std::map<std::string, std::string, std::less<>>;
@@ -30,7 +30,7 @@ class MemoryStore final : public TableStore {
  private:
   [[nodiscard]] const Rows& rows_of(std::string_view table) const;
 
-  mutable std::recursive_mutex mutex_;  ///< Recursive, so that a visitor that calls the store is told.
+  mutable std::recursive_mutex mutex_;  ///< Recursive, so that a visitor that calls the store gets an error.
   mutable bool scanning_ = false;
   Tables tables_;
 };

@@ -56,7 +56,7 @@ int number_in(const TableStore& store) {
   return number;
 }
 
-TEST_F(SqliteCopy, IsWhatWasCommittedAtSomeMomentWhileOthersCommit) {
+TEST_F(SqliteCopy, IsWhatWasCommittedAtSomeTimeWhileOthersCommit) {
   const auto store = open(file_);
   std::atomic<int> committed = 0;
   for (int i = kFirst; i <= 0; ++i) ASSERT_TRUE(store->commit(numbered(i)));
@@ -95,15 +95,15 @@ TEST_F(SqliteCopy, OfAClosedStoreIsTheStore) {
 }
 
 TEST_F(SqliteCopy, WhatCannotBeCopiedIsSaid) {
-  const auto says = [&](const fs::path& from, const char* text) {
+  const auto expect_error = [&](const fs::path& from, const char* text) {
     const Status copied = copy_sqlite_store(from, copy_);
     ASSERT_FALSE(copied.has_value());
     EXPECT_NE(copied.error().message.find(text), std::string::npos) << copied.error().message;
   };
-  says(file_, "some.tutti: cannot be copied");
+  expect_error(file_, "some.tutti: cannot be copied");
   std::ofstream(file_) << "half";
   std::ofstream(file_.string() + "-journal") << "of its making";
-  says(file_, "is just being made");
+  expect_error(file_, "is just being made");
 }
 
 }  // namespace sqlite_copy_test

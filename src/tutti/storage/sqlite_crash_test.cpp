@@ -64,7 +64,7 @@ class Child {
   int end_ = -1;
 };
 
-void tell(int pipe, std::uint64_t number) {
+void send_number(int pipe, std::uint64_t number) {
   if (::write(pipe, &number, sizeof number) != sizeof number) _exit(1);
 }
 
@@ -96,7 +96,7 @@ std::uint64_t last_of(const TableStore& store) {
   return last ? std::stoull(*last) : 0;
 }
 
-/// Goes on for ever: each commit adds a row, deletes the one kKept before it, and says which is the last.
+/// Goes on for ever: each commit adds a row, deletes the one kKept before it, and reports which is the last.
 void write_rows(const fs::path& file, int pipe) {
   const auto store = open_sqlite_store(file, robot_schema(), {.min_free_bytes = 0});
   if (!store) _exit(2);
@@ -104,7 +104,7 @@ void write_rows(const fs::path& file, int pipe) {
     std::vector<Write> writes{{"outbox", key_of({number}), bytes_of(number)}, {"meta", "last", std::to_string(number)}};
     if (number > kKept) writes.push_back({"outbox", key_of({number - kKept}), std::nullopt});
     if (!(*store)->commit(writes)) _exit(3);
-    tell(pipe, number);
+    send_number(pipe, number);
   }
 }
 
@@ -122,7 +122,7 @@ void expect_whole(const TableStore& store) {
   EXPECT_EQ(expected, last + 1);
 }
 
-TEST_F(SqliteCrashTest, KilledAtAnyMomentItHasAllThatWasAcknowledged) {
+TEST_F(SqliteCrashTest, KilledAtAnyTimeItHasAllThatWasAcknowledged) {
   Rng rng(1);
   std::uint64_t acknowledged = 0;
   for (int round = 0; round < 30; ++round) {
@@ -150,10 +150,10 @@ TEST_F(SqliteCrashTest, KilledAtAnyMomentItHasAllThatWasAcknowledged) {
   RecordProperty("commits", static_cast<int>(acknowledged));
 }
 
-TEST_F(SqliteCrashTest, AnotherProcessIsToldUntilTheFirstIsGone) {
+TEST_F(SqliteCrashTest, AnotherProcessIsRefusedUntilTheFirstIsGone) {
   Child child([&](int pipe) {
     const auto store = open_sqlite_store(file(), robot_schema(), {.min_free_bytes = 0});
-    tell(pipe, store ? 1 : 0);
+    send_number(pipe, store ? 1 : 0);
     pause();
   });
   ASSERT_EQ(child.next(), 1U);
@@ -180,7 +180,7 @@ std::optional<std::uint64_t> on_a_small_disk(const fs::path& folder, const std::
     const bool made = unshare(CLONE_NEWUSER | CLONE_NEWNS) == 0 && write_line("/proc/self/setgroups", "deny") &&
                       write_line("/proc/self/uid_map", user) && write_line("/proc/self/gid_map", group) &&
                       mount("none", folder.c_str(), "tmpfs", 0, "size=1m") == 0;
-    if (made) tell(pipe, work());
+    if (made) send_number(pipe, work());
   });
   return child.next();
 }
@@ -225,7 +225,7 @@ TEST_F(SqliteCrashTest, ADiskThatIsFullRefusesTheCommitAndTheStoreGoesOn) {
     EXPECT_LT(*found, 1000U);
     by_the_disk += *found % 2;
   }
-  EXPECT_GT(by_the_disk, 0U);  // and not only by the look at the free space before
+  EXPECT_GT(by_the_disk, 0U);  // and not only by the check of the free space before
 }
 
 }  // namespace sqlite_crash_test

@@ -52,7 +52,7 @@ class DamagedStore::File {
    private:
     std::uint64_t bytes_, rows_;
   };
-  /// Which rows there are, by any way into the table.
+  /// Which rows there are, by any path into the table.
   struct Found {
     std::set<std::int64_t> rows;
     std::map<std::int64_t, std::string> keys;
@@ -68,7 +68,7 @@ class DamagedStore::File {
   [[nodiscard]] bool has_table(const std::string& table) const { return has(table, internal::sql_of_table(table)); }
   Status choose_schema(std::span<const Schema> schemas);
   Found find(const std::string& table);
-  /// The rows on one way, each given to `note`; the number of the last, if there is one.
+  /// The rows on one path, each given to `note`; the number of the last, if there is one.
   std::optional<std::int64_t> walk(const std::string& sql, const std::function<void(const Use&)>& note, Found& found);
 
   fs::path file_;
@@ -177,7 +177,7 @@ std::optional<std::int64_t> DamagedStore::File::walk(const std::string& sql,
   return last;
 }
 
-/// Forwards and backwards, by the table and by the index of its keys: what one way cannot reach behind a damaged page
+/// Forwards and backwards, by the table and by the index of its keys: what one path cannot reach behind a damaged page
 /// another may. Between the ends of the first two, every number may be a row's.
 DamagedStore::File::Found DamagedStore::File::find(const std::string& table) {
   Found found;

@@ -34,7 +34,7 @@ class DamagedStore {
   DamagedStore(DamagedStore&& other) noexcept;
   DamagedStore& operator=(DamagedStore&&) = delete;
 
-  /// The first schema when the file does not say its kind any more.
+  /// The first schema when the file does not have its kind any more.
   [[nodiscard]] const Schema& schema() const;
   /// Hands every row of these tables of the schema, one table after the other, whose bytes have their hash to `take`.
   /// Returns the lost rows, as far as anything still names them. The first error of `take` ends it and is returned.

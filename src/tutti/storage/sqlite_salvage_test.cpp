@@ -80,7 +80,7 @@ TEST_F(SqliteSalvage, OneDamagedRowIsNamedAndTheOthersAreThere) {
 }
 
 /// Every page, one at a time, as garbage: what is taken is right, and one page costs at most a table; the first and the
-/// second, which say what the tables are and what the store is, cost nothing.
+/// second, which describe the tables and the store, cost nothing.
 TEST_F(SqliteSalvage, APageOfGarbageCostsWhatWasOnIt) {
   Rng rng(2);
   std::size_t fewest = rows_.size();
@@ -113,7 +113,7 @@ TEST_F(SqliteSalvage, AFileThatWasCutShortGivesWhatIsBeforeTheCut) {
   }
 }
 
-/// Behind several damaged pages, too: no way through the table reaches what is between them.
+/// Behind several damaged pages, too: no path through the table reaches what is between them.
 TEST_F(SqliteSalvage, SeveralPagesCostWhatWasOnThem) {
   std::string damaged = whole_;
   const std::size_t pages = whole_.size() / kPageBytes;

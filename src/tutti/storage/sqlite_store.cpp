@@ -66,7 +66,7 @@ class SqliteStore final : public TableStore {
 
   std::filesystem::path file_;
   SqliteOptions options_;
-  mutable std::recursive_mutex mutex_;  ///< Recursive, so that a visitor that calls the store is told.
+  mutable std::recursive_mutex mutex_;  ///< Recursive, so that a visitor that calls the store gets an error.
   mutable bool scanning_ = false;
   Database database_;
   std::map<std::string, TableStatements, std::less<>> tables_;
@@ -74,7 +74,7 @@ class SqliteStore final : public TableStore {
 
 tl::unexpected<Error> SqliteStore::failure(int code, std::string_view doing) const {
   const std::string file = file_.string();
-  switch (code & 0xff) {  // the rest says more of the same
+  switch (code & 0xff) {  // the rest details the same
     case SQLITE_BUSY:
       return fail(ErrorCode::io, "{}: is open in another program", file);
     case SQLITE_NOTADB:

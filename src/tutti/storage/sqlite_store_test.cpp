@@ -50,7 +50,7 @@ class SqliteStoreTest : public ::testing::Test {
     EXPECT_TRUE(store.has_value()) << store.error().message;
     return std::move(*store);
   }
-  /// What opening says; "" when it works.
+  /// The error of opening; "" when it works.
   [[nodiscard]] std::string refusal(const Schema& schema = kSchema) const {
     const auto store = open_sqlite_store(file(), schema);
     return store ? "" : store.error().message;
@@ -184,7 +184,7 @@ TEST_F(SqliteStoreTest, AFlippedBitAnywhereIsAnErrorOrChangesNothing) {
   for (int i = 0; i < 240; ++i) {
     std::string flipped = whole;
     const std::uint64_t page = rng.index(whole.size() / kPageBytes) * kPageBytes;
-    const std::uint64_t within = rng.index(i % 2 == 0 ? 64 : kPageBytes);  // pages begin with what they hold where
+    const std::uint64_t within = rng.index(i % 2 == 0 ? 64 : kPageBytes);  // pages begin with what they contain where
     const std::uint64_t bit = 8 * (i % 10 == 0 ? rng.index(100) : page + within) + rng.index(8);
     flipped[bit / 8] = static_cast<char>(flipped[bit / 8] ^ (1 << (bit % 8)));
     ASSERT_TRUE(write_file(file(), flipped));

@@ -39,7 +39,7 @@ struct CloudCodec {
 /// Errors of coding a submap: ids, stamps, flags and counts are exact; poses 1e-5 m, 1e-6 rad; odometry covariance 1 %
 /// of the variance in every direction; keypoints 1/32 px; landmarks 0.5 mm per axis; the sigmas of both 0.6 %, at least
 /// 1e-6; the rest of the visual payload and the IMU's exact; fixes 0.1 mm, their antenna and covariance 7 digits; the
-/// cloud as CloudCodec says, an empty one comes back as null. Odometry that follows from the keyframe poses is not
+/// cloud as in CloudCodec, an empty one comes back as null. Odometry that follows from the keyframe poses is not
 /// carried but computed from them.
 std::string encode(const SubmapMessage& message, const CloudCodec& cloud = {});
 Result<SubmapMessage> decode_submap(std::string_view bytes);

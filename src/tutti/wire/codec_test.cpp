@@ -156,7 +156,7 @@ TEST(SubmapCodec, EmptyCloudComesBackAsNone) {
   EXPECT_EQ(decode_submap(encode(message))->submap.cloud, nullptr);
 }
 
-/// Never surer than what was said, and by at most one step of so many to an octave less sure.
+/// Never surer than what was stated, and by at most one step of so many to an octave less sure.
 bool rounded_up(double in, double out, int steps) {
   constexpr double kSlack = 1e-6;
   return out >= in * (1.0 - kSlack) && out <= in * std::exp2(1.0 / steps) * (1.0 + kSlack);
@@ -453,10 +453,10 @@ RC_GTEST_PROP(VerdictCodec, IsExact, ()) {
 
 RC_GTEST_PROP(DecisionCodec, IsExact, ()) {
   Rng rng = any_rng();
-  const ClosureDecision word = test::any_decision(rng);
-  const auto decoded = decode_decision(encode(word));
+  const ClosureDecision decision = test::any_decision(rng);
+  const auto decoded = decode_decision(encode(decision));
   RC_ASSERT(decoded.has_value());
-  RC_ASSERT(*decoded == word);
+  RC_ASSERT(*decoded == decision);
 }
 
 TEST(Codec, BytesOnTheRadio) {
@@ -499,10 +499,10 @@ TEST(Codec, BytesToOneRobotHardlyGrowWithTheFleet) {
   EXPECT_LT(own_of_16, own_of_2 + 14 * 40);  // 10 bytes of these are a random session's number, which is random
 }
 
-/// One corruption of a valid message and a word its complaint must contain.
+/// One corruption of a valid message and a term its complaint must contain.
 template <class Message>
 struct Corruption {
-  const char* word;
+  const char* expected;
   void (*corrupt)(Message&);
 };
 
@@ -513,9 +513,9 @@ void expect_refused(const Message& good, const std::vector<Corruption<Message>>&
     Message bad = good;
     corruption.corrupt(bad);
     const Status status = validate(bad);
-    ASSERT_FALSE(status.has_value()) << corruption.word;
-    EXPECT_NE(status.error().message.find(corruption.word), std::string::npos) << status.error().message;
-    EXPECT_THROW(encode(bad), std::logic_error) << corruption.word;
+    ASSERT_FALSE(status.has_value()) << corruption.expected;
+    EXPECT_NE(status.error().message.find(corruption.expected), std::string::npos) << status.error().message;
+    EXPECT_THROW(encode(bad), std::logic_error) << corruption.expected;
   }
 }
 

@@ -17,14 +17,14 @@
 #include "tutti/wire/field_values.hpp"
 
 /// A value as the protobuf message that its list of fields (base/fields.hpp) describes, and back. proto/ has the same
-/// messages for other languages; field_bytes_test holds the two equal.
+/// messages for other languages; field_bytes_test checks that the two are equal.
 ///
 /// proto3's types: bool bool, unsigned integers and enums uint32 or uint64 (fixed32, fixed64 with FieldRule::fixed),
 /// signed ones sint64, double double, text bytes, Timestamp sint64 (ns), RobotId uint32, Pose3 repeated double
 /// [x y z; quaternion x y z w], Matrix6d repeated double (its upper triangle by rows), lists of numbers packed. A list
 /// in columns is one message with a repeated field for each field of its elements, and NumberSets are a message each,
 /// of the session and the bounds of the set's intervals as differences. What has its default is left out, unless it is
-/// an optional or an element of a list, or FieldRule::always says otherwise.
+/// an optional or an element of a list, or FieldRule::always demands it.
 namespace tutti::wire {
 
 template <class T>
@@ -201,8 +201,8 @@ class FieldReader {
   Status status_;
 };
 
-/// Holds every field to its rule; numbers must be finite, poses and covariances valid. A struct's check() may ask for
-/// more, and its where() says which one is wrong.
+/// Checks every field against its rule; numbers must be finite, poses and covariances valid. A struct's check() may ask
+/// for more, and its where() names which one is wrong.
 class FieldChecker {
  public:
   template <class T>

@@ -215,7 +215,7 @@ TEST(FieldBytes, WhatIsCutOrNoMessageIsAnError) {
   }
   EXPECT_FALSE(read_fields<Outside>(std::string("\x00\x01", 2)));  // number 0
   EXPECT_FALSE(read_fields<Outside>("\x0b"));                      // a group
-  EXPECT_FALSE(read_fields<Outside>("\x2a\xff\xff\xff\xff\x0f"));  // 4 GB, they say
+  EXPECT_FALSE(read_fields<Outside>("\x2a\xff\xff\xff\xff\x0f"));  // 4 GB, it claims
 }
 
 TEST(FieldBytes, RulesAreHeldWithTheNameOfTheField) {

@@ -35,7 +35,7 @@ struct WireField {
 using WireFields = std::vector<WireField>;
 /// The fields of a message. Errors: no protobuf message, or more fields than any message of ours has.
 Result<WireFields> split_fields(std::string_view message);
-/// What a repeated field of doubles or varints holds, packed or one by one.
+/// What a repeated field of doubles or varints contains, packed or one by one.
 Result<std::vector<std::uint64_t>> repeated_numbers(const WireFields& fields, int number, bool are_doubles,
                                                     std::size_t at_most);
 
@@ -101,7 +101,7 @@ void set_value(T& value, std::uint64_t coded) {
   } else if constexpr (std::is_same_v<T, bool>) {
     value = coded != 0;
   } else if constexpr (std::is_enum_v<T>) {
-    using Number = std::underlying_type_t<T>;  // a number that it cannot hold is none of its values
+    using Number = std::underlying_type_t<T>;  // a number outside its range is none of its values
     value = static_cast<T>(coded <= Number(-1) ? static_cast<Number>(coded) : Number(-1));
   } else if constexpr (std::is_signed_v<T>) {
     value = static_cast<T>(from_zigzag(coded));

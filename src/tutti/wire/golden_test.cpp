@@ -32,7 +32,7 @@ std::string golden_bytes(MessageKind kind, unsigned version, const std::string& 
   return bytes.str();
 }
 
-/// Hands check(decoded, version) what every version that can be read holds; the others must be refused by name.
+/// Hands check(decoded, version) what every version that can be read contains; the others must be refused by name.
 template <class Decode, class Check>
 void for_every_version(MessageKind kind, const std::string& current, Decode decode, Check check) {
   const auto [oldest, newest] = versions(kind);
@@ -82,7 +82,7 @@ TEST(Golden, Submap) {
   for_every_version(
       MessageKind::submap, encode(message), decode_submap, [&](const SubmapMessage& decoded, unsigned version) {
         const Submap& submap = decoded.submap;
-        const std::uint64_t session = version < 5 ? 0 : 1234567890123;  // before, it said nothing of the chain
+        const std::uint64_t session = version < 5 ? 0 : 1234567890123;  // before, it had nothing on the chain
         EXPECT_EQ(decoded.header, (MessageHeader{RobotId{2}, session, 17}));
         EXPECT_EQ(submap.id, (SubmapId{{RobotId{2}, session}, 16}));
         ASSERT_EQ(submap.keyframes.size(), 2U);

@@ -235,11 +235,11 @@ TEST(Hostile, ARobotIsSeenSomewhere) {
   EXPECT_EQ(good->graph.last_seen[0].stamp.ns, 7);
   EXPECT_NEAR(good->graph.last_seen[0].T_world_body.translation.x(), 3000 * kProxyPoseSteps.translation_m, 1e-9);
   const auto far = static_cast<std::int64_t>(2.0 * kMaxCoordinate_m / kProxyPoseSteps.translation_m);
-  for (const auto& [x, word] :
+  for (const auto& [x, expected] :
        {std::pair(far, "coordinate"), std::pair(std::numeric_limits<std::int64_t>::max(), "out of range")}) {
     const auto error = decode(MessageKind::proxy_graph, seen_at(x));
     ASSERT_TRUE(error.has_value());
-    EXPECT_NE(error->message.find(word), std::string::npos) << error->message;
+    EXPECT_NE(error->message.find(expected), std::string::npos) << error->message;
   }
 }
 

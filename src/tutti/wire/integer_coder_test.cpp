@@ -71,7 +71,7 @@ TEST(IntegerCoder, TakesHardlyMoreThanTheEntropy) {
   }
 }
 
-TEST(IntegerCoder, LearnsWhatChangesOnTheWay) {
+TEST(IntegerCoder, LearnsWhatChangesMeanwhile) {
   Rng rng(3);
   std::vector<std::int64_t> values = draw(rng, 5000, 1.0);
   const std::size_t quiet = coded(values).size();

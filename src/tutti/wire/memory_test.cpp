@@ -59,7 +59,7 @@ std::string field(std::size_t number, const std::string& bytes) {
   return varint(number << 3U | 2U) + varint(bytes.size()) + bytes;
 }
 
-/// As often as a message may hold it.
+/// As often as a message may contain it.
 std::string filled(const std::string& field) {
   std::string out;
   out.reserve(kMaxMessageBytes);

@@ -20,7 +20,7 @@ enum class MessageKind : std::uint8_t {
   mission_status = 10,
   submap_request = 13,     ///< Which submaps a worker lacks.
   submap_copy = 14,        ///< A submap for a worker that lacks it.
-  decision = 15,           ///< What an operator says of a closure.
+  decision = 15,           ///< What an operator decides on a closure.
   proxy_graph_delta = 17,  ///< A proxy graph in terms of an earlier one.
   tracked_images = 18,     ///< What a robot's cameras saw, in its journal.
   refinement_job = 19,     ///< Submaps to be refined together.

@@ -15,7 +15,7 @@ Result<RefinementJob> decode_refinement_job(std::string_view bytes);
 std::string encode(const Refinement& refinement);
 Result<Refinement> decode_refinement(std::string_view bytes);
 
-/// A job's name is as codec.hpp says of jobs; its parts and pairs are sorted, its poses valid, and it has at most
+/// A job's name is as in codec.hpp; its parts and pairs are sorted, its poses valid, and it has at most
 /// kMaxRefinedSubmaps submaps with kMaxRefinedKeyframes keyframes.
 Status validate(const RefinementJob& job);
 /// As for the job; its steps are sorted, each from a keyframe that has a pose, with a valid covariance; numbers are

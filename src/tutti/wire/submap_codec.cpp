@@ -135,7 +135,7 @@ Status read_fixes(const v1::Fixes& in, Submap& submap) {
 template <class In>
 Result<SubmapMessage> read_trajectory_message(const In& in, std::uint16_t version) {
   SubmapMessage message;
-  // Up to version 4 the session said nothing of the chain: each robot had one.
+  // Up to version 4 the session had nothing on the chain: each robot had one.
   const ChainId chain{RobotId{in.header().robot()}, version < 5 ? 0 : in.header().session()};
   message.header = {chain.robot, chain.session, in.header().sequence()};
   message.submap.id = {chain, in.index()};
@@ -177,9 +177,9 @@ Result<SubmapMessage> decode_submap(std::string_view bytes) {
   const auto parsed = parse_frame<v1::Submap>(MessageKind::submap, bytes);
   if (!parsed) return tl::unexpected(parsed.error());
   const v1::Submap& in = parsed->message;
-  auto way = read_trajectory_message(in, parsed->version);
-  if (!way) return way;
-  SubmapMessage message = std::move(*way);
+  auto trajectory = read_trajectory_message(in, parsed->version);
+  if (!trajectory) return trajectory;
+  SubmapMessage message = std::move(*trajectory);
   const std::string where = "submap " + to_string(message.submap.id);
   if (in.has_cloud() && in.cloud().voxel_size() > 0) {
     auto cloud = decode_cloud(in.cloud());
@@ -199,10 +199,10 @@ Result<SubmapOutline> decode_outline(std::string_view bytes) {
   const auto parsed = parse_frame<v1::SubmapOutline>(MessageKind::submap, bytes);
   if (!parsed) return tl::unexpected(parsed.error());
   const v1::SubmapOutline& in = parsed->message;
-  auto way = read_trajectory_message(in, parsed->version);
-  if (!way) return tl::unexpected(way.error());
-  if (auto ok = validate(*way); !ok) return tl::unexpected(ok.error());
-  SubmapOutline outline{std::move(way->submap), {}};
+  auto trajectory = read_trajectory_message(in, parsed->version);
+  if (!trajectory) return tl::unexpected(trajectory.error());
+  if (auto ok = validate(*trajectory); !ok) return tl::unexpected(ok.error());
+  SubmapOutline outline{std::move(trajectory->submap), {}};
   v1::CloudOutline cloud;
   v1::VisualOutline visual;
   if (!cloud.ParseFromString(in.cloud()) || !visual.ParseFromString(in.visual()))

@@ -131,8 +131,8 @@ TEST(VisualCodec, WhatIsWrongIsRefusedByName) {
       {"covariance", [](V& v) { v.imu[1].covariance(2, 2) = kNan; }},
       {"covariance", [](V& v) { v.imu[1].covariance(1, 2) = v.imu[1].covariance(2, 1) = 1.0; }},
   };
-  for (const auto& [words, change] : wrong)
-    EXPECT_NE(refusal(change).find(words), std::string::npos) << words << ": " << refusal(change);
+  for (const auto& [expected, change] : wrong)
+    EXPECT_NE(refusal(change).find(expected), std::string::npos) << expected << ": " << refusal(change);
 }
 
 }  // namespace visual_codec_test

@@ -4,7 +4,7 @@
 namespace tutti::formats::internal {
 
 std::optional<std::string> lzf_decode(std::string_view bytes, std::size_t size) {
-  constexpr std::size_t kLongestLiteral = 32;  // a control byte below it: one literal more than it says
+  constexpr std::size_t kLongestLiteral = 32;  // a control byte below it: one literal more than it states
   constexpr std::size_t kLongestShort = 7;     // a length in the upper three bits of the control byte
   constexpr std::size_t kBestRatio = 88;       // three bytes stand for at most 264
   if (size / kBestRatio > bytes.size()) return std::nullopt;

@@ -27,7 +27,7 @@ struct NumberField {
 
 struct RecordLayout {
   std::array<NumberField, 3> xyz;
-  NumberField time;            ///< When a point was measured, if the file says so;
+  NumberField time;            ///< When a point was measured, if the file has it;
   std::string_view time_name;  ///< and what it calls that.
   std::size_t stride = 0;      ///< Bytes a record.
   std::size_t columns = 0;     ///< Columns a record.

@@ -39,7 +39,7 @@ class YamlValues {
   Status status_;
 };
 
-/// What other programs say of a camera.
+/// What other programs state of a camera.
 struct ForeignCamera {
   std::string model, distortion_model;
   std::vector<double> size_px;       ///< Width, height.

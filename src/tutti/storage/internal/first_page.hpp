@@ -8,9 +8,9 @@
 /// What SQLite wants of a file before it reads anything else of it.
 namespace tutti::storage::internal {
 
-/// Takes what the file's header says of its size away, so that SQLite looks at the file, and makes the file longer by
-/// what may have been cut off, as zeros that take no disk: SQLite reads nothing of a file that is shorter than it says,
-/// or whose tables begin behind its end. The file is changed.
+/// Takes the size in the file's header away, so that SQLite reads the file's own, and makes the file longer by
+/// what may have been cut off, as zeros that take no disk: SQLite reads nothing of a file that is shorter than its
+/// header states, or whose tables begin behind its end. The file is changed.
 Status forget_size(const std::filesystem::path& file);
 
 /// Replaces the file's first page by that of an empty store: SQLite puts a new store's tables to the same pages always.

@@ -22,7 +22,7 @@ struct Close {
 using Database = std::unique_ptr<sqlite3, Close>;
 using Statement = std::unique_ptr<sqlite3_stmt, Close>;
 
-/// One use of a prepared statement: lets go of what is bound and locked when it ends.
+/// One use of a prepared statement: releases what is bound and locked when it ends.
 class Use {
  public:
   explicit Use(const Statement& statement) : statement_(statement.get()) {}

@@ -46,7 +46,7 @@ Result<robot::AgentState> decode_state_rows(const StateRows& rows);
 /// What is stored of an agent after its state was read by decode_state_rows().
 StoredState stored_state(const robot::AgentState& state);
 
-/// Images of a moment for the journal, exact. Decoding checks that the bytes are complete, not what they mean:
+/// Images of one time for the journal, exact. Decoding checks that the bytes are complete, not what they mean:
 /// check_images() does.
 std::string encode(const TrackedImages& images);
 Result<TrackedImages> decode_tracked_images(std::string_view bytes);

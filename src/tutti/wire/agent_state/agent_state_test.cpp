@@ -48,9 +48,9 @@ struct Mission {
   [[nodiscard]] RobotAgent start() const { return {kRobot, 7, config}; }
   [[nodiscard]] RobotAgent go_on(robot::AgentState state) const { return {kRobot, config, std::move(state)}; }
 
-  /// What the robot says meanwhile.
+  /// What the robot sends meanwhile.
   std::string live(RobotAgent& agent, std::size_t from, std::size_t to) const {
-    std::string said;
+    std::string sent;
     for (std::size_t i = from; i < to; ++i) {
       Rng rng = Rng(seed).fork(i);
       EXPECT_TRUE(agent.add_odometry(odometry[i].stamp, odometry[i].pose, robot::test::kStepCovariance).has_value());
@@ -70,12 +70,12 @@ struct Mission {
         ProxyGraphMessage message = robot::test::broadcast(agent, i, robot::test::kWorld);
         for (ProxyNode& node : message.graph.nodes) node.T_world_body.translation.x() += 0.05 * rng.normal();
         const auto summary = agent.receive(message);
-        said += std::to_string(summary.constraints) + ' ';
+        sent += std::to_string(summary.constraints) + ' ';
       }
       if (rng.bernoulli(0.1))
-        for (const SubmapMessage& submap : agent.take_outgoing()) said += encode(submap);
+        for (const SubmapMessage& submap : agent.take_outgoing()) sent += encode(submap);
     }
-    return said;
+    return sent;
   }
 };
 

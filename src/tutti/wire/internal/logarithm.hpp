@@ -12,7 +12,7 @@ namespace tutti::wire {
 inline constexpr double kSmallestLogged = 1e-9;  ///< Smaller ones, but for 0, become this; larger ones than
 inline constexpr double kLargestLogged = 1e9;    ///< this, this.
 
-/// 0 is 0; others, finite and not negative, are rounded up: what is unsure must not become surer on the way.
+/// 0 is 0; others, finite and not negative, are rounded up: what is unsure must not become surer in transit.
 inline std::int64_t quantise_log(double value, int steps) {
   if (value <= 0.0) return 0;
   const double bounded = std::clamp(value, kSmallestLogged, kLargestLogged);

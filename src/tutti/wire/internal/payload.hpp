@@ -14,7 +14,7 @@
 namespace tutti::wire {
 
 /// An error when the payload has more elements than limits.hpp accepts, of those that take more memory parsed than
-/// they have bytes. Looks at tags and lengths and takes no memory.
+/// they have bytes. Reads tags and lengths and takes no memory.
 Status check_counts(MessageKind kind, std::string_view payload);
 
 /// What is encoded is ours, and whole.

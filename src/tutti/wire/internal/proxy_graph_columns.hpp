@@ -15,8 +15,9 @@
 #include "tutti/wire/internal/quantise.hpp"
 #include "tutti/wire/limits.hpp"
 
-/// How the numbers of a proxy graph are predicted and coded. One routine serves both ways, so that they cannot differ:
-/// it hands each number to code(model, number), which writes and returns it, or ignores it and returns the one read.
+/// How the numbers of a proxy graph are predicted and coded. One routine serves both directions, so that they cannot
+/// differ: it hands each number to code(model, number), which writes and returns it, or ignores it and returns the one
+/// read.
 namespace tutti::wire {
 
 /// The stamps of one chain are multiples of a step after an offset: sensors are regular. Differences wrap around.
@@ -97,8 +98,8 @@ class KnownNodes {
   bool follows_ = true;  // the last one asked for is the one before `next_`
 };
 
-/// Nodes of one chain along its way. A pose is coded as the motion since the node before *as the receiver knows it*, so
-/// errors do not add up; by its difference to what is known of it, if anything is.
+/// Nodes of one chain along its trajectory. A pose is coded as the motion since the node before *as the receiver knows
+/// it*, so errors do not add up; by its difference to what is known of it, if anything is.
 class NodeColumns {
  public:
   void start_run(std::span<const ProxyNode> known = {}) {

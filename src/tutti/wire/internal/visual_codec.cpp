@@ -218,7 +218,7 @@ Status decode_body(const v1::Visual& in, std::uint32_t first_keyframe, VisualPay
 
 // --- cameras, descriptors, IMU: exact ---
 
-/// One way through a camera's numbers for both directions.
+/// One pass through a camera's numbers for both directions.
 template <class Number>
 void for_each_number(Camera& camera, Number number) {
   for (double* x : {&camera.model.fx, &camera.model.fy, &camera.model.cx, &camera.model.cy}) number(*x);

@@ -33,7 +33,7 @@ class Writer {
   v1::AgentState& out_;
 };
 
-/// Gives zeros where there is nothing more; is_complete() tells at the end.
+/// Gives zeros where there is nothing more; is_complete() shows it at the end.
 class Reader {
  public:
   /// `version`: of the frame. States of before kComplete may end early, at places where has_more() asks.
@@ -71,7 +71,7 @@ class Reader {
   bool short_ = false;
 };
 
-/// One way through a state for writing and reading: `pass(archive, value)` writes the value or fills it.
+/// One pass through a state for writing and reading: `pass(archive, value)` writes the value or fills it.
 
 template <class A, class Int>
 requires std::is_integral_v<Int> || std::is_enum_v<Int>
@@ -160,7 +160,7 @@ void pass(A& a, std::optional<T>& optional) {
   pass(a, value);
   optional = is_there ? std::optional(std::move(value)) : std::nullopt;
 }
-/// Writes the same for nothing and for an empty value: nobody tells them apart.
+/// Writes the same for nothing and for an empty value: nobody distinguishes them.
 template <class A, class T>
 void pass(A& a, std::shared_ptr<const T>& shared) {
   T value;
