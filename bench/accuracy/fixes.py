@@ -95,7 +95,7 @@ def main():
         text.append("")
     text += ["A dash: not joined, because the place of one or both was not certain, as the report says. *only* does not bend, so odometry",
              "that has drifted by 10 m has not the shape of its fixes. The 80 minutes were run without loops alone, but for those that pass",
-             "a place again to the millimetre. An antenna that is not told of costs its length where fixes are of 5 cm.", "",
+             "a place again to the millimetre. An antenna that is not known costs its length where fixes are of 5 cm.", "",
              "Two wrong closures that agree joined the two 134.6 m off with seed 4 (mode `off`, with loops, errors of 1.5 m); `factors` takes them back: 0.57 m.",
              "`tutti demo`, which has no fixes: `report.json` is the same, byte for byte, as before there were any.",
              "Fed live (`tutti mission up missions/apart_fixes.yaml`, four minutes each) the map, its origin and which fixes count are those of `tutti run`, and the submaps the same bytes."]

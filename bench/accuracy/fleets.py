@@ -53,14 +53,14 @@ class Graph:
         """Submaps as robots end them: a keyframe that two share counts for the earlier one."""
         for robot in {name[0] for name in self.stamp}:
             names = sorted((name for name in self.stamp if name[0] == robot), key=lambda name: int(name[1:]))
-            number, since_s, way_m, open_ = 0, self.stamp[names[0]], 0.0, []
+            number, since_s, distance_m, open_ = 0, self.stamp[names[0]], 0.0, []
             for name in names:
-                way_m += step.get(name, 0.0)
+                distance_m += step.get(name, 0.0)
                 open_.append(name)
-                if self.stamp[name] - since_s >= SUBMAP_S or way_m >= SUBMAP_M or name == names[-1]:
+                if self.stamp[name] - since_s >= SUBMAP_S or distance_m >= SUBMAP_M or name == names[-1]:
                     for one in open_:
                         self.submap[one], self.ends[one] = (robot, number), self.stamp[name]
-                    number, since_s, way_m, open_ = number + 1, self.stamp[name], 0.0, []
+                    number, since_s, distance_m, open_ = number + 1, self.stamp[name], 0.0, []
 
     def joins_submaps(self, closure):
         return self.submap[closure[0]] != self.submap[closure[1]]
@@ -114,7 +114,7 @@ def seconds(values):
 
 def robots_table(reports):
     policies = list(next(iter(reports.values()))["robots"][0]["policies"])
-    lines = [row("fleet", "robot", "way", "odometry", "map", "perfect judge", *(f"{p}" for p in policies), "kB up", "kB down"),
+    lines = [row("fleet", "robot", "distance", "odometry", "map", "perfect judge", *(f"{p}" for p in policies), "kB up", "kB down"),
              row(*["---"] * (8 + len(policies)))]
     for fleet, report in reports.items():
         for robot in report["robots"]:
@@ -136,10 +136,10 @@ def closures_of(graph, accepted):
 
 
 def worst(report, key):
-    moments = [robot[key] for robot in report["robots"] if robot[key]]
-    if not moments:
+    instants = [robot[key] for robot in report["robots"] if robot[key]]
+    if not instants:
         return "-"
-    at = max(moments, key=lambda moment: moment["rmse_m"] - moment["onboard_rmse_m"])
+    at = max(instants, key=lambda at: at["rmse_m"] - at["onboard_rmse_m"])
     return f"{at['rmse_m']:.2f} for {at['onboard_rmse_m']:.2f} at {at['time_s']:.0f} s"
 
 
@@ -216,7 +216,7 @@ def main():
         " ".join(f"--set {setting}" for setting in [compare(*COMPETITORS), *LIMITS]) + "`.",
         "Odometry as it came, every pose a keyframe; closures when a server got them over that radio (`wifi`, `proradio`), between",
         "robots up to 13 minutes late; the truth as reference. RMSE in metres after one rigid alignment (SE(3), no scale) at",
-        "keyframes, each robot alone; `perfect judge`: the map of a judge who is told by the truth which closures are wrong; in",
+        "keyframes, each robot alone; `perfect judge`: the map of a judge who knows by the truth which closures are wrong; in",
         "brackets the constraints that a robot holds at the end. Robots follow the first policy; `every_node` is the paper's",
         "baseline.", *(["", "One of the four fleets only (`--quick`)."] if arguments.quick else []), "",
         *robots_table(reports), "",

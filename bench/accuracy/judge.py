@@ -61,7 +61,7 @@ def main():
             "tunnel: 60 m, 2 m/s; street: 120 m, 12 m/s), closures from the truth with noise. Every place with odometry that is honest,",
             "three times too sure and three times too unsure of itself, holds or fails once (over up to 20 s, by as far as the robot",
             "gets in a second or so and 5 to 25 degrees), and with no wrong closures, 10 % and a group at two segments that look",
-            "alike (18 or 32 s), or 30 %. RMSE of the whole map over that of a judge who is told which closures are wrong.", "",
+            "alike (18 or 32 s), or 30 %. RMSE of the whole map over that of a judge who knows which closures are wrong.", "",
             row("maps", "how many", "median", "p90", "worst", "wrong accepted", "right kept", "failures made up"),
             row(*["---"] * 8), line("all", everything)]
     text += [line(place, of) for place, of in maps.items()]

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """How good the map itself is: the server's error over that of a perfect judge (docs/report.md, perfect_rmse_m), at the end and
-at the worst moment, on missions whose wrong closures are known. Writes docs/results/map.md.
+at the worst instant, on missions whose wrong closures are known. Writes docs/results/map.md.
 
 Usage: bench/accuracy/map.py TUTTI_PROGRAM --shared FOLDER [--before OTHER_TUTTI] [--jobs 2] [--out FOLDER]
 FOLDER holds data/ (docs/data.md) and cases/. With --before every run is made by the other program, too. Runs that are
@@ -104,23 +104,23 @@ def main():
 
     def worst(key):
         def of_report(report):
-            moments = [robot[key] for robot in report["robots"] if robot[key]]
-            return [m["rmse_m"] - m["onboard_rmse_m"] for m in moments]
+            instants = [robot[key] for robot in report["robots"] if robot[key]]
+            return [m["rmse_m"] - m["onboard_rmse_m"] for m in instants]
         return of_report
 
     text = ["# How good the map is", "",
             "Written by `bench/accuracy/map.py TUTTI --shared FOLDER" + (" --before OTHER" if arguments.before else "") + "`.",
-            "Trajectories only, closures from the truth with noise, one in ten wrong unless said (`*`: instead of LiDAR's). Odometry",
+            "Trajectories only, closures from the truth with noise, one in ten wrong unless stated (`*`: instead of LiDAR's). Odometry",
             "of EuRoC and KITTI is real and replayed, the rest simulated. RMSE of each robot's part of the server's map, m,",
-            "aligned alone, median of the seeds; *perfect*: of the map of a judge who is told by the reference which closures are",
+            "aligned alone, median of the seeds; *perfect*: of the map of a judge who knows by the reference which closures are",
             "wrong (docs/report.md). Over perfect: all robots and seeds at the end. Changes of mind: updates in which the map differed",
             "from the one a robot followed by more than three of its own standard deviations, in brackets those that the next map took",
             "back: robots never followed them. Maps: at the end. CPU: the server's without verification, median of the seeds. Worst",
-            "moment: by how many metres the map, and the robot corrected by it, were worse than raw odometry at most while the mission",
+            "instant: by how many metres the map, and the robot corrected by it, were worse than raw odometry at most while the mission",
             "ran (below 0: never).", "",
             row("mission", "seeds", *(f"{label}: accepted (wrong)" for label, _ in programs),
                 "odometry", *(label for label, _ in programs), "perfect", "over perfect",
-                "changes of mind (gone)", "maps", "CPU s", "worst moment: map", "corrected"),
+                "changes of mind (gone)", "maps", "CPU s", "worst instant: map", "corrected"),
             row(*["---"] * (11 + 2 * (len(programs) - 1) + 1))]
     everything = {label: [] for label, _ in programs}
     for name in CASES:

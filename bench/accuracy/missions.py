@@ -52,7 +52,7 @@ def main():
         f"Seed {arguments.seed}; written by `bench/accuracy/missions.py TUTTI --data FOLDER`. RMSE in metres after one",
         "rigid alignment (SE(3), no scale) at keyframes, in brackets the constraints held at the end; * is the policy the",
         "robot follows. Where there is no reference, the figure is the RMSE to the server; a dash stands where the reference",
-        "covers less than 95 % of the trajectory. Which part of the input is real is said in each line. `uniform` and `random` have the budget of `spectral`. `tunnel` and `terrace` are in",
+        "covers less than 95 % of the trajectory. Which part of the input is real is stated in each line. `uniform` and `random` have the budget of `spectral`. `tunnel` and `terrace` are in",
         f"`paper.md`. Every run: `--set {compare(*COMPETITORS)}`.", "",
     ]
     options = ["--seed", arguments.seed, "--set", compare(*COMPETITORS)]

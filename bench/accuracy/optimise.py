@@ -100,7 +100,7 @@ def main():
             "neighbours that agree, and in every second graph at two segments of 60 s that look alike, where all closures agree.",
             "ATE: RMSE of all robots' positions after one alignment. GNC with Geman-McClure (Yang et al. 2020) has the same solver,",
             "threshold (chi-square, 0.99) and reduction to the closures' ends as ours, and begins at odometry from where every robot",
-            "truly started, which ours is not told. Precision: of the accepted closures, those that are right; Geman-McClure has",
+            "truly started, which ours does not know. Precision: of the accepted closures, those that are right; Geman-McClure has",
             "accepted what ends below the threshold. Seconds of one core, while the other one was at work.", ""]
     text += ["## All", ""] + table(runs)
     for odometry, name in ODOMETRY.items():
