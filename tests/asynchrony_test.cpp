@@ -69,7 +69,7 @@ server::MapEstimate map_in_order(const SmallMission& mission) {
   return final_map(server);
 }
 
-/// Shuffled submaps, a fifth of them twice, verdicts held back and shuffled, an optimisation now and then.
+/// Shuffled submaps, a fifth of them twice, verdicts delayed and shuffled, an optimisation now and then.
 server::MapEstimate map_in_disorder(const SmallMission& mission, Rng rng) {
   const auto shuffle = [&rng](auto& list) {
     for (std::size_t i = list.size(); i > 1; --i) std::swap(list[i - 1], list[rng.index(i)]);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Kill -9 in process: server, robots and workers of a small mission are dropped at random moments, also between the
+// Kill -9 in process: server, robots and workers of a small mission are dropped at random instants, also between the
 // parts of a step (commit, send, tell, acknowledge), and made again from the bytes of their stores; what was not
 // acknowledged comes again. The map is the undisturbed one, bit for bit, and so are the robots' corrected trajectories.
 #include <gtest/gtest.h>
@@ -62,7 +62,7 @@ World make_world() {
   return out;
 }
 
-/// The front end of each robot begins anew at its origin half way.
+/// The front end of each robot begins anew at its origin at half of the mission.
 World begun_anew(World world) {
   for (auto& recording : world.recordings) {
     Trajectory& odometry = recording.recording.odometry;
@@ -77,16 +77,16 @@ World begun_anew(World world) {
 enum class Part { commit, send, half_sent, tell, acknowledge, end };
 constexpr std::size_t kParts = 6;
 /// Which node, at which input.
-using Moment = std::tuple<Role, std::string, Part>;
+using Instant = std::tuple<Role, std::string, Part>;
 
-/// Which of the moments of each kind end a node.
+/// Which of the instants of each kind end a node.
 struct Killer {
-  std::map<Moment, std::set<std::size_t>> plan;
-  std::map<Moment, std::size_t> seen;
-  std::map<Moment, std::size_t> killed;
-  bool strikes(Moment moment) {
-    const bool now = plan[moment].contains(seen[moment]++);
-    if (now) ++killed[moment];
+  std::map<Instant, std::set<std::size_t>> plan;
+  std::map<Instant, std::size_t> seen;
+  std::map<Instant, std::size_t> killed;
+  bool strikes(Instant instant) {
+    const bool now = plan[instant].contains(seen[instant]++);
+    if (now) ++killed[instant];
     return now;
   }
 };
@@ -104,7 +104,7 @@ struct Program {
 class Mission {
  public:
   /// `refiner`: null for a map that is its pose graph's. `change_of_mind`: the server's setting. What waits is sent at
-  /// once by a server that starts again: with "wait" robots hear other maps on their way than without a kill.
+  /// once by a server that starts again: with "wait" robots get other maps meanwhile than without a kill.
   Mission(const World& world, const bus::LinkConfig& link, Killer& killer,
           std::shared_ptr<const server::MapRefiner> refiner = nullptr, std::string change_of_mind = "follow")
       : world_(world),
@@ -164,7 +164,7 @@ class Mission {
   [[nodiscard]] const server::MapServer& server() const { return server_.node->map_server(); }
   [[nodiscard]] const robot::RobotAgent& agent(std::size_t r) const { return robots_[r].node->agent(); }
   [[nodiscard]] std::size_t robots() const { return robots_.size(); }
-  [[nodiscard]] int jumps() const { return jumps_; }  ///< Odometry's, as they were told.
+  [[nodiscard]] int jumps() const { return jumps_; }  ///< Odometry's, as they were reported.
   [[nodiscard]] const std::vector<std::string>& refusals() const { return refusals_; }
   /// Nothing is kept back anywhere.
   void expect_settled() const {
@@ -249,7 +249,7 @@ class Mission {
     return true;
   }
 
-  /// Everything that is there to be received at this moment, and what that makes others send.
+  /// Everything that is there to be received at this instant, and what that makes others send.
   void pump() {
     for (bool moved = true; moved;) {
       network_.advance(now_);
@@ -360,16 +360,16 @@ void expect_same_map(const server::MapServer& a, const server::MapServer& b) {
 
 class Kill : public testing::Test {
  protected:
-  /// Some moments of every kind, among as many as an undisturbed mission has.
+  /// Some instants of every kind, among as many as an undisturbed mission has.
   static Killer planned(const Killer& undisturbed, Rng rng, std::size_t of_each) {
     Killer killer;
-    for (const auto& [moment, count] : undisturbed.seen)
-      for (std::size_t i = 0; i < of_each; ++i) killer.plan[moment].insert(rng.index(count));
+    for (const auto& [instant, count] : undisturbed.seen)
+      for (std::size_t i = 0; i < of_each; ++i) killer.plan[instant].insert(rng.index(count));
     return killer;
   }
   static std::size_t count(const Killer& killer) {
     std::size_t all = 0;
-    for (const auto& [moment, kills] : killer.killed) all += kills;
+    for (const auto& [instant, kills] : killer.killed) all += kills;
     return all;
   }
 
@@ -389,7 +389,7 @@ TEST_F(Kill, TwoHundredKillsLeaveTheSameMapAndTheSameTrajectories) {
   ASSERT_FALSE(undisturbed.server().state().refinements.all().empty());
   ASSERT_GE(nobody.seen.size(), 11 * (kParts - 1));  // kinds of inputs, of all nodes
 
-  std::map<Moment, std::size_t> killed;
+  std::map<Instant, std::size_t> killed;
   std::size_t kills = 0;
   for (std::uint64_t seed = 0; seed < tutti::seeds(4U); ++seed) {
     Killer killer = planned(nobody, Rng(seed), 1);
@@ -404,7 +404,7 @@ TEST_F(Kill, TwoHundredKillsLeaveTheSameMapAndTheSameTrajectories) {
       EXPECT_EQ(mission.agent(r).ledger(), undisturbed.agent(r).ledger());
       EXPECT_EQ(mission.agent(r).T_map_body(), undisturbed.agent(r).T_map_body());
     }
-    for (const auto& [moment, n] : killer.killed) killed[moment] += n;
+    for (const auto& [instant, n] : killer.killed) killed[instant] += n;
     kills += count(killer);
   }
   RecordProperty("kills", static_cast<int>(kills));
@@ -412,7 +412,7 @@ TEST_F(Kill, TwoHundredKillsLeaveTheSameMapAndTheSameTrajectories) {
   EXPECT_EQ(killed.size(), nobody.seen.size());  // every node, at every input, before every part of a step
 }
 
-// On the way robots hear other maps than without kills: they end in the same place, by another history.
+// Meanwhile robots get other maps than without kills: they end in the same place, by another history.
 TEST_F(Kill, WhereMapsWaitTrajectoriesEndTheSame) {
   TUTTI_SAME_CODE();
   const bus::LinkConfig at_once{.latency_s = 0.0};
@@ -434,8 +434,8 @@ TEST_F(Kill, WhereMapsWaitTrajectoriesEndTheSame) {
   }
 }
 
-// A jump of the front end is told, the joint map is as good as without (closures decide where the robots are), and so
-// are the robots' own; whoever is killed meanwhile.
+// A jump of the front end is reported, the joint map is as good as without (closures decide where the robots are), and
+// so are the robots' own; whoever is killed meanwhile.
 TEST_F(Kill, FrontEndsThatBeginAnewCostNoMap) {
   const World anew = begun_anew(world_);
   const bus::LinkConfig at_once{.latency_s = 0.0};
@@ -469,7 +469,7 @@ TEST_F(Kill, FrontEndsThatBeginAnewCostNoMap) {
     mission.run();
     mission.expect_settled();
     EXPECT_GT(count(killer), 20U);
-    EXPECT_GE(mission.jumps(), 1);  // one that is killed before it has told a step never does
+    EXPECT_GE(mission.jumps(), 1);  // one that is killed before it has reported a step never does
     expect_same_map(undisturbed.server(), mission.server());
     for (std::size_t r = 0; r < mission.robots(); ++r) {
       EXPECT_EQ(mission.agent(r).corrected(), undisturbed.agent(r).corrected()) << "robot " << r << ", seed " << seed;

@@ -22,9 +22,9 @@ MissionRecord run(const Result<lab::MissionConfig>& config, const std::string& d
 
 double closures(const MissionRecord& record) { return static_cast<double>(record.server.closures.size()); }
 
-bool has_trouble(const MissionRecord& record, const std::string& words) {
+bool has_trouble(const MissionRecord& record, const std::string& expected) {
   return std::ranges::any_of(record.notes,
-                             [&](const std::string& note) { return note.find(words) != std::string::npos; });
+                             [&](const std::string& note) { return note.find(expected) != std::string::npos; });
 }
 
 TEST(Rates, OfOdometryDoNotChangeTheMapOfHku) {

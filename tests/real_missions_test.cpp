@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The missions on real recordings, with the figures they have to hold. Skipped without ../shared.
+// The missions on real recordings, with the figures they have to keep. Skipped without ../shared.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -104,8 +104,8 @@ TEST(RealMissions, HkuDegradedIsRepaired) {
   for (const RobotRecord& robot : record.robots) {
     EXPECT_GT(*robot.onboard.rmse_m, 0.4);
     EXPECT_LT(*corrected(record, robot).accuracy.rmse_m, 1.1 * *robot.server.rmse_m + 0.01);
-    // Its drift goes one way all along, which bends submaps by more than closures allow for: 0.0035 m instead of
-    // 0.0032.
+    // Its drift goes in one direction all along, which bends submaps by more than closures allow for: 0.0035 m instead
+    // of 0.0032.
     EXPECT_LE(*corrected(record, robot).accuracy.rpe_m, 1.15 * *robot.onboard.rpe_m);
   }
 }

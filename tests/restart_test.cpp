@@ -20,7 +20,7 @@ namespace restart_test {
 
 constexpr std::uint64_t kFirstSession = 1'700'000'000, kSecondSession = 1'700'000'300;
 
-/// A robot on its way through a recording. Each session's odometry begins at the origin.
+/// A robot in the midst of a recording. Each session's odometry begins at the origin.
 struct Walker {
   const Recording* recording = nullptr;
   robot::RobotAgent agent;

@@ -43,7 +43,7 @@ std::size_t sample_at(const Trajectory& trajectory, Timestamp stamp) {
                                   trajectory.begin());
 }
 
-/// What both say of a pose, seen from the first one.
+/// A pose by both, seen from the first one.
 struct FromStart {
   Eigen::Vector3d odometry;
   Eigen::Vector3d truth;
@@ -117,7 +117,7 @@ TEST(Scenarios, InAgreeTheServersUncertaintyExplainsTheWholeDifference) {
   }
 }
 
-TEST(Scenarios, SpinTurnsHalfOfTheWayAboutTheStartAndDistancesToItCannotSeeIt) {
+TEST(Scenarios, SpinTurnsHalfOfTheTrajectoryAboutTheStartAndDistancesToItCannotSeeIt) {
   const lab::MissionConfig config = scenario("spin", {"server.update_period_s=40"});
   const Recording alpha = recording(config);
   ASSERT_EQ(alpha.drift_origins.size(), 1U);
@@ -269,7 +269,7 @@ TEST_F(Revision, TheRecordFollowsClosuresAndErrorsOverTime) {
         }
       }
     }
-    // The last one is of nearly the whole way, and the report's own figures are of all of it.
+    // The last one is of nearly the whole trajectory, and the report's own figures are of all of it.
     const UpdateRecord& last = robot.updates.back();
     EXPECT_NEAR(*last.onboard_rmse_m, *robot.onboard.rmse_m, 0.15 * *robot.onboard.rmse_m) << robot.name;
     EXPECT_NEAR(*last.server_rmse_m, *robot.server.rmse_m, 0.15 * *robot.server.rmse_m) << robot.name;
@@ -309,7 +309,7 @@ TEST(Scenarios, LookAlikesInTheMidstOfAFailureDoNotMoveTheMap) {
   expect_repaired(run(scenario("terrace", trajectories), 5), "terrace, seed 5");
 }
 
-// Other worlds, ways and errors than those of missions/ (docs/simulation.md).
+// Other worlds, trajectories and errors than those of missions/ (docs/simulation.md).
 TEST(Scenarios, OtherParametersAreRepairedAsWell) {
   const std::string robot = "simulation.robots.0.", world = "simulation.world.";
   const auto expect = [](const std::string& name, const std::vector<std::string>& assignments, double least_onboard_m,

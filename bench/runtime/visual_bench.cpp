@@ -28,7 +28,7 @@ const std::vector<RoomPoint>& room() {
 
 void hamming_100000(benchmark::State& state) {
   Rng rng(1);
-  Descriptors rows{.kind = DescriptorKind::maplab, .words = kDecisions};
+  Descriptors rows{.kind = DescriptorKind::maplab, .words = kWords};
   for (int i = 0; i < 100000; ++i)
     for (const std::uint64_t word : random_bits(rng)) rows.bits.push_back(word);
   const Bits query(rows.row(77777).begin(), rows.row(77777).end());
@@ -106,7 +106,7 @@ Bits seen_again(std::uint32_t submap, std::uint32_t point, double flips, Rng& rn
 
 /// `share` of the descriptors are of the place, the others of nothing.
 Descriptors look_around(std::uint32_t submap, double share, Rng& rng) {
-  Descriptors out{.kind = DescriptorKind::maplab, .words = kDecisions};
+  Descriptors out{.kind = DescriptorKind::maplab, .words = kWords};
   for (std::uint32_t i = 0; i < kPerKeyframe; ++i) {
     const Bits bits = rng.bernoulli(share) ? seen_again(submap, static_cast<std::uint32_t>(rng.index(300)), 0.06, rng)
                                            : random_bits(rng);
@@ -122,7 +122,7 @@ const std::vector<SubmapFeatures>& all_submaps() {
     Rng rng(1);
     for (std::uint32_t s = 0; s < out.size(); ++s) {
       Descriptors& rows = out[s].landmark_descriptors;
-      rows = {.kind = DescriptorKind::maplab, .words = kDecisions};
+      rows = {.kind = DescriptorKind::maplab, .words = kWords};
       for (std::uint32_t k = 0; k < kPerSubmap; ++k) {
         const Descriptors its = look_around(s, 0.7, rng);
         rows.bits.insert(rows.bits.end(), its.bits.begin(), its.bits.end());
@@ -141,7 +141,7 @@ void place_among_10000(benchmark::State& state) {
   Rng rng(2);
   SubmapFeatures query;  // whose keyframes are each at another place
   std::vector<std::uint32_t> places;
-  query.descriptors = {.kind = DescriptorKind::maplab, .words = kDecisions};
+  query.descriptors = {.kind = DescriptorKind::maplab, .words = kWords};
   for (std::uint32_t k = 0; k < kPerSubmap; ++k) {
     places.push_back(static_cast<std::uint32_t>(rng.index(submaps.size())));
     const Descriptors its = look_around(places.back(), 0.3, rng);

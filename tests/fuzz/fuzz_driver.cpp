@@ -53,7 +53,7 @@ void keep_input() {
 
 bool is_sanitized() { return __sanitizer_set_death_callback != nullptr; }
 
-/// The most that this process held since forget_peak().
+/// The most memory of this process since forget_peak().
 std::size_t peak_memory() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
@@ -70,10 +70,10 @@ double cpu_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 /// Numbers, words and lengths that readers trip over.
 std::string odd(Rng& rng) {
-  static const std::vector<std::string> kDecisions = {
+  static const std::vector<std::string> kTokens = {
       "nan",   "-inf",       "1e999", "-1", "0", "99999999999999999999", "\n", "#", " ", ",", "9223372036854775807",
       "1e308", "4294967297", "-"};
-  if (rng.bernoulli(0.4)) return kDecisions[rng.index(kDecisions.size())];
+  if (rng.bernoulli(0.4)) return kTokens[rng.index(kTokens.size())];
   const std::uint64_t number = rng.bernoulli(0.5) ? rng.index(300) : ~std::uint64_t{0} >> rng.index(64);
   std::string bytes;
   for (std::uint64_t i = 0, size = std::uint64_t{1} << rng.index(4); i < size; ++i)

@@ -52,7 +52,7 @@ namespace {
 
 using wire::MessageKind;
 
-/// What was decoded can be encoded and decoded again. The first byte says whether the others are a frame, or what is
+/// What was decoded can be encoded and decoded again. The first byte decides whether the others are a frame, or what is
 /// in one: few mutations of a frame pass its checksum.
 template <class Decode>
 void frame(MessageKind kind, std::string_view bytes, const Decode& decode) {
@@ -206,7 +206,7 @@ void yaml(std::string_view bytes) {
   if (const Status read = load_config(*node, settings, "fuzz"); !read)
     TUTTI_CHECK(read.error().message.size() < 100'000, "a message of {} letters", read.error().message.size());
 }
-/// The first byte says which type. What is a cloud is one of points, too, and an image a picture or depth.
+/// The first byte decides which type. What is a cloud is one of points, too, and an image a picture or depth.
 void message(std::string_view bytes, bags::RosEncoding encoding) {
   if (bytes.empty()) return;
   const std::string_view rest = bytes.substr(1);

@@ -9,8 +9,8 @@ namespace tutti {
 /// Known when linking only, so that test files compile to the same with and without.
 extern const bool kSanitized;
 
-/// How often a test repeats itself with another seed (or input): `all` times, but once under a sanitizer, which looks
-/// at the code that runs and learns nothing from running it again. The assertions stay.
+/// How often a test repeats itself with another seed (or input): `all` times, but once under a sanitizer, which checks
+/// the code that runs and learns nothing from running it again. The assertions stay.
 template <class T>
 T seeds(T all) {
   return kSanitized ? T{1} : all;
@@ -18,7 +18,7 @@ T seeds(T all) {
 
 }  // namespace tutti
 
-/// First line of a test whose code another test runs in the same way: only its assertions are its own, and they are
+/// First line of a test whose code another test runs alike: only its assertions are its own, and they are
 /// those of a plain build.
 #define TUTTI_SAME_CODE() \
   if (::tutti::kSanitized) GTEST_SKIP() << "runs no code that a sanitizer has not seen"

@@ -67,7 +67,7 @@ class Field : public ::testing::Test {
                                     .state = folder_ / name,
                                     .rate = rate,
                                     .session = kSession};
-      if (Status told = lab::tell_robot(source, options); !told) return told;
+      if (Status ok = lab::tell_robot(source, options); !ok) return ok;
       return program::run_robot(options, stop);
     }));
   }
@@ -75,7 +75,7 @@ class Field : public ::testing::Test {
     return within(seconds, [&] { return std::ranges::all_of(robots_, [](const auto& r) { return r->over(); }); });
   }
   [[nodiscard]] fs::path status_file() const { return folder_ / "server" / program::kStatusFile; }
-  /// The map's status, as the server tells it; empty: it cannot be read.
+  /// The map's status, as the server reports it; empty: it cannot be read.
   [[nodiscard]] std::string server_status() const { return read_file(status_file().string()).value_or(""); }
 
   fs::path folder_;

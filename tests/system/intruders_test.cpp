@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A whole mission with rights, by its programs in one process, while intruders try everything: the map is that of nodes
-// that talk to each other directly, and the server's log says who tried what.
+// that talk to each other directly, and the server's log has who tried what.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -89,7 +89,7 @@ class IntrudersSystem : public ::testing::Test {
                                     .state = folder_ / name,
                                     .rate = kRate,
                                     .session = test::kSession};
-      if (Status told = lab::tell_robot(source_, options); !told) return told;
+      if (Status ok = lab::tell_robot(source_, options); !ok) return ok;
       return program::run_robot(options, stop);
     }));
   }
@@ -153,10 +153,10 @@ TEST_F(IntrudersSystem, AMissionWithRightsGivesTheSameMapWhateverIntrudersTry) {
   ASSERT_TRUE(pki_->revoke("lost"));
   EXPECT_TRUE(within(10.0, [&] { return !intruders.front()->connected(); })) << "the server looks every second";
   EXPECT_TRUE(test::server_ends(folder_ / "server"));
-  for (const char* told :
+  for (const char* expected :
        {"the bus refuses robot lost", "the bus refuses worker w", "the bus refuses viewer vera",
         "publish mission.small.robot.1.", "number 0 is robot 'alpha' by its credential, not 'bravo'"})
-    EXPECT_TRUE(within(10.0, [&] { return log().find(told) != std::string::npos; })) << told;
+    EXPECT_TRUE(within(10.0, [&] { return log().find(expected) != std::string::npos; })) << expected;
   intruders.clear();
   robots_.clear();
   worker_.reset();

@@ -55,10 +55,10 @@ class Ros : public ::testing::Test {
     children_.stop_all();
     fs::remove_all(folder_);
   }
-  void start(const std::string& name, std::vector<std::string> words, const std::vector<std::string>& more = {}) {
-    words.insert(words.begin(), TUTTI_PROGRAM);
-    words.insert(words.end(), more.begin(), more.end());
-    const Status started = children_.start(name, words, folder_ / (name + ".txt"));
+  void start(const std::string& name, std::vector<std::string> command, const std::vector<std::string>& more = {}) {
+    command.insert(command.begin(), TUTTI_PROGRAM);
+    command.insert(command.end(), more.begin(), more.end());
+    const Status started = children_.start(name, command, folder_ / (name + ".txt"));
     ASSERT_TRUE(started) << started.error().message;
   }
 
@@ -78,9 +78,9 @@ class Ros : public ::testing::Test {
   /// That a server has printed.
   std::string bus_of(const std::string& server) {
     const auto bus = [&] {
-      const std::string said = output_of(server);
-      const std::size_t at = said.find("--bus ");
-      return at == std::string::npos ? "" : said.substr(at + 6, said.find(' ', at + 6) - at - 6);
+      const std::string output = output_of(server);
+      const std::size_t at = output.find("--bus ");
+      return at == std::string::npos ? "" : output.substr(at + 6, output.find(' ', at + 6) - at - 6);
     };
     EXPECT_TRUE(within(kPatience_s, [&] { return !bus().empty(); })) << output_of(server);
     return bus();
@@ -338,9 +338,9 @@ TEST_F(Ros, TwoRobotsAndAServerMakeTheMapOfTheirBags) {
   std::vector<std::string> robot{"robot", "--ros", "--bus", bus, "--end-after", "2"};
   if (rate != "1") robot.push_back("--reliable");
   for (const std::string name : {"alpha", "bravo"}) {
-    std::vector<std::string> words = robot;
-    words.insert(words.end(), {"--name", name, "--state", (folder_ / ("of_" + name)).string()});
-    start(name, words, mission);
+    std::vector<std::string> command = robot;
+    command.insert(command.end(), {"--name", name, "--state", (folder_ / ("of_" + name)).string()});
+    start(name, command, mission);
   }
   start("play",
         {"bag", "play", (folder_ / "alpha").string(), (folder_ / "bravo").string(), "--rate", rate, "--wait-for",
@@ -399,7 +399,7 @@ closures: {verifier: visual, visual: {max_hamming: 0.2}}
 )";
 
 /// Verifiers draw by submaps' names, hence the session. Alpha's cameras and IMU are found by type, because the
-/// mission's closures are of images; bravo is told its own. TUTTI_ROS_RATE as above.
+/// mission's closures are of images; bravo is given its own. TUTTI_ROS_RATE as above.
 class RosImages : public Ros {
  protected:
   void expect_closures_of_bags(const std::string& cameras, const std::vector<std::string>& images,
@@ -420,10 +420,10 @@ class RosImages : public Ros {
                                    bus,     "--end-after", "3",        "--session", "0"};
     if (rate != "1") robot.push_back("--reliable");
     for (const std::string name : {"alpha", "bravo"}) {
-      std::vector<std::string> words = robot;
-      words.insert(words.end(), {"--name", name, "--state", (folder_ / ("of_" + name)).string()});
-      if (name == "bravo") words.insert(words.end(), of_bravo.begin(), of_bravo.end());
-      start(name, words, mission);
+      std::vector<std::string> command = robot;
+      command.insert(command.end(), {"--name", name, "--state", (folder_ / ("of_" + name)).string()});
+      if (name == "bravo") command.insert(command.end(), of_bravo.begin(), of_bravo.end());
+      start(name, command, mission);
     }
     std::vector<std::string> play{"bag",    "play", (folder_ / "alpha").string(), (folder_ / "bravo").string(),
                                   "--rate", rate};

@@ -88,8 +88,8 @@ TEST(Merge, OneNumberForTwoRobotsIsRefusedWithBothNames) {
   MemoryStore both(storage::map_schema());
   const auto merged = merge(*a, *b, both);
   ASSERT_FALSE(merged.has_value());
-  for (const char* decision : {"alpha", "zulu", "number 0"})
-    EXPECT_NE(merged.error().message.find(decision), std::string::npos) << merged.error().message;
+  for (const char* expected : {"alpha", "zulu", "number 0"})
+    EXPECT_NE(merged.error().message.find(expected), std::string::npos) << merged.error().message;
   call(*b, kAlpha, "bravo");
   call(*a, kBravo, "bravo");
   EXPECT_FALSE(merge(*a, *b, both).has_value());

@@ -24,7 +24,7 @@ TEST(Incarnation, AnOlderMapThatIsPutBackGetsWhatItLacksAndIsHeardAtOnce) {
   const std::size_t swallowed = site.swallowed();
 
   site.put_back(monday);
-  const auto forgotten = site.told<SubmapsForgotten>();
+  const auto forgotten = site.events_of<SubmapsForgotten>();
   ASSERT_EQ(forgotten.size(), 1U);
   EXPECT_EQ(forgotten[0].robot, Site::kRobot);
   EXPECT_EQ(forgotten[0].submaps, all - before);
@@ -33,8 +33,8 @@ TEST(Incarnation, AnOlderMapThatIsPutBackGetsWhatItLacksAndIsHeardAtOnce) {
   site.pass(20.0);
   EXPECT_LT(site.server().map_server().state().revision, heard.second);
   EXPECT_EQ(site.robot().agent().map_age().second, site.server().map_server().state().revision);
-  EXPECT_EQ(site.told<SubmapsForgotten>().size(), 1U);
-  EXPECT_TRUE(site.told<MessageRefused>().empty()) << site.told<MessageRefused>().front().why;
+  EXPECT_EQ(site.events_of<SubmapsForgotten>().size(), 1U);
+  EXPECT_TRUE(site.events_of<MessageRefused>().empty()) << site.events_of<MessageRefused>().front().why;
 }
 
 TEST(Incarnation, AStateThatIsLostWithoutAClockComesBack) {
@@ -58,7 +58,7 @@ TEST(Incarnation, AStateThatIsLostWithoutAClockComesBack) {
 TEST(Incarnation, ThatHasTheWholeMapGetsNothingAgain) {
   Site site;
   site.walk(200);
-  const std::size_t updates = site.told<RobotUpdated>().size();
+  const std::size_t updates = site.events_of<RobotUpdated>().size();
   for (int start = 0; start < 5; ++start) {
     site.start_server();
     site.start_robot();
@@ -66,8 +66,8 @@ TEST(Incarnation, ThatHasTheWholeMapGetsNothingAgain) {
     site.pass(100.0);
   }
   EXPECT_EQ(site.sent(), site.made());
-  EXPECT_EQ(site.told<RobotUpdated>().size(), updates);  // the graph is the one that it knows
-  EXPECT_TRUE(site.told<SubmapsForgotten>().empty());
+  EXPECT_EQ(site.events_of<RobotUpdated>().size(), updates);  // the graph is the one that it knows
+  EXPECT_TRUE(site.events_of<SubmapsForgotten>().empty());
 }
 
 TEST(Incarnation, TheArchiveIsBoundedAndTheNewestStay) {

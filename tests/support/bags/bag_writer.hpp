@@ -61,7 +61,7 @@ inline std::string packed(std::string_view bytes, std::string_view compression) 
   }
   return std::string(bytes);
 }
-/// `size` and `crc` are what it says of itself.
+/// `size` and `crc` are what it states of itself.
 inline std::string chunk(std::string_view records, std::string_view compression, std::uint64_t size,
                          std::uint32_t crc) {
   const std::string inside = packed(records, compression);

@@ -56,7 +56,7 @@ class OverNats final : public PortNetwork {
     ports_.push_back(port.get());
     return std::make_unique<Tracked>(*this, std::move(port));
   }
-  /// Everything sent is on the bus, everything acknowledged is so there; then what is under way has a moment.
+  /// Everything sent is on the bus, everything acknowledged is so there; then what is in transit has some time.
   void settle() override {
     const auto idle = [](const bus::Port* port) {
       const bus::LinkState state = port->state();
@@ -70,7 +70,7 @@ class OverNats final : public PortNetwork {
   [[nodiscard]] std::string url() const override { return network_.options(bus::Endpoint::server()).url; }
 
  private:
-  /// Says when it ends.
+  /// Reports when it ends.
   class Tracked final : public bus::Port {
    public:
     Tracked(OverNats& network, std::unique_ptr<bus::Port> port) : network_(network), port_(std::move(port)) {}

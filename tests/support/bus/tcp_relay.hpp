@@ -24,7 +24,7 @@ class TcpRelay {
   TcpRelay& operator=(const TcpRelay&) = delete;
 
   [[nodiscard]] int port() const { return port_; }
-  /// While held, nothing gets through and nobody is told: out of range.
+  /// While held, nothing gets through and nobody learns of it: out of range.
   void hold(bool held) { held_ = held; }
   /// While refused, connections break, and new ones at once.
   void refuse(bool refused) { refused_ = refused; }

@@ -81,7 +81,7 @@ struct LoopConfig {
   PolicyConfig policy{.name = "spectral"};
   ProxyGraphConfig proxy_graph;
   std::size_t nodes_per_update = 7;  ///< 20 s at 0.33 m/s.
-  /// In place of that policy; is told the number of the update, from 0, before it chooses.
+  /// In place of that policy; gets the number of the update, from 0, before it chooses.
   std::function<const ConstraintPolicy&(std::size_t update)> other_policy;
 };
 

@@ -86,7 +86,7 @@ struct ServerNoise {
   double local_rad = 0.001;
 };
 
-/// What an optimised joint map looks like: truth + a smooth error + a little noise per node.
+/// The appearance of an optimised joint map: truth + a smooth error + a little noise per node.
 inline std::vector<Pose3> server_estimate(const std::vector<Pose3>& truth, const ServerNoise& noise, Rng rng) {
   Eigen::Vector3d phase(rng.uniform(0, 6), rng.uniform(0, 6), rng.uniform(0, 6));
   std::vector<Pose3> out;
@@ -146,7 +146,7 @@ inline std::vector<ServerNode> server_nodes(RobotId robot, const std::vector<Pos
   return out;
 }
 
-/// `increments`: raw odometry from node to node; without it the poses are what odometry says.
+/// `increments`: raw odometry from node to node; without it the poses are odometry's.
 inline std::vector<RobotNode> robot_nodes(const std::vector<Pose3>& poses, const std::vector<Pose3>& increments = {}) {
   std::vector<RobotNode> out;
   for (std::size_t n = 0; n < poses.size(); ++n) {

@@ -40,7 +40,7 @@ inline ChainUncertainty uncertainty_by(const ServerNoise& noise, const ProxyGrap
 }
 
 /// Errors of a map made of a random walk and of closures to known places: position and rotation, every axis on its own,
-/// with the covariance (A^T A)^-1 of such a walk held at every `closure_every`-th node.
+/// with the covariance (A^T A)^-1 of such a walk fixed at every `closure_every`-th node.
 class WalkWithClosures {
  public:
   WalkWithClosures(std::size_t nodes, std::size_t closure_every, PoseSigma step, PoseSigma closure)

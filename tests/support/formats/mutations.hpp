@@ -15,25 +15,25 @@
 /// For the tests of every reader: what may arrive instead of a good file.
 namespace tutti::formats::internal {
 
-/// A valid file, damaged in up to four places: cut, or bytes replaced by bytes or by words that readers trip over.
+/// A valid file, damaged in up to four places: cut, or bytes replaced by bytes or by tokens that readers trip over.
 inline std::string damaged(std::string text) {
-  static const std::vector<std::string> kDecisions = {"nan",
-                                                      "-inf",
-                                                      "1e999",
-                                                      "-1",
-                                                      "0",
-                                                      "99999999999999999999",
-                                                      "9223372036854775807",
-                                                      "-9223372036854775808",
-                                                      "",
-                                                      "\n",
-                                                      "#",
-                                                      " ",
-                                                      ",",
-                                                      "4294967297",
-                                                      "1e18",
-                                                      "1e308",
-                                                      "x"};
+  static const std::vector<std::string> kTokens = {"nan",
+                                                   "-inf",
+                                                   "1e999",
+                                                   "-1",
+                                                   "0",
+                                                   "99999999999999999999",
+                                                   "9223372036854775807",
+                                                   "-9223372036854775808",
+                                                   "",
+                                                   "\n",
+                                                   "#",
+                                                   " ",
+                                                   ",",
+                                                   "4294967297",
+                                                   "1e18",
+                                                   "1e308",
+                                                   "x"};
   const int changes = *rc::gen::inRange(1, 5);
   for (int i = 0; i < changes; ++i) {
     const auto at = *rc::gen::inRange<std::size_t>(0, text.size() + 1);
@@ -43,7 +43,7 @@ inline std::string damaged(std::string text) {
         text.resize(at);
         break;
       case 1:
-        text.replace(at, length, *rc::gen::elementOf(kDecisions));
+        text.replace(at, length, *rc::gen::elementOf(kTokens));
         break;
       case 2:
         text.replace(at, length, *rc::gen::arbitrary<std::string>());

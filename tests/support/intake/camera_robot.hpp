@@ -14,8 +14,8 @@
 namespace tutti::intake::test {
 
 inline std::string why(const Status& status) { return status ? "" : status.error().message; }
-inline void expect(const std::string& said, const std::string& part) {
-  EXPECT_NE(said.find(part), std::string::npos) << said;
+inline void expect(const std::string& text, const std::string& part) {
+  EXPECT_NE(text.find(part), std::string::npos) << text;
 }
 
 inline CameraTopics topics_of(const std::string& camera, Wish wish = Wish::nothing) {

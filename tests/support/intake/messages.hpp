@@ -50,7 +50,7 @@ inline std::string livox(std::int64_t ns, const std::string& frame = "base_link"
   out.header(frame, static_cast<std::int32_t>(ns / kSecond), static_cast<std::uint32_t>(ns % kSecond));
   return bags::test::put_livox(out, {{0, {5, 0, 0}}, {50'000'000, {5, 1, 0}}, {100'000'000, {5, 2, 0}}}).done();
 }
-/// As a receiver says it that knows its place to 1 m.
+/// As of a receiver that knows its place to 1 m.
 inline std::string fix(std::int64_t ns, const std::string& frame = "base_link", double latitude_deg = 46.5) {
   bags::RosNavSatFix out = bags::to_ros({{ns}, frame}, {latitude_deg, 7.9, 600.0});
   for (const std::size_t i : {0U, 4U, 8U}) out.position_covariance[i] = 1.0;

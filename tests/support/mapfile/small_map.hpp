@@ -20,7 +20,8 @@
 /// Maps made by a server node, with a worker beside it, of robots that walk in circles (support/server/world.hpp).
 namespace tutti::mapfile::test {
 
-/// True relative poses with evidence; every fourth is wrong. Sessions of one robot walk the same way at other times.
+/// True relative poses with evidence; every fourth is wrong. Sessions of one robot walk the same trajectory at other
+/// times.
 class ExplainingVerifier final : public server::WrappedVerifier {
  public:
   ExplainingVerifier() : WrappedVerifier(std::make_shared<server::test::TestVerifier>(7, 4)) {}
@@ -30,7 +31,7 @@ class ExplainingVerifier final : public server::WrappedVerifier {
     verdict->evidence = {{RefusalReason::overlap, 0.75, 0.3}};
     return verdict;
   }
-  /// What verify() says, not what the wrapped verifier would.
+  /// What verify() finds, not what the wrapped verifier would.
   [[nodiscard]] Result<Look> look(const Submap& first, const Submap& second, const server::PayloadStore& payloads,
                                   const std::optional<Pose3>& T_first_second) const override {
     return ClosureVerifier::look(first, second, payloads, T_first_second);

@@ -81,7 +81,7 @@ class Site {
     start_robot();
   }
 
-  /// So many samples, a submap in about twenty; the robot says how it is, and the map is updated.
+  /// So many samples, a submap in about twenty; the robot reports how it is, and the map is updated.
   void walk(int samples) {
     for (const int end = walked_ + samples; walked_ < end; ++walked_) {
       pass(0.5);
@@ -133,7 +133,7 @@ class Site {
   [[nodiscard]] std::size_t sent() const { return sent_; }
   [[nodiscard]] std::size_t swallowed() const { return swallowed_; }
   template <class What>
-  [[nodiscard]] std::vector<What> told() const {
+  [[nodiscard]] std::vector<What> events_of() const {
     std::vector<What> out;
     for (const Event& event : events_)
       if (const auto* what = std::get_if<What>(&event.what)) out.push_back(*what);

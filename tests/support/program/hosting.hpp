@@ -33,25 +33,25 @@ class Hosting final : public Hosted {
       : robot_(std::move(robot)), fed_(front, *robot_, host, clock, RobotView("alpha"), tracker) {}
   Answer start(Timestamp now) override {
     robot_->resume(now);
-    return said();
+    return take_answer();
   }
   Answer receive(const bus::Received&, Timestamp) override { return {}; }
   [[nodiscard]] std::optional<Timestamp> next_work() const override { return robot_->node().next_timer(); }
   Answer work(Timestamp now) override {
     robot_->on_timer(now);
-    return said();
+    return take_answer();
   }
   void wait(double) override { fed_.wait(0.0); }
   Answer end() override {
     fed_.end();
     robot_->store_all();
-    return said();
+    return take_answer();
   }
   [[nodiscard]] Json status(Timestamp) const override { return {}; }
   [[nodiscard]] const robot::RobotAgent& agent() const { return robot_->node().agent(); }
 
  private:
-  Answer said() {
+  Answer take_answer() {
     Answer out{robot_->take_step(), {}};
     fed_.note(out.step);
     return out;

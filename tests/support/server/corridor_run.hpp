@@ -34,8 +34,8 @@ inline Failure failure(std::uint32_t robot, double from_s, double until_s, doubl
   return out;
 }
 
-/// Two segments of way that look alike: every pair of submaps there gives a closure that puts the second segment onto
-/// the first, all agreeing with each other, all wrong.
+/// Two similar segments of the trajectory: every pair of submaps there gives a closure that puts the second segment
+/// onto the first, all agreeing with each other, all wrong.
 struct LookAlike {
   RobotId first;
   double first_from_s = 0.0;
@@ -77,7 +77,7 @@ inline void fail_odometry(Trajectory& odometry, const Failure& failure) {
   }
 }
 
-/// What `look_alikes` say, in place of what true closures these pairs have.
+/// What `look_alikes` give, in place of what true closures these pairs have.
 inline void add_look_alikes(CorridorRun& run, const CorridorRunConfig& config, Rng rng) {
   const auto truth_at = [&](RobotId robot, Timestamp stamp) {
     const Trajectory& truth = run.truth.at(robot);

@@ -9,15 +9,15 @@
 /// Who refines maps in tests: submaps with a cloud.
 namespace tutti::server::test {
 
-/// Knows the truth of world.hpp to a millimetre. What is held stays where it is.
+/// Knows the truth of world.hpp to a millimetre. What is fixed stays where it is.
 class Oracle final : public MapRefiner {
  public:
   [[nodiscard]] bool can_refine(const PayloadSize& size) const override { return size.points > 0; }
   [[nodiscard]] Result<Refinement> refine(const RefinementJob& job, const SubmapSet& submaps,
                                           const PayloadStore& payloads) const override {
     Refinement out = answer_to(job);
-    const auto held = std::ranges::find_if(job.parts, [](const auto& part) { return !part.is_free; });
-    const RefinementJob::Part& first = held == job.parts.end() ? job.parts.front() : *held;
+    const auto fixed = std::ranges::find_if(job.parts, [](const auto& part) { return !part.is_free; });
+    const RefinementJob::Part& first = fixed == job.parts.end() ? job.parts.front() : *fixed;
     const Pose3 T_world_truth =
         first.T_world_body.front() *
         true_pose(first.submap.chain.robot, submaps.at(first.submap)->keyframes.front().index).inverse();

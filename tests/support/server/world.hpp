@@ -106,7 +106,7 @@ class TestVerifier final : public ClosureVerifier {
   std::uint32_t version_;
 };
 
-/// A verifier that says what places look like: where on the circle they are. The nearer, the more alike.
+/// A verifier that describes places: where on the circle they are. The nearer, the more alike.
 class RankingVerifier final : public WrappedVerifier {
  public:
   explicit RankingVerifier(std::shared_ptr<const ClosureVerifier> verifier) : WrappedVerifier(std::move(verifier)) {}

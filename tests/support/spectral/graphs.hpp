@@ -61,8 +61,8 @@ inline std::vector<int> random_permutation(int nodes, Rng& rng) {
   return out;
 }
 
-/// A robot's run through 60 m corridors joined by right angles, out and back the same way half a metre aside, one node
-/// per metre: about 27 neighbours within 7 m. `drift` bends it as odometry does: 1 is some metres at the end.
+/// A robot's run through 60 m corridors joined by right angles, out and back on the same trajectory half a metre aside,
+/// one node per metre: about 27 neighbours within 7 m. `drift` bends it as odometry does: 1 is some metres at the end.
 inline std::vector<Eigen::Vector3d> tunnel(int nodes, double drift, Rng rng) {
   const int half = (nodes + 1) / 2;
   const auto corridor_yaw = [](int metre) {

@@ -106,8 +106,8 @@ inline ChainUncertainty any_uncertainty(Rng& rng, const ChainId& chain, std::siz
   return out;
 }
 
-/// Nodes about every metre along each chain's way, two chains a robot; of every other chain, beginning with the first,
-/// it is known how sure the server is.
+/// Nodes about every metre along each chain's trajectory, two chains a robot; of every other chain, beginning with the
+/// first, it is known how sure the server is.
 inline ProxyGraphMessage any_proxy_graph(Rng& rng, std::size_t chains, std::size_t nodes_each, bool reduced) {
   ProxyGraphMessage message;
   message.header.session = rng.index(1'000'000'000'000);

@@ -16,10 +16,10 @@ struct Outcome {
   double rmse_m;
 };
 
-Outcome flight(const Pose3& T_second_told, std::uint64_t seed = 5, double max_sigmas = 3.0,
+Outcome flight(const Pose3& T_second_given, std::uint64_t seed = 5, double max_sigmas = 3.0,
                const std::string& contradicted = "one_camera") {
   SceneOptions options{.points = 120, .pixel_sigma = 0.5, .odometry_sigma_m = 0.01, .cameras = 2};
-  options.T_second_told = T_second_told;
+  options.T_second_given = T_second_given;
   const Scene scene = make_scene(options, seed);
   RefinementConfig config;
   config.stereo.max_sigmas = max_sigmas;

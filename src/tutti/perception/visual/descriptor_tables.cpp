@@ -43,14 +43,14 @@ std::vector<TableKeys> table_keys(const Descriptors& rows) {
 }
 
 DescriptorTables::DescriptorTables(std::span<const TableKeys> rows) {
-  constexpr std::size_t kDecisions = (std::size_t{1} << kKeyBits) / 64;
+  constexpr std::size_t kWords = (std::size_t{1} << kKeyBits) / 64;
   std::vector<std::uint32_t> by_key(rows.size());
   for (std::size_t t = 0; t < kTables; ++t) {
     std::iota(by_key.begin(), by_key.end(), 0U);
     std::ranges::stable_sort(by_key, {}, [&](std::uint32_t row) { return rows[row][t]; });
     Table& table = tables_[t];
-    table.taken.assign(kDecisions, 0);
-    table.first.assign(kDecisions + 1, 0);
+    table.taken.assign(kWords, 0);
+    table.first.assign(kWords + 1, 0);
     for (const std::uint32_t row : by_key) {
       const std::uint32_t key = rows[row][t];
       table.taken[key / 64] |= std::uint64_t{1} << (key % 64);

@@ -12,7 +12,7 @@ using namespace test;
 
 const VisualClosureConfig kConfig;
 
-constexpr std::size_t kMostBytes = 3 + 2 * 512 * kDecisions * 8;
+constexpr std::size_t kMostBytes = 3 + 2 * 512 * kWords * 8;
 
 Submap seen_from(const std::vector<RoomPoint>& room, const Flight& flight, std::uint32_t number) {
   return make_submap({RobotId{number}, 0}, fly(room, stereo_cameras(), flight, Rng(number)), stereo_cameras(), {});
@@ -37,7 +37,7 @@ TEST(DescribeVisualPlace, isMostAlikeWhereTheSameWallIsSeen) {
   }
   const PlaceMatcher matcher(place, kConfig);
   const double whole = matcher.likeness(place);
-  EXPECT_EQ(whole, 2.0 * static_cast<double>(place.size() / (kDecisions * 8)));
+  EXPECT_EQ(whole, 2.0 * static_cast<double>(place.size() / (kWords * 8)));
   EXPECT_GT(matcher.likeness(back), 0.2 * whole);
   EXPECT_LT(matcher.likeness(behind), 0.1 * whole);
   EXPECT_LT(matcher.likeness(elsewhere), 0.01 * whole);

@@ -28,8 +28,8 @@ struct SceneOptions {
   ImuNoise imu_noise;
   estimation::ImuBias imu_bias{{0.02, -0.05, 0.08}, {0.1, -0.2, 0.05}};
   bool imu = false;
-  int cameras = 1;      ///< The second one 0.2 m to the right of the first,
-  Pose3 T_second_told;  ///< ... and where the calibration has it: by this from there, in its frame.
+  int cameras = 1;       ///< The second one 0.2 m to the right of the first,
+  Pose3 T_second_given;  ///< ... and where the calibration has it: by this from there, in its frame.
 };
 
 inline constexpr double kKeyframePeriod_s = 1.0;
@@ -42,7 +42,7 @@ inline Pose3 scene_pose(double t, int keyframes_per_circle) {
   return {yaw * so3_exp({0.1 * std::sin(2.0 * w * t), 0.1 * std::cos(3.0 * w * t), 0.0}), position};
 }
 
-/// What an ideal IMU at rest in that motion would say, by central differences.
+/// What an ideal IMU at rest in that motion would measure, by central differences.
 inline ImuSample scene_imu(double t, int keyframes_per_circle) {
   constexpr double h = 1e-3;
   const Pose3 before = scene_pose(t - h, keyframes_per_circle);
@@ -164,8 +164,8 @@ class SceneMaker {
     submap->id = {RobotId{0}, index};
     for (int c = 0; c < options_.cameras; ++c) visual->cameras.push_back(scene_camera(c));
     if (options_.cameras > 1) {
-      Pose3& told = visual->cameras[1].T_body_camera;
-      told = told * options_.T_second_told;
+      Pose3& given = visual->cameras[1].T_body_camera;
+      given = given * options_.T_second_given;
     }
     visual->descriptors = {.kind = DescriptorKind::orb, .words = 2, .bits = {}};
     std::map<std::size_t, std::uint32_t> landmarks;

@@ -11,26 +11,26 @@
 /// For tests of what people are shown: a made-up explanation with plausible shapes.
 namespace tutti::mission::test {
 
-/// Nodes are the poses of `way`. Around every origin the disagreement stands out, wider at larger scales; elsewhere it
-/// is a third of its threshold.
-inline consistency::Explanation example_explanation(const Trajectory& way,
+/// Nodes are the poses of `trajectory`. Around every origin the disagreement stands out, wider at larger scales;
+/// elsewhere it is a third of its threshold.
+inline consistency::Explanation example_explanation(const Trajectory& trajectory,
                                                     std::vector<consistency::SuspectedOrigin> origins) {
   constexpr Eigen::Index kScales = 6;
   consistency::Explanation e;
-  for (const StampedPose& p : way) {
+  for (const StampedPose& p : trajectory) {
     e.distance_m.push_back(e.stamps.empty()
                                ? 0.0
                                : e.distance_m.back() +
-                                     (p.pose.translation - way[e.stamps.size() - 1].pose.translation).norm());
+                                     (p.pose.translation - trajectory[e.stamps.size() - 1].pose.translation).norm());
     e.stamps.push_back(p.stamp);
   }
   for (Eigen::Index s = 0; s < kScales; ++s) e.scale_length_m.push_back(128.0 / std::pow(2.0, s));
-  const auto nodes = static_cast<Eigen::Index>(way.size());
+  const auto nodes = static_cast<Eigen::Index>(trajectory.size());
   e.significance = Eigen::MatrixXd::Constant(nodes, kScales, 0.33);
   for (Eigen::Index n = 0; n < nodes; ++n)
     for (Eigen::Index s = 0; s < kScales; ++s)
       for (const auto& origin : origins) {
-        const Timestamp now = way[static_cast<std::size_t>(n)].stamp;
+        const Timestamp now = trajectory[static_cast<std::size_t>(n)].stamp;
         const double middle_s = 0.5 * (origin.until - origin.from);
         const double away_s = std::abs(now - origin.from - middle_s);
         const double reach_s = middle_s + 0.5 * e.scale_length_m[static_cast<std::size_t>(s)];

@@ -24,11 +24,11 @@ struct ExampleOptions {
 };
 
 /// A walk around a block of corridors, a different corner and length for each robot.
-inline Pose3 example_pose(std::size_t robot, double way_m) {
+inline Pose3 example_pose(std::size_t robot, double distance_m) {
   const double width = 34.0 - 5.0 * static_cast<double>(robot);
   const double height = 18.0 + 3.0 * static_cast<double>(robot);
   const double side[4] = {width, height, width, height};
-  double left = std::fmod(way_m + 13.0 * static_cast<double>(robot), 2.0 * (width + height));
+  double left = std::fmod(distance_m + 13.0 * static_cast<double>(robot), 2.0 * (width + height));
   Eigen::Vector3d p(6.0 * static_cast<double>(robot), 2.0 * static_cast<double>(robot), 0.0);
   double yaw = 0.0;
   for (const double length : side) {
@@ -38,7 +38,8 @@ inline Pose3 example_pose(std::size_t robot, double way_m) {
     if (left <= 0.0) break;
     yaw += M_PI / 2.0;
   }
-  p += Eigen::Vector3d(0.35 * std::sin(0.31 * way_m), 0.35 * std::cos(0.23 * way_m), 0.1 * std::sin(0.05 * way_m));
+  p += Eigen::Vector3d(0.35 * std::sin(0.31 * distance_m), 0.35 * std::cos(0.23 * distance_m),
+                       0.1 * std::sin(0.05 * distance_m));
   return {so3_exp({0.0, 0.0, yaw}), p};
 }
 
@@ -48,7 +49,7 @@ inline Trajectory moved(const Pose3& T_a_b, const Trajectory& trajectory_b) {
   return out;
 }
 
-/// The same way with white noise on positions.
+/// The same trajectory with white noise on positions.
 inline Trajectory noisy(const Trajectory& truth, double sigma_m, Rng rng) {
   Trajectory out = truth;
   for (auto& p : out)
@@ -69,10 +70,10 @@ inline Trajectory drifting(const Trajectory& truth, double yaw_per_metre_rad) {
 
 inline Pose3 example_T_world_truth() { return {so3_exp({0.01, 0.02, 0.4}), {5.0, -3.0, 1.0}}; }
 
-/// Two walls along a way.
-inline PointCloud example_walls(const Trajectory& way, Rng rng) {
+/// Two walls along a trajectory.
+inline PointCloud example_walls(const Trajectory& trajectory, Rng rng) {
   PointCloud out;
-  for (const auto& p : way)
+  for (const auto& p : trajectory)
     for (int i = 0; i < 60; ++i)
       out.points.push_back(
           (p.pose * Eigen::Vector3d(rng.uniform(-1.5, 1.5), i % 2 == 0 ? 1.6 : -1.6, rng.uniform(-1.0, 1.5)))

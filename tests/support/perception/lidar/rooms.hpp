@@ -70,7 +70,7 @@ inline World mirrored(World world) {
 
 struct Walk {
   Eigen::Vector3d from{2, 5, 1.2}, to{6, 5, 1.2};  ///< World frame.
-  double yaw_rad = 0.0;                            ///< The body's, all the way.
+  double yaw_rad = 0.0;                            ///< The body's, all along.
   double tilt_rad = 0.0;                           ///< The body's about its x axis.
   Pose3 T_odom_world;
   int keyframes = 11;  ///< One second apart.

@@ -14,7 +14,7 @@
 #include "tutti/perception/visual/visual_payload.hpp"
 
 /// Points with descriptors on the walls of a room, cameras like EuRoC's, and flights along the walls: what a tracker
-/// would say of them, with known truth.
+/// would give of them, with known truth.
 namespace tutti::visual::test {
 
 /// Like EuRoC's cam0 and cam1; x of the body looks forward, y to the left.
@@ -33,7 +33,7 @@ inline std::vector<Camera> stereo_cameras() {
   return {{model, {q, {0.05, 0.055, 0.0}}}, {model, {q, {0.05, -0.055, 0.0}}}};
 }
 
-inline constexpr std::uint32_t kDecisions = 6;
+inline constexpr std::uint32_t kWords = 6;
 using Bits = std::vector<std::uint64_t>;
 
 struct RoomPoint {
@@ -43,7 +43,7 @@ struct RoomPoint {
 
 inline Bits random_bits(Rng& rng) {
   Bits out;
-  for (std::uint32_t w = 0; w < kDecisions; ++w) out.push_back(rng.index(~std::uint64_t{0}));
+  for (std::uint32_t w = 0; w < kWords; ++w) out.push_back(rng.index(~std::uint64_t{0}));
   return out;
 }
 
@@ -94,7 +94,7 @@ inline Pose3 true_pose(const Flight& f, std::uint32_t k) {  // T_world_body
 
 inline TrackedImage look(const std::vector<RoomPoint>& room, const Camera& camera, std::uint32_t index,
                          const Pose3& T_world_body, const Flight& f, Rng& rng) {
-  TrackedImage out{.camera = index, .descriptors = {.kind = DescriptorKind::maplab, .words = kDecisions}};
+  TrackedImage out{.camera = index, .descriptors = {.kind = DescriptorKind::maplab, .words = kWords}};
   const Pose3 T_camera_world = (T_world_body * camera.T_body_camera).inverse();
   for (std::size_t i = 0; i < room.size(); ++i) {
     const auto pixel = project(camera.model, T_camera_world * room[i].position);
@@ -134,7 +134,7 @@ inline Seen fly(const std::vector<RoomPoint>& room, const std::vector<Camera>& c
   return out;
 }
 
-/// The flight as a submap, its odometry as sure as it says.
+/// The flight as a submap, its odometry as sure as it states.
 inline Submap make_submap(SubmapId id, const Seen& seen, const std::vector<Camera>& cameras,
                           const VisualSubmapConfig& config = {}, double sigma_m = 0.01, double sigma_rad = 0.002) {
   Vector6d sigma;
