@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # What is installed beside programs and libraries, and `cpack -G DEB`, which makes Debian packages of it: tutti, tutti-server
-# (the same program without OpenCV), libtutti-dev and, where it is built, python3-tutti. docs/install.md says how to use them.
+# (the same program without OpenCV), libtutti-dev and, where it is built, python3-tutti. docs/install.md explains how to
+# use them.
 include_guard()
 
 # Third-party libraries that an installed Tutti links, with the Debian packages that find_package(tutti) finds them in.
@@ -38,7 +39,7 @@ function(tutti_debian_dev out)
 endfunction()
 
 # tutti_install_debian(<component> <package> [EXCLUDE_FROM_ALL]): what Debian wants beside every package. Its log is
-# CHANGELOG.md; changelog.gz says which version this is.
+# CHANGELOG.md; changelog.gz names which version this is.
 function(tutti_install_debian component package)
   string(TIMESTAMP now "%a, %d %b %Y %H:%M:%S +0000" UTC)
   set(folder "${PROJECT_BINARY_DIR}/debian/${package}")
@@ -51,7 +52,7 @@ endfunction()
 
 # tutti_install_program(<target> <component> <package> [EXCLUDE_FROM_ALL]): with manual, completion, units and documents.
 # Manual and completion are written when they are installed, from the program's own tables: whoever has built the program
-# can make its package. So are units, since they say where the program is.
+# can make its package. So are units, since they name where the program is.
 function(tutti_install_program target component package)
   set(docs "${CMAKE_INSTALL_DATADIR}/doc/${package}")
   install(TARGETS ${target} RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}" COMPONENT ${component} ${ARGN})

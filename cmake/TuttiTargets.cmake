@@ -24,8 +24,9 @@ else()
   set(TUTTI_LINKER "")
 endif()
 
-# What sanitizers look at is compiled by Clang where there is one: half the time and memory of GCC 12, and a second compiler's
-# opinion. Its warnings are off: GCC's are errors in every other build, and are not Clang's. Empty: the project's compiler.
+# What sanitizers check is compiled by Clang where there is one: half the time and memory of GCC 12, and a second
+# compiler's opinion. Its warnings are off: GCC's are errors in every other build, and are not Clang's. Empty: the
+# project's compiler.
 find_program(TUTTI_SANITIZING_CXX NAMES clang++-16 clang++-17 clang++-18 clang++-19 clang++-20)
 mark_as_advanced(TUTTI_SANITIZING_CXX)
 if(TUTTI_SANITIZE AND TUTTI_SANITIZING_CXX) # its sanitizers are a package of their own
@@ -39,7 +40,7 @@ if(TUTTI_SANITIZE AND TUTTI_SANITIZING_CXX) # its sanitizers are a package of th
   endif()
 endif()
 
-# tutti_target_options(<target> [TEST]). TEST: what sanitizers are to look at is what it links, not its own files, which
+# tutti_target_options(<target> [TEST]). TEST: what sanitizers are to check is what it links, not its own files, which
 # are half of all and are then taken from the Release build by ccache.
 function(tutti_target_options target)
   cmake_parse_arguments(ARG "TEST" "" "" ${ARGN})
@@ -75,7 +76,7 @@ endfunction()
 # tutti_sources(<target> <group> a.cpp..) compiles them, with TUTTI_UNITY so many together: headers are read and templates
 # expanded once for all of these. Names in anonymous namespaces of one group must differ for that. The files that include
 # them lie below TUTTI_UNITY_DIR, which builds of one checkout share: ccache takes what no sanitizer looks at from the one
-# before. Their names say what they include, as builds with other options have other sources in a group.
+# before. Their names state what they include, as builds with other options have other sources in a group.
 function(tutti_sources target group)
   set(files ${ARGN})
   if(TUTTI_UNITY)
@@ -98,7 +99,7 @@ function(tutti_sources target group)
       string(SHA1 hash "${text}")
       string(SUBSTRING "${hash}" 0 8 hash)
       set(unit "${folder}/${group}_${number}_${hash}.cpp")
-      file(CONFIGURE OUTPUT "${unit}" CONTENT "${text}") # leaves it alone when it says so already
+      file(CONFIGURE OUTPUT "${unit}" CONTENT "${text}") # leaves it alone when it has that already
       list(APPEND files "${unit}")
       math(EXPR number "${number} + 1")
     endwhile()
@@ -108,8 +109,8 @@ endfunction()
 
 # tutti_add_library(<module> SOURCES a.cpp.. HEADERS a.hpp.. [PUBLIC libs..] [PRIVATE libs..])
 # makes target tutti_<module>, alias tutti::<module>, and installs them with the headers outside of internal/ when the
-# module is of a component (TuttiComponents.cmake). With no SOURCES it is an interface library. Left out, and said, when a
-# library that it links is turned off.
+# module is of a component (TuttiComponents.cmake). With no SOURCES it is an interface library. Left out, and reported,
+# when a library that it links is turned off.
 function(tutti_add_library module)
   cmake_parse_arguments(ARG "" "" "SOURCES;HEADERS;PUBLIC;PRIVATE" ${ARGN})
   tutti_leave_out(left_out ${module} ${ARG_PUBLIC} ${ARG_PRIVATE})
@@ -221,7 +222,8 @@ endfunction()
 # tutti_add_tests(<module> TESTS a internal/b.. [NO_THREADS c..] [NOT_SANITIZED d..] [LIBS libs..] [LABEL label] [TIMEOUT s])
 # makes one executable test_<module> of a_test.cpp, internal/b_test.cpp.. and one ctest entry "module/a" for each file.
 # NO_THREADS: files that TSan would find nothing in. NOT_SANITIZED: files that would only repeat under a sanitizer what
-# others have run there. A file that includes RapidCheck is labelled `property`, any other `unit`, unless LABEL says otherwise.
+# others have run there. A file that includes RapidCheck is labelled `property`, any other `unit`, unless LABEL is
+# given.
 function(tutti_add_tests module)
   if(NOT TUTTI_BUILD_TESTS)
     return()

@@ -16,9 +16,9 @@ using RowMatrix4d = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
 using RowMatrix6d = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
 
 std::string expected(std::initializer_list<py::ssize_t> shape) {
-  std::vector<std::string> words;
-  for (const py::ssize_t length : shape) words.push_back(length < 0 ? "n" : std::to_string(length));
-  return fmt::format("({}{})", fmt::join(words, ", "), words.size() == 1 ? "," : "");
+  std::vector<std::string> lengths;
+  for (const py::ssize_t length : shape) lengths.push_back(length < 0 ? "n" : std::to_string(length));
+  return fmt::format("({}{})", fmt::join(lengths, ", "), lengths.size() == 1 ? "," : "");
 }
 
 /// An array of numbers whose dtype is of one of these kinds; an empty list, which numpy calls float64, is of any.
@@ -76,7 +76,7 @@ void check_range(double value, double low, double high, const char* name) {
 
 std::string path_of(const PathLike& path) {
   const auto text = py::reinterpret_steal<py::object>(PyOS_FSPath(path.ptr()));
-  if (!text) throw py::error_already_set();  // a TypeError that says what it is
+  if (!text) throw py::error_already_set();  // a TypeError that states what it is
   return py::isinstance<py::bytes>(text) ? text.cast<std::string>() : py::str(text).cast<std::string>();
 }
 

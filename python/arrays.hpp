@@ -23,7 +23,7 @@
 PYBIND11_MAKE_OPAQUE(std::vector<tutti::StampedPose>)
 
 /// Converts between numpy's arrays and our values. Every input is copied and checked, whatever its dtype, strides and
-/// shape; every output is a new array. Messages name the argument, say what it is, and what was expected.
+/// shape; every output is a new array. Messages name the argument, state what it is, and what was expected.
 namespace tutti::python {
 
 namespace py = pybind11;

@@ -103,10 +103,10 @@ prints; docs/compare.md defines every figure.)")
           "stamps", [](const CompareReport& r) { return from_stamps(explanation(r).stamps); }, "(n,) seconds.")
       .def_property_readonly(
           "distance_m", [](const CompareReport& r) { return from_numbers(explanation(r).distance_m); },
-          "(n,): the way along a, metres.")
+          "(n,): the distance along a, metres.")
       .def_property_readonly(
           "scale_length_m", [](const CompareReport& r) { return from_numbers(explanation(r).scale_length_m); },
-          "(s,): what length of the way a scale speaks of, metres.")
+          "(s,): the length of the trajectory that a scale stands for, metres.")
       .def_property_readonly(
           "position_m", [](const CompareReport& r) { return from_matrix(explanation(r).position_m); },
           "(n, s): the disagreement, metres.")
@@ -156,7 +156,7 @@ void bind_compare(py::module_& m) {
 
 In what it returns the reference is a, the estimate b. tolerance_m, tolerance_deg: standard deviation of a; the default
 angle moves a point 5 m away by tolerance_m. odometry_sigma_m, odometry_sigma_deg: of b's motion over 1 m, growing with the
-square root of the way. spacing_m: way between two nodes; 0: a 500th of the way. false_alarm_rate: chance of calling it
+square root of the distance. spacing_m: distance between two nodes; 0: a 500th of all. false_alarm_rate: chance of calling it
 disagreement when b differs within the tolerance only. Poses pair up as associate() says; b need not be aligned.
 ValueError: fewer than two common times.)");
 }

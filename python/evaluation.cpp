@@ -80,7 +80,7 @@ void bind_evaluation(py::module_& m) {
         return split(pair_up(estimate, reference, max_gap_s, max_difference_s));
       },
       "estimate"_a, "reference"_a, "max_gap_s"_a = 0.2, "max_difference_s"_a = py::none(),
-      R"(Poses of both at the same moments: two trajectories of one length, with the estimate's stamps.
+      R"(Poses of both at the same times: two trajectories of one length, with the estimate's stamps.
 
 The reference is interpolated between poses at most max_gap_s apart; with max_difference_s the nearest one so near is
 taken instead. ValueError: there are no common times.)");
@@ -98,7 +98,7 @@ Poses pair up as associate() says. ValueError: there are no common times.)");
   m.def(
       "rpe", &rpe, "estimate"_a, "reference"_a, "delta_s"_a = py::none(), "delta_m"_a = py::none(), "max_gap_s"_a = 0.2,
       "max_difference_s"_a = py::none(), py::call_guard<py::gil_scoped_release>(),
-      R"(Relative pose error (Sturm et al., IROS 2012) over delta_s seconds (1, if neither is given) or delta_m metres of way.
+      R"(Relative pose error (Sturm et al., IROS 2012) over delta_s seconds (1, if neither is given) or delta_m metres.
 
 Needs no alignment. Poses pair up as associate() says. ValueError: no common times, or no two poses so far apart.)");
 }

@@ -32,7 +32,7 @@ std::unique_ptr<Map> open_map(const PathLike& file) {
 std::map<std::string, Trajectory> trajectories(const Map& map) {
   const server::ClosureNames names = map.content.closure_names();
   std::map<std::string, Trajectory> out;
-  for (auto& [chain, way] : trajectories_of(map.estimate)) out[names.of(chain)] = std::move(way);
+  for (auto& [chain, trajectory] : trajectories_of(map.estimate)) out[names.of(chain)] = std::move(trajectory);
   return out;
 }
 

@@ -31,7 +31,7 @@ struct Outcome {
   }
 };
 
-/// Tells `progress`, if anybody asked, and hears Ctrl-C.
+/// Calls `progress`, if anybody asked, and hears Ctrl-C.
 std::function<void(const mission::Progress&)> watch(const py::object& progress) {
   return [&progress](const mission::Progress& now) {
     const py::gil_scoped_acquire acquire;

@@ -27,9 +27,9 @@ struct Optimised {
 Optimised optimise(const Graph& graph, const std::string& loss, const std::string& initialisation, int max_iterations) {
   const auto is_one_of = [](const std::string& value, const char* name, std::initializer_list<const char*> known) {
     if (std::find(known.begin(), known.end(), value) != known.end()) return;
-    std::string words;
-    for (const char* word : known) words += fmt::format("{}'{}'", words.empty() ? "" : ", ", word);
-    refuse("{}: is '{}', expected one of {}", name, value, words);
+    std::string expected;
+    for (const char* one : known) expected += fmt::format("{}'{}'", expected.empty() ? "" : ", ", one);
+    refuse("{}: is '{}', expected one of {}", name, value, expected);
   };
   is_one_of(loss, "loss", {"none", "huber", "cauchy", "gnc"});
   is_one_of(initialisation, "initialisation", {"chordal", "given"});

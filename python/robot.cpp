@@ -121,13 +121,13 @@ right perturbation [translation m; rotation rad]. Any later stamp is believed: o
 up to it. ValueError: it is refused, and nothing changes.)")
       .def(
           "add_scan", &add_scan, "stamp"_a, "points"_a, "age_s"_a = py::none(),
-          R"(A sweep that ends at stamp: points (n, 3), metres in the body's frame of the moment that each was measured, which is
+          R"(A sweep that ends at stamp: points (n, 3), metres in the body's frame of the time that each was measured, which is
 age_s (n,) seconds before the stamp; None: at the stamp. Points that are not finite are left out. ValueError: it is refused.)")
       .def(
           "finish", [](Agent& agent) { agent.call([](RobotAgent& a) { a.finish(); }); },
           "Ends the run: the last, shorter submap goes out.")
       .def("take_outgoing", &take_outgoing,
-           "Messages for the server, oldest first, each told once: bytes. Ask regularly.")
+           "Messages for the server, oldest first, each given once: bytes. Ask regularly.")
       .def("receive", &receive_map, "message"_a,
            "Compares what the server's optimise() sent with the own map, and corrects it. ValueError: bytes that are "
            "no such message.")

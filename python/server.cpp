@@ -207,8 +207,8 @@ ValueError: it is refused, and the map is as it was.)")
           "trajectories",
           [](Server& s) {
             std::map<std::uint32_t, Trajectory> out;
-            for (auto& [chain, way] : s.server.call([](const MapServer& x) { return trajectories_of(x.map()); }))
-              out[chain.robot.value] = std::move(way);  // of a robot's newest session
+            for (auto& [chain, trajectory] : s.server.call([](const MapServer& x) { return trajectories_of(x.map()); }))
+              out[chain.robot.value] = std::move(trajectory);  // of a robot's newest session
             return out;
           },
           "{robot: T_world_body at the keyframes of its newest session}, as of the last optimise().")

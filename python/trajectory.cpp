@@ -5,7 +5,7 @@
 namespace tutti::python {
 namespace {
 
-constexpr double kUnit = 1e-3;  // as files are held to
+constexpr double kUnit = 1e-3;  // as files are checked
 constexpr std::int64_t kMostNanoseconds = std::int64_t{1} << 61;
 
 Trajectory assemble(const std::vector<Timestamp>& stamps, const ArrayLike& positions, const ArrayLike& quaternions) {

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# All tracked C++ files are formatted as .clang-format says (clang-format 14, Debian 12's; others format differently), and no
+# All tracked C++ files are formatted by .clang-format (clang-format 14, Debian 12's; others format differently), and no
 # comment or item of a page begins with "Of": subject first.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Holds every file below src/tutti to the architecture (docs/architecture.md); prints file:line for each breach.
+"""Checks every file below src/tutti against the architecture (docs/architecture.md); prints file:line for each breach.
 
 usage: check_layers.py [project root]
 """
@@ -30,16 +30,16 @@ CONFINED = [
     (r"pybind11/", r"(?!)", "python/"),
     (r"support/", r"(.*_test\.cpp|tests/.*)$", "tests"),
 ]
-# A library returns what it has to say, never ends the program, and knows nothing but its arguments.
+# A library returns what it has to report, never ends the program, and knows nothing but its arguments.
 FORBIDDEN = re.compile(
     r"\bstd::(cout|cerr|clog)\b|\bfmt::print\b|\brandom_device\b|(?<![\w.>])(std::|::)?"
     r"(f?printf|puts|abort|exit|_Exit|quick_exit|terminate|s?rand|getenv)\s*\(")
-# What plays robots and spoils what they say, to measure the product: no other room knows of it.
+# What plays robots and spoils what they send, to measure the product: no other room knows of it.
 LABORATORY = {"simulation", "lab"}
 # What replays recordings and scores them: of the product, but nothing that runs on a robot or its server knows of it.
 REPLAY = {"mission", "mission/report"}
 CLOCK = re.compile(r"\bsystem_clock\b")  # of the day: for programs
-SUPPORT = "tests/support/"  # what tests share: a folder a module, held to its layer
+SUPPORT = "tests/support/"  # what tests share: a folder a module, checked against its layer
 INCLUDE = re.compile(r'\s*#\s*include\s*[<"]([^>"]+)[>"]')
 
 
@@ -50,7 +50,7 @@ def layer_order(root):
 
 
 def layer_of(order, path):
-    """The innermost listed folder that holds `path`, which is relative to src/tutti; None outside of them."""
+    """The innermost listed folder that contains `path`, which is relative to src/tutti; None outside of them."""
     return max((layer for layer in order if path.startswith(layer + "/")), key=len, default=None)
 
 

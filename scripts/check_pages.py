@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Holds what README.md and docs/ name to what is there; prints page:line for each name that is not.
+"""Checks what README.md and docs/ name against what is there; prints page:line for each name that is not.
 
 Everywhere: the options and settings of `tutti` commands, and the arguments of tutti_ros's launch files. In docs/extending.md, which
 says where to change what, also every file, function, type and table.

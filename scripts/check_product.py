@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Holds the product's built libraries to have no symbol of the laboratory (check_layers.py says what that is), defined or
+"""Checks that the product's built libraries have no symbol of the laboratory (check_layers.py defines it), defined or
 needed: what runs on a robot links nothing that measures it.
 
 usage: check_product.py BUILD_FOLDER [ROOM..]

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Fuzzes every decoder of bytes from outside, one after the other, and says how many inputs there were: the long form of the tests
-# fuzz/TARGET, with mutations that CI has not seen. Stops at the first failing input, which is then in a file here.
+# Fuzzes every decoder of bytes from outside, one after the other, and reports how many inputs there were: the long form
+# of the tests fuzz/TARGET, with mutations that CI has not seen. Stops at the first failing input, which is then in a
+# file here.
 #   scripts/fuzz.sh TUTTI_FUZZ SECONDS SEED     seconds of CPU for each target; docs/results/robustness.md
 set -euo pipefail
 [ $# -eq 3 ] || {

@@ -12,7 +12,7 @@ packages=(
   libexpected-dev libfmt-dev libspdlog-dev libsystemd-dev libcli11-dev libyaml-cpp-dev nlohmann-json3-dev
   libopencv-core-dev libopencv-imgproc-dev libopencv-features2d-dev libopencv-video-dev
 )
-clang=() # compiles what sanitizers look at; another Debian or Ubuntu has another one, and GCC does it too, in twice the time
+clang=() # compiles what sanitizers check; another Debian or Ubuntu has another one, and GCC does it too, in twice the time
 for option in "$@"; do
   case "$option" in
     --tests) packages+=(libgtest-dev libgmock-dev librapidcheck-dev clang-format python3 python3-protobuf python3-numpy pybind11-dev python3-dev python3-venv mold dpkg-dev groff-base) ;;

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Pictures of the page by headless Chromium; web/test/screenshots.mjs says which, and of what.
+# Pictures of the page by headless Chromium; web/test/screenshots.mjs defines which, and of what.
 #   scripts/make_screenshots.sh [--report FILE.html | --live URL | --moving FILE.html] [OUT]    OUT: default out/pictures
 # Without an option of a made-up mission; --live: of one that runs (docs/images/room.png: tutti demo --live); --moving: the course of a
 # mission from its report, as OUT/moving.gif (docs/images/moving.gif: tutti demo), which needs ffmpeg.

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Installs the Debian packages with apt into minimal systems of Debian 12 that are made for it, as the Dockerfiles say, and
-# runs Tutti there. Needs root, network and mmdebstrap; no part of CI. Prints megabytes and seconds: docs/install.md.
+# Installs the Debian packages with apt into minimal systems of Debian 12 that are made for it, as in the Dockerfiles,
+# and runs Tutti there. Needs root, network and mmdebstrap; no part of CI. Prints megabytes and seconds:
+# docs/install.md.
 #   scripts/test_packages.sh [--development] [FOLDER]    of packages; without it they are built (preset release, cpack)
 # --development: also builds the examples on libtutti-dev there, with all that it recommends and a compiler: 1 GB more.
 set -euo pipefail
@@ -100,7 +101,7 @@ inside full '
     tutti map export mine.tutti --grid map.yaml
     ls -s mine/report.html mine.mcap map.yaml map.pgm"'
 
-# What docs/security.md tells people to type, in its order, all on one machine.
+# What docs/security.md has people type, in its order, all on one machine.
 say "a base station, two robots and an operator with rights (docs/security.md)"
 typed="$(sed -n '/^## A base station/,/^## The model/p' "$root/docs/security.md" | sed -n '/^```/,/^```/{/^```/d;p}' |
   sed -e 's/BASE/127.0.0.1/; s/0\.0\.0\.0/127.0.0.1/; s# \([a-z]*\.cred\)# pki/credentials/\1#; s#/var/lib/tutti-##')"

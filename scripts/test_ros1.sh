@@ -16,7 +16,7 @@ trap 'rm -rf "$work"' EXIT
 say "ROS 1"
 unpack "$work" python3-rosbag python3-rosmaster python3-rospy python3-nav-msgs python3-sensor-msgs python3-tf2-msgs
 
-# Its recorder looks for its plugins below /lib of this path, not in the folder of the architecture.
+# Its recorder expects its plugins below /lib of this path, not in the folder of the architecture.
 arch="$(dpkg-architecture -qDEB_HOST_MULTIARCH)"
 ln -sf "$arch/ros/librosbag_default_encryption_plugins.so" "$work/root/usr/lib/"
 export CMAKE_PREFIX_PATH="$work/root/usr"

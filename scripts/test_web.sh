@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # The page of web/: types, unit tests in Node, that web/dist is what the sources make, and a headless Chromium that drives it.
-# Skips, and says so, without what it needs; without an option it installs Chromium and Node where they are missing.
+# Skips, and reports it, without what it needs; without an option it installs Chromium and Node where they are missing.
 #   scripts/test_web.sh [--write | --quick | --chromium | --programs TUTTI]
 # --write: renews web/dist instead of comparing it; --quick: no Chromium; --chromium: nothing else;
 # --programs: Chromium drives the page of this program instead of a made-up mission. The last three install no packages.

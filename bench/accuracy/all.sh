@@ -1,12 +1,14 @@
 #!/bin/sh
 # SPDX-License-Identifier: BSD-3-Clause
-# Makes every generated table of docs/results anew, in one night on two cores, and says which differ from what is committed.
+# Makes every generated table of docs/results anew, in one night on two cores, and lists which differ from what is
+# committed.
 #
 # Usage: bench/accuracy/all.sh SHARED [TABLE...]
 #
-# SHARED holds data/ (docs/data.md) and cases/. TABLEs are fleets, map, judge, missions, hku, paper and selection; all without any.
-# Builds the preset `bench` first. Runs are kept in out/all/PROGRAM, PROGRAM being a sum over what was built: stopped at
-# any moment and called again it goes on, and another program begins anew. JOBS=1 leaves a core free (default 2).
+# SHARED has data/ (docs/data.md) and cases/. TABLEs are fleets, map, judge, missions, hku, paper and selection; all
+# without any. Builds the preset `bench` first. Runs are kept in out/all/PROGRAM, PROGRAM being a sum over what was
+# built: stopped at any time and called again it goes on, and another program begins anew. JOBS=1 leaves a core free
+# (default 2).
 set -eu
 cd "$(dirname "$0")/../.."
 [ $# -ge 1 ] || { sed -n '3,10s/^# \{0,1\}//p' "$0"; exit 2; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How often a robot that is off by no more than the map itself may be is told that it disagrees: a mission runs in the
+// How often a robot that is off by no more than the map itself may be is found to disagree: a mission runs in the
 // order of time, without a radio; at every tenth update of the map, draws of the map's own posterior, with other random
 // numbers than the server's, take the robot's place in its test. One JSON object per robot and update.
 #include <CLI/CLI.hpp>
@@ -25,8 +25,8 @@ namespace {
 
 using namespace tutti;
 
-/// The test that a robot makes of a broadcast, all of whose nodes of this chain it has. The first of a mission's looks
-/// has half of its false alarms: twice alpha gives this one all of alpha.
+/// The test that a robot makes of a broadcast, all of whose nodes of this chain it has. The first of a mission's
+/// comparisons has half of its false alarms: twice alpha gives this one all of alpha.
 consistency::DisagreementTest robots_test(const ProxyGraph& graph, const ChainId& chain, double alpha) {
   std::vector<consistency::NodePair> pairs;
   for (std::size_t i = 0; i < graph.nodes.size(); ++i)

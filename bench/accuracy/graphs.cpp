@@ -55,7 +55,7 @@ CorridorRunConfig config_of(const std::string& odometry, std::uint64_t seed) {
   config.odometry.stated_sigma_factor = odometry == "too sure" ? 1.0 / 3.0 : 1.0;
   config.closures = {.radius_m = 4.0, .sigma_m = 0.1, .sigma_deg = 1.0, .wrong_share = rng.uniform(0.04, 0.17)};
   const double until_s = config.walk.duration_s;
-  if (seed % 2 == 0)  // a street that looks like another one
+  if (seed % 2 == 0)  // a street similar to another one
     config.look_alikes = {{.first = {0},
                            .first_from_s = rng.uniform(0.1, 0.3) * until_s,
                            .second = {1},

@@ -35,16 +35,16 @@ Status print_rows(const std::string& mission_file, const std::string& map_file, 
     const auto score =
         lab::score_grid(*made, config.grid, estimate, *mission, seed, kNear_m, resolution_m < 0.1 ? 2 : 1);
     if (!score) return tl::unexpected(score.error());
-    for (const auto& [said, name] :
+    for (const auto& [state, name] :
          {std::pair{OccupancyGrid::free, "free"}, std::pair{OccupancyGrid::occupied, "occupied"},
           std::pair{OccupancyGrid::unknown, "unknown"}}) {
-      const std::size_t free = score->of(said, TrueCell::free), surface = score->of(said, TrueCell::surface),
-                        rock = score->of(said, TrueCell::rock), all = free + surface + rock;
+      const std::size_t free = score->of(state, TrueCell::free), surface = score->of(state, TrueCell::surface),
+                        rock = score->of(state, TrueCell::rock), all = free + surface + rock;
       const auto share = [&](std::size_t count) {
         return fmt::format("{:.1f} %", all > 0 ? 100.0 * static_cast<double>(count) / static_cast<double>(all) : 0.0);
       };
       fmt::print("| {} m | {} | {} | {} | {} | {} | {} |\n", resolution_m, name, all, share(free), share(surface),
-                 share(rock), said == OccupancyGrid::occupied ? share(score->occupied_near_surface) : "");
+                 share(rock), state == OccupancyGrid::occupied ? share(score->occupied_near_surface) : "");
     }
     std::fflush(stdout);
   }

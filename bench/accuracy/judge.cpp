@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Outlier rejection on simulated places of every scale: a room, a hall, a tunnel, a street; wrong closures strewn about
 // and in groups that agree, odometry that fails, and that is three times too sure or unsure of itself. One JSON object
-// per map: its error over that of a judge who is told which closures are wrong.
+// per map: its error over that of a judge who knows which closures are wrong.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
@@ -34,7 +34,7 @@ const std::vector<Place> kPlaces = {{"room", 2.5, 0.7, 150.0, 1.0},
                                     {"tunnel", 60.0, 2.0, 900.0, 1.0},
                                     {"street", 120.0, 12.0, 600.0, 0.5}};
 
-/// Wrong closures: strewn about, and how long the segments are that look alike (0: none do).
+/// Wrong closures: strewn about, and how long the similar segments are (0: none).
 struct Wrong {
   double share;
   double alike_s;
@@ -78,7 +78,7 @@ CorridorRunConfig config_of(const Case& of) {
   return config;
 }
 
-/// The map of a judge who is told which closures are wrong.
+/// The map of a judge who knows which closures are wrong.
 server::MapEstimate perfect_map(CorridorRun run, const server::MapConfig& config) {
   DecisionSet decisions;
   for (auto& [pair, verdict] : run.verdicts) {

@@ -11,7 +11,7 @@ ERRORS = ("rmse_m", "max_error_m", "rpe_m", "rpe_deg", "rpe_10m_m", "rpe_10m_deg
 
 
 def without_partial(report):
-    """The report without the errors that were scored on too little of the way (docs/report.md): no table has them."""
+    """The report without the errors that were scored on too little of the distance (docs/report.md): no table has them."""
     def drop(figures, prefix=""):
         if figures.get(f"{prefix}partial"):
             for key in figures:

@@ -42,7 +42,7 @@ def heading(*cells):
 
 
 def ratio(line):
-    """Final error over the server's; None where either is not scored on the whole way."""
+    """Final error over the server's; None where either is not scored on the whole distance."""
     own, server = line["own_rmse_m"], line["server_rmse_m"]
     return own / server if own is not None and server else None
 

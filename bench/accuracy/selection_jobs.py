@@ -42,7 +42,7 @@ def all_missions():
 
 
 class Jobs:
-    """In the order in which they are to be run: what tells most comes first."""
+    """In the order in which they are to be run: what shows most comes first."""
 
     def __init__(self, arguments):
         self.arguments, self.folder = arguments, pathlib.Path(arguments.keep)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What it costs the server to say how sure it is of the shapes: time per proxy graph and bytes per broadcast, on a map
-// of the size of the tunnel mission. `error` is the root mean square relative error of the sags against many samples;
-// with deletions it also holds what hinges on one closure.
+// What it costs the server to compute how sure it is of the shapes: time per proxy graph and bytes per broadcast, on a
+// map of the size of the tunnel mission. `error` is the root mean square relative error of the sags against many
+// samples; with deletions it also contains what hinges on one closure.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>

@@ -51,7 +51,7 @@ constexpr std::size_t kRowsPerCommit = 2000;
 /// As a LiDAR place's.
 constexpr std::size_t kPlaceBytes = 4105;
 
-/// As one that compares scans: every pair is worth a look that is a candidate.
+/// As one that compares scans: every pair is worth a check that is a candidate.
 class EveryPair final : public server::ClosureVerifier {
  public:
   static MethodId who() { return {"large_map", 1, 1}; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A robot's long day, trajectory only: what it writes, holds in memory, and how long a sample takes, hour by hour; its
+// A robot's long day, trajectory only: what it writes, keeps in memory, and how long a sample takes, hour by hour; its
 // store an SQLite file. The server is played: now and then a proxy graph of all that the robot has, the odometry's
 // drift taken out. Usage:
 //   bench_robot_day HOURS METRES_PER_SECOND SAMPLES_PER_SECOND [MINUTES BETWEEN GRAPHS, 0: none [FOLDER]]
@@ -53,8 +53,8 @@ struct Hour {
 constexpr RobotId kRobot{1};
 
 /// Laps of 500 m, of which each drifts on.
-Pose3 true_pose(double way_m) {
-  const double angle = way_m / 80.0;
+Pose3 true_pose(double distance_m) {
+  const double angle = distance_m / 80.0;
   return {Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ())),
           {80.0 * std::sin(angle), 80.0 * (1.0 - std::cos(angle)), 0.0}};
 }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a mapping server holds in memory after a mission of so many robots and minutes, per robot-hour, and where it
+// What a mapping server keeps in memory after a mission of so many robots and minutes, per robot-hour, and where it
 // goes: trajectories and, where the mission has them, images; the map in an SQLite file. Usage:
 //   bench_server_memory MISSION.yaml ROBOTS MINUTES [SECONDS BETWEEN UPDATES [POINTS PER SUBMAP [MAP: it stays there]]]
-//   bench_server_memory MISSION.yaml DATA-FOLDER [SETTING=VALUE ...]      as the mission has it: robots, way and
-//   closures
+//   bench_server_memory MISSION.yaml DATA-FOLDER [SETTING=VALUE ...]      as the mission has it: robots, trajectories
+//   and closures
 #include <fmt/format.h>
 #include <malloc.h>
 #include <sys/resource.h>
@@ -215,7 +215,7 @@ void run(const Arguments& arguments) {
              (peak_in_update - resident_before) / hours);
   const server::MapServerState& state = node->map_server().state();
   const auto map = with_peak("  of it, estimating the map", hours, [&] {
-    return server::estimate_map(state.submaps, state.verdicts, config->server.map, state.words);
+    return server::estimate_map(state.submaps, state.verdicts, config->server.map, state.decisions);
   });
   static_cast<void>(with_peak("  of it, the proxy graph", hours,
                               [&] { return server::monitor_graph(map, 1, config->server.proxy_graph); }));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Time of each stage of a visual loop closure in a simulated room, and of the first look of a keyframe at 10,000
+// Time of each stage of a visual loop closure in a simulated room, and of the first check of a keyframe against 10,000
 // others, with the error of what came out beside it. bench_visual_v101 does the closures on a real recording.
 #include <benchmark/benchmark.h>
 
@@ -57,7 +57,7 @@ void three_points(benchmark::State& state) {
 }
 BENCHMARK(three_points);
 
-/// Another room: nothing but the first look.
+/// Another room: nothing but the first check.
 void verify_a_hopeless_pair(benchmark::State& state) {
   const VisualClosureConfig config;
   const auto other_room = textured_room(1200, Rng(2));
@@ -105,7 +105,7 @@ Bits seen_again(std::uint32_t submap, std::uint32_t point, double flips, Rng& rn
 }
 
 /// `share` of the descriptors are of the place, the others of nothing.
-Descriptors look_around(std::uint32_t submap, double share, Rng& rng) {
+Descriptors observe(std::uint32_t submap, double share, Rng& rng) {
   Descriptors out{.kind = DescriptorKind::maplab, .words = kWords};
   for (std::uint32_t i = 0; i < kPerKeyframe; ++i) {
     const Bits bits = rng.bernoulli(share) ? seen_again(submap, static_cast<std::uint32_t>(rng.index(300)), 0.06, rng)
@@ -124,7 +124,7 @@ const std::vector<SubmapFeatures>& all_submaps() {
       Descriptors& rows = out[s].landmark_descriptors;
       rows = {.kind = DescriptorKind::maplab, .words = kWords};
       for (std::uint32_t k = 0; k < kPerSubmap; ++k) {
-        const Descriptors its = look_around(s, 0.7, rng);
+        const Descriptors its = observe(s, 0.7, rng);
         rows.bits.insert(rows.bits.end(), its.bits.begin(), its.bits.end());
       }
       out[s].tables = DescriptorTables(table_keys(rows));
@@ -144,7 +144,7 @@ void place_among_10000(benchmark::State& state) {
   query.descriptors = {.kind = DescriptorKind::maplab, .words = kWords};
   for (std::uint32_t k = 0; k < kPerSubmap; ++k) {
     places.push_back(static_cast<std::uint32_t>(rng.index(submaps.size())));
-    const Descriptors its = look_around(places.back(), 0.3, rng);
+    const Descriptors its = observe(places.back(), 0.3, rng);
     QueryFrame image;
     for (std::uint32_t i = 0; i < kPerKeyframe; ++i) image.observations.push_back({.descriptor = kPerKeyframe * k + i});
     query.keyframes.push_back({.frames = {image}});

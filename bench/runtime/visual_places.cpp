@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Place recognition on the 100 real stereo images of euroc_V1_01_visnav: each becomes a submap of one keyframe, every
-// two are verified as submaps are, and a revisit is a closure that says that they were taken within 1.5 m and 45
+// two are verified as submaps are, and a revisit is a closure by which they were taken within 1.5 m and 45
 // degrees. Right pairs are the 82 listed ones; wrong ones all more than 20 s apart that are neither listed nor within 2
 // m and 60 degrees. Printed: precision and recall by how many inliers are asked, and how many closures are off in their
 // pose. Usage: bench_visual_places [brisk|orb [max Hamming share [max position sigma in m]]]
@@ -72,7 +72,7 @@ struct Labels {
   Trajectory truth = value(formats::read_trajectory(TUTTI_SHARED_DIR "/data/euroc/V1_01/groundtruth.tum"));
 };
 
-/// Inliers of the closure when it says that the images were taken near each other, else 0: a wall that is recognised
+/// Inliers of the closure by which the images were taken near each other, else 0: a wall that is recognised
 /// from across the room is no revisit.
 double score(const ClosureVerdict& verdict) {
   if (verdict.closures.empty() || !within(verdict.closures[0].measurement.T_a_b, 1.5, 45.0)) return 0.0;

@@ -46,7 +46,7 @@ def scan_frame(stamp_ns, xyz_field):
 
 
 class Hall:
-    """A circle in a hall with columns; the scans of one lap, said again in each."""
+    """A circle in a hall with columns; the scans of one lap, sent again in each."""
 
     def __init__(self, points, encode):
         rng = random.Random(1)

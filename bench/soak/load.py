@@ -36,7 +36,7 @@ def head(*cells):
 
 
 def status(folder):
-    """What a program last said of itself, and when by the clock on the wall."""
+    """What a program last reported of itself, and when by the wall clock."""
     file = folder / "status.json"
     try:
         return json.loads(file.read_text()), file.stat().st_mtime
@@ -54,7 +54,7 @@ def used(process):
 
 
 class Mission:
-    """Programs in a folder; what they said and used while they ran."""
+    """Programs in a folder; what they reported and used while they ran."""
 
     def __init__(self, tutti, folder, mission, rate):
         self.tutti, self.folder, self.mission, self.rate = tutti, folder, mission, rate
@@ -101,7 +101,7 @@ class Mission:
         return robots_busy, server_busy
 
     def wait(self, until_done):
-        """Seconds until nobody has anything to do, by what look() says."""
+        """Seconds until nobody has anything to do, by what look() returns."""
         begin = time.monotonic()
         quiet = 0
         while quiet < 3:  # a status is half a second old

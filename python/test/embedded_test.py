@@ -91,7 +91,7 @@ class Embedded(InFolder):
                     for job in server.take_jobs():
                         server.receive(server.verify(job))
                     agent.receive(server.optimise())
-            except Exception as error:  # told below
+            except Exception as error:  # reported below
                 failed.append(error)
 
         threads = [threading.Thread(target=work, args=(k,)) for k in range(4)]

@@ -60,7 +60,7 @@ class Garbage(InFolder):
         yield "BagWriter.write_transform", (writer, 1.0, np.eye(4), "a", "b")
 
     def arguments(self, function):
-        """Names of all arguments, by what pybind11 says of them."""
+        """Names of all arguments, by pybind11's signatures."""
         doc = (function.__init__ if inspect.isclass(function) else function).__doc__
         names = [part.split(":")[0].strip() for part in doc.split("(", 1)[1].split(", ") if ":" in part]
         return [name for name in names if name.isidentifier() and name != "self"]

@@ -29,7 +29,7 @@ class Missions(InFolder):
         joint = tutti.open_map(path)
         self.assertEqual((joint.robots, joint.components), (["alpha", "bravo"], 1))
         ways = joint.trajectories()
-        for name, robot in zip(joint.robots, result.robots):  # nobody told the server what they are called
+        for name, robot in zip(joint.robots, result.robots):  # nobody gave the server their names
             np.testing.assert_allclose(ways[name].positions, robot.server.positions, atol=1e-6)
         self.assertEqual(len(joint.graph()), len(result.graph))
         accepted = [closure for closure in joint.closures() if closure.state == "accepted"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The package as a whole: what it has, how it says so, and that it installs."""
+"""The package as a whole: what it has, how it documents that, and that it installs."""
 import ast
 import contextlib
 import importlib.util
@@ -79,7 +79,7 @@ class Library(InFolder):
         self.assertLess(time.process_time() - cpu, 1.3 * (time.perf_counter() - wall) + 0.05)
 
     def test_others_run_meanwhile(self):
-        """Long calls let go of the interpreter."""
+        """Long calls release the interpreter."""
         import threading
         places = np.random.default_rng(1).uniform(0, 20, (1200, 3))
         graph = tutti.proximity_graph(places)

@@ -96,7 +96,7 @@ class PoseGraphs(InFolder):
         np.testing.assert_allclose(relative, truth, atol=0.3)
 
     def test_any_graph_is_solved_or_refused(self):
-        """Robots in pieces, edges that say next to nothing or all too much: whatever it is, it is no bug of Tutti's."""
+        """Robots in segments, edges with next to no or far too much information: whatever it is, it is no bug of Tutti's."""
         rng, solved = np.random.default_rng(5), 0
         for _ in range(60):
             n = rng.integers(1, 30)

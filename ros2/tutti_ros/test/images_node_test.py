@@ -62,7 +62,7 @@ class Images(WithPrograms):
             ahead = {one: it for one, it in ahead.items() if it}
 
     def recorded_images(self, name):
-        """How many moments with images, and IMU samples."""
+        """How many times with images, and IMU samples."""
         counts = collections.Counter(topic for topic, _ in self.recorded(name, TOPICS))
         return counts["camera0/image_raw"], counts["imu"]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is said to a robot, and said again: run by tutti_ros_test.py."""
+"""What is sent to a robot, and sent again: run by tutti_ros_test.py."""
 import struct
 import unittest
 
@@ -16,7 +16,7 @@ def at(i):
 
 
 class Reconnecting(unittest.TestCase):
-    """The state machine alone: what it says and says again."""
+    """The state machine alone: what it sends and sends again."""
 
     def welcome(self, link, last_ns=None, takes=("hello", "odometry", "raw")):
         self.assertEqual(self.parse(link.connected())[0].WhichOneof("what"), "hello")

@@ -32,7 +32,7 @@ class Package(unittest.TestCase):
             self.assertIn(file, files)
 
     def test_launch_files(self):
-        """Against stubs that keep what they are told: arguments are declared before they are used, files are there."""
+        """Against stubs that keep what they are given: arguments are declared before they are used, files are there."""
         made = []
 
         class Any:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""As tutti_ros_test.py is told."""
+"""As given to tutti_ros_test.py."""
 import pathlib
 import sys
 

@@ -61,7 +61,7 @@ class WithPrograms(unittest.TestCase):
                 yield of[topic], cdr
 
     def place_sensors(self, name, node):
-        """As that bag says where they are."""
+        """Where they are by that bag."""
         for topic, cdr in mcap_reader.messages((self.path / name / f"{name}_0.mcap").read_bytes()):
             if topic == "/tf_static":
                 node.callbacks[topic](cdr)
@@ -79,7 +79,7 @@ class WithPrograms(unittest.TestCase):
             return {}
 
     def fed(self, name):
-        """What its status says of its feed."""
+        """What its status reports of its feed."""
         return self.status(name).get("feed", {})
 
     def wait_for_map(self):

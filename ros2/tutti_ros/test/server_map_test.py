@@ -67,7 +67,7 @@ class Reading(unittest.TestCase):
 
 
 class Exporting(unittest.TestCase):
-    """Against a program that plays `tutti map export`: what is looked at when, and what is said."""
+    """Against a program that plays `tutti map export`: what is checked when, and what is reported."""
 
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
@@ -111,7 +111,7 @@ class Exporting(unittest.TestCase):
         self.assertIsNone(self.look(20.0))
         self.assertEqual(self.runs, 1)  # nothing was stored
         self.store("one and two")
-        self.assertIsNone(self.look(21.0))  # looks the same
+        self.assertIsNone(self.look(21.0))  # is the same
         self.assertEqual(self.runs, 2)
         self.pgm = PGM.replace(b"\xcd", b"\xfe")
         self.play("")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A thread that holds a Link to the robot program's socket, and tries again for ever when it is not there."""
+"""A thread that has a Link to the robot program's socket, and tries again for ever when it is not there."""
 import select
 import socket
 import threading
@@ -19,7 +19,7 @@ class Connection(threading.Thread):
         self.ending = threading.Event()
 
     def wake(self):
-        """There is something to say."""
+        """There is something to send."""
         try:
             self.waker.send(b".")
         except BlockingIOError:  # it is awake

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What /diagnostics says of the robot."""
+"""What /diagnostics reports of the robot."""
 OK, WARN, ERROR = 0, 1, 2  # diagnostic_msgs/DiagnosticStatus
 COUNTED = ("odometry", "scans", "fixes", "images", "imu", "corrections", "refused", "jumps", "forgotten_while_away")
 

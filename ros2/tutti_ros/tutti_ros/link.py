@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The client's side of the live feed without a socket or a clock: which messages of ROS to say next, what was heard, what to say
-again after a connection was lost. docs/protocol.md says why."""
+"""The client's side of the live feed without a socket or a clock: which messages of ROS to send next, what was heard, what to
+send again after a connection was lost. docs/protocol.md has the reasons."""
 import collections
 import dataclasses
 import struct
@@ -10,8 +10,8 @@ from tutti_ros.feed_messages import Feed
 PROTOCOL_VERSION = 1
 LONGEST_FRAME = 16 * 1024 * 1024
 FIRST_WAIT_S, LONGEST_WAIT_S = 0.25, 5.0
-HISTORY_NS = 2 * 10**9   # of odometry that the robot has: how the body moved before what is said next
-LATEST_NS = 500_000_000  # behind odometry, for what was not said before a connection was lost
+HISTORY_NS = 2 * 10**9   # of odometry that the robot has: how the body moved before what is sent next
+LATEST_NS = 500_000_000  # behind odometry, for what was not sent before a connection was lost
 MOST_LASTING, MOST_MOVING = 1000, 100  # messages that every connection begins with
 
 
@@ -44,7 +44,7 @@ class Sample:
 
 
 class Link:
-    """Messages are kept until the robot has them on its disk, so that one that was killed is told again what it lost. From
+    """Messages are kept until the robot has them on its disk, so that one that was killed is sent again what it lost. From
     `most_samples` on the oldest go; from `most_bytes` on the oldest scans, images and what else is no odometry. `hello`: fields of
     Feed.Hello. States: away, greeting, feeding, refused (the robot closed the connection, and said why; tried again like any
     other)."""
@@ -55,13 +55,13 @@ class Link:
         self.counts = collections.Counter()
         self.kept = collections.deque()
         self.heavy, self.heavy_bytes = collections.deque(), 0  # those of `kept` that are no odometry
-        self.waiting = collections.deque()  # those of `kept` that are to be said on this connection
-        self.once = collections.deque()     # frames that are said before these, and never again
+        self.waiting = collections.deque()  # those of `kept` that are to be sent on this connection
+        self.once = collections.deque()     # frames that are sent before these, and never again
         self.lasting, self.moving = {}, collections.deque(maxlen=MOST_MOVING)  # frames that every connection begins with
         self.newest_ns = None               # of odometry that was answered
         self.welcome, self.goodbye, self.received = None, False, b""
 
-    # What is to be said: add_*(topic, kind, cdr, ...), a message as it came.
+    # What is to be sent: add_*(topic, kind, cdr, ...), a message as it came.
     def add(self, topic, kind, cdr, counted):
         """A message that begins with a header, and is counted as `counted`."""
         sample = Sample(stamp_ns(cdr), raw_frame(topic, kind, cdr), counted)
@@ -83,7 +83,7 @@ class Link:
             self._count_forgotten()
 
     def add_lasting(self, topic, kind, cdr, key=b""):
-        """One that holds until another of this topic and key comes."""
+        """One that is valid until another of this topic and key comes."""
         said = raw_frame(topic, kind, cdr)
         self.lasting.pop((topic, key), None)
         self.lasting[topic, key] = said
@@ -92,7 +92,7 @@ class Link:
         self._say_once(said)
 
     def add_moving(self, topic, kind, cdr):
-        """One that is repeated for as long as it holds."""
+        """One that is repeated for as long as it is valid."""
         self.moving.append(raw_frame(topic, kind, cdr))
         self._say_once(self.moving[-1])
 
@@ -118,7 +118,7 @@ class Link:
 
     # The connection.
     def connected(self):
-        """What to say first."""
+        """What to send first."""
         self.state, self.received, self.welcome = "greeting", b"", None
         self.waiting.clear()
         self.once.clear()
@@ -134,7 +134,7 @@ class Link:
         return wait_s
 
     def next_frame(self):
-        """What to say now; empty: nothing."""
+        """What to send now; empty: nothing."""
         if self.state != "feeding":
             return b""
         if self.once:

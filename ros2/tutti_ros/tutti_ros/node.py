@@ -35,7 +35,7 @@ PARAMETERS = {
     "publish_tf": True,
     "path_period_s": 1.0,
 }
-# How much odometry is to be trusted, as robots[].covariance of a mission file. Variances add up along the way.
+# How much odometry is to be trusted, as robots[].covariance of a mission file. Variances add up along the trajectory.
 NOISE = {"translation_m_per_sqrt_m": 0.02, "translation_m_per_sqrt_deg": 0.001, "translation_m_per_sqrt_s": 0.003,
          "rotation_deg_per_sqrt_m": 0.1, "rotation_deg_per_sqrt_deg": 0.02, "rotation_deg_per_sqrt_s": 0.02}
 ODOMETRY, TRANSFORMS, PATH = "nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage", "nav_msgs/msg/Path"
@@ -43,7 +43,7 @@ CLOUD, LIVOX = "sensor_msgs/msg/PointCloud2", ("livox_ros_driver2/msg/CustomMsg"
 COMPRESSED = ("/compressed", "/compressedDepth")  # as image_transport names topics of CompressedImage
 TF_QOS = QoSProfile(depth=100)
 STATIC_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-IMAGES_QOS, IMU_QOS = best_effort(10), best_effort(2000)  # how long the node may be held up
+IMAGES_QOS, IMU_QOS = best_effort(10), best_effort(2000)  # how long the node may be blocked
 
 
 def message_type(name):
@@ -197,7 +197,7 @@ class TuttiNode(Node):
         self.outputs[topic].publish(data)
 
     def publish_transform(self, data):
-        """Once for each stamp: what a robot is told again was published while it was away, and tf2 warns of repetitions."""
+        """Once for each stamp: what a robot is sent again was published while it was away, and tf2 warns of repetitions."""
         at_ns = stamp_ns(data, 8)
         if self.publish_tf and at_ns > self.transform_ns:
             self.transform_ns = at_ns

@@ -61,7 +61,7 @@ def pixels_of(pgm):
 
 def grid_of(yaml, pgm):
     """As nav2's map server reads it, mode trinary: darker than occupied_thresh is occupied, lighter than free_thresh free
-    (or the other way round with negate), and the image's last row is the least y."""
+    (or inverted with negate), and the image's last row is the least y."""
     said = settings_of(yaml)
     if said["mode"] != "trinary":
         raise ValueError(f"mode '{said['mode']}', expected trinary")

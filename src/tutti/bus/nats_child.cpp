@@ -291,7 +291,7 @@ Result<std::unique_ptr<NatsChild>> NatsChild::start(const fs::path& folder, cons
 }
 
 /// Where it was the last time: others know it by that address, so one that is still ending is waited for. Otherwise
-/// below the ports that systems give to clients: there a client that searches a bus which is gone can connect to
+/// below the ports that systems give to clients: there a client that reconnects to a bus which is gone can reach
 /// itself, and keep its port.
 Status NatsChild::launch_anywhere() {
   constexpr int kFirst = 20000, kPorts = 10000, kTries = 10;
