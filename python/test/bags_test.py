@@ -7,22 +7,22 @@ POINTS = np.random.default_rng(1).normal(size=(50, 3)).astype(np.float32)
 
 
 class Bags(InFolder):
-    def write(self, name, way):
+    def write(self, name, trajectory):
         with tutti.BagWriter(self.path / name) as bag:
-            bag.write_transform(way.stamps[0], np.eye(4), "base_link", "lidar", is_static=True)
-            for stamp, T in zip(way.stamps, way.matrices):
+            bag.write_transform(trajectory.stamps[0], np.eye(4), "base_link", "lidar", is_static=True)
+            for stamp, T in zip(trajectory.stamps, trajectory.matrices):
                 bag.write_odometry("/odom", stamp, T)
                 bag.write_transform(stamp, T, "odom", "base_link")
                 bag.write_points("/points", stamp, POINTS, "lidar")
         return self.path / name
 
     def test_what_is_written_reads_back(self):
-        way = walk(20)
+        trajectory = walk(20)
         for name in ("bag", "bag.mcap"):
-            path = self.write(name, way)
+            path = self.write(name, trajectory)
             again = tutti.read_bag_trajectory(path, "/odom")
-            np.testing.assert_allclose(again.matrices, way.matrices, atol=1e-12)
-            np.testing.assert_allclose(again.stamps, way.stamps, atol=1e-6)
+            np.testing.assert_allclose(again.matrices, trajectory.matrices, atol=1e-12)
+            np.testing.assert_allclose(again.stamps, trajectory.stamps, atol=1e-6)
             clouds = [message.decode() for message in tutti.read_bag(path, ["/points"])]
             self.assertEqual(len(clouds), 20)
             np.testing.assert_array_equal(clouds[3]["points"], POINTS)

@@ -28,29 +28,31 @@ class Garbage(InFolder):
 
     def right(self):
         """Functions with arguments that they take."""
-        points, way = np.random.default_rng(1).uniform(size=(20, 3)), walk(20)
+        points, trajectory = np.random.default_rng(1).uniform(size=(20, 3)), walk(20)
         graph = tutti.proximity_graph(points, 0.5)
-        poses = tutti.PoseGraph(way.matrices, [(i, i + 1) for i in range(19)], np.tile(np.eye(4), (19, 1, 1)))
+        poses = tutti.PoseGraph(trajectory.matrices, [(i, i + 1) for i in range(19)], np.tile(np.eye(4), (19, 1, 1)))
         bag = str(self.path / "bag.mcap")
         with tutti.BagWriter(bag) as writer:
             writer.write_odometry("/odom", 1.0, np.eye(4))
         agent = tutti.RobotAgent(0)
         writer = tutti.BagWriter(str(self.path / "other.mcap"))
         yield from {
-            "Trajectory": (way.stamps, way.positions, way.quaternions_xyzw), "PoseGraph": (poses.poses, poses.edges, poses.measurements),
+            "Trajectory": (trajectory.stamps, trajectory.positions, trajectory.quaternions_xyzw),
+            "PoseGraph": (poses.poses, poses.edges, poses.measurements),
             "OrientedCloud": (points,), "Closure": (0, 1, np.eye(4), np.eye(6)), "RobotAgent": (0,), "MapServer": ([0],),
-            "associate": (way, way), "ate": (way, way), "rpe": (way, way), "compare": (way, way), "proximity_graph": (points,),
+            "associate": (trajectory, trajectory), "ate": (trajectory, trajectory), "rpe": (trajectory, trajectory), "compare": (trajectory, trajectory),
+            "proximity_graph": (points,),
             "graph_from_edges": (3, [[0, 1]], [1.0]), "spectrum": (graph,), "wavelet_transform": (graph, points), "meyer_kernels": (3, 2.0, [0.5]),
             "kron_reduce": (graph, [1, 2]), "sparsify": (graph, 0.1), "select_budget": (graph, points, 5), "select_largest_eigenvector": (graph,),
             "optimise": (poses,), "optimise_robust": (poses,), "read_graph": ("nowhere.g2o",), "write_graph": (self.path / "x.g2o", poses),
-            "read_trajectory": ("nowhere.tum",), "write_trajectory": (self.path / "x.tum", way), "read_cloud": ("nowhere.pcd",),
+            "read_trajectory": ("nowhere.tum",), "write_trajectory": (self.path / "x.tum", trajectory), "read_cloud": ("nowhere.pcd",),
             "read_timed_cloud": ("nowhere.pcd",), "write_cloud": (self.path / "x.ply", points), "voxel_downsample": (points, 0.1),
             "register_clouds": (points, points), "cloud_distances": (points, points), "bag_info": (bag,), "read_bag": (bag,),
             "read_bag_trajectory": (bag, "/odom"), "open_map": ("nowhere.tutti",), "run_mission": ("nowhere.yaml",), "run_bags": ({"a": "nowhere"},),
             "BagWriter": (self.path / "x.mcap",),
         }.items()
-        yield "Trajectory.transformed", (way, np.eye(4))
-        yield "Trajectory.from_matrices", (way.stamps, way.matrices)
+        yield "Trajectory.transformed", (trajectory, np.eye(4))
+        yield "Trajectory.from_matrices", (trajectory.stamps, trajectory.matrices)
         yield "RobotAgent.add_scan", (agent, 0.0, points)
         yield "RobotAgent.receive", (agent, b"")
         yield "RobotAgent.add_odometry", (agent, 0.0, np.eye(4), np.eye(6))

@@ -8,25 +8,25 @@ from support import InFolder, program, run, shift, turn, walk
 
 class Trajectories(InFolder):
     def test_arrays_come_back(self):
-        way = walk(20)
-        again = tutti.Trajectory.from_ns(way.stamps_ns, way.positions, way.quaternions_xyzw)
-        np.testing.assert_allclose(again.matrices, way.matrices, atol=1e-12)
-        np.testing.assert_array_equal(again.stamps_ns, way.stamps_ns)
-        self.assertEqual(way.positions.shape, (20, 3))
-        self.assertEqual(len(way[5:15:2]), 5)
-        self.refuses("negative", lambda: way[::-1])
-        self.assertNotEqual(way, 3)
+        trajectory = walk(20)
+        again = tutti.Trajectory.from_ns(trajectory.stamps_ns, trajectory.positions, trajectory.quaternions_xyzw)
+        np.testing.assert_allclose(again.matrices, trajectory.matrices, atol=1e-12)
+        np.testing.assert_array_equal(again.stamps_ns, trajectory.stamps_ns)
+        self.assertEqual(trajectory.positions.shape, (20, 3))
+        self.assertEqual(len(trajectory[5:15:2]), 5)
+        self.refuses("negative", lambda: trajectory[::-1])
+        self.assertNotEqual(trajectory, 3)
         self.assertEqual(tutti.Trajectory([1], [[0, 0, 0]], [[0, 0, 0, 1]]), tutti.Trajectory.from_matrices([1.0], [np.eye(4)]))
 
     def test_quaternions_are_x_y_z_w(self):
-        way = tutti.Trajectory([0.0], [[0, 0, 0]], [[0, 0, np.sqrt(0.5), np.sqrt(0.5)]])
-        np.testing.assert_allclose(way.matrices[0], turn([0, 0, 1], np.pi / 2), atol=1e-12)
+        trajectory = tutti.Trajectory([0.0], [[0, 0, 0]], [[0, 0, np.sqrt(0.5), np.sqrt(0.5)]])
+        np.testing.assert_allclose(trajectory.matrices[0], turn([0, 0, 1], np.pi / 2), atol=1e-12)
 
     def test_any_dtype_and_strides(self):
         turns = np.tile(np.float32([0, 0, 0, 1]), (6, 1))
-        way = tutti.Trajectory(np.arange(12, dtype=np.int32)[::2], np.arange(36).reshape(12, 3)[::2], np.asfortranarray(turns))
-        np.testing.assert_array_equal(way.positions, np.arange(36.0).reshape(12, 3)[::2])
-        np.testing.assert_array_equal(way.stamps, np.arange(0.0, 12.0, 2.0))
+        trajectory = tutti.Trajectory(np.arange(12, dtype=np.int32)[::2], np.arange(36).reshape(12, 3)[::2], np.asfortranarray(turns))
+        np.testing.assert_array_equal(trajectory.positions, np.arange(36.0).reshape(12, 3)[::2])
+        np.testing.assert_array_equal(trajectory.stamps, np.arange(0.0, 12.0, 2.0))
 
     def test_nothing_is_something(self):
         none = tutti.Trajectory([], [], [])
@@ -47,12 +47,12 @@ class Trajectories(InFolder):
         self.refuses("matrices[0]|rigid", tutti.Trajectory.from_matrices, [0.0], [2 * np.eye(4)])
 
     def test_files_read_back(self):
-        way = walk(30)
+        trajectory = walk(30)
         for form in ("tum", "euroc"):
-            tutti.write_trajectory(self.path / "way.txt", way, form)
-            self.assertEqual(tutti.read_trajectory(str(self.path / "way.txt")), way)
-        tutti.write_trajectory(self.path / "way.txt", way, "kitti")
-        np.testing.assert_allclose(tutti.read_trajectory(self.path / "way.txt", kitti_rate_hz=5.0).matrices, way.matrices, atol=1e-9)
+            tutti.write_trajectory(self.path / "way.txt", trajectory, form)
+            self.assertEqual(tutti.read_trajectory(str(self.path / "way.txt")), trajectory)
+        tutti.write_trajectory(self.path / "way.txt", trajectory, "kitti")
+        np.testing.assert_allclose(tutti.read_trajectory(self.path / "way.txt", kitti_rate_hz=5.0).matrices, trajectory.matrices, atol=1e-9)
 
     def test_trouble_with_files(self):
         self.refuses("nowhere.tum", tutti.read_trajectory, self.path / "nowhere.tum", error=OSError)
@@ -65,37 +65,37 @@ class Trajectories(InFolder):
 
 class Errors(InFolder):
     def test_a_rigid_motion_is_no_error(self):
-        way = walk()
-        moved = way.transformed(shift(5, -3, 1) @ turn([1, 2, 3], 2.0))
-        ate = tutti.ate(moved, way)
+        trajectory = walk()
+        moved = trajectory.transformed(shift(5, -3, 1) @ turn([1, 2, 3], 2.0))
+        ate = tutti.ate(moved, trajectory)
         self.assertLess(ate.rmse_m, 1e-9)
-        self.assertLess(tutti.rpe(moved, way, delta_m=5.0).rmse_m, 1e-9)
-        np.testing.assert_allclose(ate.T_reference_estimate @ moved.matrices[7], way.matrices[7], atol=1e-9)
+        self.assertLess(tutti.rpe(moved, trajectory, delta_m=5.0).rmse_m, 1e-9)
+        np.testing.assert_allclose(ate.T_reference_estimate @ moved.matrices[7], trajectory.matrices[7], atol=1e-9)
 
     def test_of_a_known_offset(self):
-        way = walk()
-        positions = way.positions
+        trajectory = walk()
+        positions = trajectory.positions
         positions[::2, 2] += 0.2  # every other one up: 0.1 about the mean
-        off = tutti.Trajectory.from_ns(way.stamps_ns, positions, way.quaternions_xyzw)
-        self.assertAlmostEqual(tutti.ate(off, way).rmse_m, 0.1, places=3)
+        off = tutti.Trajectory.from_ns(trajectory.stamps_ns, positions, trajectory.quaternions_xyzw)
+        self.assertAlmostEqual(tutti.ate(off, trajectory).rmse_m, 0.1, places=3)
 
     def test_associated_poses_give_what_ate_says(self):
-        truth, way = walk(400, 0.05), walk(200, 0.1, error_rad=1e-3)[3::4]
-        a, b = tutti.associate(way, truth)
-        ate = tutti.ate(way, truth)
+        truth, trajectory = walk(400, 0.05), walk(200, 0.1, error_rad=1e-3)[3::4]
+        a, b = tutti.associate(trajectory, truth)
+        ate = tutti.ate(trajectory, truth)
         T = ate.T_reference_estimate
         errors = np.linalg.norm(a.positions @ T[:3, :3].T + T[:3, 3] - b.positions, axis=1)
         self.assertAlmostEqual(float(np.sqrt(np.mean(errors**2))), ate.rmse_m, places=9)
         self.assertEqual(ate.pairs, len(a))
 
     def test_the_program_says_the_same(self):
-        truth, way = walk(), walk(error_rad=1e-3)
+        truth, trajectory = walk(), walk(error_rad=1e-3)
         tutti.write_trajectory(self.path / "truth.tum", truth)
-        tutti.write_trajectory(self.path / "way.tum", way)
+        tutti.write_trajectory(self.path / "way.tum", trajectory)
         said = json.loads(program("eval", self.path / "way.tum", self.path / "truth.tum", "--json"))
-        self.assertEqual(said["ate"]["rmse_m"], tutti.ate(way, truth).rmse_m)
-        self.assertEqual(said["rpe_time"]["rmse_m"], tutti.rpe(way, truth).rmse_m)
-        self.assertEqual(said["rpe_distance"]["rmse_m"], tutti.rpe(way, truth, delta_m=10.0).rmse_m)
+        self.assertEqual(said["ate"]["rmse_m"], tutti.ate(trajectory, truth).rmse_m)
+        self.assertEqual(said["rpe_time"]["rmse_m"], tutti.rpe(trajectory, truth).rmse_m)
+        self.assertEqual(said["rpe_distance"]["rmse_m"], tutti.rpe(trajectory, truth, delta_m=10.0).rmse_m)
 
     def test_no_common_times(self):
         self.refuses("no common times", tutti.ate, walk(), walk(start_s=5.0))
@@ -117,24 +117,24 @@ class Comparisons(InFolder):
         self.assertIn("disagree", repr(found))
 
     def test_the_program_says_the_same(self):
-        truth, way = walk(), walk(error_rad=2e-3)
+        truth, trajectory = walk(), walk(error_rad=2e-3)
         tutti.write_trajectory(self.path / "a", truth)
-        tutti.write_trajectory(self.path / "b", way)
+        tutti.write_trajectory(self.path / "b", trajectory)
         said = json.loads(program("compare", self.path / "b", self.path / "a", "--json"))
-        own = json.loads(tutti.compare(estimate=way, reference=truth).json())
+        own = json.loads(tutti.compare(estimate=trajectory, reference=truth).json())
         self.assertEqual(said["robots"], own["robots"])
-        tutti.compare(estimate=way, reference=truth).write(self.path / "out")
+        tutti.compare(estimate=trajectory, reference=truth).write(self.path / "out")
         self.assertTrue((self.path / "out/compare.html").stat().st_size > 1000)
 
     def test_estimate_and_reference_have_the_order_that_ate_has(self):
-        truth, way = walk(), walk(200, error_rad=2e-3)
-        named = tutti.compare(estimate=way, reference=truth).json()
-        self.assertNotEqual(named, tutti.compare(estimate=truth, reference=way).json())
+        truth, trajectory = walk(), walk(200, error_rad=2e-3)
+        named = tutti.compare(estimate=trajectory, reference=truth).json()
+        self.assertNotEqual(named, tutti.compare(estimate=truth, reference=trajectory).json())
         with self.assertWarnsRegex(FutureWarning, "order of tutti.ate"):
-            self.assertEqual(tutti.compare(way, truth).json(), named)
+            self.assertEqual(tutti.compare(trajectory, truth).json(), named)
         with self.assertWarnsRegex(DeprecationWarning, "reference and estimate"):
-            self.assertEqual(tutti.compare(a=truth, b=way).json(), named)  # as it was
-        self.assertAlmostEqual(tutti.ate(way, truth).rmse_m, tutti.compare(estimate=way, reference=truth).before.rmse_m, 3)
+            self.assertEqual(tutti.compare(a=truth, b=trajectory).json(), named)  # as it was
+        self.assertAlmostEqual(tutti.ate(trajectory, truth).rmse_m, tutti.compare(estimate=trajectory, reference=truth).before.rmse_m, 3)
 
     def test_wrong_numbers_are_refused(self):
         self.refuses("tolerance_m|expected", tutti.compare, estimate=walk(), reference=walk(), tolerance_m=-1.0)
