@@ -34,9 +34,9 @@ export class App {
   options: Options;
   phase: Phase;
   selection: Selection = null;
-  /** The moment that is looked at; null: the newest. */
+  /** The time that is shown; null: the newest. */
   time: number | null = null;
-  /** A moment that somebody points at in a plot. */
+  /** A time that somebody points at in a plot. */
   cursor: number | null = null;
   robots: RobotView[] = [];
   correction: Correction | null = null;
@@ -107,7 +107,7 @@ export class App {
     if (!this.live) return time_range(this.store, 0).last;
     return this.heard.t + Math.max(0, performance.now() - this.heard.ms) / 1000;
   }
-  /** The moment that is shown. */
+  /** The time that is shown. */
   shown(): number {
     return this.time ?? this.now();
   }
@@ -157,7 +157,7 @@ export class App {
     }
   }
 
-  /** Who else looks at this now: a robot or a closure that two people decide on is to be known to both. */
+  /** Who else inspects this now: a robot or a closure that two people decide on is to be known to both. */
   holders(what: string): string[] {
     return (this.store.get("held", this.at()) ?? []).filter((held) => held.what === what && held.by !== this.name()).map((held) => held.by);
   }
@@ -165,7 +165,7 @@ export class App {
   name(): string {
     return this.me.login ? this.me.name : this.by;
   }
-  /** Says what this person looks at; nothing waits for it. */
+  /** Sends what this person inspects; nothing waits for it. */
   private hold(): void {
     const s = this.selection;
     const what = s?.kind === "closure" ? `closure/${s.name}` : s?.kind === "robot" ? `robot/${s.number}` : "";

@@ -49,7 +49,7 @@ export function bytes_of_base64(text: string): ArrayBuffer {
   return bytes.buffer;
 }
 
-/** The same bytes again, of the points that are held. */
+/** The same bytes again, of the points that are kept. */
 export function base64_of_cloud(cloud: Cloud): string {
   const bytes = new Uint8Array(kHeader + 6 * cloud.n);
   const head = new DataView(bytes.buffer);
@@ -61,7 +61,7 @@ export function base64_of_cloud(cloud: Cloud): string {
   return btoa(raw);
 }
 
-/** Fetches what is asked for, and holds at most LIMITS.points points. */
+/** Fetches what is asked for, and keeps at most LIMITS.points points. */
 export class Clouds {
   private held = new Map<string, Cloud>();
   private asked = new Set<string>();

@@ -6,7 +6,7 @@ export interface RobotColours {
   light: Rgb[];
   dark: Rgb[];
 }
-/** Grey until the program has said them. */
+/** Grey until the program has sent them. */
 let robots: RobotColours = { light: [[88, 97, 113]], dark: [[154, 164, 178]] };
 export const set_robot_colours = (colours: RobotColours): void => void (robots = colours);
 

@@ -15,7 +15,7 @@ export interface RobotView {
   name: string;
   status: RobotStatus | null;
   presence: Presence;
-  /** Since the robot was heard, at the moment that is shown; null: never. */
+  /** Since the robot was heard, at the time that is shown; null: never. */
   silent_s: number | null;
   /** Its newest submap in the map. */
   newest: Submap | null;
@@ -67,7 +67,7 @@ function view_of(store: Store, t: number, age_s: number, number: number, index: 
   return { number, index, name, status, presence, silent_s, newest, submaps: submaps.length, speed_mps, reach_m, drain: drain_of(store, t, number) };
 }
 
-/** As the program says it, whose alerts follow from the same. */
+/** As the program reports it, whose alerts follow from the same. */
 export const silent_after = (store: Store): number => store.get("mission")?.robot_silent_s ?? Infinity;
 
 function presence_of(status: RobotStatus | null, silent_s: number | null, silent_after_s: number): Presence {
@@ -170,7 +170,7 @@ export function correction_between(store: Store, t: number, was: Poses, after: P
   return { t, before, after, moved_m, largest_m, largest, joined, keeper };
 }
 
-/** Ways between the mission's first and last message, for the time line. */
+/** The range between the mission's first and last message, for the time line. */
 export function time_range(store: Store, now: number): { first: number; last: number } {
   const mission = store.get("mission");
   const last = Math.max(now, store.newest, mission && mission.mode !== "live" ? (mission.duration_s ?? 0) : 0);

@@ -25,7 +25,7 @@ export function span(s: Figure): string {
   return `${Math.floor(s / 3600)}\u00a0h\u00a0${two(Math.floor((s % 3600) / 60))}\u00a0min`;
 }
 
-/** A moment of the mission: "0:04:10". */
+/** A time of the mission: "0:04:10". */
 export function moment(s: Figure): string {
   if (!known(s)) return "-";
   const whole = Math.max(0, Math.floor(s));

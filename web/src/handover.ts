@@ -7,7 +7,7 @@ import { POSE_ROW } from "./schema";
 import { MISSION_ELEMENT } from "./sources/inlined";
 import type { Store } from "./store";
 
-/** The value as a program says it, so that the same page reads it again. Most are kept as they came. */
+/** The value as a program sends it, so that the same page reads it again. Most are kept as they came. */
 const ENCODERS: { [K in Kind]?: (value: never, store: Store) => unknown } = {
   mission: (m: Mission) => ({ ...m, mode: "report" }),
   poses: (p: Poses, store: Store) => ({ ...p, rows: undefined, submaps: Object.fromEntries(rows_of_submaps(p, store)) }),
@@ -51,7 +51,7 @@ async function with_photo(mark: Mark): Promise<Mark> {
   }) };
 }
 
-/** Made of pieces: the page itself has this text exactly once. */
+/** Made of parts: the page itself has this text exactly once. */
 const slot = (text: string): string => `<script type="application/json" id="${MISSION_ELEMENT}">${text}</` + "script>";
 
 export async function save_file(app: App): Promise<void> {

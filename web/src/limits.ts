@@ -25,7 +25,7 @@ export const LIMITS = {
   },
   /** Most keys of one kind; beyond, the oldest goes. */
   keys: 20_000,
-  /** Points held by the page in all clouds together; beyond, clouds are thinned to a prefix. */
+  /** Points kept by the page in all clouds together; beyond, clouds are thinned to a prefix. */
   points: 4_000_000,
   /** Clouds fetched at once. */
   fetches: 6,
@@ -53,9 +53,9 @@ export const TIMES = {
   /** What a picture that moves may take. */
   moving_ms: 24,
   answer_ms: 20_000,
-  /** The map is made once more to say what a closure by hand would change. */
+  /** The map is made once more to show what a closure by hand would change. */
   change_ms: 300_000,
-  /** The server forgets who looks at what after three times this. */
+  /** The server forgets who inspects what after three times this. */
   hold_ms: 10_000,
 } as const;
 

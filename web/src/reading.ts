@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-/** Reads values that came from outside; what does not fit throws a DecodeError that says where. */
+/** Reads values that came from outside; what does not fit throws a DecodeError that names where. */
 
 export class DecodeError extends Error {}
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-/** What the program tells the page: {key, t, value}. A key is KIND or KIND/NAME. */
+/** What the program sends the page: {key, t, value}. A key is KIND or KIND/NAME. */
 import type { RobotColours } from "./colours";
 
 /** "ROBOT:SESSION/INDEX"; text, because a session may have 64 bits. */
@@ -99,7 +99,7 @@ export interface Submap {
   from_s: number;
   until_s: number;
   path: Vec3[];
-  /** Where the robot's own odometry has this submap; null: not told. */
+  /** Where the robot's own odometry has this submap; null: not sent. */
   T_odom_submap: Pose | null;
   points: number;
   bytes: number;
@@ -112,7 +112,7 @@ export interface Poses {
   components: number;
   rows: Float64Array;
 }
-/** component, x, y, z, qx, qy, qz, qw, closures that hold it, sigma (both NaN: not computed). A component of NaN: not in the map. */
+/** component, x, y, z, qx, qy, qz, qw, closures that join it to the map, sigma (both NaN: not computed). A component of NaN: not in the map. */
 export const POSE_ROW = 10;
 
 export type ClosureState = "accepted" | "rejected" | "candidate";

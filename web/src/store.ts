@@ -31,7 +31,7 @@ export class Store {
 
   apply(message: Message): void {
     const { kind, name } = split(message.key);
-    if (!Object.hasOwn(DECODERS, kind)) return; // a newer program says more than this page knows
+    if (!Object.hasOwn(DECODERS, kind)) return; // a newer program sends more than this page knows
     try {
       this.put(kind as Kind, name, message);
     } catch (error) {
@@ -89,7 +89,7 @@ export class Store {
     }
   }
 
-  /** All values over time, by the time since which they hold. */
+  /** All values over time, by the time since which they are valid. */
   everything(): { key: string; kind: Kind; t: number; value: unknown }[] {
     const out: { key: string; kind: Kind; t: number; value: unknown }[] = [];
     for (const [kind, named] of this.tracks)
@@ -110,7 +110,7 @@ export class Store {
     return this.ids[place] ?? "";
   }
 
-  /** How much is held: keys, values over time, numbers in poses. */
+  /** How much is kept: keys, values over time, numbers in poses. */
   size(): { keys: number; values: number; pose_numbers: number } {
     let keys = 0;
     let values = 0;

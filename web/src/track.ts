@@ -8,7 +8,7 @@ export class Track<V> {
   push(t: number, value: V | null, keep: number): void {
     const last = this.times.length - 1;
     if (last >= 0 && t <= this.times[last]) {
-      this.values[last] = value; // the same message again, or a newer one of the same moment
+      this.values[last] = value; // the same message again, or a newer one of the same time
       return;
     }
     this.times.push(t);
@@ -16,7 +16,7 @@ export class Track<V> {
     if (this.times.length > keep) this.thin(keep);
   }
 
-  /** Index of the value that held at `t`, -1 before the first one. */
+  /** Index of the value that was valid at `t`, -1 before the first one. */
   index(t: number): number {
     let low = 0;
     let high = this.times.length;

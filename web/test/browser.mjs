@@ -390,8 +390,8 @@ test("a distance is measured between two places", () =>
       await page.pause(200);
     }
     const measured = await page.evaluate(() => tutti.view.tool.spots.map((s) => s.world));
-    const way = Math.hypot(measured[0][0] - measured[1][0], measured[0][1] - measured[1][1]);
-    assert.ok(Math.abs(way - 27) < 1.5, `${way} m; three submaps of 9 m`);
+    const length_m = Math.hypot(measured[0][0] - measured[1][0], measured[0][1] - measured[1][1]);
+    assert.ok(Math.abs(length_m - 27) < 1.5, `${length_m} m; three submaps of 9 m`);
     await page.press("Stop");
   }));
 
@@ -419,7 +419,7 @@ test("a hundred robots and a million points: the first picture, frames a second,
     const heap = await page.heap_mb();
     console.log(`    ${await page.evaluate(() => tutti.view.painter.name)}: first picture ${(first_ms / 1000).toFixed(1)} s, all points ${(all / 1000).toFixed(1)} s after the page was asked for; ${frames.toFixed(0)} frames/s moving (the last ${last.points} points in ${last.ms.toFixed(0)} ms); JS heap ${heap.toFixed(0)} MB`);
     assert.ok(heap < 500, `${heap} MB`);
-    assert.ok(frames > 0, "it moves"); // how fast, a machine that others use cannot say
+    assert.ok(frames > 0, "it moves"); // how fast, a machine that others use cannot show
   });
 });
 

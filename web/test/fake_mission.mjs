@@ -10,7 +10,7 @@ const kSubmap_s = 10;
 const kKeyframes = 11;
 
 /** Along a rectangle of tunnels, with a bar across: where robot r is after s metres; heading. */
-function way(robot, s) {
+function pose_along(robot, s) {
   const [w, d] = [70, 44];
   const round = 2 * (w + d);
   const u = (s + robot * 0.31 * round) % round;
@@ -43,9 +43,9 @@ export function cloud_of(robot, index, points, speed = 0.9) {
   bytes.writeFloatLE(step_m, 0);
   bytes.writeUInt32LE(points, 4);
   const begin = index * kSubmap_s * speed;
-  const T = pose_of(way(robot, begin));
+  const T = pose_of(pose_along(robot, begin));
   for (let i = 0; i < points; ++i) {
-    const at = way(robot, begin + next() * kSubmap_s * speed + (next() - 0.5) * 6);
+    const at = pose_along(robot, begin + next() * kSubmap_s * speed + (next() - 0.5) * 6);
     const angle = 2 * Math.PI * next();
     const radius = 2.1 + 0.25 * Math.sin(at.p[0] * 1.3 + at.p[1] * 0.9 + 3 * angle) + 0.03 * next();
     const side = radius * Math.cos(angle);
@@ -56,7 +56,7 @@ export function cloud_of(robot, index, points, speed = 0.9) {
   return bytes;
 }
 
-/** As the program says them. */
+/** As the program sends them. */
 export const kSaid = { robot_silent_s: 10, robot_colours: { light: [[15, 111, 181], [194, 65, 12], [11, 143, 106]], dark: [[79, 179, 255], [255, 138, 76], [47, 211, 160]] } };
 
 export class FakeMission {
@@ -78,13 +78,13 @@ export class FakeMission {
 
   submap(robot, index) {
     const begin = index * kSubmap_s * 0.9;
-    const T = pose_of(way(robot, begin));
-    const path = Array.from({ length: kKeyframes }, (_, k) => into(T, way(robot, begin + (k * kSubmap_s * 0.9) / (kKeyframes - 1)).p).map((x) => Math.round(1e3 * x) / 1e3));
+    const T = pose_of(pose_along(robot, begin));
+    const path = Array.from({ length: kKeyframes }, (_, k) => into(T, pose_along(robot, begin + (k * kSubmap_s * 0.9) / (kKeyframes - 1)).p).map((x) => Math.round(1e3 * x) / 1e3));
     return { id: `${robot}:1/${index}`, name: `${this.robots[robot]}/${index}`, robot, session: "1", index, from_s: index * kSubmap_s, until_s: (index + 1) * kSubmap_s, path, points: this.points, bytes: 8 + 6 * this.points };
   }
 
   truth(robot, index) {
-    return pose_of(way(robot, index * kSubmap_s * 0.9));
+    return pose_of(pose_along(robot, index * kSubmap_s * 0.9));
   }
 
   /** Places of different robots, or of different times, that are near each other. */
@@ -145,7 +145,7 @@ export class FakeMission {
       const silent = this.silent.has(number) ? this.time - this.silent.get(number) : 0;
       const own = this.submaps.filter((s) => s.robot === number).length;
       const backlog = this.backlog[number];
-      return { number, last_seen_s_ago: 0.4 + silent, last_update_s_ago: 4 + silent, submaps: own, refused_submaps: 0, conflict: "", name, session: 1, start: 1, version: "0.3.0", backlog_submaps: backlog, backlog_bytes: 14000 * backlog, heard_epoch: 1, heard_revision: this.revision, update_age_s: 4.2, keyframes: own * 10, T_odom_body: { translation_m: way(number, this.time * 0.9).p, quaternion_xyzw: [0, 0, 0, 1] }, alerts: 0, finished: false, jobs_done: 0, trouble: "", can: [], submaps_begun: own, battery_v: 24.1, battery_percent: 90 - 31 * number, unread_submaps: 0 };
+      return { number, last_seen_s_ago: 0.4 + silent, last_update_s_ago: 4 + silent, submaps: own, refused_submaps: 0, conflict: "", name, session: 1, start: 1, version: "0.3.0", backlog_submaps: backlog, backlog_bytes: 14000 * backlog, heard_epoch: 1, heard_revision: this.revision, update_age_s: 4.2, keyframes: own * 10, T_odom_body: { translation_m: pose_along(number, this.time * 0.9).p, quaternion_xyzw: [0, 0, 0, 1] }, alerts: 0, finished: false, jobs_done: 0, trouble: "", can: [], submaps_begun: own, battery_v: 24.1, battery_percent: 90 - 31 * number, unread_submaps: 0 };
     });
     return { time_ns: this.time * 1e9, wall_ns: Date.now() * 1e6, version: "0.3.0", epoch: 1, revision: this.revision, submaps: this.submaps.length, closures: this.poses().accepted, components: 1 + this.apart.size, pending_jobs: 2, has_news: false, robots, workers: [{ number: 1, last_seen_s_ago: 0.6, name: "worker-1", jobs_done: 120 }], refusals: [], trouble: "", incarnation: 1, verifier: "cloud 7", former_pairs: 0, waiting: 0, why_waiting: "", words: [] };
   }

@@ -39,7 +39,7 @@ export class FakeServer {
     return this.mission.message("held", [...this.held].map(([by, what]) => ({ by, what })));
   }
 
-  /** Lets time go on, and tells everybody. */
+  /** Lets time go on, and informs everybody. */
   tick(seconds) {
     this.mission.time += seconds;
     this.send(this.mission.message("status", this.mission.status()));

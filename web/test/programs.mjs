@@ -22,7 +22,7 @@ function start(words, stderr) {
 }
 const common = [mission, "--rate", String(kRate)];
 
-/** The server, where robots reach it and where its page is, as it says itself. */
+/** The server, where robots reach it and where its page is, as it reports itself. */
 async function start_server() {
   const program = start(["server", ...common, "--state", join(work, "server"), "--view", "0"], "pipe");
   let bus, page;

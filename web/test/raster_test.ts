@@ -28,7 +28,7 @@ test("a point is where the projection puts it", () => {
   const raster = new Raster();
   raster.resize(100, 100);
   raster.begin(0);
-  // x = 1 m, y = 0.5 m, 2 m away: half and a quarter of the way from the middle to the edge
+  // x = 1 m, y = 0.5 m, 2 m away: half and a quarter of the distance from the middle to the edge
   assert.equal(raster.draw(painted([10, 5, -20], 7), kView, kAll), 1);
   assert.equal(raster.pixels.indexOf(7), 37 * 100 + 75);
 });

@@ -153,7 +153,7 @@ test("a backlog that shrinks tells when it is empty", () => {
   assert.ok(Math.abs(later.seconds! - 10.5 / 0.25) < 1.5, `${later.seconds} s`);
 });
 
-/** What is held once nothing more can be freed: arrays are freed by another thread, after the collector. */
+/** What is kept once nothing more can be freed: arrays are freed by another thread, after the collector. */
 async function held_bytes(collect: () => void): Promise<number> {
   let least = Infinity;
   for (let unchanged = 0; unchanged < 5; ) {

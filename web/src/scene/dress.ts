@@ -22,7 +22,7 @@ export interface Dressing {
   disagreement: (id: string) => number | null;
   /** The distance of a cloud's points to the survey, as places in a ramp; null: there is none. */
   distances: (id: string, cloud: Cloud, T: Pose) => Uint8Array | null;
-  /** The moment that is shown, s. */
+  /** The time that is shown, s. */
   t: number;
   /** Whether this submap is faint, because another thing is looked at. */
   faint: (id: string) => boolean;

@@ -206,7 +206,7 @@ function draw_part_names(app: App, ink: Ink, palette: Palette): void {
   }
 }
 
-/** Where everybody was at the moment that somebody points at in a plot; in a report, by every estimate. */
+/** Where everybody was at the time that somebody points at in a plot; in a report, by every estimate. */
 function draw_cursor(app: App, ink: Ink, palette: Palette, t: number): void {
   for (const robot of app.robots) {
     const at = place_at(app, robot.number, t) ?? estimate_at(app, robot.number, t);
@@ -227,7 +227,7 @@ function draw_cursor(app: App, ink: Ink, palette: Palette, t: number): void {
   }
 }
 
-/** Estimates nearer than this to the map have a dot and no words. */
+/** Estimates nearer than this to the map have a dot and no text. */
 const kLabelled_m = 0.3;
 
 const estimate_colour = (palette: Palette, kind: string): string => (kind === "onboard" ? palette.onboard : kind === "corrected" ? palette.accent : palette.ink);

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-/** Where robots were at a moment, as the map has it now. */
+/** Where robots were at a time, as the map has it now. */
 import type { App } from "../app";
 import { compose, inverse, transform } from "../pose";
 import type { RobotView } from "../derive";
 import type { Vec3 } from "../schema";
 
-/** Where a robot is now: beyond its newest submap by its odometry, where the submap says how its frame lies in odometry. */
+/** Where a robot is now: beyond its newest submap by its odometry, where the submap has how its frame lies in odometry. */
 export function position_of(app: App, robot: RobotView): Vec3 | null {
   const { newest, status } = robot;
   if (!newest) return null;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-/** Where everything is drawn: poses of submaps at the moment shown, parts side by side, changes animated. */
+/** Where everything is drawn: poses of submaps at the time shown, parts side by side, changes animated. */
 import { TIMES } from "../limits";
 import { place_parts } from "../places";
 import type { Part } from "../places";
@@ -12,7 +12,7 @@ export interface Placed {
   id: SubmapId;
   submap: Submap;
   component: number;
-  /** T_world_submap as drawn now, on the way from `start` to `target`. */
+  /** T_world_submap as drawn now, between `start` and `target`. */
   T: Pose;
   start: Pose;
   target: Pose;

@@ -26,7 +26,7 @@ export class LiveSource implements Source {
     return answer.arrayBuffer();
   }
 
-  /** After a login the server may say more. */
+  /** After a login the server may send more. */
   restart(): void {
     this.abort.abort();
   }

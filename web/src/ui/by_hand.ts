@@ -33,7 +33,7 @@ export function propose(app: App, from: SubmapId, to: SubmapId): void {
   begin(app, { from, to });
 }
 
-/** Another pair, or another place for it: what was found before holds no more. */
+/** Another pair, or another place for it: what was found before is void. */
 function begin(app: App, change: Partial<Draft>): void {
   Object.assign(draft, { guess: null, answer: null, kept: null, change_why: "" }, change);
   app.preview = null;

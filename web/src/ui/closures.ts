@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-/** All closures, newest decisions first; filtered by state and by words. */
+/** All closures, newest decisions first; filtered by state and by text. */
 import type { App } from "../app";
 import { figure } from "../format";
 import { LIMITS } from "../limits";

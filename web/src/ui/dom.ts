@@ -34,7 +34,7 @@ export function append(element: Element, children: Child[]): void {
   }
 }
 
-/** `key`: tells the button again after its panel was drawn anew. */
+/** `key`: finds the button again after its panel was drawn anew. */
 export function button(text: Child, run: () => void, props: Props = {}): HTMLButtonElement {
   return h("button", { type: "button", key: typeof text === "string" ? text : undefined, ...props, on: { click: run as () => void } }, text);
 }
@@ -43,7 +43,7 @@ export function swatch(colour: string): HTMLElement {
   return h("span", { class: "swatch", style: { background: colour } });
 }
 
-/** Who else looks at something now. */
+/** Who else inspects something now. */
 export function held(app: App, what: string): Child {
   const names = app.holders(what);
   return names.length === 0 ? null : h("span", { class: "detail held" }, `${names.join(", ")} ${names.length === 1 ? "looks" : "look"} at this`);
@@ -129,7 +129,7 @@ export function notice(text: string, severity: "info" | "error" = "info"): void 
   setTimeout(() => line.remove(), severity === "error" ? 15_000 : 6_000);
 }
 
-/** Runs something that may fail; says the sentence of its error. */
+/** Runs something that may fail; shows the sentence of its error. */
 export async function attempt(run: () => Promise<unknown>): Promise<boolean> {
   try {
     await run();

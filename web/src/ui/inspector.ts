@@ -45,7 +45,7 @@ function legend(app: App, closure: Closure, clouds: PairView): Child {
     h("span", { class: "segmented" }, toggle(false, "As measured"), toggle(true, "As in the map")));
 }
 
-/** What a person may say about a closure now. */
+/** What a person may decide on a closure now. */
 function decisions(app: App, name: string, closure: Closure): Child {
   if (!app.may("decide")) return null;
   const say = (wish: Wish, text: string, props = {}) => button(text, () => void decide(app, name, wish), { ...props, key: `decide ${wish}` });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-/** Marks: a place, words, a photo. Pinned to a submap, so that they move with the map. */
+/** Marks: a place, a text, a photo. Pinned to a submap, so that they move with the map. */
 import { api } from "../api";
 import type { App } from "../app";
 import { is_photo } from "../decode";

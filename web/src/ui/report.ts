@@ -48,7 +48,7 @@ function headline(app: App, report: Node): HTMLElement {
     h("div", { class: "cards" }, map_cards(report)));
 }
 
-/** Where robots or the server say that localisation failed. */
+/** Where robots or the server report that localisation failed. */
 function failures(report: Node): Child {
   const lines: Child[] = [];
   for (const robot of report.list("robots"))
@@ -65,7 +65,7 @@ function card(what: Child, value: Child, detail: Child): HTMLElement {
   return h("div", { class: "card" }, h("p", { class: "what" }, what), h("p", { class: "value" }, value), h("p", { class: "detail" }, detail));
 }
 
-/** A figure for headlines: none when it was scored on too little of the way. */
+/** A figure for headlines: none when it was scored on too little of the distance. */
 const headline_m = (node: Node, key: string, partial: string): string => (node.yes(partial) ? "-" : metres(node.n(key)));
 
 function robot_card(app: App, report: Node, robot: Node): HTMLElement {

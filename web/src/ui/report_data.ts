@@ -43,5 +43,5 @@ export class Node {
 
 export const reading = (report: Report | null): Node => new Node(report);
 
-/** What holds of the policy that the robot followed. */
+/** What is true of the policy that the robot followed. */
 export const followed = (report: Node, robot: Node): Node => robot.at("policies").at(report.s("default_policy"));

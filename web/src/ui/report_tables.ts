@@ -24,7 +24,7 @@ export function tables(app: App, report: Node): HTMLElement {
   return h("div", {}, out, h("p", { class: "empty" }, `Made by Tutti${version ? ` ${version}` : ""}. Every figure is defined in docs/report.md.`));
 }
 
-/** In brackets when it was scored on too little of the way. */
+/** In brackets when it was scored on too little of the distance. */
 const error = (x: number | null, partial: boolean): string => (partial && x !== null ? `(${metres(x)})` : metres(x));
 
 function policies(app: App, report: Node): HTMLElement | null {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-/** One card per robot: is it there, what can it do now, what does it still hold. */
+/** One card per robot: is it there, what can it do now, what does it still keep. */
 import type { App } from "../app";
 import { css, robot_rgb } from "../colours";
 import { silent_after } from "../derive";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-/** Time at the bottom: what happened when, and the moment that is shown. */
+/** Time at the bottom: what happened when, and the time that is shown. */
 import type { App } from "../app";
 import { correction_between, time_range } from "../derive";
 import { metres, moment } from "../format";
