@@ -90,7 +90,7 @@ Result<NamedGraph> from_pyfg(const GraphSource& source) {
     out.names.push_back(to_string(vertex.name));
     out.ids.push_back((std::int64_t{vertex.name.robot} << kSymbolShift) |
                       static_cast<std::int64_t>(vertex.name.number));
-    out.held.push_back(vertex.prior);
+    out.fixed_poses.push_back(vertex.prior);
   }
   for (const auto& edge : file->edges)
     graph.edges.push_back(
@@ -223,16 +223,16 @@ Status put_in_place(const NamedGraph& graph, server::MapEstimate& map) {
   std::map<std::uint32_t, std::size_t> anchors;
   for (std::size_t v = 0; v < map.nodes.size(); ++v) {
     const auto [anchor, is_first] = anchors.try_emplace(map.nodes[v].component, v);
-    if (is_first || !graph.held[v]) continue;
-    if (graph.held[anchor->second] && !graph.is_pyfg)
+    if (is_first || !graph.fixed_poses[v]) continue;
+    if (graph.fixed_poses[anchor->second] && !graph.is_pyfg)
       return fail(ErrorCode::unsupported,
                   "FIX names vertices {} and {} of one component: --robust holds one, leave the others out",
                   graph.names[anchor->second], graph.names[v]);
-    if (!graph.held[anchor->second]) anchor->second = v;
+    if (!graph.fixed_poses[anchor->second]) anchor->second = v;
   }
   std::map<std::uint32_t, Pose3> moves;
   for (const auto& [component, v] : anchors)
-    moves[component] = graph.held[v].value_or(graph.robots.graph.poses[v]) * map.nodes[v].T_world_body.inverse();
+    moves[component] = graph.fixed_poses[v].value_or(graph.robots.graph.poses[v]) * map.nodes[v].T_world_body.inverse();
   for (std::size_t v = 0; v < map.nodes.size(); ++v)
     map.graph.poses[v] = map.nodes[v].T_world_body = moves.at(map.nodes[v].component) * map.nodes[v].T_world_body;
   return {};
@@ -285,7 +285,7 @@ Result<NamedGraph> name_graph(const GraphSource& source, const formats::G2oFile&
     out.ids.push_back(id);
     out.names.push_back(name_of(id));
     const bool is_fixed = std::ranges::binary_search(file.fixed, v.position);
-    out.held.push_back(is_fixed ? std::optional(file.graph.poses[v.position]) : std::nullopt);
+    out.fixed_poses.push_back(is_fixed ? std::optional(file.graph.poses[v.position]) : std::nullopt);
     if (!stamps.empty()) out.robots.stamps.push_back(stamps.at(id).stamp);
   }
   place(file.graph, std::move(loose), out);

@@ -26,13 +26,13 @@ struct GraphSource {
 
 /// A pose graph with its robots' and vertices' names.
 struct NamedGraph {
-  server::RobotGraph robots;               ///< With the file's poses.
-  std::vector<std::string> names;          ///< Per vertex: its id, or "A12".
-  std::vector<std::int64_t> ids;           ///< Per vertex, its id in a g2o file; for "A12", GTSAM's symbol key.
-  std::vector<std::string> robot_names;    ///< By RobotId::value.
-  std::vector<std::optional<Pose3>> held;  ///< Per vertex: the pose that a FIX line or a prior states.
-  bool is_pyfg = false;                    ///< Or JRL.
-  bool has_poses = true;                   ///< False: the file lacks poses of vertices, which are the identity here.
+  server::RobotGraph robots;                      ///< With the file's poses.
+  std::vector<std::string> names;                 ///< Per vertex: its id, or "A12".
+  std::vector<std::int64_t> ids;                  ///< Per vertex, its id in a g2o file; for "A12", GTSAM's symbol key.
+  std::vector<std::string> robot_names;           ///< By RobotId::value.
+  std::vector<std::optional<Pose3>> fixed_poses;  ///< Per vertex: the pose that a FIX line or a prior states.
+  bool is_pyfg = false;                           ///< Or JRL.
+  bool has_poses = true;  ///< False: the file lacks poses of vertices, which are the identity here.
   bool is_2d = false;
   std::size_t replaced = 0;  ///< Number of information or covariance matrices that were not positive semidefinite.
   std::string robots_from;   ///< For people: how robots were distinguished,

@@ -103,8 +103,8 @@ std::string closures_csv(const NamedGraph& graph, const server::JudgedGraph& jud
 Status write_graph(const std::string& path, const NamedGraph& graph, const server::MapEstimate& map) {
   if (std::filesystem::path(path).extension() == ".g2o") {
     formats::G2oFile file{.graph = map.graph, .vertex_ids = graph.ids, .is_2d = graph.is_2d};
-    for (std::size_t v = 0; v < graph.held.size() && !graph.is_pyfg; ++v)
-      if (graph.held[v]) file.fixed.push_back(v);
+    for (std::size_t v = 0; v < graph.fixed_poses.size() && !graph.is_pyfg; ++v)
+      if (graph.fixed_poses[v]) file.fixed.push_back(v);
     return formats::write_g2o(path, file);
   }
   formats::PyfgFile file;
@@ -112,7 +112,7 @@ Status write_graph(const std::string& path, const NamedGraph& graph, const serve
     file.vertices.push_back({{graph.names[v].front(), std::stoull(graph.names[v].substr(1))},
                              map.nodes[v].stamp,
                              map.nodes[v].T_world_body,
-                             graph.held[v]});
+                             graph.fixed_poses[v]});
   for (const PoseGraphEdge& edge : map.graph.edges)
     file.edges.push_back({map.nodes[edge.to].stamp, edge.from, edge.to, {edge.T_from_to, edge.information.inverse()}});
   return formats::write_pyfg(path, file);

@@ -163,7 +163,7 @@ TEST_F(BagFolders, ASqliteFileIsReadWithItsLogAndWithoutATrace) {
 }
 
 /// A recorder that keeps a rollback journal was killed in the middle of a transaction whose pages had left its cache.
-TEST_F(BagFolders, OfASqliteFileWithAHotJournalItIsSaidHowToReadIt) {
+TEST_F(BagFolders, OfASqliteFileWithAHotJournalItIsReportedHowToReadIt) {
   const fs::path file = folder_ / "recorded.db3", killed = folder_ / "killed.db3";
   write_db3(file, samples());
   sqlite3* db = nullptr;

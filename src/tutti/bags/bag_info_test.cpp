@@ -137,7 +137,7 @@ TEST(BagInfo, RobotsAreNamedAndSoAreTheContradictionsOfTheirTransforms) {
       << info.notes.back();
 }
 
-TEST(BagInfo, WithoutOdometryThatIsSaid) {
+TEST(BagInfo, WithoutOdometryThatIsReported) {
   EXPECT_EQ(uses(info_of(kMagic)).at(0), "odometry     missing: without odometry nothing can be made of this bag");
 }
 

@@ -114,7 +114,7 @@ TEST(BagDepth, CompressedDepthIsUnpacked) {
   EXPECT_EQ(to_depth(message("32FC1; compressedDepth", nonsense), {3, 1})->value, (Values{0, 0, 0}));
 }
 
-TEST(BagDepth, WhatIsOtherThanInTheFirstMessageIsSaid) {
+TEST(BagDepth, WhatIsOtherThanInTheFirstMessageIsReported) {
   const ImageLook first{"16UC1", "cam", 4, 3};
   const auto why = [&](const ImageLook& look) {
     const Status ok = check_like_first(look, first);

@@ -81,7 +81,7 @@ TEST(Rgbd, OneCameraHasTheDepthThatIsRegisteredToIt) {
   EXPECT_TRUE(choose({}, {kDepth})->cameras.empty());
 }
 
-TEST(Rgbd, NoneOrSeveralAreSaidWithTheFlag) {
+TEST(Rgbd, NoneOrSeveralAreReportedWithTheFlag) {
   const auto none = choose({kColour}, {kDepth}).value();
   EXPECT_EQ(none.cameras.size(), 1U);
   EXPECT_FALSE(none.depth);

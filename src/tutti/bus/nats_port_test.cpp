@@ -95,7 +95,7 @@ TEST_F(NatsPortTest, KilledAndStartedAgainTheBusLosesNothing) {
 }
 
 /// A robot's last status reports that it has finished: without it operators would search for it.
-TEST_F(NatsPortTest, WhatIsSaidLastIsHeardThoughThePortGoesAtOnce) {
+TEST_F(NatsPortTest, WhatIsSentLastIsHeardThoughThePortGoesAtOnce) {
   NatsNetwork network;
   const auto hub = network.open(kServer);
   ASSERT_TRUE(within(20.0, [&] { return hub->state().connected; }));

@@ -61,7 +61,7 @@ TEST_F(NatsStrangers, JobsThatTheServerHasNotSentDoNotKeepItsOwnWaiting) {
 }
 
 /// A user of the bus who may not send submaps, and one without a password.
-TEST_F(NatsStrangers, WhatTheBusDoesNotAllowIsSaidAsThat) {
+TEST_F(NatsStrangers, WhatTheBusDoesNotAllowIsReportedAsThat) {
   const std::filesystem::path folder =
       std::filesystem::path(::testing::TempDir()) / ("denied_" + std::to_string(getpid()));
   std::filesystem::create_directories(folder);

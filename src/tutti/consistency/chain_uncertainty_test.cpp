@@ -217,7 +217,7 @@ TEST(ChainUncertainty, DirectionsAreWhatClosuresKnowFarBetterThanOdometry) {
 
 // One closure, a third along the trajectory, turned by 0.1 rad, 200 times what odometry may turn a step, or by 0.003
 // rad, which it may well have missed; the robot is to follow the map without the former, every node of it.
-TEST(ChainUncertainty, WhatOneClosureSaysAgainstOdometryIsDoubted) {
+TEST(ChainUncertainty, WhatOneClosureMeasuresAgainstOdometryIsDoubted) {
   const Scene scene(test::corridor(kNodes));
   ChainKnowledge known = usual_map().knowledge(scene.graph, kBravo);
   const auto turned_by = [&](double angle_rad) {  // evenly, from node 40 to 80
@@ -307,7 +307,7 @@ TEST(ChainUncertainty, OfOneNodeAndOfTwo) {
   }
 }
 
-TEST(ChainUncertainty, FewSamplesSayNothingOfScales) {
+TEST(ChainUncertainty, FewSamplesGiveNoScales) {
   const Scene scene(test::corridor(30));
   ChainKnowledge known = usual_map(30).knowledge(scene.graph, kBravo);
   known.samples.conservativeResize(Eigen::NoChange, kLeastSamples - 1);

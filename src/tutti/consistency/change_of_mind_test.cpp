@@ -62,7 +62,7 @@ TEST(MapChange, NeitherAnotherFrameNorNewNodesCount) {
   EXPECT_LT(map_change(map_with(before), map_with(test::corridor(2 * kNodes)), kBravo).significance, 0.5);
 }
 
-TEST(MapChange, NothingIsSaidWhereTheOlderMapDoesNotSayHowSureItIs) {
+TEST(MapChange, NothingIsReportedWhereTheOlderMapHasNoUncertainty) {
   const std::vector<Pose3> before = test::corridor(kNodes);
   std::vector<Pose3> after = before;
   after[60].translation.y() += 100.0;

@@ -116,7 +116,7 @@ TEST(DisagreementTest, DirectionsFindWhatOnlyClosuresKnow) {
   EXPECT_EQ(scene.test_with({.without = "directions"})(segmented).direction_significance, 0.0);
 }
 
-TEST(DisagreementTest, LooksShareTheRate) {
+TEST(DisagreementTest, ComparisonsShareTheRate) {
   const Scene scene(usual_map());
   const auto robot = usual_map().displace(scene.server, Rng(2));
   const double first = scene.test_with({}, 1)(robot).largest();
@@ -136,7 +136,7 @@ TEST(DisagreementTest, ARobotMayLackNodes) {
   EXPECT_FALSE(found.disagrees());
 }
 
-TEST(DisagreementTest, WithoutAWordFromTheServerNothingDisagrees) {
+TEST(DisagreementTest, WithoutUncertaintyFromTheServerNothingDisagrees) {
   Scene scene(usual_map());
   scene.graph.uncertainties.clear();
   auto robot = scene.server;

@@ -60,7 +60,7 @@ TEST(Explanation, SaysNothingWhenTheTwoAgree) {
   }
 }
 
-TEST(Explanation, TellsASlideWhereItIsAndRaisesAnAlertUnlessOdometrySaidSo) {
+TEST(Explanation, FindsASlideWhereItIsAndRaisesAnAlertUnlessOdometryStatedIt) {
   for (const double stated : {1.0, 100.0})
     for (std::uint64_t seed = 0; seed < 30; ++seed) {
       const Explanation e = explained(scene(seed, 0.1, stated));
@@ -133,7 +133,7 @@ TEST(Explanation, TheDisagreementStandsOutWhereTheSlideIs) {
   }
 }
 
-TEST(Explanation, SaysLittleWhenTheServerSaysNothing) {
+TEST(Explanation, HasLittleWhenTheServerSendsNoUncertainty) {
   Scene s = scene(1, 0.1);
   s.graph.uncertainties.clear();
   const Explanation e = explained(s);

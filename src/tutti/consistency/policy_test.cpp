@@ -91,7 +91,7 @@ TEST(EveryNode, LinksNeighboursInTime) {
   EXPECT_TRUE(scene.choose("every_node").replaces_all);
 }
 
-TEST(Spectral, LinksWhereItsComparisonSaysSo) {
+TEST(Spectral, LinksWhereItsComparisonDemandsIt) {
   Scene scene(60);
   for (std::size_t n = 30; n < 60; ++n) scene.nodes[n].T_map_body.translation.y() += 2.0;
   const CompareConfig compare_config;
@@ -181,7 +181,7 @@ TEST(Spectral, TopTakesTheLargestOverAllGroups) {
   EXPECT_EQ(linked(scene.spectral(config)), (Pairs{{25, 30}, {30, 35}}));
 }
 
-TEST(Spectral, MeasuresHeldConstraintsAgain) {
+TEST(Spectral, MeasuresKeptConstraintsAgain) {
   Scene scene(60);
   scene.disagreement(10, 5) = 1.0;
   scene.ledger.update(scene.spectral(kConfig).constraints, false);

@@ -65,7 +65,7 @@ TEST(Gnc, PassesFailuresOn) {
   EXPECT_EQ(solve_pose_graph_gnc(graph, {}).solution.summary.termination, Termination::singular);
 }
 
-TEST(Gnc, SurvivesAComponentHeldByWrongEdgesOnly) {
+TEST(Gnc, SurvivesAComponentJoinedByWrongEdgesOnly) {
   Rng rng(3);
   const auto one = random_graph(rng, 20, 10, 0.0);
   PoseGraph graph = one.graph;

@@ -12,7 +12,7 @@
 namespace tutti::exports {
 namespace map_scene_test {
 
-TEST(MapScene, WaysClosuresAndCloudAreTheMaps) {
+TEST(MapScene, TrajectoriesClosuresAndCloudAreTheMaps) {
   storage::MemoryStore store{storage::map_schema()};
   mapfile::test::Mapper mapper({RobotId{0}, RobotId{1}}, store);
   for (const ChainId& chain : {ChainId(RobotId{0}, 5), ChainId(RobotId{0}, 6), ChainId(RobotId{1}, 5)})

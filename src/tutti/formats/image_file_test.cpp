@@ -34,7 +34,7 @@ RC_GTEST_PROP(ImageFile, PngReadsBackBitForBit, ()) {
   RC_ASSERT(cut.error().message.starts_with("cut.png: "));
 }
 
-TEST(ImageFile, DepthReadsBackWhateverIsSaidOfItsColour) {
+TEST(ImageFile, DepthReadsBackWhateverIsReportedOfItsColour) {
   DepthImage all{256, 256, std::vector<std::uint16_t>(std::size_t{1} << 16U)};
   std::iota(all.value.begin(), all.value.end(), std::uint16_t{0});
   const std::string bytes = encode_depth(all);
@@ -103,7 +103,7 @@ TEST(ImageFile, WhatIsNoImageIsNamed) {
   EXPECT_FALSE(decode_image(huge, "huge.png").has_value());
 }
 
-TEST(ImageFile, AStreamReadsTheImagesOfAMoment) {
+TEST(ImageFile, AStreamReadsTheImagesOfAStamp) {
   const auto image = [](int side) { return Image(side, side); };
   std::vector<CameraImages> cameras(2);
   const auto add = [&](std::size_t camera, double time_s, int side) {

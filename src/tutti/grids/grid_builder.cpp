@@ -108,11 +108,11 @@ void GridBuilder::around(const Eigen::Vector3d& point, const Visit& visit) const
       if (is_inside(at)) visit(at);
 }
 
-void GridBuilder::mark_trajectory(const Trajectory& way) {
+void GridBuilder::mark_trajectory(const Trajectory& trajectory) {
   const int reach = static_cast<int>(config_.robot_m / config_.resolution_m);
-  for (std::size_t i = 0; i < way.size(); ++i) {
-    const Eigen::Vector3d& from = way[i > 0 ? i - 1 : 0].pose.translation;
-    const Eigen::Vector3d step = way[i].pose.translation - from;
+  for (std::size_t i = 0; i < trajectory.size(); ++i) {
+    const Eigen::Vector3d& from = trajectory[i > 0 ? i - 1 : 0].pose.translation;
+    const Eigen::Vector3d step = trajectory[i].pose.translation - from;
     const int steps = std::max(1, static_cast<int>(step.norm() / config_.resolution_m));
     for (int k = 1; k <= steps; ++k) {
       const Eigen::Vector3d place = from + step * k / steps;
@@ -127,28 +127,28 @@ void GridBuilder::mark_trajectory(const Trajectory& way) {
 
 /// Every cell that the ray crosses (Amanatides and Woo, Eurographics 1987), but for the last one.
 void GridBuilder::mark_ray(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
-  const Eigen::Vector3d way = to - from;
+  const Eigen::Vector3d ray = to - from;
   Index at = index_of(from.x(), from.y());
   const Index end = index_of(to.x(), to.y());
   const auto edge = [&](double start, double step, int cell, double origin) {
     if (step == 0.0) return std::numeric_limits<double>::infinity();
     return (origin + config_.resolution_m * (cell + (step > 0.0 ? 1 : 0)) - start) / step;
   };
-  double next_x = edge(from.x(), way.x(), at.x, origin_.x()), next_y = edge(from.y(), way.y(), at.y, origin_.y());
-  const double per_x = way.x() == 0.0 ? 0.0 : config_.resolution_m / std::abs(way.x());
-  const double per_y = way.y() == 0.0 ? 0.0 : config_.resolution_m / std::abs(way.y());
+  double next_x = edge(from.x(), ray.x(), at.x, origin_.x()), next_y = edge(from.y(), ray.y(), at.y, origin_.y());
+  const double per_x = ray.x() == 0.0 ? 0.0 : config_.resolution_m / std::abs(ray.x());
+  const double per_y = ray.y() == 0.0 ? 0.0 : config_.resolution_m / std::abs(ray.y());
   double entered = 0.0;
   while ((at.x != end.x || at.y != end.y) && entered < 1.0) {
     if (!is_inside(at)) return;
     const double left = std::min({next_x, next_y, 1.0});
     if (hit_by_[flat(at)] == submap_) return;
-    if (is_in_slab(at, from.z() + way.z() * (entered + left) / 2.0)) mark(passed_by_, passes_, at);
+    if (is_in_slab(at, from.z() + ray.z() * (entered + left) / 2.0)) mark(passed_by_, passes_, at);
     entered = left;
     if (next_x < next_y) {
-      at.x += way.x() > 0.0 ? 1 : -1;
+      at.x += ray.x() > 0.0 ? 1 : -1;
       next_x += per_x;
     } else {
-      at.y += way.y() > 0.0 ? 1 : -1;
+      at.y += ray.y() > 0.0 ? 1 : -1;
       next_y += per_y;
     }
   }
@@ -177,9 +177,9 @@ void GridBuilder::add(const LevelSubmap& submap) {
       const bool is_ground = std::abs(z - static_cast<double>(ground_[flat(at)])) < config_.low_m;
       if (is_ground && hit_by_[flat(at)] != submap_) mark(passed_by_, passes_, at);
     });
-    const Eigen::Vector2d way = (to - from).head<2>().normalized() * config_.point_m / 2.0;
+    const Eigen::Vector2d half_point = (to - from).head<2>().normalized() * config_.point_m / 2.0;
     for (const double side : {-1.0, 0.0, 1.0})  // the voxel's edges: many rays became this one point
-      mark_ray(from, to + side * Eigen::Vector3d(-way.y(), way.x(), 0.0));
+      mark_ray(from, to + side * Eigen::Vector3d(-half_point.y(), half_point.x(), 0.0));
   }
   mark_trajectory(submap.keyframes);
 }

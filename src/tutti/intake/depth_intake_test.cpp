@@ -110,7 +110,7 @@ TEST(DepthIntake, EveryImageHasTheNearestDepth) {
       fmt::format("/r/depth/image_raw has ended, or is by another clock: its newest is of {} ns", kStart + 111 * kMs));
 }
 
-TEST(DepthIntake, WhichDepthIsUsedIsSaid) {
+TEST(DepthIntake, WhichDepthIsUsedIsReported) {
   const CameraTopics second = topics_of("/r/confidence");
   DepthRobot several({kLeft, kDepth, second});
   for (const std::size_t topic : {1U, 2U}) EXPECT_EQ(several.add(topic, depth_image(kStart)), "");
@@ -148,7 +148,7 @@ TEST(DepthIntake, WhichDepthIsUsedIsSaid) {
          "/r/depth/image_raw: frame 'depth_optical', expected 'camera' as of /r/left/image_raw");
 }
 
-TEST(DepthIntake, ATopicThatSaysNothingIsLeftOutOnceLate) {
+TEST(DepthIntake, ATopicThatSendsNothingIsLeftOutOnceLate) {
   DepthRobot robot({kLeft, kRight, kDepth});
   EXPECT_EQ(robot.add(0, grey_image(kStart)), "");
   EXPECT_TRUE(robot.sensors().cameras.empty());
@@ -166,7 +166,7 @@ TEST(DepthIntake, ATopicThatSaysNothingIsLeftOutOnceLate) {
          "no images are used: none of the topics with a CameraInfo shows pictures: /r/depth/image_raw");
 }
 
-TEST(DepthIntake, CamerasThatCannotBeChosenAreSaid) {
+TEST(DepthIntake, CamerasThatCannotBeChosenAreReported) {
   const auto problem = [](std::vector<CameraTopics> topics, ImagesConfig config, std::size_t depths) {
     DepthRobot robot(topics, std::move(config));
     for (std::size_t i = 0; i < topics.size(); ++i)
@@ -184,7 +184,7 @@ TEST(DepthIntake, CamerasThatCannotBeChosenAreSaid) {
   expect(problem({kLeft, kRight, kDepth, topics_of("/r/depth2")}, {}, 0), "4 cameras, expected one or two");
 }
 
-TEST(DepthIntake, WrongDepthIsSaidAndLeftOut) {
+TEST(DepthIntake, WrongDepthIsReportedAndLeftOut) {
   DepthRobot robot;
   bags::RosImage image = depth_image(kStart);
   image.step = 7;

@@ -117,7 +117,7 @@ TEST(ImagesIntake, FilesStayAsTheyAre) {
   EXPECT_EQ(images->images[0].bytes, "any bytes");
 }
 
-TEST(ImagesIntake, WhatIsWrongIsSaid) {
+TEST(ImagesIntake, WhatIsWrongIsReported) {
   Robot robot;
   robot.place();
   robot.go(0);
@@ -147,7 +147,7 @@ TEST(ImagesIntake, WhatIsWrongIsSaid) {
   EXPECT_EQ(robot.images.missing(), "");
 }
 
-TEST(ImagesIntake, LateImagesAndAnImuElsewhereAreSaid) {
+TEST(ImagesIntake, LateImagesAndAnImuElsewhereAreReported) {
   Robot robot;
   robot.go(0);
   ASSERT_TRUE(robot.odometry_.add_tf(transform(0, "base_link", "imu", kBodyCamera), true));

@@ -256,7 +256,7 @@ TEST(RosIntake, OneStampInTheFutureShutsOutNothing) {
   EXPECT_EQ(fixes, 19U);
 }
 
-TEST(RosIntake, ALidarWithAClockOfItsOwnIsSaidAndAligned) {
+TEST(RosIntake, ALidarWithAClockOfItsOwnIsReportedAndAligned) {
   constexpr std::int64_t kAhead = 37'000'000'000;
   for (const double offset_s : {0.0, -37.0}) {
     RosIntake intake({.odometry_frames = {},
@@ -332,7 +332,7 @@ TEST(RosIntake, AClockThatGoesBackIsFedAsTheRobotIsToSeeIt) {
   }
 }
 
-TEST(RosIntake, WhatIsWrongIsSaid) {
+TEST(RosIntake, WhatIsWrongIsReported) {
   RosIntake intake({});
   ASSERT_TRUE(intake.add_odometry(odometry(kStart)));
   const auto expect = [](const std::string& errors, const std::string& part) {

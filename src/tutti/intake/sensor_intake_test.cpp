@@ -109,7 +109,7 @@ TEST_F(SensorIntakeTest, MessagesOfRos1AreTheSame) {
   EXPECT_EQ(due(), "o");
 }
 
-TEST_F(SensorIntakeTest, ScansAndImagesOfWhichSomethingIsNotKnownAreSaid) {
+TEST_F(SensorIntakeTest, ScansAndImagesOfWhichSomethingIsNotKnownAreReported) {
   take_images({.images = {"left/image_raw/compressed"}});
   EXPECT_EQ(odometry_at(0), "");
   EXPECT_EQ(due(), "o");
@@ -122,7 +122,7 @@ TEST_F(SensorIntakeTest, ScansAndImagesOfWhichSomethingIsNotKnownAreSaid) {
   EXPECT_EQ(intake_.missing(), "no images are used: left/camera_info: no sensor_msgs/CameraInfo");
 }
 
-TEST_F(SensorIntakeTest, ImagesOfBeforeTheirCameraWasKnownAreLeftOutWithoutAWord) {
+TEST_F(SensorIntakeTest, ImagesOfBeforeTheirCameraWasKnownAreLeftOutSilently) {
   take_images({.images = {"left/image_raw"}});
   EXPECT_EQ(add("left/camera_info", bags::kCameraInfoType, bags::encode(calibration())), "");
   for (int i = 0; i < 20; ++i) {
@@ -201,7 +201,7 @@ TEST_F(SensorIntakeTest, OdometryWaitsForCamerasWhileThereIsRoomForWhatComesMean
   EXPECT_EQ(due(), "oii");
 }
 
-TEST_F(SensorIntakeTest, OdometryThatIsSaidAgainTellsHowTheBodyMoved) {
+TEST_F(SensorIntakeTest, OdometryThatIsSentAgainShowsHowTheBodyMoved) {
   intake_.odometry().begin_behind(Timestamp{kStart + 10 * kPeriod});
   for (int i = 0; i <= 12; ++i) EXPECT_EQ(odometry_at(i), "");
   EXPECT_EQ(due(), "oo");

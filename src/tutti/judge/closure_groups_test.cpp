@@ -40,7 +40,7 @@ TEST(ClosureGroups, AreNearAtBothEnds) {
   EXPECT_TRUE(groups_of({}).empty());
 }
 
-TEST(ClosureGroups, WaysWalkedTogetherAreManyPlaces) {
+TEST(ClosureGroups, TrajectoriesWalkedTogetherAreManyPlaces) {
   std::vector<std::pair<std::size_t, std::size_t>> ends;
   for (std::size_t k = 0; k < 5; ++k) ends.emplace_back(10 + 9 * k, 300 + 9 * k);
   EXPECT_TRUE(groups_of(ends).empty()) << "36 s";

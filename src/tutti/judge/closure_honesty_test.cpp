@@ -115,7 +115,7 @@ TEST(ClosureHonesty, KnowsNoLength) {
   }
 }
 
-TEST(ClosureHonesty, FewTellNothing) {
+TEST(ClosureHonesty, FewAreNotJudged) {
   EXPECT_EQ(found({.stated_rad = 0.1, .closures = 7}, 1), ClosureHonesty{});
   EXPECT_TRUE(closure_honesty({}, {}).empty());
 }

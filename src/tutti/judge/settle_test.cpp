@@ -60,7 +60,7 @@ TEST(Settle, RightClosuresThatWereRefusedComeBack) {
   for (const double price : settled.prices) EXPECT_LT(price, most_paid({}));
 }
 
-TEST(Settle, TheLoopThatAloneTellsHowFarOdometryIsOffCountsByTheMapsDoubt) {
+TEST(Settle, TheLoopThatAloneMeasuresHowFarOdometryIsOffCountsByTheMapsDoubt) {
   Circle circle(2.0);  // a published drive's optimum asks this much more of odometry than it states
   circle.close(50);
   const Settled settled = circle.settled({0});
@@ -93,7 +93,7 @@ TEST(Settle, WhatIsCertainStaysWhateverItCosts) {
   EXPECT_EQ(circle.settled(std::vector<char>(closures, 1), certain).in.back(), 1);
 }
 
-TEST(Settle, AGraphThatCannotBeSolvedIsSaidToBeSo) {
+TEST(Settle, AGraphThatCannotBeSolvedIsReportedToBeSo) {
   Circle circle;
   circle.close(50);
   circle.graph.edges.front().information.setConstant(std::nan(""));

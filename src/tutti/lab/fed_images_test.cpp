@@ -55,9 +55,9 @@ simulation::FlownRecording simulate(const simulation::HallMissionConfig& config)
   auto out = std::move(simulation::simulate_hall(config, Timestamp{0}, 1)->robots.at(0));
   out.images.load = [load = out.images.load,
                      known = std::make_shared<std::map<std::pair<std::size_t, std::size_t>, Image>>()](
-                        std::size_t moment, std::size_t camera) -> Result<Image> {
-    Image& image = (*known)[{moment, camera}];
-    if (image.empty()) image = load(moment, camera).value();
+                        std::size_t instant, std::size_t camera) -> Result<Image> {
+    Image& image = (*known)[{instant, camera}];
+    if (image.empty()) image = load(instant, camera).value();
     return image;
   };
   return out;
@@ -148,15 +148,15 @@ intake::FeedSensors sensors_of(const simulation::FlownRecording& flown) {
   return out;
 }
 
-intake::FedImages images_of(const ImageStream& stream, std::size_t moment, bool as_files) {
-  intake::FedImages out{stream.stamps[moment], {}, {}};
+intake::FedImages images_of(const ImageStream& stream, std::size_t instant, bool as_files) {
+  intake::FedImages out{stream.stamps[instant], {}, {}};
   for (std::uint32_t camera = 0; camera < stream.cameras.size(); ++camera) {
-    const Image image = stream.load(moment, camera).value();
+    const Image image = stream.load(instant, camera).value();
     out.images.push_back(
         {camera, !as_files, as_files ? formats::encode_png(image) : std::string(image.grey.begin(), image.grey.end())});
   }
   if (stream.load_depth)
-    out.depth = intake::EncodedImage{0, false, formats::encode_depth(stream.load_depth(moment).value())};
+    out.depth = intake::EncodedImage{0, false, formats::encode_depth(stream.load_depth(instant).value())};
   return out;
 }
 

@@ -55,7 +55,7 @@ class Player {
   void note_said(Timestamp stamp, std::size_t bytes);
   void note_stored(const std::optional<Timestamp>& stored);
   Status wait_for_robot(const std::atomic<bool>& stop);
-  [[nodiscard]] std::optional<intake::FedImages> images(std::size_t moment, Timestamp stamp) const;
+  [[nodiscard]] std::optional<intake::FedImages> images(std::size_t instant, Timestamp stamp) const;
   void score(const program::FeedTrajectory& trajectory);
 
   const FeedPlayerOptions& options_;
@@ -202,11 +202,11 @@ Status Player::say_images(Timestamp now) {
 }
 
 /// Without those that cannot be read: the robot finds out that there are none.
-std::optional<intake::FedImages> Player::images(std::size_t moment, Timestamp stamp) const {
+std::optional<intake::FedImages> Player::images(std::size_t instant, Timestamp stamp) const {
   const ImageStream& stream = *robot_.recording.images;
   intake::FedImages out{stamp, {}, {}};
   for (std::uint32_t camera = 0; camera < stream.cameras.size(); ++camera) {
-    const auto image = stream.load(moment, camera);
+    const auto image = stream.load(instant, camera);
     if (!image || image->empty()) continue;
     const CameraModel& model = stream.cameras[camera].model;
     if (image->width_px != model.width_px || image->height_px != model.height_px) continue;
@@ -214,7 +214,7 @@ std::optional<intake::FedImages> Player::images(std::size_t moment, Timestamp st
   }
   if (out.images.empty() || out.images.front().camera != 0) return std::nullopt;
   if (stream.load_depth)
-    if (const auto depth = stream.load_depth(moment); depth && !depth->empty())
+    if (const auto depth = stream.load_depth(instant); depth && !depth->empty())
       out.depth = intake::EncodedImage{0, false, formats::encode_depth(*depth)};
   return out;
 }

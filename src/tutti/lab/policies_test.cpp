@@ -149,7 +149,7 @@ TEST(Skeleton, LinksAreShortWhereTheDriftWasBorn) {
   EXPECT_NEAR(at, 60.0, 5.0);
 }
 
-TEST(Skeleton, LooksAtRawOdometryNotAtWhatItCorrectedBefore) {
+TEST(Skeleton, UsesRawOdometryNotWhatItCorrectedBefore) {
   Scene scene = bent_scene(80, 40, 0.2);
   const auto before = linked(scene.choose(SkeletonPolicy()));
   for (RobotNode& node : scene.nodes) node.T_map_body = node.T_map_body * Pose3{so3_exp({0, 0, 0.1}), {1, 2, 3}};

@@ -70,7 +70,7 @@ TEST_F(ClosuresOfAMap, AreExplainedAsTheServerJudgedThem) {
   EXPECT_GT(rejected, 3U);
 }
 
-TEST_F(ClosuresOfAMap, AWordIntoTheFileIsWhatTheNextServerFollows) {
+TEST_F(ClosuresOfAMap, ADecisionInTheFileIsWhatTheNextServerFollows) {
   const auto before = infos();
   const ClosureInfo right = *first(before, ClosureState::accepted), wrong = *first(before, ClosureState::rejected);
   ASSERT_TRUE(put_decision(store_, {right.name, Wish::reject, "ada", 5}).has_value());

@@ -191,7 +191,7 @@ TEST_F(BagCameras, OfASecondCameraTheNearestImageIsTaken) {
 }
 
 /// Depth of any kind is no second camera; what does not fit is reported with what was expected.
-TEST_F(BagCameras, DepthThatIsNotRegisteredIsSaid) {
+TEST_F(BagCameras, DepthThatIsNotRegisteredIsReported) {
   const std::vector<std::pair<Depth, std::string>> cases{
       {{.width = 80}, "/depth/image_raw: 80 x 120 pixels, expected 160 x 120 as of /camera/image_raw"},
       {{.focal_px = 102}, "fx 102.0, fy 102.0, cx 80.0, cy 60.0 in its CameraInfo, expected 100.0, 100.0, 80.0, 60.0"},

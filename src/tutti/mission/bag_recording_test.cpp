@@ -333,7 +333,7 @@ TEST_F(Bags, FramesWithoutTransformsAreNamed) {
       << problem();
 }
 
-TEST_F(Bags, OfABadBagWhatIsGoodIsTakenAndTheRestIsSaid) {
+TEST_F(Bags, OfABadBagWhatIsGoodIsTakenAndTheRestIsReported) {
   std::vector<Sample> samples = robot({.time_field = "time"});
   std::vector<Sample*> odometry, clouds;
   for (Sample& sample : samples)
@@ -402,7 +402,7 @@ TEST_F(Bags, CutAndFlippedOnesGiveWhatIsLeftOrSayWhyNot) {
   EXPECT_GT(taken, 10U);
 }
 
-TEST_F(Bags, ATopicWithoutMessagesAndOtherClocksAreSaid) {
+TEST_F(Bags, ATopicWithoutMessagesAndOtherClocksAreReported) {
   std::vector<Sample> samples = robot({});
   std::erase_if(samples, [](const Sample& sample) { return sample.type == kOdometry; });
   const std::string silent = schema(90, kOdometry) + channel(90, 90, "/odom");
@@ -448,7 +448,7 @@ TEST_F(Bags, ImagesAndImuAreTakenWhereClosuresAreFoundFromThem) {
   EXPECT_LT((recording.imu[0].accelerometer - Eigen::Vector3d(-5, 4, 6)).norm(), 1e-12);
 }
 
-TEST_F(Bags, ImagesThatCannotBeUsedAreSaid) {
+TEST_F(Bags, ImagesThatCannotBeUsedAreReported) {
   write(with_camera(robot({}), odometry_, kBodyLidar, "32FC1"));
   EXPECT_NE(
       load({}, {"closures.verifier=visual"}).error().message.find("/camera/image_raw: encoding '32FC1' is no picture"),

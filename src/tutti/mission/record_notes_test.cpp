@@ -105,7 +105,7 @@ TEST(Notes, WhyTwoRobotsAreTwoMaps) {
   EXPECT_TRUE(notes(0).empty());  // of one map, joined by others
 }
 
-TEST(Notes, OdometryThatSaysTooLittleOfItsErrors) {
+TEST(Notes, OdometryThatStatesTooLittleOfItsErrors) {
   MissionRecord record = joined();
   record.notes.clear();
   server::MapEstimate map;
@@ -115,7 +115,7 @@ TEST(Notes, OdometryThatSaysTooLittleOfItsErrors) {
   EXPECT_NE(record.notes[0].find("bravo: its odometry errs 6.0 times"), std::string::npos) << record.notes[0];
 }
 
-TEST(Notes, ClosuresThatSayTooLittleOfTheirErrors) {
+TEST(Notes, ClosuresThatStateTooLittleOfTheirErrors) {
   MissionRecord record = joined();
   record.notes.clear();
   server::MapEstimate map;

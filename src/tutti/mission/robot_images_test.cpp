@@ -111,10 +111,10 @@ TEST_F(RobotImages, ABaselineThatOdometryContradictsIsReported) {
   const fs::path sensor = wrong / "mav0/cam1/sensor.yaml";
   std::stringstream text;
   text << std::ifstream(sensor).rdbuf();
-  std::string told = text.str();
-  const std::size_t at = told.find("-0.055");
-  ASSERT_NE(at, std::string::npos) << told;
-  std::ofstream(sensor) << told.replace(at, 6, "-0.099");
+  std::string yaml = text.str();
+  const std::size_t at = yaml.find("-0.055");
+  ASSERT_NE(at, std::string::npos) << yaml;
+  std::ofstream(sensor) << yaml.replace(at, 6, "-0.099");
   EXPECT_FALSE(has_note(run(), "its cameras together"));
   config_.robots[0].images.euroc_folder = "wrong";
   const MissionRecord record = run();
@@ -126,14 +126,14 @@ TEST_F(RobotImages, ASecondCameraThatIsTurnedIsReported) {
   const fs::path wrong = folder() / "turned";
   fs::copy(folder() / "hall", wrong, fs::copy_options::recursive);
   const Camera second = small_stereo()[1];
-  const Pose3 told{second.T_body_camera.rotation * so3_exp({0.0, 0.9 * kRadPerDeg, 0.0}),
-                   second.T_body_camera.translation};
+  const Pose3 given{second.T_body_camera.rotation * so3_exp({0.0, 0.9 * kRadPerDeg, 0.0}),
+                    second.T_body_camera.translation};
   const fs::path sensor = wrong / "mav0/cam1/sensor.yaml";
   std::stringstream text;
   text << std::ifstream(sensor).rdbuf();
   std::string yaml = text.str();
   const std::size_t begin = yaml.find('['), end = yaml.find(']') + 1;
-  std::ofstream(sensor) << yaml.replace(begin, end - begin, test::matrix_of(told));
+  std::ofstream(sensor) << yaml.replace(begin, end - begin, test::matrix_of(given));
   EXPECT_FALSE(has_note(run(), "the second camera is turned"));
   config_.robots[0].images.euroc_folder = "turned";
   const MissionRecord without = run();
@@ -173,7 +173,7 @@ void write_depth(const fs::path& folder, double units_per_m) {
   }
 }
 
-TEST_F(RobotImages, AnRgbdCameraTellsDepthWithoutMoving) {
+TEST_F(RobotImages, AnRgbdCameraMeasuresDepthWithoutMoving) {
   write_depth(folder(), 5000.0);
   auto& images = config_.robots[0].images;
   images = {.list = "list.csv", .cameras = "cameras.yaml"};
@@ -190,25 +190,25 @@ TEST_F(RobotImages, AnRgbdCameraTellsDepthWithoutMoving) {
 TEST_F(RobotImages, DepthImagesThatAreNoneAreReported) {
   auto& images = config_.robots[0].images;
   images = {.list = "list.csv", .cameras = "cameras.yaml", .depth = {.list = "depth.csv"}};
-  const auto told = [&] { return all_notes(run()); };
+  const auto run_notes = [&] { return all_notes(run()); };
   const auto expect = [](const std::string& notes, const std::string& expected) {
     EXPECT_NE(notes.find(expected), std::string::npos) << "'" << expected << "' in:\n" << notes;
   };
   write_depth(folder(), 5000.0);
   images.depth.scale = 1000.0;
-  expect(told(), "are there 1000 of their numbers to a metre?");
+  expect(run_notes(), "are there 1000 of their numbers to a metre?");
   write_depth(folder(), 1000.0);
   images.depth.scale = 1100.0;
-  expect(told(), "its cameras together have its trajectory 0.9");
+  expect(run_notes(), "its cameras together have its trajectory 0.9");
   images.depth.scale = 1000.0;
   const auto replace = [&](const DepthImage& depth) {
     for (std::size_t i = 0; i <= 32; ++i)
       ASSERT_TRUE(write_file((folder() / fmt::format("depth_{}.png", i)).string(), formats::encode_depth(depth)));
   };
   replace({188, 120, std::vector<std::uint16_t>(188U * 120U)});
-  expect(told(), "depth is not known (0) at 100 %");
+  expect(run_notes(), "depth is not known (0) at 100 %");
   replace({94, 60, std::vector<std::uint16_t>(94U * 60U, 1000)});
-  expect(told(), "a depth image of 94 x 60 pixels, its camera has 188 x 120");
+  expect(run_notes(), "a depth image of 94 x 60 pixels, its camera has 188 x 120");
   ASSERT_TRUE(write_file((folder() / "depth_0.png").string(), formats::encode_png(Image(188, 120))));
   expect(first_error(), "depth_0.png: 8 bits of grey, expected a grey PNG image of 16 bits");
   fs::remove(folder() / "depth_0.png");
@@ -219,7 +219,7 @@ TEST_F(RobotImages, DepthImagesThatAreNoneAreReported) {
   expect(late.error().message, "of 33 images and 1 depth images 0 are within 0.02 s");
 }
 
-TEST_F(RobotImages, StampsOfAnotherClockAreSaidAndTheOffsetIsASetting) {
+TEST_F(RobotImages, StampsOfAnotherClockAreReportedAndTheOffsetIsASetting) {
   config_.robots[0].images.time_offset_s = 0.03;
   EXPECT_NE(first_error().find("add -0.0300 "), std::string::npos) << first_error();
   EXPECT_NE(first_error().find("images.time_offset_s is 0.03"), std::string::npos) << first_error();
@@ -267,7 +267,7 @@ TEST_F(RobotImages, ARecordingWithoutAReadableImageIsRefused) {
   EXPECT_NE(first_error().find("nowhere/0.png"), std::string::npos) << first_error();
 }
 
-TEST_F(RobotImages, MissingRowsAndACameraOnItsSideAreSaidOfEveryRobot) {
+TEST_F(RobotImages, MissingRowsAndACameraOnItsSideAreReportedOfEveryRobot) {
   std::ifstream good(folder() / "cameras.yaml");
   std::string text((std::istreambuf_iterator<char>(good)), {});
   const Eigen::Quaterniond ahead((Eigen::Matrix3d() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished());
@@ -291,7 +291,7 @@ TEST_F(RobotImages, MissingRowsAndACameraOnItsSideAreSaidOfEveryRobot) {
   }
 }
 
-TEST_F(RobotImages, AWrongCalibrationIsSaidBeforeAnythingIsMerged) {
+TEST_F(RobotImages, AWrongCalibrationIsReportedBeforeAnythingIsMerged) {
   std::ifstream good(folder() / "cameras.yaml");
   std::string text((std::istreambuf_iterator<char>(good)), {});
   const std::size_t at = text.find("T_body_camera");

@@ -136,7 +136,7 @@ TEST_F(StrangerBags, WhatIsInNoRobotsNamespaceIsAnybodys) {
   EXPECT_EQ(read("bravo")->scan_topic, "/bravo/points");
 }
 
-TEST_F(StrangerBags, TransformsThatContradictEachOtherAreSaidWithNumbers) {
+TEST_F(StrangerBags, TransformsThatContradictEachOtherAreReportedWithNumbers) {
   const auto transforms = [](const char* parent, double x) {
     return sample_of("/tf_static", kTf, kStart + 1.0, tf_of(kStart, {{parent, "lidar", at_x(x)}}));
   };
@@ -153,7 +153,7 @@ TEST_F(StrangerBags, TransformsThatContradictEachOtherAreSaidWithNumbers) {
 }
 
 /// Points that have times by the LiDAR's clock are deskewed by them all the same.
-TEST_F(StrangerBags, ALidarWithAClockOfItsOwnIsSaidAndAligned) {
+TEST_F(StrangerBags, ALidarWithAClockOfItsOwnIsReportedAndAligned) {
   const auto with_clock = [](double ahead_s) {
     std::vector<Sample> out = samples_of({});
     for (Sample& sample : out) {
@@ -209,7 +209,7 @@ TEST_F(StrangerBags, OdometryOutOfOrderIsSortedInsteadOfDropped) {
 }
 
 /// The robot was on for 3 s, then its clock was set back by 5 s: what is used is the longer part, of all sensors.
-TEST_F(StrangerBags, AClockThatStartsAgainIsSaidAndTheLongerPartUsed) {
+TEST_F(StrangerBags, AClockThatStartsAgainIsReportedAndTheLongerPartUsed) {
   for (const double first_s : {3.0, 7.0}) {
     std::vector<Sample> samples = samples_of({});
     for (Sample& sample : samples) {

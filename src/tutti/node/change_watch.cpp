@@ -23,7 +23,7 @@ ChangeWatch::Decision ChangeWatch::take(RobotId robot, Map map, const LoneClosur
   Robot& known = robots_[robot];
   const ProxyGraph& own = map.own;
   const auto end_waiting = [&](ChangeOutcome outcome) {
-    if (known.waiting) out.told.push_back({robot, outcome, known.waiting->change, known.waiting->reason});
+    if (known.waiting) out.reports.push_back({robot, outcome, known.waiting->change, known.waiting->reason});
     known.waiting.reset();
   };
   const auto follow = [&] { known.followed = std::move(map); };
@@ -55,7 +55,7 @@ ChangeWatch::Decision ChangeWatch::take(RobotId robot, Map map, const LoneClosur
     return out;
   }
   end_waiting(ChangeOutcome::gone);
-  out.told.push_back({robot, ChangeOutcome::waits, change, reason});
+  out.reports.push_back({robot, ChangeOutcome::waits, change, reason});
   known.waiting = {now, std::move(map), change, reason};
   return out;
 }

@@ -45,7 +45,7 @@ class ChangeWatch {
   };
   struct Decision {
     bool send = true;
-    std::vector<ChangeOfMind> told;
+    std::vector<ChangeOfMind> reports;
   };
   /// On how many closures of one pair of places the difference between the new map and `followed` rests; 0: on more
   /// than one group (server::change_support).

@@ -39,8 +39,8 @@ class ChangeWatchTest : public testing::Test {
   }
   /// What is reported, one outcome at most.
   static std::optional<ChangeOutcome> reported(const ChangeWatch::Decision& decision) {
-    EXPECT_LE(decision.told.size(), 1U);
-    return decision.told.empty() ? std::nullopt : std::optional(decision.told.front().outcome);
+    EXPECT_LE(decision.reports.size(), 1U);
+    return decision.reports.empty() ? std::nullopt : std::optional(decision.reports.front().outcome);
   }
   ChangeWatch watch_;
   Timestamp now_;
@@ -60,7 +60,7 @@ TEST_F(ChangeWatchTest, AChangeThatStandsIsSentOneUpdateLater) {
   const auto first = take(map_with(2.0));
   EXPECT_FALSE(first.send);
   EXPECT_EQ(reported(first), ChangeOutcome::waits);
-  EXPECT_GT(first.told[0].change.significance, 1.0);
+  EXPECT_GT(first.reports[0].change.significance, 1.0);
   EXPECT_TRUE(watch_.anything_waits());
   const auto second = take(map_with(2.1));
   EXPECT_TRUE(second.send);
@@ -90,9 +90,9 @@ TEST_F(ChangeWatchTest, AThirdOpinionWaitsAnew) {
   EXPECT_FALSE(take(map_with(2.0)).send);
   const auto other = take(map_with(-1.5));
   EXPECT_FALSE(other.send);
-  ASSERT_EQ(other.told.size(), 2U);
-  EXPECT_EQ(other.told[0].outcome, ChangeOutcome::gone);
-  EXPECT_EQ(other.told[1].outcome, ChangeOutcome::waits);
+  ASSERT_EQ(other.reports.size(), 2U);
+  EXPECT_EQ(other.reports[0].outcome, ChangeOutcome::gone);
+  EXPECT_EQ(other.reports[1].outcome, ChangeOutcome::waits);
   EXPECT_TRUE(take(map_with(-1.5)).send);
 }
 
@@ -110,7 +110,7 @@ TEST_F(ChangeWatchTest, WhatRestsOnOnePlaceStandsForMinutes) {
   take(map_with(0.0));
   const auto first = take(map_with(2.0), 4);
   EXPECT_EQ(reported(first), ChangeOutcome::waits);
-  EXPECT_EQ(first.told[0].reason.lone, 4U);
+  EXPECT_EQ(first.reports[0].reason.lone, 4U);
   for (const Timestamp since = now_; now_ - since < ChangeWatch::kStands_s - 10.0;) {
     const auto next = take(map_with(2.1), 5);
     EXPECT_FALSE(next.send);
@@ -120,7 +120,7 @@ TEST_F(ChangeWatchTest, WhatRestsOnOnePlaceStandsForMinutes) {
   const auto last = take(map_with(2.1), 6);
   EXPECT_TRUE(last.send);
   EXPECT_EQ(reported(last), ChangeOutcome::stands);
-  EXPECT_EQ(last.told[0].reason.lone, 5U);  // of the map that waited
+  EXPECT_EQ(last.reports[0].reason.lone, 5U);  // of the map that waited
 }
 
 TEST_F(ChangeWatchTest, ASecondPlaceThatSaysTheSameEndsTheWait) {

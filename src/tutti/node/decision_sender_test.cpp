@@ -50,7 +50,7 @@ class Decisions : public testing::Test {
   std::unique_ptr<ServerNode> server_;
 };
 
-TEST_F(Decisions, IsSaidUntilItIsAnswered) {
+TEST_F(Decisions, IsSentUntilItIsAnswered) {
   const ClosureDecision decision{"0/0-0/2", Wish::reject, "ada", 5};
   DecisionSender sender(kSelf, decision);
   std::set<std::string> ids;

@@ -33,7 +33,7 @@ TEST(Receipts, StrangersAreBoundedUntilTheyAreGone) {
   EXPECT_NE(receipts.of_anybody(RobotId{number}, false, kStart + Receipts::kStrangerIsGone_s), nullptr);
 }
 
-TEST(Receipts, AreSaidAgainToARobotThatKeepsItsSubmaps) {
+TEST(Receipts, AreSentAgainToARobotThatKeepsItsSubmaps) {
   Receipts receipts;
   NodeStatus status;
   status.backlog_submaps = 2;

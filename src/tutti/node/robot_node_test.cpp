@@ -384,7 +384,7 @@ TEST_F(RobotNodeTest, AKillBetweenSamplesAndScansThatNeverMeetLosesNothing) {
   EXPECT_EQ(frames(), sent);
 }
 
-TEST_F(RobotNodeTest, KeyframesWithoutAScanAreTold) {
+TEST_F(RobotNodeTest, KeyframesWithoutAScanAreReported) {
   const auto reported = [&](int from, int to, bool with_scans) {
     std::vector<SensorMissing> out;
     const auto cloud = std::make_shared<const PointCloud>(PointCloud{{{5.0F, 3.0F, 1.0F}}});

@@ -319,7 +319,7 @@ TEST_F(ServerNodeTest, AnOperatorsDecisionIsStoredAndSurvivesEveryRestart) {
   EXPECT_EQ(accepted(), all);
 }
 
-TEST_F(ServerNodeTest, NobodyElseHasAWordAndNotOnWhatIsNotThere) {
+TEST_F(ServerNodeTest, NobodyElseDecidesAndNotOnWhatIsNotThere) {
   fill();
   const auto before = store_->tables();
   const ClosureDecision decision{"0/0-1/2", Wish::reject, "ada", 5};

@@ -427,7 +427,7 @@ TEST_F(HostTest, ItsLastMessagesAreStored) {
   EXPECT_TRUE(store_.read("rows", "end").value().has_value());
 }
 
-TEST_F(HostTest, CarriesOutWhatIsSaidWhileItWaitsUntilThatCannotBeStored) {
+TEST_F(HostTest, CarriesOutWhatIsSentWhileItWaitsUntilThatCannotBeStored) {
   std::atomic<bool> stop = false;
   const auto carry_out = [&](const std::string& text) {
     return host_->carry_out({.writes = {{"rows", text, text}}, .messages = {letter(MessageKind::job, text)}});

@@ -32,7 +32,7 @@ TEST(LinkWatch, SaysOnceThatThereIsNoLinkAndThatItIsBack) {
   EXPECT_TRUE(has(lines[0].sentence, "lost its link to the bus")) << lines[0].sentence;
 }
 
-TEST(LinkWatch, TheAddressOfTheBusIsSaidOnce) {
+TEST(LinkWatch, TheAddressOfTheBusIsReportedOnce) {
   LinkWatch watch;
   const bus::LinkState state{.url = "nats://base:4222", .last_error = "nats://base:4222: connecting: no server"};
   watch.look(state, 0);
@@ -52,7 +52,7 @@ TEST(AnewWatch, ConnectsAnIdleWorkerAnewOnceAMinute) {
   EXPECT_TRUE(watch.connects_anew(true, false, 65.0));
 }
 
-TEST(LinkWatch, ACutThatNobodyNoticesIsNotSaid) {
+TEST(LinkWatch, ACutThatNobodyNoticesIsNotReported) {
   LinkWatch watch;
   bus::LinkState state{.url = "nats://base:4222", .connected = true};
   for (int s = 0; s < 100; ++s) {
@@ -61,7 +61,7 @@ TEST(LinkWatch, ACutThatNobodyNoticesIsNotSaid) {
   }
 }
 
-TEST(LinkWatch, ABusThatStoresNothingIsSaidToBeFull) {
+TEST(LinkWatch, ABusThatStoresNothingIsReportedToBeFull) {
   LinkWatch watch;
   bus::LinkState state{.url = "nats://base:4222", .connected = true, .unconfirmed_s = 20.0};
   EXPECT_TRUE(watch.look(state, 0).empty());

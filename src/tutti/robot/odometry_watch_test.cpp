@@ -33,7 +33,7 @@ int jumps(double speed_mps, double rate_hz, const Pose3& jump, double seconds = 
   return reported;
 }
 
-TEST(OdometryWatch, TellsWhatNoBodyDoes) {
+TEST(OdometryWatch, FindsWhatNoBodyDoes) {
   for (const double rate_hz : {5.0, 10.0, 200.0})
     for (const double jump_m : {500.0, -500.0}) EXPECT_EQ(jumps(1.0, rate_hz, ahead(jump_m)), 1) << rate_hz;
   for (const double rate_hz : {10.0, 200.0}) {

@@ -285,7 +285,7 @@ TEST(SubmapBuilder, TheSharedKeyframesImagesAreInBothSubmaps) {
   EXPECT_TRUE(builder.take_image_errors().empty());
 }
 
-TEST(SubmapBuilder, ImagesThatContradictTheOdometryAreLeftOutAndSaidSo) {
+TEST(SubmapBuilder, ImagesThatContradictTheOdometryAreLeftOutAndReported) {
   SubmapBuilder builder(RobotId{3}, {});
   const std::vector<Submap> submaps = look_around(builder, 12.0, true);
   ASSERT_EQ(submaps.size(), 2U);

@@ -213,7 +213,7 @@ TEST(Georeference, SwappedCoordinatesAreNotBelieved) {
   EXPECT_NE(map.fixes.unaligned[0].why.find("swapped"), std::string::npos) << map.fixes.unaligned[0].why;
 }
 
-TEST(Georeference, AReceiverThatSaysTooLittleIsHeardAsFarAsItDeserves) {
+TEST(Georeference, AReceiverThatStatesTooLittleIsHeardAsFarAsItDeserves) {
   World world;
   Robot robot;
   robot.receiver.sigma_m = 2.0;

@@ -65,7 +65,7 @@ CorridorRunConfig with_wrong_closures() {
   return config;
 }
 
-TEST(GraphJudge, TellsWrongClosuresFromRightOnes) {
+TEST(GraphJudge, DistinguishesWrongClosuresFromRightOnes) {
   const Case of = make_case(with_wrong_closures(), 1);
   const JudgedGraph judged = judge_graph(of.graph, {});
   ASSERT_TRUE(judged.map.converged);

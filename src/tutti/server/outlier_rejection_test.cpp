@@ -114,7 +114,7 @@ TEST(OutlierRejection, ASlipIsFoundNearItsStep) {
 
 // Odometry that turns 0.02 degrees a metre wrongly and states a sixth of that: by its covariance nearly all right
 // closures are inconsistent with it and with each other.
-TEST(OutlierRejection, OdometryThatSaysTooLittleOfItsErrorsCostsNoClosures) {
+TEST(OutlierRejection, OdometryThatStatesTooLittleOfItsErrorsCostsNoClosures) {
   for (std::uint64_t seed = 1; seed <= tutti::seeds(3U); ++seed) {
     CorridorRunConfig config;
     config.odometry.yaw_drift_deg_per_m = 0.02;

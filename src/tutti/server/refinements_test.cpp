@@ -211,7 +211,7 @@ TEST(Refinements, BetweenThoseOfTheWholeOnesOfWhatIsNew) {
   EXPECT_LT(error_at_the_end(server->map(), RobotId{1}), 1e-6);
 }
 
-TEST(Refinements, WhatAJobHoldsIsWhereTheMapHasIt) {
+TEST(Refinements, WhatAJobFixesIsWhereTheMapHasIt) {
   RefinedServer server(100);
   const auto messages = RefinedServer::messages();
   for (std::size_t i = 0; i + 1 < messages.size(); ++i) server.take(messages[i]);

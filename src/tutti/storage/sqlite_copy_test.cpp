@@ -94,7 +94,7 @@ TEST_F(SqliteCopy, OfAClosedStoreIsTheStore) {
   EXPECT_EQ(number_in(*open(copy_)), kFirst);
 }
 
-TEST_F(SqliteCopy, WhatCannotBeCopiedIsSaid) {
+TEST_F(SqliteCopy, WhatCannotBeCopiedIsReported) {
   const auto expect_error = [&](const fs::path& from, const char* text) {
     const Status copied = copy_sqlite_store(from, copy_);
     ASSERT_FALSE(copied.has_value());

@@ -55,10 +55,10 @@ Selection AdaptivePolicy::choose(const PolicyInput& input) const {
   const OdometryDrift drift(chain.server, chain.odometry);
   const Eigen::VectorXd allowed = (config_.adaptive_error_share * input.test->sigma_m()).cwiseMax(kLeastError_m);
   Joints joints{0, nodes - 1};
-  Eigen::MatrixXd rest = drift.held(joints);
+  Eigen::MatrixXd rest = drift.with_fixed(joints);
   const auto split_at = [&](const Eigen::VectorXd& value) {
     if (!split(joints, value)) return false;
-    rest = drift.held(joints);
+    rest = drift.with_fixed(joints);
     return true;
   };
   const auto error = [&]() -> Eigen::VectorXd { return rest.leftCols<3>().rowwise().norm().cwiseQuotient(allowed); };

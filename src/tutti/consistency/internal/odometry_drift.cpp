@@ -36,8 +36,8 @@ Vector6d OdometryDrift::at_node(std::size_t node, const Vector6d& motion) const 
 
 Vector6d OdometryDrift::missed(std::size_t a, std::size_t b) const { return at_node(b, nodes_[b].E - nodes_[a].E); }
 
-Eigen::MatrixXd OdometryDrift::held(std::span<const std::size_t> held) const {
-  TUTTI_CHECK(!held.empty() && held.back() < size(), "{} of {} nodes held", held.size(), size());
+Eigen::MatrixXd OdometryDrift::with_fixed(std::span<const std::size_t> fixed) const {
+  TUTTI_CHECK(!fixed.empty() && fixed.back() < size(), "{} of {} nodes fixed", fixed.size(), size());
   Eigen::MatrixXd out(static_cast<Eigen::Index>(size()), 6);
   const auto write = [&](std::size_t k, const Vector6d& motion) {
     out.row(static_cast<Eigen::Index>(k)) = at_node(k, motion).transpose();
@@ -45,9 +45,9 @@ Eigen::MatrixXd OdometryDrift::held(std::span<const std::size_t> held) const {
   const auto write_free = [&](std::size_t first, std::size_t end, std::size_t from) {
     for (std::size_t k = first; k < end; ++k) write(k, nodes_[k].E - nodes_[from].E);
   };
-  write_free(0, held.front() + 1, held.front());
-  for (std::size_t j = 1; j < held.size(); ++j) {
-    const std::size_t a = held[j - 1], b = held[j];
+  write_free(0, fixed.front() + 1, fixed.front());
+  for (std::size_t j = 1; j < fixed.size(); ++j) {
+    const std::size_t a = fixed[j - 1], b = fixed[j];
     Matrix6d S = Matrix6d::Zero();
     for (std::size_t k = a + 1; k <= b; ++k) S += nodes_[k].step;
     const Vector6d pull = S.ldlt().solve(nodes_[b].E - nodes_[a].E);
@@ -57,7 +57,7 @@ Eigen::MatrixXd OdometryDrift::held(std::span<const std::size_t> held) const {
       write(k, nodes_[k].E - nodes_[a].E - S * pull);
     }
   }
-  write_free(held.back() + 1, size(), held.back());
+  write_free(fixed.back() + 1, size(), fixed.back());
   return out;
 }
 

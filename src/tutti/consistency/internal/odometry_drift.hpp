@@ -27,7 +27,7 @@ class OdometryDrift {
   /// the server has them: of a node between two fixed ones, a < k < b, by the most likely error,
   ///   (E_k - E_a) - S_k S_b^-1 (E_b - E_a),   S the covariance of odometry summed from a in the common frame
   /// (the linear-Gaussian bridge, the onboard smoother's first step); of one beyond the last fixed one E_k - E_a.
-  [[nodiscard]] Eigen::MatrixXd held(std::span<const std::size_t> nodes) const;
+  [[nodiscard]] Eigen::MatrixXd with_fixed(std::span<const std::size_t> nodes) const;
 
  private:
   struct Node {

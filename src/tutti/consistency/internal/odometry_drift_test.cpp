@@ -44,20 +44,20 @@ struct DriftedRun {
   }
 };
 
-TEST(OdometryDrift, HeldNodesAreWhereTheServerHasThem) {
+TEST(OdometryDrift, FixedNodesAreWhereTheServerHasThem) {
   const DriftedRun run(1.0);
   const OdometryDrift drift(run.server, run.odometry);
   const std::vector<std::size_t> all{0, 1, 7, 20, 33, 49};
-  const Eigen::MatrixXd off = drift.held(all);
+  const Eigen::MatrixXd off = drift.with_fixed(all);
   ASSERT_EQ(off.rows(), static_cast<Eigen::Index>(kNodes));
   for (const std::size_t node : all) EXPECT_LT(off.row(static_cast<Eigen::Index>(node)).norm(), 1e-10) << node;
   EXPECT_GT(off.row(27).norm(), 1e-3);
   std::vector<std::size_t> each(kNodes);
   for (std::size_t k = 0; k < kNodes; ++k) each[k] = k;
-  EXPECT_LT(drift.held(each).norm(), 1e-9);
-  EXPECT_THROW((void)drift.held({}), std::logic_error);
+  EXPECT_LT(drift.with_fixed(each).norm(), 1e-9);
+  EXPECT_THROW((void)drift.with_fixed({}), std::logic_error);
   const std::vector<std::size_t> beyond{kNodes};
-  EXPECT_THROW((void)drift.held(beyond), std::logic_error);
+  EXPECT_THROW((void)drift.with_fixed(beyond), std::logic_error);
 }
 
 // Errors ten times smaller: what is neglected becomes a hundred times smaller.
@@ -77,11 +77,11 @@ TEST(OdometryDrift, MissesTheNodeByThePoseDifferenceToFirstOrder) {
   }
 }
 
-TEST(OdometryDrift, BeyondTheLastHeldNodeItIsWhatOdometryMisses) {
+TEST(OdometryDrift, BeyondTheLastFixedNodeItIsWhatOdometryMisses) {
   const DriftedRun run(1.0);
   const OdometryDrift drift(run.server, run.odometry);
-  const std::vector<std::size_t> held{9, 30};
-  const Eigen::MatrixXd off = drift.held(held);
+  const std::vector<std::size_t> fixed{9, 30};
+  const Eigen::MatrixXd off = drift.with_fixed(fixed);
   for (const std::size_t node : {31U, 49U})
     EXPECT_LT((off.row(node).transpose() - drift.missed(30, node)).norm(), 1e-12);
   for (const std::size_t node : {0U, 8U}) EXPECT_LT((off.row(node).transpose() - drift.missed(9, node)).norm(), 1e-12);
@@ -90,20 +90,20 @@ TEST(OdometryDrift, BeyondTheLastHeldNodeItIsWhatOdometryMisses) {
 // What is left when links fix nodes on the server's map is what the onboard smoother leaves.
 TEST(OdometryDrift, IsTheFirstStepOfTheOnboardSmoother) {
   constexpr double kSize = 1e-3;
-  const std::vector<std::size_t> held{3, 10, 11, 25, 40};
+  const std::vector<std::size_t> fixed{3, 10, 11, 25, 40};
   for (std::uint64_t seed = 1; seed < 5; ++seed) {
     const DriftedRun run(kSize, seed);
-    const Eigen::MatrixXd predicted = OdometryDrift(run.server, run.odometry).held(held);
+    const Eigen::MatrixXd predicted = OdometryDrift(run.server, run.odometry).with_fixed(fixed);
     estimation::OnboardSmoother smoother;
     for (std::size_t k = 1; k < kNodes; ++k) smoother.append(run.odometry[k]);
     std::vector<estimation::ChainConstraint> links;
-    for (std::size_t j = 1; j < held.size(); ++j)
-      links.push_back({held[j - 1],
-                       held[j],
-                       {run.server[held[j - 1]].inverse() * run.server[held[j]], 1e-14 * Matrix6d::Identity()}});
+    for (std::size_t j = 1; j < fixed.size(); ++j)
+      links.push_back({fixed[j - 1],
+                       fixed[j],
+                       {run.server[fixed[j - 1]].inverse() * run.server[fixed[j]], 1e-14 * Matrix6d::Identity()}});
     smoother.set_constraints(links);
     smoother.solve();
-    const Pose3 T = run.server[held.front()] * smoother.pose(held.front()).inverse();
+    const Pose3 T = run.server[fixed.front()] * smoother.pose(fixed.front()).inverse();
     for (std::size_t k = 0; k < kNodes; ++k) {
       const Vector6d row = predicted.row(static_cast<Eigen::Index>(k));
       EXPECT_LT((run.off(k, T * smoother.pose(k)) - row).norm(), 0.01 * predicted.rowwise().norm().maxCoeff()) << k;

@@ -95,7 +95,7 @@ TEST(ScanTimes, NumbersThatAreNoSweepsAreRefused) {
   EXPECT_TRUE(point_ages(scan_with({0.0, 50.0, 400.0}), Timestamp{}, times));
 }
 
-TEST(ScanTimes, AreToldInWords) {
+TEST(ScanTimes, AreReportedInWords) {
   EXPECT_EQ(in_words(std::nullopt), "scans are taken as deskewed to the stamps of their poses");
   EXPECT_EQ(in_words(PointTimes{.field = "t", .unit = "ns", .unit_s = 1e-9, .zero = Zero::sweep_begin}),
             "scans are deskewed by the robot's odometry: their field 't' is taken as ns since the sweep's begin, their "

@@ -208,7 +208,7 @@ TEST(VerifyNear, measuresWhatItRefuses) {
   EXPECT_TRUE(none.evidence.empty());
 }
 
-TEST(ToVerdict, closureJoinsTheMiddleKeyframesWhicheverWayThePairIsGiven) {
+TEST(ToVerdict, closureJoinsTheMiddleKeyframesInWhicheverOrderThePairIsGiven) {
   const Side a = see({RobotId{0}, 2}, furnished_room(), kWalkA, 1),
              b = see({RobotId{1}, 1}, furnished_room(), kWalkB, 2);
   const auto ab = to_verdict(a.submap, b.submap, verify_pair(a.features, b.features, kConfig));

@@ -56,7 +56,7 @@ TEST(ClockCheck, FindsACameraTurnedAboutItsAxis) {
   }
 }
 
-TEST(ClockCheck, SaysNothingWhereThereIsNoneOrNothingTells) {
+TEST(ClockCheck, SaysNothingWhereThereIsNoneOrNothingShowsIt) {
   EXPECT_EQ(watched(0.0).pairs(), 40U);
   EXPECT_FALSE(watched(0.0).offset_s(odometry()).has_value());
   EXPECT_FALSE(watched(0.01).offset_s(odometry()).has_value());

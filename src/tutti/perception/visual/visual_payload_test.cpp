@@ -134,7 +134,7 @@ std::string complaint(const Seen& s, const std::vector<Camera>& cameras = kCamer
   return payload ? "" : payload.error().message;
 }
 
-TEST(VisualPayload, wrongCalibrationIsSaid) {
+TEST(VisualPayload, wrongCalibrationIsReported) {
   auto cameras = kCameras;
   cameras[0].T_body_camera.rotation = cameras[0].T_body_camera.rotation * so3_exp({0.0, 0.0, 0.2});
   EXPECT_NE(

@@ -12,7 +12,7 @@ namespace feed_clock_test {
 constexpr std::int64_t kSecond = 1'000'000'000, kHour = 3600 * kSecond;
 constexpr Timestamp kNow{1'700'000'000 * kSecond};
 
-TEST(FeedClock, IsTheRobotsUnlessSaidOtherwise) {
+TEST(FeedClock, IsTheRobotsUnlessSetOtherwise) {
   FeedClock clock;
   ASSERT_TRUE(clock.begin(std::nullopt, std::nullopt, kNow));
   EXPECT_EQ(clock.how(), FeedClock::How::same);

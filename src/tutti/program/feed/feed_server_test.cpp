@@ -80,7 +80,7 @@ TEST_F(FeedServerTest, FeedsARobotOverASocketAndAgain) {
   close(client);
 }
 
-TEST_F(FeedServerTest, OneThatHasSaidAllMayStillRead) {
+TEST_F(FeedServerTest, OneThatHasSentAllMayStillRead) {
   const int client = connect();
   const std::string bytes = test::hello() + sample(0) + test::end_of_recording();
   ASSERT_EQ(send(client, bytes.data(), bytes.size(), 0), static_cast<ssize_t>(bytes.size()));

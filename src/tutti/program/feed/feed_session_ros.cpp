@@ -66,14 +66,14 @@ void FeedSession::take_due(Client client) {
 }
 
 void FeedSession::send_to_ros(Client client, const FeedState& state, const SmoothMap::Answer& answer) {
-  const FeedAnswer told{.stamp = by_client(state.newest->stamp),
-                        .wants_scan = state.wants_scan,
-                        .T_map_body = answer.T_map_odom * state.newest->pose,
-                        .T_map_odom = answer.T_map_odom,
-                        .covariance = answer.covariance,
-                        .map_age = state.map_age,
-                        .in_map = state.component.has_value()};
-  for (const FeedRaw& raw : ros_->hear(told, state.newest->pose)) put(clients_.at(client), raw_frame(raw), true);
+  const FeedAnswer for_client{.stamp = by_client(state.newest->stamp),
+                              .wants_scan = state.wants_scan,
+                              .T_map_body = answer.T_map_odom * state.newest->pose,
+                              .T_map_odom = answer.T_map_odom,
+                              .covariance = answer.covariance,
+                              .map_age = state.map_age,
+                              .in_map = state.component.has_value()};
+  for (const FeedRaw& raw : ros_->hear(for_client, state.newest->pose)) put(clients_.at(client), raw_frame(raw), true);
 }
 
 void FeedSession::send_to_ros(FeedTrajectory trajectory) {

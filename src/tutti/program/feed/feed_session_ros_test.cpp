@@ -121,7 +121,7 @@ TEST_F(FeedSessionRos, EverySensorReachesTheRobot) {
   EXPECT_TRUE(target_.sensors.cameras.empty());
 }
 
-TEST_F(FeedSessionRos, WhatIsNotTakenIsSaidAndTheConnectionStays) {
+TEST_F(FeedSessionRos, WhatIsNotTakenIsReportedAndTheConnectionStays) {
   begin();
   for (const auto& [bytes, expected] :
        {std::pair(raw("odom", "nav_msgs/msg/Odometry", "abc"), "odom: "),
@@ -140,7 +140,7 @@ TEST_F(FeedSessionRos, WhatIsNotTakenIsSaidAndTheConnectionStays) {
   EXPECT_NE(answer[0].refused().why().find("Hello.ros"), std::string::npos);
 }
 
-TEST_F(FeedSessionRos, WhatCannotBeSaidOfRosEndsTheConnection) {
+TEST_F(FeedSessionRos, WhatCannotBeConfiguredOfRosEndsTheConnection) {
   const auto refused = [&](const auto& spoil, const std::string& expected) {
     Feed::Ros ros;
     spoil(ros);

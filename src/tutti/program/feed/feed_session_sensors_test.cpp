@@ -120,7 +120,7 @@ TEST_F(FeedSessionSensors, SensorsThatCannotBeAreReportedAndEndTheConnection) {
   join(2);
 }
 
-TEST_F(FeedSessionSensors, FixesComeAsTheyWereSaid) {
+TEST_F(FeedSessionSensors, FixesComeAsTheyWereSent) {
   join(1);
   PositionFix fix{.stamp = {5}, .antenna = {46.5, -7.9, 612.5}, .p_body_antenna = {0.3, 0.1, 1.2}};
   fix.covariance << 2.0, 0.5, 0.1, 0.5, 3.0, 0.2, 0.1, 0.2, 9.0;

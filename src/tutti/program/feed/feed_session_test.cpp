@@ -80,7 +80,7 @@ TEST_F(FeedSessionTest, RefusesWhatIsNoGoodAndGoesOn) {
   EXPECT_TRUE(say(1, sample(12))[0].has_correction());
 }
 
-TEST_F(FeedSessionTest, SaysLaterWhatTheRobotSaysLater) {
+TEST_F(FeedSessionTest, ReportsLaterWhatTheRobotReportsLater) {
   join(1);
   join(2, true);
   target_.ends_at_once = false;
@@ -150,7 +150,7 @@ TEST_F(FeedSessionTest, OneFeedsAndManyListen) {
   EXPECT_EQ(read(3).size(), 1U);
 }
 
-TEST_F(FeedSessionTest, TellsWhatChangesOnce) {
+TEST_F(FeedSessionTest, ReportsWhatChangesOnce) {
   join(1);
   join(2, true);
   target_.known.component = 3;

@@ -63,11 +63,11 @@ FromRobot read(const v1::Feed& message) {
     case v1::Feed::kRefused:
       return FeedRefusal{{message.refused().stamp_ns()}, message.refused().why()};
     case v1::Feed::kWay: {
-      const auto& trajectory_in = message.way();
-      return FeedTrajectory{{trajectory_in.map_epoch(), trajectory_in.map_revision()},
-                            trajectory_in.constraints(),
-                            trajectory(trajectory_in.stamp_ns(), trajectory_in.t_map_body()),
-                            trajectory(trajectory_in.map_stamp_ns(), trajectory_in.t_world_body())};
+      const auto& in = message.way();
+      return FeedTrajectory{{in.map_epoch(), in.map_revision()},
+                            in.constraints(),
+                            trajectory(in.stamp_ns(), in.t_map_body()),
+                            trajectory(in.map_stamp_ns(), in.t_world_body())};
     }
     case v1::Feed::kEnded:
       return FeedEnd{};

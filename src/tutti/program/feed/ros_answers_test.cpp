@@ -15,7 +15,7 @@ FeedAnswer answer(std::int64_t ns, const Pose3& T_odom_body, const Pose3& T_map_
   return out;
 }
 
-TEST(RosAnswers, MapToOdomIsSaidOnceForEachStamp) {
+TEST(RosAnswers, MapToOdomIsSentOnceForEachStamp) {
   RosAnswers answers("r1/odom", "", 0.1);
   EXPECT_EQ(answers.map_frame(), "r1/map");
   EXPECT_FALSE(answers.transform());

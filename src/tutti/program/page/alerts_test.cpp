@@ -93,7 +93,7 @@ TEST(Alerts, OfALargeMapARobotMayHearLater) {
   EXPECT_EQ(Alerts().of_status(status).front().id, "robot/4/uncorrected");
 }
 
-TEST(Alerts, AMapTellsWhoIsAlone) {
+TEST(Alerts, AMapShowsWhoIsAlone) {
   storage::MemoryStore store{storage::map_schema()};
   mapfile::test::Mapper mapper({RobotId{0}, RobotId{1}}, store);
   mapper.walk({RobotId{0}, 5});

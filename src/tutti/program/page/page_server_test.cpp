@@ -263,7 +263,7 @@ TEST_F(PageServer, ARenewedCertificateIsShownWithoutARestart) {
   EXPECT_EQ(client().Get("/api/me")->status, 200) << "without files what it began with holds";
 }
 
-TEST_F(PageServer, ConnectionsThatSayNothingTakeNothingFromTheMission) {
+TEST_F(PageServer, ConnectionsThatSendNothingTakeNothingFromTheMission) {
   start();
   std::vector<int> sockets;
   sockaddr_in at{};

@@ -82,7 +82,7 @@ TEST_F(BagPlay, OnlyTheTopicsThatAreAskedFor) {
   EXPECT_EQ(played->messages, 2U);
 }
 
-TEST_F(BagPlay, WhatIsNotThereIsSaid) {
+TEST_F(BagPlay, WhatIsNotThereIsReported) {
   const auto why = [&](const BagPlayOptions& options) { return play(options).error().message; };
   const std::vector<std::string> bags = write_bags();
   EXPECT_NE(why({.bags = {"/nowhere.mcap"}}).find("/nowhere.mcap"), std::string::npos);
@@ -91,7 +91,7 @@ TEST_F(BagPlay, WhatIsNotThereIsSaid) {
   EXPECT_NE(why({.bags = bags, .name_space = "a b"}).find("is no name for ROS"), std::string::npos);
 }
 
-TEST_F(BagPlay, WhatCannotBePublishedIsLeftOutAndSaid) {
+TEST_F(BagPlay, WhatCannotBePublishedIsLeftOutAndReported) {
   {
     auto bag = bags::RosWriter::create((folder_ / "odd.mcap").string()).value();
     EXPECT_TRUE(bag.write("/a-b", kOdometry, {kStart}, odometry(kStart)));

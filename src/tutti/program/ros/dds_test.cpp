@@ -87,7 +87,7 @@ TEST(Dds, WhoComesLateIsGivenWhatIsLatched) {
   EXPECT_EQ(got, std::vector<std::string>{odometry(2)});
 }
 
-TEST(Dds, AQosThatDoesNotMatchIsSaid) {
+TEST(Dds, AQosThatDoesNotMatchIsReported) {
   const auto a = join_loopback(), b = join_loopback();
   const auto writer = a->writer("/odom", kOdometry, kSensorQos, "").value();
   const auto reader = b->reader("/odom", kOdometry, kLatchedQos, "").value();

@@ -242,7 +242,7 @@ TEST_F(RosRobots, TransformsInTheNamespaceAreHeardAndAnsweredThere) {
   EXPECT_TRUE(taken(*all).empty());
 }
 
-TEST_F(RosRobots, WhyThereIsNoOdometryIsSaid) {
+TEST_F(RosRobots, WhyThereIsNoOdometryIsReported) {
   const auto other = publisher("/bravo/odom", kOdometry);
   start();
   EXPECT_TRUE(
@@ -251,7 +251,7 @@ TEST_F(RosRobots, WhyThereIsNoOdometryIsSaid) {
       << said();
 }
 
-TEST_F(RosRobots, AnotherTypeOrQosIsSaid) {
+TEST_F(RosRobots, AnotherTypeOrQosIsReported) {
   const auto wrong = publisher("/alpha/odom", "geometry_msgs/msg/PoseStamped");
   start();
   EXPECT_TRUE(
@@ -260,7 +260,7 @@ TEST_F(RosRobots, AnotherTypeOrQosIsSaid) {
       << said();
 }
 
-TEST_F(RosRobots, PublishersThatAreNotReliableAreSaid) {
+TEST_F(RosRobots, PublishersThatAreNotReliableAreReported) {
   const auto sensor = publisher("/alpha/odom", kOdometry);
   start({.lossless = true});
   EXPECT_TRUE(is_said("1 publishers of /alpha/odom offer another reliability (best effort) than is asked for"))
@@ -296,7 +296,7 @@ TEST_F(RosRobots, OdometryWaitsForTheScansOfItsTime) {
   EXPECT_EQ(order, "ososo") << said();  // the last one, when it has been quiet for long enough
 }
 
-TEST_F(RosRobots, TwoPublishersAndNonsenseAreSaidAndDoNoHarm) {
+TEST_F(RosRobots, TwoPublishersAndNonsenseAreReportedAndDoNoHarm) {
   const auto tf = me_->reader("/tf", kTf, test::kKeepAll, "").value();
   start();
   const auto odom = publisher("/alpha/odom", kOdometry), again = publisher("/alpha/odom", kOdometry);

@@ -192,7 +192,7 @@ TEST(VisualTracker, FindsTheSamePointsInRealStereoPairs) {
 }
 
 /// The turn between them is 0.85 degrees: transposed, it is twice as far off.
-TEST(VisualTracker, RealCamerasTellHowTheyAreTurned) {
+TEST(VisualTracker, RealCamerasShowHowTheyAreTurned) {
   const std::string folder = "data/images/euroc_V1_01_visnav/data/";
   TUTTI_REQUIRE_SHARED(folder);
   const auto turn = [&](const std::vector<Camera>& cameras) {
