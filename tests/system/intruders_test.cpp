@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A whole mission with rights, by its programs in one process, while intruders try everything: the map is that of nodes
-// that talk to each other directly, and the server's log has who tried what.
+// that talk to each other directly, and the server's log shows who tried what.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -143,7 +143,7 @@ TEST_F(Ros, NonsenseFromAnotherProcessDoesNoHarm) {
     std::mt19937 rng(1);
     for (int i = 0; i < 300; ++i) {
       std::string bytes(4 + rng() % (i % 10 == 0 ? 200'000 : 100), '\0');
-      for (std::size_t k = 2; k < bytes.size(); ++k) bytes[k] = static_cast<char>(rng());  // behind what says CDR
+      for (std::size_t k = 2; k < bytes.size(); ++k) bytes[k] = static_cast<char>(rng());  // behind what marks CDR
       ASSERT_TRUE(writer.write("/odom", "nav_msgs/msg/Odometry", {i * 1'000'000}, bytes));
       sent.push_back(std::move(bytes));
     }

@@ -22,7 +22,7 @@ using FindTransform = std::function<std::optional<Pose3>(const std::string& a, c
 
 /// Fails unless the pixels of `depth` are those of `camera`: its images have the same size; its CameraInfo, where there
 /// is one, has the same matrix, each of fx, fy, cx and cy within 1 px; and its frame is the camera's, or one at the
-/// same place by the transforms, within 1 mm and 1 mrad. The error has value and expected value.
+/// same place by the transforms, within 1 mm and 1 mrad. The error names value and expected value.
 Status check_registered(const ImageTopic& depth, const ImageTopic& camera, const FindTransform& find);
 
 /// What was configured for the topics to use, and how to configure it.

@@ -123,7 +123,7 @@ struct RosPoseStamped {
   RosPose pose;
 };
 
-/// Each takes all bytes of one message, for CDR with the 4-byte encapsulation header. Errors have type, byte (counted
+/// Each takes all bytes of one message, for CDR with the 4-byte encapsulation header. Errors name type, byte (counted
 /// behind that header) and what was expected. Bytes may not be left over, except for up to three of padding in CDR.
 Result<RosOdometry> decode_odometry(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
 Result<std::vector<RosTransform>> decode_tf(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);

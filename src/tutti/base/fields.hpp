@@ -49,7 +49,7 @@ struct FieldRule {
   bool always = false;   ///< On the wire also with its default; a pose or covariance must be there.
   bool is_flat = false;  ///< JSON has the fields of this struct beside those of its owner.
   /// On the wire the fields of this struct, or the columns of this list, are beside those of their owner, with this
-  /// field's number added to theirs; this number itself is whether an optional one is there.
+  /// field's number added to theirs; this number itself states whether an optional one is there.
   bool is_spread = false;
   const char* column = "";  ///< Heading in tables for people; empty: in none.
 };

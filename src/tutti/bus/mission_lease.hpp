@@ -70,7 +70,7 @@ class MissionLease {
   void run();
   /// Takes or renews the lease, or reads the others'.
   Status look(LeaseBoard& board);
-  /// Whether the lease is to be written; otherwise state_ has who has it.
+  /// Whether the lease is to be written; otherwise state_ knows who has it.
   bool may_take(const std::optional<LeaseHolder>& there, std::uint64_t revision);
   void give_up(LeaseBoard& board) const;
 

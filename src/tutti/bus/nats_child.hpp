@@ -58,7 +58,7 @@ class NatsChild {
   [[nodiscard]] bool running() const;
   /// To be called about once a second: starts a child that has ended again, at the same address, stops it for as
   /// long as less than half of min_free_bytes are free, and gives it its rights when they have changed, which cuts off
-  /// those who have none any more. An error is why it is not running now, or has not got its rights.
+  /// those who have none any more. An error states why it is not running now, or has not got its rights.
   Status tend();
   /// From the next tend() on.
   void set_rights(std::string rights) { options_.rights = std::move(rights); }

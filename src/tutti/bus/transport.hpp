@@ -33,7 +33,7 @@ struct BusOptions {
   /// Messages that the bus has and gives to nobody for so long, as after a power failure, are dropped with their
   /// stream, which is made anew: who sent them sends them again. A worker's job that has ended five workers is removed.
   double stranded_s = 30.0;
-  /// Asked before each connection; its error is why not. Empty: always allowed. A server's port asks its
+  /// Asked before each connection; its error states why not. Empty: always allowed. A server's port asks its
   /// MissionLease.
   std::function<Status()> may_connect = {};
 };

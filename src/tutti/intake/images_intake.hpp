@@ -23,7 +23,7 @@ namespace tutti::intake {
 /// Turns images and IMU samples of ROS 2 into inputs of a robot's live feed, as mission/bag_cameras.cpp does of a bag.
 /// Which topics are cameras and which is their depth is chosen once the first image of each has come. Raw images become
 /// grey here, raw depth millimetres; compressed ones stay as they are where the robot can decode them. Bytes are
-/// untrusted: an error is what is wrong with a message, which then has no effect.
+/// untrusted: an error states what is wrong with a message, which then has no effect.
 class ImagesIntake {
  public:
   using Encoding = bags::RosEncoding;

@@ -18,7 +18,7 @@ struct OutlierRejectionConfig {
   int candidate_groups = 3;  ///< Number of groups of neighbouring closures, the largest first, that are tried as wrong
                              ///< all together; each must explain more than least_votes.
   int most_refused_groups = 5;   ///< Limit on the groups that are refused so.
-  int min_joining_closures = 2;  ///< Fewer closures do not join two pieces of odometry.
+  int min_joining_closures = 2;  ///< Fewer closures do not join two segments of odometry.
 
   template <class V>
   void describe(V& v) {

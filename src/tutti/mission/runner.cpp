@@ -253,7 +253,7 @@ class MissionRun {
     server_latency_ms_ = std::max(server_latency_ms_, pace_.late_ms(time_s_));
   }
 
-  /// With the names that robots tell in statuses, which a mission in virtual time does not send.
+  /// With the names that robots send in statuses, which a mission in virtual time does not have.
   [[nodiscard]] mapfile::ShownMap shown_map() {
     mapfile::ShownMap shown = shown_maps_.of(*server_, now());
     for (const MissionRecording& recording : recordings_)

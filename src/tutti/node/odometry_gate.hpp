@@ -29,7 +29,7 @@ class OdometryGate {
                            ///< empty.
     std::optional<OdometrySample> waited;
   };
-  /// An error is why the sample is refused (robot::usable_step()), or what it waits for (StampWatch).
+  /// An error states why the sample is refused (robot::usable_step()), or what it waits for (StampWatch).
   Result<Passed> take(const OdometrySample& sample);
   /// A sample waits for another one that confirms it.
   [[nodiscard]] bool holds_one() const { return waiting_.has_value(); }

@@ -244,7 +244,7 @@ TEST_F(RobotNodeTest, KnowsWhenItsNameIsSomebodyElses) {
   EXPECT_EQ(node_->conflict(), std::nullopt);
   EXPECT_EQ(reported(101, 1, "alpha is there"), 1U);
   restart();
-  EXPECT_EQ(reported(101, 1, "alpha is there"), 0U);  // what was said before it started again
+  EXPECT_EQ(reported(101, 1, "alpha is there"), 0U);  // what was sent before it started again
 }
 
 TEST_F(RobotNodeTest, AKillLosesNoMoreThanThePeriodAndWhatIsFedAgainMakesTheSame) {

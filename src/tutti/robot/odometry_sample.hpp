@@ -11,7 +11,7 @@
 namespace tutti::robot {
 
 /// The sample as the robot uses it: the quaternion normalised where it is off by rounding (1e-3), the covariance given
-/// an inverse and standard deviations of at most 10 m and 0.3 rad (geometry/covariance.hpp). An error says why the
+/// an inverse and standard deviations of at most 10 m and 0.3 rad (geometry/covariance.hpp). An error states why the
 /// sample is refused.
 Result<OdometryStep> usable_step(RobotId robot, Timestamp stamp, const Pose3& T_odom_body,
                                  const Matrix6d& increment_covariance);

@@ -31,7 +31,7 @@ FixAlignment align(const Part& part, const PlacedFixes& placed, const MapEstimat
   return align_fixes(points);
 }
 
-/// Receivers that say far too little of their errors say more in `placed` then; by how much.
+/// Receivers that state far too little of their errors state more in `placed` then; by how much.
 Parts align_parts(PlacedFixes& placed, const MapEstimate& map, std::map<ChainId, double>& understated) {
   Parts parts;
   for (std::size_t s = 0; s < placed.submaps.size(); ++s) parts[placed.submaps[s].component].submaps.push_back(s);

@@ -71,7 +71,7 @@ TEST(SparePairs, ThoseWithoutAClosureOrASubmapDoNotCount) {
   EXPECT_TRUE(spare_pairs(more.verdicts, more.submaps, with_one_chain(10)).empty());
 }
 
-/// A third robot whose odometry diverged makes a submap every moment, and all of them close.
+/// A third robot whose odometry diverged makes a submap all the time, and all of them close.
 TEST(SparePairs, OneRobotCannotCrowdOutOthers) {
   Room room = one_room(6);
   const auto before = room.verdicts;

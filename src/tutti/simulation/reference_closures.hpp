@@ -60,7 +60,7 @@ class ReferenceClosures {
 
   /// True if verify() would report a closure. The order of the two submaps does not matter.
   [[nodiscard]] bool is_candidate(const Submap& a, const Submap& b) const;
-  /// The verdict on two submaps, whose order does not matter; a refusal is why there are no closures.
+  /// The verdict on two submaps, whose order does not matter; a refusal states why there are no closures.
   [[nodiscard]] ClosureVerdict verify(const Submap& a, const Submap& b) const;
   /// T_a_b, the true relative pose of two keyframes at their stamps, for evaluation; nothing where there is no
   /// reference.

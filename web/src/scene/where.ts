@@ -5,7 +5,7 @@ import { compose, inverse, transform } from "../pose";
 import type { RobotView } from "../derive";
 import type { Vec3 } from "../schema";
 
-/** Where a robot is now: beyond its newest submap by its odometry, where the submap has how its frame lies in odometry. */
+/** Where a robot is now: beyond its newest submap by its odometry, where the submap states how its frame lies in odometry. */
 export function position_of(app: App, robot: RobotView): Vec3 | null {
   const { newest, status } = robot;
   if (!newest) return null;

@@ -35,7 +35,7 @@ struct PointTimes {
   double unit_s = 1.0;
   Zero zero = Zero::unknown;
   bool pose_at_begin = false;  ///< The scan's odometry pose is of the sweep's begin, not its end; with odometry_clock
-                               ///< and message the times say it.
+                               ///< and message the times give it.
 };
 
 /// What the times of a robot's scans mean, judged by one scan whose odometry pose is of `stamp`. No value: the robot's

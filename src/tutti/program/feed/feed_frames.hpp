@@ -65,10 +65,10 @@ struct FeedHello {
   std::uint32_t version = 0;
   std::string client;
   bool listens_only = false;
-  Result<intake::FeedSensors> sensors = intake::FeedSensors{};  ///< An error is why such sensors cannot be.
+  Result<intake::FeedSensors> sensors = intake::FeedSensors{};  ///< An error states why such sensors cannot be.
   /// Nanoseconds, to be added to the client's stamps; or the client's time now.
   std::optional<std::int64_t> clock_offset_ns = {}, clock_now_ns = {};
-  Result<std::optional<FeedRos>> ros = std::nullopt;  ///< An error is why these cannot be.
+  Result<std::optional<FeedRos>> ros = std::nullopt;  ///< An error states why these cannot be.
   bool wants_trajectory = false;                      ///< Asks for a FeedWay after every update of the map.
 };
 struct FeedEnd {};

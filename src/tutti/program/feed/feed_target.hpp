@@ -79,7 +79,7 @@ struct FeedRefusal {
 class FeedTarget {
  public:
   virtual ~FeedTarget() = default;
-  /// An error is why the sample was refused; nothing has changed then.
+  /// An error states why the sample was refused; nothing has changed then.
   virtual Status add_odometry(const node::OdometrySample& sample) = 0;
   virtual Status add_scan(const Scan& scan) = 0;
   /// Sets what the client's later inputs come from.

@@ -24,7 +24,7 @@ class Localiser {
 
   explicit Localiser(RobotId robot) : robot_(robot) {}
 
-  /// Adds a sample; returns whether odometry has jumped at it. An error is why the sample was refused; nothing has
+  /// Adds a sample; returns whether odometry has jumped at it. An error states why the sample was refused; nothing has
   /// changed then.
   Result<bool> add(const node::OdometrySample& sample);
   /// Takes over what the agent knows at its newest sample: the samples up to it, and the covariance there.

@@ -17,7 +17,7 @@ class Holders {
   static constexpr std::size_t kMost = 100;     ///< People at a time.
   static constexpr std::size_t kLongest = 200;  ///< Bytes of a key.
 
-  /// `what`: the key of what somebody looks at, "closure/NAME" or "robot/NUMBER", instead of what it was before; empty:
+  /// `what`: the key of what somebody inspects, "closure/NAME" or "robot/NUMBER", instead of what it was before; empty:
   /// nothing any more. Errors: it is none of these, or too many hold something.
   Status hold(const std::string& by, const std::string& what, double now_s);
   /// "held": who holds what, and for how long, as a list.

@@ -189,7 +189,7 @@ class Routes {
     say(response, out);
   }
 
-  /// Hands the operator's decision to the server; false: the answer is why it is not stored.
+  /// Hands the operator's decision to the server; false: the answer states why it is not stored.
   bool give(const Visitor& visitor, const Json& body, ClosureDecision decision, Response& response) {
     decision.by = plain_text(body.value("by", ""));
     decision.given_ns = static_cast<std::int64_t>(program::wall_clock_ns());

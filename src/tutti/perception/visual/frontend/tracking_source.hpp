@@ -37,9 +37,9 @@ struct TrackingConfig {
 /// camera turned about its optical axis (ClockCheck), or a second camera turned against the first (StereoCheck).
 class TrackingSource : public VisualSource {
  public:
-  /// Fails when the stream's stamps do not match those of the odometry. The error has by how much they differ, by the
-  /// motion in the images where it shows; stamps alone know the offset only up to multiples of the time between images.
-  /// Fails also as ImageTracker::make() does.
+  /// Fails when the stream's stamps do not match those of the odometry. The error states by how much they differ, by
+  /// the motion in the images where it shows; stamps alone know the offset only up to multiples of the time between
+  /// images. Fails also as ImageTracker::make() does.
   static Result<std::shared_ptr<TrackingSource>> open(ImageStream stream, Trajectory odometry,
                                                       const TrackingConfig& config);
 
