@@ -50,8 +50,8 @@ struct OdometryFrames {
 
 /// Turns messages of ROS 2 into inputs of a robot's live feed: odometry samples with the covariance of their
 /// increments, scans in the body frame with the motion of their sweeps removed, and position fixes with their antenna's
-/// place, as from a bag (mission/bag_recording.hpp). It needs neither a clock nor DDS. Bytes are untrusted: an error is
-/// what is wrong with a message, which then has no effect.
+/// place, as from a bag (mission/bag_recording.hpp). It needs neither a clock nor DDS. Bytes are untrusted: an error
+/// states what is wrong with a message, which then has no effect.
 class RosIntake {
  public:
   using Encoding = bags::RosEncoding;

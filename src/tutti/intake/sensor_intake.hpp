@@ -42,8 +42,8 @@ Result<std::vector<CameraTopics>> named_topics(const ImagesConfig& config);
 
 /// Turns a robot's messages of ROS into its inputs: (topic, type, encoding, bytes) -> Input, by one table of types and
 /// one set of rules for clocks, transforms, cameras and depth (RosIntake, ImagesIntake). It waits for what belongs
-/// together, needs no clock, and reports what it makes of the messages. Bytes are untrusted: an error is what is wrong
-/// with a message, which then has no effect.
+/// together, needs no clock, and reports what it makes of the messages. Bytes are untrusted: an error states what is
+/// wrong with a message, which then has no effect.
 class SensorIntake {
  public:
   static constexpr double kPatience_s = 5.0;  ///< Topics that show nothing so long after another are left out.
