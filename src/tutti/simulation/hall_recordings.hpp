@@ -24,14 +24,14 @@ struct FlyingRobotConfig {
   std::string sensors = "visual";
   double start_s = 0.0;
   FlightConfig flight;
-  OdometryNoiseConfig odometry;
+  OdometryDriftConfig odometry;
   template <class V>
   void describe(V& v) {
     v.field("name", name, any(), "Unique name.");
     v.field("sensors", sensors, one_of({"visual", "lidar", "both"}), "What it carries.");
     v.field("start_s", start_s, between(0.0, kLongest_s), "Mission time at which it starts to fly.");
     v.field("flight", flight, any(), "Where it flies.");
-    v.field("odometry", odometry, any(), "Errors of its odometry.");
+    v.field("odometry", odometry, any(), "Drift of its odometry.");
   }
 };
 

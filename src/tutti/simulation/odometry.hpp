@@ -71,9 +71,9 @@ struct ScriptedErrorConfig {
   }
 };
 
-/// Errors of an odometry that knows gravity: yaw drifts more than tilt. All are standard deviations; the constants of
+/// Drift of an odometry that knows gravity: yaw drifts more than tilt. All are standard deviations; the constants of
 /// one run (scale, yaw drift) are drawn once from them.
-struct OdometryNoiseConfig {
+struct OdometryDriftConfig {
   double translation_m_per_sqrt_m = 0.01;
   double yaw_deg_per_sqrt_m = 0.05;
   double tilt_deg_per_sqrt_m = 0.01;
@@ -83,12 +83,6 @@ struct OdometryNoiseConfig {
   double yaw_drift_deg_per_m = 0.0;
   double scale_percent = 0.2;
   double consistent_length_m = 50.0;
-  double slips_per_km = 0.0;
-  double slip_m = 1.0;
-  double slip_deg = 10.0;
-  DegeneracyConfig degeneracy;
-  FailureConfig failure;
-  std::vector<ScriptedErrorConfig> scripted;
   double stated_sigma_factor = 1.0;
   template <class V>
   void describe(V& v) {
@@ -104,14 +98,28 @@ struct OdometryNoiseConfig {
     v.field("scale_percent", scale_percent, between(0.0, 50.0), "Constant scale error of the run.");
     v.field("consistent_length_m", consistent_length_m, above_zero_to(kFarthest_m),
             "Length at which the covariance of independent increments matches the constant errors.");
+    v.field("stated_sigma_factor", stated_sigma_factor, above_zero_to(1e6),
+            "Stated standard deviations over the honest ones: above 1 the odometry is better than it says.");
+  }
+};
+
+/// Drift, and what a robot's covariance does not show or shows along one axis alone.
+struct OdometryNoiseConfig : OdometryDriftConfig {
+  double slips_per_km = 0.0;
+  double slip_m = 1.0;
+  double slip_deg = 10.0;
+  DegeneracyConfig degeneracy;
+  FailureConfig failure;
+  std::vector<ScriptedErrorConfig> scripted;
+  template <class V>
+  void describe(V& v) {
+    OdometryDriftConfig::describe(v);
     v.field("slips_per_km", slips_per_km, between(0.0, 1e6), "Sudden errors that the covariance does not know.");
     v.field("slip_m", slip_m, between(0.0, kFarthest_m), "Horizontal size of a slip, per axis.");
     v.field("slip_deg", slip_deg, between(0.0, 180.0), "Yaw of a slip.");
     v.field("degeneracy", degeneracy, any(), "Along featureless corridors.");
     v.field("failure", failure, any(), "In the open.");
     v.field("scripted", scripted, any(), "Errors of given size at given places.");
-    v.field("stated_sigma_factor", stated_sigma_factor, above_zero_to(1e6),
-            "Stated standard deviations over the honest ones: above 1 the odometry is better than it says.");
   }
 };
 
