@@ -2,6 +2,7 @@
 #include "tutti/mission/perfect_judge.hpp"
 
 #include <map>
+#include <set>
 #include <utility>
 
 #include "tutti/mission/true_poses.hpp"
@@ -17,12 +18,15 @@ std::optional<server::MapEstimate> judge_perfectly(const server::MapServer& serv
   for (const auto& [pair, verdict] : state.verdicts)
     all.insert(all.end(), verdict.closures.begin(), verdict.closures.end());
   const std::map<KeyframeId, Pose3> truth = true_ends(all, server.map(), robots, association);
+  std::set<std::pair<KeyframeId, KeyframeId>> judged;
+  for (const server::JudgedClosure& c : server.map().closures) judged.emplace(c.closure.from, c.closure.to);
   server::VerdictSet verdicts = state.verdicts;
   DecisionSet decisions = state.decisions;
   bool checked = false;
   for (auto& [pair, verdict] : verdicts) {
     bool known = true;
     std::erase_if(verdict.closures, [&](const LoopClosure& closure) {
+      if (!judged.contains({closure.from, closure.to})) return true;
       const auto error = closure_error(closure, truth);
       known = known && error.has_value();
       return error && is_wrong(*error, check);
