@@ -20,7 +20,10 @@ constexpr std::size_t kLeastGroup = 2;
 class Search {
  public:
   /// All must outlive this.
-  Search(const HypothesisSolver& solver, const OutlierRejectionConfig& config) : solver_(solver), config_(config) {}
+  Search(const HypothesisSolver& solver, const OutlierRejectionConfig& config)
+      : solver_(solver),
+        config_(config),
+        most_(std::max(config.least_hypotheses, config.tried_nodes / std::max<std::size_t>(solver.runs(), 1))) {}
 
   Solution run(std::vector<std::vector<std::size_t>> groups) const {
     Solution best = solver_.solve({});
@@ -72,7 +75,7 @@ class Search {
   /// worse than by what the cheapest of them pays: each alone would then fit no worse either.
   [[nodiscard]] Solution without_idle(Solution best) const {
     std::set<std::size_t> needed;  // windows, by their first run
-    for (std::size_t batch = best.hypothesis.windows.size(); best.solved;) {
+    for (std::size_t batch = best.hypothesis.windows.size(); best.solved && solver_.work().hypotheses < most_;) {
       std::vector<std::size_t> open;
       for (std::size_t k = 0; k < best.hypothesis.windows.size(); ++k)
         if (!needed.contains(best.hypothesis.windows[k].first)) open.push_back(k);
@@ -121,6 +124,7 @@ class Search {
 
   const HypothesisSolver& solver_;
   const OutlierRejectionConfig& config_;
+  std::size_t most_;  // hypotheses
 };
 
 }  // namespace

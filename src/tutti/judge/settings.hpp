@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
+
 #include "tutti/base/config.hpp"
 
 namespace tutti::judge {
@@ -19,6 +21,11 @@ struct OutlierRejectionConfig {
                              ///< all together; each must explain more than least_votes.
   int most_refused_groups = 5;   ///< Limit on the groups that are refused so.
   int min_joining_closures = 2;  ///< Fewer closures do not join two segments of odometry.
+  /// Windows of failed odometry that were not needed are looked for as long as fewer hypotheses than the first were
+  /// tried, or than have so many nodes together. Where a large map has failures in many places, some of these windows
+  /// stay: what lies in them is known less well.
+  std::size_t least_hypotheses = 20;
+  std::size_t tried_nodes = 400'000;
 
   template <class V>
   void describe(V& v) {
