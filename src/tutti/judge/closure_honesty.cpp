@@ -55,10 +55,10 @@ Matrix6d scaled(const Matrix6d& covariance, const ClosureHonesty& by) {
   return scale.asDiagonal() * covariance * scale.asDiagonal();
 }
 
-std::map<std::pair<ChainId, ChainId>, ClosureHonesty> closure_honesty(std::span<const OdometryPiece> pieces,
+std::map<std::pair<ChainId, ChainId>, ClosureHonesty> closure_honesty(std::span<const OdometrySegment> segments,
                                                                       std::span<const LoopClosure> closures) {
   std::map<std::pair<ChainId, ChainId>, ClosureHonesty> out;
-  for (const auto& [between, pairs] : neighbouring_closures(pieces, closures)) {
+  for (const auto& [between, pairs] : neighbouring_closures(segments, closures)) {
     if (pairs.size() < kEnoughPairs) continue;
     ClosureHonesty honesty;
     honesty.rotation = least_raise([&](double f) { return a_quarter_fits<3>(pairs, {1.0, f}); });

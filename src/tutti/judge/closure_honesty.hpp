@@ -24,7 +24,7 @@ struct ClosureHonesty {
 /// alone, then of translation for the whole. A quarter, so that half of the pairs may contain a wrong closure. A factor
 /// that would exceed 400 is 1, because too many closures are wrong to judge by. Chains with fewer than 8 pairs, or with
 /// both factors below 2, as chance makes them, have no entry. docs/math.md, "Outlier rejection".
-std::map<std::pair<ChainId, ChainId>, ClosureHonesty> closure_honesty(std::span<const OdometryPiece> pieces,
+std::map<std::pair<ChainId, ChainId>, ClosureHonesty> closure_honesty(std::span<const OdometrySegment> segments,
                                                                       std::span<const LoopClosure> closures);
 
 /// A closure's covariance C (right tangent) with the factors applied: S C S, S = diag(sqrt(translation) three times,

@@ -27,8 +27,8 @@ struct Case {
   double scale = 1.0;  ///< All lengths'.
 };
 
-OdometryPiece chain_of(RobotId robot, const Case& c, Rng& rng, std::vector<Pose3>& truth) {
-  OdometryPiece chain{.id = robot};
+OdometrySegment chain_of(RobotId robot, const Case& c, Rng& rng, std::vector<Pose3>& truth) {
+  OdometrySegment chain{.id = robot};
   truth.assign(1, {});
   chain.T_odom_body.resize(1);
   for (std::uint32_t k = 1; k < kLength; ++k) {
@@ -45,7 +45,7 @@ OdometryPiece chain_of(RobotId robot, const Case& c, Rng& rng, std::vector<Pose3
 ClosureHonesty found(const Case& c, std::uint64_t seed) {
   Rng rng(seed);
   std::vector<Pose3> one, two;
-  const std::vector<OdometryPiece> odometry{chain_of(kOne, c, rng, one), chain_of(kTwo, c, rng, two)};
+  const std::vector<OdometrySegment> odometry{chain_of(kOne, c, rng, one), chain_of(kTwo, c, rng, two)};
   std::vector<LoopClosure> closures;
   while (closures.size() < c.closures) {
     const auto a = static_cast<std::uint32_t>(rng.index(kLength));

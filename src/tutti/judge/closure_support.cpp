@@ -48,7 +48,7 @@ class Agreement {
   }
 
   [[nodiscard]] bool fits_odometry(const Directed& closure) const {
-    if (odometry_.piece(closure.from) != odometry_.piece(closure.to)) return false;
+    if (odometry_.segment(closure.from) != odometry_.segment(closure.to)) return false;
     const RelativePose between = odometry_.between(closure.from, closure.to);
     const Vector6d missed = local(closure.measurement.T_a_b, between.T_a_b);
     return missed.dot((between.covariance + closure.measurement.covariance).llt().solve(missed)) <= limit_;
@@ -70,7 +70,7 @@ std::vector<bool> supported_closures(const OdometryTrajectories& odometry, std::
   for (std::size_t c = 0; c < closures.size(); ++c) {
     all.push_back(agreement.directed(closures[c]));
     if (agreement.fits_odometry(all[c])) support[c] = config.least_support;
-    by_segments[{odometry.piece(all[c].from), odometry.piece(all[c].to)}].push_back(c);
+    by_segments[{odometry.segment(all[c].from), odometry.segment(all[c].to)}].push_back(c);
   }
   const auto is_open = [&](std::size_t c) { return support[c] < config.least_support; };
   for (const auto& [segments, members] : by_segments) {

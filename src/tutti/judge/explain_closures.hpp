@@ -11,7 +11,7 @@
 
 namespace tutti::judge {
 
-/// A segment of odometry, between two nodes of one piece (OdometryWays), that failed.
+/// A segment of odometry, between two nodes of one segment (OdometryTrajectories), that failed.
 struct FailedSegment {
   std::size_t from = 0;
   std::size_t to = 0;

@@ -81,12 +81,12 @@ struct Solver {
 
 Pose3 off(Rng& rng) { return retract(Pose3{}, noise(rng, 5.0, 0.5)); }
 
-TEST(OdometryTrajectories, KnowsThePiecesAndWhatLiesBetween) {
+TEST(OdometryTrajectories, KnowsTheSegmentsAndWhatLiesBetween) {
   Laps laps;
   laps.graph.edges.erase(laps.graph.edges.begin() + 60);  // a gap after node 60
   const OdometryTrajectories ways(Laps::seconds(), laps.graph.edges);
-  EXPECT_EQ(ways.piece(60), 0U);
-  EXPECT_EQ(ways.piece(200), 61U);
+  EXPECT_EQ(ways.segment(60), 0U);
+  EXPECT_EQ(ways.segment(200), 61U);
   EXPECT_DOUBLE_EQ(ways.seconds(30), 60.0);
   EXPECT_NEAR(ways.usual_speed(), kStep_m / 2.0, 0.05);
   RelativePose sum{.T_a_b = {}, .covariance = Matrix6d::Zero()};
@@ -137,6 +137,25 @@ TEST(OutlierRejection, ALoneClosureIsWrongItselfAndManyBlameTheOdometry) {
   EXPECT_GE(std::count(found.accepted.begin(), found.accepted.begin() + 20, true), 19);
   EXPECT_EQ(std::count(found.accepted.begin() + 20, found.accepted.end(), true), 0);
   EXPECT_TRUE(laps.explain({}, {.let_odometry_fail = false}).failed.empty());
+}
+
+TEST(OutlierRejection, ASearchThatIsCutShortHasAllFailuresInIt) {
+  const std::vector<std::size_t> failed_at{115, 130, 145, 160, 175};
+  Laps laps;
+  for (const std::size_t k : failed_at) {
+    Pose3& step = laps.graph.edges[k].T_from_to;
+    step = step * Pose3{so3_exp({0.0, 0.0, 0.3}), Eigen::Vector3d::Zero()};
+  }
+  laps.close_laps(2);
+  const OutlierRejectionConfig short_search{.least_hypotheses = 3, .tried_nodes = 0};
+  const Judgement whole = laps.explain(), cut = laps.explain({}, short_search);
+  EXPECT_GT(whole.work.hypotheses, 4U);
+  EXPECT_LE(cut.work.hypotheses, 4U);
+  for (const Judgement& found : {whole, cut}) {
+    EXPECT_EQ(std::count(found.accepted.begin(), found.accepted.end(), true), std::ssize(found.accepted));
+    for (const std::size_t k : failed_at)
+      EXPECT_TRUE(std::ranges::any_of(found.failed, [&](const auto& f) { return f.from <= k && k < f.to; })) << k;
+  }
 }
 
 TEST(OutlierRejection, PlacesThatLookAlikeBlameNothing) {

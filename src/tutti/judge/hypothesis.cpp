@@ -98,14 +98,14 @@ std::size_t HypothesisSolver::end_of(std::size_t run) const {
 }
 
 /// Closures that look alike come by the square of the scans they join, so each shares the vote of the busier of its two
-/// ends with all others that end there, at the same keyframe, between the same two pieces.
+/// ends with all others that end there, at the same keyframe, between the same two segments.
 void HypothesisSolver::count_votes() {
-  using End = std::tuple<std::size_t, std::size_t, bool>;  // node, the other piece, which end
+  using End = std::tuple<std::size_t, std::size_t, bool>;  // node, the other segment, which end
   std::map<End, int> closures_at;
   const auto ends_of = [&](std::size_t edge) {
     const auto [i, j] =
         std::minmax(reduced_.nodes[reduced_.graph.edges[edge].from], reduced_.nodes[reduced_.graph.edges[edge].to]);
-    return std::pair(End{i, odometry_.piece(j), false}, End{j, odometry_.piece(i), true});
+    return std::pair(End{i, odometry_.segment(j), false}, End{j, odometry_.segment(i), true});
   };
   for (const std::size_t edge : closures_) {
     const auto [i, j] = ends_of(edge);
@@ -121,7 +121,7 @@ void HypothesisSolver::count_votes() {
 Window HypothesisSolver::around(std::size_t run) const {
   Window out{run, run};
   const auto is_near = [&](std::size_t other) {
-    return odometry_.piece(begin_of(other)) == odometry_.piece(begin_of(run)) &&
+    return odometry_.segment(begin_of(other)) == odometry_.segment(begin_of(run)) &&
            std::max(odometry_.seconds(begin_of(run)) - odometry_.seconds(end_of(other)),
                     odometry_.seconds(begin_of(other)) - odometry_.seconds(end_of(run))) < config_.search_s;
   };

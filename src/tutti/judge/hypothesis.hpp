@@ -59,7 +59,7 @@ class HypothesisSolver {
   /// is then this hypothesis's own, because it may let nothing else go.
   [[nodiscard]] Solution judge(Hypothesis hypothesis, estimation::GncResult optimum) const;
   [[nodiscard]] std::size_t runs() const { return runs_.size(); }
-  /// The runs within config.search_s of a run, on the same piece of odometry.
+  /// The runs within config.search_s of a run, on the same segment of odometry.
   [[nodiscard]] Window around(std::size_t run) const;
   /// Cost of all calls so far.
   [[nodiscard]] const SearchWork& work() const { return work_; }

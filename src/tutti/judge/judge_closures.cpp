@@ -90,7 +90,8 @@ class Optimiser {
   void leave_unjoined(const OdometryTrajectories& odometry, std::vector<Objection>& objections) const {
     std::map<std::pair<std::size_t, std::size_t>, std::vector<std::size_t>> between;
     for (std::size_t c = 0; c < closures_.size(); ++c)
-      between[std::minmax({odometry.piece(closure_edges_[c].from), odometry.piece(closure_edges_[c].to)})].push_back(c);
+      between[std::minmax({odometry.segment(closure_edges_[c].from), odometry.segment(closure_edges_[c].to)})]
+          .push_back(c);
     const auto least = config_.min_joining_closures;
     for (const auto& [segments, all] : between) {
       if (segments.first == segments.second || std::ranges::any_of(all, [&](std::size_t c) { return certain_[c]; }))

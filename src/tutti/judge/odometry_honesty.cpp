@@ -83,10 +83,10 @@ double least_factor(const Loops& loops, double share, bool with_closures) {
 
 }  // namespace
 
-std::map<ChainId, OdometryHonesty> odometry_honesty(std::span<const OdometryPiece> pieces,
+std::map<ChainId, OdometryHonesty> odometry_honesty(std::span<const OdometrySegment> segments,
                                                     std::span<const LoopClosure> closures) {
   std::map<ChainId, OdometryHonesty> out;
-  for (const auto& [chain, loops] : odometry_loops(pieces, closures)) {
+  for (const auto& [chain, loops] : odometry_loops(segments, closures)) {
     const Loops turning = telling<3>(loops), all = telling<6>(loops);
     const double whole = least_factor<6>(all, 0.5, false);
     out[chain] = {std::min(1.0, margin<3>(turning) * least_factor<3>(turning, kRotationShare, false)),

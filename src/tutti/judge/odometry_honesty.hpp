@@ -25,8 +25,8 @@ struct OdometryHonesty {
   double whole = 1.0;
 };
 
-/// One entry per chain in `pieces`. `closures` join keyframes of these chains.
-std::map<ChainId, OdometryHonesty> odometry_honesty(std::span<const OdometryPiece> pieces,
+/// One entry per chain in `segments`. `closures` join keyframes of these chains.
+std::map<ChainId, OdometryHonesty> odometry_honesty(std::span<const OdometrySegment> segments,
                                                     std::span<const LoopClosure> closures);
 
 /// A covariance C (right tangent) with the variances of rotation times `factor`: S C S, S = diag(1, 1, 1, s, s, s), s =

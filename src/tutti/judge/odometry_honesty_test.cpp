@@ -29,7 +29,7 @@ struct Case {
 
 OdometryHonesty honesty(const Case& c, std::uint64_t seed) {
   Rng rng(seed);
-  OdometryPiece chain{.id = kRobot};
+  OdometrySegment chain{.id = kRobot};
   std::vector<Pose3> truth(1);
   chain.T_odom_body.resize(1);
   for (std::uint32_t k = 1; k < kKeyframes; ++k) {
@@ -49,7 +49,7 @@ OdometryHonesty honesty(const Case& c, std::uint64_t seed) {
     if (rng.bernoulli(c.wrong_share)) T_a_b = T_a_b * Pose3{so3_exp(Eigen::Vector3d(0, 0, 1.0)), {3, 2, 1}};
     closures.push_back({{kRobot, a}, {kRobot, b}, {T_a_b, test::diagonal_covariance(kClosure_m, kClosure_rad)}});
   }
-  const std::vector<OdometryPiece> odometry{chain};
+  const std::vector<OdometrySegment> odometry{chain};
   return odometry_honesty(odometry, closures).at(kRobot);
 }
 

@@ -14,10 +14,10 @@ namespace tutti::judge {
 namespace {
 
 /// Odometry between any two keyframes of one chain.
-class OdometrySegments {
+class SegmentIndex {
  public:
-  explicit OdometrySegments(std::span<const OdometryPiece> pieces) {
-    for (const OdometryPiece& odometry : pieces) {
+  explicit SegmentIndex(std::span<const OdometrySegment> segments) {
+    for (const OdometrySegment& odometry : segments) {
       Segment& segment = segments_[{odometry.id, odometry.first_index}];
       segment.odometry = &odometry;
       segment.covariance.push_back(Matrix6d::Zero());
@@ -45,10 +45,10 @@ class OdometrySegments {
 
  private:
   struct Segment {
-    const OdometryPiece* odometry = nullptr;
+    const OdometrySegment* odometry = nullptr;
     std::vector<Matrix6d> covariance;  ///< Each pose's, in the frame of the first.
   };
-  static Pose3 T_first_body(const OdometryPiece& odometry, std::size_t k) {
+  static Pose3 T_first_body(const OdometrySegment& odometry, std::size_t k) {
     return odometry.T_odom_body.front().inverse() * odometry.T_odom_body[k];
   }
 
@@ -108,8 +108,8 @@ OdometryLoop loop_of(const ClosurePair& pair) {
 }
 
 std::map<std::pair<ChainId, ChainId>, std::vector<ClosurePair>> neighbouring_closures(
-    std::span<const OdometryPiece> pieces, std::span<const LoopClosure> closures) {
-  const OdometrySegments segments(pieces);
+    std::span<const OdometrySegment> segments, std::span<const LoopClosure> closures) {
+  const SegmentIndex index(segments);
   std::map<std::pair<ChainId, ChainId>, std::vector<ClosurePair>> out;
   for (auto& [two, all] : by_chains(closures)) {
     std::ranges::stable_sort(all, {}, [](const LoopClosure& c) { return std::pair(c.from, c.to); });
@@ -118,20 +118,20 @@ std::map<std::pair<ChainId, ChainId>, std::vector<ClosurePair>> neighbouring_clo
       const auto nearest = nearest_to(a, all);
       if (!nearest || !known.insert(std::minmax(a, *nearest)).second) continue;
       const auto& [first, second] = std::pair(all[std::min(a, *nearest)], all[std::max(a, *nearest)]);
-      const auto of_one = segments.between(first.from, second.from), of_two = segments.between(first.to, second.to);
+      const auto of_one = index.between(first.from, second.from), of_two = index.between(first.to, second.to);
       if (of_one && of_two) out[two].push_back({first, second, *of_one, *of_two});
     }
   }
   return out;
 }
 
-std::map<ChainId, std::vector<OdometryLoop>> odometry_loops(std::span<const OdometryPiece> pieces,
+std::map<ChainId, std::vector<OdometryLoop>> odometry_loops(std::span<const OdometrySegment> segments,
                                                             std::span<const LoopClosure> closures) {
-  const OdometrySegments segments(pieces);
+  const SegmentIndex index(segments);
   std::map<ChainId, std::vector<OdometryLoop>> loops;
-  for (const OdometryPiece& segment : pieces) loops[segment.id];
+  for (const OdometrySegment& segment : segments) loops[segment.id];
   for (const auto& [from, to, measurement] : closures)
-    if (const auto odometry = segments.between(from, to))
+    if (const auto odometry = index.between(from, to))
       loops.at(from.chain)
           .push_back(over({local(measurement.T_a_b, odometry->T_a_b), odometry->covariance, measurement.covariance},
                           from, to));
@@ -141,8 +141,8 @@ std::map<ChainId, std::vector<OdometryLoop>> odometry_loops(std::span<const Odom
     const std::size_t apart = between.size() / 2;
     for (std::size_t c = apart; c < between.size(); ++c) {
       const LoopClosure &first = between[c - apart], &second = between[c];
-      const auto of_one = segments.between(first.from, second.from);
-      const auto of_two = segments.between(first.to, second.to);
+      const auto of_one = index.between(first.from, second.from);
+      const auto of_two = index.between(first.to, second.to);
       if (!of_one || !of_two) continue;
       const OdometryLoop loop = loop_of({first, second, *of_one, *of_two});
       loops.at(two.first).push_back(over(loop, first.from, second.from));

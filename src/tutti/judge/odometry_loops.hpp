@@ -15,7 +15,7 @@ namespace tutti::judge {
 
 /// A segment of a chain's odometry without a gap. A chain with missing submaps has several segments, which do not
 /// overlap.
-struct OdometryPiece {
+struct OdometrySegment {
   ChainId id;
   std::uint32_t first_index = 0;          ///< KeyframeId::index of T_odom_body[0]; the others count up from it.
   std::vector<Pose3> T_odom_body;         ///< Raw odometry.
@@ -31,11 +31,11 @@ struct OdometryLoop {
   std::uint32_t last = 0;   ///< ... and of the last one.
 };
 
-/// The loops that measure each chain's odometry, with an entry for every chain in `pieces`. Each closure of a chain
+/// The loops that measure each chain's odometry, with an entry for every chain in `segments`. Each closure of a chain
 /// with itself is a loop; and so are, with every other chain, pairs of closures with both odometries between their
 /// ends, which measure both chains. The two closures of a pair are half of their number apart, so that much odometry
 /// lies between them: it, not the closures, is to be judged. Loops over a gap in odometry are left out.
-std::map<ChainId, std::vector<OdometryLoop>> odometry_loops(std::span<const OdometryPiece> pieces,
+std::map<ChainId, std::vector<OdometryLoop>> odometry_loops(std::span<const OdometrySegment> segments,
                                                             std::span<const LoopClosure> closures);
 
 /// Two closures between the same two chains, with the odometry between their ends.
@@ -54,6 +54,6 @@ OdometryLoop loop_of(const ClosurePair& pair);
 /// pair once. Nearness is the larger distance, in keyframes, of the two closures' ends; closures between the same two
 /// keyframes, and pairs with a gap in odometry between them, are left out.
 std::map<std::pair<ChainId, ChainId>, std::vector<ClosurePair>> neighbouring_closures(
-    std::span<const OdometryPiece> pieces, std::span<const LoopClosure> closures);
+    std::span<const OdometrySegment> segments, std::span<const LoopClosure> closures);
 
 }  // namespace tutti::judge

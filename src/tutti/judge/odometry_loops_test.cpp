@@ -23,12 +23,12 @@ RelativePose measured(const Pose3& truth, double sigma_m, double sigma_rad, Rng&
 
 /// Two robots on one winding trajectory, the second a metre beside the first.
 struct Walk {
-  std::vector<OdometryPiece> pieces;
+  std::vector<OdometrySegment> segments;
   std::vector<Pose3> truth;  ///< T_world_body of both, one after the other.
 
   Walk(double sigma_m, double sigma_rad, Rng& rng) {
     for (const RobotId robot : {kOne, kTwo}) {
-      OdometryPiece chain{.id = robot};
+      OdometrySegment chain{.id = robot};
       Pose3 T_world_body{Eigen::Quaterniond::Identity(), {0, 1.0 * robot.value, 0}};
       for (std::uint32_t k = 0; k < kKeyframes; ++k) {
         if (k > 0) {
@@ -42,7 +42,7 @@ struct Walk {
         }
         truth.push_back(T_world_body);
       }
-      pieces.push_back(std::move(chain));
+      segments.push_back(std::move(chain));
     }
   }
 
@@ -58,7 +58,7 @@ TEST(OdometryLoops, CloseWithoutNoise) {
   const std::vector<LoopClosure> closures{walk.closure({kOne, 50}, {kOne, 3}, 0, 0, rng),
                                           walk.closure({kOne, 5}, {kTwo, 40}, 0, 0, rng),
                                           walk.closure({kTwo, 10}, {kOne, 55}, 0, 0, rng)};
-  const auto loops = odometry_loops(walk.pieces, closures);
+  const auto loops = odometry_loops(walk.segments, closures);
   EXPECT_EQ(loops.at(kOne).size(), 2U);
   EXPECT_EQ(loops.at(kTwo).size(), 1U);
   for (const auto& [robot, of_robot] : loops)
@@ -77,7 +77,7 @@ TEST(OdometryLoops, MissByWhatTheirCovarianceSays) {
     const auto square = [](const OdometryLoop& loop) {
       return loop.missed.dot((loop.odometry + loop.closures).ldlt().solve(loop.missed));
     };
-    const auto loops = odometry_loops(walk.pieces, closures);
+    const auto loops = odometry_loops(walk.segments, closures);
     alone += square(loops.at(kOne).front()) / kRuns;
     together += square(loops.at(kTwo).front()) / kRuns;
   }
@@ -90,14 +90,14 @@ TEST(OdometryLoops, NotOverAGap) {
   Walk walk(0.01, 0.002, rng);
   const std::vector<LoopClosure> closures{walk.closure({kOne, 5}, {kOne, 45}, 0.02, 0.01, rng),
                                           walk.closure({kOne, 35}, {kOne, 50}, 0.02, 0.01, rng)};
-  OdometryPiece& all = walk.pieces.front();
-  OdometryPiece late{.id = kOne, .first_index = 30};
+  OdometrySegment& all = walk.segments.front();
+  OdometrySegment late{.id = kOne, .first_index = 30};
   late.T_odom_body.assign(all.T_odom_body.begin() + 30, all.T_odom_body.end());
   late.step_covariance.assign(all.step_covariance.begin() + 30, all.step_covariance.end());
   all.T_odom_body.resize(20);
   all.step_covariance.resize(19);
-  walk.pieces.push_back(late);
-  const auto loops = odometry_loops(walk.pieces, closures);
+  walk.segments.push_back(late);
+  const auto loops = odometry_loops(walk.segments, closures);
   ASSERT_EQ(loops.at(kOne).size(), 1U);
   EXPECT_NEAR(loops.at(kOne).front().odometry(5, 5), 15 * 0.002 * 0.002, 1e-9);
 }
@@ -108,7 +108,7 @@ TEST(OdometryLoops, AreAsCertainAfterADayByCarAsAtItsBegin) {
   constexpr std::uint32_t kSteps = 40'000;
   constexpr double kStep_m = 20.0;
   const Pose3 step{so3_exp(Eigen::Vector3d(0, 0, 1e-5)), Eigen::Vector3d(kStep_m, 0, 0)};
-  OdometryPiece day{.id = kOne};
+  OdometrySegment day{.id = kOne};
   day.T_odom_body.emplace_back();
   for (std::uint32_t k = 0; k < kSteps; ++k) {
     day.T_odom_body.push_back(day.T_odom_body.back() * step);
@@ -138,7 +138,7 @@ TEST(NeighbouringClosures, AreTheNearestOfAll) {
       const auto away = [](KeyframeId one, KeyframeId two) { return std::abs(int(one.index) - int(two.index)); };
       return std::max(away(a.from, b.from), away(a.to, b.to));
     };
-    const auto pairs = neighbouring_closures(walk.pieces, closures).at({kOne, other});
+    const auto pairs = neighbouring_closures(walk.segments, closures).at({kOne, other});
     EXPECT_LT(pairs.size(), closures.size());  // each pair once
     const auto has = [&](const LoopClosure& closure, int least) {
       return std::ranges::any_of(pairs, [&](const ClosurePair& pair) {
@@ -158,7 +158,7 @@ TEST(NeighbouringClosures, AreTheNearestOfAll) {
 
 TEST(OdometryLoops, EveryRobotIsThere) {
   Rng rng(3);
-  const auto loops = odometry_loops(Walk(0.01, 0.002, rng).pieces, {});
+  const auto loops = odometry_loops(Walk(0.01, 0.002, rng).segments, {});
   ASSERT_EQ(loops.size(), 2U);
   EXPECT_TRUE(loops.at(kTwo).empty());
 }

@@ -26,7 +26,7 @@ OdometryTrajectories::OdometryTrajectories(std::span<const double> seconds, std:
   const std::size_t nodes = seconds.size();
   std::vector<std::vector<Pose3>> poses(nodes, {Pose3{}});
   std::vector<std::vector<Matrix6d>> steps(nodes, {Matrix6d::Zero()});
-  for (std::size_t i = 0; i < nodes; ++i) at_[i] = {.piece = i, .seconds = seconds[i]};
+  for (std::size_t i = 0; i < nodes; ++i) at_[i] = {.segment = i, .seconds = seconds[i]};
   std::vector<double> speeds;
   std::vector<const PoseGraphEdge*> step_to(nodes, nullptr);
   for (const PoseGraphEdge& edge : odometry) step_to[edge.to] = &edge;
@@ -35,21 +35,21 @@ OdometryTrajectories::OdometryTrajectories(std::span<const double> seconds, std:
     const PoseGraphEdge& step = *step_to[i];
     const At& before = at_[step.from];
     const Matrix6d covariance = step.information.llt().solve(Matrix6d::Identity());
-    at_[i] = {before.piece, before.position + 1, seconds[i],
+    at_[i] = {before.segment, before.position + 1, seconds[i],
               before.turn_variance + covariance.bottomRightCorner<3, 3>().trace(), before.pose * step.T_from_to};
-    poses[before.piece].push_back(at_[i].pose);
-    steps[before.piece].push_back(covariance);
+    poses[before.segment].push_back(at_[i].pose);
+    steps[before.segment].push_back(covariance);
     if (const double duration_s = seconds[i] - seconds[step.from]; duration_s > 0.0)
       speeds.push_back(step.T_from_to.translation.norm() / duration_s);
   }
   usual_speed_ = median(std::move(speeds));
   for (std::size_t i = 0; i < nodes; ++i)
-    covariance_.push_back(at_[i].piece == i ? SegmentCovariance(poses[i], steps[i]) : SegmentCovariance());
+    covariance_.push_back(at_[i].segment == i ? SegmentCovariance(poses[i], steps[i]) : SegmentCovariance());
 }
 
 RelativePose OdometryTrajectories::between(std::size_t a, std::size_t b) const {
   const auto [first, last] = std::minmax(at_[a].position, at_[b].position);
-  const RelativePose forth{first == at_[a].position ? T(a, b) : T(b, a), covariance_[at_[a].piece](first, last)};
+  const RelativePose forth{first == at_[a].position ? T(a, b) : T(b, a), covariance_[at_[a].segment](first, last)};
   return first == at_[a].position ? forth : inverse(forth);
 }
 

@@ -20,7 +20,7 @@ class OdometryTrajectories {
   OdometryTrajectories(std::span<const double> seconds, std::span<const PoseGraphEdge> odometry);
 
   /// The first node of this one's segment.
-  [[nodiscard]] std::size_t piece(std::size_t node) const { return at_[node].piece; }
+  [[nodiscard]] std::size_t segment(std::size_t node) const { return at_[node].segment; }
   [[nodiscard]] double seconds(std::size_t node) const { return at_[node].seconds; }
   /// Median speed of all steps, m/s, above 0, which occasional failures and one diverged segment hardly change.
   [[nodiscard]] double usual_speed() const { return usual_speed_; }
@@ -35,7 +35,7 @@ class OdometryTrajectories {
 
  private:
   struct At {
-    std::size_t piece = 0;
+    std::size_t segment = 0;
     std::size_t position = 0;  ///< Along the segment.
     double seconds = 0.0;
     double turn_variance = 0.0;  ///< Since the segment began.

@@ -81,8 +81,8 @@ TEST(MonitorGraph, ARobotWhosePosesAreOpenIsLeftOutAlone) {
   for (const ProxyNode& node : graph.nodes) EXPECT_TRUE(node.covariance.allFinite());
 }
 
-// The second of nine submaps never arrives, so that the robot's trajectory is in two pieces that nothing joins.
-TEST(MonitorGraph, AGapNearTheStartLeavesTheLargerPiece) {
+// The second of nine submaps never arrives, so that the robot's trajectory is in two segments that nothing joins.
+TEST(MonitorGraph, AGapNearTheStartLeavesTheLargerSegment) {
   SubmapSet submaps;
   for (const std::uint32_t robot : {0U, 1U})
     for (Submap& submap : test::make_submaps(RobotId{robot}, {}, Rng(robot)))
@@ -98,14 +98,14 @@ TEST(MonitorGraph, AGapNearTheStartLeavesTheLargerPiece) {
   EXPECT_EQ(nodes_of(1), 46);
   EXPECT_EQ(graph.nodes.front().stamp, submaps.at({RobotId{0}, 2})->keyframes.front().stamp);
   ASSERT_EQ(graph.components.size(), 2U);
-  EXPECT_EQ(graph.components[0].component, 1U);  // component 0 is the piece left out
-  // Closures join the pieces: both are sent.
+  EXPECT_EQ(graph.components[0].component, 1U);  // component 0 is the segment left out
+  // Closures join the segments: both are sent.
   const ProxyGraph joined =
       monitor_graph(estimate_map(submaps, verdicts_of(submaps, test::TestVerifier(1)), {}), 2, {});
   EXPECT_EQ(std::ranges::count_if(joined.nodes, [](const ProxyNode& n) { return n.chain.robot == RobotId{0}; }),
             36 + 6);
   ASSERT_EQ(joined.uncertainties.size(), 2U);
-  // Odometry says nothing of how the pieces lie to each other.
+  // Odometry says nothing of how the segments lie to each other.
   EXPECT_FALSE(joined.uncertainties[0].directions.empty());
 }
 
@@ -133,7 +133,7 @@ TEST(ChooseComponents, MostRepresentativeNodesThenMostNodesThenTheNewest) {
   EXPECT_EQ(chosen.of_chain.at(RobotId{1}), 3U);  // equal: the newest
   EXPECT_EQ(chosen.of_chain.at(RobotId{2}), 4U);  // 2 of 6 and 2 of 4
   EXPECT_EQ(chosen.largest, 1U);
-  append(map, 3, 2, 1, 1);  // robot 1's smaller piece does not count, though with robot 3 it has three
+  append(map, 3, 2, 1, 1);  // robot 1's smaller segment does not count, though with robot 3 it has three
   EXPECT_EQ(choose_components(map).largest, 1U);
   append(map, 3, 3, 2, 1);  // with robot 1's 2 of 4
   EXPECT_EQ(choose_components(map).largest, 3U);

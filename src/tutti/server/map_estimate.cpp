@@ -119,8 +119,9 @@ judge::Closures collect_closures(const VerdictSet& verdicts, const DecisionSet& 
 }
 
 /// Closures that err by more than they say now say so.
-void raise_understated(const std::vector<judge::OdometryPiece>& pieces, judge::Closures& closures, MapEstimate& map) {
-  map.closure_factors = judge::closure_honesty(pieces, closures.judged);
+void raise_understated(const std::vector<judge::OdometrySegment>& segments, judge::Closures& closures,
+                       MapEstimate& map) {
+  map.closure_factors = judge::closure_honesty(segments, closures.judged);
   for (LoopClosure& closure : closures.judged)
     if (const auto found = map.closure_factors.find(std::minmax(closure.from.chain, closure.to.chain));
         found != map.closure_factors.end())
@@ -189,17 +190,17 @@ void adopt(const judge::Optimum& optimum, MapEstimate& map) {
 
 }  // namespace
 
-std::vector<judge::OdometryPiece> odometry_pieces(const std::vector<MapNode>& nodes,
-                                                  const std::vector<std::optional<Matrix6d>>& step_to) {
-  std::vector<judge::OdometryPiece> pieces;
+std::vector<judge::OdometrySegment> odometry_segments(const std::vector<MapNode>& nodes,
+                                                      const std::vector<std::optional<Matrix6d>>& step_to) {
+  std::vector<judge::OdometrySegment> segments;
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     if (step_to[i])
-      pieces.back().step_covariance.push_back(*step_to[i]);
+      segments.back().step_covariance.push_back(*step_to[i]);
     else
-      pieces.push_back({.id = nodes[i].id.chain, .first_index = nodes[i].id.index});
-    pieces.back().T_odom_body.push_back(nodes[i].T_odom_body);
+      segments.push_back({.id = nodes[i].id.chain, .first_index = nodes[i].id.index});
+    segments.back().T_odom_body.push_back(nodes[i].T_odom_body);
   }
-  return pieces;
+  return segments;
 }
 
 namespace {
@@ -216,7 +217,7 @@ std::map<ChainId, judge::OdometryHonesty> honesty_after(const MapEstimate& map, 
   }
   std::vector<LoopClosure> fitting;
   for (const std::size_t c : optimum.closure_of_edge) fitting.push_back(closures[c]);
-  return judge::odometry_honesty(odometry_pieces(map.nodes, step_to), fitting);
+  return judge::odometry_honesty(odometry_segments(map.nodes, step_to), fitting);
 }
 
 /// True if the odometry of any chain was far worse than it said; it now says so.
@@ -243,10 +244,10 @@ MapEstimate estimate_together(const SubmapSet& submaps, const VerdictSet& verdic
   map.spare_pairs = spare.size();
   judge::Closures closures = collect_closures(verdicts, decisions, submaps, index, spare, refuted);
   const std::vector<LoopClosure> stated = closures.judged;
-  const std::vector<judge::OdometryPiece> pieces = odometry_pieces(map.nodes, stated_steps(submaps, index));
-  if (config.judge_closures) raise_understated(pieces, closures, map);
+  const std::vector<judge::OdometrySegment> segments = odometry_segments(map.nodes, stated_steps(submaps, index));
+  if (config.judge_closures) raise_understated(segments, closures, map);
   if (config.judge_odometry)
-    for (const auto& [chain, worth] : judge::odometry_honesty(pieces, closures.judged))
+    for (const auto& [chain, worth] : judge::odometry_honesty(segments, closures.judged))
       map.rotation_factors[chain] = worth.rotation;
   PoseGraph searched = seen_through(map);
   map.graph = seen_through(map, kOverstatedRotation);

@@ -118,8 +118,8 @@ struct MapConfig {
 
 /// The raw odometry of nodes that are sorted by id, cut where a submap is missing. `step_to` has, per node, the
 /// covariance of the step that ends there, and nothing where odometry begins.
-std::vector<judge::OdometryPiece> odometry_pieces(const std::vector<MapNode>& nodes,
-                                                  const std::vector<std::optional<Matrix6d>>& step_to);
+std::vector<judge::OdometrySegment> odometry_segments(const std::vector<MapNode>& nodes,
+                                                      const std::vector<std::optional<Matrix6d>>& step_to);
 
 /// The node with this id, null when the map does not have it; logarithmic.
 const MapNode* find_node(const MapEstimate& map, const KeyframeId& id);
