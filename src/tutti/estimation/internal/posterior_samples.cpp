@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/estimation/internal/posterior_samples.hpp"
 
+#include <cblas.h>
+
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cstdint>
-#include <optional>
+#include <utility>
 #include <vector>
 
+#include "tutti/base/single_thread.hpp"
 #include "tutti/geometry/pose3.hpp"
 
 namespace tutti::estimation::internal {
@@ -57,6 +60,72 @@ void solve_block(const CholeskyFactor& factor, std::size_t j, std::vector<Batch>
     }
 }
 
+/// Columns of L^-1 at the asked variables: Y with H^-1 = Y^T Y there. Variables are eliminated from the first on, so a
+/// supernode knows of those alone that come before its end, and of their rows only its ancestors' are ever filled.
+class InverseColumns {
+ public:
+  InverseColumns(const CholeskyFactor& factor, std::vector<int> variables)
+      : factor_(factor), variables_(std::move(variables)) {
+    const CholeskyFactor::Layout& layout = *factor.layout;
+    begin_.assign(layout.supernodes.size(), -1);
+    for (const int variable : variables_) begin_[static_cast<std::size_t>(layout.supernode_of[variable])] = 0;
+    Eigen::Index rows = 0;
+    for (std::size_t s = 0; s < begin_.size(); ++s) {
+      if (begin_[s] < 0) continue;
+      begin_[s] = rows;
+      rows += layout.panels[s].columns;
+      if (const auto& below = layout.supernodes[s].below; !below.empty())
+        begin_[static_cast<std::size_t>(layout.supernode_of[below.front()])] = 0;
+    }
+    Y_ = Eigen::MatrixXd::Zero(rows, 6 * std::ssize(variables_));
+    for (Eigen::Index v = 0; v < std::ssize(variables_); ++v)
+      Y_.block<6, 6>(row_of(variables_[static_cast<std::size_t>(v)]), 6 * v).setIdentity();
+  }
+
+  /// Y^T Y, of which only the lower triangle is meant.
+  [[nodiscard]] Eigen::MatrixXd squared() && {
+    const SingleThread single_thread;
+    Eigen::MatrixXd out = Eigen::MatrixXd::Zero(Y_.cols(), Y_.cols());
+    std::size_t known = 0;  // variables that come before the end of the supernode
+    for (std::size_t s = 0; s < begin_.size(); ++s) {
+      if (begin_[s] < 0) continue;
+      while (known < variables_.size() && variables_[known] < factor_.layout->supernodes[s].end()) ++known;
+      const int width = factor_.layout->panels[s].columns, columns = 6 * static_cast<int>(known);
+      eliminate(s, columns);
+      cblas_dsyrk(CblasColMajor, CblasLower, CblasTrans, columns, width, 1.0, &Y_(begin_[s], 0),
+                  static_cast<int>(Y_.rows()), 1.0, out.data(), static_cast<int>(out.rows()));
+    }
+    return out;
+  }
+
+ private:
+  [[nodiscard]] Eigen::Index row_of(int variable) const {
+    const auto s = static_cast<std::size_t>(factor_.layout->supernode_of[variable]);
+    return begin_[s] + 6 * (variable - factor_.layout->supernodes[s].first);
+  }
+
+  /// Y_J <- L_JJ^-1 Y_J, and Y_I <- Y_I - L_IJ Y_J below.
+  void eliminate(std::size_t s, int columns) {
+    const CholeskyFactor::Panel& panel = factor_.layout->panels[s];
+    const double* const L = factor_.panel(s);
+    const int stride = static_cast<int>(Y_.rows()), m = panel.below();
+    cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, panel.columns, columns, 1.0, L,
+                panel.rows, &Y_(begin_[s], 0), stride);
+    if (m == 0) return;
+    product_.resize(m, columns);
+    cblas_dgemm(CblasColMajor, CblasNoTrans, CblasNoTrans, m, columns, panel.columns, 1.0, L + panel.columns,
+                panel.rows, &Y_(begin_[s], 0), stride, 0.0, product_.data(), m);
+    Eigen::Index k = 0;
+    for (const int row : factor_.layout->supernodes[s].below)
+      Y_.block(row_of(row), 0, 6, columns) -= product_.middleRows(6 * k++, 6);
+  }
+
+  const CholeskyFactor& factor_;
+  std::vector<int> variables_;       // increasing
+  std::vector<Eigen::Index> begin_;  // per supernode its first row of Y, or -1: none of the variables depends on it
+  Eigen::MatrixXd Y_, product_;
+};
+
 }  // namespace
 
 Eigen::MatrixXd posterior_samples(const CholeskyFactor& factor, std::span<const int> variables, std::size_t count,
@@ -83,50 +152,23 @@ Eigen::MatrixXd posterior_samples(const CholeskyFactor& factor, std::span<const 
 }
 
 Eigen::MatrixXd posterior_covariance(const CholeskyFactor& factor, std::span<const int> variables) {
-  std::vector<Matrix6d> y(factor.block_columns(), Matrix6d::Zero());
-  struct Path {
-    std::vector<std::size_t> block;  // ascending
-    std::vector<Matrix6d> y;
-  };
-  std::vector<Path> paths(variables.size());
-  for (std::size_t v = 0; v < variables.size(); ++v) {
-    if (variables[v] < 0) continue;
-    Path& path = paths[v];
-    y[static_cast<std::size_t>(variables[v])].setIdentity();
-    for (std::optional<std::size_t> j = static_cast<std::size_t>(variables[v]); j;) {
-      const CholeskyFactor::Column column(factor, *j);
-      const auto L_jj = column.diagonal();
-      Matrix6d& y_j = y[*j];
-      for (int c = 0; c < 6; ++c) {
-        y_j.row(c) /= L_jj(c, c);
-        for (int d = c + 1; d < 6; ++d) y_j.row(d) -= L_jj(d, c) * y_j.row(c);
-      }
-      for (int b = 0; b < column.below(); ++b) {
-        const auto L_ij = column.block(b);
-        Matrix6d& y_i = y[column.row(b)];
-        for (int c = 0; c < 6; ++c) y_i.noalias() -= L_ij.col(c) * y_j.row(c);
-      }
-      path.block.push_back(*j);
-      path.y.push_back(y_j);
-      j = column.parent();
-    }
-    for (const std::size_t j : path.block) y[j].setZero();
-  }
-  const auto size = static_cast<Eigen::Index>(6 * variables.size());
+  std::vector<int> asked;
+  for (const int variable : variables)
+    if (variable >= 0) asked.push_back(variable);
+  std::ranges::sort(asked);
+  const auto twice = std::ranges::unique(asked);
+  asked.erase(twice.begin(), twice.end());
+  const auto size = 6 * std::ssize(variables);
   Eigen::MatrixXd out = Eigen::MatrixXd::Zero(size, size);
-  for (std::size_t a = 0; a < paths.size(); ++a)
-    for (std::size_t b = a; b < paths.size(); ++b) {
-      Matrix6d sum = Matrix6d::Zero();
-      for (std::size_t i = 0, k = 0; i < paths[a].block.size() && k < paths[b].block.size();) {
-        if (paths[a].block[i] == paths[b].block[k])
-          sum.noalias() += paths[a].y[i++].transpose() * paths[b].y[k++];
-        else
-          paths[a].block[i] < paths[b].block[k] ? ++i : ++k;
-      }
-      const auto row = static_cast<Eigen::Index>(6 * a), column = static_cast<Eigen::Index>(6 * b);
-      out.block<6, 6>(row, column) = sum;
-      out.block<6, 6>(column, row) = sum.transpose();
-    }
+  if (asked.empty()) return out;
+  Eigen::MatrixXd squared = InverseColumns(factor, asked).squared();
+  squared.triangularView<Eigen::StrictlyUpper>() = squared.transpose();
+  const auto at = [&](int variable) { return 6 * (std::ranges::lower_bound(asked, variable) - asked.begin()); };
+  for (std::size_t a = 0; a < variables.size(); ++a)
+    for (std::size_t b = 0; b < variables.size(); ++b)
+      if (variables[a] >= 0 && variables[b] >= 0)
+        out.block<6, 6>(static_cast<Eigen::Index>(6 * a), static_cast<Eigen::Index>(6 * b)) =
+            squared.block<6, 6>(at(variables[a]), at(variables[b]));
   return out;
 }
 
