@@ -72,7 +72,8 @@ class Search {
   }
 
   /// Takes back the windows that do not pay for themselves, the cheapest first and as many at once as together fit no
-  /// worse than by what the cheapest of them pays: each alone would then fit no worse either.
+  /// worse than by what the cheapest of them pays: each alone would then fit no worse either. None goes without which
+  /// another one would have to be a failure by more than the robot can have moved.
   [[nodiscard]] Solution without_idle(Solution best) const {
     std::set<std::size_t> needed;  // windows, by their first run
     for (std::size_t batch = best.hypothesis.windows.size(); best.solved && solver_.work().hypotheses < most_;) {
@@ -83,7 +84,8 @@ class Search {
       std::ranges::stable_sort(open, {}, [&](std::size_t k) { return best.prices[k]; });
       open.resize(std::min(batch, open.size()));
       Solution other = solver_.solve(without(best.hypothesis, open));
-      if (other.solved && other.fit - best.fit <= best.prices[open.front()]) {
+      const bool is_possible = std::isfinite(other.misfit) || std::isinf(best.misfit);
+      if (other.solved && is_possible && other.fit - best.fit <= best.prices[open.front()]) {
         best = std::move(other);
         batch = 2 * open.size();
         continue;
