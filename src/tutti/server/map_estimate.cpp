@@ -75,6 +75,15 @@ std::vector<std::optional<Matrix6d>> stated_steps(const SubmapSet& submaps, cons
   return out;
 }
 
+std::vector<SubmapSet> by_chain(const SubmapSet& submaps) {
+  std::vector<SubmapSet> out;
+  for (const auto& [id, submap] : submaps) {
+    if (out.empty() || out.back().begin()->first.chain != id.chain) out.emplace_back();
+    out.back().emplace_hint(out.back().end(), id, submap);
+  }
+  return out;
+}
+
 judge::Closures collect_closures(const VerdictSet& verdicts, const DecisionSet& decisions, const SubmapSet& submaps,
                                  const judge::NodeIndex& index, const std::set<SubmapPair>& spare,
                                  const std::set<SubmapPair>& refuted) {
@@ -290,22 +299,34 @@ MapEstimate estimate_map(const SubmapSet& all_submaps, const VerdictSet& verdict
                          const DecisionSet& decisions, const std::set<SubmapPair>& refuted) {
   std::vector<SubmapId> left_out;
   const SubmapSet submaps = without_contradictions(all_submaps, left_out);
-  MapEstimate best = estimate_together(submaps, verdicts, config, decisions, refuted);
-  // One chain's numbers may be what cannot be solved; the others keep their map. The largest counts, then the first.
-  std::vector<SubmapId> unsolvable;
-  for (auto chain = best.converged ? submaps.end() : submaps.begin(); chain != submaps.end();) {
-    const auto next = submaps.upper_bound({chain->first.chain, std::numeric_limits<std::uint32_t>::max()});
-    SubmapSet others(submaps.begin(), chain);
-    others.insert(next, submaps.end());
-    MapEstimate without = estimate_together(others, verdicts, config, decisions, refuted);
-    if (without.converged && (!best.converged || without.nodes.size() > best.nodes.size())) {
-      best = std::move(without);
-      unsolvable.clear();
-      for (auto it = chain; it != next; ++it) unsolvable.push_back(it->first);
-    }
-    chain = next;
+  const auto estimate = [&](const SubmapSet& some) {
+    return estimate_together(some, verdicts, config, decisions, refuted);
+  };
+  MapEstimate best = estimate(submaps);
+  if (best.converged) {
+    best.left_out = std::move(left_out);
+    return best;
   }
-  left_out.insert(left_out.end(), unsolvable.begin(), unsolvable.end());
+  // Some chains' numbers may be what cannot be solved; the others keep their map. The largest counts, then the first.
+  SubmapSet used = submaps;
+  const auto try_with = [&](SubmapSet some) {
+    MapEstimate map = estimate(some);
+    if (!map.converged || (best.converged && map.nodes.size() <= best.nodes.size())) return;
+    best = std::move(map);
+    used = std::move(some);
+  };
+  const std::vector<SubmapSet> chains = by_chain(submaps);
+  SubmapSet sound;  // what can be solved alone
+  for (const SubmapSet& chain : chains)
+    if (estimate(chain).converged) sound.insert(chain.begin(), chain.end());
+  if (!sound.empty() && sound.size() < submaps.size()) try_with(std::move(sound));
+  for (auto chain = chains.begin(); !best.converged && chain != chains.end(); ++chain) {
+    SubmapSet others = submaps;
+    std::erase_if(others, [&](const auto& entry) { return chain->contains(entry.first); });
+    try_with(std::move(others));
+  }
+  for (const auto& [id, submap] : submaps)
+    if (!used.contains(id)) left_out.push_back(id);
   best.left_out = std::move(left_out);
   return best;
 }

@@ -202,6 +202,23 @@ TEST(MapEstimate, TheLastRobotThereCanBeIsLeftOutLikeAnyOther) {
   EXPECT_TRUE(std::ranges::all_of(left_out, [&](const SubmapId& id) { return id.chain.robot == kLast; }));
 }
 
+TEST(MapEstimate, SeveralRobotsThatCannotBeSolvedHarmNoOther) {
+  Inputs in = make_inputs(5, TestVerifier(2), 2);
+  for (auto& [id, submap] : in.submaps) {
+    if (id.chain.robot != RobotId{0} && id.chain.robot != RobotId{3}) continue;
+    Submap wild = *submap;
+    for (RelativePose& step : wild.odometry) step.T_a_b.translation *= 1e160;
+    submap = std::make_shared<const Submap>(std::move(wild));
+  }
+  const MapEstimate map = estimate_map(in.submaps, in.verdicts, {});
+  EXPECT_TRUE(map.converged);
+  EXPECT_EQ(map.components, 1U);
+  for (const RobotId robot : {RobotId{1}, RobotId{2}, RobotId{4}})
+    EXPECT_LT(rmse(map, false, robot), 0.35 * rmse(map, true, robot)) << robot.value;
+  for (const MapNode& node : map.nodes) EXPECT_TRUE(node.id.chain.robot.value % 3 != 0) << node.id.chain.robot.value;
+  EXPECT_TRUE(std::ranges::all_of(map.left_out, [](const SubmapId& id) { return id.chain.robot.value % 3 == 0; }));
+}
+
 TEST(MapEstimate, SubmapsThatContradictEarlierOnesAreLeftOut) {
   const auto second_run = [](Submap& submap) {  // robot 2 started again: keyframes of the same numbers, later
     if (submap.id.index < 4) return;
