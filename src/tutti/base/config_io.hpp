@@ -121,19 +121,23 @@ class Loader {
     findings_.places[path_].known.emplace_back(name);
     const ConfigNode* child = node_.find(name);
     const std::string path = path_.empty() ? std::string(name) : path_ + "." + std::string(name);
-    if (const ConfigNode* older = bound.formerly.empty() ? nullptr : node_.find(bound.formerly)) {
-      findings_.places[path_].former.push_back(bound.formerly);
-      if (child != nullptr)
-        complain(findings_, *older, path,
-                 fmt::format("given twice, the second time by its former name '{}'", bound.formerly));
-      else
-        child = older;
-    }
+    if (!bound.formerly.empty()) child = newest(child, bound.formerly, path);
     if (child == nullptr || child->kind == ConfigNode::Kind::null) return;
     read(*child, path, value, bound);
   }
 
  private:
+  /// What is given by this name or by the former one; the command line counts before a document.
+  const ConfigNode* newest(const ConfigNode* child, const std::string& former_name, const std::string& path) {
+    const ConfigNode* former = node_.find(former_name);
+    if (former == nullptr) return child;
+    findings_.places[path_].former.push_back(former_name);
+    if (child == nullptr || (former->line == 0 && child->line > 0)) return former;
+    if (child->line > 0 || former->line == 0)
+      complain(findings_, *former, path, fmt::format("given twice, also by its former name '{}'", former_name));
+    return child;
+  }
+
   template <class T>
   void read(const ConfigNode& node, const std::string& path, T& value, const Bound& bound) {
     if constexpr (Scalar<T>) {

@@ -139,8 +139,22 @@ TEST(Config, AFormerNameIsRead) {
   };
   EXPECT_EQ(problem_of("way_m: -1"), "x.yaml:1: distance_m: is -1, must be > 0");
   EXPECT_EQ(problem_of("distance_m: 2\nway_m: 3"),
-            "x.yaml:2: distance_m: given twice, the second time by its former name 'way_m'");
+            "x.yaml:2: distance_m: given twice, also by its former name 'way_m'");
   EXPECT_EQ(problem_of("weg_m: 2"), "x.yaml:1: weg_m: unknown key, known here: distance_m");
+}
+
+TEST(Config, TheCommandLineCountsByEitherName) {
+  const auto read = [](const std::string& text, const std::string& assignment) {
+    ConfigNode node = parse(text);
+    EXPECT_TRUE(apply_override(node, assignment));
+    RenamedSettings settings;
+    const Status status = load_config(node, settings, "x.yaml");
+    EXPECT_TRUE(status) << (status ? "" : status.error().message);
+    return settings.distance_m;
+  };
+  EXPECT_EQ(read("distance_m: 2", "way_m=3"), 3.0);
+  EXPECT_EQ(read("way_m: 2", "distance_m=3"), 3.0);
+  EXPECT_EQ(read("way_m: 2", "way_m=3"), 3.0);
 }
 
 TEST(Config, SaysWhatStandsThereInstead) {
