@@ -44,6 +44,21 @@ constexpr double kShare = 0.25;
 /// Where that is looked at: a chain bends little between so many of its nodes.
 constexpr std::size_t kMostLookedAt = 32;
 
+/// So many groups are tried at most.
+constexpr std::size_t kMostTried = 16;
+
+/// The groups, in their order, that move the chain at least so far; where these are many, those that move it most.
+std::vector<std::size_t> which_to_try(std::span<const double> moves_m, double least_m) {
+  std::vector<std::size_t> out;
+  for (std::size_t g = 0; g < moves_m.size(); ++g)
+    if (moves_m[g] >= least_m) out.push_back(g);
+  if (out.size() <= kMostTried) return out;
+  std::ranges::stable_sort(out, std::greater(), [&](std::size_t g) { return moves_m[g]; });
+  out.resize(kMostTried);
+  std::ranges::sort(out);
+  return out;
+}
+
 /// The chain's proxy nodes and which of the map's nodes they are.
 struct OwnNodes {
   std::vector<std::size_t> proxies;
@@ -102,8 +117,7 @@ ChangeSupport change_support(const MapEstimate& map, const Beliefs& followed_bel
   estimation::SolverConfig from_there = solver;
   from_there.initialisation = "given";
   std::optional<estimation::SwitchedGraph> graph;  // made when the first group is looked at closely
-  for (std::size_t g = 0; g < groups.size() && out.lone_closures == 0; ++g) {
-    if (first_order[g] < least_m) continue;
+  for (const std::size_t g : which_to_try(first_order, least_m)) {
     if (!graph) graph.emplace(map.graph, roles, from_there);
     std::vector<char> in(map.graph.edges.size(), 1);
     for (const std::size_t e : groups[g]) in[e] = 0;
@@ -114,8 +128,10 @@ ChangeSupport change_support(const MapEstimate& map, const Beliefs& followed_bel
     for (std::size_t k = 0; k < part.nodes.size(); ++k)
       without.nodes[part.proxies[k]].T_world_body = poses[part.nodes[k]];
     if (consistency::map_change(followed, without, chain).translation_m <
-        consistency::map_change(own, without, chain).translation_m)
+        consistency::map_change(own, without, chain).translation_m) {
       out.lone_closures = groups[g].size();
+      break;
+    }
   }
   if (graph) out.factorisations += graph->factorisations();
   return out;

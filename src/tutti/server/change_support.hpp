@@ -24,7 +24,8 @@ struct ChangeSupport {
 /// groups where there is none. `followed` and `own`: the robot's part (consistency::own_part) of the followed map and
 /// of this one; both have nodes of `chain`. The poses without a group are least squares with all other accepted
 /// closures and the odometry as the map counts it. Groups that move the chain by far less than it has changed, to first
-/// order (estimation::group_removals), are not tried: in the map of a large fleet nearly all.
+/// order (estimation::group_removals), are not tried: in the map of a large fleet nearly all. Where more than 16 are
+/// left, those that move it most are tried.
 ChangeSupport change_support(const MapEstimate& map, const Beliefs& followed_beliefs, const ProxyGraph& followed,
                              const ProxyGraph& own, const ChainId& chain, const estimation::SolverConfig& solver);
 

@@ -116,5 +116,35 @@ TEST(ChangeSupport, GroupsThatHardlyMoveTheChainAreNotTried) {
   EXPECT_EQ(one.tried, 1);
 }
 
+/// A street that was driven twice, with loose odometry: each of `places` says that the second time was beside the first
+/// one, to the other side than the place before it.
+MapEstimate zigzag(std::size_t places) {
+  constexpr std::size_t kApart = 50;
+  const std::size_t once = kApart * (places + 1);
+  const auto pose = [&](std::size_t n) { return Pose3{{}, {static_cast<double>(n % once), 0.0, 0.0}}; };
+  MapEstimate map;
+  for (std::size_t n = 0; n < 2 * once; ++n) {
+    map.nodes.push_back({{kAlpha, static_cast<std::uint32_t>(n)}, Timestamp{} + static_cast<double>(n), true, pose(n)});
+    map.graph.poses.push_back(pose(n));
+    if (n > 0) map.graph.edges.push_back({n - 1, n, pose(n - 1).inverse() * pose(n), Matrix6d::Identity()});
+  }
+  map.odometry_edges = map.graph.edges.size();
+  for (std::size_t p = 0; p < places; ++p)
+    for (std::size_t k = kApart * (p + 1); k < kApart * (p + 1) + 3; ++k)
+      map.graph.edges.push_back({k, k + once, {{}, {0.0, p % 2 == 0 ? 2.0 : -2.0, 0.0}}, Matrix6d::Identity() * 1e4});
+  estimation::SolverConfig given;
+  given.initialisation = "given";
+  map.graph.poses = estimation::solve_pose_graph(map.graph, given).poses;
+  return map;
+}
+
+TEST(ChangeSupport, HoweverManyGroupsMoveTheChainFewAreTried) {
+  const ChangeSupport few = change_support(zigzag(10), {}, part_of(zigzag(0)), part_of(zigzag(10)), kAlpha, {});
+  EXPECT_EQ(few.tried, 10);
+  const ChangeSupport many = change_support(zigzag(30), {}, part_of(zigzag(0)), part_of(zigzag(30)), kAlpha, {});
+  EXPECT_EQ(many.tried, 16);
+  EXPECT_EQ(many.lone_closures, 0U);
+}
+
 }  // namespace change_support_test
 }  // namespace tutti::server
