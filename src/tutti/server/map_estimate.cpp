@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <limits>
 #include <set>
+#include <span>
 #include <tuple>
 
 #include "tutti/base/chi_square.hpp"
@@ -320,9 +320,10 @@ MapEstimate estimate_map(const SubmapSet& all_submaps, const VerdictSet& verdict
   for (const SubmapSet& chain : chains)
     if (estimate(chain).converged) sound.insert(chain.begin(), chain.end());
   if (!sound.empty() && sound.size() < submaps.size()) try_with(std::move(sound));
-  for (auto chain = chains.begin(); !best.converged && chain != chains.end(); ++chain) {
+  const std::span<const SubmapSet> left = best.converged ? std::span<const SubmapSet>() : std::span(chains);
+  for (const SubmapSet& chain : left) {
     SubmapSet others = submaps;
-    std::erase_if(others, [&](const auto& entry) { return chain->contains(entry.first); });
+    std::erase_if(others, [&](const auto& entry) { return chain.contains(entry.first); });
     try_with(std::move(others));
   }
   for (const auto& [id, submap] : submaps)
