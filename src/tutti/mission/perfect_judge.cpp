@@ -24,9 +24,9 @@ std::optional<server::MapEstimate> judge_perfectly(const server::MapServer& serv
   DecisionSet decisions = state.decisions;
   bool checked = false;
   for (auto& [pair, verdict] : verdicts) {
-    bool known = true;
+    std::erase_if(verdict.closures, [&](const LoopClosure& c) { return !judged.contains({c.from, c.to}); });
+    bool known = !verdict.closures.empty();
     std::erase_if(verdict.closures, [&](const LoopClosure& closure) {
-      if (!judged.contains({closure.from, closure.to})) return true;
       const auto error = closure_error(closure, truth);
       known = known && error.has_value();
       return error && is_wrong(*error, check);
