@@ -150,10 +150,10 @@ void print_verifiers(const mapfile::Content& content) {
     if (!verdict.closures.empty()) ++found[verdict.verifier];
   for (const auto& [verifier, pairs] : content.refused) found.try_emplace(verifier, 0);
   for (const auto& [verifier, pairs] : found)
-    fmt::print("verifier       {}: closures between {} pairs, {} refused\n", to_string(verifier), pairs,
+    fmt::print("verifier     {}: closures between {} pairs, {} refused\n", to_string(verifier), pairs,
                content.refused.contains(verifier) ? content.refused.at(verifier) : 0);
   for (const auto& [verifier, pairs] : content.aside)
-    fmt::print("verifier       {}: closures between {} pairs that are not believed\n", to_string(verifier), pairs);
+    fmt::print("verifier     {}: closures between {} pairs that are not believed\n", to_string(verifier), pairs);
 }
 
 int show_map(const fs::path& file) {
