@@ -176,65 +176,27 @@ CholeskyFactor BlockCholesky::take_factor() {
 
 void BlockCholesky::solve(Eigen::Ref<Eigen::MatrixXd> b) const {
   TUTTI_CHECK(b.rows() == static_cast<Eigen::Index>(block_size()) * structure_.variables, "{} rows", b.rows());
-  if (!is_factorised_) return;
+  TUTTI_CHECK(is_factorised_, "nothing to solve with");
   const SingleThread single_thread;
+  const auto size = static_cast<Eigen::Index>(block_size());
+  const auto within = [&](std::size_t s) { return b.middleRows(size * supernodes()[s].first, panels()[s].columns); };
   for (std::size_t s = 0; s < supernodes().size(); ++s) {
-    substitute(s, false, b);
-    if (panels()[s].below() > 0) take_below(s, b);
+    factor_.solve_within(s, false, within(s));
+    if (panels()[s].below() == 0) continue;
+    const Eigen::MatrixXd product = factor_.times_below(s, within(s));
+    Eigen::Index k = 0;
+    for (const int row : supernodes()[s].below) b.middleRows(size * row, size) -= product.middleRows(size * k++, size);
   }
+  Eigen::MatrixXd b_I;
   for (std::size_t s = supernodes().size(); s-- > 0;) {
-    if (panels()[s].below() > 0) take_from_below(s, b);
-    substitute(s, true, b);
+    if (panels()[s].below() > 0) {
+      b_I.resize(panels()[s].below(), b.cols());
+      Eigen::Index k = 0;
+      for (const int row : supernodes()[s].below) b_I.middleRows(size * k++, size) = b.middleRows(size * row, size);
+      factor_.subtract_below(s, b_I, within(s));
+    }
+    factor_.solve_within(s, true, within(s));
   }
-}
-
-/// b_J <- L_JJ^-1 b_J, or L_JJ^-T b_J.
-void BlockCholesky::substitute(std::size_t supernode, bool is_transposed, Eigen::Ref<Eigen::MatrixXd> b) const {
-  const Panel& panel = panels()[supernode];
-  const CBLAS_TRANSPOSE how = is_transposed ? CblasTrans : CblasNoTrans;
-  const double* const L = factor_.panel(supernode);
-  double* const b_J = b.data() + static_cast<std::ptrdiff_t>(block_size()) * supernodes()[supernode].first;
-  if (b.cols() == 1)
-    cblas_dtrsv(CblasColMajor, CblasLower, how, CblasNonUnit, panel.columns, L, panel.rows, b_J, 1);
-  else
-    cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, how, CblasNonUnit, panel.columns, static_cast<int>(b.cols()), 1.0,
-                L, panel.rows, b_J, static_cast<int>(b.outerStride()));
-}
-
-/// b_I <- b_I - L_IJ b_J
-void BlockCholesky::take_below(std::size_t supernode, Eigen::Ref<Eigen::MatrixXd> b) const {
-  const Panel& panel = panels()[supernode];
-  const int m = panel.below(), columns = static_cast<int>(b.cols());
-  const double* const L = factor_.panel(supernode) + panel.columns;
-  const double* const b_J = b.data() + static_cast<std::ptrdiff_t>(block_size()) * supernodes()[supernode].first;
-  Eigen::MatrixXd product(m, columns);
-  if (columns == 1)
-    cblas_dgemv(CblasColMajor, CblasNoTrans, m, panel.columns, 1.0, L, panel.rows, b_J, 1, 0.0, product.data(), 1);
-  else
-    cblas_dgemm(CblasColMajor, CblasNoTrans, CblasNoTrans, m, columns, panel.columns, 1.0, L, panel.rows, b_J,
-                static_cast<int>(b.outerStride()), 0.0, product.data(), m);
-  Eigen::Index k = 0;
-  for (const int row : supernodes()[supernode].below)
-    b.middleRows(static_cast<Eigen::Index>(block_size()) * row, block_size()) -=
-        product.middleRows(block_size() * k++, block_size());
-}
-
-/// b_J <- b_J - L_IJ^T b_I
-void BlockCholesky::take_from_below(std::size_t supernode, Eigen::Ref<Eigen::MatrixXd> b) const {
-  const Panel& panel = panels()[supernode];
-  const int m = panel.below(), columns = static_cast<int>(b.cols());
-  const double* const L = factor_.panel(supernode) + panel.columns;
-  double* const b_J = b.data() + static_cast<std::ptrdiff_t>(block_size()) * supernodes()[supernode].first;
-  Eigen::MatrixXd b_I(m, columns);
-  Eigen::Index k = 0;
-  for (const int row : supernodes()[supernode].below)
-    b_I.middleRows(block_size() * k++, block_size()) =
-        b.middleRows(static_cast<Eigen::Index>(block_size()) * row, block_size());
-  if (columns == 1)
-    cblas_dgemv(CblasColMajor, CblasTrans, m, panel.columns, -1.0, L, panel.rows, b_I.data(), 1, 1.0, b_J, 1);
-  else
-    cblas_dgemm(CblasColMajor, CblasTrans, CblasNoTrans, panel.columns, columns, m, -1.0, L, panel.rows, b_I.data(), m,
-                1.0, b_J, static_cast<int>(b.outerStride()));
 }
 
 }  // namespace tutti::estimation::internal

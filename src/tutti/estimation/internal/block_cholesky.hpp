@@ -74,9 +74,6 @@ class BlockCholesky {
   template <int B>
   void update(const Supernode& node, const Group& group);
   [[nodiscard]] bool pivots_are_sound(std::size_t supernode) const;
-  void substitute(std::size_t supernode, bool is_transposed, Eigen::Ref<Eigen::MatrixXd> b) const;
-  void take_below(std::size_t supernode, Eigen::Ref<Eigen::MatrixXd> b) const;
-  void take_from_below(std::size_t supernode, Eigen::Ref<Eigen::MatrixXd> b) const;
 
   using Panel = CholeskyFactor::Panel;
   [[nodiscard]] const std::vector<Supernode>& supernodes() const { return factor_.layout->supernodes; }

@@ -45,6 +45,14 @@ struct CholeskyFactor {
     return values.get() + layout->panels[supernode].begin;
   }
 
+  /// What solving needs of a supernode J with the rows I below it. b_J and b_I: as many rows as J has columns and rows
+  /// below. b_J <- L_JJ^-1 b_J, or L_JJ^-T b_J.
+  void solve_within(std::size_t supernode, bool is_transposed, Eigen::Ref<Eigen::MatrixXd> b_J) const;
+  /// L_IJ b_J
+  [[nodiscard]] Eigen::MatrixXd times_below(std::size_t supernode, const Eigen::Ref<const Eigen::MatrixXd>& b_J) const;
+  /// b_J <- b_J - L_IJ^T b_I
+  void subtract_below(std::size_t supernode, const Eigen::MatrixXd& b_I, Eigen::Ref<Eigen::MatrixXd> b_J) const;
+
   /// The block at these positions among the supernode's rows and columns, in a factor of 6 x 6 blocks.
   using Block = Eigen::Map<const Matrix6d, 0, Eigen::OuterStride<>>;
   [[nodiscard]] Block block(std::size_t supernode, int row, int column) const;

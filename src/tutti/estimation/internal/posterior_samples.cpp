@@ -107,23 +107,19 @@ class InverseColumns {
   /// Y_J <- L_JJ^-1 Y_J, and Y_I <- Y_I - L_IJ Y_J below.
   void eliminate(std::size_t s, int columns) {
     const CholeskyFactor::Panel& panel = factor_.layout->panels[s];
-    const double* const L = factor_.panel(s);
-    const int stride = static_cast<int>(Y_.rows()), m = panel.below();
-    cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, panel.columns, columns, 1.0, L,
-                panel.rows, &Y_(begin_[s], 0), stride);
-    if (m == 0) return;
-    product_.resize(m, columns);
-    cblas_dgemm(CblasColMajor, CblasNoTrans, CblasNoTrans, m, columns, panel.columns, 1.0, L + panel.columns,
-                panel.rows, &Y_(begin_[s], 0), stride, 0.0, product_.data(), m);
+    const auto Y_J = Y_.block(begin_[s], 0, panel.columns, columns);
+    factor_.solve_within(s, false, Y_J);
+    if (panel.below() == 0) return;
+    const Eigen::MatrixXd product = factor_.times_below(s, Y_J);
     Eigen::Index k = 0;
     for (const int row : factor_.layout->supernodes[s].below)
-      Y_.block(row_of(row), 0, 6, columns) -= product_.middleRows(6 * k++, 6);
+      Y_.block(row_of(row), 0, 6, columns) -= product.middleRows(6 * k++, 6);
   }
 
   const CholeskyFactor& factor_;
   std::vector<int> variables_;       // increasing
   std::vector<Eigen::Index> begin_;  // per supernode its first row of Y, or -1: none of the variables depends on it
-  Eigen::MatrixXd Y_, product_;
+  Eigen::MatrixXd Y_;
 };
 
 }  // namespace
