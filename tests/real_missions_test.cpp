@@ -14,7 +14,7 @@
 #include "tutti/formats/kitti.hpp"
 #include "tutti/formats/trajectory_file.hpp"
 #include "tutti/lab/run_mission.hpp"
-#include "tutti/mission/worst_moment.hpp"
+#include "tutti/mission/worst_update.hpp"
 
 namespace tutti::mission {
 namespace real_missions_test {

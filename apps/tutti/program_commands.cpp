@@ -171,7 +171,7 @@ void add_robot_command(CLI::App& app, int& exit_code) {
       return;
     }
     exit_code = run_program("robot", *common, options->console, [&]() -> Status {
-      if (Status ok = lab::tell_robot(common->mission, *options); !ok) return ok;
+      if (Status ok = lab::fill_robot_options(common->mission, *options); !ok) return ok;
       if (wants_ros(*ros))
         if (Status ok = feed_from_ros(*ros, *options); !ok) return ok;
       return program::run_robot(*options, program::stop_asked());

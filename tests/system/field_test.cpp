@@ -67,7 +67,7 @@ class Field : public ::testing::Test {
                                     .state = folder_ / name,
                                     .rate = rate,
                                     .session = kSession};
-      if (Status ok = lab::tell_robot(source, options); !ok) return ok;
+      if (Status ok = lab::fill_robot_options(source, options); !ok) return ok;
       return program::run_robot(options, stop);
     }));
   }

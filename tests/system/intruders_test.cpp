@@ -89,7 +89,7 @@ class IntrudersSystem : public ::testing::Test {
                                     .state = folder_ / name,
                                     .rate = kRate,
                                     .session = test::kSession};
-      if (Status ok = lab::tell_robot(source_, options); !ok) return ok;
+      if (Status ok = lab::fill_robot_options(source_, options); !ok) return ok;
       return program::run_robot(options, stop);
     }));
   }

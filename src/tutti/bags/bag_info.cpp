@@ -41,8 +41,8 @@ void note_first(TopicInfo& topic, const BagMessage& message) {
     return;
   }
   topic.frames = std::visit([](const auto& of) { return frames_of(of); }, *decoded);
-  if (const auto* const image = std::get_if<RosImage>(&*decoded)) topic.image = look_of(*image);
-  if (const auto* const image = std::get_if<RosCompressedImage>(&*decoded)) topic.image = look_of(*image);
+  if (const auto* const image = std::get_if<RosImage>(&*decoded)) topic.image = layout_of(*image);
+  if (const auto* const image = std::get_if<RosCompressedImage>(&*decoded)) topic.image = layout_of(*image);
   if (const auto* const info = std::get_if<RosCameraInfo>(&*decoded)) topic.calibration = *info;
 }
 

@@ -20,7 +20,7 @@ struct TopicInfo {
   std::uint64_t count = 0;
   Timestamp first = kLastTimestamp, last = kFirstTimestamp;  ///< Log times: the earliest and the latest.
   std::string frames;  ///< Frames of the first message ("odom -> base_link"); empty for types without a use.
-  std::optional<ImageLook> image;  ///< What the first message shows, of images.
+  std::optional<ImageLayout> image;  ///< What the first message shows, of images.
   std::optional<RosCameraInfo> calibration;
   std::string problem;                   ///< Why the first message could not be decoded; empty if it could.
   [[nodiscard]] double rate_hz() const;  ///< Mean rate; 0 for fewer than two messages.

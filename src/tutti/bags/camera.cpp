@@ -28,7 +28,7 @@ constexpr std::array kLayouts{PixelLayout{"mono8", 1, kGrey},
                               PixelLayout{"bayer_gbrg8", 1, kBayer},
                               PixelLayout{"bayer_grbg8", 1, kBayer}};
 
-const PixelLayout* layout_of(std::string_view encoding) {
+const PixelLayout* pixel_layout_of(std::string_view encoding) {
   const auto at = std::ranges::find(kLayouts, encoding, &PixelLayout::name);
   return at == kLayouts.end() ? nullptr : &*at;
 }
@@ -83,7 +83,7 @@ Result<CameraModel> to_camera(const RosCameraInfo& message) {
   return out;
 }
 
-bool is_picture(std::string_view encoding) { return layout_of(encoding) != nullptr; }
+bool is_picture(std::string_view encoding) { return pixel_layout_of(encoding) != nullptr; }
 
 Status check_rows(const RosImage& message, std::uint32_t pixel_bytes) {
   const std::uint64_t row = std::uint64_t{message.width} * pixel_bytes;
@@ -95,7 +95,7 @@ Status check_rows(const RosImage& message, std::uint32_t pixel_bytes) {
 }
 
 Result<Image> to_image(const RosImage& message) {
-  const PixelLayout* const layout = layout_of(message.encoding);
+  const PixelLayout* const layout = pixel_layout_of(message.encoding);
   if (layout == nullptr)
     return fail(ErrorCode::unsupported, "encoding '{:.40}', expected mono8, rgb8, bgr8, rgba8, bgra8 or bayer_..8",
                 message.encoding);

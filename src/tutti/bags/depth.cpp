@@ -76,14 +76,14 @@ std::string_view png_of(std::string_view data) {
   return {};
 }
 
-ImageLook look_of(const RosImage& message) {
+ImageLayout layout_of(const RosImage& message) {
   return {message.encoding, frame_name(message.header.frame_id), message.width, message.height};
 }
 
-ImageLook look_of(const RosCompressedImage& message) {
+ImageLayout layout_of(const RosCompressedImage& message) {
   const PngHeader header = header_of(png_of(message.data));
   const std::size_t end = message.format.find(';');
-  ImageLook out{message.format.substr(0, end), frame_name(message.header.frame_id), header.width, header.height};
+  ImageLayout out{message.format.substr(0, end), frame_name(message.header.frame_id), header.width, header.height};
   if (header.is_grey16 && end == std::string::npos && !is_depth("", out.encoding)) out.encoding = kMillimetres;
   return out;
 }
@@ -97,15 +97,15 @@ std::uint32_t depth_bytes(std::string_view encoding) {
   return encoding == kMetres ? sizeof(float) : sizeof(std::uint16_t);
 }
 
-Status check_like_first(const ImageLook& look, const ImageLook& first) {
-  if (look.encoding != first.encoding)
-    return fail(ErrorCode::invalid, "encoding '{:.40}', expected '{:.40}' as of the first", look.encoding,
+Status check_like_first(const ImageLayout& layout, const ImageLayout& first) {
+  if (layout.encoding != first.encoding)
+    return fail(ErrorCode::invalid, "encoding '{:.40}', expected '{:.40}' as of the first", layout.encoding,
                 first.encoding);
-  if (look.frame != first.frame)
-    return fail(ErrorCode::invalid, "frame '{:.80}', expected '{:.80}' as of the first", look.frame, first.frame);
-  if (look.width_px != first.width_px || look.height_px != first.height_px)
-    return fail(ErrorCode::invalid, "{} x {} pixels, expected {} x {} as of the first", look.width_px, look.height_px,
-                first.width_px, first.height_px);
+  if (layout.frame != first.frame)
+    return fail(ErrorCode::invalid, "frame '{:.80}', expected '{:.80}' as of the first", layout.frame, first.frame);
+  if (layout.width_px != first.width_px || layout.height_px != first.height_px)
+    return fail(ErrorCode::invalid, "{} x {} pixels, expected {} x {} as of the first", layout.width_px,
+                layout.height_px, first.width_px, first.height_px);
   return {};
 }
 
@@ -121,7 +121,7 @@ Result<DepthImage> to_depth(const RosImage& message) {
 
 Result<DepthImage> to_depth(const RosCompressedImage& message, formats::ExpectedSize expected) {
   const std::string_view png = png_of(message.data);
-  const std::string encoding = look_of(message).encoding;
+  const std::string encoding = layout_of(message).encoding;
   const bool is_inverse = encoding == kMetres;
   if (png.empty() || (is_inverse && png.size() == message.data.size()))
     return fail(ErrorCode::unsupported, "format '{:.60}' with {} bytes, expected a PNG image as compressedDepth has",

@@ -16,14 +16,14 @@ namespace tutti::bags {
 inline constexpr double kDepthUnit_m = 0.001;  ///< Unit of what to_depth() returns.
 
 /// What a message has on its image before it is decoded.
-struct ImageLook {
+struct ImageLayout {
   std::string encoding, frame;
   std::uint32_t width_px = 0, height_px = 0;  ///< 0: of a file other than PNG.
 };
-ImageLook look_of(const RosImage& message);
+ImageLayout layout_of(const RosImage& message);
 /// The encoding is the first word of the format ("16UC1; compressedDepth png"); a grey PNG image of 16 bits whose
 /// format names none is 16UC1.
-ImageLook look_of(const RosCompressedImage& message);
+ImageLayout layout_of(const RosCompressedImage& message);
 
 /// True for images that show depth, by their encoding: 16UC1, 32FC1, and mono16 where the topic's name has "depth" in
 /// it. Images of the transport compressedDepth (topic/compressedDepth) show nothing else.
@@ -33,7 +33,7 @@ bool is_depth(std::string_view topic, std::string_view encoding);
 std::uint32_t depth_bytes(std::string_view encoding);
 
 /// Fails unless a message has the encoding, frame and size of the `first` one of its topic.
-Status check_like_first(const ImageLook& look, const ImageLook& first);
+Status check_like_first(const ImageLayout& layout, const ImageLayout& first);
 
 /// The depth image in millimetres: of 16UC1 and mono16, which have these, of 32FC1, which has metres. What is not
 /// finite, not positive, or beyond 65.5 m is unknown. Rows may be padded, bytes in either order. Other encodings are an

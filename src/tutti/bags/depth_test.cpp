@@ -80,19 +80,19 @@ TEST(BagDepth, CompressedDepthIsUnpacked) {
   };
   for (const char* const format : {"16UC1; compressedDepth png", "16UC1; compressedDepth", "16UC1;compressedDepth"}) {
     const std::string data = header + png;
-    const ImageLook look = look_of(message(format, data));
-    EXPECT_EQ(look.encoding, "16UC1");
-    EXPECT_EQ(look.frame, "cam");
-    EXPECT_EQ(look.width_px, 2U);
+    const ImageLayout layout = layout_of(message(format, data));
+    EXPECT_EQ(layout.encoding, "16UC1");
+    EXPECT_EQ(layout.frame, "cam");
+    EXPECT_EQ(layout.width_px, 2U);
     EXPECT_EQ(to_depth(message(format, data), {2, 2}).value(), depth);
     EXPECT_NE(to_depth(message(format, data), {4, 2}).error().message.find("2 x 2 pixels, expected 4 x 2"),
               std::string::npos);
   }
   EXPECT_EQ(to_depth(message("16UC1; png compressed ", png), {}).value(), depth);
-  EXPECT_EQ(look_of(message("png", png)).encoding, "16UC1");  // a picture has 8 bits
-  EXPECT_EQ(look_of(message("png", formats::encode_png(Image(3, 2)))).encoding, "png");
-  EXPECT_EQ(look_of(message("rgb8; jpeg compressed bgr8", "\xFF\xD8")).encoding, "rgb8");
-  EXPECT_EQ(look_of(message("jpeg", "\xFF\xD8")).width_px, 0U);
+  EXPECT_EQ(layout_of(message("png", png)).encoding, "16UC1");  // a picture has 8 bits
+  EXPECT_EQ(layout_of(message("png", formats::encode_png(Image(3, 2)))).encoding, "png");
+  EXPECT_EQ(layout_of(message("rgb8; jpeg compressed bgr8", "\xFF\xD8")).encoding, "rgb8");
+  EXPECT_EQ(layout_of(message("jpeg", "\xFF\xD8")).width_px, 0U);
   EXPECT_NE(to_depth(message("16UC1; compressedDepth rvl", header + "rvl bytes"), {})
                 .error()
                 .message.find("format '16UC1; compressedDepth rvl' with 21 bytes, expected a PNG image"),
@@ -115,9 +115,9 @@ TEST(BagDepth, CompressedDepthIsUnpacked) {
 }
 
 TEST(BagDepth, WhatIsOtherThanInTheFirstMessageIsReported) {
-  const ImageLook first{"16UC1", "cam", 4, 3};
-  const auto why = [&](const ImageLook& look) {
-    const Status ok = check_like_first(look, first);
+  const ImageLayout first{"16UC1", "cam", 4, 3};
+  const auto why = [&](const ImageLayout& layout) {
+    const Status ok = check_like_first(layout, first);
     return ok ? "" : ok.error().message;
   };
   EXPECT_EQ(why(first), "");
@@ -134,7 +134,7 @@ TEST(BagDepth, BytesOfStrangersDoNoHarm) {
     for (std::size_t k = rng() % 4; k > 0; --k) bytes[rng() % bytes.size()] = static_cast<char>(rng());
     if (rng() % 2 == 0) bytes.resize(rng() % bytes.size());
     const RosCompressedImage message{.header = {}, .format = rng() % 2 == 0 ? "32FC1;" : "16UC1;", .data = bytes};
-    static_cast<void>(look_of(message));
+    static_cast<void>(layout_of(message));
     const auto depth = to_depth(message, {4, 3});
     if (depth) {
       EXPECT_EQ(depth->value.size(), 12U);

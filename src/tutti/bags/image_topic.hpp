@@ -15,7 +15,7 @@ namespace tutti::bags {
 struct ImageTopic {
   std::string topic;
   bool is_compressed = false;
-  std::optional<ImageLook> first = {};     ///< What its first message shows.
+  std::optional<ImageLayout> first = {};   ///< What its first message shows.
   std::optional<RosCameraInfo> info = {};  ///< The first one beside it (camera_info_topic()).
 
   [[nodiscard]] bool shows_depth() const;

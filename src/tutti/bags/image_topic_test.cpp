@@ -7,7 +7,7 @@ namespace tutti::bags {
 namespace image_topic_test {
 
 ImageTopic topic(const char* name, const char* encoding, bool is_compressed = false) {
-  return {name, is_compressed, ImageLook{encoding, "camera", 640, 480}, {}};
+  return {name, is_compressed, ImageLayout{encoding, "camera", 640, 480}, {}};
 }
 
 TEST(ImageTopic, ShowsWhatItsFirstMessageDoes) {

@@ -18,11 +18,11 @@ RosCameraInfo info(double focal_px, double x_px = 320.0, std::uint32_t width_px 
 }
 
 /// What a RealSense publishes: depth as its left infrared camera sees it, and aligned to the colour camera.
-const ImageTopic kColour{"/color/image_raw", false, ImageLook{"rgb8", "color_optical", 640, 480}, info(610)},
-    kInfra1{"/infra1/image_rect_raw", false, ImageLook{"mono8", "infra1_optical", 848, 480}, info(420, 320, 848)},
-    kInfra2{"/infra2/image_rect_raw", false, ImageLook{"mono8", "infra2_optical", 848, 480}, info(420, 320, 848)},
-    kAligned{"/aligned_depth_to_color/image_raw", false, ImageLook{"16UC1", "color_optical", 640, 480}, info(610)},
-    kDepth{"/depth/image_rect_raw", false, ImageLook{"16UC1", "depth_optical", 848, 480}, info(420, 320, 848)};
+const ImageTopic kColour{"/color/image_raw", false, ImageLayout{"rgb8", "color_optical", 640, 480}, info(610)},
+    kInfra1{"/infra1/image_rect_raw", false, ImageLayout{"mono8", "infra1_optical", 848, 480}, info(420, 320, 848)},
+    kInfra2{"/infra2/image_rect_raw", false, ImageLayout{"mono8", "infra2_optical", 848, 480}, info(420, 320, 848)},
+    kAligned{"/aligned_depth_to_color/image_raw", false, ImageLayout{"16UC1", "color_optical", 640, 480}, info(610)},
+    kDepth{"/depth/image_rect_raw", false, ImageLayout{"16UC1", "depth_optical", 848, 480}, info(420, 320, 848)};
 
 std::optional<Pose3> find(const std::string& a, const std::string& b) {
   const std::map<std::string, Eigen::Vector3d> places{{"color_optical", {0.015, 0, 0}},

@@ -77,7 +77,7 @@ void MissionLease::run() {
   while (!stopping_) {
     guard.unlock();
     if (!board) board = transport_.open_leases(where_);
-    const Status done = look(*board);
+    const Status done = check_board(*board);
     if (done && !self_) board.reset();  // a radio has better things to carry
     guard.lock();
     state_.last_error = done ? "" : done.error().message;
@@ -121,7 +121,7 @@ bool MissionLease::may_take(const std::optional<LeaseHolder>& there, std::uint64
   return false;
 }
 
-Status MissionLease::look(LeaseBoard& board) {
+Status MissionLease::check_board(LeaseBoard& board) {
   const auto read = board.read(where_.mission);
   if (!read) return tl::unexpected(read.error());
   const auto there = read->has_value() ? lease_of((*read)->text) : std::nullopt;

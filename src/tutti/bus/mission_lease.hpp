@@ -69,7 +69,7 @@ class MissionLease {
   MissionLease(const Transport& transport, BusOptions where, std::optional<LeaseHolder> self, const LeaseTimes& times);
   void run();
   /// Takes or renews the lease, or reads the others'.
-  Status look(LeaseBoard& board);
+  Status check_board(LeaseBoard& board);
   /// Whether the lease is to be written; otherwise state_ knows who has it.
   bool may_take(const std::optional<LeaseHolder>& there, std::uint64_t revision);
   void give_up(LeaseBoard& board) const;

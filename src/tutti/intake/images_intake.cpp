@@ -82,7 +82,7 @@ Status ImagesIntake::add_image(std::size_t topic, std::string_view bytes, Encodi
     const auto message = bags::decode_compressed_image(bytes, encoding);
     if (!message) return tl::unexpected(message.error());
     if (message->data.empty()) return fail(ErrorCode::invalid, "an image of no bytes, expected a PNG or JPEG file");
-    const bags::ImageLook appearance = bags::look_of(*message);
+    const bags::ImageLayout appearance = bags::layout_of(*message);
     if (bags::is_depth(of.topics.images, of.seen.first.value_or(appearance).encoding))
       return add_depth(of, appearance, *message);
     if (!of.seen.first) of.seen.first = appearance;
@@ -90,7 +90,7 @@ Status ImagesIntake::add_image(std::size_t topic, std::string_view bytes, Encodi
   }
   const auto message = bags::decode_image(bytes, encoding);
   if (!message) return tl::unexpected(message.error());
-  const bags::ImageLook appearance = bags::look_of(*message);
+  const bags::ImageLayout appearance = bags::layout_of(*message);
   if (bags::is_depth(of.topics.images, of.seen.first.value_or(appearance).encoding))
     return add_depth(of, appearance, *message);
   const auto image = bags::to_image(*message);
@@ -100,7 +100,7 @@ Status ImagesIntake::add_image(std::size_t topic, std::string_view bytes, Encodi
               {{}, {0, true, std::string(image->grey.begin(), image->grey.end())}, message->width, message->height});
 }
 
-Status ImagesIntake::add_depth(OneTopic& topic, const bags::ImageLook& appearance, const bags::RosImage& message) {
+Status ImagesIntake::add_depth(OneTopic& topic, const bags::ImageLayout& appearance, const bags::RosImage& message) {
   const auto named = [&](const Error& error) {
     return in_context(fmt::format("depth at {} ns", message.header.stamp.ns), error);
   };
@@ -113,7 +113,7 @@ Status ImagesIntake::add_depth(OneTopic& topic, const bags::ImageLook& appearanc
 }
 
 /// The file, which depth_of() or the robot decodes, once its size is known to be a camera's.
-Status ImagesIntake::add_depth(OneTopic& topic, const bags::ImageLook& appearance,
+Status ImagesIntake::add_depth(OneTopic& topic, const bags::ImageLayout& appearance,
                                const bags::RosCompressedImage& message) {
   const auto named = [&](const Error& error) {
     return in_context(fmt::format("depth at {} ns", message.header.stamp.ns), error);

@@ -42,13 +42,13 @@ class Search {
     return true;
   }
 
-  /// What is let go when all odometry may be, in windows around it.
+  /// What is disregarded when all odometry may be, in windows around it.
   [[nodiscard]] Solution proposed() const {
     if (solver_.runs() == 0) return {};
     Solution all = solver_.solve({{{0, solver_.runs() - 1}}, {}});
     std::vector<Window> windows;
     for (std::size_t run = 0; all.solved && run < solver_.runs(); ++run) {
-      if (!all.let_go[run]) continue;
+      if (!all.disregarded[run]) continue;
       const Window window = solver_.around(run);
       if (!windows.empty() && window.first <= windows.back().last)
         windows.back().last = std::max(windows.back().last, window.last);

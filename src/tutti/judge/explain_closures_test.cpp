@@ -253,20 +253,21 @@ TEST(HypothesisSolver, EverySegmentOfAWindowPaysForHowFarItIsFromItsErrors) {
   EXPECT_GT(price(two), 1.8 * price(one));
 }
 
-// What is let go when all odometry may be is, around it, worth as much as what is found when only that may be.
-TEST(HypothesisSolver, AnOptimumHoldsUnderLessThatMayBeLetGo) {
+// The optimum for which all odometry may be disregarded, judged for the window around what it disregards, has the same
+// misfit as the optimum for that window alone.
+TEST(HypothesisSolver, AnOptimumHoldsUnderLessThatMayBeDisregarded) {
   for (const double missed_rad : {0.1, 0.4}) {
     Laps laps(50, missed_rad);
     laps.close_laps(5);
     const Solver of(laps);
     const HypothesisSolver& solver = of.solver;
     const Solution all = solver.solve({{{0, solver.runs() - 1}}, {}});
-    const auto run = static_cast<std::size_t>(std::ranges::find(all.let_go, 1) - all.let_go.begin());
+    const auto run = static_cast<std::size_t>(std::ranges::find(all.disregarded, 1) - all.disregarded.begin());
     ASSERT_LT(run, solver.runs());
     const Solution judged = solver.judge({{solver.around(run)}, {}}, all.optimum);
     const Solution solved = solver.solve({{solver.around(run)}, {}});
     EXPECT_NEAR(judged.misfit, solved.misfit, 0.01);
-    EXPECT_EQ(judged.let_go, solved.let_go);
+    EXPECT_EQ(judged.disregarded, solved.disregarded);
     EXPECT_EQ(judged.accepted, solved.accepted);
     ASSERT_EQ(judged.prices.size(), 1U);
     EXPECT_GT(judged.prices[0], of.config.least_votes);

@@ -49,7 +49,7 @@ double size_at(const OdometryTrajectories& odometry, const FailedSegment& failed
   return seen.translation.norm() / odometry.usual_speed() + kRadian_s * rotation_angle(seen);
 }
 
-/// With nothing let go or refused.
+/// With nothing disregarded or refused.
 estimation::PoseGraphSolution beginning(const PoseGraph& graph, estimation::GncConfig gnc) {
   gnc.solver.relative_cost_tolerance = std::max(kBeginning, gnc.solver.relative_cost_tolerance);
   return estimation::least_squares(graph, gnc);
@@ -86,8 +86,8 @@ HypothesisSolver::HypothesisSolver(const PoseGraph& graph, const OdometryTraject
     if (reduced_.roles[e] == estimation::EdgeRole::trusted) runs_.push_back(e);
   std::ranges::sort(runs_, {}, [&](std::size_t e) { return reduced_.graph.edges[e].from; });
   count_votes();
-  all_held_ = beginning(reduced_.graph, gnc_);
-  work_.factorisations += static_cast<std::size_t>(all_held_.summary.factorisations);
+  all_kept_ = beginning(reduced_.graph, gnc_);
+  work_.factorisations += static_cast<std::size_t>(all_kept_.summary.factorisations);
 }
 
 std::size_t HypothesisSolver::begin_of(std::size_t run) const {
@@ -144,8 +144,8 @@ Solution HypothesisSolver::solve(Hypothesis hypothesis) const {
   };
   if (hypothesis.wrong.empty())
     return judge(std::move(hypothesis),
-                 counted(estimation::truncated_least_squares(reduced_.graph, gnc_, truncation, all_held_),
-                         all_held_.summary.factorisations));
+                 counted(estimation::truncated_least_squares(reduced_.graph, gnc_, truncation, all_kept_),
+                         all_kept_.summary.factorisations));
   PoseGraph graph = reduced_.graph;
   for (const auto& group : hypothesis.wrong)
     for (const std::size_t c : group) graph.edges[closures_[c]].information *= kNothing;
@@ -154,8 +154,11 @@ Solution HypothesisSolver::solve(Hypothesis hypothesis) const {
 }
 
 Solution HypothesisSolver::judge(Hypothesis hypothesis, estimation::GncResult optimum) const {
-  Solution out{
-      .hypothesis = std::move(hypothesis), .let_go = {}, .accepted = {}, .failed = {}, .optimum = std::move(optimum)};
+  Solution out{.hypothesis = std::move(hypothesis),
+               .disregarded = {},
+               .accepted = {},
+               .failed = {},
+               .optimum = std::move(optimum)};
   const estimation::GncResult& robust = out.optimum;
   const std::vector<Pose3>& poses = robust.solution.poses;
   out.solved = estimation::is_usable(robust.solution.summary.termination);
@@ -168,8 +171,8 @@ Solution HypothesisSolver::judge(Hypothesis hypothesis, estimation::GncResult op
   };
   std::vector<double> excess{0.0};  // of the strain up to each run
   for (const std::size_t run : runs_) {
-    out.let_go.push_back(robust.inlier_weight[run] < 0.5);
-    out.misfit += out.let_go.back() ? 1.0 : error(run);
+    out.disregarded.push_back(robust.inlier_weight[run] < 0.5);
+    out.misfit += out.disregarded.back() ? 1.0 : error(run);
     excess.push_back(excess.back() + std::max(0.0, error(run) - 1.0));
   }
   for (std::size_t c = 0; c < closures_.size(); ++c) out.accepted.push_back(robust.inlier_weight[closures_[c]] >= 0.5);
@@ -217,7 +220,7 @@ void HypothesisSolver::find_failed(const std::vector<Pose3>& poses, Solution& ou
   for (const Window& window : out.hypothesis.windows) {
     const std::size_t known = out.failed.size();
     for (std::size_t run = window.first; run <= window.last; ++run) {
-      if (!out.let_go[run]) continue;
+      if (!out.disregarded[run]) continue;
       const bool continues = out.failed.size() > known && out.failed.back().to == begin_of(run);
       if (!continues) out.failed.push_back({.from = begin_of(run)});
       FailedSegment& failed = out.failed.back();

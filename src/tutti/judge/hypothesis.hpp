@@ -10,15 +10,17 @@
 
 namespace tutti::judge {
 
-/// Consecutive runs of odometry, by number, that may be let go together.
+/// Consecutive runs, by number, that may be disregarded together. A run is a segment of odometry between two
+/// neighbouring ends of closures.
 struct Window {
   std::size_t first = 0;
   std::size_t last = 0;  ///< Inclusive.
 };
 
-/// An assumption about what is wrong: odometry may be let go in these windows alone, and these closures are wrong.
+/// An assumption about what is wrong: odometry may be disregarded in these windows alone, and these closures are wrong.
 struct Hypothesis {
-  std::vector<Window> windows;  ///< In order; none overlap. In a Solution only those in which something was let go.
+  std::vector<Window> windows;  ///< In order; none overlap. In a Solution only those in which something was
+                                ///< disregarded.
   std::vector<std::vector<std::size_t>> wrong;  ///< Groups of closures that are wrong for certain.
 };
 
@@ -27,9 +29,9 @@ struct Hypothesis {
 struct Solution {
   Hypothesis hypothesis;
   bool solved = false;
-  std::vector<char> let_go;    ///< Per run.
-  std::vector<char> accepted;  ///< Per closure.
-  /// Runs that were let go, neighbours joined; `from` and `to` are nodes of the graph.
+  std::vector<char> disregarded;  ///< Per run.
+  std::vector<char> accepted;     ///< Per closure.
+  /// Runs that were disregarded, neighbours joined; `from` and `to` are nodes of the graph.
   std::vector<FailedSegment> failed;
   estimation::GncResult optimum;  ///< On the graph of the closures' ends.
   double misfit = 0.0;            ///< With the prices of windows and of wrong groups.
@@ -55,8 +57,8 @@ class HypothesisSolver {
 
   [[nodiscard]] Solution solve(Hypothesis hypothesis) const;
   /// Prices a hypothesis at an optimum that was found for another one, without solving again. This is exact where both
-  /// hypotheses refuse the same groups and the optimum lets odometry go within `hypothesis`'s windows only: the optimum
-  /// is then this hypothesis's own, because it may let nothing else go.
+  /// hypotheses refuse the same groups and the optimum disregards odometry within `hypothesis`'s windows only: the
+  /// optimum is then this hypothesis's own, because it may disregard nothing else.
   [[nodiscard]] Solution judge(Hypothesis hypothesis, estimation::GncResult optimum) const;
   [[nodiscard]] std::size_t runs() const { return runs_.size(); }
   /// The runs within config.search_s of a run, on the same segment of odometry.
@@ -77,7 +79,7 @@ class HypothesisSolver {
   const estimation::GncConfig& gnc_;
   double limit_;
   estimation::ReducedGraph reduced_;
-  estimation::PoseGraphSolution all_held_;  // with nothing let go or refused, where every solution begins
+  estimation::PoseGraphSolution all_kept_;  // with nothing disregarded or refused, where every solution begins
   std::vector<std::size_t> runs_;           // edges of the reduced graph, by their begin
   std::vector<std::size_t> closures_;       // edges of the reduced graph
   std::vector<bool> certain_;               // per closure

@@ -176,7 +176,7 @@ Submaps fed(const simulation::FlownRecording& flown, bool as_files) {
     for (; fix < recording.fixes.size() && recording.fixes[fix].stamp <= now; ++fix)
       robot.send(test::fix(recording.fixes[fix]));
     const auto scan_is_due = [&] {
-      return moment(recording, recording.scan_stamps, scan).value_or(kLastTimestamp) <= now;
+      return stamp_at(recording, recording.scan_stamps, scan).value_or(kLastTimestamp) <= now;
     };
     for (; recording.scans && scan_is_due(); ++scan)
       if (const auto seen = *recording.scans->scan(scan)) robot.send(test::scan(*seen));

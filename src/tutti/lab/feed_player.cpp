@@ -159,7 +159,7 @@ Status Player::say_sensors(Timestamp now) {
   if (recording.images && !samples.empty() && !is_known)
     if (Status ok = client_->say(samples); !ok) return ok;
   if (Status ok = say_fixes(now, is_known); !ok) return ok;
-  const auto is_due = [&] { return moment(recording, recording.scan_stamps, scan_).value_or(kLastTimestamp) <= now; };
+  const auto is_due = [&] { return stamp_at(recording, recording.scan_stamps, scan_).value_or(kLastTimestamp) <= now; };
   for (; recording.scans && is_due(); ++scan_) {
     if (!wants_scan_ || is_known) continue;
     const auto scan = recording.scans->scan(scan_);

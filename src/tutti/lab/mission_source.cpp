@@ -106,7 +106,7 @@ Result<program::WorkerSettings> worker_settings(const MissionSource& source) {
 namespace {
 
 /// What the file has on the robot's messages, if it is a robot with a recording.
-Status tell_sensors(const MissionConfig& config, program::RobotOptions& options) {
+Status fill_sensors(const MissionConfig& config, program::RobotOptions& options) {
   const auto robot = std::ranges::find(config.robots, options.name, &mission::RobotConfig::name);
   if (config.source != "recordings" || robot == config.robots.end()) return {};
   options.settings.with_images = config.closures.kind().uses_images;
@@ -145,13 +145,13 @@ Result<program::RobotSettings> robot_settings(const MissionSource& source) {
   return settings_of_robot(source, *config);
 }
 
-Status tell_robot(const MissionSource& source, program::RobotOptions& options) {
+Status fill_robot_options(const MissionSource& source, program::RobotOptions& options) {
   const auto config = load(source);
   if (!config) return tl::unexpected(config.error());
   auto settings = settings_of_robot(source, *config);
   if (!settings) return tl::unexpected(settings.error());
   options.settings = std::move(*settings);
-  if (!options.feed.empty()) return tell_sensors(*config, options);
+  if (!options.feed.empty()) return fill_sensors(*config, options);
   const auto number = program::number_of(options.name, options.settings.robots, false);
   if (!number) return tl::unexpected(number.error());
   auto input = load_input(*config, source.data, source.seed);

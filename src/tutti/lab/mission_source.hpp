@@ -46,6 +46,6 @@ Result<program::WorkerSettings> worker_settings(const MissionSource& source);
 Result<program::RobotSettings> robot_settings(const MissionSource& source);
 /// Sets the settings, replay and duration_s of a robot, and reads its recording for that unless the robot is fed
 /// (RobotOptions::feed).
-Status tell_robot(const MissionSource& source, program::RobotOptions& options);
+Status fill_robot_options(const MissionSource& source, program::RobotOptions& options);
 
 }  // namespace tutti::lab

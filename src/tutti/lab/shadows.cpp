@@ -35,8 +35,8 @@ void Shadows::add_odometry(const StampedPose& sample, const Matrix6d& covariance
     if (shadow.agent->add_odometry(sample.stamp, sample.pose, covariance)) shadow.agent->take_outgoing();
 }
 
-void Shadows::add_moment(Timestamp stamp) {
-  for (const Shadow& shadow : shadows_) shadow.agent->add_moment(stamp);
+void Shadows::add_keyframe_time(Timestamp stamp) {
+  for (const Shadow& shadow : shadows_) shadow.agent->add_keyframe_time(stamp);
 }
 
 void Shadows::update(Shadow& shadow, const ProxyGraphMessage& message) {

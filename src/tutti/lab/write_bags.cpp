@@ -83,7 +83,7 @@ class RobotWriter {
     return i < list.size() ? std::optional(list[i].stamp) : std::nullopt;
   }
   [[nodiscard]] std::optional<Timestamp> scan_stamp(std::size_t i) const {
-    return recording_.scans ? moment(recording_, recording_.scan_stamps, i) : std::nullopt;
+    return recording_.scans ? stamp_at(recording_, recording_.scan_stamps, i) : std::nullopt;
   }
   [[nodiscard]] std::optional<Timestamp> image_stamp(std::size_t i) const {
     return i < robot_.images.stamps.size() ? std::optional(robot_.images.stamps[i]) : std::nullopt;

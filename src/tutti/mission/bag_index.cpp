@@ -176,7 +176,7 @@ class Indexer {
     ++track.messages;
     if (!image) return track.refused.add(track.messages, image.error().message);
     const Timestamp stamp = image->header.stamp;
-    if (track.images.empty()) track.seen.first = bags::look_of(*image);
+    if (track.images.empty()) track.seen.first = bags::layout_of(*image);
     if (track.seen.shows_depth())
       if (auto ok = check_depth(track, *image); !ok) return track.refused.add(track.messages, ok.error().message);
     track.images.push_back({stamp, message.position, track.messages});
@@ -185,11 +185,11 @@ class Indexer {
 
   /// What can be known without decoding it.
   static Status check_depth(const ImageTrack& track, const bags::RosImage& image) {
-    if (auto ok = bags::check_like_first(bags::look_of(image), *track.seen.first); !ok) return ok;
+    if (auto ok = bags::check_like_first(bags::layout_of(image), *track.seen.first); !ok) return ok;
     return bags::check_rows(image, bags::depth_bytes(image.encoding));
   }
   static Status check_depth(const ImageTrack& track, const bags::RosCompressedImage& image) {
-    return bags::check_like_first(bags::look_of(image), *track.seen.first);
+    return bags::check_like_first(bags::layout_of(image), *track.seen.first);
   }
 
   static void take_imu(ImuTrack& track, const BagMessage& message) {

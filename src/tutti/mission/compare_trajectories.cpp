@@ -192,9 +192,9 @@ Result<TrajectoryComparison> compare_trajectories(const NamedTrajectory& a, cons
                 "{} of B's poses ha{} one of A at the same time, expected at least 2: A has {}; B has {}", all.size(),
                 all.size() == 1 ? "s" : "ve", span(a.poses), span(b.poses));
   TrajectoryComparison out{.name = b.name, .poses = b.poses.size(), .paired = all.size()};
-  out.way_m = all.back().along_m;
+  out.length_m = all.back().along_m;
   out.spacing_m =
-      config.spacing_m > 0.0 ? config.spacing_m : std::max(out.way_m / kNodesPerTrajectory, kLeastSpacing_m);
+      config.spacing_m > 0.0 ? config.spacing_m : std::max(out.length_m / kNodesPerTrajectory, kLeastSpacing_m);
   std::vector<Node> nodes = thin(all, out.spacing_m);
   while (config.spacing_m == 0.0 && nodes.size() > kMostNodes) nodes = thin(all, out.spacing_m *= 2.0);
   for (const Node& node : nodes) {

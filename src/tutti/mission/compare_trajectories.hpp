@@ -46,7 +46,7 @@ struct TrajectoryComparison {
   std::size_t poses = 0;   ///< Poses of B.
   std::size_t paired = 0;  ///< Poses of B that have one of A.
   double spacing_m = 0.0;  ///< As it was used.
-  double way_m = 0.0;      ///< Length along A.
+  double length_m = 0.0;   ///< Length along A.
   Trajectory judge;        ///< A at the nodes, in A's frame.
   Trajectory judged;       ///< B at the nodes, moved into A's frame by one rigid alignment.
   Trajectory corrected;    ///< B at the nodes after optimising it with the constraints, moved likewise.

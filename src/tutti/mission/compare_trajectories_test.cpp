@@ -44,7 +44,7 @@ TEST(CompareTrajectories, RigidMotionsAndNoiseWithinTheToleranceAgree) {
   ASSERT_TRUE(c) << c.error().message;
   EXPECT_EQ(c->name, "x");
   EXPECT_EQ(c->paired, truth.size());
-  EXPECT_NEAR(c->way_m, 120.0, 0.1);
+  EXPECT_NEAR(c->length_m, 120.0, 0.1);
   EXPECT_LT(c->before.rmse_m, 0.01);
   EXPECT_FALSE(c->explanation.disagrees());
   EXPECT_TRUE(c->explanation.origins.empty());

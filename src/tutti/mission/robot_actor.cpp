@@ -55,7 +55,7 @@ Result<std::unique_ptr<RobotActor>> RobotActor::open(const MissionRecording& rec
     const Timestamp settled = *actor->node_->agent().settled();
     const Recording& from = recording.recording;
     const auto skip = [&](const std::vector<Timestamp>& stamps, std::size_t& first) {
-      for (auto stamp = moment(from, stamps, first); stamp && *stamp < settled; stamp = moment(from, stamps, first))
+      for (auto stamp = stamp_at(from, stamps, first); stamp && *stamp < settled; stamp = stamp_at(from, stamps, first))
         ++first;
     };
     skip(from.scan_stamps, actor->next_scan_);
@@ -124,8 +124,8 @@ void RobotActor::feed_sensors(Timestamp now) {
   const Recording& recording = recording_.recording;
   const Timestamp newest = recording.odometry[next_ - 1].stamp;
   while (true) {
-    const auto scan = recording.scans ? moment(recording, recording.scan_stamps, next_scan_) : std::nullopt;
-    const auto images = recording.visual ? moment(recording, recording.image_stamps, next_images_) : std::nullopt;
+    const auto scan = recording.scans ? stamp_at(recording, recording.scan_stamps, next_scan_) : std::nullopt;
+    const auto images = recording.visual ? stamp_at(recording, recording.image_stamps, next_images_) : std::nullopt;
     if (!scan && !images) return;
     const Timestamp stamp = scan && images ? std::min(*scan, *images) : scan ? *scan : *images;
     if (stamp > newest) return;
@@ -143,7 +143,7 @@ void RobotActor::feed_at(Timestamp stamp, bool has_scan, bool has_images, Timest
   if (wants_scan) feed_scan(now);
   if (has_images) feed_images(stamp, wants_images, now);
   if (agent.keyframes().empty() || agent.keyframes().back().stamp != stamp) return;
-  if (companions_) companions_->add_moment(stamp);
+  if (companions_) companions_->add_keyframe_time(stamp);
 }
 
 void RobotActor::feed_scan(Timestamp now) {
@@ -168,7 +168,7 @@ void RobotActor::feed_images(Timestamp stamp, bool keyframe, Timestamp now) {
   TrackedImages images = recording.visual->images(next_images_, keyframe);
   refuse_images(recording.visual->take_errors(), now);
   if (!keyframe) return;
-  if (const auto stopped = sight_.add(stamp, images.images)) tell_refused(*stopped, now);
+  if (const auto stopped = sight_.add(stamp, images.images)) report_refused(*stopped, now);
   if (images.images.empty()) return;
   const CpuScope cpu(cpu_s_);
   images.imu = imu_since_keyframe(images.stamp);
@@ -176,9 +176,9 @@ void RobotActor::feed_images(Timestamp stamp, bool keyframe, Timestamp now) {
   take(node_->add_images(images, now));
 }
 
-void RobotActor::tell_refused(const std::string& why, Timestamp now) {
+void RobotActor::report_refused(const std::string& why, Timestamp now) {
   node::Step step;
-  step.tell(now, node::ImagesRefused{id(), why});
+  step.emit(now, node::ImagesRefused{id(), why});
   take(std::move(step));
 }
 
@@ -188,7 +188,7 @@ void RobotActor::refuse_images(const std::vector<Error>& errors, Timestamp now) 
     if (std::exchange(images_fail_, true))
       note(refused_images_, error.message);
     else
-      tell_refused(error.message, now);
+      report_refused(error.message, now);
   images_fail_ = !errors.empty();
 }
 

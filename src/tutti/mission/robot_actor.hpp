@@ -29,7 +29,7 @@ class Companions {
   virtual ~Companions() = default;
   virtual void add_odometry(const StampedPose& sample, const Matrix6d& covariance) = 0;
   /// The robot's node has made a keyframe at a time between two samples.
-  virtual void add_moment(Timestamp stamp) = 0;
+  virtual void add_keyframe_time(Timestamp stamp) = 0;
   /// Called after the node has received the graph; `own` is the node's agent.
   virtual void receive(const ProxyGraphMessage& message, const robot::RobotAgent& own) = 0;
   /// The agents (timings), by policy.
@@ -129,7 +129,7 @@ class RobotActor {
   void feed_images(Timestamp stamp, bool keyframe, Timestamp now);
   void feed_fixes(Timestamp now);
   void refuse_images(const std::vector<Error>& errors, Timestamp now);
-  void tell_refused(const std::string& why, Timestamp now);
+  void report_refused(const std::string& why, Timestamp now);
   [[nodiscard]] std::vector<ImuSample> imu_since_keyframe(Timestamp stamp) const;
   static void note(Trouble& trouble, const std::string& message);
 

@@ -33,7 +33,7 @@ Result<formats::TimedCloud> read(const fs::path& file) {
 
 }  // namespace
 
-ScanFolder::ScanFolder(fs::path folder, ScanMoments times, const Trajectory& odometry)
+ScanFolder::ScanFolder(fs::path folder, ScanStamps times, const Trajectory& odometry)
     : folder_(std::move(folder)), times_of_files_(std::move(times)) {
   if (times_of_files_.stamps.empty()) {
     for (const StampedPose& sample : odometry) times_of_files_.stamps.push_back(sample.stamp);
@@ -45,7 +45,7 @@ ScanFolder::ScanFolder(fs::path folder, ScanMoments times, const Trajectory& odo
   odometry_ = lidar::with_ends(odometry);
 }
 
-Result<std::shared_ptr<const ScanFolder>> ScanFolder::open(fs::path folder, ScanMoments times,
+Result<std::shared_ptr<const ScanFolder>> ScanFolder::open(fs::path folder, ScanStamps times,
                                                            const Trajectory& odometry, const RobotConfig& robot) {
   std::error_code failure;
   if (!fs::is_directory(folder, failure)) return fail(ErrorCode::io, "{}: no such folder of scans", folder.string());

@@ -15,7 +15,7 @@
 namespace tutti::mission {
 
 /// The stamp of each scan file.
-struct ScanMoments {
+struct ScanStamps {
   std::size_t first = 0;          ///< Number of the file that belongs to the first replayed odometry pose.
   std::size_t recorded = 0;       ///< Number of odometry poses, including those not replayed; 0: there are no others.
   std::vector<Timestamp> stamps;  ///< Stamps of the files from 000000 on; empty: those of the odometry poses.
@@ -27,7 +27,7 @@ class ScanFolder final : public ScanSource {
  public:
   /// Opens the folder and reads its first scans. Fails when it has none of the files, or files beyond the stamps, so
   /// that they cannot be assigned; or when none of the first few scans is usable, with the first one's error.
-  static Result<std::shared_ptr<const ScanFolder>> open(std::filesystem::path folder, ScanMoments times,
+  static Result<std::shared_ptr<const ScanFolder>> open(std::filesystem::path folder, ScanStamps times,
                                                         const Trajectory& odometry, const RobotConfig& robot);
 
   /// The scan of stamp number `sample`; keyframes without a scan are counted in the mission's notes.
@@ -36,7 +36,7 @@ class ScanFolder final : public ScanSource {
   [[nodiscard]] std::string note() const;
 
  private:
-  ScanFolder(std::filesystem::path folder, ScanMoments times, const Trajectory& odometry);
+  ScanFolder(std::filesystem::path folder, ScanStamps times, const Trajectory& odometry);
   [[nodiscard]] Status check_numbers() const;
   Status learn_times(const RobotConfig& robot);
   [[nodiscard]] Result<std::optional<lidar::PointTimes>> times_of(std::size_t sample, const RobotConfig& robot) const;
@@ -44,8 +44,8 @@ class ScanFolder final : public ScanSource {
   [[nodiscard]] std::optional<std::filesystem::path> file_of(std::size_t sample) const;
 
   std::filesystem::path folder_;
-  ScanMoments times_of_files_;  // with the stamps of all files
-  Trajectory odometry_;         // T_odom_body, extended by a sweep's length at both ends
+  ScanStamps times_of_files_;  // with the stamps of all files
+  Trajectory odometry_;        // T_odom_body, extended by a sweep's length at both ends
   Pose3 T_body_lidar_;
   std::optional<lidar::PointTimes> times_;
 };

@@ -166,7 +166,7 @@ TEST_F(Scans, NumberedFromOneOrOfNoPoseAreRefused) {
 }
 
 TEST_F(Scans, MayHaveStampsOfTheirOwn) {
-  ScanMoments times;
+  ScanStamps times;
   for (int number = 0; number < 5; ++number) {
     times.stamps.push_back(odometry_[0].stamp + (0.213 + 0.13 * number));
     write_scan(number, 0.213 + 0.13 * number - kSweep_s, true);

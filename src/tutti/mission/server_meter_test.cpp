@@ -11,7 +11,7 @@ namespace server_meter_test {
 /// A step in which the server stores a submap and asks for it in this job.
 node::Step stored(const std::string& job) {
   node::Step step;
-  step.tell({}, node::SubmapStored{});
+  step.emit({}, node::SubmapStored{});
   step.messages.push_back({bus::Endpoint::server(), bus::Endpoint::any_worker(), bus::MessageKind::job, job, {}});
   return step;
 }

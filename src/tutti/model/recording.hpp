@@ -22,7 +22,7 @@ namespace tutti {
 class ScanSource {
  public:
   virtual ~ScanSource() = default;
-  /// The sweep that ends at stamp number `sample` (moment() of Recording::scan_stamps); nothing when there is none.
+  /// The sweep that ends at stamp number `sample` (stamp_at() of Recording::scan_stamps); nothing when there is none.
   [[nodiscard]] virtual Result<std::optional<Scan>> scan(std::size_t sample) const = 0;
 };
 
@@ -31,7 +31,7 @@ class ScanSource {
 class VisualSource {
  public:
   virtual ~VisualSource() = default;
-  /// The images taken at stamp number `sample` (moment() of Recording::image_stamps), with their stamp; empty when
+  /// The images taken at stamp number `sample` (stamp_at() of Recording::image_stamps), with their stamp; empty when
   /// there are none. Descriptors, which cost most, are computed only for a `keyframe`. After starting in the middle,
   /// tracks have other numbers than a run from the beginning would give them.
   [[nodiscard]] virtual TrackedImages images(std::size_t sample, bool keyframe) = 0;
@@ -71,8 +71,8 @@ struct Recording {
 
 /// Stamp number `i` of scans or images (`stamps` is Recording::scan_stamps or image_stamps); nothing
 /// after the last.
-inline std::optional<Timestamp> moment(const Recording& recording, const std::vector<Timestamp>& stamps,
-                                       std::size_t i) {
+inline std::optional<Timestamp> stamp_at(const Recording& recording, const std::vector<Timestamp>& stamps,
+                                         std::size_t i) {
   if (!stamps.empty()) return i < stamps.size() ? std::optional(stamps[i]) : std::nullopt;
   return i < recording.odometry.size() ? std::optional(recording.odometry[i].stamp) : std::nullopt;
 }

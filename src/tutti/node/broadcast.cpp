@@ -22,7 +22,7 @@ void Broadcast::send(ProxyGraphMessage map, std::shared_ptr<const server::Belief
     ProxyGraph own = consistency::own_part(last_->graph, robot);
     ChangeWatch::Decision decision = watch_.take(robot, {own, beliefs}, lone, now);
     if (decision.send) send_last(robot, std::move(own), whole, step);
-    for (ChangeOfMind& report : decision.reports) step.tell(now, std::move(report));
+    for (ChangeOfMind& report : decision.reports) step.emit(now, std::move(report));
   }
 }
 
@@ -31,7 +31,7 @@ void Broadcast::send_waiting(const std::set<RobotId>& robots, Timestamp now, Ste
   for (const RobotId robot : robots)
     if (auto report = watch_.follow(robot, now)) {
       send_last(robot, consistency::own_part(last_->graph, robot), whole, step);
-      step.tell(now, std::move(*report));
+      step.emit(now, std::move(*report));
     }
 }
 

@@ -23,12 +23,12 @@ Step RobotNode::receive(const bus::Envelope& envelope, Timestamp now) {
   else if (envelope.kind == bus::MessageKind::receipt)
     receive_receipt(envelope, now, step);
   else
-    step.tell(now, MessageRefused{envelope.from, envelope.kind, "not for a robot"});
+    step.emit(now, MessageRefused{envelope.from, envelope.kind, "not for a robot"});
   return step;
 }
 
 void RobotNode::refuse(const bus::Envelope& envelope, const Error& error, Timestamp now, Step& step) {
-  step.tell(now, MessageRefused{envelope.from, envelope.kind, error.message});
+  step.emit(now, MessageRefused{envelope.from, envelope.kind, error.message});
   if (error.code != ErrorCode::unsupported) return;
   Unread& unread = unread_[envelope.kind];
   ++unread.count;
@@ -60,7 +60,7 @@ void RobotNode::receive_graph(const bus::Envelope& envelope, Timestamp now, Step
     mapped_age_ = {};
   }
   if (goes_on_behind(heard)) {
-    step.tell(now, MessageRefused{envelope.from, envelope.kind,
+    step.emit(now, MessageRefused{envelope.from, envelope.kind,
                                   fmt::format("the map of revision {}, heard before: the server goes on from {}",
                                               agent_.map_age().second, heard.revision)});
     agent_.forget_map_age();
@@ -74,7 +74,7 @@ void RobotNode::receive_graph(const bus::Envelope& envelope, Timestamp now, Step
   if (!agent_.is_news(heard)) return;
   if (config_.keeps_state) remember(HeardGraph{wire::encode(**graph)}, now, step);
   write_journal(step);  // what is reported of it is true
-  step.tell(now, RobotUpdated{agent_.robot(), agent_.receive(**graph, observer_)});
+  step.emit(now, RobotUpdated{agent_.robot(), agent_.receive(**graph, observer_)});
   note(std::get<RobotUpdated>(step.events.back().what).summary);
   updated_ = now;
 }
@@ -121,7 +121,7 @@ void RobotNode::receive_receipt(const bus::Envelope& envelope, Timestamp now, St
   if (!receipt) return refuse(envelope, receipt.error(), now, step);
   unread_.erase(envelope.kind);
   if (receipt->robot != agent_.robot())
-    return step.tell(now, MessageRefused{envelope.from, envelope.kind, "a receipt for another robot"});
+    return step.emit(now, MessageRefused{envelope.from, envelope.kind, "a receipt for another robot"});
   const bool has_started = receipt->incarnation != receipt_incarnation_;
   if (has_started) note_start(receipt->incarnation, step);
   take_back(*receipt, has_started, now, step);
@@ -134,7 +134,7 @@ void RobotNode::receive_receipt(const bus::Envelope& envelope, Timestamp now, St
       continue;
     }
     if (is_refused)
-      step.tell(now, MessageRefused{bus::Endpoint::of(agent_.robot()), bus::MessageKind::submap,
+      step.emit(now, MessageRefused{bus::Endpoint::of(agent_.robot()), bus::MessageKind::submap,
                                     fmt::format("submap {} is refused by the server, which last said: {}",
                                                 to_string(id), receipt->why_refused)});
     if (is_refused || receipt->contains(id))
@@ -172,7 +172,7 @@ void RobotNode::take_back(const Receipt& receipt, bool has_started, Timestamp no
     refused_.erase(id);
     step.writes.push_back({kArchive, key_of(id), std::nullopt});
   }
-  step.tell(now, SubmapsForgotten{agent_.robot(), forgotten.size()});
+  step.emit(now, SubmapsForgotten{agent_.robot(), forgotten.size()});
 }
 
 /// The oldest make room for it.

@@ -133,7 +133,7 @@ Step RobotNode::resume(Timestamp now) {
   }
   if (const auto why = std::exchange(why_lost_, {})) {
     if (config_.keeps_state) step.writes.push_back({kMeta, kLost, std::nullopt});
-    step.tell(now, StateLost{agent_.robot(), agent_.chain().session, *why});
+    step.emit(now, StateLost{agent_.robot(), agent_.chain().session, *why});
     session_begun_ = {now, "what was stored could not be read: " + *why};
   }
   send_submaps(now, {}, step);
@@ -144,7 +144,7 @@ Step RobotNode::add_odometry(const OdometrySample& sample, Timestamp now) {
   Step step;
   const auto passed = gate_.take(sample);
   if (!passed) {
-    step.tell(now, SampleRefused{agent_.robot(), passed.error().message});
+    step.emit(now, SampleRefused{agent_.robot(), passed.error().message});
     return step;
   }
   if (!passed->why_anew.empty()) step = begin_session(passed->why_anew, now);
@@ -155,7 +155,7 @@ Step RobotNode::add_odometry(const OdometrySample& sample, Timestamp now) {
 
 void RobotNode::hear(const OdometrySample& sample, Timestamp now, Step& step) {
   if (auto ok = agent_.add_odometry(sample.stamp, sample.T_odom_body, sample.increment_covariance); !ok)
-    return step.tell(now, SampleRefused{agent_.robot(), ok.error().message});
+    return step.emit(now, SampleRefused{agent_.robot(), ok.error().message});
   finished_ = false;
   remember(sample, now, step);
   settle(now, step);
@@ -171,7 +171,7 @@ Step RobotNode::add_scan(const Scan& scan, Timestamp now) {
   Step step;
   if (!agent_.wants_scan(scan.stamp)) return step;  // again, or nothing new
   if (auto ok = agent_.add_scan(scan); !ok) {
-    step.tell(now, ScanRefused{agent_.robot(), ok.error().message});
+    step.emit(now, ScanRefused{agent_.robot(), ok.error().message});
     return step;
   }
   remember(scan, now, step);
@@ -183,7 +183,7 @@ Step RobotNode::add_images(const TrackedImages& images, Timestamp now) {
   Step step;
   if (images.stamp == agent_.heard_images()) return step;  // again
   if (auto ok = agent_.add_images(images); !ok) {
-    step.tell(now, ImagesRefused{agent_.robot(), ok.error().message});
+    step.emit(now, ImagesRefused{agent_.robot(), ok.error().message});
     return step;
   }
   remember(images, now, step);
@@ -194,7 +194,7 @@ Step RobotNode::add_images(const TrackedImages& images, Timestamp now) {
 Step RobotNode::add_fix(const PositionFix& fix, Timestamp now) {
   Step step;
   if (auto ok = agent_.add_fix(fix); !ok)
-    step.tell(now, FixRefused{agent_.robot(), ok.error().message});
+    step.emit(now, FixRefused{agent_.robot(), ok.error().message});
   else
     remember(fix, now, step);
   return step;
@@ -202,16 +202,16 @@ Step RobotNode::add_fix(const PositionFix& fix, Timestamp now) {
 
 void RobotNode::settle(Timestamp now, Step& step) {
   for (const robot::OdometryJump& jump : agent_.take_odometry_jumps()) {
-    step.tell(now, OdometryJumped{agent_.robot(), jump});
+    step.emit(now, OdometryJumped{agent_.robot(), jump});
     ++jumps_;
     newest_jump_ = {now, jump};
   }
   for (Error& error : agent_.take_scan_errors())
-    step.tell(now, ScanRefused{agent_.robot(), std::move(error.message), true});
+    step.emit(now, ScanRefused{agent_.robot(), std::move(error.message), true});
   const auto watch = [&](const char* sensor, std::optional<std::uint64_t> keyframes, bool& reported) {
     const bool is_missing = keyframes && *keyframes >= config_.most_keyframes_without;
     if (is_missing != reported && keyframes)
-      step.tell(now, SensorMissing{agent_.robot(), sensor, is_missing ? *keyframes : 0});
+      step.emit(now, SensorMissing{agent_.robot(), sensor, is_missing ? *keyframes : 0});
     reported = is_missing;
   };
   watch("scan", agent_.keyframes_without_scan(), tells_no_scan_);
@@ -283,10 +283,10 @@ void RobotNode::take_outgoing(Timestamp now, Step& step) {
   Frames fresh;
   const auto submaps = agent_.take_outgoing();
   for (Error& error : agent_.take_image_errors())
-    step.tell(now, ImagesRefused{agent_.robot(), std::move(error.message), true});
+    step.emit(now, ImagesRefused{agent_.robot(), std::move(error.message), true});
   for (const SubmapMessage& message : submaps) {
     if (const Status ok = wire::validate(message); !ok) {
-      step.tell(now, MessageRefused{bus::Endpoint::of(agent_.robot()), bus::MessageKind::submap, ok.error().message});
+      step.emit(now, MessageRefused{bus::Endpoint::of(agent_.robot()), bus::MessageKind::submap, ok.error().message});
       continue;
     }
     auto frame = std::make_shared<const std::string>(wire::encode(message, {.voxel_m = config_.agent.submap.voxel_m}));
@@ -314,7 +314,7 @@ void RobotNode::send_submaps(Timestamp now, const Frames& fresh, Step& step) {
     if (row && *row)
       step.messages.push_back(submap_envelope(id, std::make_shared<const std::string>(std::move(**row))));
     else
-      step.tell(now, MessageRefused{
+      step.emit(now, MessageRefused{
                          bus::Endpoint::of(agent_.robot()), bus::MessageKind::submap,
                          row ? fmt::format("submap {} is not in the outbox", to_string(id)) : row.error().message});
   }

@@ -34,7 +34,7 @@ void RobotNode::change_session(const std::string& why, Timestamp now, Step& step
   session_begun_ = {now, why};
   save_checkpoint(step);
   if (config_.keeps_state) step.writes.push_back({kMeta, kSession, storage::key_of({session})});
-  step.tell(now, SessionBegun{agent_.robot(), session, why});
+  step.emit(now, SessionBegun{agent_.robot(), session, why});
 }
 
 Status RobotNode::set_aside(const wire::StateRows& checkpoint, std::uint64_t session) {
@@ -56,7 +56,7 @@ void RobotNode::note_conflict(const Receipt& receipt, Timestamp now, Step& step)
   const auto& conflict = receipt.conflict;
   if (!conflict || conflict->session != session || conflict->start != start()) return;
   conflict_ = conflict->why;
-  if (conflict_ != before) step.tell(now, RobotRefused{agent_.robot(), session, conflict->why});
+  if (conflict_ != before) step.emit(now, RobotRefused{agent_.robot(), session, conflict->why});
   if (receipt.owner_session == session) leave(session, conflict->why, now, step);
 }
 
@@ -67,7 +67,7 @@ void RobotNode::note_foreign(const std::set<std::uint64_t>& sessions, Timestamp 
         "under session {} the map has other submaps than this robot's: another program has sent them, with "
         "a copy of its state folder",
         session);
-    step.tell(now, RobotRefused{agent_.robot(), session, why});
+    step.emit(now, RobotRefused{agent_.robot(), session, why});
     leave(session, why, now, step);
   }
   const auto waiting = std::ranges::count_if(

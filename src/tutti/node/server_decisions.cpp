@@ -48,7 +48,7 @@ Result<bool> ServerNode::take_decision(const bus::Envelope& envelope, const Clos
   if (before == decisions.at(*pair)) return before != decision;
   step.writes.push_back(
       {map_tables::kDecisions, key_of(*pair), envelope.user.empty() ? *envelope.bytes : wire::encode(decision)});
-  step.tell(now, DecisionTaken{*pair, decision.wish});
+  step.emit(now, DecisionTaken{*pair, decision.wish});
   operator_decided_ = true;
   send_jobs(std::nullopt, now, 0, config_.pairs_per_job, step);
   return false;

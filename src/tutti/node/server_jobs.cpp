@@ -60,7 +60,7 @@ void ServerNode::receive_verdicts(const bus::Envelope& envelope, Timestamp now, 
     if (is_all && !job->is_replaced && !server_.state().answered.contains(pair))
       note_failed(pair, "the answer has nothing valid on it", now, refused, step);
   keep(refused, step);
-  step.tell(now, VerdictsTaken{answer->job, answer->verdicts.size()});
+  step.emit(now, VerdictsTaken{answer->job, answer->verdicts.size()});
 }
 
 /// Verdicts of another verifier than the server's, as of a program of another version: believed once the server has
@@ -91,7 +91,7 @@ void ServerNode::note_waiting(const std::vector<SubmapPair>& pairs, const std::s
   for (const SubmapPair& pair : pairs)
     if (server::has_both(submaps, pair) && !server_.state().answered.contains(pair)) waiting_.insert(pair);
   why_waiting_ = plain_text(why);
-  if (was_empty && !waiting_.empty()) step.tell(now, VerificationFailed{*waiting_.begin(), why});
+  if (was_empty && !waiting_.empty()) step.emit(now, VerificationFailed{*waiting_.begin(), why});
   if (was_empty != waiting_.empty()) ++changes_;
   if (workers_.any_can(server_.verifier().id(), now)) ask_waiting(now, step);
 }
@@ -118,7 +118,7 @@ void ServerNode::receive_returned_job(const bus::Envelope& envelope, Timestamp n
   }
   for (const SubmapPair& pair : job->pairs) give_back(pair);
   send_jobs(std::nullopt, now, 0, 1, step);
-  step.tell(now, VerificationFailed{
+  step.emit(now, VerificationFailed{
                      job->pairs.front(),
                      fmt::format("one of {} pairs has ended every worker: asked one by one", job->pairs.size())});
 }
@@ -131,7 +131,7 @@ void ServerNode::note_failed(const SubmapPair& pair, const std::string& why, Tim
   if (next == FailedPairs::Next::nothing) return;
   if (next == FailedPairs::Next::give_up)
     return give_up(pair, fmt::format("{} tries have failed: {}", config_.most_tries, why), now, refused, step);
-  step.tell(now, VerificationFailed{pair, why});
+  step.emit(now, VerificationFailed{pair, why});
   if (next == FailedPairs::Next::ask_now) give_back(pair);
 }
 
@@ -145,7 +145,7 @@ void ServerNode::give_up(const SubmapPair& pair, const std::string& why, Timesta
   if (!take(verdict, refused, step)) return;
   note_refusal(bus::Endpoint::Role::worker, bus::MessageKind::job,
                fmt::format("submaps {} and {} are given up: {}", to_string(pair.first), to_string(pair.second), why));
-  step.tell(now, VerificationFailed{pair, why, true});
+  step.emit(now, VerificationFailed{pair, why, true});
 }
 
 Status ServerNode::take(const ClosureVerdict& verdict, Verdicts& refused, Step& step) {
@@ -218,13 +218,13 @@ void ServerNode::ask_again(Timestamp now, Step& step) {
     const std::string why = fmt::format("no worker has answered for {:g} s: asked again", now - job.since);
     if (job.refinement) {
       ask_for_refinement(*job.refinement, now, job.asked + 1, step);
-      step.tell(now, RefinementFailed{job.refinement->revision, why});
+      step.emit(now, RefinementFailed{job.refinement->revision, why});
       continue;
     }
     const std::size_t before = step.messages.size();
     for (const SubmapPair& pair : job.pairs) give_back(pair);
     send_jobs(std::nullopt, now, job.asked + 1, config_.pairs_per_job, step);
-    if (step.messages.size() > before) step.tell(now, VerificationFailed{job.pairs.front(), why});
+    if (step.messages.size() > before) step.emit(now, VerificationFailed{job.pairs.front(), why});
   }
 }
 

@@ -84,7 +84,7 @@ Step ServerNode::end_map(MapOfTask made, Timestamp now) {
   note_settling(now);
   if (!made.is_update) return step;
   step.writes.push_back(meta());
-  step.tell(now, MapUpdated{server_.state().revision, submaps, static_cast<std::size_t>(counts.closures)});
+  step.emit(now, MapUpdated{server_.state().revision, submaps, static_cast<std::size_t>(counts.closures)});
   return step;
 }
 

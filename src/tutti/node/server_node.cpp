@@ -90,7 +90,7 @@ Step ServerNode::resume(Timestamp now) {
   step.writes.push_back(meta());
   step.writes.push_back(to_row(config_.server));
   keep_places(step);
-  tell_unread_rows(now, step);
+  emit_unread_rows(now, step);
   recall_decisions();
   for (const auto& [robot, receipt] : receipts_.members()) send_receipt(robot, step);
   send_jobs(std::nullopt, now, 0, config_.pairs_per_job, step);
@@ -120,7 +120,7 @@ Step ServerNode::receive(const bus::Envelope& envelope, Timestamp now) {
   else
     refuse(envelope, "not for a server", now, step);
   for (const Error& error : server_.take_late_errors())
-    step.tell(now, MessageRefused{envelope.from, bus::MessageKind::verdicts, error.message});
+    step.emit(now, MessageRefused{envelope.from, bus::MessageKind::verdicts, error.message});
   note_news(now, before, step);
   return step;
 }
@@ -140,7 +140,7 @@ void ServerNode::note_news(Timestamp now, bool before, Step& step) {
 }
 
 void ServerNode::refuse(const bus::Envelope& envelope, const std::string& why, Timestamp now, Step& step) {
-  step.tell(now, MessageRefused{envelope.from, envelope.kind, why});
+  step.emit(now, MessageRefused{envelope.from, envelope.kind, why});
   note_refusal(envelope.from.role, envelope.kind, why);
 }
 
@@ -217,7 +217,7 @@ Status ServerNode::take_submap(const bus::Envelope& envelope, Timestamp now, Ste
       step.writes.push_back({map_tables::kMeta, RobotRegistry::key(id.chain.robot), registry_.row(id.chain.robot)});
     step.writes.push_back({map_tables::kSubmaps, key_of(id), *envelope.bytes});
     keep_places(step);
-    step.tell(now, SubmapStored{id});
+    step.emit(now, SubmapStored{id});
   }
   send_receipt(id.chain.robot, step);
   send_jobs(id, now, 0, config_.pairs_per_job, step);
@@ -233,11 +233,11 @@ void ServerNode::keep_places(Step& step) {
   }
 }
 
-void ServerNode::tell_unread_rows(Timestamp now, Step& step) {
+void ServerNode::emit_unread_rows(Timestamp now, Step& step) {
   for (const auto& [table, rows] : unread_rows_) {
     const std::string why =
         fmt::format("{} rows of the map's table '{}' are left as they are: {}", rows.count, table, rows.why);
-    step.tell(now, MessageRefused{bus::Endpoint::server(), kind_of(table), why});
+    step.emit(now, MessageRefused{bus::Endpoint::server(), kind_of(table), why});
     note_refusal(bus::Endpoint::Role::server, kind_of(table), why);
   }
 }

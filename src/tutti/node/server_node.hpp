@@ -134,7 +134,7 @@ class ServerNode {
   /// The robot need not send the submap again before the server's next start, which may be of a newer version.
   void note_unread(SubmapId id, Timestamp now, Step& step);
   /// Reports which rows of the store were left as they are.
-  void tell_unread_rows(Timestamp now, Step& step);
+  void emit_unread_rows(Timestamp now, Step& step);
   void receive_submap(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_verdicts(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_returned_job(const bus::Envelope& envelope, Timestamp now, Step& step);

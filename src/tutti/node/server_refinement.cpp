@@ -56,7 +56,7 @@ void ServerNode::receive_refinement(const bus::Envelope& envelope, Timestamp now
     refinements_.wait(asked);
     why_waiting_ = plain_text(refinement->why);
     ++changes_;
-    return step.tell(now, RefinementFailed{refinement->revision, refinement->why});
+    return step.emit(now, RefinementFailed{refinement->revision, refinement->why});
   }
   if (!refinement->why.empty()) return failed(refinement->why);
   const std::set<std::uint64_t> before = revisions(server_.state().refinements);
@@ -71,7 +71,7 @@ void ServerNode::receive_refinement(const bus::Envelope& envelope, Timestamp now
   for (const std::uint64_t revision : after)
     if (!before.contains(revision))
       step.writes.push_back({map_tables::kMeta, refinement_key(revision), *envelope.bytes});
-  step.tell(now, RefinementTaken{refinement->job, refinement->revision, refinement->whole, refinement->steps.size(),
+  step.emit(now, RefinementTaken{refinement->job, refinement->revision, refinement->whole, refinement->steps.size(),
                                  refinement->remarks});
 }
 
@@ -85,7 +85,7 @@ void ServerNode::receive_returned_refinement(const bus::Envelope& envelope, Time
 
 void ServerNode::note_failed_refinement(const RefinementJob& job, const std::string& why, Timestamp now, Step& step) {
   if (!refinements_.note_failed(job, now)) return give_up_refinement(job.revision, why, now, step);
-  step.tell(now, RefinementFailed{job.revision, why});
+  step.emit(now, RefinementFailed{job.revision, why});
 }
 
 /// The map goes on without it, and asks for another when something new has come.
@@ -94,7 +94,7 @@ void ServerNode::give_up_refinement(std::uint64_t revision, const std::string& w
   server_.give_up_refinement();
   note_refusal(bus::Endpoint::Role::worker, bus::MessageKind::refinement_job,
                fmt::format("the refinement of revision {} is given up: {}", revision, why));
-  step.tell(now, RefinementFailed{revision, why, true});
+  step.emit(now, RefinementFailed{revision, why, true});
 }
 
 void ServerNode::note_settling(Timestamp now) {

@@ -93,11 +93,11 @@ void ServerNode::receive_status_of_robot(RobotId robot, const NodeStatus& status
   if (!heard.accepted) {
     note_refusal(bus::Endpoint::Role::robot, bus::MessageKind::status, heard.why);
     receipt.conflict = {status.session, status.start, plain_text(heard.why)};
-    if (receipt.conflict != old.conflict) step.tell(now, RobotRefused{robot, status.session, heard.why});
+    if (receipt.conflict != old.conflict) step.emit(now, RobotRefused{robot, status.session, heard.why});
   } else {
     if (receipt.conflict && receipt.conflict->session == status.session && receipt.conflict->start == status.start)
       receipt.conflict.reset();
-    if (before != owner) step.tell(now, RobotJoined{robot, status.name, status.session});
+    if (before != owner) step.emit(now, RobotJoined{robot, status.name, status.session});
   }
   const bool is_due = heard.accepted && receipts_.waits_too_long(robot, status, now);
   if (receipt != old) ++changes_;

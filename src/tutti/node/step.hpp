@@ -28,7 +28,7 @@ struct Step {
     std::ranges::move(other.events, std::back_inserter(events));
   }
   template <class What>
-  void tell(Timestamp time, What&& what) {
+  void emit(Timestamp time, What&& what) {
     events.push_back({time, std::forward<What>(what)});
   }
 };

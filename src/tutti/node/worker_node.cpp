@@ -83,7 +83,7 @@ Step WorkerNode::receive(const bus::Envelope& envelope, Timestamp now) {
   else if (envelope.kind == bus::MessageKind::submap_copy)
     receive_copy(envelope, now, step);
   else
-    step.tell(now, MessageRefused{envelope.from, envelope.kind, "not for a worker"});
+    step.emit(now, MessageRefused{envelope.from, envelope.kind, "not for a worker"});
   return step;
 }
 
@@ -152,7 +152,7 @@ void WorkerNode::receive_job(const bus::Envelope& envelope, Timestamp now, Step&
   auto job = decode(envelope);
   leaves_job_ = !job && job.error().code == ErrorCode::unsupported;
   if (!job) {
-    step.tell(now, MessageRefused{envelope.from, envelope.kind, job.error().message});
+    step.emit(now, MessageRefused{envelope.from, envelope.kind, job.error().message});
     return;
   }
   const Status ready = std::visit([&](const auto& one) { return prepare(one); }, *job);
@@ -173,7 +173,7 @@ void WorkerNode::receive_job(const bus::Envelope& envelope, Timestamp now, Step&
 /// What is no good, or was not asked for, is left where it is.
 void WorkerNode::receive_copy(const bus::Envelope& envelope, Timestamp now, Step& step) {
   const auto refuse = [&](const std::string& why) {
-    step.tell(now, MessageRefused{envelope.from, envelope.kind, why});
+    step.emit(now, MessageRefused{envelope.from, envelope.kind, why});
   };
   auto copy = wire::decode_submap_copy(*envelope.bytes);
   if (!copy) return refuse(copy.error().message);
@@ -229,7 +229,7 @@ std::optional<Timestamp> WorkerNode::next_timer() const {
 Step WorkerNode::on_timer(Timestamp now) {
   Step step;
   if (rests_until_ && *rests_until_ <= now) rests_until_.reset();
-  tell_later(now, step);
+  send_due(now, step);
   if (!pending_) return step;
   if (now - pending_->last_came < kPatience_s) {
     ask(now, step);
@@ -280,7 +280,7 @@ std::vector<Timestamp> WorkerNode::known_at(const ClosureVerdict& verdict, Times
   return known_at;
 }
 
-void WorkerNode::tell_later(Timestamp now, Step& step) {
+void WorkerNode::send_due(Timestamp now, Step& step) {
   for (const Verdicts& answer : later_.take_due(now))
     send(bus::MessageKind::verdicts, answer.job, wire::encode(answer), step);
 }
@@ -304,7 +304,7 @@ void WorkerNode::answer(const Job& job, Timestamp now, Step& step) {
   if (later_.has(job.id)) answer.job = later_.part_of(job.id);
   if (!later_.has(job.id) || !answer.verdicts.empty() || !answer.failed.empty())
     send(bus::MessageKind::verdicts, answer.job, wire::encode(answer), step);
-  tell_later(now, step);
+  send_due(now, step);
 }
 
 }  // namespace tutti::node

@@ -88,7 +88,7 @@ class WorkerNode {
   void decline(const RefinementJob& job, const std::string& why, bool cannot, Step& step) const;
   void answer(const Job& job, Timestamp now, Step& step);
   [[nodiscard]] std::vector<Timestamp> known_at(const ClosureVerdict& verdict, Timestamp now);
-  void tell_later(Timestamp now, Step& step);
+  void send_due(Timestamp now, Step& step);
   void answer(const RefinementJob& job, Timestamp now, Step& step);
   void answer(const AnyJob& job, Timestamp now, Step& step);
   [[nodiscard]] Result<ClosureVerdict> verify(const SubmapPair& pair) const;

@@ -28,7 +28,7 @@ Result<BusGuard> BusGuard::open(const std::filesystem::path& folder, const std::
 }
 
 /// While it is being changed, the state before counts.
-std::vector<std::string> BusGuard::look(const std::string& now) {
+std::vector<std::string> BusGuard::check(const std::string& now) {
   std::vector<std::string> lines;
   const auto there = pki::Pki::open(folder_);
   auto rights = there ? there->bus_configuration(now) : tl::unexpected(there.error());

@@ -21,13 +21,13 @@ class BusGuard {
   /// Fails when the folder is that of another mission. `now` as of utc_text(), here and below.
   static Result<BusGuard> open(const std::filesystem::path& folder, const std::string& mission, const std::string& now);
 
-  /// For bus::NatsChild: those of everybody whose certificate had not expired when the folder was last looked at.
+  /// For bus::NatsChild: those of everybody whose certificate had not expired when the folder was last read.
   [[nodiscard]] const std::string& rights() const { return rights_; }
   /// The server's own.
   [[nodiscard]] const bus::BusCredentials& credentials() const { return credentials_; }
   /// Reads the folder again, in which members come and go. Called once a second. Returns, as lines for the log, whose
   /// certificate has expired since it was last called.
-  std::vector<std::string> look(const std::string& now);
+  std::vector<std::string> check(const std::string& now);
   /// What the bus has refused, as lines for the log: who, what, and how many so far; of each member, and of all
   /// strangers together, as Throttle lets through.
   [[nodiscard]] std::vector<std::string> lines(const bus::NatsChild::Refusals& refusals, double wall_s);

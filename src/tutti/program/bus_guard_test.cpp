@@ -28,7 +28,7 @@ TEST_F(BusGuardTest, SaysWhoWasRefusedWhatAndNotTooOften) {
   ASSERT_TRUE(pki.add(bus::BusRole::robot, "alpha", 3));
   auto guard = BusGuard::open(folder_, "cave", kNow).value();
   EXPECT_EQ(guard.credentials().known->role, bus::BusRole::server);
-  EXPECT_TRUE(guard.look(kNow).empty());
+  EXPECT_TRUE(guard.check(kNow).empty());
   const std::string key = pki.members().back().key;
   bus::NatsChild::Refusals many;
   for (int i = 0; i < 500; ++i) many.all.push_back({"10.0.0.7:1", key, "publish mission.cave.robot.4.submap"});
@@ -43,7 +43,7 @@ TEST_F(BusGuardTest, SaysWhoWasRefusedWhatAndNotTooOften) {
   ASSERT_EQ(stranger.size(), 1U);
   EXPECT_NE(stranger.front().find("a stranger"), std::string::npos) << stranger.front();
   ASSERT_TRUE(pki.revoke("alpha"));
-  EXPECT_TRUE(guard.look(kNow).empty());
+  EXPECT_TRUE(guard.check(kNow).empty());
   const auto lost = guard.lines({{{"10.0.0.9:2", "", "authentication error - Nkey \"" + key + "\""}}, 0}, 0.0);
   ASSERT_EQ(lost.size(), 1U);
   for (const char* part : {"a stranger", "robot alpha, revoked"})
@@ -63,18 +63,18 @@ TEST_F(BusGuardTest, WhoseCertificateHasExpiredHasNoRightsUntilItIsRenewed) {
   const auto has = [&](const std::string& name) { return guard.rights().find(key(name)) != std::string::npos; };
   EXPECT_TRUE(has("bravo"));
   const std::string until = pki.members().back().until;
-  EXPECT_TRUE(guard.look(until).empty());
+  EXPECT_TRUE(guard.check(until).empty());
   EXPECT_TRUE(has("bravo"));
-  const auto lines = guard.look(until + "x");  // just after
+  const auto lines = guard.check(until + "x");  // just after
   ASSERT_EQ(lines.size(), 1U);
   EXPECT_NE(lines.front().find("robot bravo has expired (" + until), std::string::npos) << lines.front();
   EXPECT_FALSE(has("bravo"));
   EXPECT_TRUE(has("alpha"));
-  EXPECT_TRUE(guard.look(until + "x").empty()) << "said once";
+  EXPECT_TRUE(guard.check(until + "x").empty()) << "said once";
   ASSERT_TRUE(pki.renew("bravo"));
-  EXPECT_TRUE(guard.look(until + "x").empty());
+  EXPECT_TRUE(guard.check(until + "x").empty());
   EXPECT_TRUE(has("bravo"));
-  EXPECT_EQ(guard.look(kMuchLater).size(), 2U);
+  EXPECT_EQ(guard.check(kMuchLater).size(), 2U);
   EXPECT_FALSE(has("alpha"));
   EXPECT_TRUE(has("server")) << "without its own bus there is no mission";
 }
@@ -84,7 +84,7 @@ TEST_F(BusGuardTest, ARobotHasTheNameOfItsCredential) {
   auto guard = BusGuard::open(folder_, "cave", kNow).value();
   EXPECT_EQ(guard.objection(RobotId{3}, "alpha"), "");
   ASSERT_TRUE(pki.add(bus::BusRole::robot, "alpha", 3));
-  EXPECT_TRUE(guard.look(kNow).empty());
+  EXPECT_TRUE(guard.check(kNow).empty());
   EXPECT_EQ(guard.objection(RobotId{3}, "alpha"), "");
   EXPECT_NE(guard.objection(RobotId{3}, "bravo"), "");
 }

@@ -47,7 +47,7 @@ TrackedImages FedCamera::see(const intake::FedImages& images, bool keyframe) {
   }
   TrackedImages out{.stamp = images.stamp, .cameras = nullptr, .images = {}};
   if (!tracker_) return out;
-  visual::SeenImages seen{.stamp = images.stamp, .moment = instant, .images = {}};
+  visual::SeenImages seen{.stamp = images.stamp, .instant = instant, .images = {}};
   seen.images.resize(sensors_->cameras.size(), Image());
   for (const intake::EncodedImage& image : images.images)
     seen.images.at(image.camera) = decoded(image, sensors_->cameras[image.camera].model, images.stamp);

@@ -59,7 +59,7 @@ void FedRobot::hear(const std::shared_ptr<const intake::FedImages>& images, Time
   const Timestamp stamp = images->stamp;
   const bool is_keyframe = agent.wants_images(stamp);
   TrackedImages seen = camera_.see(*images, is_keyframe);
-  tell_image_errors(stamp, now);
+  emit_image_errors(stamp, now);
   if (!is_keyframe || seen.images.empty()) return;
   if (images->sensors->imu)
     if (const auto before = agent.keyframe_before(stamp)) seen.imu = front_.imu(*before, stamp);
@@ -67,12 +67,12 @@ void FedRobot::hear(const std::shared_ptr<const intake::FedImages>& images, Time
 }
 
 /// To the client all; of a row of images with errors the first is an event.
-void FedRobot::tell_image_errors(Timestamp stamp, Timestamp now) {
+void FedRobot::emit_image_errors(Timestamp stamp, Timestamp now) {
   const std::vector<Error> errors = camera_.take_errors();
   for (const Error& error : errors) {
     front_.refuse(stamp, error.message);
     if (!std::exchange(images_fail_, true))
-      robot_.tell(now, node::ImagesRefused{robot_.node().agent().robot(), error.message, true});
+      robot_.emit(now, node::ImagesRefused{robot_.node().agent().robot(), error.message, true});
   }
   images_fail_ = !errors.empty();
 }

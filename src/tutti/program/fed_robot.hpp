@@ -47,7 +47,7 @@ class FedRobot {
   void hear(FeedEnded, Timestamp now) { robot_.finish(now); }
   void hear(const FeedAnew& anew, Timestamp now) { robot_.begin_session(anew.why, now); }
   void expect(const intake::FeedSensors& sensors) { robot_.expect_sensors(sensors.scans, !sensors.cameras.empty()); }
-  void tell_image_errors(Timestamp stamp, Timestamp now);
+  void emit_image_errors(Timestamp stamp, Timestamp now);
   void publish();
 
   FeedFront& front_;

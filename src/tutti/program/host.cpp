@@ -177,14 +177,14 @@ double Host::turn() {
   }
   if (!node_) {
     if (wall_s >= reopen_s_) reopen();
-    tell_status();
+    report_status();
     return kLongestSleep_s;
   }
   send_waiting();
   if (!take_messages()) return kLongestSleep_s;
   if (!carry_out()) return kLongestSleep_s;  // receipts do not wait for long work
   if (!work() || !report() || !carry_out()) return kLongestSleep_s;
-  tell_status();
+  report_status();
   if (!received_.empty()) return 0.0;
   const auto next = clock_.wall_s() < work_again_s_ ? std::nullopt : node_->next_work();
   return next ? std::min(kLongestSleep_s, clock_.wall_s_until(*next)) : kLongestSleep_s;
@@ -210,7 +210,7 @@ void Host::run(const std::atomic<bool>& stop) {
     static_cast<void>(carry_out());
   }
   status_s_ = 0.0;
-  tell_status();
+  report_status();
 }
 
 void Host::add(Answer answer) {
@@ -297,7 +297,7 @@ void Host::count(bool sent, const bus::Envelope& message) {
 void Host::check_link() {
   const auto state = link();
   if (!state) return;
-  for (const auto& [level, sentence] : link_.look(*state, clock_.wall_s())) log_.say(level, sentence);
+  for (const auto& [level, sentence] : link_.check(*state, clock_.wall_s())) log_.say(level, sentence);
 }
 
 std::optional<bus::LinkState> Host::link() const { return port_ ? std::optional(port_->state()) : std::nullopt; }
@@ -308,7 +308,7 @@ std::string Host::all_trouble() const {
   return trouble_.empty() ? link_.trouble() : trouble_;
 }
 
-void Host::tell_status() {
+void Host::report_status() {
   const double wall_s = clock_.wall_s();
   if (wall_s < status_s_) return;
   status_s_ = wall_s + kStatus_s;

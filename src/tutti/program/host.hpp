@@ -145,7 +145,7 @@ class Host {
   void send_waiting();
   void close();
   void reopen();
-  void tell_status();
+  void report_status();
   void check_link();
   void count(bool sent, const bus::Envelope& message);
 

@@ -67,7 +67,7 @@ bus::Envelope HostedServer::mission_status(Timestamp now) {
   status.version = version_;
   status.wall_ns = static_cast<std::int64_t>(wall_clock_ns());
   status.trouble = trouble_();
-  for (const auto& viewer : viewers_) viewer->tell(status, radio_.sums());
+  for (const auto& viewer : viewers_) viewer->show_status(status, radio_.sums());
   return node::to_viewers(std::move(status));
 }
 

@@ -18,8 +18,8 @@ std::string why_of(const bus::LinkState& state) {
 
 }  // namespace
 
-std::vector<LinkWatch::Said> LinkWatch::look(const bus::LinkState& state, double wall_s) {
-  std::vector<Said> out;
+std::vector<LinkWatch::Line> LinkWatch::check(const bus::LinkState& state, double wall_s) {
+  std::vector<Line> out;
   const auto say = [&](Level level, std::string sentence) { out.push_back({level, std::move(sentence)}); };
   trouble_.clear();
   const std::string why = why_of(state);

@@ -18,12 +18,12 @@ class LinkWatch {
   static constexpr double kPatience_s = 5.0;  ///< A missing link is reported after this time.
   static constexpr double kStores_s = 25.0;   ///< Longer than a port waits for one confirmation.
 
-  struct Said {
+  struct Line {
     Level level = Level::info;
     std::string sentence;
   };
   /// The sentences to report now. To be called about once a second.
-  std::vector<Said> look(const bus::LinkState& state, double wall_s);
+  std::vector<Line> check(const bus::LinkState& state, double wall_s);
   /// What is wrong now; empty when nothing is.
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
 

@@ -11,23 +11,23 @@ bool has(const std::string& text, const std::string& part) { return text.find(pa
 TEST(LinkWatch, SaysOnceThatThereIsNoLinkAndThatItIsBack) {
   LinkWatch watch;
   bus::LinkState state{.url = "nats://base:4222", .last_error = "connecting: no server"};
-  for (int s = 0; s < 5; ++s) EXPECT_TRUE(watch.look(state, s).empty()) << s;
+  for (int s = 0; s < 5; ++s) EXPECT_TRUE(watch.check(state, s).empty()) << s;
   EXPECT_EQ(watch.trouble(), "");
-  auto lines = watch.look(state, 5);
+  auto lines = watch.check(state, 5);
   ASSERT_EQ(lines.size(), 1U);
   EXPECT_EQ(lines[0].level, Level::warning);
   EXPECT_TRUE(has(lines[0].sentence, "cannot reach the bus nats://base:4222: connecting: no server"))
       << lines[0].sentence;
-  EXPECT_TRUE(watch.look(state, 50).empty());
+  EXPECT_TRUE(watch.check(state, 50).empty());
   EXPECT_TRUE(has(watch.trouble(), "for 50 s")) << watch.trouble();
   state.connected = true;
-  lines = watch.look(state, 60);
+  lines = watch.check(state, 60);
   ASSERT_EQ(lines.size(), 1U);
   EXPECT_TRUE(has(lines[0].sentence, "is there, after 60 s")) << lines[0].sentence;
   EXPECT_EQ(watch.trouble(), "");
   state.connected = false;
-  watch.look(state, 70);
-  lines = watch.look(state, 76);
+  watch.check(state, 70);
+  lines = watch.check(state, 76);
   ASSERT_EQ(lines.size(), 1U);
   EXPECT_TRUE(has(lines[0].sentence, "lost its link to the bus")) << lines[0].sentence;
 }
@@ -35,8 +35,8 @@ TEST(LinkWatch, SaysOnceThatThereIsNoLinkAndThatItIsBack) {
 TEST(LinkWatch, TheAddressOfTheBusIsReportedOnce) {
   LinkWatch watch;
   const bus::LinkState state{.url = "nats://base:4222", .last_error = "nats://base:4222: connecting: no server"};
-  watch.look(state, 0);
-  const auto lines = watch.look(state, 5);
+  watch.check(state, 0);
+  const auto lines = watch.check(state, 5);
   ASSERT_EQ(lines.size(), 1U);
   EXPECT_TRUE(has(lines[0].sentence, "cannot reach the bus nats://base:4222: connecting: no server"))
       << lines[0].sentence;
@@ -57,51 +57,51 @@ TEST(LinkWatch, ACutThatNobodyNoticesIsNotReported) {
   bus::LinkState state{.url = "nats://base:4222", .connected = true};
   for (int s = 0; s < 100; ++s) {
     state.connected = s % 6 != 0;
-    EXPECT_TRUE(watch.look(state, s).empty()) << s;
+    EXPECT_TRUE(watch.check(state, s).empty()) << s;
   }
 }
 
 TEST(LinkWatch, ABusThatStoresNothingIsReportedToBeFull) {
   LinkWatch watch;
   bus::LinkState state{.url = "nats://base:4222", .connected = true, .unconfirmed_s = 20.0};
-  EXPECT_TRUE(watch.look(state, 0).empty());
+  EXPECT_TRUE(watch.check(state, 0).empty());
   state.unconfirmed_s = 26.0;
-  auto lines = watch.look(state, 6);
+  auto lines = watch.check(state, 6);
   ASSERT_EQ(lines.size(), 1U);
   EXPECT_EQ(lines[0].level, Level::error);
   EXPECT_TRUE(has(lines[0].sentence, "its disk may be full")) << lines[0].sentence;
   state.unconfirmed_s = 40.0;
-  EXPECT_TRUE(watch.look(state, 20).empty());
+  EXPECT_TRUE(watch.check(state, 20).empty());
   EXPECT_TRUE(has(watch.trouble(), "nothing for 40 s")) << watch.trouble();
   state.unconfirmed_s = 0.0;
-  EXPECT_EQ(watch.look(state, 21).size(), 1U);
+  EXPECT_EQ(watch.check(state, 21).size(), 1U);
   EXPECT_EQ(watch.trouble(), "");
   state.streams_made_anew = 4;
   state.last_error = "the bus had lost all";
-  lines = watch.look(state, 22);
+  lines = watch.check(state, 22);
   ASSERT_EQ(lines.size(), 1U);
   EXPECT_EQ(lines[0].sentence, "the bus had lost all");
-  EXPECT_TRUE(watch.look(state, 23).empty());
+  EXPECT_TRUE(watch.check(state, 23).empty());
 }
 
 TEST(LinkWatch, JobsGivenInVainAndWhatTheBusDoesNotAllowAreAlerts) {
   LinkWatch watch;
   bus::LinkState state{.url = "nats://base:4222", .connected = true, .given_in_vain = 60};
-  auto lines = watch.look(state, 0);
+  auto lines = watch.check(state, 0);
   ASSERT_EQ(lines.size(), 1U);
   EXPECT_EQ(lines[0].level, Level::error);
   EXPECT_TRUE(has(watch.trouble(), "given to workers 60 times")) << watch.trouble();
-  EXPECT_TRUE(watch.look(state, 1).empty());
+  EXPECT_TRUE(watch.check(state, 1).empty());
   state.given_in_vain = 0;
-  EXPECT_EQ(watch.look(state, 2).size(), 1U);
+  EXPECT_EQ(watch.check(state, 2).size(), 1U);
   EXPECT_EQ(watch.trouble(), "");
   state.denied = "Permissions Violation for Publish to \"mission.m.robot.3.submap\"";
   state.unconfirmed_s = 60.0;  // and its disk is not full
-  lines = watch.look(state, 3);
+  lines = watch.check(state, 3);
   ASSERT_EQ(lines.size(), 1U);
   EXPECT_EQ(lines[0].level, Level::error);
   EXPECT_TRUE(has(watch.trouble(), "mission.m.robot.3.submap")) << watch.trouble();
-  EXPECT_TRUE(watch.look(state, 4).empty());
+  EXPECT_TRUE(watch.check(state, 4).empty());
 }
 
 }  // namespace link_watch_test

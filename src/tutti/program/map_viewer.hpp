@@ -47,7 +47,7 @@ class MapViewer {
   [[nodiscard]] virtual bool wants(std::uint64_t revision) const = 0;
   virtual void show(std::shared_ptr<const mapfile::ShownMap> map) = 0;
   /// Every two seconds, and when something has changed.
-  virtual void tell(const MissionStatus& /*status*/, const RadioCount::Sums& /*radio*/) {}
+  virtual void show_status(const MissionStatus& /*status*/, const RadioCount::Sums& /*radio*/) {}
   /// What operators have decided at this viewer since the last call.
   [[nodiscard]] virtual std::vector<AskedDecision> take_decisions() { return {}; }
 

@@ -65,7 +65,7 @@ class LiveRobot final : public RobotDriver {
   void add_fix(const PositionFix& fix, Timestamp now) { take(node_->add_fix(fix, now)); }
   void begin_session(const std::string& why, Timestamp now) { take(node_->begin_session(why, now)); }
   /// Reports what became of samples before they reached the node.
-  void tell(Timestamp now, const node::ImagesRefused& what) { step_.tell(now, what); }
+  void emit(Timestamp now, const node::ImagesRefused& what) { step_.emit(now, what); }
   void expect_sensors(bool scans, bool images) { node_->expect_sensors(scans, images); }
 
  private:

@@ -217,9 +217,9 @@ Status RobotProgram::start() {
 }
 
 Status RobotProgram::run(const std::atomic<bool>& stop) {
-  tell_service_manager("READY=1");
+  notify_service_manager("READY=1");
   host_->run(stop);
-  tell_service_manager("STOPPING=1");
+  notify_service_manager("STOPPING=1");
   const auto* robot = dynamic_cast<const HostedRobot*>(host_->hosted());
   log_->write(last_words(host_->traffic(), robot ? std::optional(robot->node_status(clock_->now())) : std::nullopt));
   if (robot != nullptr && robot->refused())

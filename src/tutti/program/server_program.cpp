@@ -223,7 +223,7 @@ void ServerProgram::tend() {
 void ServerProgram::tend_bus() {
   if (!child_) return;
   if (guard_) {
-    for (const std::string& line : guard_->look(utc_text(static_cast<std::int64_t>(wall_clock_ns()))))
+    for (const std::string& line : guard_->check(utc_text(static_cast<std::int64_t>(wall_clock_ns()))))
       log_->say(Level::warning, line);
     child_->set_rights(guard_->rights());
   }
@@ -307,9 +307,9 @@ Status ServerProgram::run(const std::atomic<bool>& stop) {
             fmt::format("runs in {}, mission {}, bus {}, {} threads of its own verify closures",
                         folder_->path().string(), bus_.mission, bus::without_credentials(bus_.url), options_.threads));
   if (options_.announce) options_.announce(robot_command());
-  tell_service_manager("READY=1");
+  notify_service_manager("READY=1");
   host_->run(stop);
-  tell_service_manager("STOPPING=1");
+  notify_service_manager("STOPPING=1");
   log_->say(Level::info, "stops; the map is stored");
   return is_over_ ? check_lease(lease_->state()) : Status();
 }

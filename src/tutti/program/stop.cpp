@@ -39,7 +39,7 @@ void end_with_parent(int parent) {
   if (getppid() != parent) asked = true;
 }
 
-void tell_service_manager(const char* state) { sd_notify(0, state); }
+void notify_service_manager(const char* state) { sd_notify(0, state); }
 
 std::uint64_t wall_clock_ns() {
   return static_cast<std::uint64_t>(

@@ -15,6 +15,6 @@ void stop_on_signals();
 void end_with_parent(int parent);
 
 /// Notifies systemd, if it started this program, "READY=1", "STOPPING=1" or "STATUS=...".
-void tell_service_manager(const char* state);
+void notify_service_manager(const char* state);
 
 }  // namespace tutti::program

@@ -132,9 +132,9 @@ Status run_worker(const WorkerOptions& options, const std::atomic<bool>& stop) {
   if (Status opened = host.open(); !opened) return opened;
   log->say(Level::info, fmt::format("worker {} runs, mission {}, bus {}, {} threads", self.number, where.mission,
                                     bus::without_credentials(where.url), threads));
-  tell_service_manager("READY=1");
+  notify_service_manager("READY=1");
   host.run(stop);
-  tell_service_manager("STOPPING=1");
+  notify_service_manager("STOPPING=1");
   return {};
 }
 

@@ -96,8 +96,8 @@ Status RobotAgent::add_images(const TrackedImages& images) {
   return ok;
 }
 
-void RobotAgent::add_moment(Timestamp stamp) {
-  submaps_.add_moment(stamp);
+void RobotAgent::add_keyframe_time(Timestamp stamp) {
+  submaps_.add_keyframe_time(stamp);
   add_keyframes();
 }
 

@@ -136,8 +136,8 @@ class RobotAgent {
   Status add_images(const TrackedImages& images);
   /// SubmapBuilder::add_fix()
   Status add_fix(const PositionFix& fix) { return submaps_.add_fix(fix); }
-  /// SubmapBuilder::add_moment()
-  void add_moment(Timestamp stamp);
+  /// SubmapBuilder::add_keyframe_time()
+  void add_keyframe_time(Timestamp stamp);
   /// SubmapBuilder's functions of these names
   [[nodiscard]] bool wants_scan() const { return submaps_.wants_scan(); }
   [[nodiscard]] bool wants_scan(Timestamp stamp) const { return submaps_.wants_scan(stamp); }

@@ -54,12 +54,12 @@ std::optional<Pose3> SensorTimeline::pose_at(const StampedPose& last, Timestamp 
   return tutti::pose_at(std::array{before, StampedPose{after->stamp, after->T_odom_body}}, at);
 }
 
-std::optional<SensorTimeline::Moment> SensorTimeline::take(const StampedPose& last, Timestamp until) {
+std::optional<SensorTimeline::Instant> SensorTimeline::take(const StampedPose& last, Timestamp until) {
   if (odometry.empty()) return std::nullopt;
   OdometryStep& next = odometry.front();
   const bool is_between = !sensors.empty() && sensors.front().stamp < next.stamp;
   if ((is_between ? sensors.front().stamp : next.stamp) > until) return std::nullopt;
-  Moment out;
+  Instant out;
   if (is_between) {
     auto [first, second] = split(last, next, sensors.front().stamp);
     out.step = first;

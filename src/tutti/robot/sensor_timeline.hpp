@@ -54,12 +54,13 @@ struct SensorTimeline {
   /// The pose at a time not before `last`, the last step that was taken; nothing after the newest step.
   [[nodiscard]] std::optional<Pose3> pose_at(const StampedPose& last, Timestamp at) const;
 
-  struct Moment {
+  /// The step that ends at one instant of the stream, and what sensors saw then.
+  struct Instant {
     OdometryStep step;
     std::optional<SensorSample> sensors;
   };
   /// Takes the next instant of the stream, unless it is after `until`. `last` is the last step that was taken.
-  std::optional<Moment> take(const StampedPose& last, Timestamp until);
+  std::optional<Instant> take(const StampedPose& last, Timestamp until);
 };
 
 }  // namespace tutti::robot

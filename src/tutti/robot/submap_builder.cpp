@@ -10,8 +10,8 @@
 #include "tutti/base/check.hpp"
 #include "tutti/estimation/imu_preintegration.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/model/path_length.hpp"
 #include "tutti/model/pose_at.hpp"
-#include "tutti/model/way.hpp"
 #include "tutti/perception/lidar/undistort.hpp"
 #include "tutti/robot/odometry_sample.hpp"
 
@@ -149,7 +149,7 @@ void SubmapBuilder::advance() {
   while (auto instant = state_.waiting.take(state_.recent.back(), until)) take(std::move(*instant));
 }
 
-bool SubmapBuilder::makes_keyframe(const SensorTimeline::Moment& instant) {
+bool SubmapBuilder::makes_keyframe(const SensorTimeline::Instant& instant) {
   const OdometryStep& step = instant.step;
   const bool has_sensors = has_scans() || has_images();
   const bool is_waited_for = instant.sensors && (instant.sensors->images || !instant.sensors->scan || !has_images());
@@ -178,7 +178,7 @@ void SubmapBuilder::take_jump(const OdometryStep& jump) {
   state_.recent = {{jump.stamp, jump.T_odom_body}};
 }
 
-void SubmapBuilder::take(SensorTimeline::Moment instant) {
+void SubmapBuilder::take(SensorTimeline::Instant instant) {
   const auto& [stamp, T_odom_body, covariance, is_jump] = instant.step;
   if (is_jump) {
     take_jump(instant.step);
@@ -253,7 +253,7 @@ bool SubmapBuilder::wants_images(Timestamp stamp) const {
 }
 
 /// Whether odometry covers this time, or will.
-Status SubmapBuilder::check_moment(Timestamp stamp, const char* what) const {
+Status SubmapBuilder::check_time(Timestamp stamp, const char* what) const {
   const auto newest = newest_sample();
   if (!newest || stamp - *newest > kLongestGap_s)
     return fail(ErrorCode::invalid, "robot {}: {} at {} ns, no odometry within {} s before (latest: {} ns)",
@@ -290,7 +290,7 @@ void SubmapBuilder::merge(const Scan& scan, const Pose3& T_odom_body) {
 }
 
 Status SubmapBuilder::add_scan(const Scan& scan) {
-  if (auto ok = check_moment(scan.stamp, "scan"); !ok) return ok;
+  if (auto ok = check_time(scan.stamp, "scan"); !ok) return ok;
   if (!scan.cloud || scan.cloud->points.empty())
     return fail(ErrorCode::invalid, "robot {}: scan at {} ns is empty", chain_.robot.value, scan.stamp.ns);
   if (!wants_scan(scan.stamp)) return {};
@@ -318,7 +318,7 @@ void SubmapBuilder::keep(const TrackedImages& images) {
 }
 
 Status SubmapBuilder::add_images(const TrackedImages& images) {
-  if (auto ok = check_moment(images.stamp, "images"); !ok) return ok;
+  if (auto ok = check_time(images.stamp, "images"); !ok) return ok;
   const auto where = [&] { return fmt::format("robot {}: images at {} ns", chain_.robot.value, images.stamp.ns); };
   if (auto ok = check_images(images); !ok) return in_context(where(), ok.error());
   if (!state_.images.empty() && *state_.images.back().cameras != *images.cameras)
@@ -338,8 +338,8 @@ Status SubmapBuilder::add_images(const TrackedImages& images) {
   return {};
 }
 
-void SubmapBuilder::add_moment(Timestamp stamp) {
-  if (!check_moment(stamp, "moment") || stamp <= state_.recent.back().stamp) return;
+void SubmapBuilder::add_keyframe_time(Timestamp stamp) {
+  if (!check_time(stamp, "keyframe") || stamp <= state_.recent.back().stamp) return;
   if (has_scans()) state_.heard_scan = stamp;
   if (has_images()) state_.heard_images = stamp;
   state_.waiting.add(SensorSample{stamp, std::nullopt, std::nullopt});
@@ -356,7 +356,7 @@ void SubmapBuilder::start_submap(const Keyframe& first) {
 /// Travel is counted between keyframes: from sample to sample, noise alone would add up to metres.
 bool SubmapBuilder::is_full() const {
   return state_.keyframes.back().stamp - state_.keyframes.front().stamp >= config_.duration_s ||
-         way_m(state_.odometry) >= config_.distance_m;
+         path_length_m(state_.odometry) >= config_.distance_m;
 }
 
 void SubmapBuilder::close_submap() {

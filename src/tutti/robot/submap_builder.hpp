@@ -136,7 +136,7 @@ class SubmapBuilder {
   /// or older, is skipped, because the errors of neighbouring fixes are the same.
   Status add_fix(const PositionFix& fix);
   /// Like a scan or images that are not given: makes the keyframe that these would make.
-  void add_moment(Timestamp stamp);
+  void add_keyframe_time(Timestamp stamp);
   /// Sets SubmapConfig::has_scans and has_images when these become known later.
   void expect_sensors(bool scans, bool images) {
     config_.has_scans = scans;
@@ -189,10 +189,10 @@ class SubmapBuilder {
   [[nodiscard]] bool has_images() const { return config_.has_images || state_.heard_images; }
   [[nodiscard]] bool is_due_at(Timestamp stamp) const;
   void drop_between(Timestamp before, Timestamp after, const std::string& why);
-  Status check_moment(Timestamp stamp, const char* what) const;
+  Status check_time(Timestamp stamp, const char* what) const;
   void advance();
-  void take(SensorTimeline::Moment instant);
-  [[nodiscard]] bool makes_keyframe(const SensorTimeline::Moment& instant);
+  void take(SensorTimeline::Instant instant);
+  [[nodiscard]] bool makes_keyframe(const SensorTimeline::Instant& instant);
   void add_keyframe(Timestamp stamp, const Pose3& T_odom_body);
   Result<Scan> undistorted(const Scan& scan) const;
   void merge(const Scan& scan, const Pose3& T_odom_body);

@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "tutti/base/random.hpp"
-#include "tutti/model/way.hpp"
+#include "tutti/model/path_length.hpp"
 
 namespace tutti::robot {
 namespace submap_builder_test {
@@ -93,8 +93,8 @@ TEST(SubmapBuilder, ByCarTheDistanceEndsASubmap) {
   const std::vector<Submap> submaps = travel(7.0, {});
   EXPECT_NEAR(static_cast<double>(submaps.size()), 60.0 * 7.0 / 20.0, 1.0);
   for (const Submap& submap : submaps) {
-    EXPECT_GE(way_m(submap.odometry), 20.0);
-    EXPECT_LT(way_m(submap.odometry), 20.5);  // at the keyframe after 20 m
+    EXPECT_GE(path_length_m(submap.odometry), 20.0);
+    EXPECT_LT(path_length_m(submap.odometry), 20.5);  // at the keyframe after 20 m
   }
 }
 
@@ -213,7 +213,7 @@ TEST(SubmapBuilder, BadInputIsRefusedAndChangesNothing) {
 }
 
 /// A wall of points 3 m to the left of the trajectory, seen by a camera that looks there.
-TrackedImages images_at(Timestamp stamp, double way_m, bool swapped = false) {
+TrackedImages images_at(Timestamp stamp, double distance_m, bool swapped = false) {
   const Eigen::Quaterniond left(Eigen::AngleAxisd(-std::numbers::pi / 2, Eigen::Vector3d::UnitX()));
   const Camera camera{.model = {CameraKind::pinhole, 752, 480, 400.0, 400.0, 376.0, 240.0, {}},
                       .T_body_camera = {left, Eigen::Vector3d::Zero()}};
@@ -221,7 +221,7 @@ TrackedImages images_at(Timestamp stamp, double way_m, bool swapped = false) {
   for (std::uint64_t track = 1; track <= 200; ++track) {
     const Eigen::Vector3d point(0.15 * static_cast<double>(track) - 2.0, 3.0 + 0.1 * static_cast<double>(track % 7),
                                 0.2 * static_cast<double>(track % 5) - 0.4);
-    const auto pixel = project(camera.model, camera.T_body_camera.inverse() * (ahead(way_m).inverse() * point));
+    const auto pixel = project(camera.model, camera.T_body_camera.inverse() * (ahead(distance_m).inverse() * point));
     if (!pixel || !in_image(camera.model, *pixel)) continue;
     const Eigen::Vector2d seen = swapped ? Eigen::Vector2d(pixel->y(), pixel->x()) : *pixel;
     image.keypoints.push_back({seen.cast<float>(), 0.5F, track});

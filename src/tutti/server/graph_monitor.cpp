@@ -83,8 +83,8 @@ Eigen::MatrixXd shifts_without_a_closure(const MapEstimate& map, const PoseGraph
   return out;
 }
 
-/// Covariances of neighbouring spread nodes by odometry alone, as honest as `weights` make it and let go where it
-/// failed.
+/// Covariances of neighbouring spread nodes by odometry alone, which is as honest as `weights` make it, and disregarded
+/// where it failed.
 std::vector<Matrix6d> spread_odometry(const MapEstimate& map, std::span<const std::size_t> spread,
                                       std::span<const double> weights) {
   std::vector<Matrix6d> out(spread.size(), Matrix6d::Zero());

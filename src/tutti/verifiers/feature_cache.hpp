@@ -29,7 +29,7 @@ class FeatureCache {
   /// The features of a submap: kept ones, or else what `compute` returns, which is called once for all threads that ask
   /// meanwhile. The age of a submap is that of the first call for it. Exceptions of `compute` are passed on.
   Result<Features> get(SubmapId id, const std::function<Result<Features>()>& compute);
-  [[nodiscard]] std::size_t held_bytes() const;  ///< Never more than the budget.
+  [[nodiscard]] std::size_t cached_bytes() const;  ///< Never more than the budget.
 
  private:
   using Age = std::size_t;  // counts up
@@ -41,7 +41,7 @@ class FeatureCache {
 
   std::size_t budget_bytes_;
   mutable std::mutex mutex_;  // guards everything below
-  std::size_t held_bytes_ = 0;
+  std::size_t cached_bytes_ = 0;
   std::unordered_map<SubmapId, Age> ages_;  // of all submaps ever asked for
   std::map<Age, Entry> entries_;
   std::map<Age, std::shared_future<Result<Features>>> under_way_;
@@ -83,14 +83,14 @@ void FeatureCache<F>::keep(Age age, const Features& features) {
   const std::size_t bytes = bytes_of(*features);
   if (bytes > budget_bytes_) return;
   entries_[age] = {features, bytes};
-  for (held_bytes_ += bytes; held_bytes_ > budget_bytes_; entries_.erase(entries_.begin()))
-    held_bytes_ -= entries_.begin()->second.bytes;
+  for (cached_bytes_ += bytes; cached_bytes_ > budget_bytes_; entries_.erase(entries_.begin()))
+    cached_bytes_ -= entries_.begin()->second.bytes;
 }
 
 template <class F>
-std::size_t FeatureCache<F>::held_bytes() const {
+std::size_t FeatureCache<F>::cached_bytes() const {
   const std::lock_guard lock(mutex_);
-  return held_bytes_;
+  return cached_bytes_;
 }
 
 }  // namespace tutti::verifiers

@@ -66,13 +66,13 @@ TEST(FeatureCache, EachNewOneAgainstAllBeforeItComputesNoMoreThanDoesNotFit) {
     for (std::uint32_t a = 0; a < b; ++a) {
       counted.get(a);
       counted.get(b);
-      ASSERT_LE(counted.cache.held_bytes(), kRoom * kOne);
+      ASSERT_LE(counted.cache.cached_bytes(), kRoom * kOne);
     }
   std::size_t unavoidable = kSubmaps;
   for (std::uint32_t b = kRoom; b < kSubmaps; ++b) unavoidable += b + 1 - kRoom;  // all before it do not fit
   EXPECT_LE(counted.computed, unavoidable);
   EXPECT_LT(counted.computed, 1600U);
-  EXPECT_EQ(counted.cache.held_bytes(), kRoom * kOne);
+  EXPECT_EQ(counted.cache.cached_bytes(), kRoom * kOne);
   for (std::uint32_t index = kSubmaps - kRoom; index < kSubmaps; ++index) EXPECT_FALSE(counted.get(index)) << index;
 }
 
@@ -86,7 +86,7 @@ RC_GTEST_PROP(FeatureCache, TheNewestAreThereAndTheBudgetHolds, ()) {
     const std::size_t cells = 50 + 10 * index;  // always the same of one submap
     counted.get(index, cells);
     if (std::ranges::find(asked, index) == asked.end()) asked.push_back(index);
-    RC_ASSERT(counted.cache.held_bytes() <= budget);
+    RC_ASSERT(counted.cache.cached_bytes() <= budget);
     const std::uint32_t newest = asked.back(), newest_cells = 50 + 10 * newest;
     const bool fits = lidar::bytes_of(*features_of({}, newest_cells)) <= budget;
     RC_ASSERT(!fits || !counted.get(newest, newest_cells));

@@ -95,13 +95,13 @@ TEST(LidarClosureVerifier, FindsTheSameWhateverItKeeps) {
   Rooms rooms(4);
   const LidarClosureVerifier all({}, 1, kMuch);
   const auto verdicts = rooms.verify_all(all, 2);
-  const std::size_t one = all.cache().held_bytes() / 4;
+  const std::size_t one = all.cache().cached_bytes() / 4;
   for (const std::size_t budget : {std::size_t{0}, 2 * one}) {
     const LidarClosureVerifier verifier({}, 1, budget);
     EXPECT_EQ(rooms.verify_all(verifier, 2), verdicts);
     EXPECT_GT(rooms.store.gets, 4U);
-    EXPECT_LE(verifier.cache().held_bytes(), budget);
-    EXPECT_GE(verifier.cache().held_bytes(), budget / 3);
+    EXPECT_LE(verifier.cache().cached_bytes(), budget);
+    EXPECT_GE(verifier.cache().cached_bytes(), budget / 3);
   }
 }
 

@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "tutti/base/disjoint_sets.hpp"
-#include "tutti/estimation/bundle/way_scale.hpp"
+#include "tutti/estimation/bundle/path_scale.hpp"
 
 namespace tutti::bundle {
 namespace {
@@ -58,7 +58,7 @@ class Trial {
       const std::size_t middle = steps[steps.size() / 2].from;
       const Eigen::Matrix3d bias = posterior_with.accelerometer_bias(middle);
       run.bias_sigma_mps2 = std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(bias).eigenvalues().maxCoeff());
-      const WayScale fit = way_scale(steps, without, posterior_without);
+      const PathScale fit = path_scale(steps, without, posterior_without);
       run.scale = fit.scale > 0.0 ? 1.0 / fit.scale : 1.0;
       run.scale_sigma = std::sqrt(fit.variance);
       run.is_held_back = run.bias_sigma_mps2 > config.max_bias_sigma ||

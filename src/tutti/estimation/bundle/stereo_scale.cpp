@@ -7,7 +7,7 @@
 #include <optional>
 #include <set>
 
-#include "tutti/estimation/bundle/way_scale.hpp"
+#include "tutti/estimation/bundle/path_scale.hpp"
 
 namespace tutti::bundle {
 namespace {
@@ -57,8 +57,8 @@ std::optional<StereoScale> compared(const BundleProblem& own, const std::vector<
     weights_m2 += weight * t.squaredNorm();
     variance_m2 += weight * weight * stated_m4;
   }
-  const WayScale fit = way_scale(steps, solution, posterior);
-  if (!(fit.way_m > 0.0)) return std::nullopt;
+  const PathScale fit = path_scale(steps, solution, posterior);
+  if (!(fit.length_m > 0.0)) return std::nullopt;
   StereoScale out{.robot = own.keyframes[own.odometry.front().from].id.chain.robot, .ratio = fit.scale};
   const double odometry_sigma = bundle.odometry_scale_sigma * fit.scale;
   out.sigma = std::sqrt(fit.variance + variance_m2 / (weights_m2 * weights_m2) + odometry_sigma * odometry_sigma);

@@ -26,8 +26,8 @@ std::string scales_table(const TrajectoryComparison& c, const PictureClock& cloc
   table.add({"scale", "over threshold", "worst at", "position", "rotation", "above since"});
   table.rule();
   for (const ScaleSummary& s : scale_summaries(c.explanation))
-    table.add({fmt::format("{:.1f} m", s.length_m), format_significance(s.significance), format_moment(clock(s.worst)),
-               format_metres(s.position_m), degrees(s.rotation_rad), s.since ? format_moment(clock(*s.since)) : "-"});
+    table.add({fmt::format("{:.1f} m", s.length_m), format_significance(s.significance), format_time_s(clock(s.worst)),
+               format_metres(s.position_m), degrees(s.rotation_rad), s.since ? format_time_s(clock(*s.since)) : "-"});
   return table.str();
 }
 
@@ -39,7 +39,7 @@ std::string origins_table(const TrajectoryComparison& c, const PictureClock& clo
   table.rule();
   for (std::size_t i = 0; i < std::min(origins.size(), kMostRows); ++i) {
     const auto& o = origins[i];
-    table.add({format_moment(clock(o.from)), format_moment(clock(o.until)), format_place(o.place_m),
+    table.add({format_time_s(clock(o.from)), format_time_s(clock(o.until)), format_place(o.place_m),
                fmt::format("{:.1f} m", o.length_m), format_metres(o.translation_m), degrees(o.rotation_rad),
                format_scale(c.explanation, o.scale), format_significance(o.significance), o.alert ? "failure?" : ""});
   }
@@ -54,7 +54,7 @@ std::string constraints_table(const TrajectoryComparison& c, const PictureClock&
   for (std::size_t i = 0; i < std::min(c.constraints.size(), kMostRows); ++i) {
     const auto& link = c.constraints[i];
     const Pose3& T = link.measurement.T_a_b;
-    table.add({format_moment(clock(link.from_stamp)), format_moment(clock(link.to_stamp)),
+    table.add({format_time_s(clock(link.from_stamp)), format_time_s(clock(link.to_stamp)),
                format_metres(T.translation.x()), format_metres(T.translation.y()), format_metres(T.translation.z()),
                degrees(rotation_angle(T))});
   }
@@ -68,7 +68,7 @@ std::string robot_text(const CompareReport& report, const TrajectoryComparison& 
   if (!c.name.empty()) out += c.name + "\n";
   out += wrap(
       fmt::format("{} of {} poses of B have one of A; {} nodes, every {:.2f} m along {:.1f} m and {:.1f} s.", c.paired,
-                  c.poses, c.judged.size(), c.spacing_m, c.way_m, c.judged.back().stamp - c.judged.front().stamp),
+                  c.poses, c.judged.size(), c.spacing_m, c.length_m, c.judged.back().stamp - c.judged.front().stamp),
       "  ");
   out +=
       wrap(fmt::format("After one rigid alignment B is off A by {} RMSE, {} at most, {:.2f} deg; A counts as sure to "

@@ -6,7 +6,7 @@ namespace tutti::mission {
 namespace {
 
 /// Seconds after the first node, and the stamp itself.
-void add_moment(Json& out, const std::string& name, Timestamp stamp, const TrajectoryComparison& c) {
+void add_time(Json& out, const std::string& name, Timestamp stamp, const TrajectoryComparison& c) {
   out[name + "_s"] = number(stamp - c.judged.front().stamp);
   out[name + "_stamp_ns"] = stamp.ns;
 }
@@ -15,7 +15,7 @@ Json scales_json(const TrajectoryComparison& c) {
   Json out = Json::array();
   for (const ScaleSummary& s : scale_summaries(c.explanation)) {
     Json row{{"length_m", number(s.length_m)}, {"significance", number(s.significance)}};
-    add_moment(row, "worst", s.worst, c);
+    add_time(row, "worst", s.worst, c);
     row["position_m"] = number(s.position_m);
     row["rotation_rad"] = number(s.rotation_rad);
     row["since_s"] = s.since ? number(*s.since - c.judged.front().stamp) : Json(nullptr);
@@ -28,8 +28,8 @@ Json origins_json(const TrajectoryComparison& c) {
   Json out = Json::array();
   for (const auto& origin : c.explanation.origins) {
     Json row = Json::object();
-    add_moment(row, "from", origin.from, c);
-    add_moment(row, "until", origin.until, c);
+    add_time(row, "from", origin.from, c);
+    add_time(row, "until", origin.until, c);
     row.update({{"place_m", vector_json(origin.place_m)},
                 {"scale", origin.scale},
                 {"length_m", number(origin.length_m)},
@@ -46,8 +46,8 @@ Json constraints_json(const TrajectoryComparison& c) {
   Json out = Json::array();
   for (const auto& constraint : c.constraints) {
     Json row = Json::object();
-    add_moment(row, "from", constraint.from_stamp, c);
-    add_moment(row, "to", constraint.to_stamp, c);
+    add_time(row, "from", constraint.from_stamp, c);
+    add_time(row, "to", constraint.to_stamp, c);
     row["T_from_to"] = pose_json(constraint.measurement.T_a_b);
     out.push_back(std::move(row));
   }
@@ -83,7 +83,7 @@ Json robot_json(const TrajectoryComparison& c) {
           {"paired", c.paired},
           {"nodes", c.judged.size()},
           {"spacing_m", number(c.spacing_m)},
-          {"way_m", number(c.way_m)},
+          {"way_m", number(c.length_m)},
           {"duration_s", number(c.judged.back().stamp - c.judged.front().stamp)},
           {"disagrees", c.explanation.disagrees()},
           {"aligned", ate_json(c.before)},

@@ -17,7 +17,7 @@ using nlohmann::json;
 
 /// A straight trajectory of a metre a second; B parts from it after 40 s.
 TrajectoryComparison example(bool disagrees) {
-  TrajectoryComparison c{.name = "alpha", .poses = 205, .paired = 200, .spacing_m = 1.0, .way_m = 99.0};
+  TrajectoryComparison c{.name = "alpha", .poses = 205, .paired = 200, .spacing_m = 1.0, .length_m = 99.0};
   for (int i = 0; i < 100; ++i) {
     const Timestamp stamp = Timestamp{1'700'000'000'000'000'000} + static_cast<double>(i);
     const double x = static_cast<double>(i);

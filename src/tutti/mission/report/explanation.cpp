@@ -28,10 +28,10 @@ double largest_significance(const Explanation& e) {
   return std::max(e.significance.size() > 0 ? e.significance.maxCoeff() : 0.0, e.direction_significance);
 }
 
-std::string format_moment(double value_s) { return std::isfinite(value_s) ? fmt::format("{:.1f} s", value_s) : "-"; }
+std::string format_time_s(double value_s) { return std::isfinite(value_s) ? fmt::format("{:.1f} s", value_s) : "-"; }
 
 std::string format_between(const PictureClock& clock, Timestamp from, Timestamp until) {
-  return fmt::format("{} - {}", format_moment(clock(from)), format_moment(clock(until)));
+  return fmt::format("{} - {}", format_time_s(clock(from)), format_time_s(clock(until)));
 }
 
 std::string format_origin_size(const SuspectedOrigin& origin) {

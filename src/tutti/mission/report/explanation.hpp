@@ -17,7 +17,7 @@ namespace tutti::mission {
 double largest_significance(const consistency::Explanation& explanation);
 
 /// Seconds, as on the axes of pictures: "712.3 s".
-std::string format_moment(double value_s);
+std::string format_time_s(double value_s);
 /// Such as "0.41 m, 1.30 deg over 12.0 m".
 std::string format_origin_size(const consistency::SuspectedOrigin& origin);
 /// Where, when, how large and at which scale: "62.0 s - 72.0 s, at (12.3, -4.0, 0.2) m: 0.41 m, 1.30 deg over 12.0 m

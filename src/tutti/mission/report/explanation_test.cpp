@@ -7,8 +7,8 @@ namespace tutti::mission {
 namespace explanation_test {
 
 TEST(Words, OfAnOrigin) {
-  EXPECT_EQ(format_moment(12.34), "12.3 s");
-  EXPECT_EQ(format_moment(1259.96), "1260.0 s");
+  EXPECT_EQ(format_time_s(12.34), "12.3 s");
+  EXPECT_EQ(format_time_s(1259.96), "1260.0 s");
   EXPECT_EQ(format_origin_size({.length_m = 3.26, .translation_m = 0.5, .rotation_rad = 0.1}),
             "0.50 m, 5.73 deg over 3.26 m");
   consistency::Explanation e;

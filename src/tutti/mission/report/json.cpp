@@ -5,7 +5,7 @@
 #include "tutti/mission/report/geometry.hpp"
 #include "tutti/mission/report/json_parts.hpp"
 #include "tutti/mission/report/report.hpp"
-#include "tutti/mission/worst_moment.hpp"
+#include "tutti/mission/worst_update.hpp"
 #include "tutti/program/field_json.hpp"
 
 namespace tutti::mission {
@@ -144,7 +144,7 @@ Json course_json(const RobotRecord& robot) {
   return out;
 }
 
-Json worst_json(const std::optional<WorstMoment>& worst) {
+Json worst_json(const std::optional<WorstUpdate>& worst) {
   if (!worst) return nullptr;
   return {{"time_s", number(worst->time_s)},
           {"rmse_m", number(worst->rmse_m)},

@@ -9,7 +9,7 @@
 #include "tutti/mission/report/geometry.hpp"
 #include "tutti/mission/report/report.hpp"
 #include "tutti/mission/report/table.hpp"
-#include "tutti/mission/worst_moment.hpp"
+#include "tutti/mission/worst_update.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -159,7 +159,7 @@ std::string worst_lines(const RobotRecord& robot, const std::string& policy) {
   const auto worst = worst_of_policy(robot.updates, policy);
   if (!worst || worst->rmse_m - worst->onboard_rmse_m < kHarm_m) return "";
   return wrap(fmt::format("{}: corrected was worse than odometry by {} at most, at {} ({} instead of {}).", robot.name,
-                          format_metres(worst->rmse_m - worst->onboard_rmse_m), format_moment(worst->time_s),
+                          format_metres(worst->rmse_m - worst->onboard_rmse_m), format_time_s(worst->time_s),
                           format_metres(worst->rmse_m), format_metres(worst->onboard_rmse_m)),
               "  worst    ");
 }
@@ -172,7 +172,7 @@ std::string explanation_lines(const MissionRecord& record) {
       out += wrap(fmt::format("{}: localisation failure {}, {}; noticed at {}.", robot.name,
                               alert.withdrawn_s ? "no longer suspected" : "suspected",
                               format_origin(alert.origin, mission_clock(robot), robot.explanation),
-                              format_moment(alert.known_since_s)),
+                              format_time_s(alert.known_since_s)),
                   "  alert    ");
     const PolicyRecord* policy = find_policy(robot, record.default_policy);
     if (robot.explanation && !robot.explanation->stamps.empty()) {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <span>
 
-#include "tutti/model/way.hpp"
+#include "tutti/model/path_length.hpp"
 #include "tutti/perception/lidar/levelling.hpp"
 #include "tutti/perception/lidar/registration.hpp"
 #include "tutti/perception/lidar/submap_middle.hpp"
@@ -23,7 +23,7 @@ std::optional<Refusal> why_unusable(const Submap& submap, std::size_t points, co
     return Refusal{RefusalReason::too_few_keyframes, static_cast<double>(submap.keyframes.size()),
                    static_cast<double>(config.min_keyframes)};
   const double duration_s = submap.keyframes.back().stamp - submap.keyframes.front().stamp;
-  if (duration_s < config.min_duration_s && way_m(submap.odometry) < config.min_way_m)
+  if (duration_s < config.min_duration_s && path_length_m(submap.odometry) < config.min_way_m)
     return Refusal{RefusalReason::too_short, duration_s, config.min_duration_s};
   return std::nullopt;
 }

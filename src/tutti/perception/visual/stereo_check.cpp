@@ -53,7 +53,7 @@ std::optional<StereoTurn> StereoCheck::turn() const {
   StereoTurn out;
   Eigen::Matrix3d H;
   auto equations = linearise(out.turn_rad);
-  out.told_px = median_error(equations) * second_.model.fx;
+  out.stated_px = median_error(equations) * second_.model.fx;
   for (int i = 0; i < kIterations; ++i) {
     // Cauchy's loss, its scale by the residuals themselves: what is off by a turn is no outlier, wrong matches are.
     const double scale_rad = kLossMedians * std::max(median_error(equations), 1e-6);
@@ -73,10 +73,10 @@ std::optional<StereoTurn> StereoCheck::turn() const {
   out.turned_px = median_error(equations) * second_.model.fx;
   const double sigma_rad = median_error(equations) / kMadOfSigma;
   out.covariance = sigma_rad * sigma_rad * (H + 1e-9 * Eigen::Matrix3d::Identity()).inverse() +
-                   kTold_rad * kTold_rad * Eigen::Matrix3d::Identity();
+                   kStated_rad * kStated_rad * Eigen::Matrix3d::Identity();
   out.is_wrong =
       out.turn_rad.dot(out.covariance.ldlt().solve(out.turn_rad)) > kMaxSigmas * kMaxSigmas || out.turned_px > kMax_px;
-  out.is_turned = out.is_wrong && 2.0 * out.turned_px < out.told_px;
+  out.is_turned = out.is_wrong && 2.0 * out.turned_px < out.stated_px;
   return out;
 }
 

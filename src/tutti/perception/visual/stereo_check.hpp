@@ -12,12 +12,12 @@ namespace tutti::visual {
 
 /// By how much the second of two cameras is turned against its calibration.
 struct StereoTurn {
-  /// R_first_second = R_told Exp(turn_rad), about the second camera's axes.
+  /// R_first_second = R_stated Exp(turn_rad), about the second camera's axes.
   Eigen::Vector3d turn_rad = Eigen::Vector3d::Zero();
-  /// rad^2; from the points, plus kTold_rad for any calibration.
+  /// rad^2; from the points, plus kStated_rad for any calibration.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   /// Median distance from the epipolar lines, with the calibration as given and turned.
-  double told_px = 0.0, turned_px = 0.0;
+  double stated_px = 0.0, turned_px = 0.0;
   bool is_wrong = false;   ///< The turn exceeds kMaxSigmas, or more than kMax_px is left when turned.
   bool is_turned = false;  ///< Wrong, and the turn explains more than half of the distance.
 };
@@ -30,7 +30,7 @@ class StereoCheck {
  public:
   static constexpr std::size_t kFew = 200;  ///< Fewer points determine nothing.
   /// Standard deviation of any calibration: 0.05 degrees (EuRoC's cameras are 0.025 off).
-  static constexpr double kTold_rad = 0.0009;
+  static constexpr double kStated_rad = 0.0009;
   static constexpr double kMaxSigmas = 4.0;
   static constexpr double kMax_px = 1.0;  ///< The median distance's limit (EuRoC 0.07, simulated cameras 0.2).
   StereoCheck(Camera first, Camera second) : first_(std::move(first)), second_(std::move(second)) {}

@@ -46,12 +46,12 @@ TEST(StereoCheck, MeasuresATurnAboutAnyAxis) {
         Eigen::Vector3d::Unit(static_cast<int>(seed % 3)) * (seed % 2 == 0 ? 0.9 : -3.0) * kRadPerDeg;
     const auto found = turn_between(turn, seed);
     ASSERT_TRUE(found.has_value());
-    EXPECT_TRUE(found->is_wrong && (found->is_turned || seed % 2 == 0)) << seed << ' ' << found->told_px;
+    EXPECT_TRUE(found->is_wrong && (found->is_turned || seed % 2 == 0)) << seed << ' ' << found->stated_px;
     EXPECT_LT(found->turned_px, 0.5);
     const Eigen::Vector3d error = found->turn_rad - turn;
     EXPECT_LT(error.norm(), 0.1 * kRadPerDeg) << seed << ": " << found->turn_rad.transpose();
     const Eigen::Matrix3d by_points =
-        found->covariance - StereoCheck::kTold_rad * StereoCheck::kTold_rad * Eigen::Matrix3d::Identity();
+        found->covariance - StereoCheck::kStated_rad * StereoCheck::kStated_rad * Eigen::Matrix3d::Identity();
     chi2 += error.dot(by_points.inverse() * error);
   }
   EXPECT_GT(chi2 / 12.0, 0.8);  // 3 is honest
@@ -67,7 +67,7 @@ TEST(StereoCheck, ARightCalibrationIsBelieved) {
 
 TEST(StereoCheck, AWrongFocalLengthIsNoTurn) {
   const auto found = turn_between({0.0, 0.0, 0.0}, 1, 1500, 0.3, 1.03);
-  EXPECT_TRUE(found->is_wrong && !found->is_turned) << found->told_px << ' ' << found->turned_px;
+  EXPECT_TRUE(found->is_wrong && !found->is_turned) << found->stated_px << ' ' << found->turned_px;
 }
 
 }  // namespace stereo_check_test

@@ -17,7 +17,7 @@ using internal::write;
 
 }  // namespace
 
-std::int64_t told(Timestamp stamp, std::int64_t offset_ns) {
+std::int64_t client_stamp_ns(Timestamp stamp, std::int64_t offset_ns) {
   std::int64_t out = 0;
   if (!__builtin_sub_overflow(stamp.ns, offset_ns, &out)) return out;
   return offset_ns > 0 ? kFirstTimestamp.ns : kLastTimestamp.ns;
@@ -47,7 +47,7 @@ std::string welcome_frame(const FeedState& state, const Pose3& T_map_odom, std::
   out.set_robot(state.chain.robot.value);
   out.set_session(state.chain.session);
   out.set_has_odometry(state.newest.has_value());
-  if (state.newest) out.set_last_stamp_ns(told(state.newest->stamp, offset_ns));
+  if (state.newest) out.set_last_stamp_ns(client_stamp_ns(state.newest->stamp, offset_ns));
   write(T_map_odom, *out.mutable_t_map_odom());
   for (const char* kind : kFromClient) out.add_takes(kind);
   out.set_clock_offset_ns(offset_ns);
@@ -58,7 +58,7 @@ std::string correction_frame(const FeedState& state, const SmoothMap::Answer& an
                              std::int64_t offset_ns) {
   v1::Feed message;
   auto& out = *message.mutable_correction();
-  out.set_stamp_ns(told(state.newest->stamp, offset_ns));
+  out.set_stamp_ns(client_stamp_ns(state.newest->stamp, offset_ns));
   write(answer.T_map_odom * state.newest->pose, *out.mutable_t_map_body());
   write(answer.T_map_odom, *out.mutable_t_map_odom());
   for (const double x : answer.covariance.reshaped()) out.add_t_map_odom_covariance(x);
@@ -68,7 +68,7 @@ std::string correction_frame(const FeedState& state, const SmoothMap::Answer& an
   out.set_wants_scan(state.wants_scan);
   out.set_dropped(dropped);
   out.set_has_stored(state.stored.has_value());
-  if (state.stored) out.set_stored_stamp_ns(told(*state.stored, offset_ns));
+  if (state.stored) out.set_stored_stamp_ns(client_stamp_ns(*state.stored, offset_ns));
   return framed(message);
 }
 
@@ -76,7 +76,7 @@ std::string jump_frame(const FeedState& state, const SmoothMap::Jump& jump, std:
                        const std::string& why) {
   v1::Feed message;
   auto& out = *message.mutable_jump();
-  out.set_stamp_ns(told(state.newest->stamp, offset_ns));
+  out.set_stamp_ns(client_stamp_ns(state.newest->stamp, offset_ns));
   write(jump.from, *out.mutable_t_map_odom_from());
   write(jump.to, *out.mutable_t_map_odom_to());
   out.set_translation_m(jump.translation_m);
@@ -102,9 +102,9 @@ std::string situation_frame(const FeedState& state, std::int64_t offset_ns) {
   for (const FeedAlert& alert : state.alerts) {
     auto& to = *out.add_alert();
     to.set_text(plain_text(alert.text));
-    to.set_since_stamp_ns(told(alert.since, offset_ns));
-    to.set_from_stamp_ns(told(alert.from, offset_ns));
-    to.set_until_stamp_ns(told(alert.until, offset_ns));
+    to.set_since_stamp_ns(client_stamp_ns(alert.since, offset_ns));
+    to.set_from_stamp_ns(client_stamp_ns(alert.from, offset_ns));
+    to.set_until_stamp_ns(client_stamp_ns(alert.until, offset_ns));
   }
   if (state.status)
     for (const auto& [name, text] : *state.status) {
@@ -117,7 +117,7 @@ std::string situation_frame(const FeedState& state, std::int64_t offset_ns) {
 
 std::string refused_frame(Timestamp stamp, const std::string& why, std::int64_t offset_ns) {
   v1::Feed message;
-  message.mutable_refused()->set_stamp_ns(told(stamp, offset_ns));
+  message.mutable_refused()->set_stamp_ns(client_stamp_ns(stamp, offset_ns));
   message.mutable_refused()->set_why(plain_text(why));
   return framed(message);
 }
@@ -131,7 +131,7 @@ std::string time_answer_frame(std::int64_t client_now_ns, Timestamp robot_now, s
   out.set_clock_offset_ns(offset_ns);
   out.set_measured_offset_ns(measured_ns);
   out.set_has_stored(stored.has_value());
-  if (stored) out.set_stored_stamp_ns(told(*stored, offset_ns));
+  if (stored) out.set_stored_stamp_ns(client_stamp_ns(*stored, offset_ns));
   return framed(message);
 }
 
@@ -146,7 +146,7 @@ std::optional<std::string> trajectory_frame(const FeedTrajectory& trajectory, st
   out.set_constraints(trajectory.constraints);
   const auto add = [&](const Trajectory& poses, auto& stamps, auto& numbers) {
     for (const auto& [stamp, pose] : poses) {
-      stamps.Add(told(stamp, offset_ns));
+      stamps.Add(client_stamp_ns(stamp, offset_ns));
       for (const double x : pose.translation) numbers.Add(x);
       for (const double x : pose.rotation.coeffs()) numbers.Add(x);  // x y z w
     }

@@ -91,7 +91,7 @@ using FromClient = std::variant<FeedHello, node::OdometrySample, Scan, FeedEnd, 
 Result<FromClient> decode_from_client(std::string_view payload);
 
 /// A stamp by the clock of a client whose stamps `offset_ns` is added to.
-std::int64_t told(Timestamp stamp, std::int64_t offset_ns);
+std::int64_t client_stamp_ns(Timestamp stamp, std::int64_t offset_ns);
 
 /// The robot's messages, each as a whole frame. `offset_ns` is FeedClock::offset_ns(): stamps are sent by the client's
 /// clock.

@@ -6,7 +6,7 @@
 
 namespace tutti::program {
 
-Timestamp FeedSession::by_client(Timestamp stamp) const { return {told(stamp, last_.clock.offset_ns())}; }
+Timestamp FeedSession::by_client(Timestamp stamp) const { return {client_stamp_ns(stamp, last_.clock.offset_ns())}; }
 
 FeedState FeedSession::state() const {
   FeedState out = target_.state();

@@ -88,7 +88,7 @@ Message radio_message(const program::RadioCount::Sums& radio, double time_s) {
   return {"radio", time_s, text_of(out)};
 }
 
-void Metrics::tell(const MissionStatus& status, const program::RadioCount::Sums& radio) {
+void Metrics::update(const MissionStatus& status, const program::RadioCount::Sums& radio) {
   const std::scoped_lock lock(mutex_);
   last_ = status;
   radio_ = radio;

@@ -17,7 +17,7 @@ namespace tutti::page {
 /// tutti_radio_bytes_total and tutti_radio_messages_total. May be called from several threads.
 class Metrics {
  public:
-  void tell(const MissionStatus& status, const program::RadioCount::Sums& radio = {});
+  void update(const MissionStatus& status, const program::RadioCount::Sums& radio = {});
   /// The text format of Prometheus, version 0.0.4.
   [[nodiscard]] std::string text() const;
   /// The server's trouble; empty: it is well; nothing: nothing is known yet.

@@ -31,7 +31,7 @@ TEST(Metrics, HasTheNumbersOfEveryone) {
   Metrics metrics;
   EXPECT_EQ(metrics.text(), "");
   EXPECT_FALSE(metrics.trouble().has_value());
-  metrics.tell(status());
+  metrics.update(status());
   const std::string text = metrics.text();
   for (const char* line :
        {"tutti_mission_revision 8\n", "tutti_robot_submaps{name=\"al\\\"pha \"} 9\n",
@@ -62,7 +62,7 @@ program::RadioCount some_radio() {
 TEST(Metrics, CountsTheRadioByRobotAndKind) {
   Metrics metrics;
   const auto radio = some_radio();
-  metrics.tell(status(), radio.sums());
+  metrics.update(status(), radio.sums());
   const std::string text = metrics.text();
   for (const char* line : {"tutti_radio_bytes_total{name=\"al\\\"pha \",direction=\"up\",kind=\"submap\"} 150\n",
                            "tutti_radio_messages_total{name=\"al\\\"pha \",direction=\"up\",kind=\"submap\"} 2\n",
@@ -81,7 +81,7 @@ std::set<std::string> all_metrics() {
   Rng rng(3);
   for (int i = 0; i < 40; ++i) {
     Metrics metrics;
-    metrics.tell(wire::test::any_mission_status(rng), some_radio().sums());
+    metrics.update(wire::test::any_mission_status(rng), some_radio().sums());
     const std::string text = metrics.text();
     for (auto at = std::sregex_iterator(text.begin(), text.end(), type); at != std::sregex_iterator(); ++at)
       out.insert((*at)[1]);
@@ -115,7 +115,7 @@ TEST(RadioCount, IsBounded) {
 /// https://prometheus.io/docs/instrumenting/exposition_formats/
 TEST(Metrics, IsWhatPrometheusReads) {
   Metrics metrics;
-  metrics.tell(status(), some_radio().sums());
+  metrics.update(status(), some_radio().sums());
   std::istringstream lines(metrics.text());
   const std::regex sample(R"re(([a-z_]+)(\{[a-z_]+="([^"\\]|\\.)*"(,[a-z_]+="([^"\\]|\\.)*")*\})? [-+0-9.e]+)re");
   const std::regex type("# TYPE ([a-z_]+) (gauge|counter)");

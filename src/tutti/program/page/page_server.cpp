@@ -146,11 +146,11 @@ class PageViewer final : public program::MapViewer {
     }
     changed_.notify_one();
   }
-  void tell(const MissionStatus& status, const program::RadioCount::Sums& radio) override {
+  void show_status(const MissionStatus& status, const program::RadioCount::Sums& radio) override {
     const double time_s = status.time - Timestamp{};
     site_.time_s = time_s;
     const auto alerts = joined(alerts_.of_status(status), map_alerts());
-    site_.metrics.tell(status, radio);
+    site_.metrics.update(status, radio);
     const auto held = site_.held.with([&](Holders& holders) { return holders.message(Clock::steady_s(), time_s); });
     site_.board.put([&](Board& board) {
       board.put(held);

@@ -33,10 +33,10 @@ RosImages::RosImages(Options options, std::shared_ptr<Participant> participant, 
       complaints_(complaints),
       begin_s_(program::Clock::steady_s()) {}
 
-void RosImages::look(program::LocalClient& client) {
+void RosImages::check_topics(program::LocalClient& client) {
   const double now_s = program::Clock::steady_s();
-  if (now_s - looked_s_ < kCheck_s) return;
-  looked_s_ = now_s;
+  if (now_s - checked_s_ < kCheck_s) return;
+  checked_s_ = now_s;
   if (readers_.empty())
     find(client, now_s);
   else

@@ -29,7 +29,7 @@ class RosImages {
 
   /// Finds topics, until cameras are subscribed, and informs the robot which they are; after that, which of them it
   /// uses. To be called often.
-  void look(program::LocalClient& client);
+  void check_topics(program::LocalClient& client);
   /// Visits everything that is subscribed.
   void take(const std::function<void(Reader&)>& take) const;
   /// The robot must be informed again.
@@ -44,10 +44,10 @@ class RosImages {
   std::shared_ptr<Participant> participant_;
   Complaints& complaints_;
   std::vector<std::unique_ptr<Reader>> readers_;
-  std::vector<intake::CameraTopics> seen_;  ///< The topics that were published when it was looked last.
+  std::vector<intake::CameraTopics> seen_;  ///< The topics that were published at the last check.
   std::vector<intake::CameraTopics> refused_;
   std::string seen_imu_, said_;
-  double begin_s_, looked_s_ = 0.0;
+  double begin_s_, checked_s_ = 0.0;
 };
 
 }  // namespace tutti::ros

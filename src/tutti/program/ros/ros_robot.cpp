@@ -190,7 +190,7 @@ void Robot::turn() {
   } else {
     participant_->wait(kWait_s);
     complaints_.add(options_.points, subscribe_points());
-    if (images_) images_->look(*client_);
+    if (images_) images_->check_topics(*client_);
     take_messages();
     end_recording();
   }

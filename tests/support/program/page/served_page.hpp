@@ -65,7 +65,7 @@ class ServedPage : public ::testing::Test {
     ASSERT_TRUE(made.has_value()) << made.error().message;
     viewer_ = std::move(*made);
     viewer_->show(map_);
-    viewer_->tell({.time = Timestamp{} + 5.0, .revision = 3}, {});
+    viewer_->show_status({.time = Timestamp{} + 5.0, .revision = 3}, {});
     takes_ = std::thread([this] {
       while (!stop_) {
         for (program::AskedDecision& asked : viewer_->take_decisions()) {

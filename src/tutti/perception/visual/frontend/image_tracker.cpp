@@ -66,7 +66,7 @@ void ImageTracker::add_depth(const SeenImages& seen, std::vector<TrackedImage>& 
   }
   if (auto amiss = depth_watch_.add(*depth, *depth_)) errors_.push_back({ErrorCode::invalid, *std::move(amiss)});
   tracked.push_back(view_by_depth(tracked.front(), *depth, *depth_, of_images_.front(), cameras_->at(1),
-                                  kOfOneImage + (seen.moment << kNumberBits)));
+                                  kOfOneImage + (seen.instant << kNumberBits)));
 }
 
 }  // namespace tutti::visual

@@ -18,7 +18,7 @@ namespace tutti::visual {
 /// The images of a robot's cameras at one time.
 struct SeenImages {
   Timestamp stamp;
-  std::uint64_t moment = 0;           ///< Larger than that of all images before; track numbers are derived from it.
+  std::uint64_t instant = 0;          ///< Larger than that of all images before; track numbers are derived from it.
   std::vector<Result<Image>> images;  ///< One per camera; an empty image is a missing one.
   std::function<Result<DepthImage>()> load_depth = {};  ///< Called at keyframes; empty without depth.
 };

@@ -126,7 +126,7 @@ std::optional<Error> judge_turn(ImageStream& stream, const Trajectory& odometry,
     stream.cameras.resize(1);
   }
   const std::string what =
-      fmt::format("what both cameras see is {:.2f} px off its epipolar lines (median)", turn->told_px);
+      fmt::format("what both cameras see is {:.2f} px off its epipolar lines (median)", turn->stated_px);
   const std::string then = correct ? "it is turned so" : "it is not used (tracking.turned_stereo)";
   if (!turn->is_turned)
     return Error{ErrorCode::invalid, fmt::format("{}, {:.2f} however the second one is turned: check focal lengths, "
@@ -205,7 +205,7 @@ void TrackingSource::check_clock() {
 }
 
 std::vector<TrackedImage> TrackingSource::track(std::size_t instant, bool keyframe) {
-  SeenImages seen{.stamp = stream_.stamps[instant], .moment = instant, .images = {}};
+  SeenImages seen{.stamp = stream_.stamps[instant], .instant = instant, .images = {}};
   for (std::size_t camera = 0; camera < stream_.cameras.size(); ++camera)
     seen.images.push_back(stream_.load(instant, camera));
   if (stream_.load_depth) seen.load_depth = [&] { return stream_.load_depth(instant); };

@@ -209,7 +209,7 @@ TEST(VisualTracker, RealCamerasShowHowTheyAreTurned) {
   std::vector<Camera> cameras = visnav_cameras();
   const StereoTurn right = turn(cameras);
   EXPECT_FALSE(right.is_wrong) << right.turn_rad.transpose();
-  EXPECT_LT(right.told_px, 0.3);
+  EXPECT_LT(right.stated_px, 0.3);
   const Eigen::Quaterniond between = cameras[0].T_body_camera.rotation.conjugate() * cameras[1].T_body_camera.rotation;
   cameras[1].T_body_camera.rotation = cameras[0].T_body_camera.rotation * between.conjugate();
   const StereoTurn wrong = turn(cameras);

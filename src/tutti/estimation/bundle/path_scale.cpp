@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/estimation/bundle/way_scale.hpp"
+#include "tutti/estimation/bundle/path_scale.hpp"
 
 #include <cmath>
 
 namespace tutti::bundle {
 
-WayScale way_scale(const std::vector<ComparedStep>& steps, const BundleSolution& solution, const Posterior& posterior) {
+PathScale path_scale(const std::vector<ComparedStep>& steps, const BundleSolution& solution,
+                     const Posterior& posterior) {
   double square_m2 = 0.0, product_m2 = 0.0;
   std::vector<std::pair<std::size_t, Vector6d>> gradient;
   for (const ComparedStep& step : steps) {

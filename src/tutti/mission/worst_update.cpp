@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/mission/worst_moment.hpp"
+#include "tutti/mission/worst_update.hpp"
 
 #include <algorithm>
 
@@ -7,12 +7,12 @@ namespace tutti::mission {
 namespace {
 
 template <class Rmse>
-std::optional<WorstMoment> worst_moment(std::span<const UpdateRecord> updates, const Rmse& rmse_of) {
-  std::optional<WorstMoment> worst;
+std::optional<WorstUpdate> worst_update(std::span<const UpdateRecord> updates, const Rmse& rmse_of) {
+  std::optional<WorstUpdate> worst;
   for (const UpdateRecord& update : updates) {
     const std::optional<double> rmse_m = rmse_of(update);
     if (!rmse_m || !update.onboard_rmse_m) continue;
-    const WorstMoment candidate{update.time_s, *rmse_m, *update.onboard_rmse_m};
+    const WorstUpdate candidate{update.time_s, *rmse_m, *update.onboard_rmse_m};
     if (!worst || candidate.rmse_m - candidate.onboard_rmse_m > worst->rmse_m - worst->onboard_rmse_m)
       worst = candidate;
   }
@@ -21,12 +21,12 @@ std::optional<WorstMoment> worst_moment(std::span<const UpdateRecord> updates, c
 
 }  // namespace
 
-std::optional<WorstMoment> worst_of_server(std::span<const UpdateRecord> updates) {
-  return worst_moment(updates, [](const UpdateRecord& update) { return update.server_rmse_m; });
+std::optional<WorstUpdate> worst_of_server(std::span<const UpdateRecord> updates) {
+  return worst_update(updates, [](const UpdateRecord& update) { return update.server_rmse_m; });
 }
 
-std::optional<WorstMoment> worst_of_policy(std::span<const UpdateRecord> updates, const std::string& policy) {
-  return worst_moment(updates, [&](const UpdateRecord& update) -> std::optional<double> {
+std::optional<WorstUpdate> worst_of_policy(std::span<const UpdateRecord> updates, const std::string& policy) {
+  return worst_update(updates, [&](const UpdateRecord& update) -> std::optional<double> {
     const auto answer = std::ranges::find(update.answers, policy, &AnswerRecord::policy);
     return answer == update.answers.end() ? std::nullopt : answer->rmse_m;
   });

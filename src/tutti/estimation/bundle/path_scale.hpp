@@ -20,12 +20,13 @@ struct ComparedStep {
 /// How much longer a solution makes steps than expected: the factor of the least-squares fit of the solution's
 /// translations to the expected ones, in which long steps count most, so that the noise of a robot that stands still
 /// does not count as distance.
-struct WayScale {
+struct PathScale {
   double scale = 1.0;
   double variance = 0.0;  ///< That of `scale`, by the posterior.
-  double way_m = 0.0;  ///< Root of the weighted sum of squared expected lengths; 0 means that there is no distance and
-                       ///< `scale` has no meaning.
+  double length_m = 0.0;  ///< Root of the weighted sum of squared expected lengths; 0 means that there is no distance
+                          ///< and `scale` has no meaning.
 };
-WayScale way_scale(const std::vector<ComparedStep>& steps, const BundleSolution& solution, const Posterior& posterior);
+PathScale path_scale(const std::vector<ComparedStep>& steps, const BundleSolution& solution,
+                     const Posterior& posterior);
 
 }  // namespace tutti::bundle

@@ -8,7 +8,7 @@
 namespace tutti {
 
 /// Length of the path that these steps make, in metres.
-inline double way_m(std::span<const RelativePose> steps) {
+inline double path_length_m(std::span<const RelativePose> steps) {
   double sum = 0.0;
   for (const RelativePose& step : steps) sum += step.T_a_b.translation.norm();
   return sum;
