@@ -62,7 +62,7 @@ class ClosureVerifier {
   [[nodiscard]] virtual Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                                       const PayloadStore& payloads) const = 0;
   /// What is known of a pair that an operator inspects.
-  struct Look {
+  struct Inspection {
     std::optional<LoopClosure> best;  ///< The best alignment that can be measured, also where verify() refuses it.
     std::optional<Refusal> refusal;   ///< Why verify() would refuse it, or why there is none.
     std::vector<Refusal> evidence;    ///< Every gate's value and limit, as far as they were measured.
@@ -70,11 +70,12 @@ class ClosureVerifier {
   /// The same question from somebody who may know better: with `T_first_second` (of the two submap frames) the
   /// alignment nearest to it. Expensive, and no verdict: its closure is an operator's to keep
   /// (ClosureDecision::by_hand).
-  [[nodiscard]] virtual Result<Look> look(const Submap& first, const Submap& second, const PayloadStore& payloads,
-                                          const std::optional<Pose3>& /*T_first_second*/) const {
+  [[nodiscard]] virtual Result<Inspection> inspect(const Submap& first, const Submap& second,
+                                                   const PayloadStore& payloads,
+                                                   const std::optional<Pose3>& /*T_first_second*/) const {
     auto verdict = verify(first, second, payloads);
     if (!verdict) return tl::unexpected(verdict.error());
-    Look out{.best = {}, .refusal = verdict->refusal, .evidence = verdict->evidence};
+    Inspection out{.best = {}, .refusal = verdict->refusal, .evidence = verdict->evidence};
     if (!verdict->closures.empty()) out.best = verdict->closures.front();
     return out;
   }
@@ -87,8 +88,8 @@ class ClosureVerifier {
 };
 
 /// Another verifier, of which who derives from this changes what it overrides. All else is the other verifier's, also
-/// what verifiers are asked in later versions; look() too, so that who changes what verify() finds also determines what
-/// look() shows.
+/// what verifiers are asked in later versions; inspect() too, so that who changes what verify() finds also determines
+/// what inspect() shows.
 class WrappedVerifier : public ClosureVerifier {
  public:
   [[nodiscard]] MethodId id() const override { return wrapped_->id(); }
@@ -109,9 +110,9 @@ class WrappedVerifier : public ClosureVerifier {
                                               const PayloadStore& payloads) const override {
     return wrapped_->verify(first, second, payloads);
   }
-  [[nodiscard]] Result<Look> look(const Submap& first, const Submap& second, const PayloadStore& payloads,
-                                  const std::optional<Pose3>& T_first_second) const override {
-    return wrapped_->look(first, second, payloads, T_first_second);
+  [[nodiscard]] Result<Inspection> inspect(const Submap& first, const Submap& second, const PayloadStore& payloads,
+                                           const std::optional<Pose3>& T_first_second) const override {
+    return wrapped_->inspect(first, second, payloads, T_first_second);
   }
   [[nodiscard]] std::vector<Timestamp> known_at(const Submap& first, const Submap& second) const override {
     return wrapped_->known_at(first, second);

@@ -58,9 +58,9 @@ Result<ClosureVerdict> LidarClosureVerifier::verify(const Submap& first, const S
   return verdict;
 }
 
-Result<LidarClosureVerifier::Look> LidarClosureVerifier::look(const Submap& first, const Submap& second,
-                                                              const server::PayloadStore& payloads,
-                                                              const std::optional<Pose3>& T_first_second) const {
+Result<LidarClosureVerifier::Inspection> LidarClosureVerifier::inspect(
+    const Submap& first, const Submap& second, const server::PayloadStore& payloads,
+    const std::optional<Pose3>& T_first_second) const {
   const auto a = features_of(first, payloads);
   if (!a) return tl::unexpected(a.error());
   const auto b = features_of(second, payloads);
@@ -73,7 +73,7 @@ Result<LidarClosureVerifier::Look> LidarClosureVerifier::look(const Submap& firs
     seen = lidar::verify_near(**a, **b, T_first_second.value_or(seen.T_a_b), config_);
     if (!T_first_second && refusal) seen.refusal = refusal;
   }
-  Look out{.best = {}, .refusal = seen.refusal, .evidence = seen.evidence};
+  Inspection out{.best = {}, .refusal = seen.refusal, .evidence = seen.evidence};
   if (seen.evidence.empty()) return out;
   seen.accepted = true;
   seen.refusal.reset();
@@ -171,14 +171,14 @@ Result<ClosureVerdict> JointClosureVerifier::verify(const Submap& first, const S
   return out;
 }
 
-Result<JointClosureVerifier::Look> JointClosureVerifier::look(const Submap& first, const Submap& second,
-                                                              const server::PayloadStore& payloads,
-                                                              const std::optional<Pose3>& T_first_second) const {
-  Look out{.best = {}, .refusal = Refusal{RefusalReason::other}, .evidence = {}};
+Result<JointClosureVerifier::Inspection> JointClosureVerifier::inspect(
+    const Submap& first, const Submap& second, const server::PayloadStore& payloads,
+    const std::optional<Pose3>& T_first_second) const {
+  Inspection out{.best = {}, .refusal = Refusal{RefusalReason::other}, .evidence = {}};
   for (const auto& verifier : verifiers_) {
-    auto look = verifier->look(first, second, payloads, T_first_second);
-    if (!look || look->best) return look;
-    if (look->refusal && look->refusal->reason != RefusalReason::too_small) out = std::move(*look);
+    auto inspection = verifier->inspect(first, second, payloads, T_first_second);
+    if (!inspection || inspection->best) return inspection;
+    if (inspection->refusal && inspection->refusal->reason != RefusalReason::too_small) out = std::move(*inspection);
   }
   return out;
 }

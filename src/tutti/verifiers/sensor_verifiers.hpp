@@ -33,8 +33,9 @@ class LidarClosureVerifier final : public server::ClosureVerifier {
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override;
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const server::PayloadStore& payloads) const override;
-  [[nodiscard]] Result<Look> look(const Submap& first, const Submap& second, const server::PayloadStore& payloads,
-                                  const std::optional<Pose3>& T_first_second) const override;
+  [[nodiscard]] Result<Inspection> inspect(const Submap& first, const Submap& second,
+                                           const server::PayloadStore& payloads,
+                                           const std::optional<Pose3>& T_first_second) const override;
   [[nodiscard]] std::string place_of(const Submap& submap) const override;
   [[nodiscard]] bool can_rank(std::string_view place) const override;
   [[nodiscard]] std::vector<Likeness> likeness(std::string_view place,
@@ -90,8 +91,9 @@ class JointClosureVerifier final : public server::ClosureVerifier {
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override;
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const server::PayloadStore& payloads) const override;
-  [[nodiscard]] Result<Look> look(const Submap& first, const Submap& second, const server::PayloadStore& payloads,
-                                  const std::optional<Pose3>& T_first_second) const override;
+  [[nodiscard]] Result<Inspection> inspect(const Submap& first, const Submap& second,
+                                           const server::PayloadStore& payloads,
+                                           const std::optional<Pose3>& T_first_second) const override;
   [[nodiscard]] std::string place_of(const Submap& submap) const override;
   [[nodiscard]] bool can_rank(std::string_view place) const override { return !parts_of(place).empty(); }
   [[nodiscard]] std::vector<Likeness> likeness(std::string_view place,

@@ -32,9 +32,10 @@ class ExplainingVerifier final : public server::WrappedVerifier {
     return verdict;
   }
   /// What verify() finds, not what the wrapped verifier would.
-  [[nodiscard]] Result<Look> look(const Submap& first, const Submap& second, const server::PayloadStore& payloads,
-                                  const std::optional<Pose3>& T_first_second) const override {
-    return ClosureVerifier::look(first, second, payloads, T_first_second);
+  [[nodiscard]] Result<Inspection> inspect(const Submap& first, const Submap& second,
+                                           const server::PayloadStore& payloads,
+                                           const std::optional<Pose3>& T_first_second) const override {
+    return ClosureVerifier::inspect(first, second, payloads, T_first_second);
   }
 };
 

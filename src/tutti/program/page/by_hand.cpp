@@ -15,7 +15,7 @@ namespace {
 constexpr std::size_t kMostFound = 32;
 
 Pose3 asked_order(const ByHand::Seen& seen) {
-  const Pose3 T_first_second = between_submaps(*seen.map, seen.pair, *seen.look.best);
+  const Pose3 T_first_second = between_submaps(*seen.map, seen.pair, *seen.inspection.best);
   return seen.is_turned ? T_first_second.inverse() : T_first_second;
 }
 
@@ -39,20 +39,20 @@ Result<mapfile::ShownMap> map_with(const mapfile::ShownMap& map, const storage::
 
 }  // namespace
 
-void ByHand::look(const Json& body, Response& response) {
+void ByHand::inspect(const Json& body, Response& response) {
   const auto seen = look_at(body, response);
   if (!seen) return;
-  Json out{{"found", seen->look.best.has_value()},
-           {"why", seen->look.refusal ? to_string(*seen->look.refusal) : "every gate is passed"},
-           {"hint", seen->look.refusal ? mapfile::hint_for(seen->look.refusal->reason) : ""},
+  Json out{{"found", seen->inspection.best.has_value()},
+           {"why", seen->inspection.refusal ? to_string(*seen->inspection.refusal) : "every gate is passed"},
+           {"hint", seen->inspection.refusal ? mapfile::hint_for(seen->inspection.refusal->reason) : ""},
            {"name", seen->name},
-           {"evidence", Json::parse(evidence_text(seen->look.evidence))},
+           {"evidence", Json::parse(evidence_text(seen->inspection.evidence))},
            {"T_from_to", nullptr},
            {"look", nullptr}};
-  if (seen->look.best) {
+  if (seen->inspection.best) {
     out["T_from_to"] = Json::parse(pose_text(asked_order(*seen)));
     const std::scoped_lock lock(mutex_);
-    found_[++found_so_far_] = {seen->pair, *seen->look.best};
+    found_[++found_so_far_] = {seen->pair, *seen->inspection.best};
     if (found_.size() > kMostFound) found_.erase(found_.begin());
     out["look"] = found_so_far_;
   }
@@ -103,9 +103,9 @@ std::optional<ByHand::Seen> ByHand::look_at(const Json& body, Response& response
   out.pair = {first->first, second->first};
   out.name = out.map->content.closure_names().of(out.pair);
   const std::scoped_lock one_at_a_time(looks_);
-  auto look = site_.verifier->look(*first->second, *second->second, *site_.clouds, T_first_second);
-  if (!look) return refuse(500, look.error().message);
-  out.look = std::move(*look);
+  auto inspection = site_.verifier->inspect(*first->second, *second->second, *site_.clouds, T_first_second);
+  if (!inspection) return refuse(500, inspection.error().message);
+  out.inspection = std::move(*inspection);
   return out;
 }
 

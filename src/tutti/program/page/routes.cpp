@@ -146,15 +146,15 @@ class Routes {
     if (give(visitor, body, std::move(decision), response)) say(response, Json::object());
   }
 
-  /// Keeps what ByHand::look() shows as the operator's own closure.
+  /// Keeps what ByHand::inspect() shows as the operator's own closure.
   void keep(const Visitor& visitor, const Json& body, Response& response) {
     const auto seen = by_hand.look_at(body, response);
     if (!seen) return;
-    if (!seen->look.best)
+    if (!seen->inspection.best)
       return say(response, 409,
                  "there is no alignment to keep: " +
-                     (seen->look.refusal ? to_string(*seen->look.refusal) : std::string("none")));
-    ClosureDecision decision{.closure = seen->name, .wish = Wish::accept, .by_hand = {*seen->look.best}};
+                     (seen->inspection.refusal ? to_string(*seen->inspection.refusal) : std::string("none")));
+    ClosureDecision decision{.closure = seen->name, .wish = Wish::accept, .by_hand = {*seen->inspection.best}};
     if (give(visitor, body, std::move(decision), response)) say(response, Json{{"name", seen->name}});
   }
 
@@ -316,7 +316,7 @@ void add_routes(httplib::Server& server, Site& site) {
     routes->decide(visitor, body, r);
   }));
   server.Post("/api/register", routes->decided([routes](const Visitor&, const Json& body, Response& r) {
-    routes->by_hand.look(body, r);
+    routes->by_hand.inspect(body, r);
   }));
   server.Post("/api/change", routes->decided([routes](const Visitor&, const Json& body, Response& r) {
     routes->by_hand.change(body, r);

@@ -24,13 +24,13 @@ class ByHand {
     SubmapPair pair;
     bool is_turned = false;  ///< The page has asked for them in the opposite order.
     std::string name;
-    server::ClosureVerifier::Look look;
+    server::ClosureVerifier::Inspection inspection;
   };
   /// Nothing: the answer has the reason.
   std::optional<Seen> look_at(const Json& body, Response& response);
 
   /// Compares two submaps.
-  void look(const Json& body, Response& response);
+  void inspect(const Json& body, Response& response);
   /// The map as it would be with a closure that was looked at.
   void change(const Json& body, Response& response);
 
