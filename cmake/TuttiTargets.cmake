@@ -56,11 +56,11 @@ function(tutti_target_options target)
       set_target_properties(${target} PROPERTIES CXX_LINKER_LAUNCHER "${with_clang};--")
     endif()
     if(target IN_LIST TUTTI_SANITIZE_ONLY OR (NOT TUTTI_SANITIZE_ONLY AND NOT ARG_TEST))
-      # Without UBSan's checks of every pointer, which double the time to compile: ASan finds null and wild ones, and
-      # nothing here reads through a cast pointer. With assertions, Eigen's among them.
+      # Without UBSan's checks of every pointer, which double the time to compile: ASan finds null and wild ones where they
+      # are used, and nothing here reads through a cast pointer. With assertions, Eigen's among them.
       # What is instrumented looks uninitialised to GCC 12 where it is not (Eigen's assignments).
       target_compile_options(${target} PRIVATE -fsanitize=${TUTTI_SANITIZE} -fno-omit-frame-pointer
-                                               -fno-sanitize=null,alignment,object-size -fno-sanitize-recover=all
+                                               -fno-sanitize=null,alignment,object-size,pointer-overflow -fno-sanitize-recover=all
                                                -O1 -g1 -UNDEBUG -Wno-error=maybe-uninitialized)
       # Eigen otherwise pads what it allocates under ASan, and files without it would free that wrongly.
       target_compile_definitions(${target} PRIVATE EIGEN_MALLOC_ALREADY_ALIGNED=1)
@@ -219,16 +219,17 @@ function(tutti_add_proto target file)
   endif()
 endfunction()
 
-# tutti_add_tests(<module> TESTS a internal/b.. [NO_THREADS c..] [NOT_SANITIZED d..] [LIBS libs..] [LABEL label] [TIMEOUT s])
+# tutti_add_tests(<module> TESTS a internal/b.. [NO_THREADS c..] [NOT_SANITIZED d..] [LIBS libs..] [LABEL label] [TIMEOUT s]
+#                 [WAITS_FOR who])
 # makes one executable test_<module> of a_test.cpp, internal/b_test.cpp.. and one ctest entry "module/a" for each file.
 # NO_THREADS: files that TSan would find nothing in. NOT_SANITIZED: files that would only repeat under a sanitizer what
 # others have run there. A file that includes RapidCheck is labelled `property`, any other `unit`, unless LABEL is
-# given.
+# given. WAITS_FOR: tutti_waits_for().
 function(tutti_add_tests module)
   if(NOT TUTTI_BUILD_TESTS)
     return()
   endif()
-  cmake_parse_arguments(ARG "" "LABEL;TIMEOUT" "TESTS;NO_THREADS;NOT_SANITIZED;LIBS" ${ARGN})
+  cmake_parse_arguments(ARG "" "LABEL;TIMEOUT;WAITS_FOR" "TESTS;NO_THREADS;NOT_SANITIZED;LIBS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
     if(TUTTI_SANITIZE)
@@ -277,16 +278,32 @@ function(tutti_add_tests module)
     add_test(NAME ${module}/${name} COMMAND ${target} --tutti_file=${file})
     set_tests_properties(${module}/${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS ${label}
                          SKIP_REGULAR_EXPRESSION "TUTTI_ALL_SKIPPED")
-    if(ARG_LABEL STREQUAL "system")
-      tutti_waits_much(${module}/${name})
+    if(ARG_WAITS_FOR)
+      tutti_waits_for(${ARG_WAITS_FOR} ${module}/${name})
+    else()
+      tutti_computes(${module}/${name})
+      if(label STREQUAL "mission") # the longest, begun before those that take no time
+        set_tests_properties(${module}/${name} PROPERTIES COST 100)
+      endif()
     endif()
   endforeach()
 endfunction()
 
-# A test of several processes, which mostly wait: scripts/test.sh runs one of these at a time, from the beginning on,
-# beside one other test on each core.
-function(tutti_waits_much test)
-  set_tests_properties(${test} PROPERTIES RESOURCE_LOCK system COST 1000)
+# How tests share the cores. scripts/test.sh gives ctest two slots for each core and one for each `who` of tutti_waits_for():
+# a test that computes takes the slots of one core, and one that mostly waits a single slot.
+
+# tutti_computes(<test>..)
+function(tutti_computes)
+  set_tests_properties(${ARGN} PROPERTIES PROCESSORS 2)
+endfunction()
+
+# tutti_waits_for(<who> <test>..): mostly waiting, for `programs` or for `nats` (nats-server and timeouts). They are begun
+# first, and of each `who` one at a time: more would disturb each other's times.
+function(tutti_waits_for who)
+  if(NOT who MATCHES "^(programs|nats)$")
+    message(FATAL_ERROR "waits for '${who}': expected programs or nats (scripts/test.sh counts them)")
+  endif()
+  set_tests_properties(${ARGN} PROPERTIES PROCESSORS 1 RESOURCE_LOCK ${who} COST 1000)
 endfunction()
 
 # Every *_test.cpp is in some list: a forgotten one would never fail.
