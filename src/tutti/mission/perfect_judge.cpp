@@ -14,17 +14,18 @@ std::optional<server::MapEstimate> judge_perfectly(const server::MapServer& serv
                                                    const evaluation::AssociationConfig& association,
                                                    const ClosureCheckConfig& check) {
   const server::MapServerState& state = server.state();
-  std::vector<LoopClosure> all;
-  for (const auto& [pair, verdict] : state.verdicts)
-    all.insert(all.end(), verdict.closures.begin(), verdict.closures.end());
-  const std::map<KeyframeId, Pose3> truth = true_ends(all, server.map(), robots, association);
   std::set<std::pair<KeyframeId, KeyframeId>> judged;
   for (const server::JudgedClosure& c : server.map().closures) judged.emplace(c.closure.from, c.closure.to);
   server::VerdictSet verdicts = state.verdicts;
+  std::vector<LoopClosure> all;
+  for (auto& [pair, verdict] : verdicts) {
+    std::erase_if(verdict.closures, [&](const LoopClosure& c) { return !judged.contains({c.from, c.to}); });
+    all.insert(all.end(), verdict.closures.begin(), verdict.closures.end());
+  }
+  const std::map<KeyframeId, Pose3> truth = true_ends(all, server.map(), robots, association);
   DecisionSet decisions = state.decisions;
   bool checked = false;
   for (auto& [pair, verdict] : verdicts) {
-    std::erase_if(verdict.closures, [&](const LoopClosure& c) { return !judged.contains({c.from, c.to}); });
     bool known = !verdict.closures.empty();
     std::erase_if(verdict.closures, [&](const LoopClosure& closure) {
       const auto error = closure_error(closure, truth);

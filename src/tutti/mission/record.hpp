@@ -343,6 +343,13 @@ struct RefinementTiming {
   double cpu_s = 0.0;
 };
 
+/// One of the server's updates: joint optimisation and proxy graph.
+struct UpdateTiming {
+  double time_s = 0.0;  ///< Mission time.
+  double took_ms = 0.0;
+  double cpu_ms = 0.0;
+};
+
 /// Everything that depends on this machine's clock; kept apart from all other figures.
 struct TimingRecord {
   std::string machine;  ///< CPU, threads, BLAS, in words.
@@ -350,7 +357,7 @@ struct TimingRecord {
   std::optional<double> rate;  ///< As given by --rate; nothing: as fast as possible.
   std::vector<PolicyTiming> policies;
   std::vector<double> server_verification_ms;  ///< One per candidate pair.
-  std::vector<double> server_optimisation_ms;
+  std::vector<UpdateTiming> server_updates;
   std::vector<RefinementTiming> server_refinements;
   ServerLoadRecord server_load;
   ServerWorkRecord server_work;

@@ -57,17 +57,19 @@ void ServerMeter::note_job(const std::string& job, double cpu_s) {
 
 /// The submaps are those that the update now ready is the first to contain. A lone core verifies a submap's pairs while
 /// it waits for the next update.
-void ServerMeter::note_update(double time_s, double took_ms) {
-  optimisation_ms_.push_back(took_ms);
+void ServerMeter::note_update(const UpdateTiming& update) {
+  updates_.push_back(update);
+  map_cpu_s_ += 1e-3 * update.cpu_ms;
   for (const Unanswered& submap : unanswered_)
-    update_latency_ms_.push_back(1e3 * std::max(time_s - submap.arrived_s, submap.verification_cpu_s) + took_ms);
+    update_latency_ms_.push_back(1e3 * std::max(update.time_s - submap.arrived_s, submap.verification_cpu_s) +
+                                 update.took_ms);
   unanswered_.clear();
   of_job_.clear();
 }
 
 void ServerMeter::record(double mission_s, TimingRecord& timing) const {
   timing.server_verification_ms = verifier_->took_ms();
-  timing.server_optimisation_ms = optimisation_ms_;
+  timing.server_updates = updates_;
   if (refiner_) timing.server_refinements = refiner_->took();
   timing.server_load = {.mission_s = mission_s,
                         .map_cpu_s = map_cpu_s_,

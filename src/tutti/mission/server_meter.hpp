@@ -76,10 +76,13 @@ class ServerMeter {
   /// Calls `step` of the server, which updates the map, and returns its result.
   template <class F>
   node::Step update(double time_s, F&& step) {
-    const CpuScope cpu(map_cpu_s_);
+    double cpu_s = 0.0;
     Stopwatch watch;
-    node::Step made = step();
-    note_update(time_s, watch.lap_ms());
+    node::Step made = [&] {
+      const CpuScope cpu(cpu_s);
+      return step();
+    }();
+    note_update({time_s, watch.lap_ms(), 1e3 * cpu_s});
     return made;
   }
   /// Calls `step` of a worker for this job, and returns its result.
@@ -104,14 +107,14 @@ class ServerMeter {
   [[nodiscard]] double refinement_cpu_s() const;
   void note_submap(double time_s, const node::Step& step);
   void note_job(const std::string& job, double cpu_s);
-  void note_update(double time_s, double took_ms);
+  void note_update(const UpdateTiming& update);
 
   std::shared_ptr<MeasuredVerifier> verifier_;
   std::shared_ptr<MeasuredRefiner> refiner_;
   double map_cpu_s_ = 0.0;
   std::vector<Unanswered> unanswered_;         // submaps that no broadcast contains yet
   std::map<std::string, std::size_t> of_job_;  // which of these the job verifies
-  std::vector<double> optimisation_ms_;
+  std::vector<UpdateTiming> updates_;
   std::vector<double> update_latency_ms_;
 };
 

@@ -33,7 +33,8 @@ TEST(ServerMeter, MeasuresFromASubmapsArrivalToTheUpdateThatContainsIt) {
   TimingRecord timing;
   meter.record(25.0, timing);
   EXPECT_EQ(timing.server_verification_ms.size(), 1U);
-  EXPECT_EQ(timing.server_optimisation_ms.size(), 2U);
+  ASSERT_EQ(timing.server_updates.size(), 2U);
+  EXPECT_EQ(timing.server_updates[1].time_s, 20.0);
   EXPECT_EQ(timing.server_load.mission_s, 25.0);
   ASSERT_EQ(timing.server_load.update_latency_ms.size(), 2U);
   EXPECT_NEAR(timing.server_load.update_latency_ms[0], 9000.0, 500.0);

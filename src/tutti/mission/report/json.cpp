@@ -294,41 +294,6 @@ Json transform_json(const TransformRecord& transform) {
   return out;
 }
 
-/// {"count", "median_ms", "max_ms"}; the two figures are null without samples.
-Json spread_json(const std::vector<double>& samples) {
-  const auto s = spread(samples);
-  return {{"count", samples.size()},
-          {"median_ms", s ? number(s->median) : Json(nullptr)},
-          {"max_ms", s ? number(s->max) : Json(nullptr)}};
-}
-
-Json load_json(const ServerLoadRecord& load) {
-  const double busy_s = load.map_cpu_s + load.verification_cpu_s + load.refinement_cpu_s;
-  return {{"mission_s", number(load.mission_s)},
-          {"map_cpu_s", number(load.map_cpu_s)},
-          {"verification_cpu_s", number(load.verification_cpu_s)},
-          {"refinement_cpu_s", number(load.refinement_cpu_s)},
-          {"share_of_one_core", load.mission_s > 0.0 ? number(busy_s / load.mission_s) : Json(nullptr)},
-          {"update_latency", spread_json(load.update_latency_ms)},
-          {"peak_memory_mb", load.peak_memory_mb > 0.0 ? number(load.peak_memory_mb) : Json(nullptr)}};
-}
-
-Json work_json(const ServerWorkRecord& work) {
-  return {{"updates", work.updates},
-          {"pairs_looked_at", work.pairs_looked_at},
-          {"places_compared", work.places_compared},
-          {"pairs_verified", work.pairs_verified},
-          {"hypotheses", work.hypotheses},
-          {"factorisations", work.factorisations},
-          {"sample_products", work.sample_products}};
-}
-
-/// The format's version in report.json and timing.json; keys are added without a new one.
-constexpr int kFormat = 2;
-
-/// Foreign text with broken UTF-8 must not make the writer throw.
-std::string dump(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"; }
-
 }  // namespace
 
 std::string report_json(const MissionRecord& record) {
@@ -337,7 +302,7 @@ std::string report_json(const MissionRecord& record) {
     robots.push_back(robot_json(robot, record.default_policy, is_tied(record, robot.id)));
   Json transforms = Json::array();
   for (const auto& transform : record.transforms) transforms.push_back(transform_json(transform));
-  return dump(Json{{"format", kFormat},
+  return dump(Json{{"format", kReportFormat},
                    {"mission", record.mission},
                    {"description", record.description},
                    {"input", record.input},
@@ -355,43 +320,6 @@ std::string report_json(const MissionRecord& record) {
                    {"server", server_json(record)},
                    {"transforms", std::move(transforms)},
                    {"files", report_file_names(record)}});
-}
-
-std::string timing_json(const MissionRecord& record) {
-  const TimingRecord& timing = record.timing;
-  Json policies = Json::array();
-  for (const auto& policy : timing.policies)
-    policies.push_back({{"robot", policy.robot},
-                        {"policy", policy.policy},
-                        {"update", spread_json(policy.update_ms)},
-                        {"comparison", spread_json(policy.comparison_ms)},
-                        {"optimisation", spread_json(policy.optimisation_ms)}});
-  Json load = Json::array();
-  for (const auto& entry : timing.load)
-    load.push_back({{"name", entry.name},
-                    {"cpu_share", number(entry.cpu_share)},
-                    {"worst_latency_ms", number(entry.worst_latency_ms)}});
-  Json refinements = Json::array();
-  for (const RefinementTiming& refinement : timing.server_refinements)
-    refinements.push_back({{"whole", refinement.whole},
-                           {"free_submaps", refinement.free_submaps},
-                           {"submaps", refinement.submaps},
-                           {"cpu_s", number(refinement.cpu_s)}});
-  return dump(Json{{"format", kFormat},
-                   {"mission", record.mission},
-                   {"seed", record.seed},
-                   {"version", record.version},
-                   {"machine", timing.machine},
-                   {"wall_s", number(timing.wall_s)},
-                   {"rate", number(timing.rate)},
-                   {"policies", std::move(policies)},
-                   {"server",
-                    {{"verification", spread_json(timing.server_verification_ms)},
-                     {"optimisation", spread_json(timing.server_optimisation_ms)},
-                     {"refinements", std::move(refinements)},
-                     {"work", work_json(timing.server_work)},
-                     {"load", load_json(timing.server_load)}}},
-                   {"load", std::move(load)}});
 }
 
 }  // namespace tutti::mission

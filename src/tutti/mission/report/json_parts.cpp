@@ -5,6 +5,8 @@
 
 namespace tutti::mission {
 
+std::string dump(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"; }
+
 Json number(std::optional<double> value, double per_unit) {
   if (!value || !std::isfinite(*value)) return nullptr;
   const double rounded = std::round(*value * per_unit) / per_unit;

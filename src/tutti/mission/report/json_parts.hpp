@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string>
 
 #include "tutti/geometry/pose3.hpp"
 #include "tutti/mission/record.hpp"
@@ -12,6 +13,10 @@ namespace tutti::mission {
 
 using Json = nlohmann::ordered_json;
 
+/// The version of report.json and timing.json; keys are added without a new one.
+constexpr int kReportFormat = 2;
+/// The text of a file. Foreign text with broken UTF-8 must not make the writer throw.
+std::string dump(const Json& json);
 /// Rounded to 1 / per_unit, so that the shortest text that reads back the same is short; null unless finite.
 Json number(std::optional<double> value, double per_unit = 1e6);
 /// [x, y, z]

@@ -275,7 +275,7 @@ inline MissionRecord example_record(ExampleOptions options = {}) {
   for (const auto& robot : record.robots)
     for (const auto& policy : robot.policies)
       record.timing.policies.push_back({robot.name, policy.name, {9.1, 11.2, 31.0}, {5.0, 6.1, 20.0}, {3.0, 4.0, 9.0}});
-  record.timing.server_optimisation_ms = {18.0, 22.0, 64.0};
+  record.timing.server_updates = {{20.0, 18.0, 17.0}, {40.0, 64.0, 51.0}, {60.0, 22.0, 21.0}};
   record.timing.server_verification_ms = {11.0, 12.0, 13.0, 25.0};
   return record;
 }
