@@ -91,7 +91,8 @@ std::shared_ptr<const PointCloud> any_cloud(Rng& rng, int points) {
   return cloud;
 }
 
-/// Without their clouds; in the store with them.
+/// In the order in which they would come from robots that walk at the same time: which pairs are candidates when they
+/// come, and are displaced later, depends on it. Without their clouds; in the store with them.
 std::vector<Submap> write_submaps(const mission::MissionInput& input, const robot::SubmapConfig& config,
                                   std::size_t most, int points, Writer& writer) {
   Rng rng(1);
@@ -112,6 +113,7 @@ std::vector<Submap> write_submaps(const mission::MissionInput& input, const robo
       }
     }
   }
+  std::ranges::stable_sort(all, {}, [](const Submap& submap) { return submap.keyframes.back().stamp; });
   return all;
 }
 
@@ -163,7 +165,7 @@ void make_map(const lab::MissionConfig& config, const std::filesystem::path& fil
   const std::vector<Submap> all = write_submaps(*input, config.agent.submap, submaps, points, writer);
   std::vector<Eigen::Vector3d> begin;
   for (const Submap& submap : all) begin.push_back(begin_of(submap, *input));
-  std::size_t jobs = 0, closed = 0;
+  std::size_t jobs = 0, closed = 0, asked = 0;
   Verdicts refused;
   const auto end_job = [&] {
     if (refused.verdicts.empty()) return;
@@ -174,10 +176,13 @@ void make_map(const lab::MissionConfig& config, const std::filesystem::path& fil
   Compared compared(all, begin, candidates);
   for (std::size_t b = 0; b < all.size(); ++b) {
     for (const std::size_t a : compared.with(b, writer)) {
+      ++asked;
+      const bool is_in_order = all[a].id < all[b].id;
+      const Submap &first = all[is_in_order ? a : b], &second = all[is_in_order ? b : a];
       ClosureVerdict verdict{
-          .pair = {all[a].id, all[b].id}, .closures = {}, .refusal = Refusal{RefusalReason::unlike_from_above}};
-      if ((begin[a] - begin[b]).norm() < kFar_m && compared.may_close() && verifier->is_candidate(all[a], all[b]))
-        verdict = verifier->verify(all[a], all[b], *nothing).value();
+          .pair = {first.id, second.id}, .closures = {}, .refusal = Refusal{RefusalReason::unlike_from_above}};
+      if ((begin[a] - begin[b]).norm() < kFar_m && compared.may_close() && verifier->is_candidate(first, second))
+        verdict = verifier->verify(first, second, *nothing).value();
       verdict.verifier = EveryPair::who();
       if (!verdict.refusal) {
         ++closed;
@@ -192,8 +197,8 @@ void make_map(const lab::MissionConfig& config, const std::filesystem::path& fil
   writer.put(node::to_row(node::MapMeta{.epoch = 1, .revision = 1, .news = false, .start = 1}));
   writer.put(node::to_row(config.server));
   writer.flush();
-  fmt::print("{} submaps of {} robots, {} points each, closures between {} pairs, {} answers of refused ones\n",
-             all.size(), input->robots.size(), points, closed, jobs);
+  fmt::print("{} submaps of {} robots, {} points each, {} pairs asked, closures between {} of them\n", all.size(),
+             input->robots.size(), points, asked, closed);
 }
 
 /// Wall and CPU seconds of a call, printed.
