@@ -33,7 +33,7 @@ struct PlacedMark {
   std::uint64_t number = 0;
   std::uint32_t component = 0;
   Eigen::Vector3d at;  ///< In the component's world, m.
-  /// Of `at`, in the axes of the world, m^2: of the pose of the submap's middle keyframe, with the mark's lever arm
+  /// `at`'s, in the axes of the world, m^2: that of the pose of the submap's middle keyframe, with the mark's lever arm
   /// from there, seen from the first keyframe of the component; from the earth where fixes lay the component on it.
   /// Nothing: the map does not determine it.
   std::optional<Eigen::Matrix3d> covariance;
