@@ -61,10 +61,10 @@ TEST(ReportJson, SaysWhatTheAdjustmentMadeOfTheMap) {
   EXPECT_EQ(refinement["two_positions"], 93);
   EXPECT_EQ(refinement["rms_after_px"], 1.125);
   EXPECT_EQ(json::parse(timing_json(record))["server"]["refinements"][0]["submaps"], 5);
-  EXPECT_EQ(json::parse(timing_json(record))["server"]["worst_update"],
+  EXPECT_EQ(json::parse(timing_json(record))["server"]["costliest_update"],
             (json{{"time_s", 40.0}, {"took_ms", 64.0}, {"cpu_ms", 51.0}}));
   EXPECT_EQ(json::parse(timing_json(record))["server"]["optimisation_cpu"]["max_ms"], 51.0);
-  EXPECT_TRUE(json::parse(timing_json(MissionRecord{}))["server"]["worst_update"].is_null());
+  EXPECT_TRUE(json::parse(timing_json(MissionRecord{}))["server"]["costliest_update"].is_null());
   EXPECT_EQ(json::parse(timing_json(record))["server"]["work"], (json{{"updates", 31},
                                                                       {"pairs_looked_at", 27730},
                                                                       {"places_compared", 190},

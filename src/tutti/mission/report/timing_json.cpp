@@ -40,10 +40,10 @@ Json work_json(const ServerWorkRecord& work) {
 }
 
 /// The one that took most CPU; null without updates.
-Json worst_update_json(const std::vector<UpdateTiming>& updates) {
-  const auto worst = std::ranges::max_element(updates, {}, &UpdateTiming::cpu_ms);
-  if (worst == updates.end()) return nullptr;
-  return {{"time_s", number(worst->time_s)}, {"took_ms", number(worst->took_ms)}, {"cpu_ms", number(worst->cpu_ms)}};
+Json costliest_update_json(const std::vector<UpdateTiming>& updates) {
+  const auto most = std::ranges::max_element(updates, {}, &UpdateTiming::cpu_ms);
+  if (most == updates.end()) return nullptr;
+  return {{"time_s", number(most->time_s)}, {"took_ms", number(most->took_ms)}, {"cpu_ms", number(most->cpu_ms)}};
 }
 
 }  // namespace
@@ -85,7 +85,7 @@ std::string timing_json(const MissionRecord& record) {
                     {{"verification", spread_json(timing.server_verification_ms)},
                      {"optimisation", spread_json(took_ms)},
                      {"optimisation_cpu", spread_json(cpu_ms)},
-                     {"worst_update", worst_update_json(timing.server_updates)},
+                     {"costliest_update", costliest_update_json(timing.server_updates)},
                      {"refinements", std::move(refinements)},
                      {"work", work_json(timing.server_work)},
                      {"load", load_json(timing.server_load)}}},
