@@ -19,9 +19,9 @@ constexpr double kMostRaised = 400.0;
 /// Halvings of the logarithm of the range: the factor is found to 0.2 %.
 constexpr int kRaiseBisections = 12;
 
-/// True if a quarter of the pairs miss, in the last N coordinates, by no more than a quarter may.
+/// How many of the pairs miss, in the last N coordinates, by no more than a quarter may.
 template <int N>
-bool a_quarter_fits(const std::vector<ClosurePair>& pairs, const ClosureHonesty& by) {
+std::size_t count_within(const std::vector<ClosurePair>& pairs, const ClosureHonesty& by) {
   const double limit = chi_square_quantile(kPairsShare, N);
   const auto within = std::ranges::count_if(pairs, [&](ClosurePair pair) {
     for (LoopClosure* closure : {&pair.first, &pair.second})
@@ -31,7 +31,19 @@ bool a_quarter_fits(const std::vector<ClosurePair>& pairs, const ClosureHonesty&
     const Eigen::Matrix<double, N, 1> missed = loop.missed.tail<N>();
     return missed.dot(C.ldlt().solve(missed)) <= limit;
   });
-  return static_cast<double>(within) >= kPairsShare * static_cast<double>(pairs.size());
+  return static_cast<std::size_t>(within);
+}
+
+/// The chance that no more than `count` of `trials` are within where each is with a chance of a quarter.
+double chance_of_so_few(std::size_t count, std::size_t trials) {
+  const auto n = static_cast<double>(trials);
+  double sum = 0.0;
+  for (std::size_t i = 0; i <= count; ++i) {
+    const auto k = static_cast<double>(i);
+    sum += std::exp(std::lgamma(n + 1.0) - std::lgamma(k + 1.0) - std::lgamma(n - k + 1.0) + k * std::log(kPairsShare) +
+                    (n - k) * std::log1p(-kPairsShare));
+  }
+  return sum;
 }
 
 /// The least factor for which `fits` holds, at least 1; also 1 if none does: then too many closures are wrong to judge
@@ -47,6 +59,18 @@ double least_raise(const Fits& fits) {
   return enough;
 }
 
+/// The factor that these pairs ask for; 1 where chance has made it. by(factor): all factors with this one. `tests`: how
+/// often that is asked of a map. Among so many, chance makes less than one that counts (Desolneux, Moisan, Morel 2000),
+/// so in a large fleet it takes more pairs to count.
+template <int N, class By>
+double factor_of(const std::vector<ClosurePair>& pairs, std::size_t tests, const By& by) {
+  const std::size_t within = count_within<N>(pairs, by(1.0));
+  if (chance_of_so_few(within, pairs.size()) * static_cast<double>(tests) > 1.0) return 1.0;
+  return least_raise([&](double factor) {
+    return static_cast<double>(count_within<N>(pairs, by(factor))) >= kPairsShare * static_cast<double>(pairs.size());
+  });
+}
+
 }  // namespace
 
 Matrix6d scaled(const Matrix6d& covariance, const ClosureHonesty& by) {
@@ -58,11 +82,13 @@ Matrix6d scaled(const Matrix6d& covariance, const ClosureHonesty& by) {
 std::map<std::pair<ChainId, ChainId>, ClosureHonesty> closure_honesty(std::span<const OdometrySegment> segments,
                                                                       std::span<const LoopClosure> closures) {
   std::map<std::pair<ChainId, ChainId>, ClosureHonesty> out;
-  for (const auto& [between, pairs] : neighbouring_closures(segments, closures)) {
-    if (pairs.size() < kEnoughPairs) continue;
+  auto neighbours = neighbouring_closures(segments, closures);
+  std::erase_if(neighbours, [](const auto& entry) { return entry.second.size() < kEnoughPairs; });
+  const std::size_t tests = 2 * neighbours.size();
+  for (const auto& [between, pairs] : neighbours) {
     ClosureHonesty honesty;
-    honesty.rotation = least_raise([&](double f) { return a_quarter_fits<3>(pairs, {1.0, f}); });
-    honesty.translation = least_raise([&](double f) { return a_quarter_fits<6>(pairs, {f, honesty.rotation}); });
+    honesty.rotation = factor_of<3>(pairs, tests, [](double f) { return ClosureHonesty{1.0, f}; });
+    honesty.translation = factor_of<6>(pairs, tests, [&](double f) { return ClosureHonesty{f, honesty.rotation}; });
     if (std::max(honesty.rotation, honesty.translation) > kByChance) out[between] = honesty;
   }
   return out;

@@ -22,8 +22,9 @@ struct ClosureHonesty {
 /// state. Every closure is compared with its neighbour (neighbouring_closures(), odometry_loops.hpp). The factors are
 /// the least with which a quarter of the pairs miss by no more than chi-square allows a quarter, first of rotation
 /// alone, then of translation for the whole. A quarter, so that half of the pairs may contain a wrong closure. A factor
-/// that would exceed 400 is 1, because too many closures are wrong to judge by. Chains with fewer than 8 pairs, or with
-/// both factors below 2, as chance makes them, have no entry. docs/math.md, "Outlier rejection".
+/// that would exceed 400 is 1, because too many closures are wrong to judge by. So is one that chance makes somewhere
+/// in a map of so many chains. Chains with fewer than 8 pairs, or with both factors below 2, have no entry.
+/// docs/math.md, "Outlier rejection".
 std::map<std::pair<ChainId, ChainId>, ClosureHonesty> closure_honesty(std::span<const OdometrySegment> segments,
                                                                       std::span<const LoopClosure> closures);
 
