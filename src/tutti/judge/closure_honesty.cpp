@@ -36,12 +36,12 @@ std::size_t count_within(const std::vector<ClosurePair>& pairs, const ClosureHon
 
 /// The chance that no more than `count` of `trials` are within where each is with a chance of a quarter.
 double chance_of_so_few(std::size_t count, std::size_t trials) {
-  const auto n = static_cast<double>(trials);
   double sum = 0.0;
-  for (std::size_t i = 0; i <= count; ++i) {
-    const auto k = static_cast<double>(i);
-    sum += std::exp(std::lgamma(n + 1.0) - std::lgamma(k + 1.0) - std::lgamma(n - k + 1.0) + k * std::log(kPairsShare) +
-                    (n - k) * std::log1p(-kPairsShare));
+  double log_chance = static_cast<double>(trials) * std::log1p(-kPairsShare);  // of exactly k
+  for (std::size_t k = 0; k <= count; ++k) {
+    sum += std::exp(log_chance);
+    log_chance +=
+        std::log(static_cast<double>(trials - k) / static_cast<double>(k + 1) * kPairsShare / (1.0 - kPairsShare));
   }
   return sum;
 }
