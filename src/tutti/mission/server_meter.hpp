@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "tutti/mission/load_meter.hpp"
-#include "tutti/mission/record.hpp"
+#include "tutti/mission/timing_record.hpp"
 #include "tutti/node/step.hpp"
 #include "tutti/server/closure_verifier.hpp"
 #include "tutti/server/map_refiner.hpp"
