@@ -224,12 +224,15 @@ endfunction()
 # makes one executable test_<module> of a_test.cpp, internal/b_test.cpp.. and one ctest entry "module/a" for each file.
 # NO_THREADS: files that TSan would find nothing in. NOT_SANITIZED: files that would only repeat under a sanitizer what
 # others have run there. A file that includes RapidCheck is labelled `property`, any other `unit`, unless LABEL is
-# given. WAITS_FOR: tutti_waits_for().
+# given. WAITS_FOR: tutti_waits_for(); `programs` with LABEL system.
 function(tutti_add_tests module)
   if(NOT TUTTI_BUILD_TESTS)
     return()
   endif()
   cmake_parse_arguments(ARG "" "LABEL;TIMEOUT;WAITS_FOR" "TESTS;NO_THREADS;NOT_SANITIZED;LIBS" ${ARGN})
+  if(ARG_LABEL STREQUAL "system" AND NOT ARG_WAITS_FOR)
+    set(ARG_WAITS_FOR programs)
+  endif()
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
     if(TUTTI_SANITIZE)
