@@ -9,7 +9,8 @@ namespace tutti::grids {
 namespace map_grid_test {
 
 /// Robots walk in circles on level ground, half a metre below them, which they see within 3 m; one point of each
-/// submap is a metre above its first body, and is what voxels are counted by.
+/// submap is two metres above its first body, above all that a grid calls an obstacle, and is what voxels are counted
+/// by.
 class MapGrids : public testing::Test {
  protected:
   MapGrids() {
@@ -19,7 +20,7 @@ class MapGrids : public testing::Test {
         PointCloud cloud;
         for (float x = -3.0F; x <= 3.0F; x += 0.3F)
           for (float y = -3.0F; y <= 3.0F; y += 0.3F) cloud.points.emplace_back(x, y, -0.5F);
-        cloud.points.emplace_back(0.0F, 0.0F, 1.0F + 0.01F * static_cast<float>(submap.id.index));
+        cloud.points.emplace_back(0.0F, 0.0F, 2.0F + 0.01F * static_cast<float>(submap.id.index));
         return cloud;
       });
     content_ = mapfile::read(store_).value();
