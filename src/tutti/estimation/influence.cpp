@@ -7,7 +7,9 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <map>
 #include <memory>
+#include <set>
 #include <utility>
 
 #include "tutti/base/check.hpp"
@@ -82,54 +84,80 @@ Whitened whiten(const PoseGraphEdge& edge, const EdgeSlot& slot, int component, 
   return {slot, component, upper * factor.residual, upper * factor.J_i, upper * factor.J_j};
 }
 
-/// J_a H^-1 J_b^T of two edges; nothing joins those of two components, whose blocks are in no pattern.
-Matrix6d known_together(const Whitened& a, const Whitened& b, const SelectedInverse& inverse) {
-  Matrix6d out = Matrix6d::Zero();
-  if (a.component != b.component) return out;
-  for (const auto& [i, J_i] : {std::pair(a.slot.from, &a.J_from), std::pair(a.slot.to, &a.J_to)})
-    for (const auto& [j, J_j] : {std::pair(b.slot.from, &b.J_from), std::pair(b.slot.to, &b.J_to)})
-      if (i >= 0 && j >= 0) out += *J_i * inverse.block(i, j) * J_j->transpose();
-  return out;
-}
-
 using Group = std::vector<Whitened>;
 
-/// K = J H^-1 J^T of a group, of 1 in all: what the group knows of itself.
-Eigen::MatrixXd known_of(const Group& group, const SelectedInverse& inverse) {
-  const auto edges = static_cast<Eigen::Index>(group.size());
-  Eigen::MatrixXd K(6 * edges, 6 * edges);
-  for (Eigen::Index a = 0; a < edges; ++a)
-    for (Eigen::Index b = 0; b < edges; ++b)
-      K.block<6, 6>(6 * a, 6 * b) =
-          known_together(group[static_cast<std::size_t>(a)], group[static_cast<std::size_t>(b)], inverse);
-  return K;
-}
+/// What the loss of a group does, to first order, seen from the ends of its edges: closures come by the product of the
+/// keyframes that they join, so the ends are far fewer than the edges. With C = L L^T the rows and columns of H^-1 at
+/// the ends, J and r the Jacobian and the residuals of all edges there, M = L^T J^T J L has the eigenvalues of K, and
+/// by the push-through identity J^T (I - K)^-1 = L^-T (I - M)^-1 L^T J^T.
+class GroupLoss {
+ public:
+  GroupLoss(const Group& group, const SelectedInverse& inverse) {
+    std::map<int, int> component_of;  // of variables; anchored ends do not move
+    for (const Whitened& edge : group)
+      for (const int v : {edge.slot.from, edge.slot.to})
+        if (v >= 0) component_of.emplace(v, edge.component);
+    for (const auto& [v, component] : component_of) ends_.push_back(v);
+    const Eigen::Index size = 6 * static_cast<Eigen::Index>(ends_.size());
+    Eigen::MatrixXd C = Eigen::MatrixXd::Zero(size, size), information = C;
+    force_ = Eigen::VectorXd::Zero(size);
+    Eigen::Index column = 0;
+    for (const auto& [j, component_j] : component_of) {
+      Eigen::Index row = 0;
+      for (const auto& [i, component_i] : component_of) {  // nothing joins two components: no pattern has their block
+        if (component_i == component_j) C.block<6, 6>(row, column) = inverse.block(i, j);
+        row += 6;
+      }
+      column += 6;
+    }
+    for (const Whitened& edge : group) {
+      for (const auto& [a, J_a] : ends_of(edge)) {
+        force_.segment<6>(a) += J_a->transpose() * edge.residual;
+        for (const auto& [b, J_b] : ends_of(edge)) information.block<6, 6>(a, b) += J_a->transpose() * *J_b;
+      }
+    }
+    known_.compute(C);
+    if (known_.info() != Eigen::Success) return;
+    Eigen::MatrixXd others = -(known_.matrixU() * information * known_.matrixL().toDenseMatrix());
+    others.diagonal().array() += 1.0 + kAlone;
+    others_.compute(others);
+    if (others_.info() == Eigen::Success) least_known_ = others_.matrixLLT().diagonal().array().square().minCoeff();
+  }
 
-Eigen::VectorXd residual_of(const Group& group) {
-  Eigen::VectorXd out(static_cast<Eigen::Index>(6 * group.size()));
-  for (std::size_t a = 0; a < group.size(); ++a) out.segment<6>(static_cast<Eigen::Index>(6 * a)) = group[a].residual;
-  return out;
-}
+  /// The least share of any direction that comes from elsewhere, to within what a factorisation tells; 0 where the loss
+  /// cannot be told.
+  [[nodiscard]] double least_known() const { return least_known_; }
+  /// The variables at the group's ends, and the force there, J^T (I - K)^-1 r, that moves all poses as its loss does.
+  [[nodiscard]] const std::vector<int>& ends() const { return ends_; }
+  [[nodiscard]] Eigen::VectorXd force() const {
+    return known_.matrixU().solve(others_.solve(known_.matrixU() * force_));
+  }
+  /// The squared length of what the loss moves between the ends of one of its edges, in the covariance of the rest.
+  [[nodiscard]] double misfit_at(const Whitened& edge) const {
+    Eigen::MatrixXd right = Eigen::MatrixXd::Zero(force_.size(), 7);
+    right.col(0) = force_;
+    for (const auto& [a, J] : ends_of(edge)) right.block<6, 6>(a, 1) = J->transpose();
+    right = known_.matrixU() * right;
+    const Eigen::MatrixXd solved = others_.solve(right);
+    const Vector6d moved = right.rightCols<6>().transpose() * solved.col(0);
+    const Matrix6d covariance = right.rightCols<6>().transpose() * solved.rightCols<6>();
+    return std::max(0.0, moved.dot(Matrix6d(0.5 * (covariance + covariance.transpose())).ldlt().solve(moved)));
+  }
 
-/// 1 - K
-Eigen::LDLT<Eigen::MatrixXd> of_others(const Eigen::MatrixXd& K) {
-  Eigen::MatrixXd others = -0.5 * (K + K.transpose());
-  others.diagonal().array() += 1.0 + kAlone;
-  return Eigen::LDLT<Eigen::MatrixXd>(others);
-}
+ private:
+  /// First rows of the ends that move, with the edge's Jacobian there.
+  [[nodiscard]] std::vector<std::pair<Eigen::Index, const Matrix6d*>> ends_of(const Whitened& edge) const {
+    std::vector<std::pair<Eigen::Index, const Matrix6d*>> out;
+    for (const auto& [v, J] : {std::pair(edge.slot.from, &edge.J_from), std::pair(edge.slot.to, &edge.J_to)})
+      if (v >= 0) out.emplace_back(6 * (std::ranges::lower_bound(ends_, v) - ends_.begin()), J);
+    return out;
+  }
 
-double misfit(const Group& group, const SelectedInverse& inverse) {
-  const Eigen::MatrixXd K = known_of(group, inverse);
-  const Eigen::Index middle = 6 * static_cast<Eigen::Index>(group.size() / 2);
-  Eigen::MatrixXd right(K.rows(), 7);  // (I - K)^-1 of the residuals, and of K's columns at the middle edge
-  right << residual_of(group), K.middleCols<6>(middle);
-  const Eigen::LDLT<Eigen::MatrixXd> factor = of_others(K);
-  if (factor.info() != Eigen::Success || !factor.isPositive()) return 0.0;
-  const Eigen::MatrixXd solved = factor.solve(right);
-  const Vector6d moved = K.middleRows<6>(middle) * solved.col(0);
-  const Matrix6d covariance = solved.middleRows<6>(middle).rightCols<6>();
-  return std::max(0.0, moved.dot(Matrix6d(0.5 * (covariance + covariance.transpose())).ldlt().solve(moved)));
-}
+  std::vector<int> ends_;
+  Eigen::VectorXd force_;  // J^T r
+  Eigen::LLT<Eigen::MatrixXd> known_, others_;
+  double least_known_ = 0.0;
+};
 
 /// The normal equations at the optimum, factorised, of the graph without what only passes odometry on, and the groups
 /// in it.
@@ -139,13 +167,13 @@ struct GroupEquations {
       : reduced(reduce_chains(graph, roles, nodes, poses)) {
     for (const std::size_t node : reduced.nodes) at.push_back(poses[node]);
     std::vector<std::pair<std::size_t, std::size_t>> pairs;  // every end of a group with every other
-    for (const auto& group : groups)
-      for (const std::size_t a : group)
-        for (const std::size_t b : group) {
-          const PoseGraphEdge& x = edge(a);
-          const PoseGraphEdge& y = edge(b);
-          pairs.insert(pairs.end(), {{x.from, y.from}, {x.from, y.to}, {x.to, y.to}});
-        }
+    for (const auto& group : groups) {
+      std::set<std::size_t> ends;
+      for (const std::size_t e : group) ends.insert({edge(e).from, edge(e).to});
+      for (const std::size_t a : ends)
+        for (const std::size_t b : ends)
+          if (a <= b) pairs.emplace_back(a, b);
+    }
     structure = internal::analyse_blocks(reduced.graph, pairs);
     equations = std::make_unique<internal::GraphEquations>(reduced.graph, structure);
     equations->linearise(at, {}, true);
@@ -232,7 +260,10 @@ std::vector<double> group_misfits(const PoseGraph& graph, std::span<const Pose3>
   if (!equations.is_determined) return out;
   const SelectedInverse inverse(equations.equations->hessian().take_factor());
   for (std::size_t g = 0; g < groups.size(); ++g)
-    if (!groups[g].empty()) out[g] = misfit(equations.whitened(groups[g]), inverse);
+    if (const Group group = equations.whitened(groups[g]); !group.empty()) {
+      const GroupLoss loss(group, inverse);
+      if (loss.least_known() > 0.0) out[g] = loss.misfit_at(group[group.size() / 2]);
+    }
   return out;
 }
 
@@ -253,18 +284,14 @@ Eigen::MatrixXd group_removals(const PoseGraph& graph, std::span<const Pose3> po
   equations.equations->hessian().solve(columns);
   const SelectedInverse inverse(equations.equations->hessian().take_factor());
   for (std::size_t g = 0; g < groups.size(); ++g) {
-    const Group group = equations.whitened(groups[g]);
-    const Eigen::LDLT<Eigen::MatrixXd> others = of_others(known_of(group, inverse));
-    if (others.info() != Eigen::Success || !(others.vectorD().minCoeff() > kHardlyKnown)) continue;
-    const Eigen::VectorXd w = others.solve(residual_of(group));
+    const GroupLoss loss(equations.whitened(groups[g]), inverse);
+    if (!(loss.least_known() > kHardlyKnown)) continue;
+    const Eigen::VectorXd force = loss.force();
     auto moves = out.col(static_cast<Eigen::Index>(g));
     moves.setZero();
-    for (std::size_t a = 0; a < group.size(); ++a) {
-      const Vector6d own = w.segment<6>(static_cast<Eigen::Index>(6 * a));
-      for (const auto& [v, J] :
-           {std::pair(group[a].slot.from, &group[a].J_from), std::pair(group[a].slot.to, &group[a].J_to)})
-        if (v >= 0) moves += columns.middleRows<6>(6 * v).transpose() * (J->transpose() * own);
-    }
+    for (std::size_t k = 0; k < loss.ends().size(); ++k)
+      moves +=
+          columns.middleRows<6>(6 * loss.ends()[k]).transpose() * force.segment<6>(static_cast<Eigen::Index>(6 * k));
   }
   return out;
 }
