@@ -110,6 +110,7 @@ TEST(RealMissions, HkuDegradedIsRepaired) {
   }
 }
 
+/// And they bring it home: its odometry is 579 m off.
 TEST(RealMissions, ADivergedRobotHarmsNobody) {
   TUTTI_REQUIRE_SHARED("data/excavator_mm");
   lab::MissionConfig config = mission_file("excavator_diverged");
@@ -121,6 +122,9 @@ TEST(RealMissions, ADivergedRobotHarmsNobody) {
     EXPECT_LT(*corrected(with, with.robots[i]).accuracy.rmse_m,
               *corrected(without, without.robots[i]).accuracy.rmse_m + 0.01);
   }
+  EXPECT_EQ(with.server.components, 1U);
+  EXPECT_LT(*with.robots[2].server.rmse_m, 2.0);
+  EXPECT_LT(*corrected(with, with.robots[2]).accuracy.rmse_m, 2.0);
 }
 
 TEST(RealMissions, KittiSequencesOfTwoPlacesBecomeTwoMaps) {

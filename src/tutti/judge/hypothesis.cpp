@@ -207,8 +207,7 @@ double HypothesisSolver::votes_for(const FailedSegment& failed) const {
   double least_m = kInfinite;
   for (std::size_t node = about.from; node <= about.to; ++node)
     least_m = std::min(least_m, seen_from(odometry_, failed, node).translation.norm());
-  const double took_s = odometry_.seconds(about.to) - odometry_.seconds(about.from);
-  if (least_m > odometry_.usual_speed() * (took_s + kReach_s)) return kInfinite;
+  if (least_m > odometry_.reach_m(about.from, about.to) + kReach_s * odometry_.usual_speed()) return kInfinite;
   const Matrix6d covariance = odometry_.between(failed.from, failed.to).covariance;
   const double squared_distance = failed.missed.dot(covariance.llt().solve(failed.missed));
   constexpr double kPower = 1.25, kAxes = 6.0;

@@ -5,18 +5,45 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <utility>
 
 namespace tutti::judge {
 namespace {
 
-/// The middle one, or the least above 0 that a number can be.
+/// Odometry flies where it states more than kFlight times the usual speed, by the segments' time: keyframes come by
+/// distance, so a robot whose odometry diverges has most of all steps, but not of the time. A step of more than
+/// kMostFlight times the usual speed is none that passes a robot's OdometryWatch; a map that took it for odometry would
+/// be too ill-conditioned for a covariance.
+constexpr double kFlight = 3.0, kMostFlight = 1000.0;
+
+/// The steps of one segment that take time.
+struct Speeds {
+  std::vector<double> mps;
+  double total_s = 0.0;
+};
+
 double median(std::vector<double> values) {
-  constexpr double kSlowest = std::numeric_limits<double>::min();
-  if (values.empty()) return kSlowest;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::ranges::nth_element(values, middle);
-  return std::max(*middle, kSlowest);
+  return *middle;
+}
+
+/// What is above 0, where that is not.
+double positive(double value) { return std::max(value, std::numeric_limits<double>::min()); }
+
+/// The median of the segments' medians by the time that they took. `segments` is not empty.
+double median_by_time(const std::map<std::size_t, Speeds>& segments) {
+  std::vector<std::pair<double, double>> medians;  // m/s, s
+  double total_s = 0.0;
+  for (const auto& [first, speeds] : segments) {
+    medians.emplace_back(median(speeds.mps), speeds.total_s);
+    total_s += speeds.total_s;
+  }
+  std::ranges::sort(medians);
+  auto middle = medians.begin();
+  for (double slower_s = middle->second; slower_s < 0.5 * total_s;) slower_s += (++middle)->second;
+  return middle->first;
 }
 
 }  // namespace
@@ -27,7 +54,7 @@ OdometryTrajectories::OdometryTrajectories(std::span<const double> seconds, std:
   std::vector<std::vector<Pose3>> poses(nodes, {Pose3{}});
   std::vector<std::vector<Matrix6d>> steps(nodes, {Matrix6d::Zero()});
   for (std::size_t i = 0; i < nodes; ++i) at_[i] = {.segment = i, .seconds = seconds[i]};
-  std::vector<double> speeds;
+  std::map<std::size_t, Speeds> speeds;  // by the segments' first nodes
   std::vector<const PoseGraphEdge*> step_to(nodes, nullptr);
   for (const PoseGraphEdge& edge : odometry) step_to[edge.to] = &edge;
   for (std::size_t i = 0; i < nodes; ++i) {
@@ -35,14 +62,30 @@ OdometryTrajectories::OdometryTrajectories(std::span<const double> seconds, std:
     const PoseGraphEdge& step = *step_to[i];
     const At& before = at_[step.from];
     const Matrix6d covariance = step.information.llt().solve(Matrix6d::Identity());
-    at_[i] = {before.segment, before.position + 1, seconds[i],
-              before.turn_variance + covariance.bottomRightCorner<3, 3>().trace(), before.pose * step.T_from_to};
+    at_[i] = {.segment = before.segment,
+              .position = before.position + 1,
+              .seconds = seconds[i],
+              .turn_variance = before.turn_variance + covariance.bottomRightCorner<3, 3>().trace(),
+              .pose = before.pose * step.T_from_to};
     poses[before.segment].push_back(at_[i].pose);
     steps[before.segment].push_back(covariance);
-    if (const double duration_s = seconds[i] - seconds[step.from]; duration_s > 0.0)
-      speeds.push_back(step.T_from_to.translation.norm() / duration_s);
+    if (const double duration_s = seconds[i] - seconds[step.from]; duration_s > 0.0) {
+      Speeds& own = speeds[before.segment];
+      own.mps.push_back(step.T_from_to.translation.norm() / duration_s);
+      own.total_s += duration_s;
+    }
   }
-  usual_speed_ = median(std::move(speeds));
+  std::vector<double> all;
+  for (const auto& [first, own] : speeds) all.insert(all.end(), own.mps.begin(), own.mps.end());
+  usual_speed_ = positive(all.empty() ? 0.0 : median(std::move(all)));
+  const double healthy_speed = speeds.empty() ? usual_speed_ : std::min(usual_speed_, median_by_time(speeds));
+  for (std::size_t i = 0; i < nodes; ++i) {
+    if (step_to[i] == nullptr) continue;
+    const double stated_m = step_to[i]->T_from_to.translation.norm();
+    const double took_s = std::max(0.0, seconds[i] - seconds[step_to[i]->from]), usual_m = usual_speed_ * took_s;
+    const bool flies = stated_m > kFlight * healthy_speed * took_s && stated_m < kMostFlight * usual_m;
+    at_[i].reach_m = at_[step_to[i]->from].reach_m + (flies ? std::max(stated_m, usual_m) : usual_m);
+  }
   for (std::size_t i = 0; i < nodes; ++i)
     covariance_.push_back(at_[i].segment == i ? SegmentCovariance(poses[i], steps[i]) : SegmentCovariance());
 }
