@@ -48,10 +48,17 @@ class Optimiser {
   [[nodiscard]] Optimum decide() const {
     Optimum best = settle(map_.searched, explain());
     for (int round = 0; round < kRefusals && refuse_lone_witness(best);) ++round;
-    return solved(settle(map_.graph, std::move(best)));
+    if (!is_searched_as_it_counts()) best = settle(map_.graph, std::move(best));
+    return solved(std::move(best));
   }
 
  private:
+  /// True if the map counts odometry as the search does: what is settled for the one is settled for the other.
+  [[nodiscard]] bool is_searched_as_it_counts() const {
+    return std::ranges::equal(map_.searched.edges, map_.graph.edges, {}, &PoseGraphEdge::information,
+                              &PoseGraphEdge::information);
+  }
+
   /// A graph of odometry, to which closures will be added: edges are large, and are copied once.
   [[nodiscard]] PoseGraph with_room(const PoseGraph& odometry) const {
     PoseGraph out{.poses = odometry.poses, .edges = {}};
