@@ -72,6 +72,14 @@ TEST(MapEstimate, JoinsRobotsInUnknownFramesAndBeatsTheirOdometry) {
     EXPECT_LT(rmse(map, false, robot), 0.35 * rmse(map, true, robot)) << robot.value;
 }
 
+// What is settled with the search's weights of odometry is settled for the map, where these are its own.
+TEST(MapEstimate, IsSettledOnceWhereOdometryCountsAsItWasSearched) {
+  const Inputs in = make_inputs(3, TestVerifier(2), 2);
+  const MapEstimate map = estimate_map(in.submaps, in.verdicts, {});
+  EXPECT_TRUE(std::ranges::all_of(map.rotation_factors, [](const auto& factor) { return factor.second == 1.0; }));
+  EXPECT_LE(map.work.factorisations, 8U);  // 12 when it is settled twice
+}
+
 TEST(MapEstimate, RejectsWrongClosures) {
   for (const std::uint64_t seed : {1U, 2U, 3U, 4U, 5U}) {
     const Inputs in = make_inputs(2, TestVerifier(seed, 4), seed);
