@@ -98,6 +98,10 @@ class GroupLoss {
       for (const int v : {edge.slot.from, edge.slot.to})
         if (v >= 0) component_of.emplace(v, edge.component);
     for (const auto& [v, component] : component_of) ends_.push_back(v);
+    if (ends_.empty()) {  // of the fixed node alone
+      least_known_ = 1.0;
+      return;
+    }
     const Eigen::Index size = 6 * static_cast<Eigen::Index>(ends_.size());
     Eigen::MatrixXd C = Eigen::MatrixXd::Zero(size, size), information = C;
     force_ = Eigen::VectorXd::Zero(size);
@@ -125,15 +129,17 @@ class GroupLoss {
   }
 
   /// The least share of any direction that comes from elsewhere, to within what a factorisation tells; 0 where the loss
-  /// cannot be told.
+  /// is not known.
   [[nodiscard]] double least_known() const { return least_known_; }
   /// The variables at the group's ends, and the force there, J^T (I - K)^-1 r, that moves all poses as its loss does.
   [[nodiscard]] const std::vector<int>& ends() const { return ends_; }
   [[nodiscard]] Eigen::VectorXd force() const {
+    if (ends_.empty()) return {};
     return known_.matrixU().solve(others_.solve(known_.matrixU() * force_));
   }
   /// The squared length of what the loss moves between the ends of one of its edges, in the covariance of the rest.
   [[nodiscard]] double misfit_at(const Whitened& edge) const {
+    if (ends_.empty()) return 0.0;
     Eigen::MatrixXd right = Eigen::MatrixXd::Zero(force_.size(), 7);
     right.col(0) = force_;
     for (const auto& [a, J] : ends_of(edge)) right.block<6, 6>(a, 1) = J->transpose();

@@ -211,6 +211,17 @@ TEST(GroupMisfits, EdgesOfAnotherComponentSayNothing) {
   EXPECT_NEAR(misfits[0], misfits[1], 1e-9 * misfits[1]);
 }
 
+// Submaps that follow each other share a keyframe: a closure of it with itself, where nothing moves.
+TEST(GroupRemovals, AClosureOfTheFixedNodeWithItselfMovesNothing) {
+  Rng rng(3);
+  PoseGraph graph = random_graph(rng, 20, 3, 0.1).graph;
+  graph.edges.push_back({0, 0, Pose3{}});
+  const Groups groups = {{graph.edges.size() - 1}};
+  const std::vector<std::size_t> nodes = {5, 19};
+  EXPECT_EQ(group_removals(graph, optimum(graph), {}, groups, nodes).norm(), 0.0);
+  EXPECT_EQ(group_misfits(graph, optimum(graph), {}, groups).front(), 0.0);
+}
+
 TEST(Influence, NothingToSay) {
   Rng rng(3);
   PoseGraph graph = random_graph(rng, 20, 2, 0.1).graph;
