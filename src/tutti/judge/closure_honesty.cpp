@@ -46,11 +46,10 @@ double chance_of_so_few(std::size_t count, std::size_t trials) {
   return sum;
 }
 
-/// The least factor for which `fits` holds, at least 1; also 1 if none does: then too many closures are wrong to judge
-/// by.
+/// The least factor above 1 for which `fits` holds; 1 if none does: then too many closures are wrong to judge by.
 template <class Fits>
 double least_raise(const Fits& fits) {
-  if (fits(1.0) || !fits(kMostRaised)) return 1.0;
+  if (!fits(kMostRaised)) return 1.0;
   double too_small = 1.0, enough = kMostRaised;
   for (int k = 0; k < kRaiseBisections; ++k) {
     const double middle = std::sqrt(too_small * enough);
@@ -64,11 +63,12 @@ double least_raise(const Fits& fits) {
 /// so in a large fleet it takes more pairs to count.
 template <int N, class By>
 double factor_of(const std::vector<ClosurePair>& pairs, std::size_t tests, const By& by) {
+  const auto are_enough = [&](std::size_t within) {
+    return static_cast<double>(within) >= kPairsShare * static_cast<double>(pairs.size());
+  };
   const std::size_t within = count_within<N>(pairs, by(1.0));
-  if (chance_of_so_few(within, pairs.size()) * static_cast<double>(tests) > 1.0) return 1.0;
-  return least_raise([&](double factor) {
-    return static_cast<double>(count_within<N>(pairs, by(factor))) >= kPairsShare * static_cast<double>(pairs.size());
-  });
+  if (are_enough(within) || chance_of_so_few(within, pairs.size()) * static_cast<double>(tests) > 1.0) return 1.0;
+  return least_raise([&](double factor) { return are_enough(count_within<N>(pairs, by(factor))); });
 }
 
 }  // namespace

@@ -99,7 +99,7 @@ TEST(OdometryTrajectories, KnowsTheSegmentsAndWhatLiesBetween) {
   EXPECT_NEAR(ways.turn_variance(10, 14), 4 * 3 * 1e-6, 1e-9);
 }
 
-// Keyframes come by distance, so odometry that diverges has most of all steps. What is usual is told by time.
+// Keyframes come by distance, so odometry that diverges has most of all steps. What is usual follows from the time.
 TEST(OdometryTrajectories, AFlightCountsAtItsLength) {
   Laps laps;
   for (std::size_t k = 60; k < 200; ++k) laps.graph.edges[k].T_from_to.translation *= 50.0;
