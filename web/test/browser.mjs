@@ -41,6 +41,30 @@ test("three robots live: all in one frame, parts apart, clouds come", () =>
     assert.ok(await page.pixels() > 3000, "the picture is not empty");
   }));
 
+test("all of the map is in sight until somebody looks elsewhere, and a map that goes to another frame stays in sight", () =>
+  served(small(), async (page, server, mission) => {
+    const count = 72 * kPoints;
+    await page.until("clouds are drawn", (n) => tutti.view.last.points >= n, count);
+    const moves_to = async (origin) => {
+      mission.origin = origin;
+      server.send(mission.correct(0.1));
+      await page.until("all has glided there", (revision) => tutti.app.world.poses.revision === revision && [...tutti.app.world.placed.values()].every((p) => p.T === p.target), mission.revision);
+      await page.pause(300); // a picture later
+    };
+    await moves_to([300, -200, 40]); // as when it is joined to another map
+    await page.until("all is in sight there", (n) => tutti.view.last.points >= n, count);
+    const where = () => page.evaluate(() => tutti.view.eye.target);
+    await page.evaluate(() => tutti.view.eye.look_at([300, -200, 40], 15));
+    const looked_at = await where();
+    await moves_to([301, -200, 40]);
+    assert.deepEqual(await where(), looked_at, "what somebody chose to look at stays while something is to be seen there");
+    await moves_to([-150, 0, 0]);
+    await page.until("the map is found again", (n) => tutti.view.last.points >= n, count);
+    await page.evaluate(() => tutti.view.eye.look_at([1000, 0, 0], 15)); // at nothing, of one's own will
+    await moves_to([-151, 0, 0]);
+    assert.deepEqual(await where(), [1000, 0, 0], "nor is anybody's eye turned who looks away");
+  }));
+
 test("a robot goes silent: grey, a circle, an alert; comes back and drains", () =>
   served(small(), async (page, server, mission) => {
     mission.silent.set(1, mission.time);

@@ -70,6 +70,7 @@ export class FakeMission {
     this.clouds = new Map();
     this.backlog = robots.map(() => 0);
     this.revision = 0;
+    this.origin = [0, 0, 0]; // of the tunnels, in the map's frame
     this.wobble = 0.8;
     this.time = submaps * kSubmap_s;
     for (let i = 0; i < submaps; ++i) for (let r = 0; r < robots.length; ++r) this.submaps.push(this.submap(r, i));
@@ -128,7 +129,7 @@ export class FakeMission {
       const T = this.truth(s.robot, s.index);
       const bend = (this.wobble * s.index) / 20;
       const held = s.index === 0 ? 0 : s.index > 20 ? 1 : 3;
-      submaps[s.id] = [this.component(s.robot), T[0] + bend * Math.sin(s.robot + 1), T[1] + bend * 0.6, T[2], T[3], T[4], T[5], T[6], held, 0.02 + 0.01 * s.index];
+      submaps[s.id] = [this.component(s.robot), T[0] + bend * Math.sin(s.robot + 1) + this.origin[0], T[1] + bend * 0.6 + this.origin[1], T[2] + this.origin[2], T[3], T[4], T[5], T[6], held, 0.02 + 0.01 * s.index];
     }
     return { revision: this.revision, accepted, components: 1 + this.apart.size, submaps };
   }

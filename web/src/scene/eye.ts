@@ -13,6 +13,9 @@ export class Eye {
   readonly matrix = new Float64Array(16);
   width = 1;
   height = 1;
+  /** Whether somebody chose what to look at, since fit(). */
+  aimed = false;
+  private held = false;
   private product = new Matrix4();
 
   constructor(element: HTMLElement, on_change: () => void) {
@@ -23,7 +26,12 @@ export class Eye {
     this.controls.enableDamping = false;
     this.controls.maxPolarAngle = Math.PI * 0.98;
     this.controls.mouseButtons = { LEFT: MOUSE.PAN, MIDDLE: MOUSE.ROTATE, RIGHT: MOUSE.ROTATE };
-    this.controls.addEventListener("change", on_change);
+    this.controls.addEventListener("start", () => (this.held = true));
+    this.controls.addEventListener("end", () => (this.held = false));
+    this.controls.addEventListener("change", () => {
+      this.aimed ||= this.held;
+      on_change();
+    });
   }
 
   resize(width: number, height: number): void {
@@ -79,6 +87,15 @@ export class Eye {
     return true;
   }
 
+  /** Whether a box is in the picture, with all its corners. */
+  holds(low: Vec3, high: Vec3): boolean {
+    for (let corner = 0; corner < 8; ++corner) {
+      const at = this.project(low.map((x, k) => (corner & (1 << k) ? high[k] : x)));
+      if (!at || at[0] < 0 || at[0] > this.width || at[1] < 0 || at[1] > this.height) return false;
+    }
+    return true;
+  }
+
   get target(): Vec3 {
     return this.controls.target.toArray() as Vec3;
   }
@@ -102,13 +119,14 @@ export class Eye {
     const tilt = from_above ? 0.0001 : 0.62;
     this.camera.position.copy(this.controls.target).add(new Vector3(0, -away * Math.sin(tilt), away * Math.cos(tilt)));
     this.controls.update();
+    this.aimed = false;
   }
 
   /** Looks straight down, and keeps what is in the middle. */
   top(): void {
     const away = this.distance;
     this.camera.position.copy(this.controls.target).add(new Vector3(0, -0.0001 * away, away));
-    this.controls.update();
+    this.aim();
   }
 
   /** Keeps its direction and looks at p; from `away` if given. */
@@ -117,7 +135,7 @@ export class Eye {
     if (away !== undefined) back.setLength(away);
     this.controls.target.set(p[0], p[1], p[2]);
     this.camera.position.copy(this.controls.target).add(back);
-    this.controls.update();
+    this.aim();
   }
 
   /** Along the ground: right and forward in shares of the distance; turned by an angle; zoomed by a factor. */
@@ -129,6 +147,11 @@ export class Eye {
     this.controls.target.add(step);
     back.applyAxisAngle(this.camera.up, turn).multiplyScalar(zoom);
     this.camera.position.copy(this.controls.target).add(back);
+    this.aim();
+  }
+
+  private aim(): void {
+    this.aimed = true;
     this.controls.update();
   }
 }

@@ -47,7 +47,8 @@ export class View {
   private ms_per_point = 0;
   private dresser = new Dresser();
   private dirty = true;
-  private fitted = false;
+  /** Whether some of the map was in sight when it last changed, and the eye has not moved since. */
+  private saw = false;
   private moved_ms = -Infinity;
   private still = 0;
   private draw_listeners: (() => void)[] = [];
@@ -74,7 +75,6 @@ export class View {
   fit(from_above = false): void {
     this.followed = null;
     this.eye.fit(this.app.world.low, this.app.world.high, from_above);
-    this.fitted = true;
   }
   use(tool: Tool | null): void {
     this.tool = tool;
@@ -122,11 +122,22 @@ export class View {
 
   private hear(topic: string): void {
     if (topic === "link" || topic === "me") return;
-    if (!this.fitted && this.app.ready && this.app.robots.some((r) => r.newest || !this.app.live)) this.fit();
+    if (topic === "data") this.keep_in_sight();
     this.dirty = true;
   }
 
+  /** Until somebody chooses what to look at, all of the map is in sight. A map that leaves the picture later is fetched back: joined to another, it lies in that one's frame. */
+  private keep_in_sight(): void {
+    const { app, eye } = this;
+    if (!app.ready || this.tool || !app.robots.some((r) => r.newest || !app.live)) return;
+    eye.update();
+    const sees = [...app.world.placed.values()].some((p) => eye.sees(p.target, 0));
+    if (eye.aimed ? this.saw && !sees : !eye.holds(app.world.low, app.world.high)) this.fit();
+    else this.saw = sees;
+  }
+
   private move(): void {
+    this.saw = false;
     this.moved_ms = performance.now();
     this.dirty = true;
   }
