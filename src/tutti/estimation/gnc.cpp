@@ -26,6 +26,9 @@ constexpr double kWeightFloor = 1e-8;
 /// Inner solves only follow the changing weights; the last one uses the caller's tolerance.
 constexpr double kInnerTolerance = 1e-3;
 constexpr int kInnerIterations = 4;
+/// When the weights of fewer than one in so many edges change, the factor before is tried first. With many wrong
+/// closures it would lead to other optima than Newton's steps do.
+constexpr std::size_t kFewChange = 8;
 
 /// Yang et al. eq. (14): weight for whitened squared error s, truncation c2 and control parameter mu.
 double tls_weight(double s, double c2, double mu) {
@@ -72,15 +75,19 @@ GncResult truncated_least_squares(const PoseGraph& graph, const GncConfig& confi
   double mu = 1.0 / (2.0 * worst - 1.0);  // remark 5
   for (bool binary = false; !binary && out.outer_iterations < kMaxOuterIterations; ++out.outer_iterations) {
     binary = true;
+    std::size_t changed = 0;
     for (std::size_t e = 0; e < edges; ++e) {
       if (!std::isfinite(truncation[e])) continue;
-      out.inlier_weight[e] = tls_weight(excess(e), 1.0, mu);
+      const double before = std::exchange(out.inlier_weight[e], tls_weight(excess(e), 1.0, mu));
+      changed += out.inlier_weight[e] != before ? 1 : 0;
       binary = binary && is_binary(out.inlier_weight[e]);
       scale[e] = std::max(out.inlier_weight[e], kWeightFloor);
     }
     if (binary) inner = config.solver;
     const int before = out.solution.summary.factorisations;
-    out.solution.summary = internal::minimise(equations, out.solution.poses, costs, inner);
+    out.solution.summary =
+        internal::minimise(equations, out.solution.poses, costs, inner,
+                           {.is_factorised = out.outer_iterations > 0 && kFewChange * changed < edges});
     out.solution.summary.factorisations += before;
     if (!is_usable(out.solution.summary.termination)) return out;
     mu *= kControlStep;

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "support/estimation/random_graphs.hpp"
 
 namespace tutti::estimation {
@@ -56,6 +58,20 @@ TEST(Gnc, LeavesACleanGraphAlone) {
   const auto plain = solve_pose_graph(random.graph, {});
   EXPECT_EQ(result.solution.poses, plain.poses);
   EXPECT_EQ(result.outer_iterations, 0);
+}
+
+// The weights of few closures change from step to step, so the factor before still tells the way.
+TEST(Gnc, WhereFewClosuresAreDoubtfulFewStepsAreFactorised) {
+  Rng rng(6);
+  const auto random = random_graph(rng, 200, 2000, 1.0);
+  std::vector<EdgeRole> roles(random.graph.edges.size(), EdgeRole::robust);
+  std::fill_n(roles.begin(), 199, EdgeRole::trusted);
+  const auto result = solve_pose_graph_gnc(random.graph, {.confidence = 0.99}, roles);
+  const auto refused = std::ranges::count(result.inlier_weight, 0.0);
+  EXPECT_GE(refused, 5);  // by chance alone
+  EXPECT_LE(refused, 40);
+  EXPECT_GE(result.outer_iterations, 6);
+  EXPECT_LE(result.solution.summary.factorisations, 4);  // 10 with one a step
 }
 
 TEST(Gnc, PassesFailuresOn) {

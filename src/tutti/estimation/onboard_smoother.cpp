@@ -129,7 +129,7 @@ SmootherSummary OnboardSmoother::solve() {
   const auto minimise = [&] {
     const SolverConfig solver{.max_iterations = config_.max_iterations,
                               .relative_cost_tolerance = config_.relative_cost_tolerance};
-    return internal::minimise(equations, reduced, {}, solver, kStepTolerance);
+    return internal::minimise(equations, reduced, {}, solver, {.step_tolerance = kStepTolerance});
   };
   // From the last poses, or, when these are far off or lead nowhere, from raw odometry.
   SolveSummary result;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -41,7 +42,9 @@ struct SolveSummary {
   double final_cost = -1.0;     ///< The same at the returned poses.
   double gradient_norm = -1.0;  ///< Largest entry of J^T Omega r at the last linearisation.
   double step_norm = -1.0;      ///< Largest entry of the last step (m, rad).
-  int components = 0;           ///< Connected components of the graph; each has its own gauge.
+  /// Largest entries of all steps since the Hessian was factorised together; infinite if it was not.
+  double moved_since_factorised = std::numeric_limits<double>::infinity();
+  int components = 0;  ///< Connected components of the graph; each has its own gauge.
 };
 
 struct PoseGraphSolution {

@@ -22,6 +22,9 @@ constexpr double kOut = 1e-8;
 /// Less than this share of what is known of a direction comes from elsewhere: nothing does.
 constexpr double kNothingElse = 1e-9;
 
+/// Poses that moved by no more than this (m, rad) since then still have the covariances of an earlier factor.
+constexpr double kStill = 1e-3;
+
 /// Where the first solution begins is solved to this share of its cost.
 constexpr double kRoughly = 1e-3;
 
@@ -68,7 +71,29 @@ struct SwitchedGraph::State {
   bool solved = false;
   double cost = 0.0;
   int factorisations = 0;
+  /// How far poses moved since the equations were factorised, m or rad; infinite when their factor was taken.
+  double moved = std::numeric_limits<double>::infinity();
+
+  [[nodiscard]] internal::EdgeCosts costs() const { return {.loss = {}, .roles = {}, .scale = scale}; }
+  Termination begin();
 };
+
+/// Where the first solution begins: as given, or at the rough solution of what is in.
+Termination SwitchedGraph::State::begin() {
+  if (config.initialisation == "given") {
+    poses = reduced.graph.poses;
+    return internal::is_finite(reduced.graph) ? Termination::converged : Termination::invalid_input;
+  }
+  PoseGraph only{.poses = reduced.graph.poses, .edges = {}};
+  for (std::size_t e = 0; e < reduced.graph.edges.size(); ++e)
+    if (scale[e] == 1.0) only.edges.push_back(reduced.graph.edges[e]);
+  SolverConfig roughly = config;
+  roughly.relative_cost_tolerance = std::max(kRoughly, roughly.relative_cost_tolerance);
+  PoseGraphSolution start = solve_pose_graph(only, roughly);
+  factorisations += start.summary.factorisations;
+  if (is_usable(start.summary.termination)) poses = std::move(start.poses);
+  return start.summary.termination;
+}
 
 SwitchedGraph::SwitchedGraph(const PoseGraph& graph, std::span<const EdgeRole> roles, const SolverConfig& config)
     : state_(std::make_unique<State>(State{.graph = graph, .config = config, .roles = {roles.begin(), roles.end()}})) {
@@ -88,20 +113,12 @@ Termination SwitchedGraph::solve(const std::vector<char>& in) {
   for (std::size_t e = 0; e < in.size(); ++e)
     if (s.roles[e] == EdgeRole::robust) s.scale[*s.reduced.edge[e]] = in[e] ? 1.0 : kOut;
   if (!s.solved) {
-    PoseGraph only{.poses = s.reduced.graph.poses, .edges = {}};
-    for (std::size_t e = 0; e < s.reduced.graph.edges.size(); ++e)
-      if (s.scale[e] == 1.0) only.edges.push_back(s.reduced.graph.edges[e]);
-    SolverConfig roughly = s.config;
-    roughly.relative_cost_tolerance = std::max(kRoughly, roughly.relative_cost_tolerance);
-    const PoseGraphSolution start = solve_pose_graph(only, roughly);
-    s.factorisations += start.summary.factorisations;
-    if (!is_usable(start.summary.termination)) return start.summary.termination;
-    s.poses = start.poses;
+    if (const Termination begun = s.begin(); !is_usable(begun)) return begun;
   }
-  const SolveSummary summary =
-      internal::minimise(*s.equations, s.poses, {.loss = {}, .roles = {}, .scale = s.scale}, s.config);
+  const SolveSummary summary = internal::minimise(*s.equations, s.poses, s.costs(), s.config);
   s.factorisations += summary.factorisations;
   s.cost = summary.final_cost;
+  s.moved = summary.moved_since_factorised;
   s.solved = is_usable(summary.termination);
   return summary.termination;
 }
@@ -113,9 +130,13 @@ std::vector<double> SwitchedGraph::prices() {
   for (std::size_t e = 0; e < s.reduced.graph.edges.size(); ++e)
     if (s.scale[e] == 1.0) parts.join(s.reduced.graph.edges[e].from, s.reduced.graph.edges[e].to);
   const std::vector<int> part = parts.labels().first;
-  s.equations->linearise(s.poses, {.loss = {}, .roles = {}, .scale = s.scale}, true);
-  ++s.factorisations;
-  if (s.structure.variables == 0 || !s.equations->factorise()) return out;
+  if (s.structure.variables == 0) return out;
+  if (s.moved > kStill) {
+    s.equations->linearise(s.poses, s.costs(), true);
+    ++s.factorisations;
+    if (!s.equations->factorise()) return out;
+  }
+  s.moved = std::numeric_limits<double>::infinity();
   const SelectedInverse inverse(s.equations->hessian().take_factor());
   for (std::size_t e = 0; e < out.size(); ++e) {
     if (s.roles[e] != EdgeRole::robust) continue;

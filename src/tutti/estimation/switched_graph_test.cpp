@@ -57,6 +57,26 @@ TEST(SwitchedGraph, TakingInAndOutEndsWhereItBegan) {
   for (std::size_t k = 0; k < after.size(); ++k) EXPECT_LT(local(before[k], after[k]).norm(), 1e-6) << k;
 }
 
+TEST(SwitchedGraph, FromTheOptimumItTakesOneFactorisationPricesIncluded) {
+  Rng rng(4);
+  PoseGraph graph = random_graph(rng, 30, 12, 0.02).graph;
+  const std::vector<EdgeRole> roles = chain_is_trusted(graph);
+  const std::vector<char> in(graph.edges.size(), 1);
+  SwitchedGraph first(graph, roles, kPrecise);
+  ASSERT_TRUE(is_usable(first.solve(in)));
+  const std::vector<double> expected = first.prices();
+  graph.poses = first.poses();
+  SolverConfig from_there = kPrecise;
+  from_there.initialisation = "given";
+  SwitchedGraph again(graph, roles, from_there);
+  ASSERT_TRUE(is_usable(again.solve(in)));
+  const std::vector<double> prices = again.prices();
+  EXPECT_EQ(again.factorisations(), 1);
+  for (std::size_t e = 0; e < prices.size(); ++e) EXPECT_NEAR(prices[e], expected[e], 1e-4 * (1.0 + expected[e])) << e;
+  static_cast<void>(again.prices());  // the factor was taken
+  EXPECT_EQ(again.factorisations(), 2);
+}
+
 TEST(SwitchedGraph, WhatAloneJoinsTwoPartsHasNoPrice) {
   Rng rng(5);
   PoseGraph graph = random_graph(rng, 10, 2, 0.02).graph;

@@ -166,8 +166,10 @@ Judgement explain_closures(PoseGraph graph, const OdometryTrajectories& odometry
   Judgement out{.accepted = std::vector<bool>(supported.size(), false),
                 .failed = {},
                 .solved = best.solved,
+                .poses = graph.poses,
                 .work = solver.work()};
   if (!best.solved) return out;
+  solver.expand(graph, best, out.poses);
   for (std::size_t k = 0; k < closure_of.size(); ++k) out.accepted[closure_of[k]] = best.accepted[k] != 0;
   for (const FailedSegment& failed : best.failed) out.failed.push_back(narrowed(odometry, failed));
   return out;

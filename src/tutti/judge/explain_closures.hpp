@@ -36,6 +36,7 @@ struct Judgement {
   std::vector<bool> accepted;         ///< Per closure.
   std::vector<FailedSegment> failed;  ///< Sorted by `from`; none overlap.
   bool solved = false;                ///< False: the graph could not be solved, and nothing is accepted.
+  std::vector<Pose3> poses;           ///< Per node, as solved; as they were given, if nothing was.
   SearchWork work;
 };
 

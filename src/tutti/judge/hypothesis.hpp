@@ -60,6 +60,10 @@ class HypothesisSolver {
   /// hypotheses refuse the same groups and the optimum disregards odometry within `hypothesis`'s windows only: the
   /// optimum is then this hypothesis's own, because it may disregard nothing else.
   [[nodiscard]] Solution judge(Hypothesis hypothesis, estimation::GncResult optimum) const;
+  /// Writes into `poses` those of all nodes of the graph under a solution.
+  void expand(const PoseGraph& graph, const Solution& solution, std::vector<Pose3>& poses) const {
+    estimation::expand_chains(graph, reduced_, solution.optimum.solution.poses, poses);
+  }
   [[nodiscard]] std::size_t runs() const { return runs_.size(); }
   /// The runs within config.search_s of a run, on the same segment of odometry.
   [[nodiscard]] Window around(std::size_t run) const;

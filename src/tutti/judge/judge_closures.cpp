@@ -8,9 +8,11 @@
 #include <limits>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 #include "tutti/base/chi_square.hpp"
+#include "tutti/base/disjoint_sets.hpp"
 #include "tutti/estimation/influence.hpp"
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/judge/closure_groups.hpp"
@@ -79,13 +81,14 @@ class Optimiser {
     std::iota(all.begin(), all.end(), std::size_t{0});
     const auto groups = closure_groups(map_.nodes, closure_edges_, all,
                                        {kNeighbours_s, std::numeric_limits<double>::infinity(), closures_.size()});
-    auto found = explain_closures(std::move(graph), odometry, map_.odometry_edges, groups, config_, gnc_, certain_);
+    Judgement found =
+        explain_closures(std::move(graph), odometry, map_.odometry_edges, groups, config_, gnc_, certain_);
     std::vector<Objection> objections;
     for (const bool accepted : found.accepted)
       objections.push_back(accepted ? Objection::none : Objection::contradicted);
     leave_unjoined(odometry, objections);
     return {.failed = std::move(found.failed),
-            .graph = {},
+            .graph = {.poses = std::move(found.poses), .edges = {}},
             .closure_of_edge = {},
             .solution = {},
             .objections = std::move(objections),
@@ -117,10 +120,31 @@ class Optimiser {
            objection == Objection::too_few;
   }
 
+  [[nodiscard]] estimation::SolverConfig from_there() const {
+    estimation::SolverConfig out = gnc_.solver;
+    out.initialisation = "given";
+    return out;
+  }
+
+  /// Moves each part of a solved map to where odometry has its first node: closures that were refused joined parts that
+  /// lie in frames of their own.
+  void place_by_odometry(PoseGraph& graph) const {
+    DisjointSets parts(graph.poses.size());
+    for (const PoseGraphEdge& edge : graph.edges) parts.join(edge.from, edge.to);
+    const auto [part, count] = parts.labels();
+    std::vector<std::optional<Pose3>> T_odometry_solved(static_cast<std::size_t>(count));
+    for (std::size_t k = 0; k < graph.poses.size(); ++k) {
+      auto& T = T_odometry_solved[static_cast<std::size_t>(part[k])];
+      if (!T) T = map_.graph.poses[k] * graph.poses[k].inverse();
+      graph.poses[k] = *T * graph.poses[k];
+    }
+  }
+
   /// The map with the closures that are worth what it pays for them, from the objections, the failed odometry and the
   /// work of `out`. Closures that are not asked keep the price that they were refused for. Its poses are those of the
   /// graph of the closures' ends, with odometry bent to meet them.
   [[nodiscard]] Optimum settle(const PoseGraph& odometry, Optimum out) const {
+    std::vector<Pose3> begin = std::move(out.graph.poses);
     out.graph = with_room(odometry);
     out.closure_of_edge.clear();
     out.solution = {};
@@ -128,6 +152,7 @@ class Optimiser {
       weaken(out.graph, map_.odometry_edges, segment.from, segment.to, kDoubt * segment.missed.head<3>().norm(),
              kDoubt * segment.missed.tail<3>().norm());
     PoseGraph all = with_room(out.graph);
+    all.poses = std::move(begin);
     std::vector<std::size_t> asked;
     std::vector<char> in;
     std::vector<bool> certain;
@@ -138,7 +163,7 @@ class Optimiser {
       certain.push_back(certain_[c]);
       all.edges.push_back(closure_edges_[c]);
     }
-    Settled settled = settle_closures(all, map_.odometry_edges, std::move(in), certain, config_, gnc_.solver);
+    Settled settled = settle_closures(all, map_.odometry_edges, std::move(in), certain, config_, from_there());
     out.work.factorisations += settled.factorisations;
     out.graph.poses = std::move(settled.poses);
     for (std::size_t k = 0; k < asked.size(); ++k) {
@@ -152,6 +177,7 @@ class Optimiser {
       out.graph.edges.push_back(closure_edges_[asked[k]]);
       out.closure_of_edge.push_back(asked[k]);
     }
+    place_by_odometry(out.graph);
     out.solution.summary.termination = settled.termination;
     out.solution.poses = out.graph.poses;
     return out;
@@ -160,9 +186,7 @@ class Optimiser {
   /// The map in full, from where its closures' ends are. Nothing is asked of it before the last closure is decided.
   [[nodiscard]] Optimum solved(Optimum out) const {
     if (!estimation::is_usable(out.solution.summary.termination)) return out;
-    estimation::SolverConfig from_there = gnc_.solver;
-    from_there.initialisation = "given";
-    out.solution = estimation::solve_pose_graph(out.graph, from_there);
+    out.solution = estimation::solve_pose_graph(out.graph, from_there());
     out.work.factorisations += static_cast<std::size_t>(out.solution.summary.factorisations);
     return out;
   }

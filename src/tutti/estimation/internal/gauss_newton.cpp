@@ -2,6 +2,7 @@
 #include "tutti/estimation/internal/gauss_newton.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include "tutti/geometry/so3.hpp"
 
@@ -55,8 +56,8 @@ Tried search_line(GraphEquations& equations, const std::vector<Pose3>& poses, co
 }  // namespace
 
 SolveSummary minimise(GraphEquations& equations, std::vector<Pose3>& poses, const EdgeCosts& costs,
-                      const SolverConfig& config, double step_tolerance) {
-  const bool limits_step = std::isfinite(step_tolerance);
+                      const SolverConfig& config, const Minimising& how) {
+  const bool limits_step = std::isfinite(how.step_tolerance);
   SolveSummary summary{.components = equations.components()};
   summary.initial_cost = summary.final_cost = equations.cost(poses, costs);
   summary.termination = Termination::max_iterations;
@@ -65,14 +66,17 @@ SolveSummary minimise(GraphEquations& equations, std::vector<Pose3>& poses, cons
   const Eigen::VectorXd& gradient = equations.gradient();
   double previous_decrease = 0.0;
   double previous_size = 0.0;
-  bool reuse_factor = false;
+  bool reuse_factor = how.is_factorised;
+  bool is_unknown = reuse_factor;  // no step has shown yet what this factor is worth
   while (summary.iterations < config.max_iterations) {
     equations.linearise(poses, costs, !reuse_factor);
     if (!reuse_factor) ++summary.factorisations;
     if (!reuse_factor && !equations.factorise()) {
       summary.termination = Termination::singular;
+      summary.moved_since_factorised = std::numeric_limits<double>::infinity();
       break;
     }
+    if (!reuse_factor) summary.moved_since_factorised = 0.0;
     step = -gradient;
     equations.solve(step);
     const double decrease = -step.dot(gradient);  // of the cost, predicted by the linear model
@@ -82,8 +86,9 @@ SolveSummary minimise(GraphEquations& equations, std::vector<Pose3>& poses, cons
     }
     const double relative = decrease / (summary.final_cost + kCostFloor);
     const double size = step.size() > 0 ? step.lpNorm<Eigen::Infinity>() : 0.0;
-    if (reuse_factor && (decrease > kReuseContraction * previous_decrease ||
-                         (limits_step && size > kReuseStepContraction * previous_size))) {
+    if (reuse_factor && !is_unknown &&
+        (decrease > kReuseContraction * previous_decrease ||
+         (limits_step && size > kReuseStepContraction * previous_size))) {
       reuse_factor = false;
       continue;
     }
@@ -91,13 +96,18 @@ SolveSummary minimise(GraphEquations& equations, std::vector<Pose3>& poses, cons
     summary.gradient_norm = gradient.size() > 0 ? gradient.lpNorm<Eigen::Infinity>() : 0.0;
 
     const double cost_to_go = limits_step ? still_to_go(decrease, previous_decrease) : decrease;
-    const bool converged = cost_to_go <= config.relative_cost_tolerance * (summary.final_cost + kCostFloor) &&
-                           still_to_go(size, previous_size) <= step_tolerance;
+    const bool converged = !is_unknown &&
+                           cost_to_go <= config.relative_cost_tolerance * (summary.final_cost + kCostFloor) &&
+                           still_to_go(size, previous_size) <= how.step_tolerance;
     previous_decrease = decrease;
     previous_size = size;
     // A step that is asked for by its size may promise less than the cost's rounding.
     const double most = summary.final_cost * (relative <= kRounding && limits_step ? 1.0 + kRounding : 1.0);
     const auto [scale, new_cost] = search_line(equations, poses, step, costs, most, kMaxStepHalvings, candidate);
+    if (!(new_cost <= most) && std::exchange(is_unknown, false)) {
+      reuse_factor = false;
+      continue;
+    }
     if (!(new_cost <= most)) {  // not by more than rounding, when converged
       summary.termination = converged ? Termination::converged : Termination::stalled;
       break;
@@ -105,10 +115,12 @@ SolveSummary minimise(GraphEquations& equations, std::vector<Pose3>& poses, cons
     poses.swap(candidate);
     summary.final_cost = new_cost;
     summary.step_norm = scale * size;
+    summary.moved_since_factorised += summary.step_norm;
     if (converged) {
       summary.termination = Termination::converged;
       break;
     }
+    is_unknown = false;
     reuse_factor = scale == 1.0 && relative < kReuseBelow && !(limits_step && size > kReuseStepBelow);
   }
   return summary;
