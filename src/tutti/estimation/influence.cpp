@@ -32,18 +32,6 @@ constexpr double kAlone = 1e-9;
 /// Less than this share comes from elsewhere: where that would have its ends is not known to first order.
 constexpr double kHardlyKnown = 1e-4;
 
-/// H^-1 at the ends of an edge; anchored ends do not move.
-Eigen::Matrix<double, 12, 12> covariance_of_ends(const SelectedInverse& inverse, const EdgeSlot& slot) {
-  Eigen::Matrix<double, 12, 12> out = Eigen::Matrix<double, 12, 12>::Zero();
-  if (slot.from >= 0) out.topLeftCorner<6, 6>() = inverse.block(slot.from, slot.from);
-  if (slot.to >= 0) out.bottomRightCorner<6, 6>() = inverse.block(slot.to, slot.to);
-  if (slot.from >= 0 && slot.to >= 0) {
-    out.topRightCorner<6, 6>() = inverse.block(slot.from, slot.to);
-    out.bottomLeftCorner<6, 6>() = out.topRightCorner<6, 6>().transpose();
-  }
-  return out;
-}
-
 /// The force on its ends that has the effect of taking the edge away.
 struct Pull {
   std::size_t edge = 0;
@@ -230,7 +218,7 @@ std::vector<Influence> largest_influences(const PoseGraph& graph, std::span<cons
     const SelectedInverse inverse(equations.hessian().factor().copy());
     for (const std::size_t e : candidates) {
       const EdgeSlot& slot = structure.edges[*reduced.edge[e]];
-      Pull pull = pull_of(e, graph.edges[e], poses, covariance_of_ends(inverse, slot));
+      Pull pull = pull_of(e, graph.edges[e], poses, inverse.ends(slot));
       if (pull.distance > least_distance) pulls.push_back(std::move(pull));
     }
   }

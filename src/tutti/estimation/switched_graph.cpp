@@ -28,25 +28,15 @@ constexpr double kStill = 1e-3;
 /// Where the first solution begins is solved to this share of its cost.
 constexpr double kRoughly = 1e-3;
 
-using internal::EdgeSlot;
 using internal::SelectedInverse;
 
-/// H^-1 at the ends of an edge, in the coordinates of its residual.
-Matrix6d covariance_of(const SelectedInverse& inverse, const EdgeSlot& slot, const BetweenLinearisation& factor) {
-  Matrix6d out = Matrix6d::Zero();
-  const auto add = [&](int a, const Matrix6d& J_a, int b, const Matrix6d& J_b) {
-    if (a >= 0 && b >= 0) out += J_a * inverse.block(a, b) * J_b.transpose();
-  };
-  add(slot.from, factor.J_i, slot.from, factor.J_i);
-  add(slot.from, factor.J_i, slot.to, factor.J_j);
-  add(slot.to, factor.J_j, slot.from, factor.J_i);
-  add(slot.to, factor.J_j, slot.to, factor.J_j);
-  return 0.5 * (out + out.transpose());
-}
-
-double price(const PoseGraphEdge& edge, const BetweenLinearisation& factor, const Matrix6d& covariance, bool is_in) {
+/// `covariance`: H^-1 at the edge's ends.
+double price(const PoseGraphEdge& edge, const BetweenLinearisation& factor,
+             const Eigen::Matrix<double, 12, 12>& covariance, bool is_in) {
   const Matrix6d upper = edge.information.llt().matrixU();  // Omega = upper^T upper
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> known(upper * covariance * upper.transpose());
+  Eigen::Matrix<double, 6, 12> J;
+  J << upper * factor.J_i, upper * factor.J_j;
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> known(J * covariance * J.transpose());
   const Vector6d missed = known.eigenvectors().transpose() * (upper * factor.residual);
   double out = 0.0;
   for (int d = 0; d < 6; ++d) {
@@ -148,7 +138,7 @@ std::vector<double> SwitchedGraph::prices() {
       continue;
     }
     const auto factor = linearise_between(s.poses[edge.from], s.poses[edge.to], edge.T_from_to);
-    out[e] = price(edge, factor, covariance_of(inverse, s.structure.edges[at], factor), is_in);
+    out[e] = price(edge, factor, inverse.ends(s.structure.edges[at]), is_in);
   }
   return out;
 }

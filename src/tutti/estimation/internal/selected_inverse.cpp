@@ -78,6 +78,17 @@ Matrix6d SelectedInverse::block(int row_variable, int column_variable) const {
   return inverse_.block(s, position, column_variable - node.first);
 }
 
+Eigen::Matrix<double, 12, 12> SelectedInverse::ends(const EdgeSlot& edge) const {
+  Eigen::Matrix<double, 12, 12> out = Eigen::Matrix<double, 12, 12>::Zero();
+  if (edge.from >= 0) out.topLeftCorner<6, 6>() = block(edge.from, edge.from);
+  if (edge.to >= 0) out.bottomRightCorner<6, 6>() = block(edge.to, edge.to);
+  if (edge.from >= 0 && edge.to >= 0) {
+    out.topRightCorner<6, 6>() = block(edge.from, edge.to);
+    out.bottomLeftCorner<6, 6>() = out.topRightCorner<6, 6>().transpose();
+  }
+  return out;
+}
+
 // delta_a_b = delta_b - Ad(T_a_b^-1) delta_a; anchored poses do not move.
 Matrix6d SelectedInverse::relative(int a, int b, const Pose3& T_b_a) const {
   const Matrix6d A = adjoint(T_b_a);

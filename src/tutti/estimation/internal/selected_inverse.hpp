@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "tutti/estimation/internal/block_structure.hpp"
 #include "tutti/estimation/internal/cholesky_factor.hpp"
 #include "tutti/geometry/pose3.hpp"
 
@@ -18,6 +19,8 @@ class SelectedInverse {
   explicit SelectedInverse(CholeskyFactor factor);
   /// 6 x 6 block of two block variables; it must be in the pattern of L.
   [[nodiscard]] Matrix6d block(int row_variable, int column_variable) const;
+  /// (L L^T)^-1 at the ends of an edge, `from` first; anchored ends do not move.
+  [[nodiscard]] Eigen::Matrix<double, 12, 12> ends(const EdgeSlot& edge) const;
   /// Covariance of T_a_b, right tangent, of two poses whose block variables are `a` and `b`; -1: that pose is anchored.
   [[nodiscard]] Matrix6d relative(int a, int b, const Pose3& T_b_a) const;
 
