@@ -2,7 +2,6 @@
 #include "tutti/mission/runner.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <limits>
 #include <memory>
 #include <set>
@@ -15,6 +14,7 @@
 #include "tutti/mission/load_meter.hpp"
 #include "tutti/mission/make_record.hpp"
 #include "tutti/mission/mission_events.hpp"
+#include "tutti/mission/pace.hpp"
 #include "tutti/mission/recordings.hpp"
 #include "tutti/mission/robot_actor.hpp"
 #include "tutti/mission/server_meter.hpp"
@@ -36,26 +36,6 @@ constexpr double kNever = std::numeric_limits<double>::infinity();
 constexpr double kPatience_s = 86400.0;  // after the end, for what is still under way
 constexpr std::uint64_t kEpoch = 1;      // the server starts once
 const bus::Endpoint kWorker = bus::Endpoint::worker(0);
-
-/// Keeps virtual time in step with the wall clock, when asked to.
-class Pace {
- public:
-  explicit Pace(std::optional<double> rate) : rate_(rate) {}
-  void wait_until(double time_s) const {
-    if (rate_) std::this_thread::sleep_until(start_ + std::chrono::duration<double>(time_s / *rate_));
-  }
-  /// Wall milliseconds since the instant that `time_s` stood for.
-  [[nodiscard]] double late_ms(double time_s) const {
-    if (!rate_) return 0.0;
-    return std::chrono::duration<double, std::milli>(Clock::now() - start_).count() - 1e3 * time_s / *rate_;
-  }
-  [[nodiscard]] double wall_s() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  std::optional<double> rate_;
-  std::chrono::time_point<Clock, std::chrono::duration<double>> start_ = Clock::now();
-};
 
 class MissionRun {
  public:
