@@ -8,6 +8,8 @@
 namespace tutti::server {
 namespace {
 
+constexpr std::size_t kCutFrom = 4;  // times as many as stay
+
 /// In an order without ties, so that it does not matter who came first.
 bool is_more_alike(const Alike& a, const Alike& b) {
   return std::tuple(-a.likeness, a.submap) < std::tuple(-b.likeness, b.submap);
@@ -70,12 +72,21 @@ CandidatePairs::CandidatePairs(std::size_t most, const PlaceSet& places) : most_
     for (const Alike& other : place.candidates) {
       const auto others = most_alike_.find(other.submap);
       if (others == most_alike_.end()) continue;
-      by_sensor(own, other.sensor).push_back({other});
-      by_sensor(others->second, other.sensor).push_back({{id, other.likeness, other.sensor}});
+      append(by_sensor(own, other.sensor), other);
+      append(by_sensor(others->second, other.sensor), {id, other.likeness, other.sensor});
     }
   }
   for (auto& [id, lists] : most_alike_)
-    for (List& list : lists) cut(list);
+    for (List& list : lists) {
+      cut(list);
+      list.shrink_to_fit();
+    }
+}
+
+/// A submap was a candidate of many that later ones displaced: it is cut whenever it has several times as many as stay.
+void CandidatePairs::append(List& list, const Alike& other) const {
+  if (list.size() >= kCutFrom * most_) cut(list);
+  list.push_back({other});
 }
 
 void CandidatePairs::cut(List& list) const {
@@ -86,12 +97,13 @@ void CandidatePairs::cut(List& list) const {
   std::ranges::sort(list, by_robot);
   const auto twice = std::ranges::unique(list, {}, &Ranked::alike);  // of two that were compared again
   list.erase(twice.begin(), twice.end());
-  for (std::size_t i = 1; i < list.size(); ++i)
-    if (list[i].alike.submap.chain.robot == list[i - 1].alike.submap.chain.robot) list[i].turn = list[i - 1].turn + 1;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const bool is_first = i == 0 || list[i].alike.submap.chain.robot != list[i - 1].alike.submap.chain.robot;
+    list[i].turn = is_first ? 0 : list[i - 1].turn + 1;
+  }
   const std::size_t kept = std::min(list.size(), most_);
   std::ranges::partial_sort(list, list.begin() + static_cast<std::ptrdiff_t>(kept), comes_first);
   list.resize(kept);
-  list.shrink_to_fit();
 }
 
 bool CandidatePairs::prefers(SubmapId of, SubmapId other) const {

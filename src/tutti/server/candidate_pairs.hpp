@@ -64,6 +64,7 @@ class CandidatePairs {
   using List = std::vector<Ranked>;  // best first, at most most_
   static List& by_sensor(std::vector<List>& lists, std::uint32_t sensor);
   void insert(SubmapId of, const Alike& other);
+  void append(List& list, const Alike& other) const;
   void cut(List& list) const;
   [[nodiscard]] bool prefers(SubmapId of, SubmapId other) const;
 

@@ -207,6 +207,18 @@ TEST(CandidatePairs, ComeBackFromWhatIsStored) {
   for (const auto& [pair, value] : likeness) EXPECT_FALSE(restored(made.places, 5).excludes(pair));
 }
 
+TEST(CandidatePairs, ComeBackWhereMostThatIsStoredWasDisplaced) {
+  auto likeness = any_likeness(200);
+  for (auto& [pair, value] : likeness) value += 0.02 * (pair.first.index + pair.second.index);  // who is new is alike
+  for (const std::size_t most : {1U, 3U, 8U}) {
+    const Filled made = filled(numbers(200), most, likeness);
+    std::size_t stored = 0;
+    for (const auto& [id, place] : made.places) stored += place.candidates.size();
+    EXPECT_GT(stored, 3 * 200 * most);
+    EXPECT_EQ(all_of(restored(made.places, most)), all_of(made.pairs)) << most;
+  }
+}
+
 TEST(CandidatePairs, KeepTheVerdictsThatAnOperatorHasSpokenOf) {
   const auto likeness = any_likeness(30);
   const Filled made = filled(numbers(30), 2, likeness);
