@@ -37,6 +37,9 @@ double tls_weight(double s, double c2, double mu) {
   return std::sqrt(c2 * mu * (mu + 1.0) / s) - mu;
 }
 
+/// Remark 5: the largest mu with which errors up to `worst` truncations cost as a convex function of them.
+double convex_until(double worst) { return 1.0 / (2.0 * worst - 1.0); }
+
 double squared_error(const PoseGraphEdge& edge, const std::vector<Pose3>& poses) {
   const Vector6d r = between_residual(poses[edge.from], poses[edge.to], edge.T_from_to);
   return r.dot(edge.information * r);
@@ -72,7 +75,7 @@ GncResult truncated_least_squares(const PoseGraph& graph, const GncConfig& confi
   SolverConfig inner = config.solver;
   inner.relative_cost_tolerance = std::max(kInnerTolerance, config.solver.relative_cost_tolerance);
   inner.max_iterations = kInnerIterations;
-  double mu = 1.0 / (2.0 * worst - 1.0);  // remark 5
+  double mu = convex_until(worst);
   for (bool binary = false; !binary && out.outer_iterations < kMaxOuterIterations; ++out.outer_iterations) {
     binary = true;
     std::size_t changed = 0;
@@ -90,7 +93,10 @@ GncResult truncated_least_squares(const PoseGraph& graph, const GncConfig& confi
                            {.is_factorised = out.outer_iterations > 0 && kFewChange * changed < edges});
     out.solution.summary.factorisations += before;
     if (!is_usable(out.solution.summary.termination)) return out;
-    mu *= kControlStep;
+    worst = 1.0;  // of what is not refused: what is far off may be long gone, and all else fit
+    for (std::size_t e = 0; e < edges; ++e)
+      if (std::isfinite(truncation[e]) && out.inlier_weight[e] > 0.0) worst = std::max(worst, excess(e));
+    mu = std::max(kControlStep * mu, convex_until(worst));
   }
   out.solution.weights = out.inlier_weight;
   return out;

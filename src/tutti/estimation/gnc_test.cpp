@@ -74,6 +74,21 @@ TEST(Gnc, WhereFewClosuresAreDoubtfulFewStepsAreFactorised) {
   EXPECT_LE(result.solution.summary.factorisations, 4);  // 10 with one a step
 }
 
+// Once they are refused all else fits: to double the parameter from where they set it took 22 steps.
+TEST(Gnc, ClosuresThatAreFarOffAreSteppedOver) {
+  Rng rng(8);
+  auto random = random_graph(rng, 60, 600, 0.5);
+  const std::size_t right = random.graph.edges.size();
+  for (std::size_t k = 0; k < 4; ++k)
+    random.graph.edges.push_back({k, k + 30, random_pose(rng, 300.0, 1.0), random.graph.edges.front().information});
+  std::vector<EdgeRole> roles(random.graph.edges.size(), EdgeRole::robust);
+  std::fill_n(roles.begin(), 59, EdgeRole::trusted);
+  const auto result = solve_pose_graph_gnc(random.graph, {}, roles);
+  for (std::size_t e = 0; e < random.graph.edges.size(); ++e)
+    EXPECT_EQ(result.inlier_weight[e], e < right ? 1.0 : 0.0) << e;
+  EXPECT_LE(result.outer_iterations, 6);
+}
+
 TEST(Gnc, PassesFailuresOn) {
   Rng rng(2);
   PoseGraph graph = random_graph(rng, 6, 0, 0.0).graph;
