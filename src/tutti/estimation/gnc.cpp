@@ -62,10 +62,17 @@ GncResult truncated_least_squares(const PoseGraph& graph, const GncConfig& confi
   if (!is_usable(out.solution.summary.termination)) return out;
 
   // In units of the truncation, so that one mu serves edges with different ones.
-  const auto excess = [&](std::size_t e) { return squared_error(graph.edges[e], out.solution.poses) / truncation[e]; };
-  double worst = 0.0;
-  for (std::size_t e = 0; e < edges; ++e)
-    if (std::isfinite(truncation[e])) worst = std::max(worst, excess(e));
+  std::vector<double> excess(edges, 0.0);
+  const auto measure = [&] {  // returns the worst of what is not refused
+    double worst = 0.0;
+    for (std::size_t e = 0; e < edges; ++e) {
+      if (!std::isfinite(truncation[e])) continue;
+      excess[e] = squared_error(graph.edges[e], out.solution.poses) / truncation[e];
+      if (out.inlier_weight[e] > 0.0) worst = std::max(worst, excess[e]);
+    }
+    return worst;
+  };
+  const double worst = measure();
   if (worst <= 1.0) return out;  // nothing to reject
 
   const auto structure = internal::analyse_blocks(graph, {}, fixed);
@@ -81,7 +88,7 @@ GncResult truncated_least_squares(const PoseGraph& graph, const GncConfig& confi
     std::size_t changed = 0;
     for (std::size_t e = 0; e < edges; ++e) {
       if (!std::isfinite(truncation[e])) continue;
-      const double before = std::exchange(out.inlier_weight[e], tls_weight(excess(e), 1.0, mu));
+      const double before = std::exchange(out.inlier_weight[e], tls_weight(excess[e], 1.0, mu));
       changed += out.inlier_weight[e] != before ? 1 : 0;
       binary = binary && is_binary(out.inlier_weight[e]);
       scale[e] = std::max(out.inlier_weight[e], kWeightFloor);
@@ -93,10 +100,8 @@ GncResult truncated_least_squares(const PoseGraph& graph, const GncConfig& confi
                            {.is_factorised = out.outer_iterations > 0 && kFewChange * changed < edges});
     out.solution.summary.factorisations += before;
     if (!is_usable(out.solution.summary.termination)) return out;
-    worst = 1.0;  // of what is not refused: what is far off may be long gone, and all else fit
-    for (std::size_t e = 0; e < edges; ++e)
-      if (std::isfinite(truncation[e]) && out.inlier_weight[e] > 0.0) worst = std::max(worst, excess(e));
-    mu = std::max(kControlStep * mu, convex_until(worst));
+    // What is far off may be long gone, and all else fit.
+    mu = std::max(kControlStep * mu, convex_until(std::max(1.0, measure())));
   }
   out.solution.weights = out.inlier_weight;
   return out;
