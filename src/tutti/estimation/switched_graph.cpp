@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "tutti/base/check.hpp"
 #include "tutti/base/disjoint_sets.hpp"
@@ -27,6 +28,9 @@ constexpr double kStill = 1e-3;
 
 /// Where the first solution begins is solved to this share of its cost.
 constexpr double kRoughly = 1e-3;
+
+/// Two solutions whose costs differ by less than this share of them are one, reached from two sides.
+constexpr double kCheaper = 1e-6;
 
 using internal::SelectedInverse;
 
@@ -65,8 +69,22 @@ struct SwitchedGraph::State {
   double moved = std::numeric_limits<double>::infinity();
 
   [[nodiscard]] internal::EdgeCosts costs() const { return {.loss = {}, .roles = {}, .scale = scale}; }
+  PoseGraphSolution from_measurements();
   Termination begin();
 };
+
+/// The rough solution of what is in, from its measurements alone.
+PoseGraphSolution SwitchedGraph::State::from_measurements() {
+  PoseGraph only{.poses = reduced.graph.poses, .edges = {}};
+  for (std::size_t e = 0; e < reduced.graph.edges.size(); ++e)
+    if (scale[e] == 1.0) only.edges.push_back(reduced.graph.edges[e]);
+  SolverConfig roughly = config;
+  roughly.initialisation = "chordal";
+  roughly.relative_cost_tolerance = std::max(kRoughly, roughly.relative_cost_tolerance);
+  PoseGraphSolution start = solve_pose_graph(only, roughly);
+  factorisations += start.summary.factorisations;
+  return start;
+}
 
 /// Where the first solution begins: as given, or at the rough solution of what is in.
 Termination SwitchedGraph::State::begin() {
@@ -74,13 +92,7 @@ Termination SwitchedGraph::State::begin() {
     poses = reduced.graph.poses;
     return internal::is_finite(reduced.graph) ? Termination::converged : Termination::invalid_input;
   }
-  PoseGraph only{.poses = reduced.graph.poses, .edges = {}};
-  for (std::size_t e = 0; e < reduced.graph.edges.size(); ++e)
-    if (scale[e] == 1.0) only.edges.push_back(reduced.graph.edges[e]);
-  SolverConfig roughly = config;
-  roughly.relative_cost_tolerance = std::max(kRoughly, roughly.relative_cost_tolerance);
-  PoseGraphSolution start = solve_pose_graph(only, roughly);
-  factorisations += start.summary.factorisations;
+  PoseGraphSolution start = from_measurements();
   if (is_usable(start.summary.termination)) poses = std::move(start.poses);
   return start.summary.termination;
 }
@@ -113,6 +125,24 @@ Termination SwitchedGraph::solve(const std::vector<char>& in) {
   return summary.termination;
 }
 
+bool SwitchedGraph::improve_from_measurements() {
+  State& s = *state_;
+  TUTTI_CHECK(s.solved, "solve() comes first");
+  PoseGraphSolution other = s.from_measurements();
+  if (!is_usable(other.summary.termination)) return false;
+  std::vector<Pose3> poses = std::exchange(s.poses, std::move(other.poses));
+  const SolveSummary summary = internal::minimise(*s.equations, s.poses, s.costs(), s.config);
+  s.factorisations += summary.factorisations;
+  s.moved = std::numeric_limits<double>::infinity();  // the equations are factorised at the other solution
+  if (!is_usable(summary.termination) || !(summary.final_cost < s.cost - kCheaper * (s.cost + 1.0))) {
+    s.poses = std::move(poses);
+    return false;
+  }
+  s.cost = summary.final_cost;
+  s.moved = summary.moved_since_factorised;
+  return true;
+}
+
 std::vector<double> SwitchedGraph::prices() {
   State& s = *state_;
   std::vector<double> out(s.roles.size(), 0.0);
@@ -124,7 +154,7 @@ std::vector<double> SwitchedGraph::prices() {
   if (s.moved > kStill) {
     s.equations->linearise(s.poses, s.costs(), true);
     ++s.factorisations;
-    if (!s.equations->factorise()) return out;
+    if (!s.equations->factorise()) return {};
   }
   s.moved = std::numeric_limits<double>::infinity();
   const SelectedInverse inverse(s.equations->hessian().take_factor());

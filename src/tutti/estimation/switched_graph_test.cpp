@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "support/estimation/random_graphs.hpp"
+#include "tutti/geometry/so3.hpp"
 
 namespace tutti::estimation {
 namespace switched_graph_test {
@@ -39,6 +40,29 @@ TEST(SwitchedGraph, APriceIsWhatTheMapPays) {
       EXPECT_NEAR(would_cost, saved, 0.05 * saved + 0.05) << seed << " edge " << e;
     }
   }
+}
+
+// Each step of a ring turns 18 degrees too far, so that it goes round twice: no small change of any pose is cheaper.
+TEST(SwitchedGraph, FromTheMeasurementsItLeavesABasinThatCostsMore) {
+  constexpr int kNodes = 20;
+  constexpr double kTurn = 2.0 * M_PI / kNodes;
+  PoseGraph ring;
+  const Pose3 step{so3_exp({0.0, 0.0, kTurn}), {1.0, 0.0, 0.0}};
+  Pose3 T;
+  for (std::size_t k = 0; k < kNodes; ++k) {
+    ring.poses.push_back(T);
+    T = T * step * Pose3{so3_exp({0.0, 0.0, kTurn}), Eigen::Vector3d::Zero()};
+    ring.edges.push_back({k, (k + 1) % kNodes, step, Matrix6d::Identity()});
+  }
+  const std::vector<EdgeRole> robust(ring.edges.size(), EdgeRole::robust);
+  SolverConfig given = kPrecise;
+  given.initialisation = "given";
+  SwitchedGraph switched(ring, robust, given);
+  ASSERT_TRUE(is_usable(switched.solve(std::vector<char>(ring.edges.size(), 1))));
+  EXPECT_GT(switched.cost(), 1.0);
+  EXPECT_TRUE(switched.improve_from_measurements());
+  EXPECT_NEAR(switched.cost(), 0.0, 1e-9);
+  EXPECT_FALSE(switched.improve_from_measurements());  // it is there
 }
 
 TEST(SwitchedGraph, TakingInAndOutEndsWhereItBegan) {

@@ -18,12 +18,6 @@ namespace tutti::judge {
 namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
-/// What is wrong for certain counts so little (as a factor on its information) that it moves nothing.
-constexpr double kNothing = 1e-9;
-/// Odometry may have failed where closures strain it by more than this beyond chance (truncations), or where they are
-/// refused by this share of all votes. Otherwise refused closures are strewn about, as wrong ones are.
-constexpr double kStrained = 1.0;
-constexpr double kManyRefused = 0.1;
 /// Closures do not tell exactly where in a segment odometry failed. Each place is possible where the failure would be
 /// at most this many times as large as at the place where it would be smallest, plus the usual motion of so many
 /// seconds. A radian counts as much as so many seconds of motion.
@@ -135,22 +129,13 @@ Solution HypothesisSolver::solve(Hypothesis hypothesis) const {
   for (const std::size_t run : runs_) truncation[run] = kInfinite;
   for (std::size_t c = 0; c < closures_.size(); ++c)
     if (certain_[c]) truncation[closures_[c]] = kInfinite;
-  for (const Window& window : hypothesis.windows)
+  for (const Window& window : hypothesis)
     for (std::size_t run = window.first; run <= window.last; ++run) truncation[runs_[run]] = limit_;
   ++work_.hypotheses;
-  const auto counted = [&](estimation::GncResult optimum, int before) {
-    work_.factorisations += static_cast<std::size_t>(optimum.solution.summary.factorisations - before);
-    return optimum;
-  };
-  if (hypothesis.wrong.empty())
-    return judge(std::move(hypothesis),
-                 counted(estimation::truncated_least_squares(reduced_.graph, gnc_, truncation, all_kept_),
-                         all_kept_.summary.factorisations));
-  PoseGraph graph = reduced_.graph;
-  for (const auto& group : hypothesis.wrong)
-    for (const std::size_t c : group) graph.edges[closures_[c]].information *= kNothing;
-  return judge(std::move(hypothesis),
-               counted(estimation::truncated_least_squares(graph, gnc_, truncation, beginning(graph, gnc_)), 0));
+  estimation::GncResult optimum = estimation::truncated_least_squares(reduced_.graph, gnc_, truncation, all_kept_);
+  work_.factorisations +=
+      static_cast<std::size_t>(optimum.solution.summary.factorisations - all_kept_.summary.factorisations);
+  return judge(std::move(hypothesis), std::move(optimum));
 }
 
 Solution HypothesisSolver::judge(Hypothesis hypothesis, estimation::GncResult optimum) const {
@@ -176,9 +161,6 @@ Solution HypothesisSolver::judge(Hypothesis hypothesis, estimation::GncResult op
     excess.push_back(excess.back() + std::max(0.0, error(run) - 1.0));
   }
   for (std::size_t c = 0; c < closures_.size(); ++c) out.accepted.push_back(robust.inlier_weight[closures_[c]] >= 0.5);
-  for (const auto& group : out.hypothesis.wrong)
-    for (const std::size_t c : group) out.accepted[c] = 0;
-  out.misfit += config_.least_votes * static_cast<double>(out.hypothesis.wrong.size());
   for (std::size_t c = 0; c < closures_.size(); ++c) {
     const double most = certain_[c] ? kInfinite : 1.0;
     out.misfit += votes_[c] * (out.accepted[c] ? std::min(error(closures_[c]), most) : 1.0);
@@ -189,9 +171,6 @@ Solution HypothesisSolver::judge(Hypothesis hypothesis, estimation::GncResult op
     const Window window = around(run);
     strain = std::max(strain, excess[window.last + 1] - excess[window.first]);
   }
-  double all = 0.0;
-  for (const double votes : votes_) all += votes;
-  out.suspicious = strain >= kStrained || out.unexplained >= kManyRefused * all;
   out.unexplained += strain;
   out.fit = out.misfit;
   find_failed(poses, out);
@@ -216,7 +195,7 @@ double HypothesisSolver::votes_for(const FailedSegment& failed) const {
 
 void HypothesisSolver::find_failed(const std::vector<Pose3>& poses, Solution& out) const {
   std::vector<Window> paying;
-  for (const Window& window : out.hypothesis.windows) {
+  for (const Window& window : out.hypothesis) {
     const std::size_t known = out.failed.size();
     for (std::size_t run = window.first; run <= window.last; ++run) {
       if (!out.disregarded[run]) continue;
@@ -235,7 +214,7 @@ void HypothesisSolver::find_failed(const std::vector<Pose3>& poses, Solution& ou
     for (std::size_t f = known; f < out.failed.size(); ++f) price += votes_for(out.failed[f]);
     out.misfit += price;
   }
-  out.hypothesis.windows = std::move(paying);
+  out.hypothesis = std::move(paying);
 }
 
 }  // namespace tutti::judge

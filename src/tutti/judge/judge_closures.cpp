@@ -5,18 +5,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
-#include <numeric>
 #include <optional>
 #include <utility>
 
-#include "tutti/base/chi_square.hpp"
 #include "tutti/base/disjoint_sets.hpp"
 #include "tutti/estimation/influence.hpp"
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/judge/closure_groups.hpp"
-#include "tutti/judge/settle.hpp"
 
 namespace tutti::judge {
 namespace {
@@ -24,15 +20,13 @@ namespace {
 /// What failed odometry missed is measured; that it was this much more is as likely as not.
 constexpr double kDoubt = 2.0;
 
-/// Closures of neighbouring submaps may be wrong all together.
-constexpr double kNeighbours_s = 15.0;
-
 /// How many groups of closures can be refused as lone witnesses against all the rest, and how many closures make one:
 /// fewer are judged one by one, by what the map pays for them.
 constexpr int kRefusals = 5;
 constexpr std::size_t kLeastWitnesses = 3;
 
-constexpr double kUnknown = std::numeric_limits<double>::infinity();
+/// Two solutions whose costs differ by less than this share of them are one.
+constexpr double kCheaper = 1e-6;
 
 class Optimiser {
  public:
@@ -50,6 +44,7 @@ class Optimiser {
   [[nodiscard]] Optimum decide() const {
     Optimum best = settle(map_.searched, explain());
     for (int round = 0; round < kRefusals && refuse_lone_witness(best);) ++round;
+    ask_again(best);
     if (!is_searched_as_it_counts()) best = settle(map_.graph, std::move(best));
     return solved(std::move(best));
   }
@@ -77,22 +72,17 @@ class Optimiser {
     std::vector<double> seconds;
     for (const MapNode& node : map_.nodes) seconds.push_back(node.stamp - map_.nodes.front().stamp);
     const OdometryTrajectories odometry(seconds, map_.searched.edges);
-    std::vector<std::size_t> all(closures_.size());
-    std::iota(all.begin(), all.end(), std::size_t{0});
-    const auto groups = closure_groups(map_.nodes, closure_edges_, all,
-                                       {kNeighbours_s, std::numeric_limits<double>::infinity(), closures_.size()});
-    Judgement found =
-        explain_closures(std::move(graph), odometry, map_.odometry_edges, groups, config_, gnc_, certain_);
+    Judgement found = explain_closures(std::move(graph), odometry, map_.odometry_edges, config_, gnc_, certain_);
     std::vector<Objection> objections;
     for (const bool accepted : found.accepted)
       objections.push_back(accepted ? Objection::none : Objection::contradicted);
     leave_unjoined(odometry, objections);
     return {.failed = std::move(found.failed),
-            .graph = {.poses = std::move(found.poses), .edges = {}},
+            .graph = {},
             .closure_of_edge = {},
             .solution = {},
             .objections = std::move(objections),
-            .prices = std::vector<double>(closures_.size(), kUnknown),
+            .prices = std::vector<Price>(closures_.size()),
             .work = found.work};
   }
 
@@ -144,7 +134,6 @@ class Optimiser {
   /// work of `out`. Closures that are not asked keep the price that they were refused for. Its poses are those of the
   /// graph of the closures' ends, with odometry bent to meet them.
   [[nodiscard]] Optimum settle(const PoseGraph& odometry, Optimum out) const {
-    std::vector<Pose3> begin = std::move(out.graph.poses);
     out.graph = with_room(odometry);
     out.closure_of_edge.clear();
     out.solution = {};
@@ -152,7 +141,6 @@ class Optimiser {
       weaken(out.graph, map_.odometry_edges, segment.from, segment.to, kDoubt * segment.missed.head<3>().norm(),
              kDoubt * segment.missed.tail<3>().norm());
     PoseGraph all = with_room(out.graph);
-    all.poses = std::move(begin);
     std::vector<std::size_t> asked;
     std::vector<char> in;
     std::vector<bool> certain;
@@ -163,14 +151,14 @@ class Optimiser {
       certain.push_back(certain_[c]);
       all.edges.push_back(closure_edges_[c]);
     }
-    Settled settled = settle_closures(all, map_.odometry_edges, std::move(in), certain, config_, from_there());
+    Settled settled = settle_closures(all, map_.odometry_edges, std::move(in), certain, config_, gnc_.solver);
     out.work.factorisations += settled.factorisations;
     out.graph.poses = std::move(settled.poses);
     for (std::size_t k = 0; k < asked.size(); ++k) {
       Objection& objection = out.objections[asked[k]];
       out.prices[asked[k]] = settled.prices[k];
       if (settled.in[k] == 0) {
-        if (objection == Objection::none || std::isfinite(settled.prices[k])) objection = Objection::dear;
+        if (objection == Objection::none || std::isfinite(settled.prices[k].paid)) objection = Objection::dear;
         continue;
       }
       objection = Objection::none;
@@ -183,11 +171,42 @@ class Optimiser {
     return out;
   }
 
-  /// The map in full, from where its closures' ends are. Nothing is asked of it before the last closure is decided.
+  /// The map in full, from where its closures' ends are and from its measurements alone; the cheaper solution counts.
+  /// Nothing is asked of it before the last closure is decided.
   [[nodiscard]] Optimum solved(Optimum out) const {
     if (!estimation::is_usable(out.solution.summary.termination)) return out;
     out.solution = estimation::solve_pose_graph(out.graph, from_there());
-    out.work.factorisations += static_cast<std::size_t>(out.solution.summary.factorisations);
+    PoseGraph anew{.poses = map_.graph.poses, .edges = std::move(out.graph.edges)};
+    estimation::PoseGraphSolution other = estimation::solve_pose_graph(anew, gnc_.solver);
+    out.graph.edges = std::move(anew.edges);
+    for (const auto* solution : {&out.solution, &other})
+      out.work.factorisations += static_cast<std::size_t>(solution->summary.factorisations);
+    const bool is_known = estimation::is_usable(out.solution.summary.termination);
+    const double most = out.solution.summary.final_cost * (1.0 - kCheaper) - kCheaper;
+    if (estimation::is_usable(other.summary.termination) && (!is_known || other.summary.final_cost < most)) {
+      out.solution = std::move(other);
+      out.from_measurements = true;
+    }
+    return out;
+  }
+
+  /// Groups of closures at one pair of places, as positions in best.graph.edges, and by how much each contradicts all
+  /// the rest of the map.
+  struct Groups {
+    std::vector<std::vector<std::size_t>> edges;
+    std::vector<double> misfits;
+  };
+  [[nodiscard]] Groups groups_of(Optimum& best) const {
+    std::vector<std::size_t> closures;
+    for (std::size_t k = 0; k < best.closure_of_edge.size(); ++k)
+      if (!certain_[best.closure_of_edge[k]]) closures.push_back(map_.odometry_edges + k);
+    std::vector<estimation::EdgeRole> roles(best.graph.edges.size(), estimation::EdgeRole::robust);
+    std::fill_n(roles.begin(), map_.odometry_edges, estimation::EdgeRole::trusted);
+    Groups out{.edges = closure_groups(map_.nodes, best.graph.edges, closures), .misfits = {}};
+    std::erase_if(out.edges, [](const auto& group) { return group.size() < kLeastWitnesses; });
+    if (out.edges.empty()) return out;
+    ++best.work.factorisations;
+    out.misfits = estimation::group_misfits(best.graph, best.solution.poses, roles, out.edges);
     return out;
   }
 
@@ -195,25 +214,38 @@ class Optimiser {
   /// beyond chance: as a lone closure against odometry, a lone group is wrong itself. False if there is none.
   [[nodiscard]] bool refuse_lone_witness(Optimum& best) const {
     if (!estimation::is_usable(best.solution.summary.termination)) return false;
-    std::vector<std::size_t> closures;  // edges of best.graph
-    for (std::size_t k = 0; k < best.closure_of_edge.size(); ++k)
-      if (!certain_[best.closure_of_edge[k]]) closures.push_back(map_.odometry_edges + k);
-    std::vector<estimation::EdgeRole> roles(best.graph.edges.size(), estimation::EdgeRole::robust);
-    std::fill_n(roles.begin(), map_.odometry_edges, estimation::EdgeRole::trusted);
-    auto groups = closure_groups(map_.nodes, best.graph.edges, closures);
-    std::erase_if(groups, [](const auto& group) { return group.size() < kLeastWitnesses; });
-    if (groups.empty()) return false;
-    ++best.work.factorisations;
-    const auto misfits = estimation::group_misfits(best.graph, best.solution.poses, roles, groups);
-    const auto worst = std::ranges::max_element(misfits);
-    if (*worst <= chi_square_quantile(config_.confidence, 6)) return false;
-    for (const std::size_t e : groups[static_cast<std::size_t>(worst - misfits.begin())]) {
+    const Groups groups = groups_of(best);
+    const double most = most_paid(config_, groups.edges.size());
+    const auto worst = std::ranges::max_element(groups.misfits);
+    if (worst == groups.misfits.end() || *worst <= most) return false;
+    for (const std::size_t e : groups.edges[static_cast<std::size_t>(worst - groups.misfits.begin())]) {
       const std::size_t c = best.closure_of_edge[e - map_.odometry_edges];
       best.objections[c] = Objection::lone;
-      best.prices[c] = *worst;
+      best.prices[c] = {.paid = *worst, .most = most};
     }
     best = settle(map_.searched, std::move(best));
     return true;
+  }
+
+  /// Takes in again each group of lone witnesses that the map, as it is now, can be made with: another group may have
+  /// been wrong, and have made this one look so.
+  void ask_again(Optimum& best) const {
+    std::vector<std::size_t> lone;
+    for (std::size_t c = 0; c < closures_.size(); ++c)
+      if (best.objections[c] == Objection::lone) lone.push_back(c);
+    for (const auto& group : closure_groups(map_.nodes, closure_edges_, lone)) {
+      Optimum with = best;
+      for (const std::size_t c : group) with.objections[c] = Objection::none;
+      with = settle(map_.searched, std::move(with));
+      const bool fits =
+          estimation::is_usable(with.solution.summary.termination) &&
+          std::ranges::all_of(group, [&](std::size_t c) { return with.objections[c] == Objection::none; });
+      if (!fits) continue;
+      const Groups all = groups_of(with);
+      if (std::ranges::all_of(all.misfits,
+                              [most = most_paid(config_, all.edges.size())](double misfit) { return misfit <= most; }))
+        best = std::move(with);
+    }
   }
 
   const OdometryGraph& map_;
@@ -252,13 +284,11 @@ Optimum judge_closures(const OdometryGraph& map, const NodeIndex& index, const C
   return Optimiser(map, index, closures, config, gnc).decide();
 }
 
-std::string reason_of(Objection objection, double price) {
-  const double most = most_paid({});
-  if (objection == Objection::dear && std::isfinite(price))
-    return fmt::format("{}: {:.0f} (at most {:.0f})", to_string(objection), price, most);
-  if (objection == Objection::lone && std::isfinite(price))
-    return fmt::format("{}: by {:.0f} (at most {:.0f})", to_string(objection), price,
-                       chi_square_quantile(OutlierRejectionConfig{}.confidence, 6));
+std::string reason_of(Objection objection, const Price& price) {
+  if (objection == Objection::dear && std::isfinite(price.paid))
+    return fmt::format("{}: {:.0f} (at most {:.0f})", to_string(objection), price.paid, price.most);
+  if (objection == Objection::lone && std::isfinite(price.paid))
+    return fmt::format("{}: by {:.0f} (at most {:.0f})", to_string(objection), price.paid, price.most);
   return to_string(objection);
 }
 

@@ -10,6 +10,7 @@
 #include "tutti/estimation/pose_graph_solver.hpp"
 #include "tutti/judge/explain_closures.hpp"
 #include "tutti/judge/settings.hpp"
+#include "tutti/judge/settle.hpp"
 #include "tutti/model/loop_closure.hpp"
 #include "tutti/model/map_node.hpp"
 #include "tutti/model/pose_graph.hpp"
@@ -28,8 +29,8 @@ enum class Objection {
   no_map         ///< The map could not be solved.
 };
 const char* to_string(Objection objection);  ///< The rule, for people; empty for none.
-/// The rule with its number: what the map pays for the closure, or would (Optimum::prices). Has no comma.
-std::string reason_of(Objection objection, double price);
+/// The rule with its numbers. Has no comma.
+std::string reason_of(Objection objection, const Price& price);
 
 using NodeIndex = std::unordered_map<KeyframeId, std::size_t>;
 
@@ -47,10 +48,11 @@ struct Optimum {
   PoseGraph graph;                           ///< Odometry, weakened where it failed, and the closures of the map.
   std::vector<std::size_t> closure_of_edge;  ///< Per edge beyond odometry its position in Closures::judged.
   estimation::PoseGraphSolution solution;
+  bool from_measurements = false;     ///< Solved from the measurements alone it costs less than from where its closures
+                                      ///< were decided, and that is the solution.
   std::vector<Objection> objections;  ///< Per judged closure.
-  std::vector<double>
-      prices;       ///< Per judged closure what the map pays for it, or would (settle.hpp); infinite: unknown.
-  SearchWork work;  ///< The cost, with that of the optima before this one.
+  std::vector<Price> prices;          ///< Per judged closure.
+  SearchWork work;                    ///< The cost, with that of the optima before this one.
 };
 
 /// A map without closures, as input of judge_closures(), which keeps no references.
@@ -63,9 +65,10 @@ struct OdometryGraph {
 };
 
 /// Decides which closures the map is made with and which odometry has failed: explain_closures(), then, up to five
-/// times, refusal of the group of closures that alone contradicts the rest of the map (docs/math.md, "Lone witnesses").
-/// `index`: of each keyframe its position among the nodes. Closures that are certain are never refused. Numerical
-/// failures are in Optimum::solution.
+/// times, refusal of the group of closures that alone contradicts the rest of the map (docs/math.md, "Lone witnesses");
+/// what was refused so is asked again when the map no longer changes. The poses cost no more than those of the same
+/// factors solved from their measurements alone. `index`: of each keyframe its position among the nodes. Closures that
+/// are certain are never refused. Numerical failures are in Optimum::solution.
 Optimum judge_closures(const OdometryGraph& map, const NodeIndex& index, const Closures& closures,
                        const OutlierRejectionConfig& config, const estimation::GncConfig& gnc);
 

@@ -2,7 +2,7 @@
 #include "tutti/judge/settle.hpp"
 
 #include <algorithm>
-#include <limits>
+#include <cstddef>
 
 #include "tutti/base/chi_square.hpp"
 #include "tutti/estimation/switched_graph.hpp"
@@ -14,12 +14,37 @@ namespace {
 constexpr double kDearest = 0.5;
 /// A closure that went so often does not come again.
 constexpr int kTimesOut = 2;
+/// A closure of a small map is judged by what it may cost in one of so many: a drive's only loop tells as much of its
+/// odometry as of itself, and odometry misses more than it states more often than chance makes it.
+constexpr std::size_t kLeastAsked = 100;
 /// Prices change with the map, which is settled long before.
 constexpr int kRounds = 30;
 
+/// Which closures are in next, by their prices.
+std::vector<char> next_round(const Settled& now, const std::vector<bool>& certain, double limit,
+                             std::vector<int>& times_out) {
+  // A wrong closure makes its right neighbours dear, so the dearest go first, alone.
+  double dearest = limit;
+  for (std::size_t c = 0; c < now.in.size(); ++c)
+    if (now.in[c] != 0 && !certain[c]) dearest = std::max(dearest, now.prices[c].paid);
+  const bool any_too_dear = dearest > limit;
+  std::vector<char> next = now.in;
+  for (std::size_t c = 0; c < next.size(); ++c) {
+    if (certain[c]) continue;
+    const double paid = now.prices[c].paid;
+    const bool goes = next[c] != 0 && any_too_dear && paid > std::max(limit, kDearest * dearest);
+    const bool comes = next[c] == 0 && !any_too_dear && paid <= limit && times_out[c] < kTimesOut;
+    times_out[c] += goes ? 1 : 0;
+    if (goes || comes) next[c] = comes ? 1 : 0;
+  }
+  return next;
+}
+
 }  // namespace
 
-double most_paid(const OutlierRejectionConfig& config) { return chi_square_exceeded_with(config.right_refused, 6); }
+double most_paid(const OutlierRejectionConfig& config, std::size_t asked) {
+  return chi_square_exceeded_with(config.right_refused / static_cast<double>(std::max<std::size_t>(asked, 1)), 6);
+}
 
 Settled settle_closures(const PoseGraph& graph, std::size_t odometry_edges, std::vector<char> in,
                         const std::vector<bool>& certain, const OutlierRejectionConfig& config,
@@ -30,8 +55,8 @@ Settled settle_closures(const PoseGraph& graph, std::size_t odometry_edges, std:
   estimation::SwitchedGraph switched(graph, roles, solver);
   std::vector<char> edges(graph.edges.size(), 1);
   std::vector<int> times_out(closures, 0);
-  const double limit = most_paid(config);
-  Settled out{.in = std::move(in), .prices = std::vector<double>(closures, std::numeric_limits<double>::infinity())};
+  const double limit = most_paid(config, std::max(closures, kLeastAsked));
+  Settled out{.in = std::move(in), .prices = std::vector<Price>(closures, Price{.most = limit})};
   for (std::size_t c = 0; c < closures; ++c)
     if (certain[c]) out.in[c] = 1;
   for (int round = 0;; ++round) {
@@ -39,23 +64,14 @@ Settled settle_closures(const PoseGraph& graph, std::size_t odometry_edges, std:
     out.termination = switched.solve(edges);
     if (!estimation::is_usable(out.termination)) break;
     const std::vector<double> prices = switched.prices();
-    out.prices.assign(prices.begin() + static_cast<std::ptrdiff_t>(odometry_edges), prices.end());
-    // A wrong closure makes its right neighbours dear, so the dearest go first, alone.
-    double dearest = limit;
-    for (std::size_t c = 0; c < closures; ++c)
-      if (out.in[c] != 0 && !certain[c]) dearest = std::max(dearest, out.prices[c]);
-    const bool any_too_dear = dearest > limit;
-    bool changed = false;
-    for (std::size_t c = 0; c < closures; ++c) {
-      if (certain[c]) continue;
-      const bool goes = out.in[c] != 0 && any_too_dear && out.prices[c] > std::max(limit, kDearest * dearest);
-      const bool comes = out.in[c] == 0 && !any_too_dear && out.prices[c] <= limit && times_out[c] < kTimesOut;
-      if (!goes && !comes) continue;
-      times_out[c] += goes ? 1 : 0;
-      out.in[c] = comes ? 1 : 0;
-      changed = true;
-    }
-    if (!changed || round == kRounds) break;
+    if (prices.empty()) out.termination = estimation::Termination::singular;
+    if (prices.empty()) break;
+    for (std::size_t c = 0; c < closures; ++c) out.prices[c].paid = prices[odometry_edges + c];
+    if (round == kRounds) break;
+    std::vector<char> next = next_round(out, certain, limit, times_out);
+    // What has come and gone may have led the poses into a basin of its own.
+    if (next == out.in && !switched.improve_from_measurements()) break;
+    out.in = std::move(next);
   }
   out.poses = switched.poses();
   out.factorisations = static_cast<std::size_t>(switched.factorisations());

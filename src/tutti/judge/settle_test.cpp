@@ -57,7 +57,7 @@ TEST(Settle, RightClosuresThatWereRefusedComeBack) {
   in[3] = 1;  // the map begins with one
   const Settled settled = circle.settled(in);
   EXPECT_EQ(settled.in, std::vector<char>(in.size(), 1));
-  for (const double price : settled.prices) EXPECT_LT(price, most_paid({}));
+  for (const Price& price : settled.prices) EXPECT_LT(price.paid, price.most);
 }
 
 TEST(Settle, TheLoopThatAloneMeasuresHowFarOdometryIsOffCountsByTheMapsDoubt) {
@@ -80,7 +80,7 @@ TEST(Settle, WrongClosuresThatAreInGo) {
   std::vector<char> right = in;
   right.back() = right[right.size() - 2] = 0;
   EXPECT_EQ(settled.in, right);
-  EXPECT_GT(settled.prices.back(), most_paid({}));
+  EXPECT_GT(settled.prices.back().paid, settled.prices.back().most);
 }
 
 TEST(Settle, WhatIsCertainStaysWhateverItCosts) {

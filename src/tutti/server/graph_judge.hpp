@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <limits>
 #include <vector>
 
 #include "tutti/base/ids.hpp"
@@ -23,9 +22,9 @@ struct RobotGraph {
 /// The verdict on one edge.
 struct JudgedEdge {
   bool odometry = false;
-  bool accepted = true;                                    ///< Always true for odometry, even where it failed.
-  judge::Objection objection = judge::Objection::none;     ///< Why a closure is not accepted.
-  double price = std::numeric_limits<double>::infinity();  ///< JudgedClosure::price
+  bool accepted = true;                                 ///< Always true for odometry, even where it failed.
+  judge::Objection objection = judge::Objection::none;  ///< Why a closure is not accepted.
+  judge::Price price;                                   ///< JudgedClosure::price
 };
 
 /// The result of judge_graph().

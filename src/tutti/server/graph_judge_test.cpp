@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <numeric>
 
+#include "support/sanitized.hpp"
 #include "support/server/corridor_run.hpp"
+#include "tutti/estimation/pose_graph_solver.hpp"
 
 namespace tutti::server {
 namespace graph_judge_test {
@@ -117,6 +119,38 @@ TEST(GraphJudge, OdometryThatFailedIsFoundAndAGapIsNone) {
   for (const FailedOdometry& failed : judged.map.failed_odometry) EXPECT_EQ(failed.chain, ChainId(RobotId{0}));
   EXPECT_EQ(judged.map.nodes.size(), of.graph.vertices.size());
   EXPECT_EQ(judged.map.odometry_edges, of.graph.vertices.size() - 3);  // two robots and a gap
+}
+
+/// By how much the poses of a map cost more than those of the same factors solved from their measurements alone.
+double too_dear(const MapEstimate& map) {
+  estimation::SolverConfig precisely;
+  precisely.relative_cost_tolerance = 1e-12;
+  const auto anew = estimation::solve_pose_graph(map.graph, precisely);
+  EXPECT_TRUE(estimation::is_usable(anew.summary.termination));
+  return estimation::chi2(map.graph) / std::max(anew.summary.final_cost, 1.0) - 1.0;
+}
+
+// What is wrong leads the search astray, and poses that it leaves may lie in a basin of their own. So the same factors
+// must not be cheaper from their measurements, whatever came before: with many wrong closures, odometry that fails, and
+// at every update of a mission.
+TEST(GraphJudge, ThePosesCostNoMoreThanTheSameFactorsFromTheirMeasurements) {
+  for (std::uint64_t seed = 1; seed <= tutti::seeds(std::uint64_t{4}); ++seed) {
+    CorridorRunConfig config = with_wrong_closures();
+    config.closures.wrong_share = 0.1 * static_cast<double>(seed);
+    if (seed % 2 == 0) config.failures = {test::failure(0, 170, 172, 1.5, 1.5, 20)};
+    const Case of = make_case(config, seed);
+    const std::size_t odometry = of.graph.vertices.size() - 2;
+    for (std::size_t known = odometry; known <= of.graph.graph.edges.size(); known += 120) {
+      RobotGraph some = of.graph;
+      some.graph.edges.resize(known);
+      const MapEstimate map = judge_graph(some, {}).map;
+      ASSERT_TRUE(map.converged);
+      if (!map.failed_odometry.empty()) continue;  // its graph is weakened where it failed, after it was solved
+      EXPECT_LT(too_dear(map), 1e-5) << "seed " << seed << ", " << known << " edges";
+      EXPECT_NEAR(map.cost, estimation::chi2(map.graph), 1e-6 * map.cost + 1e-6);
+      EXPECT_EQ(map.degrees_of_freedom, 6 * (map.graph.edges.size() + map.components - map.nodes.size()));
+    }
+  }
 }
 
 TEST(GraphJudge, RobotsThatNeverMeetStayApart) {

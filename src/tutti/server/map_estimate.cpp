@@ -181,6 +181,7 @@ void label_components(MapEstimate& map) {
   const auto [label, count] = sets.labels();
   for (std::size_t i = 0; i < map.nodes.size(); ++i) map.nodes[i].component = static_cast<std::uint32_t>(label[i]);
   map.components = static_cast<std::uint32_t>(count);
+  map.degrees_of_freedom = 6 * (map.graph.edges.size() + map.components - map.nodes.size());
 }
 
 void adopt(const judge::Optimum& optimum, MapEstimate& map) {
@@ -193,6 +194,8 @@ void adopt(const judge::Optimum& optimum, MapEstimate& map) {
     map.closures[c].price = optimum.prices[c];
   }
   map.graph.poses = optimum.solution.poses;
+  map.cost = optimum.solution.summary.final_cost;
+  map.from_measurements = optimum.from_measurements;
   for (std::size_t i = 0; i < map.nodes.size(); ++i) map.nodes[i].T_world_body = map.graph.poses[i];
   for (const judge::FailedSegment& failed : optimum.failed) record_failure(failed, map);
 }

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -44,8 +43,7 @@ struct JudgedClosure {
   bool accepted = false;
   bool by_operator = false;                             ///< An operator's decision decided, whatever the map says.
   judge::Objection objection = judge::Objection::none;  ///< Why it is not accepted.
-  /// What the map pays for it, or would (judge/settle.hpp); infinite: unknown.
-  double price = std::numeric_limits<double>::infinity();
+  judge::Price price;
 };
 
 /// Odometry that failed, as closures show: between these two keyframes of one chain it is not used.
@@ -86,7 +84,12 @@ struct MapEstimate {
   std::size_t spare_pairs = 0;
   Fixes fixes;             ///< What became of position fixes, and where on the earth the map lies.
   judge::SearchWork work;  ///< The cost of judging the closures.
-  bool converged = false;  ///< False: no closure is accepted, and every robot's odometry stands alone.
+  /// The sum of r^T Omega r over all edges of the graph as it was solved, and by how many degrees of freedom: about as
+  /// many where everything errs by what it states.
+  double cost = 0.0;
+  std::size_t degrees_of_freedom = 0;
+  bool from_measurements = false;  ///< judge::Optimum::from_measurements
+  bool converged = false;          ///< False: no closure is accepted, and every robot's odometry stands alone.
 };
 
 /// How the joint map is made.
