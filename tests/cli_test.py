@@ -563,6 +563,11 @@ class CommandLine(unittest.TestCase):
         self.assertEqual(report["closures"], {"right": 55, "right_accepted": 55, "wrong_accepted": 0, "precision": 1.0,
                                               "recall": 1.0})
         self.assertEqual((report["accepted"], report["refused"], report["failed_odometry"]), (55, 3, []))
+        self.assertEqual(report["ate_m"]["perfect"]["robots_in_joint"], 2)
+        self.assertLess(report["ate_m"]["perfect"]["joint"], 1e-3)
+        self.assertGreater(report["factorisations"], 0)
+        all_right = json.loads(tutti("optimise", "--robust", graph, "-o", out, "--json", "--right", graph).stdout)
+        self.assertGreater(all_right["ate_m"]["perfect"]["joint"], 0.1)  # least squares of the wrong ones, too
         again = json.loads(tutti("optimise", "--robust", self.path / "out.pyfg", "-o", out, "--json").stdout)
         self.assertEqual((again["accepted"], again["refused"]), (55, 0))
         unscored = json.loads(tutti("optimise", "--robust", graph, "-o", out, "--json", "--truth", "none").stdout)
