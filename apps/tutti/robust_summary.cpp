@@ -25,6 +25,9 @@ std::map<std::string, std::size_t> reasons(const JudgedGraph& judged) {
   return out;
 }
 
+/// From where the solution with the least cost began.
+const char* start_of(const server::MapEstimate& map) { return map.from_measurements ? "measurements" : "closures"; }
+
 std::size_t count(const JudgedGraph& judged, bool odometry, bool accepted) {
   return static_cast<std::size_t>(std::ranges::count_if(judged.edges, [&](const JudgedEdge& edge) {
     return edge.odometry == odometry && (odometry || edge.accepted == accepted);
@@ -84,6 +87,9 @@ void print_json(const RobustResult& result) {
                    {"odometry_edges", count(judged, true, true)},
                    {"replaced_matrices", graph.replaced},
                    {"components", judged.map.components},
+                   {"cost", judged.map.cost},
+                   {"degrees_of_freedom", judged.map.degrees_of_freedom},
+                   {"start", start_of(judged.map)},
                    {"accepted", count(judged, false, true)},
                    {"refused", count(judged, false, false)},
                    {"reasons", reasons(judged)},
@@ -107,6 +113,7 @@ void print_text(const RobustResult& result) {
   fmt::print("robots       {} ({}), by {}\nposes        {}\nodometry     {} edges\ntimes        {}\ncomponents   {}\n",
              graph.robot_names.size(), fmt::join(graph.robot_names, " "), graph.robots_from, graph.names.size(),
              count(judged, true, true), graph.stamps_from, judged.map.components);
+  fmt::print("cost         {:.1f}, {} degrees of freedom\n", judged.map.cost, judged.map.degrees_of_freedom);
   if (graph.replaced > 0)
     fmt::print("matrices     {} were not positive semidefinite; the nearest ones that are were taken\n",
                graph.replaced);

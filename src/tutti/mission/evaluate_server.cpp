@@ -20,6 +20,9 @@ void measure_joint_map(const std::vector<RobotOutcome>& robots, const server::Ma
                        MissionRecord& record) {
   ServerRecord& out = record.server;
   out.components = map.components;
+  out.cost = map.cost;
+  out.degrees_of_freedom = map.degrees_of_freedom;
+  out.from_measurements = map.from_measurements;
   out.largest_component = components.largest;
   std::vector<evaluation::PosePair> all;
   double scored_m = 0.0, whole_m = 0.0;

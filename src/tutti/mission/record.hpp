@@ -267,6 +267,9 @@ struct ServerRecord {
   std::vector<MapUpdateRecord> updates;
   std::vector<ChangeOfMindRecord> changes_of_mind;
   std::size_t components = 0;               ///< Groups of robots that share a frame.
+  double cost = 0.0;                        ///< server::MapEstimate::cost
+  std::size_t degrees_of_freedom = 0;       ///< server::MapEstimate::degrees_of_freedom
+  bool from_measurements = false;           ///< server::MapEstimate::from_measurements
   std::vector<ClosureRecord> closures;      ///< Accepted ones.
   std::vector<RejectionRecord> rejections;  ///< By reason.
   std::optional<ClosureCheckRecord> closure_check;

@@ -265,6 +265,9 @@ Json server_json(const MissionRecord& record) {
                       {"closures_accepted", update.closures},
                       {"closures_wrong", update.wrong ? Json(*update.wrong) : Json(nullptr)}});
   Json out{{"components", server.components},
+           {"cost", number(server.cost)},
+           {"degrees_of_freedom", server.degrees_of_freedom},
+           {"start", server.from_measurements ? "measurements" : "closures"},
            {"closures_accepted", counts.accepted()},
            {"closures_accepted_intra", counts.accepted_intra},
            {"closures_accepted_inter", counts.accepted_inter},
