@@ -131,7 +131,7 @@ def forms_summary(scores):
     of = graph_scores.summary(scores)
     return {"median": ("ratio", of.median), "p95": ("ratio", of.p95), "worst": ("ratio", of.worst),
             "worst of first50": ("ratio", of.worst_first50), "right refused": ("share", of.refused_share),
-            "wrong accepted": ("wrong", of.wrong), "wrong by a metre": ("wrong", of.far),
+            "wrong accepted": ("some", of.wrong), "wrong by a metre": ("some", of.far),
             "factorisations": ("work", sum(score.factorisations for score in scores.values())), "median CPU s": ("cpu_s", of.median_cpu_s)}
 
 
@@ -141,7 +141,7 @@ def fleets_in_forms(**flags):
         scores = scores_of_forms(places)
         figures = forms_summary(scores)
         for (fleet_name, form), score in scores.items():
-            figures[f"{fleet_name} {form}"] = ("ratio", score.ratio)
+            figures[f"{fleet_name} {form}"] = ("form", score.ratio)
         return figures
     return Job("forms", FLEETS, lambda _: [f"data/cosmo/{file}.pyfg" for file in fleets.FLEETS.values()], run, **flags)
 

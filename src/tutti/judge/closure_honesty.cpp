@@ -4,8 +4,6 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <utility>
 #include <vector>
 
 #include "tutti/base/chi_square.hpp"
@@ -18,34 +16,19 @@ constexpr double kPairsShare = 0.25;
 /// Chance makes factors up to about this.
 constexpr double kByChance = 2.0;
 constexpr double kMostRaised = 400.0;
-/// Factors are tried in steps of a quarter of a power of two, with these shares of pairs that hold a wrong closure.
-const double kStep = std::exp2(0.25);
-constexpr double kWrongShares[] = {0.01, 0.1, 0.2, 0.35, 0.5, 0.65};
-/// A wrong closure misses by anything from one standard deviation to so many: each power of ten is as likely.
-constexpr double kMostMissed = 1e4;
-/// A factor counts that explains the pairs this much better (logarithm of the likelihood) than what is stated does.
-constexpr double kMuchBetter = 4.0;
-
-template <int N>
-using Covariance = Eigen::Matrix<double, N, N>;
-template <int N>
-using Missed = Eigen::Matrix<double, N, 1>;
-
-/// What a pair misses in the last N coordinates, and its covariance with the factors `by`.
-template <int N>
-std::pair<Missed<N>, Covariance<N>> missed_by(ClosurePair pair, const ClosureHonesty& by) {
-  for (LoopClosure* closure : {&pair.first, &pair.second})
-    closure->measurement.covariance = scaled(closure->measurement.covariance, by);
-  const OdometryLoop loop = loop_of(pair);
-  return {loop.missed.tail<N>(), (loop.odometry + loop.closures).bottomRightCorner<N, N>()};
-}
+/// Halvings of the logarithm of the range: the factor is found to 0.2 %.
+constexpr int kRaiseBisections = 12;
 
 /// How many of the pairs miss, in the last N coordinates, by no more than a quarter may.
 template <int N>
 std::size_t count_within(const std::vector<ClosurePair>& pairs, const ClosureHonesty& by) {
   const double limit = chi_square_quantile(kPairsShare, N);
-  const auto within = std::ranges::count_if(pairs, [&](const ClosurePair& pair) {
-    const auto [missed, C] = missed_by<N>(pair, by);
+  const auto within = std::ranges::count_if(pairs, [&](ClosurePair pair) {
+    for (LoopClosure* closure : {&pair.first, &pair.second})
+      closure->measurement.covariance = scaled(closure->measurement.covariance, by);
+    const OdometryLoop loop = loop_of(pair);
+    const Eigen::Matrix<double, N, N> C = (loop.odometry + loop.closures).bottomRightCorner<N, N>();
+    const Eigen::Matrix<double, N, 1> missed = loop.missed.tail<N>();
     return missed.dot(C.ldlt().solve(missed)) <= limit;
   });
   return static_cast<std::size_t>(within);
@@ -63,61 +46,29 @@ double chance_of_so_few(std::size_t count, std::size_t trials) {
   return sum;
 }
 
-/// The logarithm of a normal density, and of that of a pair with a wrong closure, both of what one pair misses and up
-/// to (2 pi)^(-N/2).
-struct Densities {
-  double right = 0.0, wrong = 0.0;
-};
-
-template <int N>
-Densities densities(const ClosurePair& pair, const ClosureHonesty& by) {
-  const auto logarithms = [](const std::pair<Missed<N>, Covariance<N>>& of) {
-    const Eigen::LLT<Covariance<N>> llt(of.second);
-    return std::pair(of.first.dot(llt.solve(of.first)), llt.matrixLLT().diagonal().array().log().sum());
-  };
-  const auto [squared, root] = logarithms(missed_by<N>(pair, by));
-  const auto [stated, stated_root] = logarithms(missed_by<N>(pair, {}));
-  // In units of what is stated, its length has the density 1 / (r ln most), on a sphere of this surface.
-  const double surface = 2.0 * std::pow(M_PI, 0.5 * N) / std::tgamma(0.5 * N);
-  const double normal = 0.5 * N * std::log(2.0 * M_PI);
-  return {-0.5 * squared - root,
-          normal - stated_root - std::log(surface * std::log(kMostMissed)) - 0.5 * N * std::log(std::max(stated, 1.0))};
-}
-
-/// The logarithm of the likelihood of these pairs with the factors `by`, at the share of wrong ones that explains them
-/// best. A closure is in two pairs, so two pairs count as one.
-template <int N>
-double log_likelihood(const std::vector<ClosurePair>& pairs, const ClosureHonesty& by) {
-  std::vector<Densities> of;
-  for (const ClosurePair& pair : pairs) of.push_back(densities<N>(pair, by));
-  double best = -std::numeric_limits<double>::infinity();
-  for (const double share : kWrongShares) {
-    double sum = 0.0;
-    for (const auto& [right, wrong] : of) {
-      const double a = std::log1p(-share) + right, b = std::log(share) + wrong;
-      sum += std::max(a, b) + std::log1p(std::exp(-std::abs(a - b)));
-    }
-    best = std::max(best, sum);
+/// The least factor above 1 for which `fits` holds; 1 if none does: then too many closures are wrong to judge by.
+template <class Fits>
+double least_raise(const Fits& fits) {
+  if (!fits(kMostRaised)) return 1.0;
+  double too_small = 1.0, enough = kMostRaised;
+  for (int k = 0; k < kRaiseBisections; ++k) {
+    const double middle = std::sqrt(too_small * enough);
+    (fits(middle) ? enough : too_small) = middle;
   }
-  return 0.5 * best;
+  return enough;
 }
 
-/// The factor that these pairs ask for; 1 where chance has made it, or wrong closures among honest ones. by(factor):
-/// all factors with this one. `tests`: how often that is asked of a map. Among so many, chance makes less than one that
-/// counts (Desolneux, Moisan, Morel 2000), so in a large fleet it takes more pairs to count.
+/// The factor that these pairs ask for; 1 where chance has made it. by(factor): all factors with this one. `tests`: how
+/// often that is asked of a map. Among so many, chance makes less than one that counts (Desolneux, Moisan, Morel 2000),
+/// so in a large fleet it takes more pairs to count.
 template <int N, class By>
 double factor_of(const std::vector<ClosurePair>& pairs, std::size_t tests, const By& by) {
+  const auto are_enough = [&](std::size_t within) {
+    return static_cast<double>(within) >= kPairsShare * static_cast<double>(pairs.size());
+  };
   const std::size_t within = count_within<N>(pairs, by(1.0));
-  if (static_cast<double>(within) >= kPairsShare * static_cast<double>(pairs.size()) ||
-      chance_of_so_few(within, pairs.size()) * static_cast<double>(tests) > 1.0)
-    return 1.0;
-  double best = 1.0, most = log_likelihood<N>(pairs, by(1.0)) + kMuchBetter + std::log(static_cast<double>(tests));
-  for (double factor = kStep; factor < kMostRaised; factor *= kStep)
-    if (const double likelihood = log_likelihood<N>(pairs, by(factor)); likelihood > most) {
-      most = likelihood;
-      best = factor;
-    }
-  return best;
+  if (are_enough(within) || chance_of_so_few(within, pairs.size()) * static_cast<double>(tests) > 1.0) return 1.0;
+  return least_raise([&](double factor) { return are_enough(count_within<N>(pairs, by(factor))); });
 }
 
 }  // namespace

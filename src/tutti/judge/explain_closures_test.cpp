@@ -61,8 +61,9 @@ struct Laps {
     for (std::size_t k = 0; k < kNodes; ++k) out.push_back(2.0 * static_cast<double>(k));
     return out;
   }
-  [[nodiscard]] Judgement explain(const OutlierRejectionConfig& config = {}) const {
-    return explain_closures(graph, ways(), odometry_edges, config, {});
+  [[nodiscard]] Judgement explain(const std::vector<std::vector<std::size_t>>& groups = {},
+                                  const OutlierRejectionConfig& config = {}) const {
+    return explain_closures(graph, ways(), odometry_edges, groups, config, {});
   }
 };
 
@@ -153,7 +154,7 @@ TEST(OutlierRejection, ALoneClosureIsWrongItselfAndManyBlameTheOdometry) {
   EXPECT_NEAR(found.failed[0].missed.tail<3>().norm(), 0.3, 0.02);
   EXPECT_GE(std::count(found.accepted.begin(), found.accepted.begin() + 20, true), 19);
   EXPECT_EQ(std::count(found.accepted.begin() + 20, found.accepted.end(), true), 0);
-  EXPECT_TRUE(laps.explain({.let_odometry_fail = false}).failed.empty());
+  EXPECT_TRUE(laps.explain({}, {.let_odometry_fail = false}).failed.empty());
 }
 
 TEST(OutlierRejection, SeveralFailuresAreFoundByASearchAndByOneCutShort) {
@@ -165,7 +166,7 @@ TEST(OutlierRejection, SeveralFailuresAreFoundByASearchAndByOneCutShort) {
   }
   laps.close_laps(2);
   const OutlierRejectionConfig short_search{.least_hypotheses = 3, .tried_nodes = 0};
-  const Judgement whole = laps.explain(), cut = laps.explain(short_search);
+  const Judgement whole = laps.explain(), cut = laps.explain({}, short_search);
   EXPECT_GT(whole.work.hypotheses, 4U);
   EXPECT_LE(cut.work.hypotheses, 4U);
   for (const Judgement& found : {whole, cut}) {
@@ -181,10 +182,13 @@ TEST(OutlierRejection, PlacesThatLookAlikeBlameNothing) {
   const std::size_t right = laps.graph.edges.size() - laps.odometry_edges;
   const Pose3 alike{so3_exp({0.0, 0.0, 0.5}), {6.0, 4.0, 0.0}};
   const Pose3 T_moved = laps.truth[30] * alike * laps.truth[150].inverse();
+  std::vector<std::size_t> group;
   for (std::size_t i = 30; i < 38; i += 2)
-    for (std::size_t j = 150; j < 158; j += 2)
+    for (std::size_t j = 150; j < 158; j += 2) {
+      group.push_back(laps.graph.edges.size() - laps.odometry_edges);
       laps.graph.edges.push_back({i, j, laps.truth[i].inverse() * T_moved * laps.truth[j], information(0.03, 0.005)});
-  const Judgement found = laps.explain();
+    }
+  const Judgement found = laps.explain({group});
   EXPECT_TRUE(found.failed.empty());
   for (std::size_t c = 0; c < found.accepted.size(); ++c) EXPECT_EQ(found.accepted[c], c < right) << c;
 }
@@ -280,7 +284,7 @@ TEST(HypothesisSolver, EverySegmentOfAWindowPaysForHowFarItIsFromItsErrors) {
   }
   const auto price = [](const Laps& laps) {
     const Solver of(laps);
-    const Solution all = of.solver.solve({{0, of.solver.runs() - 1}});
+    const Solution all = of.solver.solve({{{0, of.solver.runs() - 1}}, {}});
     return all.prices.size() == 1 ? all.prices[0] - of.config.least_votes : 0.0;
   };
   EXPECT_GT(price(one), 1.0);
@@ -295,11 +299,11 @@ TEST(HypothesisSolver, AnOptimumHoldsUnderLessThatMayBeDisregarded) {
     laps.close_laps(5);
     const Solver of(laps);
     const HypothesisSolver& solver = of.solver;
-    const Solution all = solver.solve({{0, solver.runs() - 1}});
+    const Solution all = solver.solve({{{0, solver.runs() - 1}}, {}});
     const auto run = static_cast<std::size_t>(std::ranges::find(all.disregarded, 1) - all.disregarded.begin());
     ASSERT_LT(run, solver.runs());
-    const Solution judged = solver.judge({solver.around(run)}, all.optimum);
-    const Solution solved = solver.solve({solver.around(run)});
+    const Solution judged = solver.judge({{solver.around(run)}, {}}, all.optimum);
+    const Solution solved = solver.solve({{solver.around(run)}, {}});
     EXPECT_NEAR(judged.misfit, solved.misfit, 0.01);
     EXPECT_EQ(judged.disregarded, solved.disregarded);
     EXPECT_EQ(judged.accepted, solved.accepted);

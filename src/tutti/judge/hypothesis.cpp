@@ -18,6 +18,8 @@ namespace tutti::judge {
 namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
+/// What is wrong for certain counts so little (as a factor on its information) that it moves nothing.
+constexpr double kNothing = 1e-9;
 /// Closures do not tell exactly where in a segment odometry failed. Each place is possible where the failure would be
 /// at most this many times as large as at the place where it would be smallest, plus the usual motion of so many
 /// seconds. A radian counts as much as so many seconds of motion.
@@ -129,13 +131,22 @@ Solution HypothesisSolver::solve(Hypothesis hypothesis) const {
   for (const std::size_t run : runs_) truncation[run] = kInfinite;
   for (std::size_t c = 0; c < closures_.size(); ++c)
     if (certain_[c]) truncation[closures_[c]] = kInfinite;
-  for (const Window& window : hypothesis)
+  for (const Window& window : hypothesis.windows)
     for (std::size_t run = window.first; run <= window.last; ++run) truncation[runs_[run]] = limit_;
   ++work_.hypotheses;
-  estimation::GncResult optimum = estimation::truncated_least_squares(reduced_.graph, gnc_, truncation, all_kept_);
-  work_.factorisations +=
-      static_cast<std::size_t>(optimum.solution.summary.factorisations - all_kept_.summary.factorisations);
-  return judge(std::move(hypothesis), std::move(optimum));
+  const auto counted = [&](estimation::GncResult optimum, int before) {
+    work_.factorisations += static_cast<std::size_t>(optimum.solution.summary.factorisations - before);
+    return optimum;
+  };
+  if (hypothesis.wrong.empty())
+    return judge(std::move(hypothesis),
+                 counted(estimation::truncated_least_squares(reduced_.graph, gnc_, truncation, all_kept_),
+                         all_kept_.summary.factorisations));
+  PoseGraph graph = reduced_.graph;
+  for (const auto& group : hypothesis.wrong)
+    for (const std::size_t c : group) graph.edges[closures_[c]].information *= kNothing;
+  return judge(std::move(hypothesis),
+               counted(estimation::truncated_least_squares(graph, gnc_, truncation, beginning(graph, gnc_)), 0));
 }
 
 Solution HypothesisSolver::judge(Hypothesis hypothesis, estimation::GncResult optimum) const {
@@ -161,6 +172,9 @@ Solution HypothesisSolver::judge(Hypothesis hypothesis, estimation::GncResult op
     excess.push_back(excess.back() + std::max(0.0, error(run) - 1.0));
   }
   for (std::size_t c = 0; c < closures_.size(); ++c) out.accepted.push_back(robust.inlier_weight[closures_[c]] >= 0.5);
+  for (const auto& group : out.hypothesis.wrong)
+    for (const std::size_t c : group) out.accepted[c] = 0;
+  out.misfit += config_.least_votes * static_cast<double>(out.hypothesis.wrong.size());
   for (std::size_t c = 0; c < closures_.size(); ++c) {
     const double most = certain_[c] ? kInfinite : 1.0;
     out.misfit += votes_[c] * (out.accepted[c] ? std::min(error(closures_[c]), most) : 1.0);
@@ -195,7 +209,7 @@ double HypothesisSolver::votes_for(const FailedSegment& failed) const {
 
 void HypothesisSolver::find_failed(const std::vector<Pose3>& poses, Solution& out) const {
   std::vector<Window> paying;
-  for (const Window& window : out.hypothesis) {
+  for (const Window& window : out.hypothesis.windows) {
     const std::size_t known = out.failed.size();
     for (std::size_t run = window.first; run <= window.last; ++run) {
       if (!out.disregarded[run]) continue;
@@ -214,7 +228,7 @@ void HypothesisSolver::find_failed(const std::vector<Pose3>& poses, Solution& ou
     for (std::size_t f = known; f < out.failed.size(); ++f) price += votes_for(out.failed[f]);
     out.misfit += price;
   }
-  out.hypothesis = std::move(paying);
+  out.hypothesis.windows = std::move(paying);
 }
 
 }  // namespace tutti::judge

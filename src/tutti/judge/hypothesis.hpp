@@ -17,9 +17,12 @@ struct Window {
   std::size_t last = 0;  ///< Inclusive.
 };
 
-/// An assumption about what is wrong: odometry may be disregarded in these windows alone. In order; none overlap. In a
-/// Solution only those in which something was disregarded.
-using Hypothesis = std::vector<Window>;
+/// An assumption about what is wrong: odometry may be disregarded in these windows alone, and these closures are wrong.
+struct Hypothesis {
+  std::vector<Window> windows;  ///< In order; none overlap. In a Solution only those in which something was
+                                ///< disregarded.
+  std::vector<std::vector<std::size_t>> wrong;  ///< Groups of closures that are wrong for certain.
+};
 
 /// The pose graph solved under a hypothesis, and what follows for the closures. Misfits are in votes, of which closures
 /// that end at one keyframe share one.
@@ -31,7 +34,7 @@ struct Solution {
   /// Runs that were disregarded, neighbours joined; `from` and `to` are nodes of the graph.
   std::vector<FailedSegment> failed;
   estimation::GncResult optimum;  ///< On the graph of the closures' ends.
-  double misfit = 0.0;            ///< With the prices of windows.
+  double misfit = 0.0;            ///< With the prices of windows and of wrong groups.
   double fit = 0.0;               ///< The misfit without the prices of windows.
   std::vector<double> prices;  ///< Per window its part of the misfit; infinite where odometry would have failed by more
                                ///< than a body can move.
@@ -51,15 +54,16 @@ class HypothesisSolver {
                    const OutlierRejectionConfig& config, const estimation::GncConfig& gnc, std::vector<bool> certain);
 
   [[nodiscard]] Solution solve(Hypothesis hypothesis) const;
-  /// Prices a hypothesis at an optimum that was found for another one, without solving again. This is exact where the
-  /// optimum disregards odometry within `hypothesis`'s windows only: it is then this hypothesis's own, because it may
-  /// disregard nothing else.
+  /// Prices a hypothesis at an optimum that was found for another one, without solving again. This is exact where both
+  /// hypotheses refuse the same groups and the optimum disregards odometry within `hypothesis`'s windows only: the
+  /// optimum is then this hypothesis's own, because it may disregard nothing else.
   [[nodiscard]] Solution judge(Hypothesis hypothesis, estimation::GncResult optimum) const;
   [[nodiscard]] std::size_t runs() const { return runs_.size(); }
   /// The runs within config.search_s of a run, on the same segment of odometry.
   [[nodiscard]] Window around(std::size_t run) const;
   /// Cost of all calls so far.
   [[nodiscard]] const SearchWork& work() const { return work_; }
+  [[nodiscard]] double votes(std::size_t closure) const { return votes_[closure]; }
 
  private:
   [[nodiscard]] std::size_t begin_of(std::size_t run) const;

@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -19,6 +21,9 @@ namespace {
 
 /// What failed odometry missed is measured; that it was this much more is as likely as not.
 constexpr double kDoubt = 2.0;
+
+/// Closures of neighbouring submaps may be wrong all together.
+constexpr double kNeighbours_s = 15.0;
 
 /// How many groups of closures can be refused as lone witnesses against all the rest, and how many closures make one:
 /// fewer are judged one by one, by what the map pays for them.
@@ -72,7 +77,12 @@ class Optimiser {
     std::vector<double> seconds;
     for (const MapNode& node : map_.nodes) seconds.push_back(node.stamp - map_.nodes.front().stamp);
     const OdometryTrajectories odometry(seconds, map_.searched.edges);
-    Judgement found = explain_closures(std::move(graph), odometry, map_.odometry_edges, config_, gnc_, certain_);
+    std::vector<std::size_t> all(closures_.size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    const auto groups = closure_groups(map_.nodes, closure_edges_, all,
+                                       {kNeighbours_s, std::numeric_limits<double>::infinity(), closures_.size()});
+    Judgement found =
+        explain_closures(std::move(graph), odometry, map_.odometry_edges, groups, config_, gnc_, certain_);
     std::vector<Objection> objections;
     for (const bool accepted : found.accepted)
       objections.push_back(accepted ? Objection::none : Objection::contradicted);
