@@ -131,8 +131,8 @@ double too_dear(const MapEstimate& map) {
 }
 
 // What is wrong leads the search astray, and poses that it leaves may lie in a basin of their own. So the same factors
-// must not be cheaper from their measurements, whatever came before: with many wrong closures, with odometry that fails,
-// and with the first closures of a fleet as with all of them.
+// must not be cheaper from their measurements, whatever came before: with many wrong closures, with odometry that
+// fails, and with the first closures of a fleet as with all of them.
 TEST(GraphJudge, ThePosesCostNoMoreThanTheSameFactorsFromTheirMeasurements) {
   for (std::uint64_t seed = 1; seed <= tutti::seeds(std::uint64_t{4}); ++seed) {
     CorridorRunConfig config = with_wrong_closures();
