@@ -20,6 +20,11 @@ std::vector<EdgeRole> roles_from_numbering(const PoseGraph& graph) {
   return roles;
 }
 
+bool is_cheaper(double cost, double other) {
+  constexpr double kOne = 1e-6;
+  return cost < other - kOne * (other + 1.0);
+}
+
 double chi2(const PoseGraph& graph) {
   double sum = 0.0;
   for (const auto& edge : graph.edges) {

@@ -59,6 +59,10 @@ struct PoseGraphSolution {
 PoseGraphSolution solve_pose_graph(const PoseGraph& graph, const SolverConfig& config,
                                    std::span<const EdgeRole> roles = {});
 
+/// Whether a solution of this cost counts as cheaper than one of `other`: two whose costs differ by less than a
+/// millionth are one, reached from two sides.
+bool is_cheaper(double cost, double other);
+
 /// Sum of r^T Omega r over all edges at the graph's poses (r: between_factor.hpp).
 double chi2(const PoseGraph& graph);
 

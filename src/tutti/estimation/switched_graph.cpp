@@ -29,9 +29,6 @@ constexpr double kStill = 1e-3;
 /// Where the first solution begins is solved to this share of its cost.
 constexpr double kRoughly = 1e-3;
 
-/// Two solutions whose costs differ by less than this share of them are one, reached from two sides.
-constexpr double kCheaper = 1e-6;
-
 using internal::SelectedInverse;
 
 /// `covariance`: H^-1 at the edge's ends.
@@ -134,7 +131,7 @@ bool SwitchedGraph::improve_from_measurements() {
   const SolveSummary summary = internal::minimise(*s.equations, s.poses, s.costs(), s.config);
   s.factorisations += summary.factorisations;
   s.moved = std::numeric_limits<double>::infinity();  // the equations are factorised at the other solution
-  if (!is_usable(summary.termination) || !(summary.final_cost < s.cost - kCheaper * (s.cost + 1.0))) {
+  if (!is_usable(summary.termination) || !is_cheaper(summary.final_cost, s.cost)) {
     s.poses = std::move(poses);
     return false;
   }

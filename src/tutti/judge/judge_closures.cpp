@@ -30,9 +30,6 @@ constexpr double kNeighbours_s = 15.0;
 constexpr int kRefusals = 5;
 constexpr std::size_t kLeastWitnesses = 3;
 
-/// Two solutions whose costs differ by less than this share of them are one.
-constexpr double kCheaper = 1e-6;
-
 class Optimiser {
  public:
   /// All must outlive this.
@@ -192,8 +189,8 @@ class Optimiser {
     for (const auto* solution : {&out.solution, &other})
       out.work.factorisations += static_cast<std::size_t>(solution->summary.factorisations);
     const bool is_known = estimation::is_usable(out.solution.summary.termination);
-    const double most = out.solution.summary.final_cost * (1.0 - kCheaper) - kCheaper;
-    if (estimation::is_usable(other.summary.termination) && (!is_known || other.summary.final_cost < most)) {
+    if (estimation::is_usable(other.summary.termination) &&
+        (!is_known || estimation::is_cheaper(other.summary.final_cost, out.solution.summary.final_cost))) {
       out.solution = std::move(other);
       out.from_measurements = true;
     }
