@@ -90,6 +90,7 @@ build_stage "$preset" Release
 test_stage "$preset" Release "${tests[@]}"
 [ "$sanitize" = yes ] || exit 0
 export ASAN_OPTIONS=detect_stack_use_after_return=1:strict_string_checks=1
+export LSAN_OPTIONS=suppressions=$root/cmake/leaks_of_others.txt:print_suppressions=0
 export UBSAN_OPTIONS=print_stacktrace=1
 targets=(test_bus test_feed test_verifiers test_integration test_program)
 build_stage tsan TSan
