@@ -278,7 +278,7 @@ class CommandLine(unittest.TestCase):
 
     def test_settings_say_what_can_be_set(self):
         few = tutti("settings")
-        self.expect(few, 0, "server.update_period_s = ", "closures.verifier = ", "link.loss = 0", "--all")
+        self.expect(few, 0, "server.update_least_s = ", "closures.verifier = ", "link.loss = 0", "--all")
         self.assertLess(len(few.stdout.splitlines()), 35, few.stdout)
         everything = tutti("settings", "--all")
         self.expect(everything, 0, "closures.verifier = ", "simulation.robots[].start_s = 0")
@@ -287,7 +287,7 @@ class CommandLine(unittest.TestCase):
         self.expect(one, 0, "agent.disagreement.false_alarm_rate = 0.01   (a number, ")
         self.assertEqual(len(one.stdout.splitlines()), 2, one.stdout)
         self.expect(tutti("settings", "transmissions", "lost"), 0, "link.loss = 0")  # words of its meaning
-        for program, key, other in (("server", "server.update_period_s = ", "agent."), ("robot", "agent.policy.name = ", "server."),
+        for program, key, other in (("server", "server.update_least_s = ", "agent."), ("robot", "agent.policy.name = ", "server."),
                                     ("worker", "closures.lidar.", "server.")):
             its = tutti("settings", "--of", program)
             self.expect(its, 0, key)

@@ -31,7 +31,7 @@ lab::MissionConfig an_hour(std::size_t robots) {
   config.agent.submap.duration_s = 60.0;
   config.agent.submap.keyframe_time_s = 6.0;
   config.agent.submap.keyframe_distance_m = 1.5;
-  config.server.update_period_s = 2.0 * kMinute_s;
+  config.server.update_least_s = 2.0 * kMinute_s;
   config.closure_changes.verifier = "reference";
   config.closure_changes.reference.wrong_share = 0.1;
   return config;

@@ -177,7 +177,7 @@ class Mission {
   std::unique_ptr<node::ServerNode> open(Program<node::ServerNode>& program) {
     program.store = std::make_unique<storage::MemoryStore>(storage::map_schema(), std::move(program.saved));
     node::ServerNodeConfig config{.pairs_per_job = 3, .job_timeout_s = 30.0};
-    config.server.update_period_s = kUpdatePeriod_s;
+    config.server.update_least_s = kUpdatePeriod_s;
     config.server.change_of_mind = change_of_mind_;
     config.refiner = refiner_;
     return std::move(node::ServerNode::open(world_.robots, world_.verifier, config, kEpoch, *program.store).value());

@@ -135,7 +135,7 @@ TEST(Mission, ABadLinkDelaysTheMapAndTheRobotsAndHarmsNeither) {
 /// As somebody would have seen it at the page: the report's page has robots' statuses, and what they make alarm.
 TEST(Mission, TheReportShowsARobotThatWasOutOfRange) {
   lab::MissionConfig config = small_mission();
-  config.server.update_period_s = 5.0;
+  config.server.update_least_s = 5.0;
   config.robot_links = {{.robot = "bravo", .link = {.outages = {{.from_s = 60.0, .until_s = 120.0}}}}};
   const MissionRecord record = run(config);
   ASSERT_NE(record.view, nullptr);

@@ -104,7 +104,7 @@ TEST(Scenarios, EveryMissionFileLoads) {
 
 TEST(Scenarios, InAgreeTheServersUncertaintyExplainsTheWholeDifference) {
   for (const std::uint64_t seed : {1U, 2U}) {
-    const MissionRecord record = run(scenario("agree", {"server.update_period_s=40"}), seed);
+    const MissionRecord record = run(scenario("agree", {"server.update_least_s=40"}), seed);
     EXPECT_EQ(record.server.components, 1U);
     if (seed == 1) expect_work(record, {11, 3160, 350, 14, 176, 510'000});  // 11, 3160, 279, 11, 141, 408,672
     for (const RobotRecord& robot : record.robots) {
@@ -118,7 +118,7 @@ TEST(Scenarios, InAgreeTheServersUncertaintyExplainsTheWholeDifference) {
 }
 
 TEST(Scenarios, SpinTurnsHalfOfTheTrajectoryAboutTheStartAndDistancesToItCannotSeeIt) {
-  const lab::MissionConfig config = scenario("spin", {"server.update_period_s=40"});
+  const lab::MissionConfig config = scenario("spin", {"server.update_least_s=40"});
   const Recording alpha = recording(config);
   ASSERT_EQ(alpha.drift_origins.size(), 1U);
   const DriftOrigin& origin = alpha.drift_origins.front();
@@ -168,7 +168,7 @@ TEST(Scenarios, HeightGrowsByThreeMetresWhileTheRobotClimbsTheRamp) {
     EXPECT_NEAR(error_over(alpha, from, until).z(), 3.0, 0.4);
     EXPECT_NEAR(error_over(alpha, from, (from + until) / 2).z(), 1.5, 0.4);  // gradually
   }
-  const MissionRecord record = run(scenario("height", {"server.update_period_s=60"}));
+  const MissionRecord record = run(scenario("height", {"server.update_least_s=60"}));
   EXPECT_LT(*record.server.joint.rmse_m, 0.09);      // 0.058
   EXPECT_GT(*record.robots[0].onboard.rmse_m, 1.0);  // 1.40
   expect_repaired(record, "height");
@@ -177,7 +177,7 @@ TEST(Scenarios, HeightGrowsByThreeMetresWhileTheRobotClimbsTheRamp) {
 }
 
 TEST(Scenarios, DegenerateSlidesAlongOneCorridorForAMinuteAndSaysSo) {
-  const lab::MissionConfig config = scenario("degenerate", {"server.update_period_s=60"});
+  const lab::MissionConfig config = scenario("degenerate", {"server.update_least_s=60"});
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     const Recording alpha = recording(config, 0, seed);
     ASSERT_EQ(alpha.drift_origins.size(), 1U) << "visited once";
@@ -207,7 +207,7 @@ TEST(Scenarios, DegenerateSlidesAlongOneCorridorForAMinuteAndSaysSo) {
 class Revision : public testing::Test {
  protected:
   static MissionRecord at(double time_s) {
-    return run(scenario("revision", {"server.update_period_s=60", fmt::format("duration_s={}", time_s)}));
+    return run(scenario("revision", {"server.update_least_s=60", fmt::format("duration_s={}", time_s)}));
   }
   static double server_error(const MissionRecord& record) { return *record.robots[0].server.max_error_m; }
   static std::size_t wrong(const MissionRecord& record) {
@@ -247,7 +247,7 @@ TEST_F(Revision, AWrongClosureStandsForMinutesAndIsGone) {
 }
 
 TEST_F(Revision, TheRecordFollowsClosuresAndErrorsOverTime) {
-  lab::MissionConfig config = scenario("revision", {"server.update_period_s=60", "duration_s=900"});
+  lab::MissionConfig config = scenario("revision", {"server.update_least_s=60", "duration_s=900"});
   config.compare_policies = {"none"};
   const MissionRecord record = run(config);
   for (const MapUpdateRecord& update : record.server.updates) {
@@ -281,7 +281,7 @@ TEST_F(Revision, TheRecordFollowsClosuresAndErrorsOverTime) {
 }
 
 TEST(Scenarios, LateJoinsLoseContactAndReturn) {
-  const lab::MissionConfig config = scenario("late", {"server.update_period_s=30", "agent.submap.duration_s=20"});
+  const lab::MissionConfig config = scenario("late", {"server.update_least_s=30", "agent.submap.duration_s=20"});
   const MissionRecord record = run(config);
   const RobotRecord& bravo = record.robots[1];
   ASSERT_EQ(bravo.name, "bravo");

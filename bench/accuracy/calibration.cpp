@@ -133,8 +133,7 @@ void run(const Options& options, const lab::MissionConfig& config,
   std::size_t update = 0;
   const double end_s = config.duration_s > 0.0 ? config.duration_s : std::numeric_limits<double>::infinity();
   bool done = false;
-  for (double time_s = config.server.update_period_s; !done && time_s <= end_s;
-       time_s += config.server.update_period_s) {
+  for (double time_s = kUpdate_s; !done && time_s <= end_s; time_s += kUpdate_s) {
     done = true;
     for (Speaker& speaker : speakers) {
       for (const SubmapMessage& message : speaker.until(time_s))

@@ -9,7 +9,7 @@ import argparse
 from runs import SOURCE, mission_file, report_of, row, write_results
 
 RECEIVER = {"rate_hz": 1.0, "sigma_m": 1.5, "sigma_up_m": 3.0}
-UPDATES = "server.update_period_s=600"  # the last map is all that counts here
+UPDATES = "server.update_least_s=600"  # the last map is all that counts here
 LONG = ["simulation.robots.0.walk.duration_s=4800", "simulation.robots.1.walk.duration_s=4800"]
 WAYS = [  # a name, and what is changed of missions/apart_fixes.yaml
     ("with loops", []),

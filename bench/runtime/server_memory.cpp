@@ -241,7 +241,7 @@ int main(int argc, char** argv) {
     const double minutes = argc > 3 ? std::atof(argv[3]) : 30.0;
     arguments.settings = {fmt::format("simulation.robots.0.copies={}", std::atoi(argv[2])),
                           fmt::format("simulation.robots.0.walk.duration_s={}", 60.0 * minutes),
-                          fmt::format("server.update_period_s={}", argc > 4 ? std::atof(argv[4]) : 20.0)};
+                          fmt::format("server.update_least_s={}", argc > 4 ? std::atof(argv[4]) : 20.0)};
     arguments.points = argc > 5 ? std::atoi(argv[5]) : 0;
     arguments.keep = argc > 6 ? argv[6] : "";
   }

@@ -252,8 +252,8 @@ Result<mission::MissionRecord> collect_mission(const MissionConfig& config, cons
   if (gone > 0) record.notes.push_back(cut_short("the server", gone));
   for (Robot& robot : robots) record.timing.policies.push_back(std::move(robot.timing));
   const Timestamp end = mission::kMissionStart + record.duration_s;
-  auto view = mission::ViewRecorder(1).finish(mapfile::ShownMaps(**store).of(**server, end), std::nullopt,
-                                              *node::SubmapFrames::of(**store));
+  auto view = mission::ViewRecorder(0.0).finish(mapfile::ShownMaps(**store).of(**server, end), std::nullopt,
+                                                *node::SubmapFrames::of(**store));
   const auto marks = page::marks_with_photos(**store, 0.0);
   if (!marks) return in_context(map.string(), marks.error());
   view.messages.insert(view.messages.begin(), marks->begin(), marks->end());

@@ -65,7 +65,7 @@ class Mission {
     mission.closure_changes.reference.wrong_share = 0.0;
     verifier_ = lab::make_closure_verifier(mission, recordings_, 5);
     node::ServerNodeConfig of_server;
-    of_server.server.update_period_s = 20.0;
+    of_server.server.update_least_s = 20.0;
     server_ = std::move(node::ServerNode::open(robots, verifier_, of_server, 1, map_).value());
     const auto submaps = std::make_shared<node::SubmapFrames>(
         [this](SubmapId id) { return Result<std::string>(**map_.read("submaps", node::key_of(id))); });

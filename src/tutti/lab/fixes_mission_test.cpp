@@ -18,7 +18,7 @@ struct Ended {
 /// Ten minutes of missions/apart_fixes.yaml, with one map at the end.
 Ended run(const std::vector<std::string>& assignments) {
   std::vector<std::string> all{"simulation.robots.0.walk.duration_s=600", "simulation.robots.1.walk.duration_s=600",
-                               "server.update_period_s=300"};
+                               "server.update_least_s=300"};
   all.insert(all.end(), assignments.begin(), assignments.end());
   const auto config = load_mission(test::source_path("missions/apart_fixes.yaml"), all);
   EXPECT_TRUE(config) << config.error().message;

@@ -142,7 +142,7 @@ TEST(MissionConfig, AssignmentsAreCheckedLikeTheFile) {
   EXPECT_NE(problem_with(kGood, {"robot_links=[{robot: a, link: {outages: [{from_s: 2, until_s: 1}]}}]"})
                 .find("robot_links.0.link.outages.0.until_s"),
             std::string::npos);
-  EXPECT_NE(problem_with(kGood, {"server.update_period_s=1e-9"}).find("is 1e-09, expected at least 0.001"),
+  EXPECT_NE(problem_with(kGood, {"server.update_least_s=1e-9"}).find("is 1e-09, expected at least 0.001"),
             std::string::npos);
   EXPECT_NE(problem_with(kGood, {"robots.0.start_s=.inf"}).find("start_s: is .inf"), std::string::npos);
   EXPECT_NE(problem_with(kGood, {"robots.0.reference_offset_m=[1, 2]"}).find("expected 3"), std::string::npos);

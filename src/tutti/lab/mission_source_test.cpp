@@ -23,9 +23,9 @@ TEST(MissionSource, RobotsAreNumberedByTheirPlaceOrByTheirName) {
 }
 
 TEST(MissionSource, WithoutAMissionClosuresAreFoundFromScans) {
-  const auto defaults = load({.assignments = {"server.update_period_s=3"}});
+  const auto defaults = load({.assignments = {"server.update_least_s=3"}});
   ASSERT_TRUE(defaults.has_value()) << defaults.error().message;
-  EXPECT_EQ(defaults->server.update_period_s, 3.0);
+  EXPECT_EQ(defaults->server.update_least_s, 3.0);
   EXPECT_EQ(defaults->closures.verifier, "lidar");
   EXPECT_FALSE(load({.assignments = {"closures.verifier=reference"}}).has_value());
   EXPECT_FALSE(load({.assignments = {"closures.colour=red"}}).has_value());

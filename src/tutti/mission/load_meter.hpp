@@ -4,6 +4,8 @@
 #include <chrono>
 #include <string>
 
+#include "tutti/program/clock.hpp"
+
 namespace tutti::mission {
 
 /// Processor and number of threads in words, as far as the system reports them.
@@ -11,9 +13,6 @@ std::string machine_description();
 
 /// Largest resident memory of this process so far, in 10^6 bytes; 0 where the system does not report it.
 double peak_memory_mb();
-
-/// CPU time of the calling thread so far, in seconds.
-double thread_cpu_s();
 
 /// Measures wall time in milliseconds, since it was made or last asked.
 class Stopwatch {
@@ -32,8 +31,8 @@ class Stopwatch {
 /// Adds the CPU time of a scope to a total.
 class CpuScope {
  public:
-  explicit CpuScope(double& total_s) : total_s_(total_s), begin_s_(thread_cpu_s()) {}
-  ~CpuScope() { total_s_ += thread_cpu_s() - begin_s_; }
+  explicit CpuScope(double& total_s) : total_s_(total_s), begin_s_(program::thread_cpu_s()) {}
+  ~CpuScope() { total_s_ += program::thread_cpu_s() - begin_s_; }
   CpuScope(const CpuScope&) = delete;
   CpuScope& operator=(const CpuScope&) = delete;
 

@@ -124,8 +124,8 @@ std::vector<std::string> problems_of(const MissionConfig& config) {
   check_graphs(config, problem);
   check_imu(config, problem);
   check_links(config, problem);
-  if (config.server.update_period_s < kShortestUpdate_s)  // every one is a step of the mission
-    problem(fmt::format("server.update_period_s: is {}, expected at least {}", config.server.update_period_s,
+  if (config.server.update_least_s < kShortestUpdate_s)  // every one is a step of the mission
+    problem(fmt::format("server.update_least_s: is {}, expected at least {}", config.server.update_least_s,
                         kShortestUpdate_s));
   return problems;
 }

@@ -34,6 +34,7 @@ namespace {
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
 constexpr double kPatience_s = 86400.0;  // after the end, for what is still under way
+constexpr double kProgress_s = 10.0;     // between two reports of it
 constexpr std::uint64_t kEpoch = 1;      // the server starts once
 const bus::Endpoint kWorker = bus::Endpoint::worker(0);
 
@@ -61,7 +62,7 @@ class MissionRun {
         server_port_(network_.connect(bus::Endpoint::server())),
         worker_port_(network_.connect(kWorker)),
         pace_(options.rate),
-        view_(static_cast<std::size_t>(duration_of(config, recordings_) / config.server.update_period_s)) {
+        view_(duration_of(config, recordings_)) {
     keep_freed_memory();
     worker_.refine_with(meter_.refiner());
     for (const MissionRecording& recording : recordings_) {
@@ -75,7 +76,7 @@ class MissionRun {
 
   void run() {
     carry_out(*server_port_, server_->resume(now()));
-    double next_progress_s = config_.server.update_period_s;
+    double next_progress_s = kProgress_s;
     while (true) {
       const double sample_s = next_sample();
       if (sample_s == kNever)
@@ -96,7 +97,7 @@ class MissionRun {
       if (next_worker() <= time_s_) carry_out(*worker_port_, worker_.on_timer(now()));
       if (time_s_ < next_progress_s) continue;
       tell_progress();
-      while (next_progress_s <= time_s_) next_progress_s += config_.server.update_period_s;
+      while (next_progress_s <= time_s_) next_progress_s += kProgress_s;
     }
   }
 
@@ -229,7 +230,7 @@ class MissionRun {
     if (const auto check =
             check_closures(server_->map_server().map(), recordings, config_.association, config_.closure_check))
       events_.set_wrong(check->wrong);
-    if (server_->has_map() && view_.wants_next()) view_.take(shown_map(), status());
+    if (server_->has_map() && view_.wants(time_s_)) view_.take(shown_map(), status());
     server_latency_ms_ = std::max(server_latency_ms_, pace_.late_ms(time_s_));
   }
 

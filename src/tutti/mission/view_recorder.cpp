@@ -13,6 +13,7 @@ namespace tutti::mission {
 void ViewRecorder::take(const mapfile::ShownMap& map, const std::optional<MissionStatus>& status,
                         const std::map<SubmapId, double>& sigma_m) {
   const double time_s = map.time - Timestamp{};
+  last_s_ = time_s;
   const std::uint64_t before = board_.sequence();
   const auto holding = page::closures_holding(map.content.submaps, map.map);
   page::MapMessages messages = page::map_messages(map, holding, sigma_m);

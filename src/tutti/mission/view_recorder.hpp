@@ -31,10 +31,9 @@ class ViewRecorder {
   static constexpr std::size_t kMostMaps = 60;
   static constexpr std::size_t kMostPoints = 300'000;  ///< In all clouds together.
 
-  explicit ViewRecorder(std::size_t expected_updates)
-      : every_(std::max<std::size_t>(1, (expected_updates + kMostMaps - 1) / kMostMaps)) {}
-  /// True if this update's map is one to keep.
-  [[nodiscard]] bool wants_next() { return updates_++ % every_ == 0; }
+  explicit ViewRecorder(double mission_s) : every_s_(mission_s / static_cast<double>(kMostMaps)) {}
+  /// True if the map of an update at this time, in seconds of the mission, is one to keep.
+  [[nodiscard]] bool wants(double time_s) const { return !last_s_ || time_s >= *last_s_ + every_s_; }
   void take(const mapfile::ShownMap& map, const std::optional<MissionStatus>& status,
             const std::map<SubmapId, double>& sigma_m = {});
   /// The last map, and the clouds of its submaps; what cannot be read is left out.
@@ -42,8 +41,8 @@ class ViewRecorder {
                     const server::PayloadStore& payloads) &&;
 
  private:
-  std::size_t every_;
-  std::size_t updates_ = 0;
+  double every_s_;
+  std::optional<double> last_s_;
   page::Board board_;
   page::Alerts alerts_;
   std::vector<page::Message> messages_;

@@ -70,7 +70,7 @@ std::optional<ChangeOfMind> ChangeWatch::follow(RobotId robot, Timestamp now) {
 }
 
 bool ChangeWatch::has_stood(const Waiting& waiting, std::size_t lone_closures, Timestamp now) {
-  return lone_closures == 0 || now - waiting.since >= kStands_s;
+  return now - waiting.since >= (lone_closures == 0 ? kAnother_s : kStands_s);
 }
 
 bool ChangeWatch::anything_waits() const {

@@ -37,6 +37,7 @@ struct ChangeOfMind {
 /// is sent as it is.
 class ChangeWatch {
  public:
+  static constexpr double kAnother_s = 10.0;
   static constexpr double kStands_s = 120.0;
 
   struct Map {

@@ -100,7 +100,7 @@ TEST_F(ChangeWatchTest, AnUpdateWithoutNewsLetsItStand) {
   take(map_with(0.0));
   EXPECT_FALSE(watch_.follow(kBravo, now_).has_value());
   EXPECT_FALSE(take(map_with(2.0)).send);
-  EXPECT_EQ(watch_.follow(kBravo, now_)->outcome, ChangeOutcome::stands);
+  EXPECT_EQ(watch_.follow(kBravo, now_ + ChangeWatch::kAnother_s)->outcome, ChangeOutcome::stands);
   EXPECT_FALSE(watch_.anything_waits());
   EXPECT_TRUE(take(map_with(2.0)).send);
 }

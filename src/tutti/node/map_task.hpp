@@ -27,6 +27,7 @@ struct MapTask {
 struct MapOfTask {
   server::MadeMap made;
   bool is_update = false;
+  double cost_s = 0.0;  ///< Of CPU, for UpdatePacer: counted (server/update_cost.hpp), unless the host has measured it.
   Broadcast broadcast;
   Step step;  ///< What robots are sent of the map, and what is reported of that.
 };

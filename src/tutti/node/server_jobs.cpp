@@ -201,7 +201,8 @@ std::optional<Timestamp> ServerNode::next_timer() const {
   const auto note = [&](const std::optional<Timestamp>& due) {
     if (due) next = std::min(next.value_or(*due), *due);
   };
-  for (const auto& due : {settle_at_, jobs_.next_due(), failed_.next_due(), refinements_.next_due()}) note(due);
+  for (const auto& due : {settle_at_, refine_at_, jobs_.next_due(), failed_.next_due(), refinements_.next_due()})
+    note(due);
   if (is_making_map_) return next;
   note(timer_);
   note(compute_at_);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // When a ServerNode makes its map, and what follows.
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "tutti/base/check.hpp"
@@ -9,16 +8,9 @@
 
 namespace tutti::node {
 
-/// The first multiple of the period that is not before `now`, nor in the pause after the last update.
-Timestamp ServerNode::next_update(Timestamp now) const {
-  const double period_s = config_.server.update_period_s;
-  const Timestamp earliest = operator_decided_ ? now : std::max(now, pause_until_);
-  return Timestamp{} + std::ceil((earliest - Timestamp{}) / period_s - 1e-9) * period_s;
-}
-
-/// At the next update, whether or not there is news by then.
+/// Whether or not there is news by then.
 void ServerNode::review_waiting_changes(Timestamp now) {
-  if (broadcast_.anything_waits()) timer_ = now + config_.server.update_period_s;
+  if (broadcast_.anything_waits()) timer_ = now + ChangeWatch::kAnother_s;
 }
 
 bool ServerNode::is_due(const std::optional<Timestamp>& timer, Timestamp now) const {
@@ -43,6 +35,7 @@ std::optional<MapTask> ServerNode::begin_map(Timestamp now) {
   timer_.reset();
   compute_at_.reset();
   is_making_map_ = true;
+  pacer_.begin(now);
   const bool operator_decided = std::exchange(operator_decided_, false);
   MapTask task{.job = is_update ? server_.begin_update() : server_.begin_rebuild(),
                .is_update = is_update,
@@ -51,8 +44,6 @@ std::optional<MapTask> ServerNode::begin_map(Timestamp now) {
                .robots = robots_,
                .follow = config_.server.change_of_mind != "wait" || operator_decided,
                .broadcast = std::move(broadcast_)};
-  const double pause_s = config_.server.update_pause_per_submap_s * static_cast<double>(task.job.submaps.size());
-  if (is_update && pause_s > config_.server.update_period_s) pause_until_ = now + pause_s;
   for (const RobotId robot : robots_)
     if (const auto owner = registry_.owner(robot)) task.job.owners.push_back(*owner);
   return task;
@@ -62,14 +53,15 @@ Step ServerNode::end_map(MapOfTask made, Timestamp now) {
   TUTTI_CHECK(is_making_map_, "a map that was not begun");
   Step step = std::move(made.step);
   const std::size_t submaps = made.made.job.submaps.size();
-  server_.finish(std::move(made.made));
+  server_.finish(std::move(made.made), may_refine(now));
   broadcast_ = std::move(made.broadcast);
   last_broadcast_ = broadcast_.last();
+  pacer_.end(made.cost_s);
   is_making_map_ = false;
   has_map_ = true;
   ++changes_;
   if (server_.has_news())
-    timer_ = next_update(now);
+    timer_ = pacer_.earliest(now, operator_decided_);
   else
     review_waiting_changes(now);
   const server::MapEstimate& map = server_.map();

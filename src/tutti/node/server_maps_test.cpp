@@ -71,7 +71,7 @@ TEST_F(MapBeingMade, SubmapsAreStoredAndAcknowledgedBeforeItIsThere) {
 
 TEST_F(MapBeingMade, WhatComesMeanwhileIsInTheNextWhichIsOneOfTheWholeSet) {
   take_both(4);
-  now_ = now_ + 25.0;                                // it takes longer than a period
+  now_ = now_ + 25.0;                                // it takes long
   EXPECT_FALSE(node_->begin_map(now_).has_value());  // one at a time
   EXPECT_EQ(node_->next_timer(), std::nullopt);      // and nobody is to ask
   done(node_->end_map(make_map(std::move(*task_)), now_));
@@ -110,31 +110,21 @@ TEST_F(MapBeingMade, HasNewsUntilItIsThere) {
   EXPECT_FALSE(read_map_meta(*store_).value()->news);
 }
 
-TEST_F(MapBeingMade, ALargeMapIsMadeLessOften) {
-  constexpr double kPeriod_s = 10.0;  // 10 s per submap instead of 0.01: 8 are as 8,000
-  ServerNodeConfig config;
-  config.server.update_pause_per_submap_s = 10.0;
-  start({RobotId{0}, RobotId{1}}, config);
-  now_ = node_->next_timer().value();
-  const Timestamp first = now_;
-  EXPECT_EQ(updates(done(node_->on_timer(now_))), std::vector<std::size_t>{8});
-  now_ = now_ + 3.0;
+TEST_F(MapBeingMade, WhatItCostKeepsTheNextBack) {
+  MapOfTask made = make_map(std::move(*task_));
+  EXPECT_GT(made.cost_s, 0.0);  // counted
+  made.cost_s = 20.0;           // measured by the host
+  const Timestamp begun = now_;
+  now_ = now_ + 21.0;
+  done(node_->end_map(std::move(made), now_));
   take_both(4);
-  EXPECT_EQ(*node_->next_timer(), first + 80.0);
-  now_ = *node_->next_timer();
-  const Timestamp second = now_;
-  EXPECT_EQ(updates(done(node_->on_timer(now_))), std::vector<std::size_t>{10});
-  now_ = now_ + 200.0;  // nothing has come for longer than the pause
-  take_both(5);
-  EXPECT_EQ(*node_->next_timer(), second + 200.0);
-  now_ = *node_->next_timer();
-  const Timestamp third = now_;
-  EXPECT_EQ(updates(done(node_->on_timer(now_))), std::vector<std::size_t>{12});
-  now_ = now_ + 1.0;
-  take_both(6);
-  EXPECT_EQ(*node_->next_timer(), third + 120.0);
+  EXPECT_EQ(node_->next_timer(), begun + 80.0);
   receive(test::envelope(ClosureDecision{"0/0-1/2", Wish::reject, "ada", 5}));
-  EXPECT_EQ(*node_->next_timer(), third + kPeriod_s);  // an operator does not wait
+  EXPECT_EQ(node_->next_timer(), now_);  // an operator does not wait
+  EXPECT_EQ(updates(done(node_->on_timer(now_))), std::vector<std::size_t>{10});
+  now_ = now_ + 0.1;
+  take_both(5);
+  EXPECT_EQ(*node_->next_timer(), now_ + 0.4);  // what it has cost is counted again, and is little
 }
 
 TEST_F(MapBeingMade, ARobotThatJoinsMeanwhileHearsOfTheNext) {

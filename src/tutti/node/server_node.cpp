@@ -86,7 +86,7 @@ Step ServerNode::resume(Timestamp now) {
     server_.nothing_is_new();
     compute_at_ = now;
   }
-  if (server_.has_news()) timer_ = next_update(now);
+  if (server_.has_news()) timer_ = pacer_.earliest(now);
   step.writes.push_back(meta());
   step.writes.push_back(to_row(config_.server));
   keep_places(step);
@@ -132,10 +132,10 @@ Step ServerNode::put_aside(const bus::Envelope& envelope, const std::string& why
 }
 
 void ServerNode::note_news(Timestamp now, bool before, Step& step) {
-  if (server_.has_news() && operator_decided_) timer_ = next_update(now);  // the pause, if any, is over
+  if (server_.has_news() && operator_decided_) timer_ = pacer_.earliest(now, true);
   if (before == server_.has_news()) return;
   compute_at_.reset();  // the map with the news takes its place
-  timer_ = next_update(now);
+  timer_ = pacer_.earliest(now, operator_decided_);
   step.writes.push_back(meta());
 }
 

@@ -22,6 +22,7 @@
 #include "tutti/node/step.hpp"
 #include "tutti/node/stored_rows.hpp"
 #include "tutti/node/submap_frames.hpp"
+#include "tutti/node/update_pacer.hpp"
 #include "tutti/node/worker_roster.hpp"
 #include "tutti/server/closure_names.hpp"
 #include "tutti/server/map_server.hpp"
@@ -157,9 +158,10 @@ class ServerNode {
   /// The refinement is asked for again later, or given up.
   void note_failed_refinement(const RefinementJob& job, const std::string& why, Timestamp now, Step& step);
   void give_up_refinement(std::uint64_t revision, const std::string& why, Timestamp now, Step& step);
-  /// After an update: sets when the whole map is to be refined if nothing more comes.
+  /// After an update: sets when the map is to be refined that was not yet, and the whole map if nothing more comes.
   void note_settling(Timestamp now);
   void settle(Timestamp now, Step& step);
+  [[nodiscard]] bool may_refine(Timestamp now) const { return !refine_from_ || *refine_from_ <= now; }
   void set_aside(const bus::Envelope& envelope, const std::vector<ClosureVerdict>& verdicts, Timestamp now, Step& step);
   /// An answer to a job that is not open.
   void refuse_unasked(const bus::Envelope& envelope, const std::string& job, Timestamp now, Step& step);
@@ -178,7 +180,6 @@ class ServerNode {
   void send_receipt(RobotId robot, Step& step) const;
   [[nodiscard]] bool is_due(const std::optional<Timestamp>& timer, Timestamp now) const;
   void review_waiting_changes(Timestamp now);
-  [[nodiscard]] Timestamp next_update(Timestamp now) const;
   /// Sets the timer when something new has come, and stores whether it has.
   void note_news(Timestamp now, bool before, Step& step);
   [[nodiscard]] storage::Write meta() const;
@@ -200,10 +201,12 @@ class ServerNode {
   std::string why_waiting_;
   RefinementQueue refinements_;
   std::optional<Timestamp> settle_at_;
+  std::optional<Timestamp> refine_from_;  // ServerConfig::refine_pause_s after the last job
+  std::optional<Timestamp> refine_at_;    // the last update was too soon for one
   std::uint64_t changes_ = 0;
   bool had_news_ = false;  // when the store was opened
   std::optional<Timestamp> timer_;
-  Timestamp pause_until_;                // by ServerConfig::update_pause_per_submap_s
+  UpdatePacer pacer_{{config_.server.update_least_s, config_.server.update_share}};
   std::optional<Timestamp> compute_at_;  // when to compute the map that the store had when it was opened
   std::optional<MapCounts> stored_counts_;
   bool has_map_ = false;

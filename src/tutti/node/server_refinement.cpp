@@ -23,7 +23,10 @@ std::set<std::uint64_t> revisions(const server::Refinements& refinements) {
 }  // namespace
 
 void ServerNode::send_refinement_job(Timestamp now, Step& step) {
-  if (auto job = server_.take_refinement_job()) ask_for_refinement(std::move(*job), now, 0, step);
+  auto job = server_.take_refinement_job();
+  if (!job) return;
+  refine_from_ = now + config_.server.refine_pause_s;
+  ask_for_refinement(std::move(*job), now, 0, step);
 }
 
 void ServerNode::ask_for_refinement(RefinementJob job, Timestamp now, unsigned asked, Step& step) {
@@ -99,11 +102,17 @@ void ServerNode::give_up_refinement(std::uint64_t revision, const std::string& w
 
 void ServerNode::note_settling(Timestamp now) {
   settle_at_.reset();
+  refine_at_ = config_.refiner == nullptr || may_refine(now) ? std::nullopt : refine_from_;
   if (server_.is_unsettled())
-    settle_at_ = now + static_cast<double>(config_.server.refine_every) * config_.server.update_period_s;
+    settle_at_ = now + static_cast<double>(config_.server.refine_every) * config_.server.refine_pause_s;
 }
 
 void ServerNode::settle(Timestamp now, Step& step) {
+  if (refine_at_ && *refine_at_ <= now) {
+    refine_at_.reset();
+    server_.refine();
+    send_refinement_job(now, step);
+  }
   if (!settle_at_ || *settle_at_ > now) return;
   settle_at_.reset();
   server_.settle();

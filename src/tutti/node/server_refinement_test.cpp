@@ -93,7 +93,7 @@ TEST_F(ServerRefinement, OfAPartIsFollowedByOneOfTheWholeWhenNothingMoreComes) {
   ASSERT_EQ(part.size(), 1U);
   EXPECT_FALSE(wire::decode_refinement_job(*part[0].bytes)->whole);
   answer(part[0]);
-  EXPECT_TRUE(wait(50.0).empty());
+  EXPECT_TRUE(wait(45.0).empty());
   EXPECT_EQ(node_->mission_status(now_).pending_jobs, 1U);
   const auto whole = wait(10.0);
   ASSERT_EQ(whole.size(), 1U);
@@ -167,7 +167,7 @@ TEST_F(ServerRefinement, ThatEndsEveryWorkerIsGivenUp) {
 TEST_F(ServerRefinement, ThatNobodyAnswersIsAskedAgain) {
   take(0);
   const bus::Envelope lost = wait(10.0).at(0);
-  EXPECT_TRUE(wait(590.0).empty());
+  EXPECT_TRUE(wait(580.0).empty());
   const auto again = wait(10.0);
   ASSERT_EQ(again.size(), 1U);
   EXPECT_NE(again[0].id, lost.id);

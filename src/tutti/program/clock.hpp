@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <ctime>
 #include <functional>
 #include <limits>
 #include <utility>
@@ -23,6 +24,7 @@ class Clock {
       : source_(std::move(source)), rate_(rate), from_s_(from_s), start_s_(source_()) {}
 
   [[nodiscard]] double wall_s() const { return source_() - start_s_; }  ///< Since the clock was made.
+  [[nodiscard]] double rate() const { return rate_; }                   ///< Mission seconds in a wall second.
   [[nodiscard]] double mission_s() const { return from_s_ + rate_ * wall_s(); }
   [[nodiscard]] Timestamp now() const { return Timestamp{} + mission_s(); }
   /// Wall seconds until `time`; 0 when that is past.
@@ -36,6 +38,13 @@ class Clock {
   double from_s_;
   double start_s_;
 };
+
+/// CPU time of the calling thread so far, in seconds.
+inline double thread_cpu_s() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
 
 /// Nanoseconds since the Unix epoch, by this machine's clock.
 std::uint64_t wall_clock_ns();

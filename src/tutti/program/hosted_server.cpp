@@ -40,8 +40,12 @@ Answer HostedServer::work(Timestamp now) {
     return_freed_memory();
   }
   if (auto task = node_->begin_map(now))
-    making_ = std::async(std::launch::async,
-                         [make = make_map_, task = std::move(*task)]() mutable { return make(std::move(task)); });
+    making_ = std::async(std::launch::async, [this, task = std::move(*task)]() mutable {
+      const double begun_s = thread_cpu_s();
+      node::MapOfTask made = make_map_(std::move(task));
+      made.cost_s = clock_.rate() * (thread_cpu_s() - begun_s);  // a mission's clock may be faster than the wall's
+      return made;
+    });
   if (node_->changes() != reported_changes_) answer.step.messages.push_back(mission_status(now));
   return counted(std::move(answer));
 }

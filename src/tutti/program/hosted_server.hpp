@@ -18,7 +18,7 @@
 namespace tutti::program {
 
 /// A server as its host sees it. Maps are made on a second thread, one at a time, so that no submap, receipt or job
-/// waits for one.
+/// waits for one. The CPU time of that thread is what the node paces its updates by.
 class HostedServer final : public Hosted {
  public:
   /// Called on the second thread; what it throws is thrown by work().

@@ -331,8 +331,8 @@ Status MapServer::receive(const Refinement& refinement) {
   return {};
 }
 
-void MapServer::settle() {
-  if (estimate_) plan_refinement(*estimate_, state_.submaps, state_.payload_sizes, state_.verdicts, true);
+void MapServer::refine(bool settle) {
+  if (estimate_) plan_refinement(*estimate_, state_.submaps, state_.payload_sizes, state_.verdicts, settle);
 }
 
 void MapServer::plan_refinement(const MapEstimate& estimate, const SubmapSet& submaps,
@@ -368,14 +368,14 @@ MapJob MapServer::begin(std::uint64_t revision) {
 MapJob MapServer::begin_update() { return begin(state_.revision + 1); }
 MapJob MapServer::begin_rebuild() { return begin(state_.revision); }
 
-void MapServer::finish(MadeMap made) {
+void MapServer::finish(MadeMap made, bool refines) {
   makes_news_ = false;
   state_.revision = made.job.revision;
   ++work_.updates;
   work_.search += made.search;
   work_.monitor += made.monitor;
   map_ = std::move(made.map);
-  if (made.estimate)
+  if (made.estimate && refines)
     plan_refinement(*made.estimate, made.job.submaps, made.job.payload_sizes, made.job.verdicts, false);
   if (!graph_is_new_) estimate_ = std::move(made.estimate);
 }

@@ -31,8 +31,9 @@ struct ServerConfig {
   MapConfig map;
   consistency::ProxyGraphConfig proxy_graph;
   int refine_every = 5;
-  double update_period_s = 10.0;
-  double update_pause_per_submap_s = 0.01;
+  double refine_pause_s = 10.0;
+  double update_least_s = 0.5;
+  double update_share = 0.25;
   std::string broadcast = "own";
   std::string change_of_mind = "wait";
   int candidates_per_submap = 100;
@@ -43,12 +44,16 @@ struct ServerConfig {
     v.field(
         "refine_every", refine_every, at_least(0),
         "Every which bundle adjustment goes over the whole map, where cameras saw it; those between over what is new. "
-        "When nothing has come for so many update periods, one of the whole follows. 0: none at all.");
-    v.field("update_period_s", update_period_s, greater_than(0.0),
-            "Mission time between two optimisations when there is something new.");
-    v.field("update_pause_per_submap_s", update_pause_per_submap_s, at_least(0.0),
-            "A large map takes longer to make, so it is made less often: so many seconds per submap after the last was "
-            "begun (0.01: every 100 s with 10,000 submaps), unless an operator has spoken. 0: always after a period.");
+        "When nothing has come for so many of its pauses, one of the whole follows. 0: none at all.");
+    v.field("refine_pause_s", refine_pause_s, greater_than(0.0),
+            "Mission time between two bundle adjustments, at the least.");
+    v.field("update_least_s", update_least_s, formerly("update_period_s", greater_than(0.0)),
+            "Mission time between the beginnings of two updates, at the least. An update, which optimises the map and "
+            "sends it, begins as soon as something new has come and the last one is sent.");
+    v.field("update_share", update_share, above_zero_to(1.0),
+            "The share of one core that updates may take: one that costs c seconds of CPU keeps the next back until "
+            "c / share after it began, unless an operator has spoken. In virtual time the cost is counted "
+            "(server/update_cost.hpp).");
     v.field("broadcast", broadcast, one_of({"own", "all"}),
             "What a robot is sent of the map: 'own' = the proxy nodes of its newest session, how sure the map is of "
             "them, and where the others were last seen; 'all' = everybody's (the paper). It does the same with both.");
@@ -160,7 +165,9 @@ class MapServer {
   /// True while parts were refined since the whole map was: call settle() when nothing new has come for some time.
   [[nodiscard]] bool is_unsettled() const { return refiner_ != nullptr && state_.refinements.parts() > 0; }
   /// Makes a job for the whole present map, unless a job is out.
-  void settle();
+  void settle() { refine(true); }
+  /// Makes the job that finish() was not to make, if it is still due. A map with news gets none: the next one does.
+  void refine() { refine(false); }
   /// The job that is out will never be answered.
   void give_up_refinement() { refining_.reset(); }
 
@@ -174,8 +181,8 @@ class MapServer {
   /// The same for the last revision again, for a server that goes on from a state to which nothing was added;
   /// nothing_is_new() then tells the server so.
   [[nodiscard]] MapJob begin_rebuild();
-  /// Takes the map that was begun. What has come since is news.
-  void finish(MadeMap made);
+  /// Takes the map that was begun. What has come since is news. With `refines` it makes a refinement job if one is due.
+  void finish(MadeMap made, bool refines = true);
   void nothing_is_new() { news_ = false; }
   /// Begins, makes and finishes a map, and returns its whole proxy graph, as a new revision.
   ProxyGraphMessage optimise();
@@ -215,6 +222,7 @@ class MapServer {
   /// Notes that something has come that changes the pose graph.
   void note_news();
   [[nodiscard]] MapJob begin(std::uint64_t revision);
+  void refine(bool settle);
   /// Makes a refinement job for the present map, which was made of this, if one is due.
   void plan_refinement(const MapEstimate& estimate, const SubmapSet& submaps,
                        const std::map<SubmapId, PayloadSize>& sizes, const VerdictSet& verdicts, bool settle);

@@ -38,7 +38,7 @@ inline const std::vector<std::string> kNames{"alpha", "bravo"};
 /// Submaps of `submap_s`: few of them keep the map small, and the test fast.
 inline lab::MissionSource mission_of(int duration_s, int submap_s) {
   lab::MissionSource source{.file = source_path("tests/system/small_mission.yaml").string()};
-  source.assignments = {"server.update_period_s=50", fmt::format("agent.submap.duration_s={}", submap_s),
+  source.assignments = {"server.update_least_s=50", fmt::format("agent.submap.duration_s={}", submap_s),
                         fmt::format("agent.submap.distance_m={}", submap_s)};
   for (const char* robot : {"0", "1"})
     source.assignments.push_back(fmt::format("simulation.robots.{}.walk.duration_s={}", robot, duration_s));

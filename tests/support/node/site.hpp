@@ -42,7 +42,7 @@ inline std::string lowered(std::string frame) {
 /// of the next version, which numbers its submaps one higher and reads ours too.
 class Site {
  public:
-  explicit Site(double update_period_s = 10.0) : update_period_s_(update_period_s) {
+  explicit Site(double least_s = 10.0) : least_s_(least_s) {
     start_server();
     start_robot();
   }
@@ -53,7 +53,7 @@ class Site {
     server_store_ = std::make_unique<storage::MemoryStore>(storage::map_schema(), std::move(tables));
     ServerNodeConfig config{.accepts_others = true};
     config.incarnation = 0x1000 + ++starts_;
-    config.server.update_period_s = update_period_s_;
+    config.server.update_least_s = least_s_;
     auto opened = ServerNode::open({}, std::make_shared<EvenVerifier>(), config, epoch_, *server_store_);
     ASSERT_TRUE(opened.has_value()) << opened.error().message;
     server_ = std::move(*opened);
@@ -201,7 +201,7 @@ class Site {
   }
 
   const Trajectory odometry_ = robot::test::drifting_odometry(500);
-  double update_period_s_;
+  double least_s_;
   std::uint64_t epoch_ = 1'700'000'000;
   RobotNodeConfig robot_config_;
   std::unique_ptr<storage::MemoryStore> server_store_, robot_store_;

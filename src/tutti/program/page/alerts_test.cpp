@@ -82,12 +82,12 @@ TEST(Alerts, EveryTroubleIsReportedWithWhenItBegan) {
   EXPECT_EQ(find(second, "server/trouble")->since_s, 100.0) << "and what lasts keeps its beginning";
 }
 
-/// A large map is made less often (ServerConfig::update_pause_per_submap_s), and robots hear of it as much later.
+/// A large map is made less often (node::UpdatePacer), and robots hear of it as much later.
 TEST(Alerts, OfALargeMapARobotMayHearLater) {
   MissionStatus status = status_at(1000.0, 999.0);
   status.robots.front().last_update = status.time - 400.0;
   EXPECT_EQ(Alerts().of_status(status).front().id, "robot/4/uncorrected");
-  status.submaps = 20'000;  // every 200 s
+  status.submaps = 10'000;  // may take 600 s
   EXPECT_TRUE(Alerts().of_status(status).empty());
   status.robots.front().last_update = status.time - 700.0;
   EXPECT_EQ(Alerts().of_status(status).front().id, "robot/4/uncorrected");
