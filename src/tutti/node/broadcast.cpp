@@ -29,9 +29,9 @@ void Broadcast::send(ProxyGraphMessage map, std::shared_ptr<const server::Belief
 void Broadcast::send_waiting(const std::set<RobotId>& robots, Timestamp now, Step& step) {
   std::shared_ptr<const std::string> whole;
   for (const RobotId robot : robots)
-    if (auto report = watch_.follow(robot, now)) {
+    if (auto late = watch_.follow(robot, now)) {
       send_last(robot, consistency::own_part(last_->graph, robot), whole, step);
-      step.emit(now, std::move(*report));
+      if (late->report) step.emit(now, std::move(*late->report));
     }
 }
 

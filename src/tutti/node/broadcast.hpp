@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 
@@ -24,13 +25,13 @@ class Broadcast {
   /// With `to_all` every robot is sent the whole map, as in the paper (ServerConfig::broadcast).
   explicit Broadcast(bool to_all) : to_all_(to_all) {}
 
-  /// Sends a new map, which rests on `beliefs`. With `lone` (ChangeWatch::take), robots about which it changes
-  /// its mind are not sent it yet; otherwise every robot is sent it.
+  /// Sends a new map, which rests on `beliefs`, to the robots that are to follow it by `lone` (ChangeWatch::take);
+  /// without `lone` to all.
   void send(ProxyGraphMessage map, std::shared_ptr<const server::Beliefs> beliefs, const std::set<RobotId>& robots,
             const ChangeWatch::LoneClosures& lone, Timestamp now, Step& step);
-  /// True while some robot was not sent the last map.
-  [[nodiscard]] bool anything_waits() const { return watch_.anything_waits(); }
-  /// Sends the last map to the robots that wait for it, because it has stood.
+  /// When some robot is to be sent the last map if no other one is made before.
+  [[nodiscard]] std::optional<Timestamp> next_review() const { return watch_.next_review(); }
+  /// Sends the last map to the robots that are to be sent it now.
   void send_waiting(const std::set<RobotId>& robots, Timestamp now, Step& step);
   /// The last map; empty before the first.
   [[nodiscard]] std::shared_ptr<const ProxyGraph> last() const { return {last_, &last_->graph}; }

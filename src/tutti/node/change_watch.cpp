@@ -5,6 +5,25 @@
 #include <utility>
 
 namespace tutti::node {
+namespace {
+
+using consistency::MapChange;
+
+/// The newer map takes something else for true of this chain.
+bool concerns(const server::ChangeReason& reason) {
+  return reason.found + reason.taken_up + reason.dropped + reason.failed + reason.recovered > 0;
+}
+
+/// It has another submap of the chain, or concerns it.
+bool has_more(const ChangeWatch::Map& older, const ChangeWatch::Map& newer, const ChainId& chain) {
+  return newer.own.nodes.back().stamp > older.own.nodes.back().stamp ||
+         concerns(server::reason_of_change(*older.beliefs, *newer.beliefs, chain));
+}
+
+/// Nothing but one place says so, and odometry says something else.
+bool needs_witness(const server::ChangeReason& reason) { return reason.lone > 0 && reason.failed > 0; }
+
+}  // namespace
 
 const char* to_string(ChangeOutcome outcome) {
   switch (outcome) {
@@ -21,60 +40,87 @@ const char* to_string(ChangeOutcome outcome) {
 ChangeWatch::Decision ChangeWatch::take(RobotId robot, Map map, const LoneClosures& lone, Timestamp now) {
   Decision out;
   Robot& known = robots_[robot];
-  const ProxyGraph& own = map.own;
   const auto end_waiting = [&](ChangeOutcome outcome) {
     if (known.waiting) out.reports.push_back({robot, outcome, known.waiting->change, known.waiting->reason});
     known.waiting.reset();
   };
-  const auto follow = [&] { known.followed = std::move(map); };
-  if (own.nodes.empty() || !lone) {
+  const auto send = [&] {
+    known.followed = std::move(map);
+    known.sent = now;
+    known.held.reset();
+  };
+  const bool is_overdue = known.followed.beliefs == nullptr || now - known.sent >= kAnyway_s;
+  const ProxyGraph& own = map.own;
+  if (own.nodes.empty() || !lone || nodes_of(known.followed.own, own.nodes.front().chain).empty()) {
     end_waiting(ChangeOutcome::stands);
-    follow();
+    if (out.send = !own.nodes.empty() || !lone || is_overdue; out.send)
+      send();
+    else
+      known.held = std::move(map);
     return out;
   }
   const ChainId& chain = own.nodes.front().chain;
-  const consistency::MapChange change = consistency::map_change(known.followed.own, own, chain);
+  const MapChange change = consistency::map_change(known.followed.own, own, chain);
   if (!change.is_change_of_mind()) {
     end_waiting(ChangeOutcome::gone);
-    follow();
-    return out;
+    out.send = is_overdue || change.significance > kNoticed ||
+               concerns(server::reason_of_change(*known.followed.beliefs, *map.beliefs, chain));
+  } else {
+    out.send = stands(known, map, change, lone, now, robot, out.reports);
+    if (out.send) end_waiting(ChangeOutcome::stands);
   }
-  server::ChangeReason reason = server::reason_of_change(*known.followed.beliefs, *map.beliefs, chain);
-  reason.lone = lone(known.followed, own);
-  const bool stands =
-      known.waiting && consistency::map_change(known.waiting->map.own, own, chain).translation_m < change.translation_m;
-  if (stands && has_stood(*known.waiting, reason.lone, now)) {
-    end_waiting(ChangeOutcome::stands);
-    follow();
-    return out;
-  }
-  out.send = false;
-  if (stands) {
-    known.waiting->map = std::move(map);
-    known.waiting->reason.lone = reason.lone;
-    return out;
-  }
-  end_waiting(ChangeOutcome::gone);
-  out.reports.push_back({robot, ChangeOutcome::waits, change, reason});
-  known.waiting = {now, std::move(map), change, reason};
+  if (out.send)
+    send();
+  else
+    known.held = std::move(map);
   return out;
 }
 
-std::optional<ChangeOfMind> ChangeWatch::follow(RobotId robot, Timestamp now) {
-  const auto known = robots_.find(robot);
-  if (known == robots_.end() || !known->second.waiting) return std::nullopt;
-  if (!has_stood(*known->second.waiting, known->second.waiting->reason.lone, now)) return std::nullopt;
-  Waiting waiting = *std::exchange(known->second.waiting, std::nullopt);
-  known->second.followed = std::move(waiting.map);
-  return ChangeOfMind{robot, ChangeOutcome::stands, waiting.change, waiting.reason};
+bool ChangeWatch::stands(Robot& robot, const Map& map, const MapChange& change, const LoneClosures& lone, Timestamp now,
+                         RobotId id, std::vector<ChangeOfMind>& reports) {
+  const ChainId& chain = map.own.nodes.front().chain;
+  const bool is_same = robot.waiting && consistency::map_change(robot.waiting->map.own, map.own, chain).translation_m <
+                                            change.translation_m;
+  if (is_same && !has_more(robot.waiting->map, map, chain))
+    return !needs_witness(robot.waiting->reason) && now - robot.waiting->since >= kStands_s;
+  server::ChangeReason reason = server::reason_of_change(*robot.followed.beliefs, *map.beliefs, chain);
+  reason.lone = lone(robot.followed, map.own);
+  if (is_same) {
+    robot.waiting->map = map;
+    robot.waiting->reason.lone = reason.lone;
+    robot.waiting->reason.failed = reason.failed;
+    return !needs_witness(reason);
+  }
+  if (robot.waiting) reports.push_back({id, ChangeOutcome::gone, robot.waiting->change, robot.waiting->reason});
+  reports.push_back({id, ChangeOutcome::waits, change, reason});
+  robot.waiting = {now, map, change, reason};
+  return false;
 }
 
-bool ChangeWatch::has_stood(const Waiting& waiting, std::size_t lone_closures, Timestamp now) {
-  return now - waiting.since >= (lone_closures == 0 ? kAnother_s : kStands_s);
+std::optional<Timestamp> ChangeWatch::due(const Robot& robot) {
+  if (!robot.held) return std::nullopt;
+  if (!robot.waiting) return robot.sent + kAnyway_s;
+  return needs_witness(robot.waiting->reason) ? std::nullopt : std::optional(robot.waiting->since + kStands_s);
 }
 
-bool ChangeWatch::anything_waits() const {
-  return std::ranges::any_of(robots_, [](const auto& known) { return known.second.waiting.has_value(); });
+std::optional<ChangeWatch::Late> ChangeWatch::follow(RobotId robot, Timestamp now) {
+  const auto found = robots_.find(robot);
+  if (found == robots_.end()) return std::nullopt;
+  Robot& known = found->second;
+  if (const auto at = due(known); !at || *at > now) return std::nullopt;
+  Late out;
+  if (const auto waiting = std::exchange(known.waiting, std::nullopt))
+    out.report = ChangeOfMind{robot, ChangeOutcome::stands, waiting->change, waiting->reason};
+  known.followed = *std::exchange(known.held, std::nullopt);
+  known.sent = now;
+  return out;
+}
+
+std::optional<Timestamp> ChangeWatch::next_review() const {
+  std::optional<Timestamp> next;
+  for (const auto& [id, robot] : robots_)
+    if (const auto at = due(robot)) next = std::min(next.value_or(*at), *at);
+  return next;
 }
 
 }  // namespace tutti::node

@@ -15,7 +15,7 @@ namespace tutti::node {
 
 /// What becomes of a map that has changed its mind about a robot (consistency::MapChange).
 enum class ChangeOutcome {
-  waits,   ///< The robot is not sent the map before it has stood: for another update, or for minutes.
+  waits,   ///< The robot is not sent the map before the change has stood, or has a second witness.
   stands,  ///< The map has stood, and the robot is sent it.
   gone     ///< The next map is nearer to the one that the robot follows, so the change is dropped.
 };
@@ -29,16 +29,27 @@ struct ChangeOfMind {
   server::ChangeReason reason;    ///< Why these two maps differ.
 };
 
-/// Decides which maps robots are sent, so that no robot follows a change that the next map takes back. A robot follows
-/// the last map that it was sent. A map that differs from that one by no more than it allowed for is sent at once; any
-/// other waits. The next map is sent if it is nearer to the waiting map than to the followed one: the change stands. A
-/// change that rests on the closures of one pair of places must stand for kStands_s: similar places come in groups, and
-/// what is right is seen again from elsewhere. The watch is not stored, so after a restart of the server the first map
-/// is sent as it is.
+/// Decides which maps robots are sent. A robot follows the last map that it was sent.
+///
+/// *What is sent.* A map that differs from the followed one by no more than that allowed for is sent at once if it
+/// concerns the robot: closures of its trajectory were found, taken up or dropped, odometry of it failed or is believed
+/// again, or it lies elsewhere by more than one standard deviation (kNoticed). All others have nothing to correct and
+/// would cost the radio as much: such a map is sent kAnyway_s after the last one.
+///
+/// *What waits.* Any other map has changed its mind, and waits, so that no robot follows what the next map takes back.
+/// The change stands when a later map that has more about the robot (another submap of it, or closures as above) is
+/// nearer to the waiting map than to the followed one, or when none such has come for kStands_s. A change that rests on
+/// the closures of one pair of places and for which odometry of the robot must have failed waits for a second witness
+/// instead: it stands when the loss of no one group would undo it (server::change_support). Similar places come in
+/// groups, and what is right is seen again from elsewhere. A change that rests on one place and agrees with odometry
+/// moves the robot by no more than odometry may be wrong, so it does not wait for that.
+///
+/// The watch is not stored, so after a restart of the server the first map is sent as it is.
 class ChangeWatch {
  public:
-  static constexpr double kAnother_s = 10.0;
-  static constexpr double kStands_s = 120.0;
+  static constexpr double kNoticed = 1.0 / 3.0;  ///< Of consistency::MapChange::significance.
+  static constexpr double kAnyway_s = 20.0;
+  static constexpr double kStands_s = 5.0;
 
   struct Map {
     ProxyGraph own;  ///< The robot's part of the map (consistency::own_part).
@@ -54,23 +65,31 @@ class ChangeWatch {
 
   /// Decides about a new map. `lone` is asked when the map has changed its mind; without it the map is always sent.
   Decision take(RobotId robot, Map map, const LoneClosures& lone, Timestamp now);
-  /// To be called at an update without news, because the waiting map has then stood. Nothing when no map waits for this
-  /// robot, or the change must stand for longer.
-  std::optional<ChangeOfMind> follow(RobotId robot, Timestamp now);
-  [[nodiscard]] bool anything_waits() const;
+  struct Late {
+    std::optional<ChangeOfMind> report;
+  };
+  /// To be called at next_review(), without news. Nothing: the robot is not to be sent the last map yet, or has it.
+  std::optional<Late> follow(RobotId robot, Timestamp now);
+  /// When a robot is to be sent the last map if no other one is made before.
+  [[nodiscard]] std::optional<Timestamp> next_review() const;
 
  private:
   struct Waiting {
     Timestamp since;
-    Map map;
+    Map map;  // the last one that had more about the robot
     consistency::MapChange change;
     server::ChangeReason reason;
   };
   struct Robot {
     Map followed;
+    Timestamp sent;
+    std::optional<Map> held;  // the last map, if it was not sent
     std::optional<Waiting> waiting;
   };
-  static bool has_stood(const Waiting& waiting, std::size_t lone_closures, Timestamp now);
+  /// Decides about a map that has changed its mind; true: it is to be sent.
+  static bool stands(Robot& robot, const Map& map, const consistency::MapChange& change, const LoneClosures& lone,
+                     Timestamp now, RobotId id, std::vector<ChangeOfMind>& reports);
+  static std::optional<Timestamp> due(const Robot& robot);
 
   std::map<RobotId, Robot> robots_;
 };

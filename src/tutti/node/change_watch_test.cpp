@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -32,10 +33,31 @@ ProxyGraph map_with(double aside_m, const ChainId& chain = {kBravo, 1}) {
 
 class ChangeWatchTest : public testing::Test {
  protected:
-  /// Ten seconds after the last one; a map that rests on so many closures of one place.
-  ChangeWatch::Decision take(const ProxyGraph& map, std::size_t lone_closures = 0) {
-    const auto lone = [&](const ChangeWatch::Map&, const ProxyGraph&) { return lone_closures; };
-    return watch_.take(kBravo, {map, std::make_shared<const server::Beliefs>()}, lone, now_ = now_ + 10.0);
+  /// Ten seconds after the last one: a map with one more submap of the robot, or without. It rests on so many closures
+  /// of one place, and takes so many segments of the robot's odometry to have failed.
+  struct What {
+    bool has_more = true;
+    std::size_t lone = 0;
+    std::size_t failed = 0;
+    std::size_t closures = 0;
+  };
+  ChangeWatch::Decision take(const ProxyGraph& map) { return take(map, {}); }
+  ChangeWatch::Decision take(ProxyGraph map, const What& what) {
+    now_ = now_ + 10.0;
+    return take_now(std::move(map), what);
+  }
+  ChangeWatch::Decision take_now(ProxyGraph map, const What& what) {
+    const auto lone = [&](const ChangeWatch::Map&, const ProxyGraph&) { return what.lone; };
+    return watch_.take(kBravo, of(std::move(map), what), lone, now_);
+  }
+  ChangeWatch::Map of(ProxyGraph map, const What& what) {
+    if (what.has_more) ++submaps_;
+    map.nodes.back().stamp = map.nodes.back().stamp + 1e-3 * submaps_;
+    const ChainId chain = map.nodes.back().chain;
+    server::Beliefs beliefs;
+    for (std::uint32_t i = 0; i < what.failed; ++i) beliefs.failed_odometry.push_back({chain, 10 * i, 10 * i + 5});
+    for (std::uint32_t i = 0; i < what.closures; ++i) beliefs.accepted.insert({{chain, i}, {chain, 100 + i}});
+    return {std::move(map), std::make_shared<const server::Beliefs>(std::move(beliefs))};
   }
   /// What is reported, one outcome at most.
   static std::optional<ChangeOutcome> reported(const ChangeWatch::Decision& decision) {
@@ -44,25 +66,51 @@ class ChangeWatchTest : public testing::Test {
   }
   ChangeWatch watch_;
   Timestamp now_;
+  int submaps_ = 0;
 };
 
-TEST_F(ChangeWatchTest, TheFirstMapAndThoseLikeItAreSent) {
-  for (const double aside_m : {0.0, 0.01, 0.02}) {
-    const auto decision = take(map_with(aside_m));
-    EXPECT_TRUE(decision.send);
-    EXPECT_EQ(reported(decision), std::nullopt);
-  }
-  EXPECT_FALSE(watch_.anything_waits());
+TEST_F(ChangeWatchTest, TheFirstMapIsSentAndOthersThatConcernTheRobot) {
+  EXPECT_TRUE(take(map_with(0.0)).send);
+  EXPECT_FALSE(take_now(map_with(0.0), {}).send);  // another submap, of which nothing is known but odometry
+  EXPECT_TRUE(take_now(map_with(0.0), {.closures = 1}).send);
+  EXPECT_FALSE(take_now(map_with(0.0), {.closures = 1}).send);
+  EXPECT_TRUE(take_now(map_with(0.0), {.closures = 0}).send);
+  EXPECT_TRUE(take_now(map_with(0.0), {.failed = 1}).send);
 }
 
-TEST_F(ChangeWatchTest, AChangeThatStandsIsSentOneUpdateLater) {
+TEST_F(ChangeWatchTest, AMapThatLiesElsewhereByMoreThanOneSigmaIsSent) {
+  take(map_with(0.0));
+  const ProxyGraph followed = map_with(0.0);
+  const double per_metre = map_change(followed, map_with(0.01), {kBravo, 1}).significance / 0.01;
+  EXPECT_FALSE(take_now(map_with(0.3 / per_metre), {}).send);
+  EXPECT_TRUE(take_now(map_with(0.4 / per_metre), {}).send);
+}
+
+// So robots hear of their last submaps, and of the others.
+TEST_F(ChangeWatchTest, WhatDoesNotConcernTheRobotIsSentLater) {
+  take(map_with(0.0));
+  const Timestamp sent = now_;
+  EXPECT_EQ(watch_.next_review(), std::nullopt);
+  EXPECT_FALSE(take(map_with(0.0)).send);
+  EXPECT_EQ(watch_.next_review(), sent + ChangeWatch::kAnyway_s);
+  EXPECT_FALSE(watch_.follow(kBravo, sent + (ChangeWatch::kAnyway_s - 1.0)).has_value());
+  const auto late = watch_.follow(kBravo, sent + ChangeWatch::kAnyway_s);
+  ASSERT_TRUE(late.has_value());
+  EXPECT_FALSE(late->report.has_value());
+  EXPECT_EQ(watch_.next_review(), std::nullopt);
+  now_ = sent + ChangeWatch::kAnyway_s;
+  EXPECT_FALSE(take(map_with(0.0)).send);
+  EXPECT_TRUE(take(map_with(0.0)).send);
+}
+
+TEST_F(ChangeWatchTest, AChangeStandsWhenMoreAboutTheRobotSaysTheSame) {
   take(map_with(0.0));
   const auto first = take(map_with(2.0));
   EXPECT_FALSE(first.send);
   EXPECT_EQ(reported(first), ChangeOutcome::waits);
   EXPECT_GT(first.reports[0].change.significance, 1.0);
-  EXPECT_TRUE(watch_.anything_waits());
-  const auto second = take(map_with(2.1));
+  EXPECT_FALSE(take_now(map_with(2.1), {.has_more = false}).send);  // half a second later, of somebody else
+  const auto second = take_now(map_with(2.1), {});
   EXPECT_TRUE(second.send);
   EXPECT_EQ(reported(second), ChangeOutcome::stands);
   EXPECT_EQ(reported(take(map_with(2.1))), std::nullopt);
@@ -72,9 +120,7 @@ TEST_F(ChangeWatchTest, AChangeThatIsTakenBackIsNeverSent) {
   take(map_with(0.0));
   for (int flip = 0; flip < 5; ++flip) {
     EXPECT_FALSE(take(map_with(2.0)).send);
-    const auto back = take(map_with(0.0));
-    EXPECT_TRUE(back.send);
-    EXPECT_EQ(reported(back), ChangeOutcome::gone);
+    EXPECT_EQ(reported(take(map_with(0.0))), ChangeOutcome::gone);
   }
 }
 
@@ -96,57 +142,56 @@ TEST_F(ChangeWatchTest, AThirdOpinionWaitsAnew) {
   EXPECT_TRUE(take(map_with(-1.5)).send);
 }
 
-TEST_F(ChangeWatchTest, AnUpdateWithoutNewsLetsItStand) {
+TEST_F(ChangeWatchTest, WithoutMoreAboutTheRobotItStandsSoon) {
   take(map_with(0.0));
   EXPECT_FALSE(watch_.follow(kBravo, now_).has_value());
   EXPECT_FALSE(take(map_with(2.0)).send);
-  EXPECT_EQ(watch_.follow(kBravo, now_ + ChangeWatch::kAnother_s)->outcome, ChangeOutcome::stands);
-  EXPECT_FALSE(watch_.anything_waits());
-  EXPECT_TRUE(take(map_with(2.0)).send);
+  EXPECT_EQ(watch_.next_review(), now_ + ChangeWatch::kStands_s);
+  now_ = now_ + ChangeWatch::kStands_s;
+  EXPECT_EQ(watch_.follow(kBravo, now_)->report->outcome, ChangeOutcome::stands);
+  EXPECT_EQ(watch_.next_review(), std::nullopt);
+  EXPECT_EQ(reported(take_now(map_with(2.0), {})), std::nullopt);
 }
 
-// The robot stays where it was for two minutes, whether or not there is news, and one change only is reported.
-TEST_F(ChangeWatchTest, WhatRestsOnOnePlaceStandsForMinutes) {
+TEST_F(ChangeWatchTest, WithOthersNewsAloneItStandsAsSoon) {
   take(map_with(0.0));
-  const auto first = take(map_with(2.0), 4);
+  EXPECT_FALSE(take(map_with(2.0)).send);
+  EXPECT_TRUE(take(map_with(2.0), {.has_more = false}).send);
+}
+
+// The robot stays where it was, however long that takes, and one change only is reported.
+TEST_F(ChangeWatchTest, WhatRestsOnOnePlaceAgainstOdometryWaitsForAnotherPlace) {
+  take(map_with(0.0));
+  const auto first = take(map_with(2.0), {.lone = 4, .failed = 1});
   EXPECT_EQ(reported(first), ChangeOutcome::waits);
   EXPECT_EQ(first.reports[0].reason.lone, 4U);
-  for (const Timestamp since = now_; now_ - since < ChangeWatch::kStands_s - 10.0;) {
-    const auto next = take(map_with(2.1), 5);
+  for (int i = 0; i < 60; ++i) {
+    const auto next = take(map_with(2.1), {.lone = 5, .failed = 1});
     EXPECT_FALSE(next.send);
     EXPECT_EQ(reported(next), std::nullopt);
-    EXPECT_FALSE(watch_.follow(kBravo, now_).has_value());
+    EXPECT_EQ(watch_.next_review(), std::nullopt);
+    EXPECT_FALSE(watch_.follow(kBravo, now_ + 1e3).has_value());
   }
-  const auto last = take(map_with(2.1), 6);
+  const auto last = take(map_with(2.1), {.failed = 1});
   EXPECT_TRUE(last.send);
   EXPECT_EQ(reported(last), ChangeOutcome::stands);
-  EXPECT_EQ(last.reports[0].reason.lone, 5U);  // of the map that waited
 }
 
-TEST_F(ChangeWatchTest, ASecondPlaceThatSaysTheSameEndsTheWait) {
+TEST_F(ChangeWatchTest, WhatRestsOnOnePlaceAndAgreesWithOdometryStandsAsOthersDo) {
   take(map_with(0.0));
-  EXPECT_FALSE(take(map_with(2.0), 4).send);
-  EXPECT_FALSE(take(map_with(2.0), 4).send);
-  EXPECT_TRUE(take(map_with(2.0), 0).send);
-}
-
-TEST_F(ChangeWatchTest, WithoutNewsItIsFollowedAfterMinutes) {
-  take(map_with(0.0));
-  EXPECT_FALSE(take(map_with(2.0), 4).send);
-  EXPECT_FALSE(watch_.follow(kBravo, now_ + (ChangeWatch::kStands_s - 1.0)).has_value());
-  EXPECT_TRUE(watch_.anything_waits());
-  EXPECT_EQ(watch_.follow(kBravo, now_ + ChangeWatch::kStands_s)->outcome, ChangeOutcome::stands);
+  EXPECT_FALSE(take(map_with(2.0), {.lone = 4}).send);
+  EXPECT_TRUE(take(map_with(2.0), {.lone = 4}).send);
 }
 
 TEST_F(ChangeWatchTest, WhoeverDoesNotWaitIsSentItAtOnce) {
   take(map_with(0.0));
-  EXPECT_TRUE(watch_.take(kBravo, {map_with(2.0), std::make_shared<const server::Beliefs>()}, nullptr, now_).send);
-  EXPECT_TRUE(take(map_with(2.0)).send);
+  EXPECT_TRUE(watch_.take(kBravo, of(map_with(2.0), {}), nullptr, now_).send);
+  EXPECT_TRUE(watch_.take(kBravo, of(map_with(2.0), {}), nullptr, now_).send);
 }
 
 TEST_F(ChangeWatchTest, ANewSessionIsAnotherTrajectory) {
   take(map_with(0.0));
-  EXPECT_TRUE(take(map_with(2.0, {kBravo, 2})).send);
+  EXPECT_TRUE(take_now(map_with(2.0, {kBravo, 2}), {}).send);
 }
 
 }  // namespace change_watch_test

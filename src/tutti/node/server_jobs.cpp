@@ -206,6 +206,7 @@ std::optional<Timestamp> ServerNode::next_timer() const {
   if (is_making_map_) return next;
   note(timer_);
   note(compute_at_);
+  note(review_at_);
   return next;
 }
 

@@ -8,11 +8,6 @@
 
 namespace tutti::node {
 
-/// Whether or not there is news by then.
-void ServerNode::review_waiting_changes(Timestamp now) {
-  if (broadcast_.anything_waits()) timer_ = now + ChangeWatch::kAnother_s;
-}
-
 bool ServerNode::is_due(const std::optional<Timestamp>& timer, Timestamp now) const {
   return !is_making_map_ && timer && *timer <= now;
 }
@@ -21,10 +16,9 @@ Step ServerNode::tend(Timestamp now) {
   Step step;
   ask_again(now, step);
   settle(now, step);
-  if (is_due(timer_, now) && !server_.has_news() && broadcast_.anything_waits()) {
-    timer_.reset();
+  if (is_due(review_at_, now)) {
     broadcast_.send_waiting(robots_, now, step);
-    review_waiting_changes(now);
+    review_at_ = broadcast_.next_review();
   }
   return step;
 }
@@ -60,10 +54,8 @@ Step ServerNode::end_map(MapOfTask made, Timestamp now) {
   is_making_map_ = false;
   has_map_ = true;
   ++changes_;
-  if (server_.has_news())
-    timer_ = pacer_.earliest(now, operator_decided_);
-  else
-    review_waiting_changes(now);
+  if (server_.has_news()) timer_ = pacer_.earliest(now, operator_decided_);
+  review_at_ = broadcast_.next_review();
   const server::MapEstimate& map = server_.map();
   const auto accepted = std::ranges::count_if(map.closures, &server::JudgedClosure::accepted);
   const MapCounts counts{server_.state().revision, map.nodes.size(), static_cast<std::uint64_t>(accepted),

@@ -179,7 +179,6 @@ class ServerNode {
   bool give_back(const SubmapPair& pair);
   void send_receipt(RobotId robot, Step& step) const;
   [[nodiscard]] bool is_due(const std::optional<Timestamp>& timer, Timestamp now) const;
-  void review_waiting_changes(Timestamp now);
   /// Sets the timer when something new has come, and stores whether it has.
   void note_news(Timestamp now, bool before, Step& step);
   [[nodiscard]] storage::Write meta() const;
@@ -207,6 +206,7 @@ class ServerNode {
   bool had_news_ = false;  // when the store was opened
   std::optional<Timestamp> timer_;
   UpdatePacer pacer_{{config_.server.update_least_s, config_.server.update_share}};
+  std::optional<Timestamp> review_at_;   // when robots are sent the last map that they were not sent at once
   std::optional<Timestamp> compute_at_;  // when to compute the map that the store had when it was opened
   std::optional<MapCounts> stored_counts_;
   bool has_map_ = false;

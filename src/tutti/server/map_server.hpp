@@ -57,11 +57,12 @@ struct ServerConfig {
     v.field("broadcast", broadcast, one_of({"own", "all"}),
             "What a robot is sent of the map: 'own' = the proxy nodes of its newest session, how sure the map is of "
             "them, and where the others were last seen; 'all' = everybody's (the paper). It does the same with both.");
-    v.field("change_of_mind", change_of_mind, one_of({"wait", "follow"}),
-            "A map that differs from the one a robot follows by more than three of that map's own standard deviations: "
-            "'wait' = the robot is sent it once it has stood for another update (for two minutes, if it rests on the "
-            "closures of one place), or an operator has spoken since; "
-            "'follow' = at once.");
+    v.field(
+        "change_of_mind", change_of_mind, one_of({"wait", "follow"}),
+        "A map that differs from the one a robot follows by more than three of that map's own standard deviations: "
+        "'wait' = the robot is sent it once more about it says the same (of another pair of places, if odometry must "
+        "have failed for it), or an operator has spoken since, and what has nothing to correct is sent seldom; "
+        "'follow' = every map at once.");
     v.field("candidates_per_submap", candidates_per_submap, at_least(0),
             "LiDAR: a pair of submaps is verified when either is among so many that look most alike to the other from "
             "above, robots taking turns. With no more submaps than that, these are all pairs. 0: all pairs always.");
