@@ -249,7 +249,7 @@ def main():
         "Joint ATE: all robots after one alignment. Worst instant: the update after which the map, or the robot that follows it,",
         "was worst beside its odometry. Worse than odometry: by more than 10 % and 5 cm. Closure to correction: from a closure's",
         "arrival to the first map with it on each robot that it joins; it waits for the end of both submaps and for the server's",
-        "next update (every 10 s). Changes of mind: maps that differ from the one a robot follows by more than that allowed for,",
+        "next update (`server.update_least_s`). Changes of mind: maps that differ from the one a robot follows by more than that allowed for,",
         "in brackets those that the next map took back. Published for a central server on this benchmark: 4.3 s in the median and",
         "17.7 s at p99 from closure to correction; 6.0 MB down and 11.3 MB up for four robots.", "",
         *course_table(reports, timings, graphs, edges), "",
