@@ -20,8 +20,11 @@ bool has_more(const ChangeWatch::Map& older, const ChangeWatch::Map& newer, cons
          concerns(server::reason_of_change(*older.beliefs, *newer.beliefs, chain));
 }
 
-/// Nothing but one place says so, and odometry says something else.
-bool needs_witness(const server::ChangeReason& reason) { return reason.lone > 0 && reason.failed > 0; }
+/// For how long a change waits for a second witness where nothing but one place says so, and odometry says something
+/// else.
+double patience_s(const server::ChangeReason& reason) {
+  return reason.lone > 0 && reason.failed > 0 ? ChangeWatch::kWitness_s : ChangeWatch::kStands_s;
+}
 
 }  // namespace
 
@@ -82,14 +85,15 @@ bool ChangeWatch::stands(Robot& robot, const Map& map, const MapChange& change, 
   const bool is_same = robot.waiting && consistency::map_change(robot.waiting->map.own, map.own, chain).translation_m <
                                             change.translation_m;
   if (is_same && !has_more(robot.waiting->map, map, chain))
-    return !needs_witness(robot.waiting->reason) && now - robot.waiting->since >= kStands_s;
+    return now - robot.waiting->since >= patience_s(robot.waiting->reason);
   server::ChangeReason reason = server::reason_of_change(*robot.followed.beliefs, *map.beliefs, chain);
   reason.lone = lone(robot.followed, map.own);
   if (is_same) {
     robot.waiting->map = map;
     robot.waiting->reason.lone = reason.lone;
     robot.waiting->reason.failed = reason.failed;
-    return !needs_witness(reason);
+    const double patience = patience_s(reason);
+    return patience == kStands_s || now - robot.waiting->since >= patience;
   }
   if (robot.waiting) reports.push_back({id, ChangeOutcome::gone, robot.waiting->change, robot.waiting->reason});
   reports.push_back({id, ChangeOutcome::waits, change, reason});
@@ -100,7 +104,7 @@ bool ChangeWatch::stands(Robot& robot, const Map& map, const MapChange& change, 
 std::optional<Timestamp> ChangeWatch::due(const Robot& robot) {
   if (!robot.held) return std::nullopt;
   if (!robot.waiting) return robot.sent + kAnyway_s;
-  return needs_witness(robot.waiting->reason) ? std::nullopt : std::optional(robot.waiting->since + kStands_s);
+  return robot.waiting->since + patience_s(robot.waiting->reason);
 }
 
 std::optional<ChangeWatch::Late> ChangeWatch::follow(RobotId robot, Timestamp now) {

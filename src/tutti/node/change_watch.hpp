@@ -40,9 +40,10 @@ struct ChangeOfMind {
 /// The change stands when a later map that has more about the robot (another submap of it, or closures as above) is
 /// nearer to the waiting map than to the followed one, or when none such has come for kStands_s. A change that rests on
 /// the closures of one pair of places and for which odometry of the robot must have failed waits for a second witness
-/// instead: it stands when the loss of no one group would undo it (server::change_support). Similar places come in
-/// groups, and what is right is seen again from elsewhere. A change that rests on one place and agrees with odometry
-/// moves the robot by no more than odometry may be wrong, so it does not wait for that.
+/// instead: it stands when the loss of no one group would undo it (server::change_support), or after kWitness_s, as a
+/// place may never be seen again. Similar places come in groups, and what is right is mostly seen again from elsewhere.
+/// A change that rests on one place and agrees with odometry moves the robot by no more than odometry may be wrong, so
+/// it does not wait for that.
 ///
 /// The watch is not stored, so after a restart of the server the first map is sent as it is.
 class ChangeWatch {
@@ -50,6 +51,7 @@ class ChangeWatch {
   static constexpr double kNoticed = 1.0 / 3.0;  ///< Of consistency::MapChange::significance.
   static constexpr double kAnyway_s = 20.0;
   static constexpr double kStands_s = 5.0;
+  static constexpr double kWitness_s = 120.0;
 
   struct Map {
     ProxyGraph own;  ///< The robot's part of the map (consistency::own_part).
