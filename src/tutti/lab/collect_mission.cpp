@@ -182,9 +182,12 @@ Result<mission::MissionEvents> read_course(const fs::path& folder, std::uint64_t
     const std::string what = event.value("event", "");
     const Timestamp time = Timestamp{} + event.value("time_s", 0.0);
     if (what == "map_updated")
-      course.take(
-          {time, node::MapUpdated{event.value("revision", std::uint64_t{0}), event.value("submaps", std::size_t{0}),
-                                  event.value("accepted", std::size_t{0})}});
+      course.take({time, node::MapUpdated{.revision = event.value("revision", std::uint64_t{0}),
+                                          .submaps = event.value("submaps", std::size_t{0}),
+                                          .accepted = event.value("accepted", std::size_t{0}),
+                                          .cost = event.value("cost", 0.0),
+                                          .degrees_of_freedom = event.value("degrees_of_freedom", std::size_t{0}),
+                                          .from_measurements = event.value("from_measurements", false)}});
     if (what == "change_of_mind") {
       consistency::MapChange change;
       static_cast<void>(read_json_fields(event, change));

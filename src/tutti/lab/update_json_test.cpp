@@ -13,6 +13,7 @@ TEST(UpdateJson, ComesBackExactlyThroughText) {
                                .revision = 1ULL << 60U,
                                .onboard_rmse_m = 0.1,
                                .server_rmse_m = std::nullopt,
+                               .perfect_rmse_m = 0.2,
                                .answers = {{"adaptive", 3, 0.25}, {"uniform", 4, std::nullopt}}};
   update.origins.push_back({.from = {1'577'836'980'099'104'643},
                             .until = {1'577'836'981'199'104'651},
@@ -29,6 +30,7 @@ TEST(UpdateJson, ComesBackExactlyThroughText) {
   EXPECT_EQ(back->revision, update.revision);
   EXPECT_EQ(back->onboard_rmse_m, update.onboard_rmse_m);
   EXPECT_EQ(back->server_rmse_m, update.server_rmse_m);
+  EXPECT_EQ(back->perfect_rmse_m, update.perfect_rmse_m);
   ASSERT_EQ(back->answers.size(), 2U);
   EXPECT_EQ(back->answers[0].policy, "adaptive");
   EXPECT_EQ(back->answers[1].constraints, 4U);

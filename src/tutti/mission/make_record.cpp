@@ -91,6 +91,8 @@ MissionRecord make_record(const FinishedMission& mission) {
     robot.status = finished.status;
     robot.status.name = robot.name;
     robot.updates = finished.updates;
+    for (UpdateRecord& update : robot.updates)
+      update.perfect_rmse_m = mission.perfect.rmse_m(update.revision, robot.id);
     robot.alerts = alerts_of(robot.updates);
     robot.explanation = finished.explanation;
     robot.proxy_nodes = static_cast<std::size_t>(

@@ -12,6 +12,7 @@
 #include "tutti/mission/evaluate.hpp"
 #include "tutti/mission/mission_config.hpp"
 #include "tutti/mission/mission_events.hpp"
+#include "tutti/mission/perfect_course.hpp"
 #include "tutti/mission/record.hpp"
 #include "tutti/node/server_node.hpp"
 
@@ -39,6 +40,7 @@ struct FinishedMission {
   std::vector<FinishedRobot> robots;  ///< By number, from 0.
   const node::ServerNode& server;
   const MissionEvents& events;
+  PerfectCourse perfect = {};  ///< Empty in missions of programs.
   std::map<bus::SimulatedRadio::Topic, std::size_t> undelivered;
 };
 

@@ -15,7 +15,11 @@ void MissionEvents::take(const node::Event& event) {
     refusals_.push_back(failed->why);
   if (const auto* failed = std::get_if<node::RefinementFailed>(&event.what)) refusals_.push_back(failed->why);
   if (const auto* update = std::get_if<node::MapUpdated>(&event.what))
-    updates_.push_back({static_cast<double>(event.time.ns) / 1e9, update->accepted, std::nullopt});
+    updates_.push_back({.time_s = static_cast<double>(event.time.ns) / 1e9,
+                        .closures = update->accepted,
+                        .cost = update->cost,
+                        .degrees_of_freedom = update->degrees_of_freedom,
+                        .from_measurements = update->from_measurements});
   if (const auto* changed = std::get_if<node::ChangeOfMind>(&event.what))
     take(ChangeOfMindRecord{changed->robot,
                             static_cast<double>(event.time.ns) / 1e9,

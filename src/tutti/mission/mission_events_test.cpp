@@ -22,13 +22,14 @@ TEST(MissionEvents, CountsRefusalsAndAPairThatCannotBeVerifiedOnce) {
 TEST(MissionEvents, EveryUpdateOfTheMapIsOne) {
   MissionEvents events;
   for (int k = 1; k <= 100; ++k) {
-    events.take({Timestamp{} + 0.5 * k, node::MapUpdated{.revision = 1, .submaps = 2, .accepted = 3}});
+    events.take({Timestamp{} + 0.5 * k, node::MapUpdated{.revision = 1, .submaps = 2, .accepted = 3, .cost = 1.5 * k}});
     if (k % 2 == 0) events.set_wrong(1);
   }
   ASSERT_EQ(events.updates().size(), 100U);
   for (std::size_t k = 0; k < 100; ++k) {
     EXPECT_EQ(events.updates()[k].time_s, 0.5 * static_cast<double>(k + 1));  // to the bit
     EXPECT_EQ(events.updates()[k].closures, 3U);
+    EXPECT_EQ(events.updates()[k].cost, 1.5 * static_cast<double>(k + 1));
     EXPECT_EQ(events.updates()[k].wrong.has_value(), k % 2 == 1);
   }
 }

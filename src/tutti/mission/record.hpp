@@ -91,6 +91,8 @@ struct UpdateRecord {
   /// ATE of raw odometry, and of the broadcast, at the robot's nodes in it; each after a rigid alignment of its own.
   std::optional<double> onboard_rmse_m;
   std::optional<double> server_rmse_m;
+  /// Likewise of a perfect judge's map of that update (perfect_course.hpp); nothing where none was made.
+  std::optional<double> perfect_rmse_m;
   std::vector<AnswerRecord> answers;                  ///< One per policy.
   std::vector<consistency::SuspectedOrigin> origins;  ///< Where the raw odometry was then suspected to leave the map.
   template <class V>
@@ -101,6 +103,7 @@ struct UpdateRecord {
     v.field(4, "server_rmse_m", server_rmse_m);
     v.field(5, "answers", answers);
     v.field(6, "origins", origins);
+    v.field(7, "perfect_rmse_m", perfect_rmse_m);
   }
 };
 
@@ -232,8 +235,11 @@ struct FailedOdometryRecord {
 struct MapUpdateRecord {
   double time_s = 0.0;       ///< Mission time.
   std::size_t closures = 0;  ///< Accepted ones.
+  double cost = 0.0;         ///< server::MapEstimate::cost, and the next two likewise.
+  std::size_t degrees_of_freedom = 0;
+  bool from_measurements = false;
   /// How many of these are wrong (ClosureCheckRecord); nothing when none can be checked.
-  std::optional<std::size_t> wrong;
+  std::optional<std::size_t> wrong = {};
 };
 
 /// An update whose map differed from the one that a robot followed by more than that had allowed for

@@ -15,6 +15,7 @@
 #include "tutti/mission/make_record.hpp"
 #include "tutti/mission/mission_events.hpp"
 #include "tutti/mission/pace.hpp"
+#include "tutti/mission/perfect_course.hpp"
 #include "tutti/mission/recordings.hpp"
 #include "tutti/mission/robot_actor.hpp"
 #include "tutti/mission/server_meter.hpp"
@@ -227,9 +228,12 @@ class MissionRun {
     }));
     std::vector<const MissionRecording*> recordings;
     for (const MissionRecording& recording : recordings_) recordings.push_back(&recording);
-    if (const auto check =
-            check_closures(server_->map_server().map(), recordings, config_.association, config_.closure_check))
+    const server::MapServer& server = server_->map_server();
+    if (const auto check = check_closures(server.map(), recordings, config_.association, config_.closure_check))
       events_.set_wrong(check->wrong);
+    if (const std::uint64_t revision = server.state().revision; std::exchange(judged_revision_, revision) != revision)
+      perfect_.update(server, server_->broadcast(), config_.server.map, recordings, config_.association,
+                      config_.closure_check);
     if (server_->has_map() && view_.wants(time_s_)) view_.take(shown_map(), status());
     server_latency_ms_ = std::max(server_latency_ms_, pace_.late_ms(time_s_));
   }
@@ -284,6 +288,8 @@ class MissionRun {
   ViewRecorder view_;
   std::vector<Robot> robots_;  // by RobotId
   MissionEvents events_;
+  PerfectCourse perfect_;
+  std::uint64_t judged_revision_ = 0;
   double time_s_ = 0.0;
   double duration_s_ = 0.0;
   double server_latency_ms_ = 0.0;
@@ -321,6 +327,7 @@ MissionRecord MissionRun::record() {
                           .robots = {},
                           .server = *server_,
                           .events = events_,
+                          .perfect = perfect_,
                           .undelivered = network_.radio().undelivered()};
   for (const Robot& robot : robots_) {
     const RobotActor& actor = *robot.actor;

@@ -58,6 +58,9 @@ struct MapUpdated {
   std::uint64_t revision = 0;
   std::size_t submaps = 0;
   std::size_t accepted = 0;  ///< Number of accepted closures.
+  double cost = 0.0;         ///< server::MapEstimate::cost, and the next two likewise.
+  std::size_t degrees_of_freedom = 0;
+  bool from_measurements = false;
 };
 /// Reported by a robot: it has used a proxy graph.
 struct RobotUpdated {

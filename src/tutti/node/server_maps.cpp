@@ -68,7 +68,12 @@ Step ServerNode::end_map(MapOfTask made, Timestamp now) {
   note_settling(now);
   if (!made.is_update) return step;
   step.writes.push_back(meta());
-  step.emit(now, MapUpdated{server_.state().revision, submaps, static_cast<std::size_t>(counts.closures)});
+  step.emit(now, MapUpdated{.revision = server_.state().revision,
+                            .submaps = submaps,
+                            .accepted = static_cast<std::size_t>(counts.closures),
+                            .cost = map.cost,
+                            .degrees_of_freedom = map.degrees_of_freedom,
+                            .from_measurements = map.from_measurements});
   return step;
 }
 

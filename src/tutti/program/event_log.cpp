@@ -127,7 +127,13 @@ EventReport report_of(const node::RefinementFailed& failed) {
           Level::warning};
 }
 EventReport report_of(const node::MapUpdated& map) {
-  return {{{"event", "map_updated"}, {"revision", map.revision}, {"submaps", map.submaps}, {"accepted", map.accepted}},
+  return {{{"event", "map_updated"},
+           {"revision", map.revision},
+           {"submaps", map.submaps},
+           {"accepted", map.accepted},
+           {"cost", map.cost},
+           {"degrees_of_freedom", map.degrees_of_freedom},
+           {"from_measurements", map.from_measurements}},
           fmt::format("map revision {}: {} submaps, {} closures", map.revision, map.submaps, map.accepted)};
 }
 EventReport report_of(const node::ChangeOfMind& report) {

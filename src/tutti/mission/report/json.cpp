@@ -139,6 +139,7 @@ Json course_json(const RobotRecord& robot) {
                    {"broadcast", update.revision},
                    {"onboard_rmse_m", number(update.onboard_rmse_m)},
                    {"server_rmse_m", number(update.server_rmse_m)},
+                   {"perfect_rmse_m", number(update.perfect_rmse_m)},
                    {"policies", std::move(policies)}});
   }
   return out;
@@ -260,14 +261,14 @@ Json server_json(const MissionRecord& record) {
     for (const RobotRecord& robot : record.robots)
       if (robot.id == change.robot) changes.push_back(change_of_mind_json(robot, change));
   Json course = Json::array();
-  for (const MapUpdateRecord& update : server.updates)
-    course.push_back({{"time_s", number(update.time_s)},
-                      {"closures_accepted", update.closures},
-                      {"closures_wrong", update.wrong ? Json(*update.wrong) : Json(nullptr)}});
+  for (const MapUpdateRecord& update : server.updates) {
+    Json row{{"time_s", number(update.time_s)},
+             {"closures_accepted", update.closures},
+             {"closures_wrong", update.wrong ? Json(*update.wrong) : Json(nullptr)}};
+    row.update(optimum_json(update.cost, update.degrees_of_freedom, update.from_measurements));
+    course.push_back(std::move(row));
+  }
   Json out{{"components", server.components},
-           {"cost", number(server.cost)},
-           {"degrees_of_freedom", server.degrees_of_freedom},
-           {"start", server.from_measurements ? "measurements" : "closures"},
            {"closures_accepted", counts.accepted()},
            {"closures_accepted_intra", counts.accepted_intra},
            {"closures_accepted_inter", counts.accepted_inter},
@@ -284,6 +285,7 @@ Json server_json(const MissionRecord& record) {
            {"changes_of_mind", std::move(changes)},
            {"refinement", refinement_json(server.refinement)},
            {"course", std::move(course)}};
+  out.update(optimum_json(server.cost, server.degrees_of_freedom, server.from_measurements));
   add_scored(out, "", server.joint.scored_share);
   if (server.fixes) out["fixes"] = fixes_json(*server.fixes);
   return out;

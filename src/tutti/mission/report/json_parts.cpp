@@ -13,6 +13,12 @@ Json number(std::optional<double> value, double per_unit) {
   return rounded == 0.0 ? 0.0 : rounded;  // no "-0.0"
 }
 
+Json optimum_json(double cost, std::size_t degrees_of_freedom, bool from_measurements) {
+  return {{"cost", number(cost)},
+          {"degrees_of_freedom", degrees_of_freedom},
+          {"start", from_measurements ? "measurements" : "closures"}};
+}
+
 Json vector_json(const Eigen::Vector3d& v) { return Json::array({number(v.x()), number(v.y()), number(v.z())}); }
 
 Json pose_json(const Pose3& T) {

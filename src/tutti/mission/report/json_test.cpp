@@ -61,8 +61,12 @@ TEST(ReportJson, SaysWhatTheAdjustmentMadeOfTheMap) {
   EXPECT_EQ(refinement["two_positions"], 93);
   EXPECT_EQ(refinement["rms_after_px"], 1.125);
   EXPECT_EQ(json::parse(timing_json(record))["server"]["refinements"][0]["submaps"], 5);
-  EXPECT_EQ(json::parse(timing_json(record))["server"]["costliest_update"],
-            (json{{"time_s", 40.0}, {"took_ms", 64.0}, {"cpu_ms", 51.0}}));
+  EXPECT_EQ(json::parse(timing_json(record))["server"]["costliest_update"], (json{{"time_s", 40.0},
+                                                                                  {"took_ms", 64.0},
+                                                                                  {"cpu_ms", 51.0},
+                                                                                  {"cost", 7.25},
+                                                                                  {"degrees_of_freedom", 24},
+                                                                                  {"start", "measurements"}}));
   EXPECT_EQ(json::parse(timing_json(record))["server"]["optimisation_cpu"]["max_ms"], 51.0);
   EXPECT_TRUE(json::parse(timing_json(MissionRecord{}))["server"]["costliest_update"].is_null());
   EXPECT_EQ(json::parse(timing_json(record))["server"]["work"], (json{{"updates", 31},
@@ -95,12 +99,15 @@ TEST(ReportJson, CarriesTheRecordsFigures) {
 
 TEST(ReportJson, FollowsErrorsFromBroadcastToBroadcast) {
   MissionRecord record = test::example_record();
-  record.server.updates = {{.time_s = 20.0, .closures = 3, .wrong = 1}, {.time_s = 40.0, .closures = 4, .wrong = {}}};
+  record.server.updates = {
+      {.time_s = 20.0, .closures = 3, .cost = 5.5, .degrees_of_freedom = 18, .wrong = 1},
+      {.time_s = 40.0, .closures = 4, .cost = 7.25, .degrees_of_freedom = 24, .from_measurements = true}};
   record.robots[1].updates = {{.time_s = 21.0, .revision = 1},
                               {.time_s = 41.0,
                                .revision = 2,
                                .onboard_rmse_m = 0.5,
                                .server_rmse_m = 0.25,
+                               .perfect_rmse_m = 0.125,
                                .answers = {{"spectral", 7, 0.375}, {"none", 0, {}}}}};
   const json report = json::parse(report_json(record));
   const json& course = report["robots"][1]["course"];
@@ -110,12 +117,22 @@ TEST(ReportJson, FollowsErrorsFromBroadcastToBroadcast) {
                              {"broadcast", 2},
                              {"onboard_rmse_m", 0.5},
                              {"server_rmse_m", 0.25},
+                             {"perfect_rmse_m", 0.125},
                              {"policies",
                               {{"spectral", {{"rmse_m", 0.375}, {"constraints", 7}}},
                                {"none", {{"rmse_m", nullptr}, {"constraints", 0}}}}}}));
-  EXPECT_EQ(report["server"]["course"],
-            (json{{{"time_s", 20.0}, {"closures_accepted", 3}, {"closures_wrong", 1}},
-                  {{"time_s", 40.0}, {"closures_accepted", 4}, {"closures_wrong", nullptr}}}));
+  EXPECT_EQ(report["server"]["course"], (json{{{"time_s", 20.0},
+                                               {"closures_accepted", 3},
+                                               {"closures_wrong", 1},
+                                               {"cost", 5.5},
+                                               {"degrees_of_freedom", 18},
+                                               {"start", "closures"}},
+                                              {{"time_s", 40.0},
+                                               {"closures_accepted", 4},
+                                               {"closures_wrong", nullptr},
+                                               {"cost", 7.25},
+                                               {"degrees_of_freedom", 24},
+                                               {"start", "measurements"}}}));
 }
 
 TEST(ReportJson, ExplainsTheLastUpdateInMissionTime) {

@@ -39,11 +39,16 @@ Json work_json(const ServerWorkRecord& work) {
           {"sample_products", work.sample_products}};
 }
 
-/// The one that took most CPU; null without updates.
-Json costliest_update_json(const std::vector<UpdateTiming>& updates) {
+/// The one that took most CPU, with what its map costs; null without updates.
+Json costliest_update_json(const MissionRecord& record) {
+  const std::vector<UpdateTiming>& updates = record.timing.server_updates;
   const auto most = std::ranges::max_element(updates, {}, &UpdateTiming::cpu_ms);
   if (most == updates.end()) return nullptr;
-  return {{"time_s", number(most->time_s)}, {"took_ms", number(most->took_ms)}, {"cpu_ms", number(most->cpu_ms)}};
+  Json out{{"time_s", number(most->time_s)}, {"took_ms", number(most->took_ms)}, {"cpu_ms", number(most->cpu_ms)}};
+  const auto map = std::ranges::find(record.server.updates, most->time_s, &MapUpdateRecord::time_s);
+  if (map != record.server.updates.end())
+    out.update(optimum_json(map->cost, map->degrees_of_freedom, map->from_measurements));
+  return out;
 }
 
 }  // namespace
@@ -85,7 +90,7 @@ std::string timing_json(const MissionRecord& record) {
                     {{"verification", spread_json(timing.server_verification_ms)},
                      {"optimisation", spread_json(took_ms)},
                      {"optimisation_cpu", spread_json(cpu_ms)},
-                     {"costliest_update", costliest_update_json(timing.server_updates)},
+                     {"costliest_update", costliest_update_json(record)},
                      {"refinements", std::move(refinements)},
                      {"work", work_json(timing.server_work)},
                      {"load", load_json(timing.server_load)}}},
