@@ -103,6 +103,7 @@ def fleet(name, file, page=FLEETS, **flags):
         took_s = fleets.corrections(report, graph, fleets.accepted_edges(folder_of(places, name)))
         figures["joint"] = ("error_m", report["server"]["rmse_m"])
         figures["updates worse than odometry"] = ("updates", fleets.worse_updates(report)[0])
+        figures["updates worse than odometry, a perfect judge's not"] = ("updates", fleets.avoidably_worse_updates(report)[0])
         figures["closure to correction, median"] = ("latency_s", statistics.median(took_s))
         figures["closure to correction, p99"] = ("latency_s", fleets.quantile(took_s, 0.99))
         return figures

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -16,6 +17,11 @@ struct GroupLimits {
   double near_s = 10.0;
   double longest_s = 30.0;
   std::size_t most_closures = 24;
+
+  /// Closures of neighbouring submaps, which may be wrong all together, however long they last.
+  static GroupLimits of_neighbours() {
+    return {15.0, std::numeric_limits<double>::infinity(), std::numeric_limits<std::size_t>::max()};
+  }
 };
 
 /// Groups `closures` (positions in `edges`, which join `nodes`) that are about one pair of places. Each closure of a

@@ -66,6 +66,14 @@ FailedSegment narrowed(const OdometryTrajectories& odometry, FailedSegment faile
   return failed;
 }
 
+bool is_possible(const OdometryTrajectories& odometry, const FailedSegment& failed) {
+  const FailedSegment about = narrowed(odometry, failed);
+  double least_m = kInfinite;
+  for (std::size_t node = about.from; node <= about.to; ++node)
+    least_m = std::min(least_m, seen_from(odometry, failed, node).translation.norm());
+  return least_m <= odometry.reach_m(about.from, about.to) + kReach_s * odometry.usual_speed();
+}
+
 HypothesisSolver::HypothesisSolver(const PoseGraph& graph, const OdometryTrajectories& odometry,
                                    std::size_t odometry_edges, const OutlierRejectionConfig& config,
                                    const estimation::GncConfig& gnc, std::vector<bool> certain)
@@ -196,11 +204,7 @@ Solution HypothesisSolver::judge(Hypothesis hypothesis, estimation::GncResult op
 /// what a body can do, so that large failures are rarer than small ones. With the power 1, errors of any size are as
 /// likely, to a factor, and two failures that cancel each other explain a group of look-alikes too cheaply.
 double HypothesisSolver::votes_for(const FailedSegment& failed) const {
-  const FailedSegment about = narrowed(odometry_, failed);
-  double least_m = kInfinite;
-  for (std::size_t node = about.from; node <= about.to; ++node)
-    least_m = std::min(least_m, seen_from(odometry_, failed, node).translation.norm());
-  if (least_m > odometry_.reach_m(about.from, about.to) + kReach_s * odometry_.usual_speed()) return kInfinite;
+  if (!is_possible(odometry_, failed)) return kInfinite;
   const Matrix6d covariance = odometry_.between(failed.from, failed.to).covariance;
   const double squared_distance = failed.missed.dot(covariance.llt().solve(failed.missed));
   constexpr double kPower = 1.25, kAxes = 6.0;

@@ -45,6 +45,9 @@ struct Solution {
 /// Where a segment failed: far from where odometry turned wrongly, the failure would have to be larger.
 FailedSegment narrowed(const OdometryTrajectories& odometry, FailedSegment failed);
 
+/// Whether a body can have moved by what odometry missed there.
+bool is_possible(const OdometryTrajectories& odometry, const FailedSegment& failed);
+
 /// Solves a pose graph under hypotheses, on the graph of the closures' ends.
 class HypothesisSolver {
  public:

@@ -12,9 +12,8 @@
 #include <utility>
 
 #include "tutti/base/disjoint_sets.hpp"
-#include "tutti/estimation/influence.hpp"
 #include "tutti/geometry/covariance.hpp"
-#include "tutti/judge/closure_groups.hpp"
+#include "tutti/judge/internal/optimiser.hpp"
 
 namespace tutti::judge {
 namespace {
@@ -22,248 +21,183 @@ namespace {
 /// What failed odometry missed is measured; that it was this much more is as likely as not.
 constexpr double kDoubt = 2.0;
 
-/// Closures of neighbouring submaps may be wrong all together.
-constexpr double kNeighbours_s = 15.0;
+/// How often what the search decided is decided otherwise, of each kind.
+constexpr int kDecisions = 5;
 
-/// How many groups of closures can be refused as lone witnesses against all the rest, and how many closures make one:
-/// fewer are judged one by one, by what the map pays for them.
-constexpr int kRefusals = 5;
-constexpr std::size_t kLeastWitnesses = 3;
-
-class Optimiser {
- public:
-  /// All must outlive this.
-  Optimiser(const OdometryGraph& map, const NodeIndex& index, const Closures& closures,
-            const OutlierRejectionConfig& config, const estimation::GncConfig& gnc)
-      : map_(map), closures_(closures.judged), certain_(closures.certain), config_(config), gnc_(gnc) {
-    for (const LoopClosure& closure : closures.judged)
-      closure_edges_.push_back({.from = index.at(closure.from),
-                                .to = index.at(closure.to),
-                                .T_from_to = closure.measurement.T_a_b,
-                                .information = information_of(closure.measurement.covariance)});
-  }
-
-  [[nodiscard]] Optimum decide() const {
-    Optimum best = settle(map_.searched, explain());
-    for (int round = 0; round < kRefusals && refuse_lone_witness(best);) ++round;
-    ask_again(best);
-    if (!is_searched_as_it_counts()) best = settle(map_.graph, std::move(best));
-    return solved(std::move(best));
-  }
-
- private:
-  /// True if the map counts odometry as the search does: what is settled for the one is settled for the other.
-  [[nodiscard]] bool is_searched_as_it_counts() const {
-    return std::ranges::equal(map_.searched.edges, map_.graph.edges, {}, &PoseGraphEdge::information,
-                              &PoseGraphEdge::information);
-  }
-
-  /// A graph of odometry, to which closures will be added: edges are large, and are copied once.
-  [[nodiscard]] PoseGraph with_room(const PoseGraph& odometry) const {
-    PoseGraph out{.poses = odometry.poses, .edges = {}};
-    out.edges.reserve(odometry.edges.size() + closure_edges_.size());
-    out.edges.assign(odometry.edges.begin(), odometry.edges.end());
-    return out;
-  }
-
-  /// Objections to each closure, and the odometry that failed, without a map. What it takes is gone when the map is
-  /// optimised.
-  [[nodiscard]] Optimum explain() const {
-    PoseGraph graph = with_room(map_.searched);
-    graph.edges.insert(graph.edges.end(), closure_edges_.begin(), closure_edges_.end());
-    std::vector<double> seconds;
-    for (const MapNode& node : map_.nodes) seconds.push_back(node.stamp - map_.nodes.front().stamp);
-    const OdometryTrajectories odometry(seconds, map_.searched.edges);
-    std::vector<std::size_t> all(closures_.size());
-    std::iota(all.begin(), all.end(), std::size_t{0});
-    const auto groups = closure_groups(map_.nodes, closure_edges_, all,
-                                       {kNeighbours_s, std::numeric_limits<double>::infinity(), closures_.size()});
-    Judgement found =
-        explain_closures(std::move(graph), odometry, map_.odometry_edges, groups, config_, gnc_, certain_);
-    std::vector<Objection> objections;
-    for (const bool accepted : found.accepted)
-      objections.push_back(accepted ? Objection::none : Objection::contradicted);
-    leave_unjoined(odometry, objections);
-    return {.failed = std::move(found.failed),
-            .graph = {},
-            .closure_of_edge = {},
-            .solution = {},
-            .objections = std::move(objections),
-            .prices = std::vector<Price>(closures_.size()),
-            .work = found.work};
-  }
-
-  /// Too few closures do not join two segments of odometry, unless an operator decided so.
-  void leave_unjoined(const OdometryTrajectories& odometry, std::vector<Objection>& objections) const {
-    std::map<std::pair<std::size_t, std::size_t>, std::vector<std::size_t>> between;
-    for (std::size_t c = 0; c < closures_.size(); ++c)
-      between[std::minmax({odometry.segment(closure_edges_[c].from), odometry.segment(closure_edges_[c].to)})]
-          .push_back(c);
-    const auto least = config_.min_joining_closures;
-    for (const auto& [segments, all] : between) {
-      if (segments.first == segments.second || std::ranges::any_of(all, [&](std::size_t c) { return certain_[c]; }))
-        continue;
-      const bool never_enough = std::ssize(all) < least;
-      const auto is_left = [&](std::size_t c) { return objections[c] == Objection::none; };
-      if (!never_enough && std::ranges::count_if(all, is_left) >= least) continue;
-      for (const std::size_t c : all)
-        if (never_enough || is_left(c)) objections[c] = Objection::too_few;
-    }
-  }
-
-  /// Whether a closure may be asked again.
-  static bool is_open(Objection objection) {
-    return objection == Objection::none || objection == Objection::contradicted || objection == Objection::dear ||
-           objection == Objection::too_few;
-  }
-
-  [[nodiscard]] estimation::SolverConfig from_there() const {
-    estimation::SolverConfig out = gnc_.solver;
-    out.initialisation = "given";
-    return out;
-  }
-
-  /// Moves each part of a solved map to where odometry has its first node: closures that were refused joined parts that
-  /// lie in frames of their own.
-  void place_by_odometry(PoseGraph& graph) const {
-    DisjointSets parts(graph.poses.size());
-    for (const PoseGraphEdge& edge : graph.edges) parts.join(edge.from, edge.to);
-    const auto [part, count] = parts.labels();
-    std::vector<std::optional<Pose3>> T_odometry_solved(static_cast<std::size_t>(count));
-    for (std::size_t k = 0; k < graph.poses.size(); ++k) {
-      auto& T = T_odometry_solved[static_cast<std::size_t>(part[k])];
-      if (!T) T = map_.graph.poses[k] * graph.poses[k].inverse();
-      graph.poses[k] = *T * graph.poses[k];
-    }
-  }
-
-  /// The map with the closures that are worth what it pays for them, from the objections, the failed odometry and the
-  /// work of `out`. Closures that are not asked keep the price that they were refused for. Its poses are those of the
-  /// graph of the closures' ends, with odometry bent to meet them.
-  [[nodiscard]] Optimum settle(const PoseGraph& odometry, Optimum out) const {
-    out.graph = with_room(odometry);
-    out.closure_of_edge.clear();
-    out.solution = {};
-    for (const FailedSegment& segment : out.failed)
-      weaken(out.graph, map_.odometry_edges, segment.from, segment.to, kDoubt * segment.missed.head<3>().norm(),
-             kDoubt * segment.missed.tail<3>().norm());
-    PoseGraph all = with_room(out.graph);
-    std::vector<std::size_t> asked;
-    std::vector<char> in;
-    std::vector<bool> certain;
-    for (std::size_t c = 0; c < closures_.size(); ++c) {
-      if (!is_open(out.objections[c])) continue;
-      asked.push_back(c);
-      in.push_back(out.objections[c] == Objection::none ? 1 : 0);
-      certain.push_back(certain_[c]);
-      all.edges.push_back(closure_edges_[c]);
-    }
-    Settled settled = settle_closures(all, map_.odometry_edges, std::move(in), certain, config_, gnc_.solver);
-    out.work.factorisations += settled.factorisations;
-    out.graph.poses = std::move(settled.poses);
-    for (std::size_t k = 0; k < asked.size(); ++k) {
-      Objection& objection = out.objections[asked[k]];
-      out.prices[asked[k]] = settled.prices[k];
-      if (settled.in[k] == 0) {
-        if (objection == Objection::none || std::isfinite(settled.prices[k].paid)) objection = Objection::dear;
-        continue;
-      }
-      objection = Objection::none;
-      out.graph.edges.push_back(closure_edges_[asked[k]]);
-      out.closure_of_edge.push_back(asked[k]);
-    }
-    place_by_odometry(out.graph);
-    out.solution.summary.termination = settled.termination;
-    out.solution.poses = out.graph.poses;
-    return out;
-  }
-
-  /// The map in full, from where its closures' ends are and from its measurements alone; the cheaper solution counts.
-  /// Nothing is asked of it before the last closure is decided.
-  [[nodiscard]] Optimum solved(Optimum out) const {
-    if (!estimation::is_usable(out.solution.summary.termination)) return out;
-    out.solution = estimation::solve_pose_graph(out.graph, from_there());
-    PoseGraph anew{.poses = map_.graph.poses, .edges = std::move(out.graph.edges)};
-    estimation::PoseGraphSolution other = estimation::solve_pose_graph(anew, gnc_.solver);
-    out.graph.edges = std::move(anew.edges);
-    for (const auto* solution : {&out.solution, &other})
-      out.work.factorisations += static_cast<std::size_t>(solution->summary.factorisations);
-    const bool is_known = estimation::is_usable(out.solution.summary.termination);
-    if (estimation::is_usable(other.summary.termination) &&
-        (!is_known || estimation::is_cheaper(other.summary.final_cost, out.solution.summary.final_cost))) {
-      out.solution = std::move(other);
-      out.from_measurements = true;
-    }
-    return out;
-  }
-
-  /// Groups of closures at one pair of places, as positions in best.graph.edges, and by how much each contradicts all
-  /// the rest of the map.
-  struct Groups {
-    std::vector<std::vector<std::size_t>> edges;
-    std::vector<double> misfits;
-  };
-  [[nodiscard]] Groups groups_of(Optimum& best) const {
-    std::vector<std::size_t> closures;
-    for (std::size_t k = 0; k < best.closure_of_edge.size(); ++k)
-      if (!certain_[best.closure_of_edge[k]]) closures.push_back(map_.odometry_edges + k);
-    std::vector<estimation::EdgeRole> roles(best.graph.edges.size(), estimation::EdgeRole::robust);
-    std::fill_n(roles.begin(), map_.odometry_edges, estimation::EdgeRole::trusted);
-    Groups out{.edges = closure_groups(map_.nodes, best.graph.edges, closures), .misfits = {}};
-    std::erase_if(out.edges, [](const auto& group) { return group.size() < kLeastWitnesses; });
-    if (out.edges.empty()) return out;
-    ++best.work.factorisations;
-    out.misfits = estimation::group_misfits(best.graph, best.solution.poses, roles, out.edges);
-    return out;
-  }
-
-  /// Takes back the group of closures at one pair of places that contradicts all the rest of the map most, if it does
-  /// beyond chance: as a lone closure against odometry, a lone group is wrong itself. False if there is none.
-  [[nodiscard]] bool refuse_lone_witness(Optimum& best) const {
-    if (!estimation::is_usable(best.solution.summary.termination)) return false;
-    const Groups groups = groups_of(best);
-    const double most = most_paid(config_, groups.edges.size());
-    const auto worst = std::ranges::max_element(groups.misfits);
-    if (worst == groups.misfits.end() || *worst <= most) return false;
-    for (const std::size_t e : groups.edges[static_cast<std::size_t>(worst - groups.misfits.begin())]) {
-      const std::size_t c = best.closure_of_edge[e - map_.odometry_edges];
-      best.objections[c] = Objection::lone;
-      best.prices[c] = {.paid = *worst, .most = most};
-    }
-    best = settle(map_.searched, std::move(best));
-    return true;
-  }
-
-  /// Takes in again each group of lone witnesses that the map, as it is now, can be made with: another group may have
-  /// been wrong, and have made this one look so.
-  void ask_again(Optimum& best) const {
-    std::vector<std::size_t> lone;
-    for (std::size_t c = 0; c < closures_.size(); ++c)
-      if (best.objections[c] == Objection::lone) lone.push_back(c);
-    for (const auto& group : closure_groups(map_.nodes, closure_edges_, lone)) {
-      Optimum with = best;
-      for (const std::size_t c : group) with.objections[c] = Objection::none;
-      with = settle(map_.searched, std::move(with));
-      const bool fits =
-          estimation::is_usable(with.solution.summary.termination) &&
-          std::ranges::all_of(group, [&](std::size_t c) { return with.objections[c] == Objection::none; });
-      if (!fits) continue;
-      const Groups all = groups_of(with);
-      if (std::ranges::all_of(all.misfits,
-                              [most = most_paid(config_, all.edges.size())](double misfit) { return misfit <= most; }))
-        best = std::move(with);
-    }
-  }
-
-  const OdometryGraph& map_;
-  const std::vector<LoopClosure>& closures_;
-  const std::vector<bool>& certain_;
-  const OutlierRejectionConfig& config_;
-  const estimation::GncConfig& gnc_;
-  std::vector<PoseGraphEdge> closure_edges_;
-};
+std::vector<double> seconds_of(const std::vector<MapNode>& nodes) {
+  std::vector<double> out;
+  for (const MapNode& node : nodes) out.push_back(node.stamp - nodes.front().stamp);
+  return out;
+}
 
 }  // namespace
+
+Optimiser::Optimiser(const OdometryGraph& map, const NodeIndex& index, const Closures& closures,
+                     const OutlierRejectionConfig& config, const estimation::GncConfig& gnc)
+    : map_(map),
+      closures_(closures.judged),
+      certain_(closures.certain),
+      config_(config),
+      gnc_(gnc),
+      odometry_(seconds_of(map.nodes), map.searched.edges) {
+  for (const LoopClosure& closure : closures.judged)
+    closure_edges_.push_back({.from = index.at(closure.from),
+                              .to = index.at(closure.to),
+                              .T_from_to = closure.measurement.T_a_b,
+                              .information = information_of(closure.measurement.covariance)});
+}
+
+/// Groups that look alike support each other and may lead the search astray; where nothing supports anything, random
+/// closures do. So the other search is made where the first one's map is not plausible.
+Optimum Optimiser::decide() const {
+  Optimum best = searched(config_.least_support);
+  if (is_usable(best) && !is_plausible(best)) {
+    Optimum other = searched(0);
+    SearchWork work = best.work;
+    work += other.work;
+    if (is_usable(other) && score(other) < score(best)) best = std::move(other);
+    best.work = work;
+  }
+  if (!is_searched_as_it_counts()) best = settle(map_.graph, std::move(best));
+  return solved(std::move(best));
+}
+
+Optimum Optimiser::searched(int least_support) const {
+  Optimum best = settle(map_.searched, explain(least_support));
+  for (int round = 0; round < kDecisions && lay_joint_anew(best);) ++round;
+  for (int round = 0; round < kDecisions && refuse_lone_witness(best);) ++round;
+  ask_again(best);
+  for (int round = 0; round < kDecisions && lay_joint_anew(best);) ++round;
+  return best;
+}
+
+bool Optimiser::is_searched_as_it_counts() const {
+  return std::ranges::equal(map_.searched.edges, map_.graph.edges, {}, &PoseGraphEdge::information,
+                            &PoseGraphEdge::information);
+}
+
+PoseGraph Optimiser::with_room(const PoseGraph& odometry) const {
+  PoseGraph out{.poses = odometry.poses, .edges = {}};
+  out.edges.reserve(odometry.edges.size() + closure_edges_.size());
+  out.edges.assign(odometry.edges.begin(), odometry.edges.end());
+  return out;
+}
+
+bool Optimiser::is_open(Objection objection) {
+  return objection == Objection::none || objection == Objection::contradicted || objection == Objection::dear ||
+         objection == Objection::too_few;
+}
+
+estimation::SolverConfig Optimiser::from_there() const {
+  estimation::SolverConfig out = gnc_.solver;
+  out.initialisation = "given";
+  return out;
+}
+
+Optimum Optimiser::explain(int least_support) const {
+  PoseGraph graph = with_room(map_.searched);
+  graph.edges.insert(graph.edges.end(), closure_edges_.begin(), closure_edges_.end());
+  OutlierRejectionConfig config = config_;
+  config.least_support = least_support;
+  std::vector<std::size_t> all(closures_.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  const auto groups = closure_groups(map_.nodes, closure_edges_, all, GroupLimits::of_neighbours());
+  Judgement found = explain_closures(std::move(graph), odometry_, map_.odometry_edges, groups, config, gnc_, certain_);
+  std::vector<Objection> objections;
+  for (const bool accepted : found.accepted) objections.push_back(accepted ? Objection::none : Objection::contradicted);
+  leave_unjoined(objections);
+  return {.failed = std::move(found.failed),
+          .graph = {},
+          .closure_of_edge = {},
+          .solution = {},
+          .objections = std::move(objections),
+          .prices = std::vector<Price>(closures_.size()),
+          .work = found.work};
+}
+
+void Optimiser::leave_unjoined(std::vector<Objection>& objections) const {
+  std::map<std::pair<std::size_t, std::size_t>, std::vector<std::size_t>> between;
+  for (std::size_t c = 0; c < closures_.size(); ++c)
+    between[std::minmax({odometry_.segment(closure_edges_[c].from), odometry_.segment(closure_edges_[c].to)})]
+        .push_back(c);
+  const auto least = config_.min_joining_closures;
+  for (const auto& [segments, all] : between) {
+    if (segments.first == segments.second || std::ranges::any_of(all, [&](std::size_t c) { return certain_[c]; }))
+      continue;
+    const bool never_enough = std::ssize(all) < least;
+    const auto is_left = [&](std::size_t c) { return objections[c] == Objection::none; };
+    if (!never_enough && std::ranges::count_if(all, is_left) >= least) continue;
+    for (const std::size_t c : all)
+      if (never_enough || is_left(c)) objections[c] = Objection::too_few;
+  }
+}
+
+void Optimiser::place_by_odometry(PoseGraph& graph) const {
+  DisjointSets parts(graph.poses.size());
+  for (const PoseGraphEdge& edge : graph.edges) parts.join(edge.from, edge.to);
+  const auto [part, count] = parts.labels();
+  std::vector<std::optional<Pose3>> T_odometry_solved(static_cast<std::size_t>(count));
+  for (std::size_t k = 0; k < graph.poses.size(); ++k) {
+    auto& T = T_odometry_solved[static_cast<std::size_t>(part[k])];
+    if (!T) T = map_.graph.poses[k] * graph.poses[k].inverse();
+    graph.poses[k] = *T * graph.poses[k];
+  }
+}
+
+Optimum Optimiser::settle(const PoseGraph& odometry, Optimum out) const {
+  out.graph = with_room(odometry);
+  out.closure_of_edge.clear();
+  out.solution = {};
+  for (const FailedSegment& segment : out.failed)
+    weaken(out.graph, map_.odometry_edges, segment.from, segment.to, kDoubt * segment.missed.head<3>().norm(),
+           kDoubt * segment.missed.tail<3>().norm());
+  PoseGraph all = with_room(out.graph);
+  std::vector<std::size_t> asked;
+  std::vector<char> in;
+  std::vector<bool> certain;
+  for (std::size_t c = 0; c < closures_.size(); ++c) {
+    if (!is_open(out.objections[c])) continue;
+    asked.push_back(c);
+    in.push_back(out.objections[c] == Objection::none ? 1 : 0);
+    certain.push_back(certain_[c]);
+    all.edges.push_back(closure_edges_[c]);
+  }
+  Settled settled = settle_closures(all, map_.odometry_edges, std::move(in), certain, config_, gnc_.solver);
+  out.work.factorisations += settled.factorisations;
+  out.graph.poses = std::move(settled.poses);
+  for (std::size_t k = 0; k < asked.size(); ++k) {
+    Objection& objection = out.objections[asked[k]];
+    out.prices[asked[k]] = settled.prices[k];
+    if (settled.in[k] == 0) {
+      if (objection == Objection::none || std::isfinite(settled.prices[k].paid)) objection = Objection::dear;
+      continue;
+    }
+    objection = Objection::none;
+    out.graph.edges.push_back(closure_edges_[asked[k]]);
+    out.closure_of_edge.push_back(asked[k]);
+  }
+  place_by_odometry(out.graph);
+  out.solution.summary.termination = settled.termination;
+  out.solution.poses = out.graph.poses;
+  return out;
+}
+
+Optimum Optimiser::solved(Optimum out) const {
+  if (!estimation::is_usable(out.solution.summary.termination)) return out;
+  out.solution = estimation::solve_pose_graph(out.graph, from_there());
+  PoseGraph anew{.poses = map_.graph.poses, .edges = std::move(out.graph.edges)};
+  estimation::PoseGraphSolution other = estimation::solve_pose_graph(anew, gnc_.solver);
+  out.graph.edges = std::move(anew.edges);
+  for (const auto* solution : {&out.solution, &other})
+    out.work.factorisations += static_cast<std::size_t>(solution->summary.factorisations);
+  const bool is_known = estimation::is_usable(out.solution.summary.termination);
+  if (estimation::is_usable(other.summary.termination) &&
+      (!is_known || estimation::is_cheaper(other.summary.final_cost, out.solution.summary.final_cost))) {
+    out.solution = std::move(other);
+    out.from_measurements = true;
+  }
+  return out;
+}
 
 Matrix6d information_of(const Matrix6d& covariance) {
   Matrix6d floored = covariance;

@@ -46,6 +46,10 @@ double most_paid(const OutlierRejectionConfig& config, std::size_t asked) {
   return chi_square_exceeded_with(config.right_refused / static_cast<double>(std::max<std::size_t>(asked, 1)), 6);
 }
 
+double most_paid_for_closure(const OutlierRejectionConfig& config, std::size_t closures) {
+  return most_paid(config, std::max(closures, kLeastAsked));
+}
+
 Settled settle_closures(const PoseGraph& graph, std::size_t odometry_edges, std::vector<char> in,
                         const std::vector<bool>& certain, const OutlierRejectionConfig& config,
                         const estimation::SolverConfig& solver) {
@@ -55,7 +59,7 @@ Settled settle_closures(const PoseGraph& graph, std::size_t odometry_edges, std:
   estimation::SwitchedGraph switched(graph, roles, solver);
   std::vector<char> edges(graph.edges.size(), 1);
   std::vector<int> times_out(closures, 0);
-  const double limit = most_paid(config, std::max(closures, kLeastAsked));
+  const double limit = most_paid_for_closure(config, closures);
   Settled out{.in = std::move(in), .prices = std::vector<Price>(closures, Price{.most = limit})};
   for (std::size_t c = 0; c < closures; ++c)
     if (certain[c]) out.in[c] = 1;

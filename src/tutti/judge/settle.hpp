@@ -17,6 +17,9 @@ namespace tutti::judge {
 /// degrees of freedom exceeds it for that share over `asked`.
 double most_paid(const OutlierRejectionConfig& config, std::size_t asked);
 
+/// The same for a closure of so many, where few are judged as more would be.
+double most_paid_for_closure(const OutlierRejectionConfig& config, std::size_t closures);
+
 /// What the map pays for a closure, or would, and the most that it pays for one.
 struct Price {
   double paid = std::numeric_limits<double>::infinity();  ///< Infinite: not known.

@@ -54,6 +54,8 @@ TEST(ReportJson, SaysWhatTheAdjustmentMadeOfTheMap) {
   MissionRecord record = test::example_record();
   EXPECT_TRUE(json::parse(report_json(record))["server"]["refinement"].is_null());
   record.server.refinement = RefinementCounts{152, 7417, 26486, 811, 1204, 93, 12, 377, 41, 2.5, 1.125};
+  record.server.updates = {
+      {.time_s = 40.0, .closures = 4, .cost = 7.25, .degrees_of_freedom = 24, .from_measurements = true}};
   record.timing.server_refinements = {{false, 2, 5, 0.25}};
   record.timing.server_work = {31, 27730, 36, 33, 230, 2303424, 190};
   const json refinement = json::parse(report_json(record))["server"]["refinement"];
