@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # `tutti robot --ros` against Fast DDS, the middleware that ROS 2 comes with (Debian's 2.9, its own coder of messages): a robot
-# that publishes odometry, scans and transforms as ROS 2 does must be answered for each sample. Downloads 3 MB of packages into
-# a temporary folder; loopback only; no part of CI.
+# that publishes odometry, scans and transforms as ROS 2 does must be answered for each sample, whichever of ROS's settings of
+# discovery configures it. Downloads 3 MB of packages into a temporary folder; no part of CI.
 #   scripts/test_fastdds.sh [PRESET]    of the build whose programs are used; default: ci
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
@@ -30,17 +30,24 @@ g++ -std=c++20 -O1 -isystem "$work/root/usr/include" -isystem "$work/root/usr/in
   -Wl,-rpath-link,"$libraries"
 
 export ROS_DOMAIN_ID=87
-"$tutti" robot --ros --name r1 --bus nats://127.0.0.1:1 --state "$work/r1" >"$work/said" 2>&1 &
-robot=$!
-LD_LIBRARY_PATH="$libraries" "$work/robot" "$ROS_DOMAIN_ID" r1 200 || {
-  cat "$work/said" >&2
-  exit 1
-}
+for setting in jazzy-nothing-set-or-range-subnet jazzy-range-localhost-or-localhost-only jazzy-static-peer-loopback \
+  humble-localhost-only off; do
+  say "$setting"
+  "$tutti" robot --ros --name r1 --bus nats://127.0.0.1:1 --state "$work/$setting" >"$work/said" 2>&1 &
+  robot=$!
+  LD_LIBRARY_PATH="$libraries" "$work/robot" "$ROS_DOMAIN_ID" r1 200 "$setting" || {
+    cat "$work/said" >&2
+    exit 1
+  }
+  [ "$setting" = off ] || python3 - "$work/$setting/status.json" <<'EOF'
 # A scan has 19 kB, and the robot wants one of each keyframe.
-python3 - "$work/r1/status.json" <<'EOF'
 import json, sys
 feed = json.load(open(sys.argv[1]))["feed"]
 print({name: feed[name] for name in ("client", "bytes", "scans_left_out", "samples_joined")})
 assert feed["bytes"] > 100_000 and feed["scans_left_out"] == 0, feed
 EOF
+  kill "$robot"
+  wait "$robot" || true
+  robot=
+done
 echo "test_fastdds: every sample was answered"

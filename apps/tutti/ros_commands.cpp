@@ -43,8 +43,6 @@ Result<std::shared_ptr<ros::Participant>> join_domain(bool insecure) {
   const char* const domain = std::getenv("ROS_DOMAIN_ID");
   const auto number = ros::domain_of(domain == nullptr ? "" : domain);
   if (!number) return tl::unexpected(number.error());
-  if (!insecure && std::getenv("CYCLONEDDS_URI") != nullptr)
-    fmt::print(stderr, "tutti: CYCLONEDDS_URI is not used: without --insecure only this machine is heard by DDS\n");
   return ros::Participant::open(*number, insecure ? ros::Reach::network : ros::Reach::this_machine);
 }
 

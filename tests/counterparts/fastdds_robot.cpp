@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A robot on Fast DDS, the middleware that ROS 2 comes with: publishes odometry, scans and transforms with ROS 2's
 // names, types and quality of service, in the bytes of Fast CDR, and hears what Tutti answers. Run by
-// scripts/test_fastdds.sh.
+// scripts/test_fastdds.sh. It is configured as rmw_fastrtps_cpp does it by SETTING (2.14 of Jazzy, 6.2 of Humble); with
+// `off` it is alone, and must stay so.
 //
-// usage: fastdds_robot DOMAIN NAMESPACE SAMPLES
+// usage: fastdds_robot DOMAIN NAMESPACE SAMPLES SETTING
 #include <fastcdr/Cdr.h>
 #include <fastcdr/FastBuffer.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
 #include <fastrtps/utils/IPLocator.h>
 
 #include <atomic>
@@ -25,6 +27,7 @@
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/TopicDataType.hpp>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -185,19 +188,59 @@ void check(bool is_so, const std::string& what) {
   std::exit(1);
 }
 
-/// One program in a domain of DDS, on loopback.
+rtps::Locator_t locator(int a, int b, int c, int d) {
+  rtps::Locator_t out;
+  rtps::IPLocator::setIPv4(out, static_cast<rtps::octet>(a), static_cast<rtps::octet>(b), static_cast<rtps::octet>(c),
+                           static_cast<rtps::octet>(d));
+  return out;
+}
+
+/// ROS's settings.
+const std::map<std::string, std::function<void(fastdds::DomainParticipantQos&)>> kSettings{
+    {"jazzy-nothing-set-or-range-subnet", [](fastdds::DomainParticipantQos&) {}},
+    {"jazzy-range-localhost-or-localhost-only",
+     [](fastdds::DomainParticipantQos& qos) {
+       qos.wire_protocol().builtin.metatrafficMulticastLocatorList.clear();
+       qos.wire_protocol().builtin.metatrafficUnicastLocatorList.push_back(rtps::Locator_t());
+       qos.transport().use_builtin_transports = false;
+       qos.transport().user_transports.push_back(
+           std::make_shared<eprosima::fastdds::rtps::SharedMemTransportDescriptor>());
+       auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
+       udp->maxInitialPeersRange = 32;
+       qos.transport().user_transports.push_back(udp);
+       qos.wire_protocol().builtin.initialPeersList.push_back(locator(127, 0, 0, 1));
+     }},
+    {"jazzy-static-peer-loopback",
+     [](fastdds::DomainParticipantQos& qos) {
+       qos.wire_protocol().builtin.initialPeersList.push_back(locator(127, 0, 0, 1));
+       qos.wire_protocol().builtin.initialPeersList.push_back(locator(239, 255, 0, 1));
+     }},
+    {"humble-localhost-only",
+     [](fastdds::DomainParticipantQos& qos) {
+       qos.transport().use_builtin_transports = false;
+       auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
+       udp->interfaceWhiteList.emplace_back("127.0.0.1");
+       qos.transport().user_transports.push_back(udp);
+       qos.transport().user_transports.push_back(
+           std::make_shared<eprosima::fastdds::rtps::SharedMemTransportDescriptor>());
+     }},
+    {"off",
+     [](fastdds::DomainParticipantQos& qos) {
+       qos.allocation().participants.initial = 1;
+       qos.allocation().participants.maximum = 1;
+       qos.allocation().participants.increment = 0;
+       qos.wire_protocol().builtin.metatrafficMulticastLocatorList.clear();
+       qos.wire_protocol().builtin.metatrafficUnicastLocatorList.push_back(rtps::Locator_t());
+     }},
+};
+
+/// One program in a domain of DDS.
 class Node {
  public:
-  explicit Node(std::uint32_t domain) {
+  Node(std::uint32_t domain, const std::string& setting) {
     fastdds::DomainParticipantQos qos = fastdds::PARTICIPANT_QOS_DEFAULT;
-    qos.transport().use_builtin_transports = false;
-    auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
-    udp->interfaceWhiteList.emplace_back("127.0.0.1");
-    qos.transport().user_transports.push_back(udp);
-    rtps::Locator_t loopback;
-    rtps::IPLocator::setIPv4(loopback, 127, 0, 0, 1);
-    qos.wire_protocol().builtin.initialPeersList.push_back(loopback);
-    qos.wire_protocol().builtin.metatrafficUnicastLocatorList.push_back(loopback);
+    check(kSettings.count(setting) == 1, "SETTING is '" + setting + "', expected one of those in the source");
+    kSettings.at(setting)(qos);
     participant_ = fastdds::DomainParticipantFactory::get_instance()->create_participant(domain, qos);
     check(participant_ != nullptr, "no participant");
     publisher_ = participant_->create_publisher(fastdds::PUBLISHER_QOS_DEFAULT);
@@ -256,13 +299,13 @@ bool has_reader(fastdds::DataWriter* writer) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  check(argc == 4, "usage: fastdds_robot DOMAIN NAMESPACE SAMPLES");
+  check(argc == 5, "usage: fastdds_robot DOMAIN NAMESPACE SAMPLES SETTING");
   const std::string name = argv[2], prefix = name + "/", inside = "/" + name + "/";
   const auto samples = static_cast<std::size_t>(std::atoi(argv[3]));
   const std::string tf_type = "tf2_msgs::msg::dds_::TFMessage_",
                     pose_type = "geometry_msgs::msg::dds_::PoseWithCovarianceStamped_";
   Heard transforms, poses;
-  Node node(static_cast<std::uint32_t>(std::atoi(argv[1])));
+  Node node(static_cast<std::uint32_t>(std::atoi(argv[1])), argv[4]);
   const Quality sensor{.reliable = false, .depth = 5};
   auto* const odom = node.writer(inside + "odom", "nav_msgs::msg::dds_::Odometry_", {});
   auto* const points = node.writer(inside + "points", "sensor_msgs::msg::dds_::PointCloud2_", sensor);
@@ -271,6 +314,11 @@ int main(int argc, char** argv) {
   node.hear(inside + "corrected_pose", pose_type, {.depth = 100}, poses);
   const auto write = [](fastdds::DataWriter* writer, std::string bytes) { check(writer->write(&bytes), "write"); };
   write(still, transform(1, prefix + "base_link", prefix + "lidar", 0.5));
+  if (std::string(argv[4]) == "off") {
+    std::this_thread::sleep_for(std::chrono::seconds(10));
+    check(!has_reader(odom) && !has_reader(points), "it is heard, although it wants to be alone");
+    return 0;
+  }
   check(within_patience([&] { return has_reader(odom) && has_reader(points) && has_reader(still); }),
         "nobody hears odometry, scans and tf_static");
 

@@ -17,7 +17,7 @@ def generate_launch_description():
         DeclareLaunchArgument("mission", default_value="tutti", description="name of the mission on the bus"),
         DeclareLaunchArgument("verifier", default_value="lidar", description="of closures, as the robots': lidar, visual, sensors"),
         DeclareLaunchArgument("ros", default_value="false",
-                              description="the server itself publishes the map, by CycloneDDS, on loopback only: map, map_points (docs/ros.md)"),
+                              description="the server itself publishes the map, by CycloneDDS, on this machine only: map, map_points (docs/ros.md)"),
         DeclareLaunchArgument("grid", default_value="false",
                               description="a node publishes the map, by this ROS: map. Not beside ros:=true: the same topic"),
         ExecuteProcess(cmd=server, output="screen", condition=UnlessCondition(value("ros"))),

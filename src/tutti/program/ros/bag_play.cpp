@@ -169,7 +169,8 @@ class Player {
       std::erase_if(missing, [this](const std::string& topic) { return writers_.at(topic)->readers() > 0; });
       if (missing.empty()) return {};
       if (const double now_s = seconds_since(begin); now_s - reported_s > kTellsAgain_s) {
-        options_.say(fmt::format("nobody subscribes {} yet", fmt::join(missing, ", ")));
+        options_.say(
+            fmt::format("nobody subscribes {} yet; {}", fmt::join(missing, ", "), participant_->discovery_hint()));
         reported_s = now_s;
       }
       sleep_s(kLongestSleep_s / 5);

@@ -4,6 +4,7 @@
 #include <dds/dds.h>
 #include <dds/ddsi/ddsi_serdata.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -21,12 +22,8 @@ constexpr std::string_view kTopicPrefix = "rt/";
 constexpr std::string_view kTypeMiddle = "::msg::dds_::";
 constexpr std::uint32_t kDiscovered = 256;  // publications that are read at a time
 constexpr std::uint32_t kTaken = 64;        // messages
-/// Loopback may not have multicast, so programs find each other at the ports of the first hundred.
-constexpr const char* kLoopback =
-    "<General><Interfaces><NetworkInterface address='127.0.0.1'/></Interfaces><AllowMulticast>false</AllowMulticast>"
-    "</General><Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>99</"
-    "MaxAutoParticipantIndex>"
-    "<Peers><Peer address='127.0.0.1'/></Peers></Discovery>";
+// Interfaces that CycloneDDS may be on: loopback and, of networks, the first ones.
+constexpr std::size_t kMostInterfaces = 4;
 
 /// "nav_msgs/msg/Odometry" is nav_msgs::msg::dds_::Odometry_; empty where it is no such name.
 std::string dds_type(std::string_view ros) {
@@ -98,15 +95,17 @@ bool is_name(std::string_view part) {
 }
 
 /// Makes the domain, which stays until the process ends, unless the process is in it already.
-Status open_on_loopback(std::uint32_t domain) {
-  const dds_entity_t made = dds_create_domain(domain, kLoopback);
+Status open_on_this_machine(std::uint32_t domain) {
+  const std::vector<std::string> addresses = internal::network_addresses(kMostInterfaces - 1);
+  const dds_entity_t made = dds_create_domain(domain, internal::this_machine_configuration(addresses).c_str());
   if (made == DDS_RETCODE_PRECONDITION_NOT_MET) return {};
-  if (made < 0) return failure(made, fmt::format("domain {} on loopback", domain));
-  // Cyclone sends from 127.0.0.1 then, but receives at every address of the machine.
-  Status bound = internal::hold_to_loopback(internal::sockets_of(domain));
-  if (bound) return {};
+  const std::string where =
+      fmt::format("domain {} on 127.0.0.1{}{}", domain, addresses.empty() ? "" : " and ", fmt::join(addresses, ", "));
+  if (made < 0) return failure(made, where);
+  Status held = internal::hold_to_this_machine(internal::sockets_of(domain));
+  if (held) return {};
   dds_delete(made);
-  return in_context(fmt::format("DDS: domain {} on loopback", domain), bound.error());
+  return in_context("DDS: " + where, held.error());
 }
 
 dds_duration_t duration(double wall_s) { return static_cast<dds_duration_t>(std::llround(wall_s * 1e9)); }
@@ -200,15 +199,16 @@ std::string Reader::incompatible() const {
 
 Result<std::shared_ptr<Participant>> Participant::open(std::uint32_t domain, Reach reach) {
   if (reach == Reach::this_machine)
-    if (Status ok = open_on_loopback(domain); !ok) return tl::unexpected(ok.error());
+    if (Status ok = open_on_this_machine(domain); !ok) return tl::unexpected(ok.error());
   const QosPointer qos(dds_create_qos());
   constexpr std::string_view kEnclave = "enclave=/;";  // as ROS's own participants send it
   dds_qset_userdata(qos.get(), kEnclave.data(), kEnclave.size());
   const dds_entity_t entity = dds_create_participant(domain, qos.get(), nullptr);
   if (entity < 0)
-    return failure(entity, fmt::format("domain {} ({})", domain,
-                                       reach == Reach::network ? "CYCLONEDDS_URI and network interfaces" : "loopback"));
-  std::shared_ptr<Participant> out(new Participant(entity));
+    return failure(entity,
+                   fmt::format("domain {} ({})", domain,
+                               reach == Reach::network ? "CYCLONEDDS_URI and network interfaces" : "this machine"));
+  std::shared_ptr<Participant> out(new Participant(entity, domain, reach));
   out->wait_set_ = dds_create_waitset(entity);
   if (out->wait_set_ < 0) return failure(out->wait_set_, "a wait set");
   out->discovered_ = dds_create_reader(entity, DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr, nullptr);
@@ -274,6 +274,19 @@ std::vector<Publication> Participant::publications() const {
   return out;
 }
 
+std::string Participant::discovery_hint() const {
+  const std::string at_home = fmt::format("ROS_DOMAIN_ID {} as here", domain_);
+  if (reach_ == Reach::network)
+    return fmt::format(
+        "a ROS 2 is heard with {}, and ROS_AUTOMATIC_DISCOVERY_RANGE SUBNET (not OFF, nor LOCALHOST or "
+        "ROS_LOCALHOST_ONLY=1 on another machine), on a network that CYCLONEDDS_URI names here",
+        at_home);
+  return fmt::format(
+      "a ROS 2 is heard on this machine, with {} and whatever ROS_AUTOMATIC_DISCOVERY_RANGE or "
+      "ROS_LOCALHOST_ONLY but OFF; on other machines with --insecure",
+      at_home);
+}
+
 std::string why_silent(const Participant& participant, const Reader& reader, const std::string& otherwise) {
   std::string why, others;
   for (const Publication& publication : participant.publications()) {
@@ -284,8 +297,10 @@ std::string why_silent(const Participant& participant, const Reader& reader, con
       others += (others.empty() ? "" : ", ") + publication.topic;
   }
   if (why.empty()) why = reader.incompatible();
-  if (why.empty()) why = reader.writers() == 0 ? "nobody publishes it" : otherwise;
-  return fmt::format("{}; topics of {} here are: {}", why, reader.type(), others.empty() ? "none" : others);
+  const bool is_alone = why.empty() && reader.writers() == 0;
+  if (why.empty()) why = is_alone ? "nobody publishes it" : otherwise;
+  why += fmt::format("; topics of {} here are: {}", reader.type(), others.empty() ? "none" : others);
+  return is_alone && others.empty() ? why + "; " + participant.discovery_hint() : why;
 }
 
 }  // namespace tutti::ros

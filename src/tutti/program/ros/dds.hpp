@@ -99,7 +99,7 @@ struct Publication {
 
 /// Whom a participant hears, and who hears it. DDS has neither passwords nor encryption here.
 enum class Reach {
-  this_machine,  ///< Programs on this machine, over loopback; CYCLONEDDS_URI is not used.
+  this_machine,  ///< Programs on this machine, whichever interface they name; CYCLONEDDS_URI is not used.
   network,       ///< Whoever is on the networks that CYCLONEDDS_URI names; without it, on all.
 };
 
@@ -122,12 +122,17 @@ class Participant : public std::enable_shared_from_this<Participant> {
   void wait(double wall_s);
   /// The topics of ROS that other participants publish; topics of DDS programs other than ROS's are left out.
   [[nodiscard]] std::vector<Publication> publications() const;
+  /// Which of ROS's settings let it be heard here, for a message when nothing is.
+  [[nodiscard]] std::string discovery_hint() const;
 
  private:
-  explicit Participant(std::int32_t entity) : entity_(entity) {}
+  Participant(std::int32_t entity, std::uint32_t domain, Reach reach)
+      : entity_(entity), domain_(domain), reach_(reach) {}
   Result<std::int32_t> topic(const std::string& name, const std::string& type, const ddsi_sertype*& made);
 
   std::int32_t entity_;
+  std::uint32_t domain_;
+  Reach reach_;
   std::int32_t wait_set_ = 0, discovered_ = 0;
 };
 

@@ -11,7 +11,6 @@
 #include "support/program/ros/loopback.hpp"
 #include "tutti/bags/ros_definitions.hpp"
 #include "tutti/bags/ros_encode.hpp"
-#include "tutti/program/ros/internal/this_machine.hpp"
 
 namespace tutti::ros {
 namespace dds_test {
@@ -40,22 +39,6 @@ TEST(Dds, BytesArriveAsTheyWereWritten) {
     return got.size() == sent.size();
   })) << got.size();
   EXPECT_EQ(got, sent);
-}
-
-TEST(Dds, WithoutMoreBeingAskedForOnlyThisMachineIsHeard) {
-  setenv("CYCLONEDDS_URI", "<General><Interfaces><NetworkInterface autodetermine='true'/></Interfaces></General>", 1);
-  const auto here = join_loopback();
-  unsetenv("CYCLONEDDS_URI");
-  const auto sockets = internal::sockets_of(test::loopback_domain());
-  ASSERT_FALSE(sockets.empty());
-  for (const int socket : sockets) EXPECT_EQ(internal::interface_of(socket), "lo");
-
-  const std::uint32_t other = test::free_domain();
-  const auto everywhere = Participant::open(other, Reach::network);
-  ASSERT_TRUE(everywhere) << everywhere.error().message;
-  const auto open_sockets = internal::sockets_of(other);
-  ASSERT_FALSE(open_sockets.empty());
-  for (const int socket : open_sockets) EXPECT_EQ(internal::interface_of(socket), "");
 }
 
 TEST(Dds, EveryTopicIsSeenWithTypeQosAndHash) {
