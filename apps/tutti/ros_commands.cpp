@@ -178,6 +178,20 @@ std::shared_ptr<RosArguments> add_ros_robot_options(CLI::App& robot) {
       ->type_name("FRAME")
       ->needs(ros);
   robot
+      .add_option(
+          "--grid", out->robot.grid,
+          "Topic of the server's nav_msgs/OccupancyGrid, which is published in the robot's own map as map, below "
+          "the namespace; '' for none")
+      ->type_name("TOPIC")
+      ->capture_default_str()
+      ->needs(ros);
+  robot
+      .add_option("--world-frame", out->robot.world_frame,
+                  "Frame that world -> map is published from, the server's; '' for none")
+      ->type_name("FRAME")
+      ->capture_default_str()
+      ->needs(ros);
+  robot
       .add_flag("--reliable", out->robot.lossless,
                 "Ask for reliable publishers, keep all and wait for it: nothing is lost however fast a bag is played; "
                 "corrections come a scan later")
@@ -194,10 +208,13 @@ std::shared_ptr<RosArguments> add_ros_server_options(CLI::App& server) {
                                     "Publish the map as ROS 2's topics map (nav_msgs/OccupancyGrid) and map_points "
                                     "(sensor_msgs/PointCloud2), over DDS and without ROS, on this machine; with "
                                     "--insecure on the networks that CYCLONEDDS_URI names, else on all (docs/ros.md)");
-  server.add_option("--namespace", out->name_space, "Namespace of these topics; default: none")
+  server.add_option("--namespace", out->server.name_space, "Namespace of these topics; '/' for none")
       ->type_name("NAME")
+      ->capture_default_str()
       ->needs(ros);
-  server.add_option("--map-frame", out->server.frame, "Frame that they are in")
+  server
+      .add_option("--map-frame", out->server.frame,
+                  "Frame that they are in, with _N behind it where the map that is shown is of component N")
       ->type_name("FRAME")
       ->capture_default_str()
       ->needs(ros);
@@ -254,7 +271,6 @@ Status show_on_ros(const RosArguments& arguments, program::ServerOptions& option
   const auto participant = join_domain(options.bus.allow_insecure);
   if (!participant) return tl::unexpected(participant.error());
   ros::RosServerOptions ros = arguments.server;
-  ros.name_space = arguments.name_space;
   ros.say = log_of("server ros", options.console);
   options.views.emplace_back([ros, participant = *participant](const program::ViewedMission& mission) {
     return ros::view_on_ros(ros, participant, mission.map);

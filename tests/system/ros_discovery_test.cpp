@@ -173,7 +173,7 @@ TEST_P(RosDiscovery, APlayerAndAServerAreHeard) {
   TUTTI_SKIP_WITHOUT_NATS_SERVER();
   const auto ros = join(GetParam().configuration);
   const auto odom = ros->reader("/r1/odom", kOdometry, kKeepAll, "").value();
-  const auto map = ros->reader("/map", "nav_msgs/msg/OccupancyGrid", ros::kLatchedQos, "").value();
+  const auto map = ros->reader("/world/map", "nav_msgs/msg/OccupancyGrid", ros::kLatchedQos, "").value();
   const std::string bag = (folder_ / "bag.mcap").string();
   {
     auto writer = bags::RosWriter::create(bag).value();

@@ -301,7 +301,7 @@ void expect_grid(std::string_view cdr) {
                             bags::internal::Cursor::Layout::aligned);
   in.number<std::int32_t>("sec");
   in.number<std::uint32_t>("nanosec");
-  EXPECT_EQ(in.counted("frame_id"), std::string_view("map\0", 4));
+  EXPECT_EQ(in.counted("frame_id"), std::string_view("world\0", 6));
   in.number<std::int32_t>("map_load_time");
   in.number<std::uint32_t>("map_load_time");
   EXPECT_EQ(in.number<float>("resolution"), 0.1F);
@@ -330,8 +330,9 @@ TEST_F(Ros, TwoRobotsAndAServerMakeTheMapOfTheirBags) {
   const auto participant = join_loopback();
   const auto tf = participant->reader("/tf", "tf2_msgs/msg/TFMessage", kKeepAll, "").value();
   const auto odom = participant->reader("/alpha/odom", "nav_msgs/msg/Odometry", kKeepAll, "").value();
-  const auto grid = participant->reader("/map", "nav_msgs/msg/OccupancyGrid", ros::kLatchedQos, "").value();
-  const auto cloud = participant->reader("/map_points", "sensor_msgs/msg/PointCloud2", ros::kLatchedQos, "").value();
+  const auto grid = participant->reader("/world/map", "nav_msgs/msg/OccupancyGrid", ros::kLatchedQos, "").value();
+  const auto cloud =
+      participant->reader("/world/map_points", "sensor_msgs/msg/PointCloud2", ros::kLatchedQos, "").value();
   const std::vector<std::string> mission{source.file, "--data", folder_.string(), "--rate", rate};
   start("server", {"server", "--ros", "--map-period", "1", "--state", (folder_ / "server").string()}, mission);
   const std::string bus = bus_of("server");

@@ -37,6 +37,11 @@ class Reading(unittest.TestCase):
         self.assertEqual(grid.cells.tolist(), [[0, 100, -1], [-1, 0, 100]])  # the image's last row is the least y
         self.assertEqual(grid, grid_of(YAML, PGM))
         self.assertNotEqual(grid, grid_of(YAML.replace("-1,", "-2,"), PGM))
+        self.assertNotEqual(grid, grid_of("# component 2 of the map\n" + YAML, PGM))
+        notes = "# T_level_world 0 0 0 0.6 0 -0 0.8 (x y z, quaternion x y z w) takes\n# ground at -2.000 m\n"
+        at, turn = grid_of(notes + YAML, PGM).origin_in_world()  # a turn about x, of which y is 0.28 and z is 0.96
+        self.assertTrue(np.allclose([*at, *turn], [-1.0, 0.28 * 2.5 - 0.96 * 2.0, -0.96 * 2.5 - 0.28 * 2.0, -0.6, 0.0, 0.0, 0.8]))
+        self.assertEqual(grid_of("# component 2 of the map\n" + YAML, PGM).component, 2)
         self.assertNotEqual(grid, grid_of(YAML, PGM.replace(b"\xcd\xfe", b"\xfe\xfe")))
 
     def test_thresholds_as_nav2s_map_server_reads_them(self):
@@ -212,9 +217,9 @@ class OfAServer(WithPrograms):
         self.run_tutti("map", "export", map_file, "--grid", self.path / "out.yaml")
         expected = grid_of((self.path / "out.yaml").read_text(), (self.path / "out.pgm").read_bytes())
         last = grids[-1]
-        self.assertEqual((last.header.frame_id, last.info.width), ("map", expected.cells.shape[1]))
+        self.assertEqual((last.header.frame_id, last.info.width), ("world", expected.cells.shape[1]))
         self.assertAlmostEqual(last.info.resolution, 0.1)
-        self.assertEqual((last.info.origin.position.x, last.info.origin.position.y), expected.origin_m)
+        self.assertEqual((last.info.origin.position.x, last.info.origin.position.y), expected.origin_in_world()[0][:2])
         self.assertEqual(list(last.data), expected.cells.ravel().tolist())
         for cell in (server_map.FREE, server_map.OCCUPIED, server_map.UNKNOWN):
             self.assertGreater(np.count_nonzero(expected.cells == cell), 50)

@@ -35,6 +35,21 @@ def stamp_ns(cdr, at=4):
     return seconds * 10**9 + nanoseconds
 
 
+def stamps_of_transforms(cdr):
+    """Where in a TFMessage of the robot's (little endian) the stamps are."""
+    count, = struct.unpack_from("<I", cdr, 4)
+    out, at = [], 8
+    for _ in range(count):
+        at = 4 + -(-(at - 4) // 4) * 4
+        out.append(at)
+        at += 8
+        for _ in range(2):  # frame and child
+            at = 4 + -(-(at - 4) // 4) * 4
+            at += 4 + struct.unpack_from("<I", cdr, at)[0]
+        at = 4 + -(-(at - 4) // 8) * 8 + 7 * 8
+    return out
+
+
 @dataclasses.dataclass
 class Sample:
     stamp_ns: int

@@ -12,7 +12,7 @@ from tutti_ros.server_map import ServerMap
 
 PARAMETERS = {
     "map": "",          # file of the server's map: map.tutti in its --state folder
-    "map_frame": "map",
+    "map_frame": "world",  # _N behind it where the map that is shown is of component N
     "period_s": 5.0,    # between two maps, at least
     "program": "tutti",
 }
@@ -42,11 +42,13 @@ class MapNode(Node):
             return
         out = OccupancyGrid()
         out.header.stamp = out.info.map_load_time = self.get_clock().now().to_msg()
-        out.header.frame_id = self.frame
+        out.header.frame_id = self.frame + (f"_{grid.component}" if grid.component else "")
         out.info.resolution = grid.resolution_m
         out.info.height, out.info.width = grid.cells.shape
-        out.info.origin.position.x, out.info.origin.position.y = grid.origin_m
-        out.info.origin.orientation.w = 1.0
+        at, turn = grid.origin_in_world()
+        out.info.origin.position.x, out.info.origin.position.y, out.info.origin.position.z = at
+        place = out.info.origin.orientation
+        place.x, place.y, place.z, place.w = turn
         out.data = array.array("b", grid.cells.tobytes())
         self.publisher.publish(out)
 

@@ -14,12 +14,14 @@ from std_srvs.srv import Trigger
 from tutti_ros.connection import Connection
 from tutti_ros.diagnosis import diagnosis
 from tutti_ros.feed_messages import Feed
-from tutti_ros.link import Link, stamp_ns
+from tutti_ros.link import Link, stamp_ns, stamps_of_transforms
 from tutti_ros.ros_node import LATCHED, best_effort, diagnostics, run
 
 PARAMETERS = {
     "socket": "",              # of tutti robot --feed
     "map_frame": "",           # empty: odom_frame with 'odom' at its end made 'map', else 'map'
+    "world_frame": "world",    # world -> map is published, too; empty: neither that nor the grid
+    "grid": "/world/map",      # topic of the server's OccupancyGrid, which is published in this robot's map, as map
     "odom_frame": "",          # empty: as odometry's header says
     "base_frame": "",          # empty: as odometry's child_frame_id says
     "T_body_lidar": "",        # "x y z qx qy qz qw"; empty: as the robot's mission file or transforms say
@@ -38,6 +40,7 @@ PARAMETERS = {
 # How much odometry is to be trusted, as robots[].covariance of a mission file. Variances add up along the trajectory.
 NOISE = {"translation_m_per_sqrt_m": 0.02, "translation_m_per_sqrt_deg": 0.001, "translation_m_per_sqrt_s": 0.003,
          "rotation_deg_per_sqrt_m": 0.1, "rotation_deg_per_sqrt_deg": 0.02, "rotation_deg_per_sqrt_s": 0.02}
+GRID = "nav_msgs/msg/OccupancyGrid"
 ODOMETRY, TRANSFORMS, PATH = "nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage", "nav_msgs/msg/Path"
 CLOUD, LIVOX = "sensor_msgs/msg/PointCloud2", ("livox_ros_driver2/msg/CustomMsg", "livox_ros_driver/msg/CustomMsg")
 COMPRESSED = ("/compressed", "/compressedDepth")  # as image_transport names topics of CompressedImage
@@ -65,7 +68,7 @@ class TuttiNode(Node):
         if not self.socket:
             raise ValueError("parameter 'socket' is empty, expected the SOCKET of tutti robot --feed SOCKET")
         self.correction, self.situation, self.trouble = None, None, collections.deque(maxlen=5)
-        self.transform, self.transform_ns = None, -1  # the last map -> odom, and its stamp
+        self.transform, self.transform_ns = None, -1  # the last map -> odom (and world -> map), and its stamp
         self.link = Link(client_name=b"tutti_ros", sensors=Feed.Sensors(scans=self.use_scans), ros=self._settings())
         self.connection = Connection(self.socket, self.link, self.hear)
         self.outputs = {}  # publishers
@@ -91,7 +94,7 @@ class TuttiNode(Node):
                        depth=self.depth.encode(), imu=self.imu.encode(), images_offset_s=self.images_offset_s,
                        p_body_antenna=self._numbers("antenna_m", "x y z"), scans_deskewed=self.scans_deskewed,
                        body_frame=self.base_frame.encode(), noise=noise, odom_frame=self.odom_frame.encode(),
-                       map_frame=self.map_frame.encode(), tolerance_s=self.transform_tolerance_s)
+                       map_frame=self.map_frame.encode(), world_frame=self.world_frame.encode(), tolerance_s=self.transform_tolerance_s)
         names = "x y z qx qy qz qw"
         if pose := self._numbers("T_body_lidar", names):
             out.T_body_lidar.CopyFrom(Feed.Pose(**dict(zip(names.split(), pose))))
@@ -120,6 +123,8 @@ class TuttiNode(Node):
         self._subscribe("/tf_static", TRANSFORMS, STATIC_QOS, take_static)
         self._subscribe("/tf", TRANSFORMS, TF_QOS, link.add_moving)
         self._subscribe("odom", ODOMETRY, sensor_qos, self.add_odometry)
+        if self.grid and self.world_frame:
+            self._subscribe(self.grid, GRID, LATCHED, link.add_lasting)
         self._subscribe("battery_state", "sensor_msgs/msg/BatteryState", sensor_qos, link.add_once)
         if self.use_scans:
             self.scans = CLOUD, self._subscribe("points", CLOUD, sensor_qos, link.add, "scans")
@@ -145,7 +150,8 @@ class TuttiNode(Node):
         self.link.add(topic, kind, cdr, "odometry")
         if self.link.state != "feeding" and self.transform:  # the last correction, so that nobody loses the map
             out, at_ns = bytearray(self.transform), stamp_ns(cdr) + int(self.transform_tolerance_s * 1e9)
-            struct.pack_into("<iI", out, 8, *divmod(at_ns, 10**9))
+            for at in stamps_of_transforms(self.transform):
+                struct.pack_into("<iI", out, at, *divmod(at_ns, 10**9))
             self.publish_transform(bytes(out))
 
     def look_for_scans(self):

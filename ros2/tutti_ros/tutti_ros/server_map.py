@@ -5,6 +5,7 @@ import contextlib
 import dataclasses
 import os
 import pathlib
+import re
 import subprocess
 import tempfile
 
@@ -25,10 +26,21 @@ class Grid:
     resolution_m: float
     origin_m: tuple    # corner of the first cell with the least x and y
     cells: np.ndarray  # height x width of int8, row by row from the least y on
+    component: int = 0  # of the server's map, whose world it is in
+    tilt: tuple = (0.0, 0.0, 0.0, 1.0)  # x y z w of the quaternion that takes this world level
+    ground_m: float = 0.0               # where the grid lies, in the level frame
+
+    def origin_in_world(self):
+        """(x y z, x y z w): the pose of the first cell's corner."""
+        x, y, z, w = self.tilt
+        back = -np.array([x, y, z])
+        corner = np.array([*self.origin_m, self.ground_m])
+        turned = corner + 2.0 * np.cross(back, np.cross(back, corner) + w * corner)
+        return tuple(map(float, turned)), (-x, -y, -z, w)
 
     def __eq__(self, other):
         return (isinstance(other, Grid) and (self.resolution_m, self.origin_m) == (other.resolution_m, other.origin_m)
-                and np.array_equal(self.cells, other.cells))
+                and self.component == other.component and np.array_equal(self.cells, other.cells))
 
 
 def settings_of(yaml):
@@ -74,7 +86,12 @@ def grid_of(yaml, pgm):
     shade = np.arange(256) / 255.0
     occupied = shade if said["negate"] == "1" else 1.0 - shade
     cell_of = np.where(occupied > high, OCCUPIED, np.where(occupied < low, FREE, UNKNOWN)).astype(np.int8)
-    return Grid(resolution_m, tuple(origin[:2]), cell_of[pixels_of(pgm)[::-1]])
+    note = lambda pattern, other: [float(word) for word in (re.search(pattern, yaml, re.MULTILINE) or [0, other])[1].split()]
+    return Grid(resolution_m, tuple(origin[:2]), cell_of[pixels_of(pgm)[::-1]],
+                int(note(r"^# component (\d+) of the map$", "0")[0]),
+                tuple(note(r"^# T_level_world 0 0 0 ((?:[-+.\de]+ ){4})", "0 0 0 1")),
+                note(r"^# ground at ([-+.\de]+) m$", "0")[0])
+
 
 
 class ServerMap:

@@ -27,6 +27,7 @@ std::string encode(const RosCompressedImage& message);
 std::string encode(const RosCameraInfo& message);
 std::string encode(const RosNavSatFix& message);
 std::string encode(const RosPoseStamped& message);
+std::string encode(const RosOccupancyGrid& message);
 
 RosPose to_ros(const Pose3& T_frame_body);
 /// A fix of unknown covariance.
@@ -45,15 +46,6 @@ struct RosPoseWithCovariance {
 };
 /// As geometry_msgs/msg/PoseWithCovarianceStamped.
 std::string encode(const RosPoseWithCovariance& message);
-
-struct RosOccupancyGrid {
-  RosHeader header;
-  double resolution_m = 0.0;
-  std::uint32_t width = 0, height = 0;
-  RosPose origin;                     ///< Pose of the corner of the first cell.
-  std::span<const std::int8_t> data;  ///< Row by row; -1 unknown, 0 free to 100 occupied.
-};
-std::string encode(const RosOccupancyGrid& message);
 
 /// rosgraph_msgs/msg/Clock
 std::string encode_clock(Timestamp now);

@@ -116,6 +116,24 @@ Result<RosOdometry> decode_odometry(std::string_view bytes, RosEncoding encoding
   });
 }
 
+Result<RosOccupancyGrid> decode_occupancy_grid(std::string_view bytes, RosEncoding encoding) {
+  return decode(bytes, encoding, "nav_msgs/msg/OccupancyGrid", [](Cursor& in) {
+    RosOccupancyGrid out;
+    out.header = header(in);
+    in.number<std::int32_t>("map_load_time.sec");
+    in.number<std::uint32_t>("map_load_time.nanosec");
+    out.resolution_m = static_cast<double>(in.number<float>("resolution"));
+    out.width = in.number<std::uint32_t>("width");
+    out.height = in.number<std::uint32_t>("height");
+    out.origin = pose(in);
+    const std::string_view cells = in.counted("data");
+    if (cells.size() != std::uint64_t{out.width} * out.height)
+      in.complain(fmt::format("{} cells, expected {} x {}", cells.size(), out.width, out.height));
+    out.data = {reinterpret_cast<const std::int8_t*>(cells.data()), cells.size()};
+    return out;
+  });
+}
+
 Result<std::vector<RosTransform>> decode_tf(std::string_view bytes, RosEncoding encoding) {
   constexpr std::size_t kLeastBytes = 8 + 4 + 4 + 56;  // stamp, two empty strings, seven numbers
   return decode(bytes, encoding, "tf2_msgs/msg/TFMessage", [](Cursor& in) {

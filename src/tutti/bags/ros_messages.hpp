@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -41,6 +42,15 @@ struct RosOdometry {
   std::array<double, 36> pose_covariance{};
   Eigen::Vector3d linear = Eigen::Vector3d::Zero(), angular = Eigen::Vector3d::Zero();  ///< m/s, rad/s
   std::array<double, 36> twist_covariance{};
+};
+
+struct RosOccupancyGrid {
+  RosHeader header;
+  double resolution_m = 0.0;
+  std::uint32_t width = 0, height = 0;
+  RosPose origin;  ///< Pose of the corner of the first cell.
+  std::span<const std::int8_t>
+      data;  ///< Row by row; -1 unknown, 0 free to 100 occupied. A decoded one has it in its bytes.
 };
 
 struct RosTransform {
@@ -125,6 +135,7 @@ struct RosPoseStamped {
 
 /// Each takes all bytes of one message, for CDR with the 4-byte encapsulation header. Errors name type, byte (counted
 /// behind that header) and what was expected. Bytes may not be left over, except for up to three of padding in CDR.
+Result<RosOccupancyGrid> decode_occupancy_grid(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
 Result<RosOdometry> decode_odometry(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
 Result<std::vector<RosTransform>> decode_tf(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
 Result<RosPointCloud> decode_point_cloud(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);

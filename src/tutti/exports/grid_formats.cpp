@@ -45,7 +45,9 @@ Result<std::string> write_grid(const MapSource& map, const FormatSettings& setti
                 config.high_m);
   const auto made = grids::grid_of_map(*map.store, map.content, map.estimate, settings.grid);
   if (!made) return tl::unexpected(made.error());
-  const std::vector<std::string> notes = notes_of(*made, map);
+  std::vector<std::string> notes = notes_of(*made, map);
+  notes.push_back(fmt::format("ground at {:.3f} m", made->ground_m));
+  notes.push_back(fmt::format("component {} of the map", mapfile::component_to_show(map.content, map.estimate)));
   if (auto ok = grids::write_nav2_map(made->grid, out.string(), notes); !ok) return tl::unexpected(ok.error());
   const grids::OccupancyGrid& grid = made->grid;
   return fmt::format("{}: {} x {} cells of {} m, {} free, {} occupied; of {} submaps{}{}\n  {}", out.string(),

@@ -149,6 +149,7 @@ Result<MapGrid> grid_of_map(const storage::TableStore& store, const mapfile::Con
     if (const auto height = out.body_height_m.find(chain); height != out.body_height_m.end())
       for (const StampedPose& pose : trajectory)
         ground.push_back(out.T_level_world * pose.pose.translation - Eigen::Vector3d(0.0, 0.0, height->second));
+  for (const Ground& below : ground) out.ground_m += below.z() / static_cast<double>(ground.size());
   auto builder = GridBuilder::create(config.grid, ground);
   if (!builder) return tl::unexpected(builder.error());
   const auto added = part.each(out.T_level_world, [&](const ChainId&, const LevelSubmap& submap) {

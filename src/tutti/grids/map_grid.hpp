@@ -19,7 +19,8 @@ struct MapGridConfig {
 
 struct MapGrid {
   OccupancyGrid grid;
-  Pose3 T_level_world;  ///< A rotation, because the map's world has the tilt of the odometry that began it.
+  Pose3 T_level_world;    ///< A rotation, because the map's world has the tilt of the odometry that began it.
+  double ground_m = 0.0;  ///< Mean height of the ground below all trajectories, in the level frame.
   std::map<ChainId, double> body_height_m;
   std::size_t submaps = 0;      ///< Submaps that the grid is made of.
   std::size_t left_out = 0;     ///< Submaps with a cloud that are not in the component.

@@ -232,9 +232,11 @@ Matrix6d RobotAgent::covariance_by(const ProxyGraph& graph) const {
 void RobotAgent::locate_others(const ProxyGraph& graph, std::span<const consistency::RobotNode> own,
                                std::span<const consistency::NodePair> pairs) {
   state_.whereabouts.clear();
+  T_map_world_.reset();
   if (pairs.empty()) return;
   const Pose3& T_map_newest = smoother_.pose(own[pairs.back().robot].chain_index);  // as corrected now
   const Pose3 T_map_world = T_map_newest * graph.nodes[pairs.back().proxy].T_world_body.inverse();
+  T_map_world_ = T_map_world;
   for (const LastSeen& seen : graph.last_seen)
     if (seen.chain.robot != chain_.robot && component_of(graph, seen.chain) == component_of(graph, chain_))
       state_.whereabouts.push_back({seen.chain.robot, seen.stamp, T_map_world * seen.T_world_body});

@@ -213,6 +213,9 @@ class RobotAgent {
   /// The chain's component in the newest proxy graph; nothing when that does not know the chain, or none was received.
   [[nodiscard]] std::optional<std::uint32_t> component() const { return state_.component; }
   [[nodiscard]] const std::vector<Whereabouts>& whereabouts() const { return state_.whereabouts; }
+  /// Ties the map to the world of component(), where this robot is now; nothing before the first proxy graph that knows
+  /// it. It may jump with either frame, and is not part of the state.
+  [[nodiscard]] const std::optional<Pose3>& T_map_world() const { return T_map_world_; }
 
  private:
   RobotAgent(RobotId robot, const AgentConfig& config, std::unique_ptr<const consistency::ConstraintPolicy> policy,
@@ -232,6 +235,7 @@ class RobotAgent {
   estimation::OnboardSmoother smoother_;
   AgentState state_;  // without the state of submaps_ and smoother_
   std::vector<OdometryJump> jumps_;
+  std::optional<Pose3> T_map_world_;
 };
 
 }  // namespace tutti::robot

@@ -102,6 +102,7 @@ Result<std::optional<FeedRos>> read(const v1::Feed::Ros& in) {
               .body_frame = in.body_frame(),
               .odom_frame = plain_text(in.odom_frame()),
               .map_frame = plain_text(in.map_frame()),
+              .world_frame = plain_text(in.world_frame()),
               .tolerance_s = in.tolerance_s()};
   if (in.has_images_offset_s()) out.images_offset_s = in.images_offset_s();
   if (!(std::abs(out.tolerance_s) < kMost_s) || !(std::abs(out.images_offset_s.value_or(0.0)) < kMost_s))

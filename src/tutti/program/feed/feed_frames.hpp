@@ -54,6 +54,7 @@ struct FeedRos {
   bool scans_deskewed = false;
   std::string odometry_frames;  ///< IntakeConfig::odometry_frames; clients in other processes cannot send it.
   std::string body_frame, odom_frame, map_frame;
+  std::string world_frame;  ///< Empty: world -> map is not answered, and grids are not taken.
   std::optional<robot::OdometryCovarianceConfig> covariance;
   double tolerance_s = 0.0;  ///< By which map -> odom is dated ahead.
 };

@@ -49,6 +49,7 @@ struct FeedState {
   std::pair<std::uint64_t, std::uint64_t>
       map_age;                             ///< ProxyGraph::age() of the newest graph heard; zeros before the first.
   std::optional<std::uint32_t> component;  ///< The server's map's; nothing while the map does not know this chain.
+  std::optional<Pose3> T_map_world;        ///< RobotAgent::T_map_world(): of that component's world.
   bool wants_scan = false;                 ///< A scan from now on would be used.
   std::vector<TeamMate> team_mates;
   std::vector<FeedAlert> alerts;

@@ -62,6 +62,7 @@ FeedState RobotView::state(const node::RobotNode& node) const {
                 .covariance = agent.covariance(),
                 .map_age = agent.map_age(),
                 .component = agent.component(),
+                .T_map_world = agent.T_map_world(),
                 .wants_scan = agent.wants_scan(),
                 .team_mates = {},
                 .alerts = alerts_,

@@ -55,11 +55,15 @@ void RosAnswers::hear(const FeedTrajectory& trajectory) {
 std::optional<std::string> RosAnswers::transform() {
   if (!last_ || (said_ && last_->stamp <= *said_)) return std::nullopt;
   said_ = last_->stamp;
-  const bags::RosTransform out{.header = {last_->stamp + tolerance_s_, map_},
-                               .child_frame_id = odom_,
-                               .translation = last_->T_map_odom.translation,
-                               .rotation = last_->T_map_odom.rotation};
-  return bags::encode(std::span(&out, 1));
+  const auto transform = [&](const std::string& parent, const std::string& child, const Pose3& T) {
+    return bags::RosTransform{.header = {last_->stamp + tolerance_s_, parent},
+                              .child_frame_id = child,
+                              .translation = T.translation,
+                              .rotation = T.rotation};
+  };
+  std::vector<bags::RosTransform> out{transform(map_, odom_, last_->T_map_odom)};
+  if (T_world_map_ && world_ != map_) out.push_back(transform(world_, map_, *T_world_map_));
+  return bags::encode(out);
 }
 
 std::string RosAnswers::pose() const {

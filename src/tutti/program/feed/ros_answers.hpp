@@ -26,9 +26,14 @@ class RosAnswers {
   void hear(const FeedAnswer& answer, const Pose3& T_odom_body);
   void hear(const FeedTrajectory& trajectory);
   void hear(std::vector<TeamMate> team_mates) { team_mates_ = std::move(team_mates); }
+  /// Where the map is in a world. Nothing: not known.
+  void hear_world(const std::string& frame, const std::optional<Pose3>& T_world_map) {
+    world_ = frame;
+    T_world_map_ = T_world_map;
+  }
 
-  /// TFMessage with map -> odom as of the last answer; nothing when that stamp was published already, because tf2 warns
-  /// of repeated ones.
+  /// TFMessage with map -> odom, and world -> map once that is known, as of the last answer; nothing when that stamp
+  /// was published already, because tf2 warns of repeated ones.
   std::optional<std::string> transform();
   /// PoseWithCovarianceStamped: where the body is on the map.
   [[nodiscard]] std::string pose() const;
@@ -49,6 +54,8 @@ class RosAnswers {
   Trajectory trajectory_;         ///< T_map_body
   std::deque<StampedPose> tail_;  ///< T_odom_body since the end of trajectory_.
   std::vector<TeamMate> team_mates_;
+  std::string world_;
+  std::optional<Pose3> T_world_map_;
 };
 
 /// The covariance of T_map_body as ROS states it (6x6 by rows; position, then rotation; about the axes of the map),

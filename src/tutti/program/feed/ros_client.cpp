@@ -5,6 +5,8 @@
 
 #include <utility>
 
+#include "tutti/bags/ros_encode.hpp"
+#include "tutti/bags/ros_messages.hpp"
 #include "tutti/bags/ros_types.hpp"
 #include "tutti/base/plain_text.hpp"
 
@@ -14,6 +16,18 @@ namespace {
 
 constexpr const char* kCdr = "cdr";
 constexpr std::size_t kLongest = 80;  // of a name, which is anybody's
+
+/// The transforms of a message but those that robots publish from a world, which change with the map; nothing when it
+/// has none of these.
+std::optional<std::string> without_world(std::string_view cdr, const std::string& world) {
+  if (cdr.find(world) == std::string_view::npos) return std::nullopt;
+  auto transforms = bags::decode_tf(cdr);
+  if (!transforms) return std::nullopt;
+  const std::size_t left_out = std::erase_if(*transforms, [&](const bags::RosTransform& one) {
+    return one.header.frame_id == world || one.header.frame_id.starts_with(world + "_");
+  });
+  return left_out > 0 ? std::optional(bags::encode(*transforms)) : std::nullopt;
+}
 
 }  // namespace
 
@@ -67,7 +81,31 @@ void RosClient::hear(const FeedTrajectory& trajectory) {
   if (answers_) answers_->hear(trajectory);
 }
 
-std::vector<FeedRaw> RosClient::hear(const std::vector<TeamMate>& team_mates) {
+Status RosClient::add(const intake::RawMessage& raw) {
+  if (raw.type == bags::kTfType && !said_.world_frame.empty()) {
+    const auto own = without_world(raw.bytes, said_.world_frame);
+    return intake_.add(own ? intake::RawMessage{raw.topic, raw.type, raw.encoding, *own} : raw);
+  }
+  if (raw.type != RosGrid::kType) return intake_.add(raw);
+  const Status taken = grid_.take(raw.bytes);
+  return taken ? taken : in_context(plain_text(raw.topic, kLongest), taken.error());
+}
+
+std::vector<FeedRaw> RosClient::hear(const FeedState& known) {
+  std::vector<FeedRaw> out = team_mates(known.team_mates);
+  if (!answers_ || said_.world_frame.empty()) return out;
+  if (!known.T_map_world || !known.component) {
+    answers_->hear_world({}, std::nullopt);
+    return out;
+  }
+  const std::string world = world_frame(said_.world_frame, *known.component);
+  answers_->hear_world(world, known.T_map_world->inverse());
+  if (auto grid = grid_.next(world, *known.T_map_world, answers_->map_frame()))
+    out.push_back({"map", RosGrid::kType, kCdr, std::move(*grid)});
+  return out;
+}
+
+std::vector<FeedRaw> RosClient::team_mates(const std::vector<TeamMate>& team_mates) {
   std::vector<FeedRaw> out;
   if (team_mates == team_mates_) return out;
   team_mates_ = team_mates;

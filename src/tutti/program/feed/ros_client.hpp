@@ -9,6 +9,7 @@
 #include "tutti/intake/sensor_intake.hpp"
 #include "tutti/program/feed/feed_frames.hpp"
 #include "tutti/program/feed/ros_answers.hpp"
+#include "tutti/program/feed/ros_grid.hpp"
 
 namespace tutti::program {
 
@@ -25,7 +26,7 @@ class RosClient {
                                                  const std::optional<Timestamp>& newest);
 
   /// Fails when the message is not taken; next() has what is due then.
-  Status add(const intake::RawMessage& raw) { return intake_.add(raw); }
+  Status add(const intake::RawMessage& raw);
   /// SensorIntake::next(). Scans are left out while the last answer wanted none.
   Result<std::optional<intake::Input>> next() { return intake_.next(wants_scan_); }
   [[nodiscard]] intake::SensorIntake& intake() { return intake_; }
@@ -37,12 +38,13 @@ class RosClient {
   /// What the client is to publish: where the robot is, as transform and pose.
   std::vector<FeedRaw> hear(const FeedAnswer& answer, const Pose3& T_odom_body);
   void hear(const FeedTrajectory& trajectory);
-  /// The team-mates, if they are others than before.
-  std::vector<FeedRaw> hear(const std::vector<TeamMate>& team_mates);
+  /// The team-mates, if they are others than before, and the grid in the robot's own map, if it is another.
+  std::vector<FeedRaw> hear(const FeedState& known);
   /// The whole trajectory; nothing before there is any, and when it is too long for a message.
   [[nodiscard]] std::optional<FeedRaw> path() const;
 
  private:
+  std::vector<FeedRaw> team_mates(const std::vector<TeamMate>& team_mates);
   RosClient(intake::IntakeConfig config, FeedRos ros) : said_(std::move(ros)), intake_(std::move(config)) {}
 
   FeedRos said_;
@@ -50,6 +52,7 @@ class RosClient {
   std::optional<RosAnswers> answers_;
   std::optional<FeedTrajectory> trajectory_;  ///< Heard before there was any odometry.
   std::vector<TeamMate> team_mates_;
+  RosGrid grid_;
   bool wants_scan_ = false;
 };
 

@@ -88,7 +88,7 @@ class Robot final : public RosRobot {
   RosRobotOptions options_;
   std::shared_ptr<Participant> participant_;
   program::LiveFeed* feed_ = nullptr;
-  std::unique_ptr<Reader> odometry_, points_, fixes_, battery_, tf_, tf_static_, own_tf_, own_tf_static_;
+  std::unique_ptr<Reader> odometry_, points_, fixes_, battery_, grid_, tf_, tf_static_, own_tf_, own_tf_static_;
   std::unique_ptr<LocalClient> client_;
   program::FeedSituation situation_;
   intake::RosIntake::Counts counts_;
@@ -108,6 +108,16 @@ Status Robot::open() {
   for (const std::string& topic : {by_tf() ? "/tf" : options_.odometry, options_.points, options_.fixes})
     if (const auto name = resolve(topic.empty() ? "none" : topic, options_.name_space); !name)
       return tl::unexpected(name.error());
+  if (!options_.grid.empty()) {
+    const auto from = resolve(options_.grid, options_.name_space);
+    if (!from) return tl::unexpected(from.error());
+    if (*from == resolve("map", options_.name_space).value())
+      return fail(
+          ErrorCode::configuration,
+          "the server's grid is to be taken from {}, where this robot publishes its own: expected another topic, "
+          "as the server's /world/map",
+          *from);
+  }
   if (!options_.images) return {};
   if (Status ok = resolve(*options_.images, options_.name_space); !ok) return ok;
   images_ = std::make_unique<RosImages>(
@@ -151,6 +161,9 @@ Status Robot::subscribe() {
         !ok)
       return ok;
   if (Status ok = subscribe_points(); !ok) return ok;
+  if (Status ok = make(grid_, options_.world_frame.empty() ? "" : options_.grid, program::RosGrid::kType, kLatchedQos);
+      !ok)
+    return ok;
   if (Status ok = make(battery_, options_.battery, bags::kBatteryType, in_qos(false, 1)); !ok) return ok;
   return make(fixes_, options_.fixes, bags::kFixType, in_qos(options_.lossless, kFixesDepth));
 }
@@ -206,6 +219,7 @@ bool Robot::join() {
   program::FeedRos ros;
   ros.odometry_frames = options_.odometry_frames;
   ros.map_frame = options_.map_frame;
+  ros.world_frame = options_.world_frame;
   ros.tolerance_s = options_.tolerance_s;
   hello.ros = std::optional(std::move(ros));
   auto client = LocalClient::join(*feed_, hello);
@@ -226,7 +240,7 @@ void Robot::take_messages() {
   hold_odometry(true);
   if (own_tf_ && own_tf_->writers() > 0 && topics_.open_own_tf())
     options_.say(Level::info, fmt::format("transforms come on {}: map -> odom is published there", own_tf_->topic()));
-  for (const auto* reader : {&tf_static_, &own_tf_static_, &points_, &fixes_, &battery_}) take(reader->get());
+  for (const auto* reader : {&tf_static_, &own_tf_static_, &points_, &fixes_, &battery_, &grid_}) take(reader->get());
   if (images_) images_->take([this](Reader& reader) { take(&reader); });
   for (const auto* reader : {&tf_, &own_tf_, &odometry_}) take(reader->get());
   release_odometry();

@@ -14,7 +14,9 @@
 #include "tutti/bags/point_cloud.hpp"
 #include "tutti/bags/ros_definitions.hpp"
 #include "tutti/bags/ros_encode.hpp"
+#include "tutti/mapfile/placement.hpp"
 #include "tutti/program/clock.hpp"
+#include "tutti/program/feed/ros_grid.hpp"
 
 namespace tutti::ros {
 namespace {
@@ -24,26 +26,19 @@ using program::Clock, program::Level;
 constexpr const char *kGridType = "nav_msgs/msg/OccupancyGrid", *kCloudType = "sensor_msgs/msg/PointCloud2";
 constexpr double kRestPerWork = 9.0;
 
-std::string encode_grid(const grids::OccupancyGrid& grid, const bags::RosHeader& header) {
+std::string encode_grid(const grids::MapGrid& made, const bags::RosHeader& header) {
+  const grids::OccupancyGrid& grid = made.grid;
+  const Pose3 T_level_corner{Eigen::Quaterniond::Identity(), {grid.origin.x(), grid.origin.y(), made.ground_m}};
   static_assert(sizeof(grids::OccupancyGrid::Cell) == sizeof(std::int8_t));
   bags::RosOccupancyGrid out{.header = header,
                              .resolution_m = grid.resolution_m,
                              .width = static_cast<std::uint32_t>(grid.width),
                              .height = static_cast<std::uint32_t>(grid.height),
-                             .origin = {{grid.origin.x(), grid.origin.y(), 0.0}},
+                             .origin = bags::to_ros(made.T_level_world.inverse() * T_level_corner),
                              .data = {}};
   std::vector<std::int8_t> cells(grid.cells.begin(), grid.cells.end());
   out.data = cells;
   return bags::encode(out);
-}
-
-std::string encode_points(const PointCloud& cloud, const Pose3& T_level_world, const bags::RosHeader& header) {
-  const Eigen::Matrix3f R = T_level_world.rotation.toRotationMatrix().cast<float>();
-  const Eigen::Vector3f t = T_level_world.translation.cast<float>();
-  std::vector<Eigen::Vector3f> points;
-  points.reserve(cloud.points.size());
-  for (const Eigen::Vector3f& point : cloud.points) points.emplace_back(R * point + t);
-  return bags::encode(bags::to_point_cloud(header, points));
 }
 
 class Viewer final : public program::MapViewer {
@@ -97,16 +92,17 @@ class Viewer final : public program::MapViewer {
 
   void publish(const mapfile::ShownMap& map) {
     const double begin_s = Clock::steady_s();
-    const bags::RosHeader header{{static_cast<std::int64_t>(program::wall_clock_ns())}, options_.frame};
+    const std::uint32_t component = mapfile::component_to_show(map.content, map.map);
+    const bags::RosHeader header{{static_cast<std::int64_t>(program::wall_clock_ns())},
+                                 program::world_frame(options_.frame, component)};
     const auto grid = grids::grid_of_map(map_, map.content, map.map, options_.grid);
     const auto points = grids::voxels_of_map(map_, map.content, map.map, options_.voxel_m, options_.grid.grid.mate_m);
     std::string problems;
     const auto note_problem = [&](const Status& ok) {
       if (!ok) problems += (problems.empty() ? "" : "; ") + ok.error().message;
     };
-    note_problem(grid ? grid_->write(encode_grid(grid->grid, header)) : tl::unexpected(grid.error()));
-    const Pose3 T_level_world = grid ? grid->T_level_world : Pose3{};
-    note_problem(points ? points_->write(encode_points(*points, T_level_world, header))
+    note_problem(grid ? grid_->write(encode_grid(*grid, header)) : tl::unexpected(grid.error()));
+    note_problem(points ? points_->write(bags::encode(bags::to_point_cloud(header, points->points)))
                         : tl::unexpected(points.error()));
     if (problems != problems_ && !problems.empty())
       options_.say(Level::warning, fmt::format("map revision {} is not shown whole: {}", map.revision, problems));

@@ -14,8 +14,10 @@ namespace tutti::ros {
 
 /// How a server's map is published on topics of ROS 2.
 struct RosServerOptions {
-  std::string name_space;
-  std::string frame = "map";  ///< Frame of both topics: level, with the origin of the map's world.
+  std::string name_space = "world";
+  /// Frame of both topics, program::world_frame() of it: the world of the component that is shown. The grid is a plane
+  /// in it, where the ground is, which info.origin turns level.
+  std::string frame = "world";
   double period_s = 5.0;  ///< Least wall time between two maps; a map that takes long to make is followed by a pause of
                           ///< nine times as long.
   double voxel_m = 0.2;   ///< Edge of the voxels of `map_points`.
