@@ -106,7 +106,7 @@ class Programs(WithPrograms):
         self.assertTrue(answer.success)
         robot.send_signal(signal.SIGTERM)
         self.assertEqual(robot.wait(PATIENCE_S), 0)
-        self.assertEqual(node.qos["odom"], "sensor data")
+        self.assertEqual((node.qos["odom"]["reliability"], node.qos["odom"]["depth"]), ("best effort", 1000))
         self.assertTrue(all(node.raw.values()))
         self.assertEqual(node.qos["/tf_static"]["durability"], "transient local")
         self.assertEqual(node.qos["corrected_path"]["durability"], "transient local")

@@ -47,6 +47,7 @@ COMPRESSED = ("/compressed", "/compressedDepth")  # as image_transport names top
 TF_QOS = QoSProfile(depth=100)
 STATIC_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 IMAGES_QOS, IMU_QOS = best_effort(10), best_effort(2000)  # how long the node may be blocked
+ODOMETRY_DEPTH = 1000  # the same: 5 s at 200 Hz, as of tutti robot --ros
 
 
 def message_type(name):
@@ -122,7 +123,7 @@ class TuttiNode(Node):
         take_static = lambda topic, kind, cdr: link.add_lasting(topic, kind, cdr, key=cdr)
         self._subscribe("/tf_static", TRANSFORMS, STATIC_QOS, take_static)
         self._subscribe("/tf", TRANSFORMS, TF_QOS, link.add_moving)
-        self._subscribe("odom", ODOMETRY, sensor_qos, self.add_odometry)
+        self._subscribe("odom", ODOMETRY, best_effort(ODOMETRY_DEPTH), self.add_odometry)
         if self.grid and self.world_frame:
             self._subscribe(self.grid, GRID, LATCHED, link.add_lasting)
         self._subscribe("battery_state", "sensor_msgs/msg/BatteryState", sensor_qos, link.add_once)
