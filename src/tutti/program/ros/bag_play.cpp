@@ -186,7 +186,6 @@ class Player {
 
   Status play_all(Merged& messages) {
     std::optional<Timestamp> first;
-    double clock_s = -kClockPeriod_s;
     while (!stop_) {
       const auto message = messages.next();
       if (!message) {
@@ -200,11 +199,8 @@ class Player {
       if (*writer == nullptr) continue;
       if (!first) first = (*message)->log_time;
       const double due_s = ((*message)->log_time - *first) / options_.rate;
-      wait_until(due_s);
-      if (clock_ && seconds_since(begin_) - clock_s >= kClockPeriod_s) {
-        clock_s = seconds_since(begin_);
-        if (Status ok = clock_->write(bags::encode_clock((*message)->log_time)); !ok) return ok;
-      }
+      if (Status ok = wait_until(due_s, *first); !ok) return ok;
+      if (Status ok = tick((*message)->log_time); !ok) return ok;
       if (Status ok = (*writer)->write((*message)->data); !ok) {
         const std::string& topic = (*message)->channel->topic;
         if (ok.error().code != ErrorCode::invalid)
@@ -219,9 +215,20 @@ class Player {
     return {};
   }
 
-  void wait_until(double due_s) {
-    for (double left_s = due_s - seconds_since(begin_); left_s > 0.0 && !stop_; left_s = due_s - seconds_since(begin_))
-      sleep_s(std::min(left_s, kLongestSleep_s));
+  Status wait_until(double due_s, Timestamp first) {
+    for (double left_s = due_s - seconds_since(begin_); left_s > 0.0 && !stop_;
+         left_s = due_s - seconds_since(begin_)) {
+      sleep_s(std::min(left_s, clock_ ? kClockPeriod_s : kLongestSleep_s));
+      if (Status ok = tick(first + options_.rate * std::min(due_s, seconds_since(begin_))); !ok) return ok;
+    }
+    return {};
+  }
+
+  /// The clock goes on where the bag has no messages.
+  Status tick(Timestamp now) {
+    if (!clock_ || seconds_since(begin_) - clock_s_ < kClockPeriod_s) return {};
+    clock_s_ = seconds_since(begin_);
+    return clock_->write(bags::encode_clock(now));
   }
 
   static constexpr std::size_t kMostErrors = 1000;
@@ -233,6 +240,7 @@ class Player {
   std::map<bags::BagChannel, Writer*> of_channel_;
   std::set<std::string> said_;
   std::unique_ptr<Writer> clock_;
+  double clock_s_ = -kClockPeriod_s;  // when it was last published
   Clock::time_point begin_;
   BagPlayed played_;
   std::size_t errors_ = 0;

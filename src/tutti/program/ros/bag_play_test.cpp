@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstring>
 #include <filesystem>
 #include <thread>
 
@@ -12,6 +13,7 @@
 #include "support/intake/messages.hpp"
 #include "support/program/ros/loopback.hpp"
 #include "tutti/bags/bag_writer.hpp"
+#include "tutti/bags/ros_encode.hpp"
 
 namespace tutti::ros {
 namespace bag_play_test {
@@ -74,6 +76,32 @@ TEST_F(BagPlay, SeveralBagsComeInTheOrderOfTimeBelowANamespace) {
   EXPECT_EQ(taken(*tf).size(), 2U);
   EXPECT_GE(taken(*clock).size(), 2U);
   EXPECT_EQ(said_, "");
+}
+
+TEST_F(BagPlay, TheClockGoesOnWhereTheBagHasNoMessages) {
+  {
+    auto bag = bags::RosWriter::create((folder_ / "gap.mcap").string()).value();
+    for (const std::int64_t stamp : {kStart, kStart + 20 * kPeriod})
+      EXPECT_TRUE(bag.write("/odom", kOdometry, {stamp}, odometry(stamp)));
+    EXPECT_TRUE(bag.close());
+  }
+  const auto clock = me_->reader("/clock", "rosgraph_msgs/msg/Clock", test::kKeepAll, "").value();
+  const auto played = play({.bags = {(folder_ / "gap.mcap").string()}, .delay_s = 0.0, .rate = 4.0, .clock = true});
+  ASSERT_TRUE(played) << played.error().message;
+  const std::vector<std::string> said = taken(*clock);
+  EXPECT_GE(said.size(), 5U);  // 0.5 s of wall time: 20 on a machine with nothing else to do
+  EXPECT_EQ(said.front(), bags::encode_clock({kStart}));
+  std::int64_t before = 0;
+  for (const std::string& cdr : said) {
+    std::int32_t seconds = 0;
+    std::uint32_t rest = 0;
+    std::memcpy(&seconds, cdr.data() + 4, sizeof seconds);
+    std::memcpy(&rest, cdr.data() + 8, sizeof rest);
+    const std::int64_t now = 1'000'000'000LL * seconds + rest;
+    EXPECT_GT(now, before);
+    EXPECT_LE(now, kStart + 20 * kPeriod);
+    before = now;
+  }
 }
 
 TEST_F(BagPlay, OnlyTheTopicsThatAreAskedFor) {

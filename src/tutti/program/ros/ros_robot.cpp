@@ -96,7 +96,7 @@ class Robot final : public RosRobot {
   double last_odometry_s_ = 0.0, second_s_ = 0.0;
   bool is_silent_turn_ = true;
   int silent_turns_ = 0;  ///< In a row.
-  bool said_no_odometry_ = false;
+  bool said_no_odometry_ = false, odometry_came_ = false;
   Complaints complaints_;
   RobotTopics topics_;
   std::unique_ptr<RosImages> images_;  // null: none are wanted
@@ -252,6 +252,7 @@ void Robot::take(Reader* reader) {
       [&](const Message& message) {
         if (!client_) return;
         is_silent_turn_ = false;
+        odometry_came_ = odometry_came_ || reader == odometry_.get();
         client_->say(intake::RawMessage{reader->topic(), reader->type(), "cdr", message.cdr});
         hear();
       },
@@ -317,7 +318,8 @@ void Robot::look_for_odometry() {
   said_no_odometry_ = true;
   const Reader& reader = by_tf() ? *tf_ : *odometry_;
   const std::string otherwise = by_tf() ? fmt::format("there is no {} among its frames", options_.odometry_frames)
-                                        : "its publisher says nothing that can be taken";
+                                : odometry_came_ ? "its publisher says nothing that can be taken"
+                                                 : "its publisher has sent nothing yet";
   options_.say(Level::warning, fmt::format("no odometry on {} for {} s: {}", reader.topic(), options_.patience_s,
                                            why_silent(*participant_, reader, otherwise)));
 }

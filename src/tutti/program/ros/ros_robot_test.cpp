@@ -251,6 +251,12 @@ TEST_F(RosRobots, WhyThereIsNoOdometryIsReported) {
       << said();
 }
 
+TEST_F(RosRobots, APublisherThatHasSentNothingYetIsReportedSo) {
+  const auto odom = publisher("/alpha/odom", kOdometry);
+  start();
+  EXPECT_TRUE(is_said("no odometry on /alpha/odom for 0.2 s: its publisher has sent nothing yet")) << said();
+}
+
 TEST_F(RosRobots, AnotherTypeOrQosIsReported) {
   const auto wrong = publisher("/alpha/odom", "geometry_msgs/msg/PoseStamped");
   start();
