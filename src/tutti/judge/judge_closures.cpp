@@ -65,9 +65,11 @@ Optimum Optimiser::decide() const {
 Optimum Optimiser::searched(int least_support) const {
   Optimum best = settle(map_.searched, explain(least_support));
   for (int round = 0; round < kDecisions && lay_joint_anew(best);) ++round;
-  for (int round = 0; round < kDecisions && refuse_lone_witness(best);) ++round;
+  bool blames_odometry = true;
+  int refusals = 0;
+  while (refusals < kDecisions && refuse_lone_witness(best, blames_odometry)) ++refusals;
   ask_again(best);
-  for (int round = 0; round < kDecisions && lay_joint_anew(best);) ++round;
+  for (int round = 0; refusals > 0 && round < kDecisions && lay_joint_anew(best);) ++round;
   return best;
 }
 

@@ -67,8 +67,9 @@ class Optimiser {
   [[nodiscard]] Groups groups_of(Optimum& best) const;
   /// Takes back the group of closures at one pair of places that contradicts all the rest of the map most, if it does
   /// beyond chance: as a lone closure against odometry, a lone group is wrong itself. Where several contradict it, the
-  /// segment of odometry that fails all of them goes instead, if there is one. False if nothing changes.
-  [[nodiscard]] bool refuse_lone_witness(Optimum& best) const;
+  /// segment of odometry that fails all of them goes instead, if there is one; `blames_odometry` becomes false when
+  /// there is none, which is then not looked for again. False if nothing changes.
+  [[nodiscard]] bool refuse_lone_witness(Optimum& best, bool& blames_odometry) const;
   /// Takes in again each group of lone witnesses that the map, as it is now, can be made with: another group may have
   /// been wrong, and have made this one look so.
   void ask_again(Optimum& best) const;

@@ -81,12 +81,15 @@ Optimiser::Groups Optimiser::groups_of(Optimum& best) const {
   return out;
 }
 
-bool Optimiser::refuse_lone_witness(Optimum& best) const {
+bool Optimiser::refuse_lone_witness(Optimum& best, bool& blames_odometry) const {
   if (!is_usable(best)) return false;
   const Groups groups = groups_of(best);
   const auto worst = std::ranges::max_element(groups.misfits);
   if (worst == groups.misfits.end() || *worst <= groups.most) return false;
-  if (groups.contradicting() > 1 && disregard_segment(best, groups)) return true;
+  if (groups.contradicting() > 1 && blames_odometry) {
+    if (disregard_segment(best, groups)) return true;
+    blames_odometry = false;
+  }
   for (const std::size_t e : groups.edges[static_cast<std::size_t>(worst - groups.misfits.begin())]) {
     const std::size_t c = best.closure_of_edge[e - map_.odometry_edges];
     best.objections[c] = Objection::lone;
