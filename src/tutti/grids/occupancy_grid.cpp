@@ -10,6 +10,24 @@ namespace tutti::grids {
 
 std::size_t OccupancyGrid::count(Cell cell) const { return static_cast<std::size_t>(std::ranges::count(cells, cell)); }
 
+namespace {
+
+/// `text` as a YAML string in double quotes: unquoted, ` #` begins a comment and `: ` a mapping.
+std::string yaml_quoted(const std::string& text) {
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') quoted += '\\';
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x20 || byte == 0x7f)
+      quoted += fmt::format("\\x{:02x}", byte);
+    else
+      quoted += c;
+  }
+  return quoted + "\"";
+}
+
+}  // namespace
+
 Status write_nav2_map(const OccupancyGrid& grid, const std::string& yaml_path, const std::vector<std::string>& notes) {
   namespace fs = std::filesystem;
   const fs::path image = fs::path(yaml_path).replace_extension(".pgm");
@@ -28,7 +46,7 @@ Status write_nav2_map(const OccupancyGrid& grid, const std::string& yaml_path, c
   yaml += fmt::format(
       "image: {}\nmode: trinary\nresolution: {}\norigin: [{}, {}, 0]\nnegate: 0\noccupied_thresh: 0.65\n"
       "free_thresh: 0.196\n",
-      image.filename().string(), grid.resolution_m, grid.origin.x(), grid.origin.y());
+      yaml_quoted(image.filename().string()), grid.resolution_m, grid.origin.x(), grid.origin.y());
   return write_file(yaml_path, yaml);
 }
 
