@@ -386,6 +386,15 @@ class CommandLine(unittest.TestCase):
         self.expect(tutti("eval", self.path / "empty.tum", self.path / "none.tum"), 1)
         self.expect(tutti("optimise", self.path / "bad.g2o", "-o", self.path / "x.g2o"), 1, "bad.g2o:1")
 
+    def test_eval_gives_no_figure_below_three_pairs(self):
+        way = self.write_way("way.tum").read_text().splitlines(keepends=True)
+        for poses in (1, 2):
+            (self.path / "few.tum").write_text("".join(way[:poses]))
+            self.expect(tutti("eval", self.path / "few.tum", self.path / "way.tum"), 1,
+                        f"{poses} of {poses} poses of", "expected 3 or more")
+        (self.path / "few.tum").write_text("".join(way[:3]))
+        self.expect(tutti("eval", self.path / "few.tum", self.path / "way.tum"), 0)
+
     def write_way(self, name, bend_at=None, seconds=100, start=10.0):
         """A pose every 0.2 s along a way of 1 m/s; from `bend_at` seconds on it runs off to the left."""
         lines, x, y, heading = [], 0.0, 0.0, 0.0

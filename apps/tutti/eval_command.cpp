@@ -68,6 +68,13 @@ Result<Report> evaluate(const EvalOptions& options) {
         "overlapping times (--max-gap and --max-difference say how close)",
         options.estimate_path, seconds(estimate->front().stamp), seconds(estimate->back().stamp),
         options.reference_path, seconds(reference->front().stamp), seconds(reference->back().stamp));
+  // One pose lies on its reference after any alignment, and two nearly do: that error could not be anything but small.
+  constexpr std::size_t kLeastPairs = 3;
+  if (ate->pairs < kLeastPairs)
+    return fail(ErrorCode::invalid,
+                "{} of {} poses of {} pair up with {}, expected {} or more: the alignment fits fewer whatever they are "
+                "(--max-gap and --max-difference say how close in time a pair has to be)",
+                ate->pairs, estimate->size(), options.estimate_path, options.reference_path, kLeastPairs);
   auto rpe_time = evaluation::rpe_over_time(pairs, options.rpe_time_s);
   auto rpe_distance = evaluation::rpe_over_distance(pairs, options.rpe_distance_m);
   return Report{std::move(*estimate), std::move(*reference), *ate, rpe_time, rpe_distance};
@@ -198,7 +205,7 @@ void add_eval_command(CLI::App& app, int& exit_code) {
       "with\n"
       "it, do not read it as accuracy. For a mission's own map:\n"
       "  tutti eval --map OUT/map.ply OUT/survey.ply --report OUT/report.json\n\n"
-      "Exit code 0; 1 when a file is bad or no poses can be paired; 2 on wrong usage.");
+      "Exit code 0; 1 when a file is bad or fewer than 3 poses can be paired; 2 on wrong usage.");
   CLI::Option* map = command->add_flag("--map", options->map, "EST and REF are point clouds: a map and a survey");
   command->add_option("EST", options->estimate_path, "Trajectory, or map, to judge")->required()->type_name("FILE");
   command->add_option("REF", options->reference_path, "Ground truth, or the best there is; survey")
