@@ -48,7 +48,7 @@ struct ChangeOfMind {
 /// The watch is not stored, so after a restart of the server the first map is sent as it is.
 class ChangeWatch {
  public:
-  static constexpr double kNoticed = 1.0 / 3.0;  ///< Of consistency::MapChange::significance.
+  static constexpr double kNoticed = 1.0 / 3.0;  ///< In consistency::MapChange::significance.
   static constexpr double kAnyway_s = 20.0;
   static constexpr double kStands_s = 5.0;
   static constexpr double kWitness_s = 120.0;
