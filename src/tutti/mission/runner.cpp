@@ -94,7 +94,10 @@ class MissionRun {
       pace_.wait_until(time_s_);
       deliver();
       if (sample_s <= time_s_) replay();
-      if (next_timer() <= time_s_) update_map();
+      if (next_timer() <= time_s_) {
+        update_map();
+        deliver();  // what it asks workers for is answered now, and not at whatever happens next
+      }
       if (next_worker() <= time_s_) carry_out(*worker_port_, worker_.on_timer(now()));
       if (time_s_ < next_progress_s) continue;
       tell_progress();
