@@ -115,7 +115,7 @@ TEST_F(StateFolderTest, EventsComeBackInTheirOrderAndWithoutWhatAKillHasTorn) {
   fs::create_directories(folder_);
   {
     const auto log = EventLog::open(folder_, "test", Level::error).value();
-    log->write(node::Event{Timestamp{1'500'000'000}, node::MapUpdated{3, 20, 7}});
+    log->write(node::Event{Timestamp{1'500'000'000}, node::MapUpdated{3, 20, 7, 1.5, 12, true}});
   }
   std::ofstream(folder_ / "events.jsonl", std::ios::app) << R"({"time_s": 2, "even)";
   {
@@ -125,7 +125,9 @@ TEST_F(StateFolderTest, EventsComeBackInTheirOrderAndWithoutWhatAKillHasTorn) {
   std::vector<Json> events;
   ASSERT_TRUE(read_events(folder_, [&](const Json& event) { events.push_back(event); }).has_value());
   ASSERT_EQ(events.size(), 2U);
-  EXPECT_EQ(events[0].dump(), R"({"time_s":1.5,"event":"map_updated","revision":3,"submaps":20,"accepted":7})");
+  EXPECT_EQ(events[0].dump(),
+            R"({"time_s":1.5,"event":"map_updated","revision":3,"submaps":20,"accepted":7,"cost":1.5,)"
+            R"("degrees_of_freedom":12,"from_measurements":true})");
   EXPECT_EQ(events[1]["submap"], "1/2");
   EXPECT_FALSE(read_events(folder_ / "nowhere", [](const Json&) {}).has_value());
 }
