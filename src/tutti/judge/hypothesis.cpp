@@ -11,6 +11,7 @@
 
 #include "tutti/base/chi_square.hpp"
 #include "tutti/estimation/between_factor.hpp"
+#include "tutti/estimation/edge_roles.hpp"
 #include "tutti/estimation/truncated_least_squares.hpp"
 #include "tutti/geometry/so3.hpp"
 
@@ -82,8 +83,7 @@ HypothesisSolver::HypothesisSolver(const PoseGraph& graph, const OdometryTraject
       gnc_(gnc),
       limit_(chi_square_quantile(gnc.confidence, 6)),
       certain_(std::move(certain)) {
-  std::vector<estimation::EdgeRole> roles(graph.edges.size(), estimation::EdgeRole::robust);
-  std::fill_n(roles.begin(), odometry_edges, estimation::EdgeRole::trusted);
+  const std::vector<estimation::EdgeRole> roles = estimation::roles_of(graph, odometry_edges);
   reduced_ = estimation::reduce_chains(graph, roles);
   for (std::size_t e = odometry_edges; e < graph.edges.size(); ++e) closures_.push_back(*reduced_.edge[e]);
   for (std::size_t e = 0; e < reduced_.graph.edges.size(); ++e)

@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include "tutti/base/chi_square.hpp"
+#include "tutti/estimation/edge_roles.hpp"
 #include "tutti/estimation/switched_graph.hpp"
 
 namespace tutti::judge {
@@ -54,8 +55,7 @@ Settled settle_closures(const PoseGraph& graph, std::size_t odometry_edges, std:
                         const std::vector<bool>& certain, const OutlierRejectionConfig& config,
                         const estimation::SolverConfig& solver) {
   const std::size_t closures = in.size();
-  std::vector<estimation::EdgeRole> roles(graph.edges.size(), estimation::EdgeRole::robust);
-  std::fill_n(roles.begin(), odometry_edges, estimation::EdgeRole::trusted);
+  const std::vector<estimation::EdgeRole> roles = estimation::roles_of(graph, odometry_edges);
   estimation::SwitchedGraph switched(graph, roles, solver);
   std::vector<char> edges(graph.edges.size(), 1);
   std::vector<int> times_out(closures, 0);

@@ -15,8 +15,8 @@
 
 namespace tutti::mission {
 
-/// What a perfect judge's map (perfect_judge.hpp) errs by while a mission runs, so that an update which leaves a robot
-/// worse than its odometry can be told from one at which no judge of these closures could have done better. It makes a
+/// The error of a perfect judge's map (perfect_judge.hpp) while a mission runs: it tells an update which leaves a robot
+/// worse than its odometry from one at which no judge of these closures could have done better. It makes a
 /// map of its own for an update as long as all of them took at most kShare of the server's factorisations.
 class PerfectCourse {
  public:

@@ -11,6 +11,7 @@
 
 #include "tutti/consistency/change_of_mind.hpp"
 #include "tutti/consistency/signal.hpp"
+#include "tutti/estimation/edge_roles.hpp"
 #include "tutti/estimation/influence.hpp"
 #include "tutti/estimation/switched_graph.hpp"
 #include "tutti/judge/closure_groups.hpp"
@@ -108,8 +109,7 @@ ChangeSupport change_support(const MapEstimate& map, const Beliefs& followed_bel
   ChangeSupport out;
   const Groups groups = groups_to_try(map, followed_beliefs);
   if (groups.empty()) return out;
-  std::vector<estimation::EdgeRole> roles(map.graph.edges.size(), estimation::EdgeRole::robust);
-  std::fill_n(roles.begin(), map.odometry_edges, estimation::EdgeRole::trusted);
+  const std::vector<estimation::EdgeRole> roles = estimation::roles_of(map.graph, map.odometry_edges);
   const OwnNodes part = own_nodes(own, chain, map);
   const std::vector<double> first_order = first_order_moves(map, roles, groups, part);
   ++out.factorisations;

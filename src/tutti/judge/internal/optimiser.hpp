@@ -51,7 +51,8 @@ class Optimiser {
 
   /// What follows changes a map that is settled.
   [[nodiscard]] static bool is_usable(const Optimum& map);
-  /// What a map costs, with its closures' errors, what it refuses and what it disregards. The least is taken.
+  /// The cost of a map: its factors' errors, the closures it refuses and the odometry it disregards. The least is
+  /// taken.
   [[nodiscard]] double score(const Optimum& map) const;
   /// False where closures and odometry err by far more than they state: something wrong is believed.
   [[nodiscard]] bool is_plausible(const Optimum& map) const;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What an Optimiser asks again of a map that is settled.
+// An Optimiser's second questions to a map that is settled.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -8,6 +8,7 @@
 
 #include "tutti/base/disjoint_sets.hpp"
 #include "tutti/estimation/chain_reduction.hpp"
+#include "tutti/estimation/edge_roles.hpp"
 #include "tutti/estimation/influence.hpp"
 #include "tutti/judge/hypothesis.hpp"
 #include "tutti/judge/internal/optimiser.hpp"
@@ -35,6 +36,10 @@ constexpr int kSuspects = 3;
 constexpr double kLoose = 3.0;
 
 bool overlap(const FailedSegment& a, const FailedSegment& b) { return a.from < b.to && b.from < a.to; }
+
+bool has_failed(const Optimum& map, const FailedSegment& segment) {
+  return std::ranges::any_of(map.failed, std::bind_front(overlap, segment));
+}
 
 /// In place of what it was there before, if anything.
 void set_failed(Optimum& map, const FailedSegment& failed) {
@@ -70,14 +75,13 @@ Optimiser::Groups Optimiser::groups_of(Optimum& best) const {
   std::vector<std::size_t> closures;
   for (std::size_t k = 0; k < best.closure_of_edge.size(); ++k)
     if (!certain_[best.closure_of_edge[k]]) closures.push_back(map_.odometry_edges + k);
-  std::vector<estimation::EdgeRole> roles(best.graph.edges.size(), estimation::EdgeRole::robust);
-  std::fill_n(roles.begin(), map_.odometry_edges, estimation::EdgeRole::trusted);
   Groups out{.edges = closure_groups(map_.nodes, best.graph.edges, closures), .misfits = {}};
   std::erase_if(out.edges, [](const auto& group) { return group.size() < kLeastWitnesses; });
   out.most = most_paid(config_, out.edges.size());
   if (out.edges.empty()) return out;
   ++best.work.factorisations;
-  out.misfits = estimation::group_misfits(best.graph, best.solution.poses, roles, out.edges);
+  out.misfits = estimation::group_misfits(best.graph, best.solution.poses,
+                                          estimation::roles_of(best.graph, map_.odometry_edges), out.edges);
   return out;
 }
 
@@ -114,9 +118,8 @@ void Optimiser::ask_again(Optimum& best) const {
 }
 
 std::vector<Optimiser::Suspect> Optimiser::suspects(Optimum& best) const {
-  std::vector<estimation::EdgeRole> roles(best.graph.edges.size(), estimation::EdgeRole::robust);
-  std::fill_n(roles.begin(), map_.odometry_edges, estimation::EdgeRole::trusted);
-  const estimation::ReducedGraph reduced = estimation::reduce_chains(best.graph, roles);
+  const estimation::ReducedGraph reduced =
+      estimation::reduce_chains(best.graph, estimation::roles_of(best.graph, map_.odometry_edges));
   std::vector<Pose3> poses;
   for (const std::size_t node : reduced.nodes) poses.push_back(best.solution.poses[node]);
   std::vector<std::vector<std::size_t>> runs;
@@ -156,10 +159,9 @@ bool Optimiser::disregard_segment(Optimum& best, const Groups& groups) const {
   for (const Suspect& suspect : suspects(best)) {
     if (suspect.misfit <= worst || tried == kSuspects) break;
     const FailedSegment& segment = suspect.segment;
-    const bool is_known =
-        std::ranges::any_of(best.failed, [&](const FailedSegment& other) { return overlap(other, segment); });
     // In more time than a failure is looked for in, odometry can have missed anything.
-    if (is_known || odometry_.seconds(segment.to) - odometry_.seconds(segment.from) > config_.search_s) continue;
+    if (has_failed(best, segment) || odometry_.seconds(segment.to) - odometry_.seconds(segment.from) > config_.search_s)
+      continue;
     ++tried;
     auto with = with_failed(best, suspect);
     if (!with) continue;
@@ -198,8 +200,7 @@ std::optional<Optimum> Optimiser::laid(const Optimum& best, const WeakJoint& joi
     const std::vector<Pose3>& poses = best.solution.poses;
     failed.missed = local(odometry_.T(failed.from, failed.to),
                           poses[failed.from].inverse() * agreed.T_first_second * poses[failed.to]);
-    const bool is_known = std::ranges::any_of(best.failed, std::bind_front(overlap, failed));
-    if (is_known || !is_possible(odometry_, failed)) return std::nullopt;
+    if (has_failed(best, failed) || !is_possible(odometry_, failed)) return std::nullopt;
     set_failed(with, failed);
   }
   return with;

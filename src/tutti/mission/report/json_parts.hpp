@@ -19,7 +19,7 @@ constexpr int kReportFormat = 2;
 std::string dump(const Json& json);
 /// Rounded to 1 / per_unit, so that the shortest text that reads back the same is short; null unless finite.
 Json number(std::optional<double> value, double per_unit = 1e6);
-/// What a map costs, of how many degrees of freedom, and from which start it was solved (server::MapEstimate).
+/// The cost of a map, of how many degrees of freedom, and from which start it was solved (server::MapEstimate).
 Json optimum_json(double cost, std::size_t degrees_of_freedom, bool from_measurements);
 /// [x, y, z]
 Json vector_json(const Eigen::Vector3d& v);
