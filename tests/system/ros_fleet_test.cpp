@@ -17,6 +17,7 @@
 
 #include "support/bus/nats_network.hpp"
 #include "support/bus/nats_server.hpp"
+#include "support/lab/ros_programs.hpp"
 #include "support/program/ros/loopback.hpp"
 #include "tutti/bags/bag_reader.hpp"
 #include "tutti/bags/bag_writer.hpp"
@@ -141,36 +142,9 @@ std::vector<Eigen::Vector3d> points_of(const std::string& path, std::string& fra
   return out;
 }
 
-class RosFleet : public ::testing::TestWithParam<bool> {
+class RosFleet : public ::testing::TestWithParam<bool>, protected ros::test::Programs {
  protected:
-  void SetUp() override {
-    ros::test::loopback_domain();
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override {
-    children_.stop_all();
-    fs::remove_all(folder_);
-  }
-  void start(const std::string& name, std::vector<std::string> command) {
-    command.insert(command.begin(), TUTTI_PROGRAM);
-    ASSERT_TRUE(children_.start(name, command, folder_ / (name + ".txt")));
-  }
-  [[nodiscard]] std::string output_of(const std::string& name) const {
-    return name + ": " + read_file((folder_ / (name + ".txt")).string()).value_or("no output") + "\n";
-  }
-  std::string bus() {
-    const auto found = [&] {
-      const std::string output = output_of("server");
-      const std::size_t at = output.find("--bus ");
-      return at == std::string::npos ? "" : output.substr(at + 6, output.find(' ', at + 6) - at - 6);
-    };
-    EXPECT_TRUE(within(kPatience_s, [&] { return !found().empty(); })) << output_of("server");
-    return found();
-  }
-
-  const fs::path folder_ = fs::path(::testing::TempDir()) / ("ros_fleet_" + std::to_string(getpid()));
-  lab::Children children_;
+  RosFleet() : Programs("ros_fleet_", kPatience_s) {}
 };
 
 /// What one robot's stack has.
@@ -214,7 +188,7 @@ TEST_P(RosFleet, EveryPoseOfARobotIsOnAFreeCellOfItsGridAndInOneTree) {
   std::map<std::string, Buffer> buffers;
   std::vector<std::string> play{"bag", "play"};
   start("server", {"server", "--ros", "--map-period", "1", "--state", (folder_ / "server").string()});
-  const std::string bus = this->bus();
+  const std::string bus = bus_of("server");
   for (const std::string name : {"alpha", "bravo"}) {
     fs::path bag = folder_ / name;
     if (is_nav2) {

@@ -18,6 +18,7 @@
 
 #include "support/bus/nats_network.hpp"
 #include "support/bus/nats_server.hpp"
+#include "support/lab/ros_programs.hpp"
 #include "support/paths.hpp"
 #include "support/program/ros/loopback.hpp"
 #include "support/shared_data.hpp"
@@ -44,27 +45,9 @@ using ros::test::join_loopback, ros::test::kKeepAll, ros::test::taken, test::wit
 
 constexpr double kPatience_s = 60.0;  // a busy machine
 
-class Ros : public ::testing::Test {
+class Ros : public ::testing::Test, protected ros::test::Programs {
  protected:
-  void SetUp() override {
-    ros::test::loopback_domain();
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override {
-    children_.stop_all();
-    fs::remove_all(folder_);
-  }
-  void start(const std::string& name, std::vector<std::string> command, const std::vector<std::string>& more = {}) {
-    command.insert(command.begin(), TUTTI_PROGRAM);
-    command.insert(command.end(), more.begin(), more.end());
-    const Status started = children_.start(name, command, folder_ / (name + ".txt"));
-    ASSERT_TRUE(started) << started.error().message;
-  }
-
-  [[nodiscard]] std::string output_of(const std::string& name) const {
-    return name + ": " + read_file((folder_ / (name + ".txt")).string()).value_or("no output") + "\n";
-  }
+  Ros() : Programs("ros_", kPatience_s) {}
   /// All of them, each with exit code 0.
   bool have_ended(const std::vector<std::string>& names) {
     for (Status ended = children_.check(); !ended; ended = children_.check()) {
@@ -75,17 +58,6 @@ class Ros : public ::testing::Test {
       return std::ranges::any_of(ended_, [&](const std::string& end) { return end.starts_with(name + " has ended"); });
     });
   }
-  /// That a server has printed.
-  std::string bus_of(const std::string& server) {
-    const auto bus = [&] {
-      const std::string output = output_of(server);
-      const std::size_t at = output.find("--bus ");
-      return at == std::string::npos ? "" : output.substr(at + 6, output.find(' ', at + 6) - at - 6);
-    };
-    EXPECT_TRUE(within(kPatience_s, [&] { return !bus().empty(); })) << output_of(server);
-    return bus();
-  }
-
   /// A server whose state is in folder_/server has an answer for every pair, and a map with it, by a status that is
   /// written after this is asked. Robots end before that: what they sent is stored, and not yet looked at.
   [[nodiscard]] bool server_has_map() {
@@ -101,8 +73,6 @@ class Ros : public ::testing::Test {
   }
 
   std::vector<std::string> ended_;
-  const fs::path folder_ = fs::path(::testing::TempDir()) / ("ros_" + std::to_string(getpid()));
-  lab::Children children_;
 };
 
 /// Types are matched by name alone: what a real robot recorded must arrive in the very bytes.
