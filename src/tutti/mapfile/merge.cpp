@@ -29,7 +29,8 @@ using Choose = std::function<Result<std::string>(std::string_view key, std::stri
 /// and join_places() put.
 bool is_of_one_map(const std::string& table, std::string_view key) {
   return table == map_tables::kMeta &&
-         (key == node::kCountsKey || key.starts_with(node::kRefinementPrefix) || key.starts_with(node::kPlacePrefix));
+         (key == node::kCountsKey || key == node::kLastUpdateKey || key.starts_with(node::kRefinementPrefix) ||
+          key.starts_with(node::kPlacePrefix));
 }
 
 /// Rows of `a`, and those of `b`, into the table; counts the keys that are in both.

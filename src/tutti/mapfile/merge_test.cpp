@@ -156,7 +156,9 @@ TEST(Merge, TheRefinementsOfBothAreKeptAsThoseOfParts) {
   put(*a, refinement_of({kAlpha, 5}, 1, true, 0));
   put(*a, refinement_of({kAlpha, 5}, 2, false, 1));
   put(*b, refinement_of({kBravo, 6}, 1, true, 0));  // of the same revision as one of the first map
-  ASSERT_TRUE(a->commit(std::vector<Write>{node::to_row(node::MapCounts{.revision = 1, .closures = 77})}).has_value());
+  ASSERT_TRUE(a->commit(std::vector<Write>{node::to_row(node::MapCounts{.revision = 1, .closures = 77}),
+                                           node::to_row(node::LastUpdate{.begun = {5}, .cost_s = 3.0})})
+                  .has_value());
   MemoryStore both(storage::map_schema());
   ASSERT_TRUE(merge(*a, *b, both).has_value());
   const Content content = read(both).value();
@@ -169,6 +171,7 @@ TEST(Merge, TheRefinementsOfBothAreKeptAsThoseOfParts) {
             (std::vector<std::pair<ChainId, std::uint32_t>>{{{kAlpha, 5}, 0}, {{kAlpha, 5}, 1}, {{kBravo, 6}, 0}}));
   EXPECT_GE(content.meta.revision, content.refinements.all().rbegin()->first);
   EXPECT_EQ(content.counts, std::nullopt);  // no update has been made of the two
+  EXPECT_FALSE(node::read_last_update(both).value().has_value());
 }
 
 TEST(Merge, WhatEitherNeverTakesIsNotTaken) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/node/map_meta.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <utility>
@@ -43,6 +44,23 @@ Result<std::optional<MapCounts>> read_map_counts(const storage::TableStore& map)
   const auto numbers = storage::numbers_of(row->value_or(""), 4);
   if (!numbers) return std::nullopt;
   return MapCounts{(*numbers)[0], (*numbers)[1], (*numbers)[2], (*numbers)[3]};
+}
+
+storage::Write to_row(const LastUpdate& update) {
+  return {
+      map_tables::kMeta, std::string(kLastUpdateKey),
+      storage::key_of({std::bit_cast<std::uint64_t>(update.begun.ns), std::bit_cast<std::uint64_t>(update.cost_s)})};
+}
+
+Result<std::optional<LastUpdate>> read_last_update(const storage::TableStore& map) {
+  constexpr double kMost_s = 3600.0;
+  const auto row = map.read(map_tables::kMeta, kLastUpdateKey);
+  if (!row) return tl::unexpected(row.error());
+  const auto numbers = storage::numbers_of(row->value_or(""), 2);
+  if (!numbers) return std::nullopt;
+  const auto cost_s = std::bit_cast<double>((*numbers)[1]);
+  if (!(cost_s >= 0.0)) return std::nullopt;
+  return LastUpdate{{std::bit_cast<std::int64_t>((*numbers)[0])}, std::min(cost_s, kMost_s)};
 }
 
 storage::Write to_row(const server::ServerConfig& settings) {

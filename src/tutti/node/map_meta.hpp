@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "tutti/node/update_pacer.hpp"
 #include "tutti/server/map_server.hpp"
 #include "tutti/storage/map_tables.hpp"
 #include "tutti/storage/table_store.hpp"
@@ -38,6 +39,13 @@ struct MapCounts {
 storage::Write to_row(const MapCounts& counts);
 /// Nothing when no update was made, when the program that made it wrote no counts, or when the row cannot be read.
 Result<std::optional<MapCounts>> read_map_counts(const storage::TableStore& map);
+
+/// The row `update`: when the last update began, and what it cost, so that a server that starts again makes the next
+/// one when it would have made it.
+storage::Write to_row(const LastUpdate& update);
+/// Nothing when no update was made, when the program that made it wrote no such row, or when the row cannot be read. A
+/// cost of more than an hour counts as an hour, so that no file keeps a server from its next update.
+Result<std::optional<LastUpdate>> read_last_update(const storage::TableStore& map);
 
 /// The row `settings`: how the server judges closures, so that other readers of the map judge them alike.
 storage::Write to_row(const server::ServerConfig& settings);

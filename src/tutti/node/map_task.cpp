@@ -12,11 +12,11 @@ namespace tutti::node {
 MapOfTask make_map(MapTask task) {
   MapOfTask out{.made = server::make_map(std::move(task.job)),
                 .is_update = task.is_update,
-                .cost_s = 0.0,
+                .pace = {.begun = task.begun},
                 .broadcast = std::move(task.broadcast),
                 .step = {}};
   const server::MadeMap& made = out.made;
-  out.cost_s = server::counted_cost_s(made);
+  out.pace.cost_s = server::counted_cost_s(made);
   const auto lone = [&](const ChangeWatch::Map& followed, const ProxyGraph& own) {
     return server::change_support(made.map, *followed.beliefs, followed.own, own, own.nodes.front().chain,
                                   made.job.map.gnc.solver)

@@ -7,6 +7,7 @@
 #include "tutti/base/timestamp.hpp"
 #include "tutti/node/broadcast.hpp"
 #include "tutti/node/step.hpp"
+#include "tutti/node/update_pacer.hpp"
 #include "tutti/server/map_job.hpp"
 
 namespace tutti::node {
@@ -27,7 +28,7 @@ struct MapTask {
 struct MapOfTask {
   server::MadeMap made;
   bool is_update = false;
-  double cost_s = 0.0;  ///< Of CPU, for UpdatePacer: counted (server/update_cost.hpp), unless the host has measured it.
+  LastUpdate pace;  ///< Its cost is counted (server/update_cost.hpp), unless the host has measured it.
   Broadcast broadcast;
   Step step;  ///< What robots are sent of the map, and what is reported of that.
 };

@@ -7,6 +7,7 @@
 namespace tutti::node {
 
 inline constexpr std::string_view kCountsKey = "counts";              ///< MapCounts
+inline constexpr std::string_view kLastUpdateKey = "update";          ///< LastUpdate
 inline constexpr std::string_view kRefinementPrefix = "refinement/";  ///< refinement_key()
 inline constexpr std::string_view kPlacePrefix = "place/";            ///< place_of_row()
 /// Followed by a robot's number; its submaps that are refused for good.

@@ -29,7 +29,6 @@ std::optional<MapTask> ServerNode::begin_map(Timestamp now) {
   timer_.reset();
   compute_at_.reset();
   is_making_map_ = true;
-  pacer_.begin(now);
   const bool operator_decided = std::exchange(operator_decided_, false);
   MapTask task{.job = is_update ? server_.begin_update() : server_.begin_rebuild(),
                .is_update = is_update,
@@ -50,7 +49,10 @@ Step ServerNode::end_map(MapOfTask made, Timestamp now) {
   server_.finish(std::move(made.made), may_refine(now));
   broadcast_ = std::move(made.broadcast);
   last_broadcast_ = broadcast_.last();
-  pacer_.end(made.cost_s);
+  if (made.is_update) {
+    pacer_.end(made.pace);
+    step.writes.push_back(to_row(made.pace));
+  }
   is_making_map_ = false;
   has_map_ = true;
   ++changes_;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
 #include <set>
 #include <utility>
 #include <vector>
@@ -112,8 +113,8 @@ TEST_F(MapBeingMade, HasNewsUntilItIsThere) {
 
 TEST_F(MapBeingMade, WhatItCostKeepsTheNextBack) {
   MapOfTask made = make_map(std::move(*task_));
-  EXPECT_GT(made.cost_s, 0.0);  // counted
-  made.cost_s = 20.0;           // measured by the host
+  EXPECT_GT(made.pace.cost_s, 0.0);  // counted
+  made.pace.cost_s = 20.0;           // measured by the host
   const Timestamp begun = now_;
   now_ = now_ + 21.0;
   done(node_->end_map(std::move(made), now_));
@@ -125,6 +126,24 @@ TEST_F(MapBeingMade, WhatItCostKeepsTheNextBack) {
   now_ = now_ + 0.1;
   take_both(5);
   EXPECT_EQ(*node_->next_timer(), now_ + 0.4);  // what it has cost is counted again, and is little
+}
+
+TEST_F(MapBeingMade, AServerThatStartsAgainKeepsItsDistance) {
+  MapOfTask made = make_map(std::move(*task_));
+  made.pace.cost_s = 20.0;
+  const Timestamp begun = now_;
+  done(node_->end_map(std::move(made), now_));
+  now_ = now_ + 30.0;
+  start({RobotId{0}, RobotId{1}}, {});  // and makes the map that was there, which is no update
+  ASSERT_TRUE(node_->has_map());
+  take_both(4);
+  EXPECT_EQ(node_->next_timer(), begun + 80.0);
+  for (const double cost_s : {-1.0, std::numeric_limits<double>::quiet_NaN()}) {
+    ASSERT_TRUE(store_->commit(std::vector{to_row(LastUpdate{begun, cost_s})}).has_value());
+    EXPECT_FALSE(read_last_update(*store_).value().has_value());
+  }
+  ASSERT_TRUE(store_->commit(std::vector{to_row(LastUpdate{begun, 1e300})}).has_value());
+  EXPECT_EQ(read_last_update(*store_).value()->cost_s, 3600.0);
 }
 
 TEST_F(MapBeingMade, ARobotThatJoinsMeanwhileHearsOfTheNext) {

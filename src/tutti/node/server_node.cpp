@@ -67,6 +67,7 @@ ServerNode::ServerNode(std::set<RobotId> robots, std::shared_ptr<const server::C
       failed_(config.job_timeout_s, config.most_tries),
       refinements_(config.job_timeout_s, config.most_tries),
       had_news_(opened.news),
+      pacer_({config.server.update_least_s, config.server.update_share}, opened.last_update),
       stored_counts_(opened.counts) {
   if (config.refiner != nullptr) server_.refine_with(config.refiner);
 }

@@ -205,7 +205,7 @@ class ServerNode {
   std::uint64_t changes_ = 0;
   bool had_news_ = false;  // when the store was opened
   std::optional<Timestamp> timer_;
-  UpdatePacer pacer_{{config_.server.update_least_s, config_.server.update_share}};
+  UpdatePacer pacer_;
   std::optional<Timestamp> review_at_;   // when robots are sent the last map that they were not sent at once
   std::optional<Timestamp> compute_at_;  // when to compute the map that the store had when it was opened
   std::optional<MapCounts> stored_counts_;

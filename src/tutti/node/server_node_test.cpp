@@ -215,8 +215,9 @@ TEST_F(ServerNodeTest, GoesOnFromItsStoreAsIfNothingHadHappened) {
   receive(test::submap(kAlpha, 9));
   restart();
   EXPECT_TRUE(of_kind(resumed_, MessageKind::proxy_graph).empty());  // there is news: the next revision comes first
-  EXPECT_EQ(node_->next_timer(), Timestamp{} + 20.0);
+  EXPECT_EQ(node_->next_timer(), now_ + 0.5);  // after the update before the restart
   EXPECT_EQ(pairs_of(resumed_).size(), 8U);
+  now_ = now_ + 0.5;
   done(node_->on_timer(now_));
   EXPECT_EQ(node_->broadcast().age(), (std::pair<std::uint64_t, std::uint64_t>(1001, 2)));
 }
@@ -300,8 +301,9 @@ TEST_F(ServerNodeTest, AnOperatorsDecisionIsStoredAndSurvivesEveryRestart) {
     restart();
     ASSERT_EQ(node_->map_server().state().decisions.size(), 1U);
     EXPECT_EQ(node_->map_server().state().decisions.at(pair), (ClosureDecision{"0/0-1/2", Wish::reject, "ada", 5}));
-    ASSERT_EQ(node_->next_timer(), Timestamp{} + 20.0);  // the map has not followed yet
+    ASSERT_EQ(node_->next_timer(), now_ + 0.5);  // the map has not followed yet
   }
+  now_ = now_ + 0.5;
   done(node_->on_timer(now_));
   EXPECT_EQ(accepted(), all - 1);
   restart();
@@ -314,6 +316,7 @@ TEST_F(ServerNodeTest, AnOperatorsDecisionIsStoredAndSurvivesEveryRestart) {
   EXPECT_EQ(store_->tables(), before);
   receive(test::envelope(ClosureDecision{"1/2-0/0", Wish::withdraw, "ada", 6}));
   restart();
+  now_ = now_ + 0.5;
   done(node_->on_timer(now_));
   EXPECT_EQ(accepted(), all);
 }

@@ -6,10 +6,10 @@
 namespace tutti::node {
 
 Timestamp UpdatePacer::earliest(Timestamp now, bool operator_decided) {
-  if (!begun_) return now;
-  begun_ = std::min(*begun_, now);
-  const double wait_s = operator_decided ? limits_.least_s : std::max(limits_.least_s, cost_s_ / limits_.share);
-  return std::max(now, *begun_ + wait_s);
+  if (!last_) return now;
+  last_->begun = std::min(last_->begun, now);
+  const double wait_s = operator_decided ? limits_.least_s : std::max(limits_.least_s, last_->cost_s / limits_.share);
+  return std::max(now, last_->begun + wait_s);
 }
 
 }  // namespace tutti::node

@@ -17,15 +17,14 @@ const Timestamp kBegin = Timestamp{} + 1000.0;
 
 /// A server that gets news at these times, whose updates cost what `cost_s` says: when each began.
 std::vector<Timestamp> updates(const std::vector<Timestamp>& news, const std::function<double()>& cost_s,
-                               UpdatePacer pacer = UpdatePacer(kLimits)) {
+                               UpdatePacer pacer = UpdatePacer(kLimits, {})) {
   std::vector<Timestamp> out;
   Timestamp free_at;  // the last update is sent
   for (std::size_t i = 0; i < news.size();) {
     const Timestamp begins = pacer.earliest(std::max(news[i], free_at));
     while (i < news.size() && news[i] <= begins) ++i;  // it has all that has come by then
-    pacer.begin(begins);
     const double cost = cost_s();
-    pacer.end(cost);
+    pacer.end({begins, cost});
     free_at = begins + cost;
     out.push_back(begins);
   }
@@ -33,25 +32,22 @@ std::vector<Timestamp> updates(const std::vector<Timestamp>& news, const std::fu
 }
 
 TEST(UpdatePacer, NewsBeginsAnUpdateAtOnce) {
-  UpdatePacer pacer(kLimits);
-  EXPECT_EQ(pacer.earliest(kBegin), kBegin);  // the first, and after a restart
-  pacer.begin(kBegin);
-  pacer.end(0.01);
+  UpdatePacer pacer(kLimits, {});
+  EXPECT_EQ(pacer.earliest(kBegin), kBegin);  // the first
+  pacer.end({kBegin, 0.01});
   EXPECT_EQ(pacer.earliest(kBegin + 7.0), kBegin + 7.0);
 }
 
 TEST(UpdatePacer, NoTwoBeginWithinTheLeast) {
-  UpdatePacer pacer(kLimits);
-  pacer.begin(kBegin);
+  UpdatePacer pacer(kLimits, {});
+  pacer.end({kBegin, 0.01});
   EXPECT_EQ(pacer.earliest(kBegin), kBegin + 0.5);
-  pacer.end(0.01);
   EXPECT_EQ(pacer.earliest(kBegin + 0.1), kBegin + 0.5);
 }
 
 TEST(UpdatePacer, ALongUpdateKeepsTheNextBackByItsCost) {
-  UpdatePacer pacer(kLimits);
-  pacer.begin(kBegin);
-  pacer.end(3.0);
+  UpdatePacer pacer(kLimits, {});
+  pacer.end({kBegin, 3.0});
   EXPECT_EQ(pacer.earliest(kBegin + 3.0), kBegin + 12.0);
   EXPECT_EQ(pacer.earliest(kBegin + 3.0, true), kBegin + 3.0);  // an operator does not wait for that
   EXPECT_EQ(pacer.earliest(kBegin + 0.2, true), kBegin + 0.5);
@@ -59,9 +55,8 @@ TEST(UpdatePacer, ALongUpdateKeepsTheNextBackByItsCost) {
 }
 
 TEST(UpdatePacer, AClockThatStepsBackHoldsUpOneUpdateForItsWait) {
-  UpdatePacer pacer(kLimits);
-  pacer.begin(kBegin);
-  pacer.end(1.0);
+  UpdatePacer pacer(kLimits, {});
+  pacer.end({kBegin, 1.0});
   const Timestamp back = kBegin - 3600.0;
   EXPECT_EQ(pacer.earliest(back), back + 4.0);
   EXPECT_EQ(pacer.earliest(back + 1.0), back + 4.0);  // it is not put off again and again

@@ -43,7 +43,7 @@ Answer HostedServer::work(Timestamp now) {
     making_ = std::async(std::launch::async, [this, task = std::move(*task)]() mutable {
       const double begun_s = thread_cpu_s();
       node::MapOfTask made = make_map_(std::move(task));
-      made.cost_s = clock_.rate() * (thread_cpu_s() - begun_s);  // a mission's clock may be faster than the wall's
+      made.pace.cost_s = clock_.rate() * (thread_cpu_s() - begun_s);  // a mission's clock may be faster than the wall's
       return made;
     });
   if (node_->changes() != reported_changes_) answer.step.messages.push_back(mission_status(now));

@@ -111,6 +111,9 @@ Result<OpenedMap> OpenedMap::from(const storage::TableStore& store, MethodId ver
   auto counts = read_map_counts(store);
   if (!counts) return tl::unexpected(counts.error());
   opened.counts = *counts;
+  auto last_update = read_last_update(store);
+  if (!last_update) return tl::unexpected(last_update.error());
+  opened.last_update = *last_update;
   auto refinements = read_refinements(store);
   if (!refinements) return tl::unexpected(refinements.error());
   opened.state.refinements = std::move(*refinements);

@@ -28,6 +28,7 @@ struct OpenedMap {
   std::uint64_t start = 0;
   bool news = false;
   std::optional<MapCounts> counts;
+  std::optional<LastUpdate> last_update;
 
   static Result<OpenedMap> from(const storage::TableStore& store, MethodId verifier);
 
