@@ -25,13 +25,12 @@ namespace {
 
 using namespace tutti;
 
-/// The test that a robot makes of a broadcast, all of whose nodes of this chain it has. The first of a mission's
-/// comparisons has half of its false alarms: twice alpha gives this one all of alpha.
+/// The test that a robot makes of a broadcast, all of whose nodes of this chain it has.
 consistency::DisagreementTest robots_test(const ProxyGraph& graph, const ChainId& chain, double alpha) {
   std::vector<consistency::NodePair> pairs;
   for (std::size_t i = 0; i < graph.nodes.size(); ++i)
     if (graph.nodes[i].chain == chain) pairs.push_back({.proxy = i, .robot = pairs.size()});
-  return {graph, chain, pairs, 1, {.false_alarm_rate = 2.0 * alpha}};
+  return {graph, chain, pairs, {.false_alarm_rate = alpha}};
 }
 
 /// Draws of these nodes' errors (right tangents): (6 nodes) x count, other draws than the server's own.

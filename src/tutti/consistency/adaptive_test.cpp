@@ -28,7 +28,7 @@ struct Scene {
     const auto nodes = robot_nodes(integrate({}, increments), increments);
     const auto pairs = synchronise(graph, kAlpha, nodes).pairs;
     const auto policy = *make_policy(config, {});
-    const DisagreementTest test(graph, kAlpha, pairs, update, {});
+    const DisagreementTest test(graph, kAlpha, pairs, DisagreementConfig().for_run_of(pairs.size()));
     const Disagreement found = test(odometry_at(nodes, pairs));
     const auto selection = policy->choose({graph, kAlpha, nodes, pairs, ledger, &test, &found});
     return ledger.update(selection.constraints, selection.replaces_all);

@@ -27,7 +27,7 @@ MapChange map_change(const ProxyGraph& older, const ProxyGraph& newer, const Cha
     before.push_back(older.nodes[pair.proxy].T_world_body);
     after.push_back(nodes[pair.robot].T_map_body);
   }
-  const DisagreementTest test(older, chain, pairs, 1, {.false_alarm_rate = 2.0 * kThreeSigma});
+  const DisagreementTest test(older, chain, pairs, {.false_alarm_rate = kThreeSigma});
   out.significance = test(after).largest();
 
   const Eigen::MatrixXd moved = pose_difference(before, after);

@@ -61,16 +61,21 @@ double Disagreement::largest() const {
   return out;
 }
 
+DisagreementConfig DisagreementConfig::for_run_of(std::size_t nodes) const {
+  const double doublings = std::floor(std::log2(std::max(1.0, static_cast<double>(nodes) / 2.0)));
+  DisagreementConfig out = *this;
+  out.false_alarm_rate /= (doublings + 1.0) * (doublings + 2.0);
+  return out;
+}
+
 DisagreementTest::DisagreementTest(const ProxyGraph& graph, const ChainId& chain, std::span<const NodePair> pairs,
-                                   std::uint64_t update, const DisagreementConfig& config)
+                                   const DisagreementConfig& config)
     : uncertainty_(uncertainty_of(graph, chain)), config_(config) {
-  TUTTI_CHECK(update > 0 && pairs.size() >= 2, "update {}, {} pairs", update, pairs.size());
+  TUTTI_CHECK(pairs.size() >= 2, "{} pairs", pairs.size());
   const std::span<const ProxyNode> nodes = nodes_of(graph, chain);
   const auto first = static_cast<std::size_t>(nodes.data() - graph.nodes.data());
   for (const ProxyNode& node : nodes) server_.push_back(node.T_world_body);
   for (const NodePair& pair : pairs) ranks_.push_back(pair.proxy - first);
-  const double doublings = std::floor(std::log2(static_cast<double>(update)));
-  rate_ = config.false_alarm_rate / ((doublings + 1.0) * (doublings + 2.0));
   if (uncertainty_ == nullptr) return;
   if (uncertainty_->scales.size() >= 2) {
     laplacian_ = internal::chain_laplacian(graph, chain);
@@ -103,8 +108,9 @@ void DisagreementTest::measure_scales(const MatrixXd& W, Disagreement& out) cons
       std::ranges::count_if(uncertainty_->scales, [](const ScaleUncertainty& scale) { return !scale.sigma.empty(); }));
   const auto n = static_cast<Index>(server_.size());
   const double tests = 2.0 * std::max(1.0, tested);
-  const double local = kFewSamples * std::sqrt(chi_square_exceeded_with(
-                                         rate_ * kCoefficientsShare / (tests * static_cast<double>(n)), 3.0));
+  const double local =
+      kFewSamples * std::sqrt(chi_square_exceeded_with(
+                        config_.false_alarm_rate * kCoefficientsShare / (tests * static_cast<double>(n)), 3.0));
   MatrixXd metres(n, scales()), radians(n, scales()), significance = MatrixXd::Zero(n, scales());
   for (int s = 0; s < scales(); ++s) {
     metres.col(s) = W.middleCols<3>(6 * s).rowwise().norm();
@@ -149,7 +155,7 @@ double DisagreementTest::measure_directions(std::span<const Pose3> robot) const 
     largest = std::max(largest, square);
   }
   const auto count = static_cast<double>(directions.size());
-  const double rate = rate_ * kDirectionsShare;
+  const double rate = config_.false_alarm_rate * kDirectionsShare;
   return std::sqrt(
       std::max(squares / chi_square_exceeded_with(rate, count), largest / chi_square_exceeded_with(rate / count, 1.0)));
 }

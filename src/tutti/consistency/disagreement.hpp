@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <cstddef>
-#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
@@ -21,6 +20,12 @@ namespace tutti::consistency {
 struct DisagreementConfig {
   double false_alarm_rate = 0.01;
   std::string without = "nothing";
+
+  /// For one comparison of a mission, with so many synchronised nodes: its share of the mission's false alarms.
+  /// Comparisons while a run doubles in length see much the same, however often the map changes meanwhile, and count as
+  /// one: doubling k = 1, 2, ... has the share 1 / (k (k + 1)), which sums to 1 over a run of any length. It follows
+  /// from the nodes alone, so that whoever compares the same two finds the same (docs/math.md).
+  [[nodiscard]] DisagreementConfig for_run_of(std::size_t nodes) const;
 
   template <class V>
   void describe(V& v) {
@@ -52,14 +57,12 @@ struct Disagreement {
 ///
 /// Half of the false-alarm rate is for single coefficients (chi distribution, 3 degrees of freedom), which detect local
 /// differences. The other half is for the directions (chi-square of all, and each one alone), which detect that a robot
-/// has not returned to where closures say it has. Updates are grouped into comparisons, because updates while a run
-/// doubles in length see much the same: comparison k = 1, 2, ... has the share 1 / (k (k + 1)) of the rate, which sums
-/// to 1 over a mission of any length (docs/math.md).
+/// has not returned to where closures say it has.
 class DisagreementTest {
  public:
-  /// `pairs` are the chain's synchronised nodes in time order, at least two. `update` counts from 1. Keeps a pointer
-  /// into `graph`, which must outlive the test.
-  DisagreementTest(const ProxyGraph& graph, const ChainId& chain, std::span<const NodePair> pairs, std::uint64_t update,
+  /// `pairs` are the chain's synchronised nodes in time order, at least two. The rate of `config` is of this one test.
+  /// Keeps a pointer into `graph`, which must outlive the test.
+  DisagreementTest(const ProxyGraph& graph, const ChainId& chain, std::span<const NodePair> pairs,
                    const DisagreementConfig& config);
 
   /// The server has sent the uncertainty of this chain. Otherwise nothing disagrees.
@@ -82,7 +85,6 @@ class DisagreementTest {
   std::vector<Pose3> server_;       ///< All nodes of the chain.
   std::vector<std::size_t> ranks_;  ///< Positions of the synchronised nodes in server_.
   const ChainUncertainty* uncertainty_;
-  double rate_;  ///< False-alarm rate of this comparison.
   DisagreementConfig config_;
   spectral::SparseMatrix laplacian_;
   std::unique_ptr<spectral::WaveletFilter> filter_;

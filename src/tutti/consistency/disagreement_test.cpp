@@ -33,8 +33,8 @@ struct Scene {
     for (std::size_t n = 0; n < server.size(); ++n) pairs.push_back({others.size() + n, n});
     graph.uncertainties = {map.uncertainty(graph, test::kBravo)};
   }
-  [[nodiscard]] DisagreementTest test_with(const DisagreementConfig& config = {}, std::uint64_t update = 1) const {
-    return {graph, test::kBravo, pairs, update, config};
+  [[nodiscard]] DisagreementTest test_with(const DisagreementConfig& config = {}) const {
+    return {graph, test::kBravo, pairs, config};
   }
 };
 
@@ -59,7 +59,7 @@ TEST(DisagreementTest, DrawsOfTheMapsOwnErrorsPass) {
   const std::vector<Kind> maps = kinds();
   for (const auto& [name, map] : maps) {
     const Scene scene(map);
-    const DisagreementTest test = scene.test_with({.false_alarm_rate = 0.02});  // first comparison: half of it
+    const DisagreementTest test = scene.test_with();
     int here = 0;
     for (int draw = 0; draw < draws; ++draw)
       here += test(map.displace(scene.server, Rng(5).fork(static_cast<std::uint64_t>(draw)))).disagrees() ? 1 : 0;
@@ -116,13 +116,21 @@ TEST(DisagreementTest, DirectionsFindWhatOnlyClosuresKnow) {
   EXPECT_EQ(scene.test_with({.without = "directions"})(segmented).direction_significance, 0.0);
 }
 
-TEST(DisagreementTest, ComparisonsShareTheRate) {
+TEST(DisagreementTest, ComparisonsOfARunOfAnyLengthShareTheRate) {
   const Scene scene(usual_map());
   const auto robot = usual_map().displace(scene.server, Rng(2));
-  const double first = scene.test_with({}, 1)(robot).largest();
-  EXPECT_GT(first, scene.test_with({}, 2)(robot).largest());
-  EXPECT_EQ(scene.test_with({}, 2)(robot).largest(), scene.test_with({}, 3)(robot).largest());
-  EXPECT_LT(first, scene.test_with({.false_alarm_rate = 0.3}, 1)(robot).largest());
+  const auto largest = [&](const DisagreementConfig& config) { return scene.test_with(config)(robot).largest(); };
+  EXPECT_GT(largest({}), largest(DisagreementConfig().for_run_of(kNodes)));
+  EXPECT_LT(largest({}), largest({.false_alarm_rate = 0.3}));
+  double sum = 0.0, before = 1.0;
+  for (std::size_t nodes = 2; nodes < 1'000'000; nodes *= 2) {
+    const double rate = DisagreementConfig().for_run_of(nodes).false_alarm_rate;
+    EXPECT_LT(rate, before);
+    EXPECT_EQ(DisagreementConfig().for_run_of(2 * nodes - 1).false_alarm_rate, rate);
+    sum += rate, before = rate;
+  }
+  EXPECT_LT(sum, 0.01);
+  EXPECT_GT(sum, 0.009);
 }
 
 TEST(DisagreementTest, ARobotMayLackNodes) {

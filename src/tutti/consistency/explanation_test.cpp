@@ -46,7 +46,7 @@ Scene scene(std::uint64_t seed, double slide_m, double stated = 1.0) {
   return out;
 }
 Explanation explained(const Scene& s) {
-  const DisagreementTest test(s.graph, test::kBravo, s.pairs, 1, {});
+  const DisagreementTest test(s.graph, test::kBravo, s.pairs, {});
   return explain(s.graph, test::kBravo, s.nodes, s.pairs, test, test(odometry_at(s.nodes, s.pairs)), 0.01);
 }
 

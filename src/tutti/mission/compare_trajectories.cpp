@@ -204,7 +204,7 @@ Result<TrajectoryComparison> compare_trajectories(const NamedTrajectory& a, cons
   const ProxyGraph graph = proxy_graph(nodes, out.spacing_m, config);
   const auto robot = robot_nodes(b, nodes, config);
   const std::vector<consistency::NodePair> pairs = consistency::synchronise(graph, kRobot, robot).pairs;
-  const consistency::DisagreementTest test(graph, kRobot, pairs, 1, {.false_alarm_rate = config.false_alarm_rate});
+  const consistency::DisagreementTest test(graph, kRobot, pairs, {.false_alarm_rate = config.false_alarm_rate});
   const consistency::Disagreement found = test(consistency::odometry_at(robot, pairs));
   const consistency::Ledger nothing_held;
   const auto choose = [&](double error_share) {

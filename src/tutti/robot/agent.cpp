@@ -168,7 +168,7 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, const StageO
   consistency::Disagreement odometry_disagreement;
   ++state_.comparisons;
   if (pairs.size() >= 2 && (config_.explain || policy_->needs_test())) {
-    test.emplace(graph, chain_, pairs, state_.comparisons, config_.disagreement);
+    test.emplace(graph, chain_, pairs, config_.disagreement.for_run_of(pairs.size()));
     odometry_disagreement = (*test)(consistency::odometry_at(own, pairs));
   }
   const std::size_t withdrawn = state_.ledger.withdraw_unknown(graph, chain_);

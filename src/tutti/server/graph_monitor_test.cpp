@@ -100,8 +100,9 @@ TEST(MonitorGraph, AGapNearTheStartLeavesTheLargerSegment) {
   ASSERT_EQ(graph.components.size(), 2U);
   EXPECT_EQ(graph.components[0].component, 1U);  // component 0 is the segment left out
   // Closures join the segments: both are sent.
-  const ProxyGraph joined =
-      monitor_graph(estimate_map(submaps, verdicts_of(submaps, test::TestVerifier(1)), {}), 2, {});
+  const ProxyGraph joined = monitor_graph(estimate_map(submaps, verdicts_of(submaps, test::TestVerifier(1)),
+                                                       {.outlier_rejection = {.min_joining_closures = 2}}),
+                                          2, {});
   EXPECT_EQ(std::ranges::count_if(joined.nodes, [](const ProxyNode& n) { return n.chain.robot == RobotId{0}; }),
             36 + 6);
   ASSERT_EQ(joined.uncertainties.size(), 2U);
@@ -291,7 +292,7 @@ void add_errors(const ProxyGraph& graph, const ChainUncertainty& u, Calibration&
   const auto nodes = static_cast<double>(off.rows());
   out.whole_m.add(off.leftCols<3>().squaredNorm() / nodes / std::pow(u.whole.position_m, 2));
   out.whole_rad.add(off.rightCols<3>().squaredNorm() / nodes / std::pow(u.whole.rotation_rad, 2));
-  const consistency::DisagreementTest test(graph, u.chain, robot.pairs, 1, {.false_alarm_rate = 0.02});
+  const consistency::DisagreementTest test(graph, u.chain, robot.pairs, {.false_alarm_rate = 0.01});
   const consistency::Disagreement found = test(robot.truth);
   ++out.robots;
   out.rejected += found.disagrees() ? 1 : 0;

@@ -126,7 +126,7 @@ inline LoopResult run_closed_loop(const Mission& mission, const LoopConfig& conf
     std::optional<DisagreementTest> test;
     Disagreement found;
     if (pairs.size() >= 2) {
-      test.emplace(graph, kAlpha, pairs, out.updates, DisagreementConfig{});
+      test.emplace(graph, kAlpha, pairs, DisagreementConfig().for_run_of(pairs.size()));
       found = (*test)(odometry_at(nodes, pairs));
     }
     const auto selection = policy.choose({graph, kAlpha, nodes, pairs, ledger, test ? &*test : nullptr, &found});

@@ -53,7 +53,7 @@ Scene scene(std::uint64_t seed, const std::vector<Failure>& failures) {
 std::vector<DriftSegment> segments(const Scene& s) {
   std::vector<NodePair> pairs;
   for (std::size_t n = 0; n < kNodes; ++n) pairs.push_back({n, n});
-  const DisagreementTest test(s.graph, test::kAlpha, pairs, 1, {});
+  const DisagreementTest test(s.graph, test::kAlpha, pairs, {});
   std::vector<double> lengths_m;
   for (int scale = 0; scale < test.scales(); ++scale) lengths_m.push_back(test.scale_length_m(scale));
   return drift_segments(s.chain, lengths_m, &s.graph.uncertainties[0], kRate);

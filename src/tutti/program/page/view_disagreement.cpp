@@ -32,7 +32,7 @@ struct Comparison {
       : graph(consistency::without_doubted(consistency::own_part(map.broadcast, chain.robot), chain)),
         nodes(robot_nodes(map.content.submaps, chain)),
         pairs(consistency::synchronise(graph, chain, nodes).pairs) {
-    if (pairs.size() >= 2) test.emplace(graph, chain, pairs, std::max<std::uint64_t>(1, map.revision), kConfig);
+    if (pairs.size() >= 2) test.emplace(graph, chain, pairs, kConfig.for_run_of(pairs.size()));
   }
   Comparison(const Comparison&) = delete;
   Comparison& operator=(const Comparison&) = delete;
