@@ -158,16 +158,22 @@ bool JointClosureVerifier::is_candidate(const Submap& first, const Submap& secon
 Result<ClosureVerdict> JointClosureVerifier::verify(const Submap& first, const Submap& second,
                                                     const server::PayloadStore& payloads) const {
   ClosureVerdict out{.pair = {first.id, second.id}, .verifier = id()};
+  int sensors = 0;
   for (const auto& verifier : verifiers_) {
     if (!verifier->is_candidate(first, second)) continue;
     auto verdict = verifier->verify(first, second, payloads);
     if (!verdict) return verdict;
+    sensors += verdict->closures.empty() ? 0 : 1;
     std::ranges::move(verdict->closures, std::back_inserter(out.closures));
     std::ranges::move(verdict->evidence, std::back_inserter(out.evidence));
     // "Too small" only means that a submap has no payload of this kind: any other reason takes its place.
     if (!out.refusal || out.refusal->reason == RefusalReason::too_small) out.refusal = verdict->refusal;
   }
   if (!out.closures.empty()) out.refusal.reset();
+  // All sensors' closures of a pair have the errors of the same submaps' odometry, which laid out what each has seen.
+  // How much of their errors that is, is not known: together they are no surer than their mean (covariance
+  // intersection).
+  for (LoopClosure& closure : out.closures) closure.measurement.covariance *= std::max(1, sensors);
   return out;
 }
 

@@ -77,7 +77,8 @@ class VisualClosureVerifier final : public server::ClosureVerifier {
   mutable FeatureCache<visual::SubmapFeatures> cache_;
 };
 
-/// Combines several verifiers, one per kind of payload: each pair is compared by every verifier that can. Robots with
+/// Combines several verifiers, one per kind of payload: each pair is compared by every verifier that can, and where
+/// several find closures, each counts for its share. Robots with
 /// different sensors are joined through robots that carry both kinds. A place is what every verifier that can compare
 /// its submap computes of it; each ranks by its own part, as the sensor of its number. A place that one of them cannot
 /// describe is unknown.

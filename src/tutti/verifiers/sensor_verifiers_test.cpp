@@ -105,6 +105,28 @@ TEST(LidarClosureVerifier, FindsTheSameWhateverItKeeps) {
   }
 }
 
+TEST(SensorVerifiers, WhatSeveralSensorsFindOfAPairIsNoSurerThanWhatOneFinds) {
+  Rooms rooms(4);
+  const auto lidar = std::make_shared<LidarClosureVerifier>(lidar::LidarClosureConfig{}, 1, kMuch);
+  const auto visual = std::make_shared<VisualClosureVerifier>(visual::VisualClosureConfig{}, 1, kMuch);
+  const JointClosureVerifier one({lidar, visual}), twice({lidar, lidar});
+  std::size_t closed = 0;
+  for (std::size_t k = 1; k < rooms.submaps.size(); ++k) {
+    const auto verified = [&](const server::ClosureVerifier& verifier) {
+      return verifier.verify(rooms.submaps[0], rooms.submaps[k], rooms.store)->closures;
+    };
+    const auto alone = verified(*lidar), both = verified(twice);
+    EXPECT_EQ(verified(one), alone);  // nothing was seen by cameras
+    ASSERT_EQ(both.size(), 2 * alone.size());
+    if (alone.empty()) continue;
+    ++closed;
+    Matrix6d information = Matrix6d::Zero();
+    for (const LoopClosure& closure : both) information += closure.measurement.covariance.inverse();
+    EXPECT_TRUE(information.isApprox(alone.front().measurement.covariance.inverse(), 1e-6));
+  }
+  EXPECT_GT(closed, 0U);
+}
+
 TEST(SensorVerifiers, DescribeThePlacesAppearanceFromAbove) {
   Rooms rooms(2);
   Submap seen = rooms.submaps[0];
