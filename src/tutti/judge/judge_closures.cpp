@@ -18,9 +18,6 @@
 namespace tutti::judge {
 namespace {
 
-/// What failed odometry missed is measured; that it was this much more is as likely as not.
-constexpr double kDoubt = 2.0;
-
 /// How often what the search decided is decided otherwise, of each kind.
 constexpr int kDecisions = 5;
 
@@ -151,8 +148,8 @@ Optimum Optimiser::settle(const PoseGraph& odometry, Optimum out) const {
   out.closure_of_edge.clear();
   out.solution = {};
   for (const FailedSegment& segment : out.failed)
-    weaken(out.graph, map_.odometry_edges, segment.from, segment.to, kDoubt * segment.missed.head<3>().norm(),
-           kDoubt * segment.missed.tail<3>().norm());
+    weaken(out.graph, map_.odometry_edges, segment.from, segment.to, segment.missed.head<3>().norm(),
+           segment.missed.tail<3>().norm());
   PoseGraph all = with_room(out.graph);
   std::vector<std::size_t> asked;
   std::vector<char> in;

@@ -21,7 +21,7 @@ struct OutlierRejectionConfig {
   int candidate_groups = 3;  ///< Number of groups of neighbouring closures, the largest first, that are tried as wrong
                              ///< all together; each must explain more than least_votes.
   int most_refused_groups = 5;   ///< Limit on the groups that are refused so.
-  int min_joining_closures = 2;  ///< Fewer closures do not join two segments of odometry.
+  int min_joining_closures = 3;  ///< Fewer closures do not join two segments of odometry.
   /// Windows of failed odometry that were not needed are looked for as long as fewer hypotheses than the first were
   /// tried, or than have so many nodes together. Where a large map has failures in many places, some of these windows
   /// stay: what lies in them is known less well.

@@ -11,8 +11,6 @@
 namespace tutti::judge {
 namespace {
 
-/// Closures that are too dear go at once if they cost this share of what the dearest does.
-constexpr double kDearest = 0.5;
 /// A closure that went so often does not come again.
 constexpr int kTimesOut = 2;
 /// A closure of a small map is judged by what it may cost in one of so many: a drive's only loop tells as much of its
@@ -24,20 +22,19 @@ constexpr int kRounds = 30;
 /// Which closures are in next, by their prices.
 std::vector<char> next_round(const Settled& now, const std::vector<bool>& certain, double limit,
                              std::vector<int>& times_out) {
-  // A wrong closure makes its right neighbours dear, so the dearest go first, alone.
-  double dearest = limit;
-  for (std::size_t c = 0; c < now.in.size(); ++c)
-    if (now.in[c] != 0 && !certain[c]) dearest = std::max(dearest, now.prices[c].paid);
-  const bool any_too_dear = dearest > limit;
+  // Right neighbours of a wrong closure may go with it, and come again without it.
+  const auto is_too_dear = [&](std::size_t c) { return now.in[c] != 0 && !certain[c] && now.prices[c].paid > limit; };
   std::vector<char> next = now.in;
+  bool any_goes = false;
   for (std::size_t c = 0; c < next.size(); ++c) {
-    if (certain[c]) continue;
-    const double paid = now.prices[c].paid;
-    const bool goes = next[c] != 0 && any_too_dear && paid > std::max(limit, kDearest * dearest);
-    const bool comes = next[c] == 0 && !any_too_dear && paid <= limit && times_out[c] < kTimesOut;
-    times_out[c] += goes ? 1 : 0;
-    if (goes || comes) next[c] = comes ? 1 : 0;
+    if (!is_too_dear(c)) continue;
+    any_goes = true;
+    next[c] = 0;
+    ++times_out[c];
   }
+  if (any_goes) return next;
+  for (std::size_t c = 0; c < next.size(); ++c)
+    if (next[c] == 0 && !certain[c] && now.prices[c].paid <= limit && times_out[c] < kTimesOut) next[c] = 1;
   return next;
 }
 
