@@ -7,6 +7,7 @@
 
 #include "support/paths.hpp"
 #include "support/sanitized.hpp"
+#include "support/server/optimum.hpp"
 #include "tutti/lab/run_mission.hpp"
 #include "tutti/mission/report/report.hpp"
 #include "tutti/mission/view_recorder.hpp"
@@ -29,7 +30,7 @@ lab::MissionConfig small_mission() {
 }
 
 MissionRecord run(const lab::MissionConfig& config, std::uint64_t seed = 1, int threads = 1) {
-  auto record = lab::run_mission(config, {.seed = seed, .threads = threads});
+  auto record = lab::run_mission(config, {.seed = seed, .threads = threads, .updated = server::test::expect_optimum});
   EXPECT_TRUE(record.has_value()) << record.error().message;
   return record ? *record : MissionRecord{};
 }

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "support/bags/robot_bag.hpp"
+#include "support/server/optimum.hpp"
 #include "support/shared_data.hpp"
 #include "tutti/formats/kitti.hpp"
 #include "tutti/formats/trajectory_file.hpp"
@@ -26,7 +27,8 @@ lab::MissionConfig mission_file(const std::string& name) {
 }
 
 MissionRecord run(const lab::MissionConfig& config, std::uint64_t seed) {
-  auto record = lab::run_mission(config, {.data = test::shared_path("data"), .seed = seed});
+  auto record = lab::run_mission(
+      config, {.data = test::shared_path("data"), .seed = seed, .updated = server::test::expect_optimum});
   EXPECT_TRUE(record.has_value()) << record.error().message;
   return record ? *record : MissionRecord{};
 }

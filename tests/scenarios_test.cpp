@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "support/server/optimum.hpp"
 #include "support/shared_data.hpp"
 #include "tutti/evaluation/association.hpp"
 #include "tutti/evaluation/ate.hpp"
@@ -26,7 +27,8 @@ lab::MissionConfig scenario(const std::string& name, const std::vector<std::stri
 }
 
 MissionRecord run(const lab::MissionConfig& config, std::uint64_t seed = 1) {
-  auto record = lab::run_mission(config, {.data = test::shared_path("data"), .seed = seed, .threads = 1});
+  auto record = lab::run_mission(
+      config, {.data = test::shared_path("data"), .seed = seed, .threads = 1, .updated = server::test::expect_optimum});
   EXPECT_TRUE(record.has_value()) << record.error().message;
   return record ? *record : MissionRecord{};
 }

@@ -234,9 +234,11 @@ class MissionRun {
     const server::MapServer& server = server_->map_server();
     if (const auto check = check_closures(server.map(), recordings, config_.association, config_.closure_check))
       events_.set_wrong(check->wrong);
-    if (const std::uint64_t revision = server.state().revision; std::exchange(judged_revision_, revision) != revision)
+    if (const std::uint64_t revision = server.state().revision; std::exchange(revision_, revision) != revision) {
+      if (options_.updated) options_.updated(server);
       perfect_.update(server, server_->broadcast(), config_.server.map, recordings, config_.association,
                       config_.closure_check);
+    }
     if (server_->has_map() && view_.wants(time_s_)) view_.take(shown_map(), status());
     server_latency_ms_ = std::max(server_latency_ms_, pace_.late_ms(time_s_));
   }
@@ -292,7 +294,7 @@ class MissionRun {
   std::vector<Robot> robots_;  // by RobotId
   MissionEvents events_;
   PerfectCourse perfect_;
-  std::uint64_t judged_revision_ = 0;
+  std::uint64_t revision_ = 0;
   double time_s_ = 0.0;
   double duration_s_ = 0.0;
   double server_latency_ms_ = 0.0;

@@ -46,6 +46,8 @@ struct RunOptions {
   std::string version;         ///< Version of the program, for the report.
   std::string settings_yaml;   ///< Settings to show in the report; empty: those of the configuration.
   std::function<void(const Progress&)> progress;
+  /// Called after every update of the map.
+  std::function<void(const server::MapServer&)> updated;
   /// Called with the server's store when the mission is over.
   std::function<Status(const storage::TableStore&)> keep_map;
 };
