@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # The page of web/: types, unit tests in Node, that web/dist is what the sources make, and a headless Chromium that drives it.
 # Skips, and reports it, without what it needs; without an option it installs Chromium and Node where they are missing.
-#   scripts/test_web.sh [--write | --quick | --chromium | --programs TUTTI]
+#   scripts/test_web.sh [--write | --quick | --chromium | --programs TUTTI | --log-in TUTTI]
 # --write: renews web/dist instead of comparing it; --quick: no Chromium; --chromium: nothing else;
-# --programs: Chromium drives the page of this program instead of a made-up mission. The last three install no packages.
+# --programs: Chromium drives the page of this program instead of a made-up mission; --log-in: the
+# same with credentials. The last four install no packages.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
@@ -14,7 +15,7 @@ missing=()
 [ "$mode" = --quick ] || command -v chromium >/dev/null || missing+=(chromium)
 command -v npm >/dev/null || missing+=(nodejs npm)
 if [ "${#missing[@]}" -gt 0 ]; then
-  case "$mode" in --quick | --chromium | --programs) skip "missing: ${missing[*]}" ;; esac
+  case "$mode" in --quick | --chromium | --programs | --log-in) skip "missing: ${missing[*]}" ;; esac
   [ "$(id -u)" = 0 ] || skip "not root, and missing: ${missing[*]}"
   say "packages: ${missing[*]}"
   export DEBIAN_FRONTEND=noninteractive
@@ -36,9 +37,11 @@ if grep -q '"resolved"' package-lock.json; then
   exit 1
 fi
 
-if [ "$mode" = --programs ]; then
+if [ "$mode" = --programs ] || [ "$mode" = --log-in ]; then
   PATH="$PATH:/usr/sbin" command -v nats-server >/dev/null || skip "missing: nats-server"
-  node test/programs.mjs "$program" "$root/tests/system/page_mission.yaml"
+  script=programs
+  [ "$mode" = --programs ] || script=log_in
+  node "test/$script.mjs" "$program" "$root/tests/system/page_mission.yaml"
   exit
 fi
 

@@ -68,6 +68,7 @@ export class App {
   }
 
   start(): void {
+    if (this.live) void this.ask_me(); // before messages: without a credential none comes
     this.source.start({
       message: (m) => this.hear(m.t, () => {
         this.store.apply(m);
@@ -88,6 +89,7 @@ export class App {
       link: (link) => {
         const changed = link.state !== this.link.state;
         this.link = link;
+        if (changed && link.state === "locked") void this.ask_me(); // a session may be over
         if (changed) this.say("link");
       },
     });
@@ -142,9 +144,13 @@ export class App {
     this.say("options");
   }
 
+  /** Whether the server shows nothing until this person logs in. */
+  is_locked(): boolean {
+    return this.me.login && !this.me.role;
+  }
   /** Whether the program offers it, and this person may. Without a server there is nobody to ask. */
   may(offer: Offer): boolean {
-    if (!this.live || this.time !== null || !this.me.offers.includes(offer)) return false;
+    if (!this.live || this.is_locked() || this.time !== null || !this.me.offers.includes(offer)) return false;
     return offer === "why" || offer === "disagreement" || this.me.may_decide;
   }
 

@@ -41,6 +41,8 @@ export const TIMES = {
   /** The server sends a sign of life every second. */
   server_silent_s: 3,
   reconnect_ms: 400,
+  /** Between two looks whether this browser is logged in; its own log-in is followed at once. */
+  locked_ms: 3_000,
   /** Over which the drain of a backlog is measured. */
   drain_window_s: 60,
   /** How long a correction stays in sight. */

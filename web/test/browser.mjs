@@ -23,7 +23,7 @@ async function served(mission, run, options) {
   const server = await new FakeServer(mission, options).start();
   const page = await browser.open(`http://127.0.0.1:${server.port}/`);
   try {
-    await page.until("all submaps are placed", (n) => tutti.app.world.placed.size >= n, mission.submaps.length);
+    if (server.me.role !== null || !server.me.login) await page.until("all submaps are placed", (n) => tutti.app.world.placed.size >= n, mission.submaps.length);
     await run(page, server, mission);
     assert.deepEqual(page.errors, [], "errors on the page");
   } finally {
@@ -269,20 +269,30 @@ test("a viewer is offered no decisions, and what the program does not offer is n
   }, { me: { login: true, role: "viewer", name: "vera", may_decide: false, offers: ["decide", "register", "closure", "mark", "why"] } }));
 
 test("who has a credential logs in with it, and its seed stays in the page", () =>
-  served(small(), async (page, server) => {
+  served(small(), async (page, server, mission) => {
     await page.until("a login is asked for", () => document.querySelector('[aria-label="Credential file"]') !== null);
-    assert.equal((await page.texts(".tabs button")).includes("By hand"), false);
+    assert.deepEqual((await page.texts(".tabs button")).filter((t) => /By hand|Why|Marks/.test(t)), []);
+    assert.deepEqual(await page.texts(".badge"), ["Not logged in"]);
+    assert.match((await page.texts(".legend-box"))[0], /Log in/);
+    assert.equal(await page.evaluate(() => tutti.app.world.placed.size), 0);
     const { text, seed_text, open } = credential();
     const file = join(work, "eva.credential");
     writeFileSync(file, text);
     await (await page.page.$('[aria-label="Credential file"]')).uploadFile(file);
     await page.until("eva is there", () => document.querySelector(".person b")?.textContent === "eva");
     await page.until("she may decide", () => [...document.querySelectorAll(".tabs button")].some((b) => b.textContent === "By hand"));
+    await page.until("all submaps are placed", (n) => tutti.app.world.placed.size >= n, mission.submaps.length);
     const [login] = server.asked;
     assert.deepEqual([login.path, login.body.nonce, login.body.key], ["/api/login", "nonce 7", "UEVA"]);
     assert.ok(verify(null, Buffer.from("nonce 7"), open, Buffer.from(login.body.signature, "base64")), "the signature is hers");
     assert.equal(JSON.stringify(server.asked).includes(seed_text.slice(4, 40)), false);
-  }, { me: { login: true, role: null, may_decide: false, nonce: "nonce 7", offers: [] } }));
+    server.lock();
+    await page.until("a session that is over asks for another", () => document.querySelector('[aria-label="Credential file"]') !== null);
+    await (await page.page.$('[aria-label="Credential file"]')).uploadFile(file);
+    await page.until("she is there again", () => /Live/.test(document.querySelector(".badge").textContent) && tutti.app.me.name === "eva");
+    await page.press("Log out");
+    await page.until("a login is asked for after she has gone", () => document.querySelector('[aria-label="Credential file"]') !== null);
+  }, { me: { login: true, role: null, may_decide: false, nonce: "nonce 7" } }));
 
 /** As `tutti pki` writes it, with a key made here. */
 function credential() {

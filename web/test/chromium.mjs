@@ -11,9 +11,9 @@ const kFlags = ["--no-sandbox", "--disable-dev-shm-usage", "--disable-quic", "--
 const kDrawn_ms = 250;
 
 export class Browser {
-  static async launch(graphics = kNoGpu) {
+  static async launch(graphics = kNoGpu, more = {}) {
     const out = new Browser();
-    out.browser = await puppeteer.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: [...kFlags, ...graphics] });
+    out.browser = await puppeteer.launch({ ...more, executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: [...kFlags, ...graphics] });
     return out;
   }
   async open(url, { width = 1280, height = 800, light = false } = {}) {

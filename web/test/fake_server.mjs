@@ -63,6 +63,8 @@ export class FakeServer {
     const url = new URL(request.url, "http://localhost");
     if (url.pathname === "/") return response.writeHead(200, { "Content-Type": "text/html; charset=utf-8", "Content-Security-Policy": kPolicy }).end(readFileSync(kPage));
     if (url.pathname === "/api/me") return this.say(response, 200, this.me);
+    const may_see = !this.me.login || this.me.role !== null;
+    if (!may_see && request.method !== "POST") return this.say(response, 401, { error: "sign in with an operator's or viewer's credential" });
     if (url.pathname === "/api/events") return this.stream(response);
     if (url.pathname.startsWith("/api/cloud/")) {
       const [, , , robot, , index] = url.pathname.split("/");
@@ -74,8 +76,15 @@ export class FakeServer {
     let text = "";
     for await (const chunk of request) text += chunk;
     const body = JSON.parse(text);
+    if (!this.me.may_decide && !["/api/login", "/api/logout"].includes(url.pathname)) return this.say(response, may_see ? 403 : 401, { error: may_see ? "viewers do not decide" : "sign in with an operator's credential" });
     this.asked.push({ path: url.pathname, body });
     this.post(url.pathname, body, response);
+  }
+
+  /** As when a session is over: nobody is logged in, and streams end. */
+  lock() {
+    Object.assign(this.me, { role: null, name: "", may_decide: false });
+    for (const listener of this.listeners) listener.end();
   }
 
   stream(response) {
@@ -92,7 +101,11 @@ export class FakeServer {
     const submap = (id) => mission.submaps.find((s) => s.id === id);
     const ok = (value = {}) => this.say(response, 200, value);
     if (path === "/api/login") {
-      Object.assign(this.me, { role: "operator", name: "eva", may_decide: true, offers: ["decide", "register", "closure"] });
+      Object.assign(this.me, { role: "operator", name: "eva", may_decide: true });
+      return ok();
+    }
+    if (path === "/api/logout") {
+      this.lock();
       return ok();
     }
     if (path === "/api/decide") {

@@ -2,47 +2,18 @@
 // Drives the built page in a headless Chromium against tutti's own programs: one server and three robots that replay a simulated mission,
 // through what an operator lives through. usage: programs.mjs TUTTI MISSION. Ends with 1 if anything is not as it should be.
 import assert from "node:assert/strict";
-import { execFileSync, spawn } from "node:child_process";
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
-import { tmpdir } from "node:os";
+import { execFileSync } from "node:child_process";
+import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { createInterface } from "node:readline";
 import { Browser } from "./chromium.mjs";
+import { play_with, Started } from "./started.mjs";
 
 const [, , tutti, mission] = process.argv;
 const kRate = 4; // times as fast as the robots walk; statuses come by the wall clock
 const kPatience_ms = 120_000; // of a busy machine
-const work = mkdtempSync(join(tmpdir(), "tutti-web-"));
-const programs = [];
+const started = new Started(tutti, mission, kRate);
+const { work } = started;
 
-function start(words, stderr) {
-  const program = spawn(tutti, words, { stdio: ["ignore", "pipe", stderr] });
-  programs.push(program);
-  return program;
-}
-const common = [mission, "--rate", String(kRate)];
-
-/** The server, where robots reach it and where its page is, as it reports itself. */
-async function start_server() {
-  const program = start(["server", ...common, "--state", join(work, "server"), "--view", "0"], "pipe");
-  let bus, page;
-  await new Promise((resolve, reject) => {
-    for (const stream of [program.stdout, program.stderr])
-      createInterface({ input: stream }).on("line", (line) => {
-        bus ??= line.match(/--bus (nats:\S+)/)?.[1];
-        page ??= line.match(/the page is at (\S+)/)?.[1];
-        if (bus && page) resolve();
-        else console.log(`    ${line}`);
-      });
-    program.on("exit", () => reject(new Error("the server ended")));
-  });
-  return { program, bus, page };
-}
-function start_robot(name, bus, ...more) {
-  const program = start(["robot", ...common, ...more, "--name", name, "--bus", bus, "--state", join(work, name), "--session", "0"], "inherit");
-  program.stdout.resume();
-  return program;
-}
 /** The process ids of the bus that the server has started. */
 const buses_of = (server) =>
   execFileSync("ps", ["--ppid", String(server.pid), "-o", "pid=,comm="], { encoding: "utf8" })
@@ -53,19 +24,19 @@ const until_presence = (page, name, wanted) =>
 const step = (what) => console.log(`ok   ${what}`);
 
 async function play(browser) {
-  const { program: server, bus, page: url } = await start_server();
+  const { program: server, bus, page: url } = await started.server();
   const page = await browser.open(url);
   await page.evaluate(() => localStorage.setItem("tutti.by", JSON.stringify("eva")));
   await page.reload();
-  const robots = { bravo: start_robot("bravo", bus) };
+  const robots = { bravo: started.robot("bravo", bus) };
   await page.until("bravo is in the picture", () => tutti.app.world.placed.size > 0, undefined, kPatience_ms);
-  robots.alpha = start_robot("alpha", bus); // whose map takes bravo's into another frame, out of the picture that there was
+  robots.alpha = started.robot("alpha", bus); // whose map takes bravo's into another frame, out of the picture that there was
   await page.until("alpha and bravo are joined", () => tutti.app.world.parts.size === 1 && new Set([...tutti.app.world.placed.values()].map((p) => p.submap.robot)).size === 2 && (tutti.app.world.poses?.accepted ?? 0) > 0, undefined, kPatience_ms);
   await page.until("clouds are drawn", () => tutti.view.last.points > 1000, undefined, kPatience_ms);
   assert.match((await page.texts(".badge"))[0], /Live/);
   step("two robots in one map, live");
 
-  robots.charlie = start_robot("charlie", bus, "--set", "simulation.lidar.range_sigma_m=0.5"); // fits nobody's scans
+  robots.charlie = started.robot("charlie", bus, "--set", "simulation.lidar.range_sigma_m=0.5"); // fits nobody's scans
   await page.until("charlie is in the picture, apart from the others", () => tutti.app.robots.some((r) => r.name === "charlie" && r.submaps > 1) && tutti.app.world.parts.size === 2, undefined, kPatience_ms);
   await page.until("that is an alert", () => /charlie/.test([...document.querySelectorAll(".alert")].find((a) => /joined to no other/.test(a.textContent))?.textContent ?? ""), undefined, kPatience_ms);
   step("a third robot comes later, and is said to be joined to nobody");
@@ -142,7 +113,7 @@ async function play(browser) {
   await page.click(".mark .closure");
   await page.until("its photo", () => document.querySelector(".mark img")?.naturalWidth > 0, undefined, kPatience_ms);
   const marks = join(work, "marks.csv");
-  execFileSync(tutti, ["export", join(work, "server", "map.tutti"), "--live", "-o", marks]);
+  started.run("export", join(work, "server", "map.tutti"), "--live", "-o", marks);
   assert.match(readFileSync(marks, "utf8"), /door, locked/);
   step("a mark with a photo is in the map's file");
 
@@ -158,20 +129,4 @@ async function play(browser) {
   await page.close();
 }
 
-const browser = await Browser.launch();
-let failed = false;
-try {
-  await play(browser);
-} catch (error) {
-  failed = true;
-  console.log(`FAIL ${error.stack ?? error}`);
-}
-await browser.close();
-for (const program of programs) {
-  program.kill("SIGCONT");
-  program.kill("SIGTERM");
-}
-await Promise.all(programs.map((p) => p.exitCode !== null || p.signalCode !== null || new Promise((resolve) => p.on("exit", resolve))));
-rmSync(work, { recursive: true });
-console.log(failed ? "failed" : "all is as it should be");
-process.exit(failed ? 1 : 0);
+await play_with(await Browser.launch(), started, play);

@@ -13,6 +13,8 @@ export class LiveSource implements Source {
   private abort = new AbortController();
   /** Keys since the connection was made, until all was sent. */
   private seen: Set<string> | null = null;
+  /** Ends the rest between two connections. */
+  private wake: () => void = () => undefined;
 
   start(on: Callbacks): void {
     void this.run(on);
@@ -29,6 +31,7 @@ export class LiveSource implements Source {
   /** After a login the server may send more. */
   restart(): void {
     this.abort.abort();
+    this.wake();
   }
 
   private async run(on: Callbacks): Promise<never> {
@@ -38,14 +41,22 @@ export class LiveSource implements Source {
       } catch (error) {
         this.link.why = error instanceof Error ? error.message : String(error);
       }
-      await new Promise((resolve) => setTimeout(resolve, TIMES.reconnect_ms));
+      await this.rest(this.link.state === "locked" ? TIMES.locked_ms : TIMES.reconnect_ms);
     }
+  }
+
+  private rest(at_most_ms: number): Promise<void> {
+    return new Promise((resolve) => {
+      this.wake = resolve;
+      setTimeout(resolve, at_most_ms);
+    });
   }
 
   private async listen(on: Callbacks): Promise<void> {
     this.abort = new AbortController();
     const late = setTimeout(() => this.abort.abort(), 1000 * TIMES.server_silent_s);
     const answer = await fetch("/api/events", { signal: this.abort.signal, cache: "no-store" }).finally(() => clearTimeout(late));
+    if (answer.status === 401) return this.set({ state: "locked", heard_ms: performance.now(), why: "" }, on);
     if (!answer.ok || !answer.body) throw new Error(`the server answers ${answer.status}`);
     this.seen = new Set();
     const parser = new SseParser((event) => this.hear(event, on));

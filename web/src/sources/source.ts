@@ -20,8 +20,8 @@ export interface Source {
 }
 
 export interface LinkState {
-  /** connecting: never heard yet; here: signs of life come; silent: they stopped. */
-  state: "connecting" | "here" | "silent";
+  /** connecting: never heard yet; here: signs of life come; silent: they stopped; locked: it is there, and wants a credential. */
+  state: "connecting" | "here" | "silent" | "locked";
   /** performance.now() of the last sign of life. */
   heard_ms: number;
   why: string;

@@ -10,7 +10,7 @@ import type { Child } from "./dom";
 
 export function person(app: App): Child {
   const { me } = app;
-  if (me.login && !me.role) return h("label", { class: "button primary", title: "Choose the credential file that `tutti pki` has made for you" }, "Log in", credential_input(app));
+  if (app.is_locked()) return h("label", { class: "button primary", title: "Choose the credential file that `tutti pki` has made for you" }, "Log in", credential_input(app));
   if (me.login) return h("span", { class: "person" }, h("b", {}, me.name), ` ${me.role}`, button("Log out", () => void attempt(() => log_out(app)), { class: "plain" }));
   if (!me.may_decide) return null;
   return button(app.by ? `You: ${app.by}` : "Your name?", () => void name_of(app), { class: "plain", title: "Decisions carry this name" });

@@ -121,8 +121,9 @@ function lines(app: App): Child {
 }
 
 export function legend(app: App, view: View): HTMLElement {
-  return panel(app, ["options", "data", "time", "cloud"], { class: "legend-box" }, () => {
+  return panel(app, ["options", "data", "time", "cloud", "me"], { class: "legend-box" }, () => {
     if (app.world.placed.size === 0 && app.robots.length > 0 && !app.live) return [h("b", {}, "robot"), app.robots.slice(0, 12).map((r) => h("span", { class: "entry" }, swatch(css(robot_rgb(r.index, app.dark))), r.name)), lines(app)];
+    if (app.world.placed.size === 0 && app.is_locked()) return [h("p", { class: "empty" }, "Log in (above) with an operator's or a viewer's credential to see the mission.")];
     if (app.world.placed.size === 0) return [h("p", { class: "empty" }, app.ready ? "No submap is in the map yet." : "Waiting for the map …")];
     const { title, entries, scale } = legend_of(app.world, view.dressing());
     return [

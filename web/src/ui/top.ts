@@ -37,6 +37,7 @@ export function status_age(app: App): number | null {
 function badge(app: App): Child {
   if (!app.live) return h("span", { class: "badge report", title: "A recorded mission; nothing here changes any more" }, app.store.get("mission")?.mode === "compare" ? "Comparison" : "Report");
   const { state, heard_ms, why } = app.link;
+  if (state === "locked") return h("span", { class: "badge old" }, "Not logged in");
   if (state === "connecting") return h("span", { class: "badge old" }, why ? `No server (${why})` : "Connecting …");
   if (state === "silent") return h("span", { class: "badge bad", role: "alert" }, `The server is silent since ${span((performance.now() - heard_ms) / 1000)}`);
   const age = status_age(app);
