@@ -24,7 +24,7 @@ CONFINED = [
     (r"lz4|bzlib", r"(tests/support/)?bags/", "bags/"),
     (r"dds/", r"program/ros/(dds|internal/raw_type)\.cpp$", "program/ros/dds.cpp and internal/raw_type.cpp"),
     (r"openssl/", r"(bags/internal/sha256|pki/.*)\.cpp$", "bags/internal/sha256.cpp and pki/*.cpp"),
-    (r"httplib", r"(tests/support/)?program/page/(page_server|routes|mark_routes|page_server_test|served_page)\.[ch]pp$", "the page's server and its tests"),
+    (r"httplib", r"(tests/support/)?program/page/(internal/)?(guarded_server|guarded_stream|routes|mark_routes|page_server_test|served_page)\.[ch]pp$", "the page's server and its tests"),
     (r"turbojpeg", r"formats/.*\.cpp$", "formats/*.cpp"),
     (r"CLI/", r"(?!)", "apps/"),
     (r"pybind11/", r"(?!)", "python/"),

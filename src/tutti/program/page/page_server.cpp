@@ -2,7 +2,6 @@
 #include "tutti/program/page/page_server.hpp"
 
 #include <fmt/format.h>
-#include <httplib.h>
 
 #include <algorithm>
 #include <atomic>
@@ -17,6 +16,7 @@
 #include "tutti/pki/pki.hpp"
 #include "tutti/program/clock.hpp"
 #include "tutti/program/incarnation.hpp"
+#include "tutti/program/page/internal/guarded_server.hpp"
 #include "tutti/program/page/internal/mark_routes.hpp"
 #include "tutti/program/page/internal/routes.hpp"
 #include "tutti/program/page/view.hpp"
@@ -26,54 +26,8 @@ namespace {
 
 using program::Clock, program::Level, mapfile::ShownMap;
 
-constexpr std::size_t kConnections = 64;  // served at a time; watchers are among them
-constexpr time_t kRead_s = 3, kWrite_s = 5, kKeepAlive_s = 3;
-constexpr std::size_t kMostBody = 8U << 20U;
 constexpr double kPeriod_s = 1.0;  // at least between two maps that are shown
 constexpr double kRestPerWork = 4.0;
-
-/// As many threads as connections are served at a time. Who comes then waits in the kernel's queue, and takes no file
-/// of the program's.
-class BoundedPool final : public httplib::TaskQueue {
- public:
-  explicit BoundedPool(std::size_t threads) : pool_(threads), free_(threads) {}
-  void enqueue(std::function<void()> task) override {
-    {
-      std::unique_lock lock(mutex_);
-      changed_.wait(lock, [this] { return free_ > 0; });
-      --free_;
-    }
-    pool_.enqueue([this, task = std::move(task)] {
-      task();
-      {
-        const std::scoped_lock lock(mutex_);
-        ++free_;
-      }
-      changed_.notify_one();
-    });
-  }
-  void shutdown() override { pool_.shutdown(); }
-
- private:
-  httplib::ThreadPool pool_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::size_t free_;
-};
-
-/// The bus's certificate, read for each connection, so that a renewed one needs no restart. Between the two files of a
-/// renewal a connection may be refused; the next one is not.
-struct CertificateFiles {
-  std::string certificate, key;
-
-  static int use(SSL* connection, void* files) {
-    const auto& own = *static_cast<const CertificateFiles*>(files);
-    if (SSL_use_certificate_chain_file(connection, own.certificate.c_str()) == 1)
-      static_cast<void>(SSL_use_PrivateKey_file(connection, own.key.c_str(), SSL_FILETYPE_PEM));
-    ERR_clear_error();  // without files, it keeps what it began with
-    return 1;
-  }
-};
 
 class PageViewer final : public program::MapViewer {
  public:
@@ -88,7 +42,8 @@ class PageViewer final : public program::MapViewer {
   }
   ~PageViewer() override {
     site_.board.close();
-    if (server_) server_->stop();
+    site_.decisions.close();
+    if (server_) server_->end();
     if (listens_.joinable()) listens_.join();
     makes_.request_stop();
     if (makes_.joinable()) makes_.join();
@@ -98,29 +53,12 @@ class PageViewer final : public program::MapViewer {
 
   Status open(const bus::HostPort& address, const std::filesystem::path& pki) {
     if (Status ok = open_marks(); !ok) return in_context("--view", ok.error());
-    if (pki.empty()) {
-      server_ = std::make_unique<httplib::Server>();
-    } else {
-      certificate_ = {pki / pki::kBusCertificate, pki / pki::kBusKey};
-      auto secure = std::make_unique<httplib::SSLServer>(certificate_.certificate.c_str(), certificate_.key.c_str());
-      if (secure->is_valid()) {
-        SSL_CTX_set_cert_cb(secure->ssl_context(), &CertificateFiles::use, &certificate_);
-        // Who has a certificate may show it (Routes::metrics()); browsers have none.
-        SSL_CTX_set_session_id_context(secure->ssl_context(), reinterpret_cast<const unsigned char*>("tutti"), 5);
-        SSL_CTX_load_verify_locations(secure->ssl_context(), (pki / pki::kAuthority).c_str(), nullptr);
-        SSL_CTX_set_verify(secure->ssl_context(), SSL_VERIFY_PEER, nullptr);
-      }
-      server_ = std::move(secure);
-    }
-    if (!server_->is_valid()) return fail(ErrorCode::io, "--view: the certificate of {} cannot be used", pki.string());
-    server_->new_task_queue = [] { return new BoundedPool(kConnections); };
-    server_->set_read_timeout(kRead_s);
-    server_->set_write_timeout(kWrite_s);
-    server_->set_keep_alive_timeout(kKeepAlive_s);
-    server_->set_payload_max_length(kMostBody);
+    server_ = std::make_unique<GuardedServer>();
+    if (!pki.empty() && !server_->use_tls({pki / pki::kBusCertificate, pki / pki::kBusKey, pki / pki::kAuthority}))
+      return fail(ErrorCode::io, "--view: the certificate of {} cannot be used", pki.string());
     add_routes(*server_, site_);
-    const int port = address.port == 0 ? server_->bind_to_any_port(address.host) : address.port;
-    if (port < 0 || (address.port != 0 && !server_->bind_to_port(address.host, port)))
+    const int port = server_->bind(address.host, address.port);
+    if (port < 0)
       return fail(ErrorCode::io, "--view {}: this address cannot be listened at; is another program there?",
                   to_string(address));
     site_.is_secure = !pki.empty();
@@ -207,8 +145,7 @@ class PageViewer final : public program::MapViewer {
   Site site_;
   std::function<void(Level, const std::string&)> say_;
   std::function<void(const std::string&)> announce_;
-  CertificateFiles certificate_;
-  std::unique_ptr<httplib::Server> server_;
+  std::unique_ptr<GuardedServer> server_;
   Alerts alerts_;       // the server's thread's
   Alerts maps_alerts_;  // of the thread that makes messages
   std::atomic<std::uint64_t> shown_ = 0;

@@ -20,6 +20,7 @@
 #include "tutti/program/page/internal/by_hand.hpp"
 #include "tutti/program/page/internal/mark_routes.hpp"
 #include "tutti/program/page/internal/page_data.hpp"
+#include "tutti/program/page/internal/request_head.hpp"
 #include "tutti/program/page/view.hpp"
 
 namespace tutti::page {
@@ -28,6 +29,7 @@ namespace {
 constexpr const char* kJson = "application/json";
 constexpr std::size_t kLongestName = 64;  // of `tutti pki`
 constexpr const char* kCookie = "tutti_session";
+constexpr const char *kLogin = "/api/login", *kLogout = "/api/logout";
 constexpr int kMostWatchers = 32;
 constexpr std::size_t kMostPoints = 20'000;  // of one submap's cloud
 constexpr auto kSignOfLife = std::chrono::milliseconds(1000);
@@ -233,6 +235,24 @@ class Routes {
     return site_.sign_in.visitor(token_of(request), program::Clock::steady_s());
   }
 
+  /// Whether a request that changes something is refused before its body is read; the answer states why.
+  bool refuses_unread(const Request& request, Response& response) {
+    if (request.get_header_value("X-Tutti") != "1") {
+      say(response, 403, "the header X-Tutti: 1 is missing");
+      return true;
+    }
+    if (request.path == kLogin || request.path == kLogout) {
+      if (request.get_header_value<std::uint64_t>("Content-Length") <= kMostStrangersBody) return false;
+      say(response, 413, fmt::format("who is not signed in sends at most {} bytes", kMostStrangersBody));
+      return true;
+    }
+    const Visitor visitor = who(request);
+    if (visitor.may_decide) return false;
+    say(response, visitor.may_see ? 403 : 401,
+        visitor.may_see ? "viewers do not decide" : "sign in with an operator's credential");
+    return true;
+  }
+
   /// A handler for those who may see.
   template <class Call>
   httplib::Server::Handler seen(Call call) {
@@ -241,11 +261,10 @@ class Routes {
       call(request, response);
     };
   }
-  /// A handler of a request with JSON; only pages of ours can set its header.
+  /// A handler of a request with JSON that refuses_unread() lets pass.
   template <class Call>
   static httplib::Server::Handler posted(Call call) {
     return [call](const Request& request, Response& response) {
-      if (request.get_header_value("X-Tutti") != "1") return say(response, 403, "the header X-Tutti: 1 is missing");
       try {
         const Json body = Json::parse(request.body.empty() ? "{}" : request.body);
         if (!body.is_object()) return say(response, 400, "expected a JSON object");
@@ -258,11 +277,7 @@ class Routes {
   template <class Call>
   httplib::Server::Handler decided(Call call) {
     return posted([this, call](const Request& request, const Json& body, Response& response) {
-      const Visitor visitor = who(request);
-      if (!visitor.may_decide)
-        return say(response, visitor.may_see ? 403 : 401,
-                   visitor.may_see ? "viewers do not decide" : "sign in with an operator's credential");
-      call(visitor, body, response);
+      call(who(request), body, response);
     });
   }
 
@@ -290,10 +305,13 @@ void add_routes(httplib::Server& server, Site& site) {
                               {"X-Content-Type-Options", "nosniff"},
                               {"Referrer-Policy", "no-referrer"},
                               {"Cross-Origin-Resource-Policy", "same-origin"}});
-  server.set_pre_routing_handler([](const Request& request, Response& response) {
-    if (is_our_host(request.get_header_value("Host"))) return httplib::Server::HandlerResponse::Unhandled;
-    say(response, 421, "this page is served under addresses and this machine's name only");
-    return httplib::Server::HandlerResponse::Handled;
+  server.set_pre_routing_handler([routes](const Request& request, Response& response) {
+    using enum httplib::Server::HandlerResponse;
+    if (!is_our_host(request.get_header_value("Host"))) {
+      say(response, 421, "this page is served under addresses and this machine's name only");
+      return Handled;
+    }
+    return request.method == "POST" && routes->refuses_unread(request, response) ? Handled : Unhandled;
   });
   server.set_error_handler([](const Request& request, Response& response) {
     if (response.body.empty()) say(response, response.status, fmt::format("{}: nothing there", request.path));
@@ -305,10 +323,9 @@ void add_routes(httplib::Server& server, Site& site) {
     response.set_content(page.data(), page.size(), "text/html; charset=utf-8");
   });
   server.Get("/api/me", [routes](const Request& q, Response& r) { routes->me(q, r); });
-  server.Post("/api/login",
+  server.Post(kLogin,
               Routes::posted([routes](const Request&, const Json& body, Response& r) { routes->login(body, r); }));
-  server.Post("/api/logout",
-              Routes::posted([routes](const Request& q, const Json&, Response& r) { routes->logout(q, r); }));
+  server.Post(kLogout, Routes::posted([routes](const Request& q, const Json&, Response& r) { routes->logout(q, r); }));
   server.Get("/api/events", routes->seen([routes](const Request& q, Response& r) { routes->events(q, r); }));
   server.Get(R"(/api/cloud/(\d{1,10})/(\d{1,20})/(\d{1,10}))",
              routes->seen([routes](const Request& q, Response& r) { routes->cloud(q, r); }));

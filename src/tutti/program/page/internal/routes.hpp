@@ -30,7 +30,7 @@ class DecisionInbox {
   /// The server's answer will be in the future: why the decision is not stored, or empty. Nothing when too many wait.
   std::optional<std::future<std::string>> ask(ClosureDecision decision, std::string proved_name) {
     const std::scoped_lock lock(mutex_);
-    if (asked_.size() >= kMost) return std::nullopt;
+    if (is_closed_ || asked_.size() >= kMost) return std::nullopt;
     asked_.push_back({std::move(decision), std::move(proved_name), {}});
     return asked_.back().answer.get_future();
   }
@@ -38,9 +38,16 @@ class DecisionInbox {
     const std::scoped_lock lock(mutex_);
     return std::exchange(asked_, {});
   }
+  /// Nobody takes any more: who waits for an answer is told that there is none.
+  void close() {
+    const std::scoped_lock lock(mutex_);
+    is_closed_ = true;
+    asked_.clear();
+  }
 
  private:
   static constexpr std::size_t kMost = 100;
+  bool is_closed_ = false;
   std::mutex mutex_;
   std::vector<program::AskedDecision> asked_;
 };
