@@ -33,7 +33,8 @@ void ServerNode::receive_verdicts(const bus::Envelope& envelope, Timestamp now, 
   std::erase_if(answer->failed, [&](const SubmapPair& pair) { return job->is_replaced || !job->has(pair); });
   std::erase_if(answer->verdicts, [&](const ClosureVerdict& verdict) { return !job->has(verdict.pair); });
   if (answer->cannot) {
-    if (!job->is_replaced) note_waiting(answer->failed, answer->why, now, step);
+    const bool is_unread = answer->failed.empty();  // the worker cannot read the job, and knows its id alone
+    if (!job->is_replaced) note_waiting(is_unread ? job->pairs : answer->failed, answer->why, now, step);
     return;
   }
   std::set<SubmapPair> unanswered(job->pairs.begin(), job->pairs.end());

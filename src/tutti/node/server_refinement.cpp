@@ -49,17 +49,17 @@ void ServerNode::receive_refinement(const bus::Envelope& envelope, Timestamp now
   const auto failed = [&](const std::string& why) {
     if (!closed->is_replaced) note_failed_refinement(asked, why, now, step);
   };
-  if (refinement->revision != asked.revision || refinement->whole != asked.whole) {
-    const std::string why = "an answer to another refinement than was asked for";
-    refuse(envelope, why, now, step);
-    return failed(why);
-  }
   if (refinement->cannot) {
     if (closed->is_replaced) return;
     refinements_.wait(asked);
     why_waiting_ = plain_text(refinement->why);
     ++changes_;
-    return step.emit(now, RefinementFailed{refinement->revision, refinement->why});
+    return step.emit(now, RefinementFailed{asked.revision, refinement->why});
+  }
+  if (refinement->revision != asked.revision || refinement->whole != asked.whole) {
+    const std::string why = "an answer to another refinement than was asked for";
+    refuse(envelope, why, now, step);
+    return failed(why);
   }
   if (!refinement->why.empty()) return failed(refinement->why);
   const std::set<std::uint64_t> before = revisions(server_.state().refinements);

@@ -132,6 +132,22 @@ TEST_F(ServerVerifiers, WhatAWorkerCannotDoIsAskedAgainAtOnceWhereAnotherCan) {
   EXPECT_EQ(status().waiting, 1U);
 }
 
+TEST_F(ServerVerifiers, AJobThatAWorkerCannotReadWaitsForAnotherWorker) {
+  const bus::Envelope job = ask();
+  bus::Envelope newer = job;
+  newer.bytes = std::make_shared<const std::string>(test::raised(*job.bytes));
+  WorkerNode older = worker(3, verifier_);
+  receive(older.receive(newer, now_).messages.at(0));
+  EXPECT_EQ(status().waiting, 1U);
+  EXPECT_NE(status().why_waiting.find("this program reads versions"), std::string::npos) << status().why_waiting;
+  WorkerNode proper = worker(4, verifier_);
+  const auto again = of_kind(hear(proper, 4), MessageKind::job);
+  ASSERT_EQ(again.size(), 1U);
+  answer(proper, again[0]);
+  EXPECT_TRUE(has_closure());
+  EXPECT_EQ(status().waiting, 0U);
+}
+
 TEST_F(ServerVerifiers, AVerdictOfAnUnknownVerifierIsKeptButNotBelieved) {
   const MethodId of_old_programs{"", 3, 0};
   const bus::Envelope job = ask();

@@ -234,24 +234,66 @@ TEST(Upgrade, SubmapsOfEveryVersionAreInTheMap) {
   }
 }
 
-TEST(Upgrade, AnOlderWorkerLeavesAJobToAnother) {
+/// It answers, and pauses so that another gets it; what it can read it does afterwards.
+TEST(Upgrade, AnOlderWorkerGivesAJobBackAndGoesOn) {
   const ChainId chain{RobotId{0}, 7};
   const Job job{.id = "1/0", .pairs = {{{chain, 0}, {chain, 2}}}};
-  const auto envelope = [](MessageKind kind, std::string bytes) {
-    return bus::Envelope{Endpoint::server(), Endpoint::worker(1), kind, "1/0",
+  const RefinementJob refinement{.id = "1/1", .revision = 1};
+  const auto envelope = [](MessageKind kind, std::string id, std::string bytes) {
+    return bus::Envelope{Endpoint::server(), Endpoint::worker(1), kind, std::move(id),
                          std::make_shared<const std::string>(std::move(bytes))};
   };
   WorkerNode worker(Endpoint::worker(1), std::make_shared<test::EvenVerifier>(), std::make_shared<FrameCache>(1 << 20));
-  const auto leaves = [&](const Step& step) {
-    EXPECT_EQ(step.events.size(), 1U);
-    EXPECT_TRUE(step.messages.empty());
-    EXPECT_FALSE(worker.next_timer().has_value());  // nor does it report that it works on it
-    return worker.holds_job();
+  Timestamp now;
+  const auto rests = [&] {
+    EXPECT_TRUE(worker.holds_job());
+    EXPECT_EQ(worker.next_timer(), now + WorkerNode::kRest_s);
+    now = now + WorkerNode::kRest_s;
+    EXPECT_TRUE(worker.on_timer(now).messages.empty());
+    EXPECT_FALSE(worker.holds_job());
   };
-  EXPECT_TRUE(leaves(worker.receive(envelope(MessageKind::job, raised(wire::encode(job))), {})));
-  EXPECT_EQ(worker.receive(envelope(MessageKind::job, wire::encode(job)), {}).messages.size(), 1U);  // it asks
-  const SubmapCopy copy{{chain, 0}, raised(wire::encode(test::submap(chain, 0)))};
-  EXPECT_TRUE(leaves(worker.receive(envelope(MessageKind::submap_copy, wire::encode(copy)), {})));
+  Step step = worker.receive(envelope(MessageKind::job, "1/0", raised(wire::encode(job))), now);
+  EXPECT_EQ(step.events.size(), 1U);
+  Verdicts answer = wire::decode_verdicts(*step.messages.at(0).bytes).value();
+  EXPECT_TRUE(answer.cannot);
+  EXPECT_EQ(answer.job, "1/0");
+  EXPECT_NE(answer.why.find("this program reads versions"), std::string::npos) << answer.why;
+  rests();
+
+  step = worker.receive(envelope(MessageKind::refinement_job, "1/1", raised(wire::encode(refinement))), now);
+  EXPECT_TRUE(wire::decode_refinement(*step.messages.at(0).bytes)->cannot);
+  EXPECT_EQ(wire::decode_refinement(*step.messages.at(0).bytes)->job, "1/1");
+  rests();
+
+  step = worker.receive(envelope(MessageKind::job, "1/0", wire::encode(job)), now);
+  EXPECT_EQ(step.messages.size(), 1U);  // it asks
+  const SubmapCopy newer{{chain, 0}, raised(wire::encode(test::submap(chain, 0)))};
+  step = worker.receive(envelope(MessageKind::submap_copy, "1/0", wire::encode(newer)), now);
+  answer = wire::decode_verdicts(*step.messages.at(0).bytes).value();
+  EXPECT_TRUE(answer.cannot);
+  EXPECT_EQ(answer.failed, job.pairs);
+  EXPECT_NE(answer.why.find(to_string(newer.id)), std::string::npos) << answer.why;
+  rests();
+
+  static_cast<void>(worker.receive(envelope(MessageKind::job, "1/0", wire::encode(job)), now));
+  for (const std::uint32_t index : {0U, 2U}) {
+    const SubmapCopy copy{{chain, index}, wire::encode(test::submap(chain, index))};
+    step = worker.receive(envelope(MessageKind::submap_copy, "1/0", wire::encode(copy)), now);
+  }
+  EXPECT_EQ(wire::decode_verdicts(*step.messages.at(0).bytes)->verdicts.size(), 1U);
+}
+
+/// The server's own worker never pauses for others, and does the jobs behind it.
+TEST(Upgrade, AJobOfANewerVersionDoesNotHaltTheServersOwnWorker) {
+  const ChainId chain{RobotId{0}, 7};
+  const std::string bytes = raised(wire::encode(Job{.id = "9/0", .pairs = {{{chain, 0}, {chain, 2}}}}));
+  WorkerNode worker(Endpoint::worker(0), std::make_shared<test::EvenVerifier>(), std::make_shared<FrameCache>(1 << 20));
+  worker.rest_for(0.0);
+  const Step step = worker.receive(
+      {Endpoint::server(), Endpoint::worker(0), MessageKind::job, "9/0", std::make_shared<const std::string>(bytes)},
+      {});
+  EXPECT_EQ(step.messages.size(), 1U);
+  EXPECT_FALSE(worker.holds_job());
 }
 
 }  // namespace upgrade_test

@@ -147,12 +147,21 @@ void WorkerNode::decline(const RefinementJob& job, const std::string& why, bool 
   send(bus::MessageKind::refinement, job.id, wire::encode(answer), step);
 }
 
+void WorkerNode::decline_unread(const bus::Envelope& envelope, const std::string& why, Step& step) const {
+  if (envelope.kind == bus::MessageKind::job)
+    decline(Job{.id = envelope.id, .pairs = {}}, why, true, step);
+  else
+    decline(RefinementJob{.id = envelope.id}, why, true, step);
+}
+
 void WorkerNode::receive_job(const bus::Envelope& envelope, Timestamp now, Step& step) {
   TUTTI_CHECK(!pending_ && !rests_until_, "a second job");
   auto job = decode(envelope);
-  leaves_job_ = !job && job.error().code == ErrorCode::unsupported;
   if (!job) {
     step.emit(now, MessageRefused{envelope.from, envelope.kind, job.error().message});
+    if (job.error().code != ErrorCode::unsupported) return;
+    decline_unread(envelope, job.error().message, step);
+    if (rest_s_ > 0.0) rests_until_ = now + rest_s_;
     return;
   }
   const Status ready = std::visit([&](const auto& one) { return prepare(one); }, *job);
@@ -186,8 +195,10 @@ void WorkerNode::receive_copy(const bus::Envelope& envelope, Timestamp now, Step
   }
   const auto message = wire::decode_submap(copy->frame);
   if (!message && message.error().code == ErrorCode::unsupported) {
-    leaves_job_ = true;
-    pending_.reset();
+    const PendingJob pending = *std::exchange(pending_, std::nullopt);
+    const std::string why = fmt::format("submap {}: {}", to_string(copy->id), message.error().message);
+    std::visit([&](const auto& job) { decline(job, why, true, step); }, pending.job);
+    rests_until_ = now + kRest_s;  // also the server's own: the job is asked again at once
   }
   if (!message) return refuse(message.error().message);
   if (message->submap.id != copy->id) return refuse("another submap than it says");

@@ -21,10 +21,11 @@
 namespace tutti::node {
 
 /// Verifies loop closures and refines maps for the server, with the verifier or refiner that the job names: the
-/// worker's own, or one made from the job's settings. A job that it cannot do goes back to the server, and the worker
-/// then pauses so that other workers get the job. It keeps nothing between jobs that it could not get again, except
-/// closures that become known later (LaterAnswers): a worker that ends forgets those of pairs that it has begun to
-/// answer. A worker that lacks submaps of a job asks the server for them, and keeps the job until they are there.
+/// worker's own, or one made from the job's settings. A job that it cannot do, also because the job or a submap of it
+/// is of a version that this program cannot read, goes back to the server, and the worker then pauses so that other
+/// workers get the job. It keeps nothing between jobs that it could not get again, except closures that become known
+/// later (LaterAnswers): a worker that ends forgets those of pairs that it has begun to answer. A worker that lacks
+/// submaps of a job asks the server for them, and keeps the job until they are there.
 class WorkerNode {
  public:
   /// Calls its argument with 0 ... count - 1, in any order and possibly on several threads, and returns after the last
@@ -59,10 +60,8 @@ class WorkerNode {
   [[nodiscard]] std::vector<MethodId> can() const;
   /// Takes a job, only when holds_job() is false, or a submap that was asked for. The same job gives the same verdicts.
   Step receive(const bus::Envelope& envelope, Timestamp now);
-  /// True while no further job may come: the last job is not answered, or the worker pauses, or the job (or a submap of
-  /// it) is of a version that this program cannot read. In the last case the job is never answered and must be left to
-  /// another worker.
-  [[nodiscard]] bool holds_job() const { return pending_.has_value() || leaves_job_ || rests_until_.has_value(); }
+  /// True while no further job may come: the last job is not answered, or the worker pauses.
+  [[nodiscard]] bool holds_job() const { return pending_.has_value() || rests_until_.has_value(); }
   /// When on_timer() is to be called next; nothing while no job is pending and no closure is to become known.
   [[nodiscard]] std::optional<Timestamp> next_timer() const;
   Step on_timer(Timestamp now);
@@ -79,6 +78,8 @@ class WorkerNode {
   static Result<AnyJob> decode(const bus::Envelope& envelope);
   void receive_job(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_copy(const bus::Envelope& envelope, Timestamp now, Step& step);
+  /// Answers a job of a version that this program cannot read: nothing but its id is known.
+  void decline_unread(const bus::Envelope& envelope, const std::string& why, Step& step) const;
   void ask(Timestamp now, Step& step);
   /// Sets the verifier (refiner) that the job asks for.
   Status prepare(const Job& job);
@@ -110,7 +111,6 @@ class WorkerNode {
   std::optional<PendingJob> pending_;
   double rest_s_ = kRest_s;
   std::optional<Timestamp> rests_until_;
-  bool leaves_job_ = false;
   LaterAnswers later_;
 };
 
