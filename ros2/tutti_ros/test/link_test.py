@@ -54,6 +54,13 @@ class Reconnecting(unittest.TestCase):
     def add_scan(self, link, i, points=2):
         link.add("points", CLOUD, cloud([(n, 7, [1.0] * points) for n in "xyz"], stamp_ns=at(i)), "scans")
 
+    def test_what_is_published_and_not_heard_is_counted(self):
+        link = Link()
+        self.add(link, *(i for i in range(100) if i < 20 or i % 3))
+        self.assertEqual(link.counts["odometry_missed"], 26)  # the last of all has none behind it
+        self.add(link, 1000)
+        self.assertEqual(link.counts["odometry_missed"], 26, "a pause")
+
     def filled(self, count=10, **limits):
         link = Link(**limits)
         self.add(link, *range(count))

@@ -24,6 +24,8 @@ class Programs(WithPrograms):
         for i in range(3):
             node.callbacks["odom"](odometry((1 + i) * 10**8, pose_at(0.1 * i)))
         node.callbacks["points"](cloud([(n, 7, [1.0, 2.0]) for n in "xyz"], stamp_ns=2 * 10**8))
+        for i in range(3, 56):  # so long it is waited for
+            node.callbacks["odom"](odometry((1 + i) * 10**8, pose_at(0.1 * i)))
         self.wait_for(lambda: "no transform from 'r1/lidar' to 'r1/body'" in self.diagnosis(node)[1], "why no scan is taken")
         self.wait_for(lambda: node.made["/tf"].said, "map -> odom")
         said = node.made["/tf"].said[0].transforms[0]

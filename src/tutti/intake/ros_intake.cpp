@@ -116,6 +116,8 @@ bool RosIntake::is_history(const StampedPose& sample) {
 
 void RosIntake::queue(const StampedPose& sample) {
   samples_.push_back(sample);
+  missed_.note(sample.stamp);
+  counts_.missed = missed_.count();
   ++counts_.odometry;
 }
 
@@ -126,6 +128,7 @@ void RosIntake::begin_anew() {
   std::for_each(first, refused_.end(), [&](const StampedPose& sample) { queue(sample); });
   known_.reset();
   scans_.clear();
+  held_since_.reset();
   fixes_.clear();
 }
 
@@ -222,6 +225,7 @@ Status RosIntake::take_points(std::string_view bytes, std::string_view type, Enc
 
 std::optional<node::OdometrySample> RosIntake::next_odometry(bool wait_for_scans) {
   if (samples_.empty()) return std::nullopt;
+  if (waits_for_place()) return std::nullopt;
   const StampedPose sample = samples_.front();
   if (wait_for_scans && !(newest_scan_ && *newest_scan_ >= sample.stamp)) return std::nullopt;
   samples_.pop_front();
@@ -252,8 +256,19 @@ Result<Pose3> RosIntake::pose_on_body(const std::string& frame) const {
   const bags::TransformTree all = tree();
   if (const auto found = all.find(body, from)) return *found;
   const std::string frames = all.frames();
-  return fail(ErrorCode::invalid, "no transform from '{}' to '{}' on /tf_static, frames that do not move are: {}",
-              plain(from), plain(body), frames.empty() ? "none" : frames.substr(0, 500));
+  return fail(ErrorCode::invalid, "no transform from '{}' to '{}' on {}, frames that do not move are: {}", plain(from),
+              plain(body), own_frames_.empty() ? "/tf_static" : "tf_static of its namespace or /tf_static",
+              frames.empty() ? "none" : frames.substr(0, 500));
+}
+
+/// Whether the first scans wait for a transform that may still come.
+bool RosIntake::waits_for_place() {
+  if (is_placed_ || scans_.empty() || !frames_) return false;
+  if (!held_since_) held_since_ = scans_.front().stamp;
+  const auto newest = stamps_.newest();
+  const bool is_late = newest && *newest - *held_since_ > kHold_s;
+  is_placed_ = is_late || lidar_pose(scans_.front().frame).has_value();
+  return !is_placed_;
 }
 
 Result<Pose3> RosIntake::lidar_pose(const std::string& frame) const {
@@ -279,6 +294,7 @@ Result<std::optional<Scan>> RosIntake::to_scan(Waiting waiting) const {
 }
 
 Result<std::optional<Scan>> RosIntake::next_scan(bool is_wanted) {
+  if (waits_for_place()) return std::optional<Scan>{};
   while (!scans_.empty() && last_ && last_->stamp >= scans_.front().until) {
     Waiting waiting = std::move(scans_.front());
     scans_.pop_front();

@@ -18,6 +18,7 @@
 #include "tutti/bags/transform_tree.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/formats/pcd.hpp"
+#include "tutti/intake/missed_count.hpp"
 #include "tutti/model/point_cloud.hpp"
 #include "tutti/model/trajectory.hpp"
 #include "tutti/node/journal.hpp"
@@ -60,6 +61,7 @@ class RosIntake {
   static constexpr std::size_t kMostFixes = 200;     ///< Fixes that wait for odometry; beyond it the oldest is dropped.
   static constexpr std::size_t kMostRefused = 8000;  ///< Samples that are kept until it is known whether they count.
   static constexpr std::size_t kMostFrames = 1000;   ///< Limit on the frames of /tf.
+  static constexpr double kHold_s = 5.0;  ///< At first scans, and odometry since, wait so long for the LiDAR's place.
   explicit RosIntake(IntakeConfig config) : config_(std::move(config)) {}
 
   /// The robot already has everything up to `newest` (FeedWelcome::newest): samples that wait and are older are
@@ -81,7 +83,8 @@ class RosIntake {
   Status add_tf(std::string_view bytes, bool is_static, TfOf of = TfOf::all, Encoding encoding = Encoding::cdr);
 
   /// The next odometry sample to feed, in order of arrival. With `wait_for_scans` it is held back until a scan with its
-  /// stamp or a later one has arrived.
+  /// stamp or a later one has arrived. Also held back, for kHold_s of odometry's time once, while the first scans wait
+  /// for the transform that places the LiDAR, as who publishes it may be heard later.
   std::optional<node::OdometrySample> next_odometry(bool wait_for_scans);
   /// The next scan that can be fed, because the motion up to the newest sample that next_odometry() returned covers its
   /// sweep. Nothing when none is due; an error when the scan is left out. When the scan is not wanted it is skipped,
@@ -91,6 +94,9 @@ class RosIntake {
   /// The next fix whose stamp next_odometry() has reached; nothing when there is none. Where the antenna's pose is
   /// unknown, the fix is taken as of the body's origin, and take_note() reports it.
   std::optional<PositionFix> next_fix();
+
+  /// Nothing is to be waited for any more.
+  void end() { is_placed_ = true; }
 
   [[nodiscard]] const std::optional<OdometryFrames>& frames() const { return frames_; }
   /// T_body_frame by transforms that do not move; an error names those that are known.
@@ -114,6 +120,7 @@ class RosIntake {
   std::string take_note() { return std::exchange(note_, {}); }
   struct Counts {
     std::uint64_t odometry = 0, scans = 0, fixes = 0, refused = 0;
+    std::uint64_t missed = 0;  ///< Odometry that was published and never heard (MissedCount).
   };
   [[nodiscard]] const Counts& counts() const { return counts_; }
 
@@ -129,6 +136,7 @@ class RosIntake {
   Status take_transform(const bags::RosTransform& transform, bool is_static, TfOf of);
   [[nodiscard]] bags::TransformTree tree() const;
   Status counted(Status taken);
+  bool waits_for_place();
   [[nodiscard]] Result<Pose3> lidar_pose(const std::string& frame) const;
   struct Waiting;
   Result<std::optional<Scan>> to_scan(Waiting waiting) const;
@@ -150,6 +158,8 @@ class RosIntake {
   Trajectory history_;               ///< Samples that were fed, over the last kHistory_s.
   bool has_whole_history_ = true;    ///< history_ begins with the very first sample.
   std::deque<Waiting> scans_;
+  bool is_placed_ = false;  ///< A scan's LiDAR was placed, or was waited for in vain.
+  std::optional<Timestamp> held_since_;
   bags::SensorClock scan_clock_{"robots[].scan_time_offset_s"};
   std::deque<bags::ReceivedFix> fixes_;
   std::optional<Timestamp> newest_scan_, newest_fix_, known_;
@@ -157,6 +167,7 @@ class RosIntake {
   bool unseen_ = false;              ///< Nobody has observed the motion to the next sample.
   bool is_unsure_ = false;           ///< A fix came without covariance.
   std::string how_, how_fixed_, note_;
+  MissedCount missed_;
   Counts counts_;
 };
 

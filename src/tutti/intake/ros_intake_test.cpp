@@ -104,6 +104,7 @@ TEST(RosIntake, TheLidarIsWhereStaticTransformsSay) {
   ASSERT_TRUE(intake.add_tf(transform(0, "base_link", "mast", T_base_mast), true));
   ASSERT_TRUE(intake.add_points(points(kStart, kAtOnce, "lidar")));
   ASSERT_TRUE(intake.add_odometry(odometry(kStart)));
+  intake.end();  // or it would be waited for
   const Fed early = feed(intake);
   ASSERT_EQ(early.errors.size(), 1U);
   EXPECT_NE(early.errors[0].find("no transform from 'lidar' to 'base_link' on /tf_static, frames that do not move are: "
@@ -119,6 +120,43 @@ TEST(RosIntake, TheLidarIsWhereStaticTransformsSay) {
 }
 
 /// Two robots may use the same frames, each in its own namespace.
+/// Who publishes it may be discovered after the LiDAR.
+TEST(RosIntake, TheFirstScansAndOdometrySinceWaitForTheTransformOfTheLidar) {
+  for (const bool comes : {true, false}) {
+    RosIntake intake({});
+    constexpr auto kHeld = static_cast<int>(RosIntake::kHold_s / (kPeriod * 1e-9));
+    Fed fed;
+    const auto take = [&](const Fed& more) {
+      fed.samples.insert(fed.samples.end(), more.samples.begin(), more.samples.end());
+      fed.scans.insert(fed.scans.end(), more.scans.begin(), more.scans.end());
+      fed.errors.insert(fed.errors.end(), more.errors.begin(), more.errors.end());
+    };
+    ASSERT_TRUE(intake.add_odometry(odometry(kStart)));
+    take(feed(intake));
+    EXPECT_EQ(fed.samples.size(), 1U) << "nothing is known of a LiDAR";
+    for (int i = 1; i <= kHeld; ++i) {
+      ASSERT_TRUE(intake.add_points(points(kStart + i * kPeriod, kSweepBefore, "lidar")));
+      ASSERT_TRUE(intake.add_odometry(odometry(kStart + i * kPeriod, 0.1 * i)));
+      take(feed(intake));
+    }
+    EXPECT_EQ(fed.samples.size(), 1U);
+    EXPECT_TRUE(fed.errors.empty());
+    const std::size_t kept = std::min<std::size_t>(kHeld, RosIntake::kMostScans);
+    if (comes) {
+      ASSERT_TRUE(intake.add_tf(transform(0, "base_link", "lidar", {}), true));
+    }
+    for (int i = kHeld + 1; i < kHeld + 3; ++i)
+      ASSERT_TRUE(intake.add_odometry(odometry(kStart + i * kPeriod, 0.1 * i)));
+    take(feed(intake));
+    EXPECT_EQ(fed.samples.size(), kHeld + 3U);
+    EXPECT_EQ(fed.scans.size(), comes ? kept : 0U);
+    EXPECT_EQ(fed.errors.size(), comes ? 0U : kept);
+    ASSERT_TRUE(intake.add_points(points(kStart + (kHeld + 3) * kPeriod, kSweepBefore, "lidar")));
+    ASSERT_TRUE(intake.add_odometry(odometry(kStart + (kHeld + 3) * kPeriod, 0.1 * (kHeld + 3))));
+    EXPECT_EQ(feed(intake).samples.size(), 1U) << "it is waited for once";
+  }
+}
+
 TEST(RosIntake, TransformsOfTheRobotAloneCountBeforeThoseOfAll) {
   using Of = RosIntake::TfOf;
   RosIntake intake({.odometry_frames = "odom->base_link"});

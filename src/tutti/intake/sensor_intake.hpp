@@ -68,7 +68,10 @@ class SensorIntake {
   /// Images are taken, or may be: what their topics send allows it.
   [[nodiscard]] bool may_see() const { return images_.has_value(); }
   /// Nothing more comes that would be worth waiting for.
-  void end() { is_last_ = true; }
+  void end() {
+    is_last_ = true;
+    ros_.end();
+  }
 
   /// Cameras, depth and IMU, as far as they are known.
   [[nodiscard]] const FeedSensors& sensors() const { return sensors_; }

@@ -13,6 +13,7 @@ bags::RosDiagnostic diagnosis(const RosSituation& situation) {
   };
   add("connection", situation.is_connected ? "feeding" : "away");
   add("odometry", situation.counts.odometry);
+  add("odometry_missed", situation.counts.missed);
   add("scans", situation.counts.scans);
   add("fixes", situation.counts.fixes);
   add("refused", situation.counts.refused);

@@ -211,6 +211,47 @@ TEST_F(RosRobots, ImagesAndImuAreFedOnceTheirPlaceIsKnown) {
   EXPECT_GT(feed_->front().imu({kStart}, {stamp}).size(), 5U);
 }
 
+/// Who publishes it may be discovered after the LiDAR, as with Fast DDS.
+TEST_F(RosRobots, ScansThatComeBeforeTheirTransformWaitForIt) {
+  const auto diagnostics = me_->reader("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", {}, "").value();
+  start();
+  const auto odom = publisher("/alpha/odom", kOdometry), cloud = publisher("/alpha/points", kPoints);
+  ASSERT_TRUE(is_heard(*odom) && is_heard(*cloud));
+  std::size_t scans = 0, samples = 0, i = 0;
+  const auto read_all = [&] {
+    while (const auto input = feed_->front().take(0.0)) {
+      samples += std::holds_alternative<node::OdometrySample>(*input) ? 1 : 0;
+      scans += std::holds_alternative<Scan>(*input) ? 1 : 0;
+      feed_->front().note_heard();
+    }
+  };
+  const auto publish = [&](std::size_t until) {
+    for (; i < until; ++i) {
+      const std::int64_t stamp = kStart + static_cast<std::int64_t>(i) * kPeriod;
+      ASSERT_TRUE(cloud->write(points(stamp, kAtOnce, "lidar")) && odom->write(odometry(stamp)));
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+      read_all();
+    }
+  };
+  publish(20);  // two seconds of odometry
+  EXPECT_LE(samples, 1U);
+  EXPECT_EQ(scans, 0U);
+  const auto still = publisher("/tf_static", kTf, kStaticTfQos);
+  ASSERT_TRUE(is_heard(*still) && still->write(intake::test::transform(0, "base_link", "lidar", {})));
+  publish(21);
+  EXPECT_TRUE(::tutti::test::within(kPatience_s,
+                                    [&] {
+                                      read_all();
+                                      return samples == 21 && scans == 21;
+                                    }))
+      << samples << " " << scans << " " << said();
+  EXPECT_EQ(said().find("no transform"), std::string::npos) << said();
+  EXPECT_TRUE(::tutti::test::within(kPatience_s, [&] {
+    const auto all = taken(*diagnostics);
+    return std::ranges::any_of(all, [](const std::string& cdr) { return cdr.find("odometry_missed") != cdr.npos; });
+  }));
+}
+
 /// As Nav2 starts several robots: frames without prefixes, transforms in the robot's namespace.
 TEST_F(RosRobots, TransformsInTheNamespaceAreHeardAndAnsweredThere) {
   const auto all = me_->reader("/tf", kTf, test::kKeepAll, "").value(),
