@@ -4,17 +4,32 @@ import os
 
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, ExecuteProcess
+from launch.actions import DeclareLaunchArgument, EmitEvent, ExecuteProcess, RegisterEventHandler
 from launch.conditions import IfCondition
+from launch.event_handlers import OnProcessExit
+from launch.events import Shutdown
 from launch.substitutions import LaunchConfiguration, PythonExpression
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
 
+WRONG = 2  # exit code of both programs when their arguments cannot be: starting them again changes nothing
+
+
+def ends_with(program, name):
+    """Ends this launch when the program says that it is started wrongly."""
+    def at_exit(event, _):
+        if event.returncode == WRONG:
+            return [EmitEvent(event=Shutdown(reason=f"{name} cannot be started like this: see what it says above"))]
+        return None
+    return RegisterEventHandler(OnProcessExit(target_action=program, on_exit=at_exit))
+
+
 def generate_launch_description():
     value = LaunchConfiguration
+    name = PythonExpression(["'", value("namespace"), "'.strip('/').replace('/', '_')"])  # '/alpha' and 'fleet/alpha' are namespaces
     arguments = {
-        "namespace": ("r1", "of the robot, and its name in the map"),
+        "namespace": ("r1", "of the robot, and, without slashes around it, its name in the map"),
         "odom": ("odom", "topic of nav_msgs/Odometry, relative to the namespace"),
         "points": ("points", "topic of sensor_msgs/PointCloud2, or of a Livox's CustomMsg, relative to the namespace"),
         "fix": ("fix", "topic of sensor_msgs/NavSatFix, relative to the namespace"),
@@ -26,15 +41,15 @@ def generate_launch_description():
         "bus": ("", "nats://HOST:PORT as the server prints it; empty: tutti robot is started by somebody else"),
         "mission": ("tutti", "name of the mission on the bus, as the server's"),
         "verifier": ("lidar", "of closures, as the server's: lidar, visual (of images), sensors (of whatever two submaps both carry)"),
-        "state": (["/tmp/tutti_", value("namespace")], "folder that the robot keeps what it knows in"),
+        "state": (["/tmp/tutti_", name], "folder that the robot keeps what it knows in"),
         "socket": ([value("state"), ".feed"], "of tutti robot --feed"),
         "params": (os.path.join(get_package_share_directory("tutti_ros"), "config", "robot.yaml"), "parameters"),
         "use_sim_time": ("false", "the clock of /clock"),
     }
-    declared = [DeclareLaunchArgument(name, default_value=default, description=text)
-                for name, (default, text) in arguments.items()]
+    declared = [DeclareLaunchArgument(argument, default_value=default, description=text)
+                for argument, (default, text) in arguments.items()]
     robot = ExecuteProcess(
-        cmd=["tutti", "robot", "--name", value("namespace"), "--bus", value("bus"), "--mission", value("mission"),
+        cmd=["tutti", "robot", "--name", name, "--bus", value("bus"), "--mission", value("mission"),
              "--state", value("state"), "--feed", value("socket"), "--stay",
              "--set", ["closures.verifier=", value("verifier")]],
         output="screen", respawn=True, respawn_delay=2.0,
@@ -42,8 +57,8 @@ def generate_launch_description():
     node = Node(
         package="tutti_ros", executable="tutti_ros", name="tutti_ros", namespace=value("namespace"), output="screen",
         respawn=True, respawn_delay=2.0,
-        parameters=[{name: ParameterValue(value(name), value_type=str) for name in ("images", "depth", "imu")},
+        parameters=[{one: ParameterValue(value(one), value_type=str) for one in ("images", "depth", "imu")},
                     value("params"), {"socket": value("socket"), "use_sim_time": value("use_sim_time")}],
         remappings=[("odom", value("odom")), ("points", value("points")), ("fix", value("fix")),
                     ("/tf", value("tf")), ("/tf_static", value("tf_static"))])
-    return LaunchDescription([*declared, robot, node])
+    return LaunchDescription([*declared, ends_with(robot, "tutti robot"), ends_with(node, "tutti_ros"), robot, node])

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The node on a stub of rclpy, with programs at the other end: run by tutti_ros_test.py."""
+import contextlib
+import io
 import random
 import signal
 import time
@@ -10,6 +12,7 @@ from made_messages import cloud, fix, livox, odometry, pose_at, transforms
 from paths import SOURCE
 from programs import HAS_NATS, PATIENCE_S, WithPrograms
 from tutti_ros.node import CLOUD, camera_info_topic
+from tutti_ros.ros_node import run
 
 
 class Programs(WithPrograms):
@@ -32,13 +35,25 @@ class Programs(WithPrograms):
         self.assertEqual((said.header.frame_id, said.child_frame_id), ("world", "r1/o"))
 
     def test_parameters_that_cannot_be(self):
-        for bad in ({"socket": ""}, {"T_body_lidar": "1 2 3"}, {"antenna_m": "1"}):
-            with self.assertRaisesRegex(ValueError, "parameter"):
+        for bad in ({"socket": ""}, {"T_body_lidar": "1 2 3"}, {"antenna_m": "1"}, {"use_scans": 1}, {"path_period_s": "1"},
+                    {"transform_tolerance_s": True}, {"images": 3}, {"noise.translation_m_per_sqrt_m": "0.1"}):
+            with self.assertRaisesRegex(ValueError, f"parameter '{next(iter(bad))}' is .*expected"):
                 self.node("r1", **bad)
+        whole = self.node("r2", transform_tolerance_s=1)
+        self.assertEqual(whole.transform_tolerance_s, 1.0, "a whole number is a number")
         self.start_robot("r1", "nats://127.0.0.1:1")
         node = self.node("r1", images="a/image_raw,b/image_raw,c/image_raw")
         self.wait_for(lambda: node.link.state == "refused", "the robot's refusal")
         self.assertIn("images are of 'a/image_raw,b/image_raw,c/image_raw', expected", node.link.why)
+
+    def test_what_cannot_be_ends_the_program_with_a_sentence(self):
+        def make_node():
+            raise ValueError("parameter 'socket' is empty, expected the SOCKET of tutti robot --feed SOCKET")
+        said = io.StringIO()
+        with contextlib.redirect_stderr(said), self.assertRaises(SystemExit) as ended:
+            run(make_node)
+        self.assertEqual(ended.exception.code, 2)
+        self.assertEqual(said.getvalue(), "tutti_ros: parameter 'socket' is empty, expected the SOCKET of tutti robot --feed SOCKET\n")
 
     def test_the_camera_info_is_beside_the_images(self):
         for images, expected in (("image", "camera_info"), ("left/image_raw", "left/camera_info"), ("/l/i", "/l/camera_info"),

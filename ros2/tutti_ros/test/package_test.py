@@ -41,7 +41,8 @@ class Package(unittest.TestCase):
                 made.append(self)
 
         modules = {"ament_index_python.packages": ["get_package_share_directory"], "launch": ["LaunchDescription"],
-                   "launch.actions": ["DeclareLaunchArgument", "ExecuteProcess"],
+                   "launch.actions": ["DeclareLaunchArgument", "EmitEvent", "ExecuteProcess", "RegisterEventHandler"],
+                   "launch.event_handlers": ["OnProcessExit"], "launch.events": ["Shutdown"],
                    "launch.conditions": ["IfCondition", "UnlessCondition"],
                    "launch.substitutions": ["LaunchConfiguration", "PathJoinSubstitution", "PythonExpression"],
                    "launch_ros.actions": ["Node"], "launch_ros.parameter_descriptions": ["ParameterValue"]}
@@ -64,4 +65,13 @@ class Package(unittest.TestCase):
             described = subprocess.run([TUTTI, told[1], "--help"], capture_output=True, text=True).stdout
             for word in told[2:]:
                 self.assertIn(f" {word} ", described)
+            for handler in of("OnProcessExit"):  # of a robot that is started wrongly, and of one that was killed
+                at_exit = handler.named["on_exit"]
+                self.assertIn("cannot be started", at_exit(ros_stub.types.SimpleNamespace(returncode=2), None)[0].named["event"].named["reason"])
+                self.assertIsNone(at_exit(ros_stub.types.SimpleNamespace(returncode=-9), None))
+            self.assertEqual(len(of("OnProcessExit")), 2 if file == "robot" else 0)
+            for expression in [x.words[0] for x in of("PythonExpression") if "strip" in x.words[0][-1]]:
+                for given, expected in (("r1", "r1"), ("/alpha", "alpha"), ("/fleet/alpha/", "fleet_alpha")):
+                    said = "".join(word if isinstance(word, str) else given for word in expression)
+                    self.assertEqual(eval(said), expected)
         self.assertTrue((HERE.parent / "config/robot.yaml").exists())

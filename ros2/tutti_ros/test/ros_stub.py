@@ -205,6 +205,11 @@ class Clock:
         return TYPES["builtin_interfaces/Time"]()
 
 
+class Subscription(tuple):
+    """(topic, type)"""
+    topic_name = property(lambda self: self[0] if self[0].startswith("/") else "/r1/" + self[0])
+
+
 class Node:
     given = {}  # parameters
 
@@ -212,8 +217,11 @@ class Node:
         self.name, self.made, self.callbacks, self.qos, self.raw = name, {}, {}, {}, {}
         self.published, self.destroyed = {}, []  # {topic: types}, subscriptions
 
-    def declare_parameter(self, name, value):
-        return types.SimpleNamespace(value=self.given.get(name, value))
+    def declare_parameter(self, name, value, descriptor=None):
+        """As rclpy's: another type than the default's is refused, but where it may change."""
+        given = self.given.get(name, value)
+        assert descriptor or type(given) is type(value), f"InvalidParameterTypeException: {name}"
+        return types.SimpleNamespace(value=given)
 
     def create_publisher(self, kind, topic, qos):
         self.made[topic], self.qos[topic] = Publisher(kind), qos
@@ -221,7 +229,7 @@ class Node:
 
     def create_subscription(self, kind, topic, callback, qos, raw=False):
         self.callbacks[topic], self.qos[topic], self.raw[topic] = callback, qos, raw
-        return topic, kind
+        return Subscription((topic, kind))
 
     def destroy_subscription(self, subscription):
         self.destroyed.append(subscription)
@@ -261,7 +269,8 @@ def install():
     module("rclpy.qos", DurabilityPolicy=types.SimpleNamespace(TRANSIENT_LOCAL="transient local"),
            ReliabilityPolicy=types.SimpleNamespace(RELIABLE="reliable", BEST_EFFORT="best effort"),
            QoSProfile=lambda **what: what, qos_profile_sensor_data="sensor data")
-    module("rclpy", ok=lambda: True, executors=executors)
+    module("rcl_interfaces.msg", ParameterDescriptor=lambda **what: what)
+    module("rclpy", init=lambda: None, try_shutdown=lambda: None, ok=lambda: True, executors=executors)
     module("std_srvs.srv", Trigger=object)
     module("livox_ros_driver2.msg", CustomMsg=type("CustomMsg", (), {}))  # whose messages are taken as bytes
     for name, made in TYPES.items():

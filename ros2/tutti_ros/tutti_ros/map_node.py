@@ -7,7 +7,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import OccupancyGrid
 from rclpy.node import Node
 
-from tutti_ros.ros_node import LATCHED, diagnostics, run
+from tutti_ros.ros_node import LATCHED, diagnostics, parameter, run
 from tutti_ros.server_map import ServerMap
 
 PARAMETERS = {
@@ -22,7 +22,7 @@ LOOK_S = 0.25
 class MapNode(Node):
     def __init__(self):
         super().__init__("tutti_map")
-        given = {name: self.declare_parameter(name, default).value for name, default in PARAMETERS.items()}
+        given = {name: parameter(self, name, default) for name, default in PARAMETERS.items()}
         if not given["map"]:
             raise ValueError("parameter 'map' is empty, expected STATE/map.tutti of tutti server --state STATE")
         self.frame = given["map_frame"]

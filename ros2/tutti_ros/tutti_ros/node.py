@@ -15,7 +15,7 @@ from tutti_ros.connection import Connection
 from tutti_ros.diagnosis import diagnosis
 from tutti_ros.feed_messages import Feed
 from tutti_ros.link import Link, stamp_ns, stamps_of_transforms
-from tutti_ros.ros_node import LATCHED, best_effort, diagnostics, run
+from tutti_ros.ros_node import LATCHED, best_effort, diagnostics, parameter, run
 
 PARAMETERS = {
     "socket": "",              # of tutti robot --feed
@@ -65,14 +65,14 @@ class TuttiNode(Node):
     def __init__(self):
         super().__init__("tutti_ros")
         for name, default in PARAMETERS.items():
-            setattr(self, name, self.declare_parameter(name, default).value)
+            setattr(self, name, parameter(self, name, default))
         if not self.socket:
             raise ValueError("parameter 'socket' is empty, expected the SOCKET of tutti robot --feed SOCKET")
         self.correction, self.situation, self.trouble = None, None, collections.deque(maxlen=5)
         self.transform, self.transform_ns = None, -1  # the last map -> odom (and world -> map), and its stamp
         self.link = Link(client_name=b"tutti_ros", sensors=Feed.Sensors(scans=self.use_scans), ros=self._settings())
         self.connection = Connection(self.socket, self.link, self.hear)
-        self.outputs = {}  # publishers
+        self.outputs, self.topic_names = {}, {}  # publishers; subscribed topics, as ROS calls them
         for topic, kind, qos in (("/tf", TRANSFORMS, TF_QOS), ("corrected_path", PATH, LATCHED),
                                  ("corrected_pose", "geometry_msgs/msg/PoseWithCovarianceStamped", 10),
                                  ("team_mates", "visualization_msgs/msg/MarkerArray", LATCHED)):
@@ -90,7 +90,7 @@ class TuttiNode(Node):
 
     def _settings(self):
         """How the robot is to read the messages, and in which frames it answers."""
-        noise = [float(self.declare_parameter("noise." + name, default).value) for name, default in NOISE.items()]
+        noise = [parameter(self, "noise." + name, default) for name, default in NOISE.items()]
         out = Feed.Ros(images=[topic.strip().encode() for topic in self.images.split(",") if topic.strip()],
                        depth=self.depth.encode(), imu=self.imu.encode(), images_offset_s=self.images_offset_s,
                        p_body_antenna=self._numbers("antenna_m", "x y z"), scans_deskewed=self.scans_deskewed,
@@ -116,7 +116,9 @@ class TuttiNode(Node):
     # From ROS.
     def _subscribe(self, topic, kind, qos, add, *more):
         take = lambda cdr: self.take(add, topic, kind, bytes(cdr), *more)
-        return self.create_subscription(message_type(kind), topic, take, qos, raw=True)
+        subscription = self.create_subscription(message_type(kind), topic, take, qos, raw=True)
+        self.topic_names[topic] = subscription.topic_name  # as it is remapped
+        return subscription
 
     def _subscribe_all(self):
         link, sensor_qos = self.link, qos_profile_sensor_data
@@ -144,7 +146,7 @@ class TuttiNode(Node):
             with self.connection.lock:
                 add(topic, *what)
         except ValueError as error:
-            self.complain(f"{topic}: {error}")
+            self.complain(f"{self.topic_names.get(topic, topic)}: {error}")
         self.connection.wake()
 
     def add_odometry(self, topic, kind, cdr):
