@@ -11,6 +11,7 @@
 #include "support/robot/drifting_robot.hpp"
 #include "support/wire/messages.hpp"
 #include "support/wire/visual.hpp"
+#include "tutti/bags/ros_encode.hpp"
 #include "tutti/base/file.hpp"
 #include "tutti/bus/lease_holder.hpp"
 #include "tutti/formats/image_file.hpp"
@@ -119,6 +120,13 @@ void add_bags(std::map<std::string, std::vector<std::string>>& out) {
   for (const char* const compression : {"none", "bz2", "lz4"})
     out["ros1_bag"].push_back(bags::test::ros1_bag(samples, compression, 1));
   out["db3"] = {small_db3(samples)};
+  const std::vector<std::int8_t> cells{0, 100, -1, 0, 0, 100};
+  out["grid"] = {bags::encode(bags::RosOccupancyGrid{.header = {{7}, "world"},
+                                                     .resolution_m = 0.1,
+                                                     .width = 3,
+                                                     .height = 2,
+                                                     .origin = {{1.0, 2.0, 0.0}},
+                                                     .data = cells})};
   out["rosbag2_metadata"] = {metadata_of({"bag_0.mcap", "bag_1.mcap.zstd"}, 12)};
   for (const int how : {0, 1, 2}) {
     char type = '\0';

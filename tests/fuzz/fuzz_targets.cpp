@@ -17,6 +17,7 @@
 #include "tutti/bags/point_cloud.hpp"
 #include "tutti/bags/ros1_reader.hpp"
 #include "tutti/bags/ros_messages.hpp"
+#include "tutti/bags/ros_types.hpp"
 #include "tutti/bags/rosbag2_metadata.hpp"
 #include "tutti/base/check.hpp"
 #include "tutti/base/config_io.hpp"
@@ -40,6 +41,7 @@
 #include "tutti/node/journal.hpp"
 #include "tutti/program/feed/feed_frames.hpp"
 #include "tutti/program/feed/feed_settings.hpp"
+#include "tutti/program/feed/ros_grid.hpp"
 #include "tutti/wire/agent_state/agent_state.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
@@ -197,6 +199,16 @@ void db3(std::string_view bytes) {
 void rosbag2_metadata(std::string_view bytes) {
   static_cast<void>(bags::parse_rosbag2_metadata(std::string(bytes), "fuzz"));
 }
+/// In whatever way the robot's map lies.
+void grid(std::string_view bytes) {
+  program::RosGrid taken;
+  if (!taken.take(bytes)) return;
+  for (const double yaw : {0.0, 0.5}) {
+    const Pose3 T_map_world{Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ())), {1.0, 2.0, 0.0}};
+    if (const auto made = taken.next("world", T_map_world, "map"); made && *made)
+      TUTTI_CHECK(bags::decode_occupancy_grid(**made), "what a grid is made into is none");
+  }
+}
 /// What was read can be written; and a message about its keys is short.
 void yaml(std::string_view bytes) {
   const auto node = parse_yaml(std::string(bytes), "fuzz");
@@ -314,6 +326,7 @@ const std::map<std::string, Target>& targets() {
       {"fixes", fixes},
       {"g2o", g2o},
       {"graph_stamps", file<formats::parse_graph_stamps>},
+      {"grid", grid},
       {"image", file<[](std::string_view bytes, const char* name) { return formats::decode_image(bytes, name); }>},
       {"image_list", image_list},
       {"imu_csv", file<formats::parse_imu_csv>},

@@ -100,8 +100,11 @@ std::vector<FeedRaw> RosClient::hear(const FeedState& known) {
   }
   const std::string world = world_frame(said_.world_frame, *known.component);
   answers_->hear_world(world, known.T_map_world->inverse());
-  if (auto grid = grid_.next(world, *known.T_map_world, answers_->map_frame()))
-    out.push_back({"map", RosGrid::kType, kCdr, std::move(*grid)});
+  auto grid = grid_.next(world, *known.T_map_world, answers_->map_frame());
+  if (!grid)
+    intake_.note(grid.error().message);
+  else if (*grid)
+    out.push_back({"map", RosGrid::kType, kCdr, std::move(**grid)});
   return out;
 }
 

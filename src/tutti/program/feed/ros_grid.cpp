@@ -79,13 +79,14 @@ std::vector<std::int8_t> RosGrid::cells_in(const Plane& map_from_grid, const Eig
   return out;
 }
 
-std::optional<std::string> RosGrid::next(const std::string& frame, const Pose3& T_map_world,
-                                         const std::string& map_frame) {
-  if (cells_.empty() || frame != frame_) return std::nullopt;
+Result<std::optional<std::string>> RosGrid::next(const std::string& frame, const Pose3& T_map_world,
+                                                 const std::string& map_frame) {
+  const std::optional<std::string> nothing;
+  if (cells_.empty() || frame != frame_) return nothing;
   const Pose3 T_map_grid = T_map_world * T_world_grid_;
   const Plane map_from_grid{T_map_grid.rotation.toRotationMatrix().topLeftCorner<2, 2>(),
                             T_map_grid.translation.head<2>()};
-  if (!(std::abs(map_from_grid.turn.determinant()) > kLeastSeen)) return std::nullopt;
+  if (!(std::abs(map_from_grid.turn.determinant()) > kLeastSeen)) return nothing;
   const auto now = corners(map_from_grid);
   Eigen::Vector2d least = now[0], most = now[0];
   double moved_m = 0.0;
@@ -94,17 +95,23 @@ std::optional<std::string> RosGrid::next(const std::string& frame, const Pose3& 
     most = most.cwiseMax(now[i]);
     if (said_) moved_m = std::max(moved_m, (now[i] - (*said_)[i]).norm());
   }
-  if (said_ && moved_m <= resolution_m_ / 2.0) return std::nullopt;
+  if (said_ && moved_m <= resolution_m_ / 2.0) return nothing;
   said_ = now;
   least = (least / resolution_m_).array().floor() * resolution_m_;
   const auto [width, height] = cell_of((most - least).array() + resolution_m_, resolution_m_);
+  if (static_cast<double>(width) * static_cast<double>(height) > 2.0 * static_cast<double>(kMostCells))
+    return fail(
+        ErrorCode::unsupported,
+        "the server's grid of {} x {} cells has {} x {} in the robot's map, where it is turned: expected at most {} "
+        "cells",
+        width_, height_, width, height, 2 * kMostCells);
   const std::vector<std::int8_t> cells = cells_in(map_from_grid, least, width, height);
-  return bags::encode(bags::RosOccupancyGrid{.header = {stamp_, map_frame},
-                                             .resolution_m = resolution_m_,
-                                             .width = static_cast<std::uint32_t>(width),
-                                             .height = static_cast<std::uint32_t>(height),
-                                             .origin = {{least.x(), least.y(), 0.0}},
-                                             .data = cells});
+  return std::optional(bags::encode(bags::RosOccupancyGrid{.header = {stamp_, map_frame},
+                                                           .resolution_m = resolution_m_,
+                                                           .width = static_cast<std::uint32_t>(width),
+                                                           .height = static_cast<std::uint32_t>(height),
+                                                           .origin = {{least.x(), least.y(), 0.0}},
+                                                           .data = cells}));
 }
 
 }  // namespace tutti::program

@@ -29,8 +29,10 @@ class RosGrid {
   Status take(std::string_view cdr);
   /// The grid in `map_frame`, axis by axis, seen along the map's z axis, if it is another than before: the server has
   /// made a new one, or the map has moved in the world by more than half a cell at a corner. Nothing while the grid is
-  /// of another world than `frame`.
-  std::optional<std::string> next(const std::string& frame, const Pose3& T_map_world, const std::string& map_frame);
+  /// of another world than `frame`. Fails, once for each place, when turned it would have more than 2 * kMostCells
+  /// cells, as a long and narrow one has.
+  Result<std::optional<std::string>> next(const std::string& frame, const Pose3& T_map_world,
+                                          const std::string& map_frame);
 
  private:
   /// From a place on the grid to the map's x and y.

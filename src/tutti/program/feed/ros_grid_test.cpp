@@ -47,7 +47,7 @@ TEST(RosGrid, IsTheSameRoomInTheRobotsOwnMap) {
     RosGrid grid;
     ASSERT_TRUE(grid.take(room.message()));
     const Pose3 T_world_map = turned(yaw, 2.0, -3.0);
-    const auto bytes = grid.next("world", T_world_map.inverse(), "alpha/map");
+    const auto bytes = grid.next("world", T_world_map.inverse(), "alpha/map").value();
     ASSERT_TRUE(bytes);
     const auto made = bags::decode_occupancy_grid(*bytes).value();
     EXPECT_EQ(made.header.frame_id, "alpha/map");
@@ -70,16 +70,16 @@ TEST(RosGrid, IsTheSameRoomInTheRobotsOwnMap) {
 TEST(RosGrid, IsSentAgainWhenItIsAnotherOne) {
   const Room room;
   RosGrid grid;
-  EXPECT_FALSE(grid.next("world", {}, "map"));
+  EXPECT_FALSE(grid.next("world", {}, "map").value());
   ASSERT_TRUE(grid.take(room.message()));
-  EXPECT_FALSE(grid.next("world_1", {}, "map")) << "of another component";
-  EXPECT_TRUE(grid.next("world", {}, "map"));
-  EXPECT_FALSE(grid.next("world", turned(0.001, 0.01, 0.0), "map")) << "less than half a cell";
-  EXPECT_TRUE(grid.next("world", turned(0.0, 0.06, 0.0), "map"));
-  EXPECT_TRUE(grid.next("world", turned(0.02, 0.06, 0.0), "map"));
-  EXPECT_FALSE(grid.next("world", turned(0.02, 0.06, 0.0), "map"));
+  EXPECT_FALSE(grid.next("world_1", {}, "map").value()) << "of another component";
+  EXPECT_TRUE(grid.next("world", {}, "map").value());
+  EXPECT_FALSE(grid.next("world", turned(0.001, 0.01, 0.0), "map").value()) << "less than half a cell";
+  EXPECT_TRUE(grid.next("world", turned(0.0, 0.06, 0.0), "map").value());
+  EXPECT_TRUE(grid.next("world", turned(0.02, 0.06, 0.0), "map").value());
+  EXPECT_FALSE(grid.next("world", turned(0.02, 0.06, 0.0), "map").value());
   ASSERT_TRUE(grid.take(room.message()));
-  EXPECT_TRUE(grid.next("world", turned(0.02, 0.06, 0.0), "map")) << "the server's is new";
+  EXPECT_TRUE(grid.next("world", turned(0.02, 0.06, 0.0), "map").value()) << "the server's is new";
 }
 
 TEST(RosGrid, WhatIsNoneIsRefused) {
@@ -98,7 +98,24 @@ TEST(RosGrid, WhatIsNoneIsRefused) {
   other = made;
   other.origin.orientation.coeffs().setZero();
   EXPECT_NE(why(other).find("no place"), std::string::npos);
-  EXPECT_FALSE(grid.next("world", {}, "map"));
+  EXPECT_FALSE(grid.next("world", {}, "map").value());
+}
+
+/// A row of cells seen at 45 degrees is a square of half its length.
+TEST(RosGrid, ALongOneThatIsTurnedTakesNoMemory) {
+  RosGrid grid;
+  const std::vector<std::int8_t> cells(RosGrid::kMostCells, kFree);
+  ASSERT_TRUE(grid.take(bags::encode(bags::RosOccupancyGrid{.header = {{7}, "world"},
+                                                            .resolution_m = 0.1,
+                                                            .width = 8,
+                                                            .height = static_cast<std::uint32_t>(cells.size() / 8),
+                                                            .data = cells})));
+  const auto turned_one = grid.next("world", turned(M_PI / 4, 0.0, 0.0), "map");
+  ASSERT_FALSE(turned_one.has_value());
+  EXPECT_NE(turned_one.error().message.find("expected at most 16000000 cells"), std::string::npos)
+      << turned_one.error().message;
+  EXPECT_FALSE(grid.next("world", turned(M_PI / 4, 0.0, 0.0), "map").value()) << "said once";
+  EXPECT_TRUE(grid.next("world", {}, "map").value()) << "as it lies there is room for it";
 }
 
 /// The world has the tilt of the odometry that began it, and its origin may be far above a robot's.
@@ -116,7 +133,8 @@ TEST(RosGrid, IsWhereItIsSeenInATiltedWorld) {
                                                     .origin = bags::to_ros(T_level_world.inverse() * T_level_corner),
                                                     .data = room.cells})));
   const Pose3 T_map_level = turned(0.0, 3.0, 7.0);
-  const auto made = bags::decode_occupancy_grid(grid.next("world", T_map_level * T_level_world, "map").value()).value();
+  const auto made =
+      bags::decode_occupancy_grid(grid.next("world", T_map_level * T_level_world, "map").value().value()).value();
   EXPECT_LT((made.origin.position.head<2>() - Eigen::Vector2d(2.0, 6.0)).norm(), 0.15);
   EXPECT_EQ(at(made, 5.0, 8.0), kFree);
   EXPECT_EQ(world_frame("world", 0), "world");
