@@ -316,11 +316,14 @@ void Robot::each_second() {
 void Robot::look_for_odometry() {
   if (said_no_odometry_ || ended_ || !tf_ || Clock::steady_s() - last_odometry_s_ < options_.patience_s) return;
   said_no_odometry_ = true;
-  const Reader& reader = by_tf() ? *tf_ : *odometry_;
+  const bool is_own = own_tf_ && own_tf_->writers() > 0;
+  const Reader& reader = !by_tf() ? *odometry_ : is_own ? *own_tf_ : *tf_;
+  const bool is_either = by_tf() && own_tf_ && !is_own;
+  const std::string topic = is_either ? fmt::format("{} or {}", tf_->topic(), own_tf_->topic()) : reader.topic();
   const std::string otherwise = by_tf() ? fmt::format("there is no {} among its frames", options_.odometry_frames)
                                 : odometry_came_ ? "its publisher says nothing that can be taken"
                                                  : "its publisher has sent nothing yet";
-  options_.say(Level::warning, fmt::format("no odometry on {} for {} s: {}", reader.topic(), options_.patience_s,
+  options_.say(Level::warning, fmt::format("no odometry on {} for {} s: {}", topic, options_.patience_s,
                                            why_silent(*participant_, reader, otherwise)));
 }
 

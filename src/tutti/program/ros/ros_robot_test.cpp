@@ -283,6 +283,17 @@ TEST_F(RosRobots, TransformsInTheNamespaceAreHeardAndAnsweredThere) {
   EXPECT_TRUE(taken(*all).empty());
 }
 
+TEST_F(RosRobots, TheTransformsThatAreMeantAreNamed) {
+  start({.odometry_frames = "odom->base_link"});
+  EXPECT_TRUE(is_said("no odometry on /tf or /alpha/tf for")) << said();
+}
+
+TEST_F(RosRobots, TheTransformsOfTheNamespaceAreNamedWhereTheyCome) {
+  const auto own = publisher("/alpha/tf", kTf, kTfQos);
+  start({.odometry_frames = "odom->base_link"});
+  EXPECT_TRUE(is_said("no odometry on /alpha/tf for")) << said();
+}
+
 TEST_F(RosRobots, WhyThereIsNoOdometryIsReported) {
   const auto other = publisher("/bravo/odom", kOdometry);
   start();
