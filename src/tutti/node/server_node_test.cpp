@@ -215,7 +215,7 @@ TEST_F(ServerNodeTest, GoesOnFromItsStoreAsIfNothingHadHappened) {
   receive(test::submap(kAlpha, 9));
   restart();
   EXPECT_TRUE(of_kind(resumed_, MessageKind::proxy_graph).empty());  // there is news: the next revision comes first
-  EXPECT_EQ(node_->next_timer(), now_ + 0.5);  // after the update before the restart
+  EXPECT_EQ(node_->next_timer(), now_ + 0.5);                        // after the update before the restart
   EXPECT_EQ(pairs_of(resumed_).size(), 8U);
   now_ = now_ + 0.5;
   done(node_->on_timer(now_));
