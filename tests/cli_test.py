@@ -194,7 +194,7 @@ class CommandLine(unittest.TestCase):
         bad_lines = {
             "columns": "1.0 0 0 0 0 0 0 1\n2.0 1 2 3\n",
             "quaternion": "1.0 0 0 0 0 0 0 1\n2.0 1 0 0 0 0 0 2\n",
-            "stamp": "2.0 0 0 0 0 0 0 1\n1.0 1 0 0 0 0 0 1\n",
+            "stamp": "2.0 0 0 0 0 0 0 1\n2.0 1 0 0 0 0 0 1\n",
             "nan": "1.0 0 0 0 0 0 0 1\n2.0 nan 0 0 0 0 0 1\n",
         }
         for word, text in bad_lines.items():
@@ -385,6 +385,13 @@ class CommandLine(unittest.TestCase):
         (self.path / "bad.g2o").write_text("VERTEX_SE3:QUAT 0 1 2\n")
         self.expect(tutti("eval", self.path / "empty.tum", self.path / "none.tum"), 1)
         self.expect(tutti("optimise", self.path / "bad.g2o", "-o", self.path / "x.g2o"), 1, "bad.g2o:1")
+
+    def test_bad_rows_of_a_trajectory_are_left_out_and_said(self):
+        way = self.write_way("way.tum")
+        rows = way.read_text().splitlines(keepends=True)
+        (self.path / "twice.tum").write_text("".join(rows[:4] + rows[3:]))
+        for command in ("eval", "compare"):
+            self.expect(tutti(command, self.path / "twice.tum", way), 0, "1 rows left out")
 
     def test_eval_gives_no_figure_below_three_pairs(self):
         way = self.write_way("way.tum").read_text().splitlines(keepends=True)

@@ -20,6 +20,14 @@ namespace {
 namespace fs = std::filesystem;
 using mission::NamedTrajectory;
 
+Result<Trajectory> load_poses(const std::string& path, std::vector<std::string>& notes) {
+  formats::RowReport report;
+  auto poses = formats::read_trajectory(path, "auto", 10.0, &report);
+  if (poses && poses->empty()) return fail(ErrorCode::invalid, "{}: holds no pose, expected at least one", path);
+  for (const std::string& note : report.notes(path)) notes.push_back(note + ".");
+  return poses;
+}
+
 Result<CompareSide> load_folder(const fs::path& folder, const std::string& estimate) {
   const std::string ending = "_" + estimate + ".tum";
   std::map<std::string, fs::path> files;  // by robot
@@ -34,9 +42,8 @@ Result<CompareSide> load_folder(const fs::path& folder, const std::string& estim
                 ending);
   CompareSide out;
   for (const auto& [robot, path] : files) {
-    auto poses = formats::read_trajectory(path.string());
+    auto poses = load_poses(path.string(), out.notes);
     if (!poses) return tl::unexpected(poses.error());
-    if (poses->empty()) return fail(ErrorCode::invalid, "{}: holds no pose, expected at least one", path.string());
     out.robots.push_back({robot, std::move(*poses), {}});
   }
   return out;
@@ -157,10 +164,11 @@ Result<CompareSide> load_side(const CompareSource& source, const std::string& st
   const std::string& path = source.path;
   if (is_folder(path)) return load_folder(path, source.estimate);
   if (is_graph(path)) return load_g2o(path, stamps_path);
-  auto poses = formats::read_trajectory(path);
+  CompareSide out;
+  auto poses = load_poses(path, out.notes);
   if (!poses) return tl::unexpected(poses.error());
-  if (poses->empty()) return fail(ErrorCode::invalid, "{}: holds no pose, expected at least one", path);
-  return CompareSide{{NamedTrajectory{"", std::move(*poses), {}}}, {}, {}};
+  out.robots.push_back({"", std::move(*poses), {}});
+  return out;
 }
 
 /// Where a graph's stamps are when the other side is `other`; empty when neither side has times.

@@ -44,7 +44,9 @@ double duration_s(const Trajectory& trajectory) { return trajectory.back().stamp
 double seconds(Timestamp stamp) { return static_cast<double>(stamp.ns) * 1e-9; }
 
 Result<Trajectory> load(const std::string& path, const EvalOptions& options) {
-  auto trajectory = formats::read_trajectory(path, options.format, options.kitti_rate_hz);
+  formats::RowReport report;
+  auto trajectory = formats::read_trajectory(path, options.format, options.kitti_rate_hz, &report);
+  for (const std::string& note : report.notes(path)) fmt::print(stderr, "tutti eval: {}\n", note);
   if (trajectory && trajectory->empty())
     return fail(ErrorCode::invalid, "{}: holds no pose, expected at least one", path);
   return trajectory;
@@ -219,7 +221,7 @@ void add_eval_command(CLI::App& app, int& exit_code) {
              "Interpolate only between reference poses at most this far apart", "SECONDS", finite(true));
   add_number(*command, "--rpe-time", options->rpe_time_s, "Interval of the RPE over time", "SECONDS");
   add_number(*command, "--rpe-distance", options->rpe_distance_m, "Interval of the RPE over distance", "METRES");
-  command->add_option("--format", options->format, "Format of both files; auto looks at each file's first row")
+  command->add_option("--format", options->format, "Format of both files; auto looks at each file's columns")
       ->check(CLI::IsMember({"auto", "tum", "euroc", "kitti"}))
       ->capture_default_str()
       ->type_name("");

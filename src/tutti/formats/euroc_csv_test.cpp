@@ -9,6 +9,7 @@
 
 #include "support/formats/mutations.hpp"
 #include "support/shared_data.hpp"
+#include "tutti/geometry/pose3.hpp"
 
 namespace tutti::formats {
 namespace euroc_csv_test {
@@ -44,9 +45,10 @@ TEST(EurocCsv, ErrorsSayWhereAndWhat) {
             "a.csv:1: row has 7 columns, expected at least 8 (stamp[ns],px,py,pz,qw,qx,qy,qz,...)");
   EXPECT_EQ(message("1,0,0,0,1,0,0,0,5\n2,0,0,0,1,0,0,0"),
             "a.csv:2: row has 8 columns, expected 9 (stamp[ns],px,py,pz,qw,qx,qy,qz,...)");
-  EXPECT_EQ(message("1.5,0,0,0,1,0,0,0"), "a.csv:1: stamp in column 1 is '1.5', expected a 64-bit integer");
+  EXPECT_EQ(message("1.5,0,0,0,1,0,0,0"),
+            "a.csv:1: stamp in column 1 is '1.5', expected a 64-bit integer (nanoseconds)");
   EXPECT_EQ(message("1,0,,0,1,0,0,0"), "a.csv:1: column 3 is '', expected a number");
-  EXPECT_EQ(message("1,0,0,0,2,0,0,0"), "a.csv:1: quaternion has norm 2, expected 1 within 0.001");
+  EXPECT_EQ(message("1,0,0,0,2,0,0,0"), "a.csv:1: quaternion has norm 2, expected 1 within 0.01");
   EXPECT_EQ(message("9223372036854775807,0,0,0,1,0,0,0"),
             "a.csv:1: stamp is 9223372036854775807 ns, expected at most 2^61 either way");
 }
@@ -75,7 +77,123 @@ TEST(TrajectoryFile, RecognisesWhatItReads) {
   EXPECT_EQ(size_of("1 0 0 5 0 1 0 6 0 0 1\n"), -1);
   EXPECT_EQ(size_of(""), 0);
   std::ofstream(path) << kGroundTruth;
-  EXPECT_FALSE(read_trajectory(path, "tum"));
+  const auto by_names = read_trajectory(path, "tum");
+  ASSERT_TRUE(by_names) << by_names.error().message;
+  EXPECT_EQ(*by_names, parse_euroc_csv(kGroundTruth, "c").value());
+  std::ofstream(path) << std::string(kGroundTruth).substr(std::string(kGroundTruth).find('\n') + 1);
+  EXPECT_FALSE(read_trajectory(path, "tum"));  // w is first
+}
+
+/// Four poses as others write them, and the same read back.
+class OthersTrajectories : public testing::Test {
+ protected:
+  Result<Trajectory> read(const std::string& text, const std::string& format = "auto") {
+    report_ = {};
+    std::ofstream(path_) << text;
+    return read_trajectory(path_, format, 10.0, &report_);
+  }
+  void expect_turned(const std::string& text) {
+    const auto read_back = read(text);
+    ASSERT_TRUE(read_back) << text << read_back.error().message;
+    ASSERT_EQ(read_back->size(), 1U) << text;
+    EXPECT_EQ(read_back->front().stamp.ns, 1700000000500000000) << text;
+    EXPECT_EQ(read_back->front().pose.translation, Eigen::Vector3d(1, 2, 3)) << text;
+    EXPECT_LT(rotation_angle(read_back->front().pose.inverse() * Pose3{Eigen::Quaterniond(0.8, 0, 0, 0.6), {}}), 1e-9)
+        << text;
+  }
+  std::string path_ = testing::TempDir() + "tutti_others_trajectories_test";
+  RowReport report_;
+};
+
+TEST_F(OthersTrajectories, BadRowsAreLeftOutAndTheRestSorted) {
+  const auto poses = read(
+      "1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n4 3 nan 0 0 0 0 1\n3 2 0 0 0 0 0 1\n2.5 2 0 0 0 0 0 1\n"
+      "5 0 0 0 0 0 0 0\n6 5 0 0");
+  ASSERT_TRUE(poses) << poses.error().message;
+  ASSERT_EQ(poses->size(), 4U);
+  EXPECT_EQ((*poses)[2].stamp.ns, 2500000000);
+  EXPECT_EQ(report_.left_out.size(), 4U);
+  EXPECT_EQ(report_.steps_back, 1U);
+  ASSERT_EQ(report_.notes("f").size(), 2U);
+  EXPECT_NE(report_.notes("f")[0].find("f: 4 rows left out, the first because: "), std::string::npos);
+}
+
+TEST_F(OthersTrajectories, StampsSeparatorsAndNames) {
+  for (const char* text :
+       {"1700000000.5,1,2,3,0,0,0.6,0.8\n",
+        "1700000000.5, 1, 2, 3, 0, 0, 0.6, 0.8\n",
+        "1700000000.5;1;2;3;0;0;0.6;0.8\n",
+        "1700000000500000000 1 2 3 0 0 0.6 0.8\n",
+        "1.7000000005e18 1 2 3 0 0 0.6 0.8\n",
+        "1700000000500000 1 2 3 0 0 0.6 0.8\n",
+        "1700000000500 1 2 3 0 0 0.6 0.8\n",
+        "1700000000.5 1 2 3 0 0 0.6 0.8 17\n",
+        "1700000000500000000,1,2,3,0.8,0,0,0.6\n",
+        "timestamp,x,y,z,qw,qx,qy,qz\n1700000000500000000,1,2,3,0.8,0,0,0.6\n",
+        "timestamp,x,y,z,qx,qy,qz,qw\n1700000000500000000,1,2,3,0,0,0.6,0.8\n",
+        "#timestamp_kf,x,y,z,qw,qx,qy,qz\n1700000000500000000,1,2,3,0.8,0,0,0.6\n",
+        "num, t, x, y, z, qx, qy, qz, qw\n7, 1700000000.5, 1, 2, 3, 0, 0, 0.6, 0.8\n",
+        ",time,pos_x,pos_y,pos_z,quat_x,quat_y,quat_z,quat_w\n0,1700000000.5,1,2,3,0,0,0.6,0.8\n",
+        "# sec,nsec,x,y,z,qx,qy,qz,qw\n1700000000,500000000,1,2,3,0,0,0.6,0.8\n",
+        "%time,field.header.seq,field.header.stamp,field.header.frame_id,field.pose.pose.position.x,"
+        "field.pose.pose.position.y,field.pose.pose.position.z,field.pose.pose.orientation.x,"
+        "field.pose.pose.orientation.y,field.pose.pose.orientation.z,field.pose.pose.orientation.w,"
+        "field.twist.twist.linear.x\n"
+        "1700000009000000000,4,1700000000500000000,odom,1,2,3,0,0,0.6,0.8,5\n",
+        "__time,/odom/pose/pose/position/x,/odom/pose/pose/position/y,/odom/pose/pose/position/z,"
+        "/odom/pose/pose/orientation/x,/odom/pose/pose/orientation/y,/odom/pose/pose/orientation/z,"
+        "/odom/pose/pose/orientation/w\n1700000000.5,1,2,3,0,0,0.6,0.8\n",
+        "header.stamp.sec,header.stamp.nanosec,p.x,p.y,p.z,q.x,q.y,q.z,q.w\n"
+        "1700000000,500000000,1,2,3,0,0,0.6,0.8\n",
+        "# timestamp [ns], vertex, mission, p_G_I_x [m], p_G_I_y [m], p_G_I_z [m], q_G_I_w, q_G_I_x, "
+        "q_G_I_y, q_G_I_z\n1700000000500000000, 3, a0, 1, 2, 3, 0.8, 0, 0, 0.6\n",
+        "VehicleName\tTimeStamp\tPOS_X\tPOS_Y\tPOS_Z\tQ_W\tQ_X\tQ_Y\tQ_Z\tImageFile\n"
+        "Drone\t1700000000500\t1\t2\t3\t0.8\t0\t0\t0.6\timg.png\n",
+        "1700000000500000000,1,2,3,0.8,0,0,0.6,0,0,0,\n",
+        "1700000000500000000.000000 1 2 3 0 0 0.6 0.8\n",
+        "# timestamp(s) tx ty tz qx qy qz qw Pr11 Pr12\n# by OpenVINS\n"
+        "1700000000.5 1 2 3 0 0 0.6 0.8 0.1 0.1\n",
+        "Poses of a robot\ntime x y z qw qx qy qz\n1700000000.5 1 2 3 0.8 0 0 0.6\n",
+        "time x y z qw qx qy qz\n1700000000.5 1 2 3 0.8 0 0 0.6\n",
+        "1700000000.5 0.28 -0.96 0 1 0.96 0.28 0 2 0 0 1 3\n",
+        "1700000000.5 0.28 -0.96 0 1 0.96 0.28 0 2 0 0 1 3 0 0 0 1\n"})
+    expect_turned(text);
+  EXPECT_EQ(read("0.28 -0.96 0 1 0.96 0.28 0 2 0 0 1 3 0 0 0 1\n").value().front().pose.translation.z(), 3.0);
+  read("1 0 0 0 0 0 0 1 5\n").value();
+  EXPECT_EQ(report_.notes("f"), (std::vector<std::string>{"f: 1 columns beside stamp and pose are not read"}));
+}
+
+TEST_F(OthersTrajectories, NumberedRowsHaveARate) {
+  const auto poses = read("0 1 0 0 0 0 1 0 0 0 0 1 0\n5 1 0 0 9 0 1 0 0 0 0 1 0\n");  // KITTI-360
+  ASSERT_TRUE(poses) << poses.error().message;
+  EXPECT_EQ(poses->back().stamp.ns, 500000000);
+  EXPECT_EQ(report_.notes("f"), (std::vector<std::string>{"f: rows have no stamps, taken as 10 a second"}));
+}
+
+TEST_F(OthersTrajectories, StatedTumWithCommasCountsSeconds) {
+  EXPECT_EQ(read("5,1,2,3,0,0,0.6,0.8\n", "tum").value().front().stamp.ns, 5000000000);
+}
+
+TEST_F(OthersTrajectories, StampsOfTooFewDigitsAreAnError) {
+  const std::string many(
+      "1.7e+09 0 0 0 0 0 0 1\n1.7e+09 1 0 0 0 0 0 1\n1.7e+09 2 0 0 0 0 0 1\n1.7e+09 3 0 0 0 0 0 1\n");
+  const auto poses = read(many + "1.70001e+09 3 0 0 0 0 0 1\n");
+  ASSERT_FALSE(poses);
+  EXPECT_NE(poses.error().message.find("too few digits"), std::string::npos) << poses.error().message;
+}
+
+TEST_F(OthersTrajectories, OnePoseOfSeveralRowsIsNoTrajectory) {
+  EXPECT_NE(read("2 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n").error().message.find(":2: stamp 2.000000000 s comes twice"),
+            std::string::npos);
+  EXPECT_NE(read("2 0 0 0 0 0 0 1\n3 nan 0 0 0 0 0 1\n").error().message.find(":2: column 2 is 'nan'"),
+            std::string::npos);
+}
+
+TEST_F(OthersTrajectories, AnErrorSaysAsWhatItWasRead) {
+  const auto message = [&](const std::string& format) { return read("1 2 3\n", format).error().message; };
+  EXPECT_NE(message("auto").find(":1: row has 3 columns, expected 8"), std::string::npos) << message("auto");
+  EXPECT_NE(message("auto").find("; recognised as tum: state another format"), std::string::npos) << message("auto");
+  EXPECT_NE(message("kitti").find("; read as kitti: state another format"), std::string::npos) << message("kitti");
 }
 
 }  // namespace euroc_csv_test

@@ -13,9 +13,8 @@
 namespace tutti::formats {
 
 /// TUM: one `stamp[s] x y z qx qy qz qw` a line (metres, Hamilton quaternion). Stamps go between decimal text and
-/// nanoseconds exactly, never through a double. With `left_out`, a pose whose stamp does not come after the one before
-/// is no error: it is left out and reported there.
-Result<Trajectory> parse_tum(std::string_view text, const std::string& name, std::vector<Error>* left_out = nullptr);
+/// nanoseconds exactly, never through a double.
+Result<Trajectory> parse_tum(std::string_view text, const std::string& name);
 /// Stamps with nine decimals, other numbers with the fewest digits that read back the same: parse_tum(to_tum(t)) == t.
 std::string to_tum(const Trajectory& trajectory);
 Status write_tum(const std::string& path, const Trajectory& trajectory);
@@ -35,10 +34,22 @@ Result<Trajectory> parse_kitti_poses(std::string_view text, const std::string& n
 std::string to_kitti_poses(const Trajectory& trajectory);
 Status write_kitti_poses(const std::string& path, const Trajectory& trajectory);
 
-/// `format`: tum, euroc, kitti (stamps k / kitti_rate_hz), or auto, which decides by the first row that is not a
-/// comment: commas mean EuRoC csv, 12 columns KITTI, anything else TUM. `left_out`: as in parse_tum(), for TUM and
-/// EuRoC.
+/// What read_trajectory() made of rows that are not as they should be.
+struct RowReport {
+  std::vector<Error> left_out;      ///< Why each row is not in the trajectory.
+  std::size_t steps_back = 0;       ///< Rows that are earlier than the one before them.
+  std::size_t ignored_columns = 0;  ///< Beside stamp and pose.
+  double rows_hz = 0.0;             ///< How many rows were taken for a second; 0: they have stamps.
+  /// A sentence for each of these that there are.
+  [[nodiscard]] std::vector<std::string> notes(const std::string& path) const;
+};
+
+/// What other programs write: `format` is tum, euroc, kitti (stamps k / kitti_rate_hz where it has none), or auto.
+/// Blanks, commas or semicolons separate; names of columns in a first row or in the comment before it are heeded;
+/// stamps may count s, ms, us or ns; a matrix may have 12 or 16 numbers, with a stamp before it. With `report`, a row
+/// that cannot be read, has a stamp twice or is not finite is left out, and rows are sorted; a file most of whose rows
+/// cannot be read is an error all the same, and without `report` any such row is.
 Result<Trajectory> read_trajectory(const std::string& path, std::string_view format = "auto",
-                                   double kitti_rate_hz = 10.0, std::vector<Error>* left_out = nullptr);
+                                   double kitti_rate_hz = 10.0, RowReport* report = nullptr);
 
 }  // namespace tutti::formats

@@ -24,14 +24,15 @@ inline constexpr double kLongestMission_s = 7.0 * 86400.0;
 
 /// A trajectory file in the --data folder.
 struct TrajectoryFile {
-  std::string file;            ///< Empty: none.
-  std::string format = "tum";  ///< tum, euroc or kitti (12 numbers per line, stamps from `times` or `rate_hz`)
-  std::string times;           ///< For kitti: file with one stamp in seconds per line; empty: index / rate_hz.
+  std::string file;             ///< Empty: none.
+  std::string format = "auto";  ///< auto, tum, euroc or kitti (matrices, stamps from `times` or `rate_hz`)
+  std::string times;            ///< For kitti: file with one stamp in seconds per line; empty: index / rate_hz.
   double rate_hz = 10.0;
   template <class V>
   void describe(V& v) {
     v.field("file", file, any(), "File below the --data folder.");
-    v.field("format", format, one_of({"tum", "euroc", "kitti"}), "How the file is written.");
+    v.field("format", format, one_of({"auto", "tum", "euroc", "kitti"}),
+            "How the file is written; auto: by its columns.");
     v.field("times", times, any(), "kitti format: file with one stamp in seconds per line.");
     v.field("rate_hz", rate_hz, between(1e-3, 1e6), "kitti format without times: poses per second.");
   }

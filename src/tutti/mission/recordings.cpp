@@ -26,10 +26,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Result<Trajectory> read_trajectory(const TrajectoryFile& source, const fs::path& data,
-                                   std::vector<Error>* left_out = nullptr) {
-  auto poses = formats::read_trajectory((data / source.file).string(), source.format, source.rate_hz, left_out);
-  if (!poses || source.format != "kitti" || source.times.empty()) return poses;
+Result<Trajectory> read_trajectory(const TrajectoryFile& source, const fs::path& data, formats::RowReport* report) {
+  const bool is_numbered = !source.times.empty();  // needs all poses, which are matrices
+  auto poses = formats::read_trajectory((data / source.file).string(), is_numbered ? "kitti" : source.format,
+                                        source.rate_hz, is_numbered ? nullptr : report);
+  if (!poses || !is_numbered) return poses;
   const auto times = formats::read_times((data / source.times).string());
   if (!times) return tl::unexpected(times.error());
   return formats::with_times(*poses, *times);
@@ -57,8 +58,10 @@ Result<std::vector<Timestamp>> read_scan_times(const RobotConfig& robot, const f
 }
 
 /// The reference in the common frame, and where its own frame lies in that.
-Result<std::pair<Trajectory, Pose3>> read_reference(const RobotConfig& robot, const fs::path& data) {
-  auto reference = read_trajectory(robot.reference, data);
+Result<std::pair<Trajectory, Pose3>> read_reference(const RobotConfig& robot, const fs::path& data,
+                                                    std::vector<std::string>& notes) {
+  formats::RowReport report;
+  auto reference = read_trajectory(robot.reference, data, &report);
   if (!reference) return tl::unexpected(reference.error());
   Pose3 T_common_reference;
   if (!robot.reference_transform.empty()) {
@@ -69,6 +72,7 @@ Result<std::pair<Trajectory, Pose3>> read_reference(const RobotConfig& robot, co
   if (robot.reference_offset_m.size() == 3)
     T_common_reference.translation += Eigen::Vector3d(robot.reference_offset_m.data());
   for (StampedPose& sample : *reference) sample.pose = T_common_reference * sample.pose;
+  std::ranges::move(report.notes((data / robot.reference.file).string()), std::back_inserter(notes));
   return std::pair(std::move(*reference), T_common_reference);
 }
 
@@ -162,13 +166,13 @@ Status read_sources(const RobotConfig& robot, const fs::path& data, const Missio
 }
 
 Result<Trajectory> recorded_odometry(const Sources& sources, const RobotConfig& robot, const fs::path& data,
-                                     std::vector<Error>& left_out) {
+                                     formats::RowReport& report) {
   if (sources.maplab) return sources.maplab->odometry;
   if (sources.bag) return sources.bag->odometry;
   if (sources.graph) return sources.graph->odometry;
   // Scans that are numbered as the poses need all of these.
   const bool is_numbered = !robot.scans.empty() && robot.scan_times.empty();
-  return read_trajectory(robot.odometry, data, is_numbered ? nullptr : &left_out);
+  return read_trajectory(robot.odometry, data, is_numbered ? nullptr : &report);
 }
 
 /// One for each sample of `odometry`, the first of which is number `from`.
@@ -185,15 +189,14 @@ Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, 
   Sources sources;
   if (auto ok = read_sources(robot, data, config, sources); !ok) return tl::unexpected(ok.error());
   const auto& [maplab, bag, graph] = sources;
-  std::vector<Error> left_out;
-  const auto odometry = recorded_odometry(sources, robot, data, left_out);
+  formats::RowReport report;
+  const auto odometry = recorded_odometry(sources, robot, data, report);
   if (!odometry) return tl::unexpected(odometry.error());
   MissionRecording out;
-  if (!left_out.empty())
-    out.notes.push_back(fmt::format("{}: {} odometry samples refused, the first because: {}", robot.name,
-                                    left_out.size(), left_out.front().message));
+  for (const std::string& note : report.notes((data / robot.odometry.file).string()))
+    out.notes.push_back(fmt::format("{}: odometry: {}", robot.name, note));
   if (!robot.reference.file.empty()) {
-    auto reference = read_reference(robot, data);
+    auto reference = read_reference(robot, data, out.notes);
     if (!reference) return tl::unexpected(reference.error());
     out.recording.reference = std::move(reference->first);
     if (robot.reference.file == robot.odometry.file) out.T_common_odom = reference->second;

@@ -20,7 +20,9 @@ std::string_view trimmed(std::string_view text) {
 
 /// `line` is trimmed and not empty.
 void split(std::string_view line, Separator separator, std::vector<std::string_view>& columns) {
-  const auto is_separator = [separator](char c) { return separator == Separator::comma ? c == ',' : is_blank(c); };
+  const auto is_separator = [separator](char c) {
+    return separator == Separator::whitespace ? is_blank(c) : c == (separator == Separator::comma ? ',' : ';');
+  };
   columns.clear();
   while (true) {
     std::size_t end = 0;

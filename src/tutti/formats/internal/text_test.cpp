@@ -111,8 +111,8 @@ RC_GTEST_PROP(UnitQuaternion, UnitOnesAreLeftAlone, ()) {
 TEST(UnitQuaternion, NormalisedWithinToleranceRefusedBeyond) {
   const Eigen::Quaterniond q(0.5, 0.5, -0.5, 0.5);
   const LineReader where("", "f");
-  EXPECT_NEAR(to_unit(where, Eigen::Quaterniond(q.coeffs() * 1.0009))->norm(), 1.0, 1e-15);
-  EXPECT_FALSE(to_unit(where, Eigen::Quaterniond(q.coeffs() * 1.0011)));
+  EXPECT_NEAR(to_unit(where, Eigen::Quaterniond(q.coeffs() * 1.009))->norm(), 1.0, 1e-15);
+  EXPECT_FALSE(to_unit(where, Eigen::Quaterniond(q.coeffs() * 1.011)));
   EXPECT_FALSE(to_unit(where, Eigen::Quaterniond(0, 0, 0, 0)));
   EXPECT_FALSE(to_unit(where, Eigen::Quaterniond(1e200, 1e200, 0, 0)));
 }
