@@ -13,7 +13,7 @@
 #include "support/mission/fleet_graph.hpp"
 #include "support/shared_data.hpp"
 #include "tutti/base/file.hpp"
-#include "tutti/formats/jrl.hpp"
+#include "tutti/formats/fleet_graph.hpp"
 #include "tutti/lab/run_mission.hpp"
 #include "tutti/mission/graph_recording.hpp"
 
@@ -27,7 +27,7 @@ struct FleetRun {
 
 FleetRun run_fleet(const std::string& file, const std::filesystem::path& data,
                    const std::vector<std::string>& assignments = {}) {
-  FleetRun out{.record = {}, .graph = formats::read_pyfg_or_jrl((data / file).string()).value()};
+  FleetRun out{.record = {}, .graph = formats::read_fleet_graph((data / file).string()).value()};
   const auto config = lab::parse_mission(graph_mission(file, data).value(), file, assignments);
   EXPECT_TRUE(config.has_value()) << config.error().message;
   if (!config) return out;

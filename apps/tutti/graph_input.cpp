@@ -10,16 +10,16 @@
 #include <tuple>
 
 #include "tutti/base/file.hpp"
+#include "tutti/formats/fleet_graph.hpp"
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/graph_stamps.hpp"
 #include "tutti/formats/jrl.hpp"
 #include "tutti/formats/pyfg.hpp"
+#include "tutti/formats/symbol_keys.hpp"
 #include "tutti/geometry/covariance.hpp"
 
 namespace tutti::app {
 namespace {
-
-constexpr int kSymbolShift = 56;
 
 /// A vertex before it has its place: by robot, then by `order`.
 struct Loose {
@@ -75,7 +75,7 @@ void count_seconds(NamedGraph& graph) {
 Result<NamedGraph> from_pyfg(const GraphSource& source) {
   if (!source.robots.empty())
     return fail(ErrorCode::configuration, "--robots: {} names its robots by letters", source.path);
-  const auto file = formats::read_pyfg_or_jrl(source.path);
+  const auto file = formats::read_fleet_graph(source.path);
   if (!file) return tl::unexpected(file.error());
   NamedGraph out{.is_pyfg = true, .replaced = file->indefinite, .robots_from = "letters of the names"};
   PoseGraph graph;
@@ -88,7 +88,7 @@ Result<NamedGraph> from_pyfg(const GraphSource& source) {
     graph.poses.push_back(vertex.pose.value_or(Pose3{}));
     out.has_poses = out.has_poses && vertex.pose.has_value();
     out.names.push_back(to_string(vertex.name));
-    out.ids.push_back((std::int64_t{vertex.name.robot} << kSymbolShift) |
+    out.ids.push_back((std::int64_t{vertex.name.robot} << formats::kSymbolShift) |
                       static_cast<std::int64_t>(vertex.name.number));
     out.fixed_poses.push_back(vertex.prior);
   }
@@ -103,17 +103,6 @@ Result<NamedGraph> from_pyfg(const GraphSource& source) {
     count_seconds(out);
   }
   return out;
-}
-
-std::optional<char> letter_of(std::int64_t id) {
-  const auto letter = static_cast<char>(id >> kSymbolShift);
-  const bool is_letter = (letter >= 'a' && letter <= 'z') || (letter >= 'A' && letter <= 'Z');
-  return id > 0 && is_letter ? std::optional(letter) : std::nullopt;
-}
-
-std::string name_of(std::int64_t id) {
-  const auto letter = letter_of(id);
-  return letter ? fmt::format("{}{}", *letter, id & ((std::int64_t{1} << kSymbolShift) - 1)) : fmt::format("{}", id);
 }
 
 /// The robots of ascending ids: which robot each vertex is of, and what they are called.
@@ -140,7 +129,7 @@ Result<Robots> robots_by_ranges(const GraphSource& source, const formats::G2oFil
 Robots robots_by_letters(const formats::G2oFile& file) {
   Robots out;
   for (const std::int64_t id : file.vertex_ids) {
-    const std::string name(1, *letter_of(id));
+    const std::string name(1, *formats::letter_of(id));
     if (out.names.empty() || out.names.back() != name) out.names.push_back(name);
     out.of.push_back(static_cast<std::uint32_t>(out.names.size() - 1));
   }
@@ -164,7 +153,9 @@ Result<Robots> robots_by_gaps(const GraphSource& source, const formats::G2oFile&
 }
 
 Result<NamedGraph> from_g2o(const GraphSource& source) {
-  const auto file = formats::read_g2o(source.path);
+  std::vector<std::string> paths = {source.path};
+  paths.insert(paths.end(), source.more.begin(), source.more.end());
+  const auto file = formats::read_g2o(paths);
   if (!file) return tl::unexpected(file.error());
   std::vector<formats::VertexStamp> stamps;
   if (const std::string beside = formats::stamps_beside(source.path); is_a_file(beside)) {
@@ -196,12 +187,12 @@ Result<Plain> read_plain(const std::string& path, Wanted wanted) {
   if (!*pyfg) {
     auto file = wanted == Wanted::poses ? formats::read_g2o(path) : formats::read_g2o_edges(path);
     if (!file) return tl::unexpected(file.error());
-    for (const std::int64_t id : file->vertex_ids) out.names.push_back(name_of(id));
+    for (const std::int64_t id : file->vertex_ids) out.names.push_back(formats::vertex_name(id));
     out.poses.assign(file->graph.poses.begin(), file->graph.poses.end());
     out.edges = std::move(file->graph.edges);
     return out;
   }
-  const auto file = formats::read_pyfg_or_jrl(path);
+  const auto file = formats::read_fleet_graph(path);
   if (!file) return tl::unexpected(file.error());
   for (const auto& vertex : file->vertices) {
     out.names.push_back(to_string(vertex.name));
@@ -242,14 +233,18 @@ Status put_in_place(const NamedGraph& graph, server::MapEstimate& map) {
 
 Result<NamedGraph> name_graph(const GraphSource& source, const formats::G2oFile& file,
                               std::span<const formats::VertexStamp> stated) {
-  NamedGraph out{.is_2d = file.is_2d, .replaced = file.indefinite_edges};
+  NamedGraph out{.is_2d = file.is_2d,
+                 .replaced = file.indefinite_edges,
+                 .repeated = file.repeated_edges,
+                 .left_out = file.left_out};
   std::map<std::int64_t, formats::VertexStamp> stamps;
   for (const auto& stamp : stated) stamps[stamp.vertex_id] = stamp;
   for (const std::int64_t id : file.vertex_ids)
     if (!stamps.empty() && !stamps.contains(id))
       return fail(ErrorCode::invalid, "{}: has no line for vertex {} of {}", formats::stamps_beside(source.path), id,
                   source.path);
-  const bool has_letters = std::ranges::all_of(file.vertex_ids, [](auto id) { return letter_of(id).has_value(); });
+  const bool has_letters =
+      std::ranges::all_of(file.vertex_ids, [](auto id) { return formats::letter_of(id).has_value(); });
   Robots robots;
   if (!source.robots.empty()) {
     auto found = robots_by_ranges(source, file);
@@ -283,7 +278,7 @@ Result<NamedGraph> name_graph(const GraphSource& source, const formats::G2oFile&
   for (const Loose& v : ordered) {
     const std::int64_t id = file.vertex_ids[v.position];
     out.ids.push_back(id);
-    out.names.push_back(name_of(id));
+    out.names.push_back(formats::vertex_name(id));
     const bool is_fixed = std::ranges::binary_search(file.fixed, v.position);
     out.fixed_poses.push_back(is_fixed ? std::optional(file.graph.poses[v.position]) : std::nullopt);
     if (!stamps.empty()) out.robots.stamps.push_back(stamps.at(id).stamp);
@@ -307,6 +302,8 @@ Result<server::JudgedGraph> judge(const NamedGraph& graph, const std::string& pa
 Result<NamedGraph> read_graph(const GraphSource& source) {
   const auto pyfg = is_pyfg(source.path);
   if (!pyfg) return tl::unexpected(pyfg.error());
+  if (*pyfg && !source.more.empty())
+    return fail(ErrorCode::configuration, "{}: is a graph of several robots already, expected one file", source.path);
   return *pyfg ? from_pyfg(source) : from_g2o(source);
 }
 

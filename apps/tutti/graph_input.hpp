@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -19,6 +20,7 @@ namespace tutti::app {
 /// Which file to read, and what is known beside it.
 struct GraphSource {
   std::string path;
+  std::vector<std::string> more;     ///< Further g2o files of the same graph, as of other robots.
   std::vector<std::int64_t> robots;  ///< For g2o: the first vertex id of each robot; empty: as in the file.
   std::string truth;                 ///< A file whose vertices are the truth, "none", or empty: PyFG's own truth.
   std::string right;  ///< A file without the wrong closures; empty: *_no_outliers beside the graph, if there is one.
@@ -35,8 +37,10 @@ struct NamedGraph {
   bool has_poses = true;  ///< False: the file lacks poses of vertices, which are the identity here.
   bool is_2d = false;
   std::size_t replaced = 0;  ///< Number of information or covariance matrices that were not positive semidefinite.
-  std::string robots_from;   ///< For people: how robots were distinguished,
-  std::string stamps_from;   ///< and where the times are from.
+  std::size_t repeated = 0;  ///< Edges that were there twice, and count once.
+  std::map<std::string, std::size_t> left_out;  ///< Lines that are not read, by their tags.
+  std::string robots_from;                      ///< For people: how robots were distinguished,
+  std::string stamps_from;                      ///< and where the times are from.
 };
 
 /// The truth that results are scored against.

@@ -8,6 +8,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "commands.hpp"
 #include "optimise_robust.hpp"
@@ -23,7 +24,7 @@ namespace {
 using namespace tutti::estimation;
 
 struct OptimiseOptions {
-  std::string input;
+  std::vector<std::string> inputs;
   std::string output;
   std::string initialisation = "chordal";
   std::string loss = "none";
@@ -72,6 +73,8 @@ void print(const formats::G2oFile& file, const Outcome& outcome, const OptimiseO
                                       {"fixed_vertices", file.fixed.size()},
                                       {"indefinite_edges", file.indefinite_edges},
                                       {"worst_indefinite_share", file.worst_indefinite_share},
+                                      {"repeated_edges", file.repeated_edges},
+                                      {"left_out", file.left_out},
                                       {"chi2_before", outcome.chi2_before},
                                       {"chi2_after", outcome.chi2_after},
                                       {"downweighted_edges", outcome.rejected},
@@ -89,6 +92,9 @@ void print(const formats::G2oFile& file, const Outcome& outcome, const OptimiseO
         "information  {} of {} matrices are not positive semidefinite (worst: {:.2g} of its largest eigenvalue "
         "below zero); the nearest ones that are were taken\n",
         file.indefinite_edges, graph.edges.size(), file.worst_indefinite_share);
+  if (file.repeated_edges > 0)
+    fmt::print("repeated     {} edges are there twice and count once\n", file.repeated_edges);
+  if (!file.left_out.empty()) fmt::print("left out     {}\n", formats::counted(file.left_out));
   fmt::print("chi2         {:.6g} -> {:.6g}\n", outcome.chi2_before, outcome.chi2_after);
   if (options.loss != "none") fmt::print("down-weighted edges {}\n", outcome.rejected);
   fmt::print("iterations   {}\ntime         {:.1f} ms\ntermination  {}\n", summary.iterations, 1e3 * outcome.time_s,
@@ -97,7 +103,7 @@ void print(const formats::G2oFile& file, const Outcome& outcome, const OptimiseO
 
 /// The same vertices at the same times: the stamps beside the input, if any, go beside the output.
 Status copy_stamps(const OptimiseOptions& options) {
-  const std::string from = formats::stamps_beside(options.input);
+  const std::string from = formats::stamps_beside(options.inputs.front());
   const std::string to = formats::stamps_beside(options.output);
   std::error_code failure;
   if (!std::filesystem::exists(from, failure) || std::filesystem::equivalent(from, to, failure)) return {};
@@ -108,18 +114,19 @@ Status copy_stamps(const OptimiseOptions& options) {
 
 int run(OptimiseOptions options) {
   if (options.robust) {
-    options.robustly.source.path = options.input;
+    options.robustly.source.path = options.inputs.front();
+    options.robustly.source.more.assign(options.inputs.begin() + 1, options.inputs.end());
     options.robustly.output = options.output;
     options.robustly.json = options.json;
     return optimise_robust(options.robustly);
   }
-  auto file = formats::read_g2o(options.input);
+  auto file = formats::read_g2o(options.inputs);
   if (!file) return complain("optimise", file.error().message);
   const Outcome outcome = optimise(*file, options);
   print(*file, outcome, options);
   const auto termination = outcome.solution.summary.termination;
   if (!is_usable(termination))
-    return complain("optimise", fmt::format("{}: {}; nothing written", options.input,
+    return complain("optimise", fmt::format("{}: {}; nothing written", options.inputs.front(),
                                             termination == Termination::singular
                                                 ? "the edges do not determine every pose (singular)"
                                                 : "a pose or an edge is not a number"));
@@ -159,7 +166,9 @@ void add_optimise_command(CLI::App& app, int& exit_code) {
       "summary counts them; numbers that are not finite, or no positive eigenvalue, are an error.\n"
       "SE(2) graphs are optimised lifted to SE(3). With a robust loss or gnc, edges between vertices that follow each\n"
       "other in the file count as odometry and are trusted; gnc decides for each other edge whether it is wrong.\n"
-      "IN_stamps.csv, if it is there, is copied beside the output.\n\n"
+      "IN_stamps.csv, if it is there, is copied beside the output. Several files are one graph, as where each robot "
+      "has its own.\nAn edge that is there twice to the digit counts once; lines of other kinds (priors, landmarks) "
+      "are left out\nand counted.\n\n"
       "--robust decides as the mapping server does which closures, and which segments of odometry, are wrong: of g2o\n"
       "files, and of PyFG and JRL as COSMO-Bench has them (names are a letter per robot and a number). Edges between\n"
       "vertices that follow each other in one robot are odometry. OUT holds odometry and the accepted closures, each "
@@ -171,11 +180,13 @@ void add_optimise_command(CLI::App& app, int& exit_code) {
       "needs times: where the file has none, the n-th pose of a robot counts as at n seconds. Priors tell where a map\n"
       "lies, not how robots do to each other.\n"
       "Examples: tutti optimise sphere2500.g2o -o out.g2o\n"
+      "          tutti optimise --robust robot_a.g2o robot_b.g2o -o out.g2o\n"
       "          tutti optimise --robust fleet.pyfg -o out.g2o\n"
       "          tutti optimise --robust fleet.g2o --robots 0,1000,2000 --truth truth.g2o -o out.g2o\n");
   command
-      ->add_option("input", options->input,
-                   "Graph to read: g2o (EDGE_SE3:QUAT or EDGE_SE2, VERTEX lines optional); PyFG, JRL with --robust.")
+      ->add_option("input", options->inputs,
+                   "Graph to read: g2o (EDGE_SE3:QUAT or EDGE_SE2, VERTEX lines optional) or TORO, in one file or "
+                   "several; PyFG, JRL with --robust.")
       ->required()
       ->type_name("IN");
   command->add_option("-o,--output", options->output, "Where to write the optimised graph.")

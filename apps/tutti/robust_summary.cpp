@@ -86,6 +86,8 @@ void print_json(const RobustResult& result) {
                    {"poses", graph.names.size()},
                    {"odometry_edges", count(judged, true, true)},
                    {"replaced_matrices", graph.replaced},
+                   {"repeated_edges", graph.repeated},
+                   {"left_out", graph.left_out},
                    {"components", judged.map.components},
                    {"cost", judged.map.cost},
                    {"degrees_of_freedom", judged.map.degrees_of_freedom},
@@ -117,6 +119,8 @@ void print_text(const RobustResult& result) {
   if (graph.replaced > 0)
     fmt::print("matrices     {} were not positive semidefinite; the nearest ones that are were taken\n",
                graph.replaced);
+  if (graph.repeated > 0) fmt::print("repeated     {} edges are there twice and count once\n", graph.repeated);
+  if (!graph.left_out.empty()) fmt::print("left out     {}\n", formats::counted(graph.left_out));
   fmt::print("closures     {} accepted, {} refused\n", count(judged, false, true), count(judged, false, false));
   for (const auto& [reason, times] : reasons(judged)) fmt::print("  {:>6}     {}\n", times, reason);
   for (const auto& failed : judged.map.failed_odometry)

@@ -1,179 +1,52 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/formats/g2o.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <iterator>
 #include <numeric>
-#include <span>
+#include <set>
+#include <utility>
 
 #include "tutti/base/check.hpp"
 #include "tutti/formats/internal/chain.hpp"
-#include "tutti/formats/internal/text.hpp"
-#include "tutti/geometry/so3.hpp"
+#include "tutti/formats/internal/g2o_lines.hpp"
+#include "tutti/formats/symbol_keys.hpp"
 
 namespace tutti::formats {
 namespace {
 
-using internal::LineReader;
-using internal::shown;
+using internal::G2oEdge;
+using internal::G2oLines;
+using internal::G2oVertex;
+using internal::kPlanarAxes;
 
-constexpr double kRounding = 1e-12;    // an eigenvalue this far below zero, as a share of the largest, is zero
-constexpr double kLeastShare = 1e-9;   // of the largest eigenvalue, that takes the place of a negative one
-constexpr double kMaxAngle_rad = 1e6;  // of SE(2): its square stays finite, and its rounding below 1e-9 rad
-constexpr std::array<int, 3> kPlanarAxes = {0, 1, 5};  // x y theta within [tx ty tz rx ry rz]
+bool is_same(const Pose3& a, const Pose3& b) {
+  return a.translation == b.translation && a.rotation.coeffs() == b.rotation.coeffs();
+}
 
-struct Vertex {
-  std::int64_t id = 0;
-  Pose3 pose;
-};
-/// Edge between ids; PoseGraphEdge has positions.
-struct IdEdge {
-  std::int64_t from = 0;
-  std::int64_t to = 0;
-  Pose3 T_from_to;
-  Matrix6d information;
-  int line = 0;
-};
-/// Information matrices that were not positive semidefinite.
-struct Repairs {
-  std::size_t count = 0;
-  double worst_share = 0.0;
-};
-struct Lines {
-  std::vector<Vertex> vertices;
-  std::vector<IdEdge> edges;
-  std::vector<std::int64_t> fixed;
-  Repairs repairs;
-  bool has_2d = false;
-  bool has_3d = false;
-};
-
-Pose3 lift(double x, double y, double theta) { return {so3_exp({0.0, 0.0, theta}), {x, y, 0.0}}; }
-
-/// Pose in the columns from `first` on: x y theta, or x y z qx qy qz qw.
-Result<Pose3> read_pose(const LineReader& line, std::size_t first, bool is_2d) {
-  if (is_2d) {
-    double v[3];
-    if (auto ok = line.numbers(first, v); !ok) return tl::unexpected(ok.error());
-    if (auto ok = check_position(line, {v[0], v[1], 0.0}); !ok) return tl::unexpected(ok.error());
-    if (std::abs(v[2]) > kMaxAngle_rad)
-      return line.fail(ErrorCode::invalid, "angle is {:g} rad, expected at most {:g}", v[2], kMaxAngle_rad);
-    return lift(v[0], v[1], v[2]);
+/// The vertices by id, each once; an error when one comes twice with different poses.
+Result<std::map<std::int64_t, const G2oVertex*>> index_vertices(const G2oLines& lines) {
+  std::map<std::int64_t, const G2oVertex*> out;
+  for (const G2oVertex& vertex : lines.vertices) {
+    const auto [at, is_new] = out.try_emplace(vertex.id, &vertex);
+    if (!is_new && !is_same(at->second->pose, vertex.pose))
+      return fail(ErrorCode::invalid,
+                  "{}: vertex {} is at {} already, with another pose: expected ids of their own in each file",
+                  vertex.where, vertex_name(vertex.id), at->second->where);
   }
-  double v[7];
-  if (auto ok = line.numbers(first, v); !ok) return tl::unexpected(ok.error());
-  if (auto ok = check_position(line, {v[0], v[1], v[2]}); !ok) return tl::unexpected(ok.error());
-  const auto q = internal::to_unit(line, {v[6], v[3], v[4], v[5]});
-  if (!q) return tl::unexpected(q.error());
-  return Pose3{*q, {v[0], v[1], v[2]}};
+  return out;
 }
 
-/// The nearest positive semidefinite matrix (Frobenius norm): negative eigenvalues become 0, but for the share that
-/// keeps the solver's equations regular. `information` is symmetric; unchanged when it is semidefinite to rounding.
-Status make_semidefinite(const LineReader& line, Eigen::MatrixXd& information, Repairs& repairs) {
-  if (information.llt().info() == Eigen::Success) return {};  // positive definite, the usual case
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
-  const Eigen::VectorXd& values = eigen.eigenvalues();  // ascending
-  const double least = values(0), largest = values(values.size() - 1);
-  if (least >= -kRounding * largest) return {};
-  if (!(largest > 0.0) || !values.allFinite())
-    return line.fail(ErrorCode::invalid, "eigenvalues of the information are {:.3g} to {:.3g}, expected a positive one",
-                     least, largest);
-  information =
-      eigen.eigenvectors() * values.cwiseMax(kLeastShare * largest).asDiagonal() * eigen.eigenvectors().transpose();
-  information = (0.5 * (information + information.transpose())).eval();
-  ++repairs.count;
-  repairs.worst_share = std::max(repairs.worst_share, -least / largest);
-  return {};
-}
-
-/// Upper triangle, row by row, from column `first` on.
-Result<Matrix6d> read_information(const LineReader& line, std::size_t first, bool is_2d, Repairs& repairs) {
-  std::array<double, 21> upper{};
-  if (auto ok = line.numbers(first, std::span(upper).first(is_2d ? 6 : 21)); !ok) return tl::unexpected(ok.error());
-  Eigen::MatrixXd given(is_2d ? 3 : 6, is_2d ? 3 : 6);
-  std::size_t next = 0;
-  for (int row = 0; row < given.rows(); ++row)
-    for (int column = row; column < given.cols(); ++column) given(row, column) = given(column, row) = upper[next++];
-  if (auto ok = make_semidefinite(line, given, repairs); !ok) return tl::unexpected(ok.error());
-  if (!is_2d) return Matrix6d(given);
-
-  Matrix6d information = Matrix6d::Zero();
-  for (int row = 0; row < 3; ++row)
-    for (int column = 0; column < 3; ++column)
-      information(kPlanarAxes[static_cast<std::size_t>(row)], kPlanarAxes[static_cast<std::size_t>(column)]) =
-          given(row, column);
-  const auto or_one = [](double value) { return value > 0.0 ? value : 1.0; };
-  information(2, 2) = or_one(0.5 * information(0, 0) + 0.5 * information(1, 1));
-  information(3, 3) = information(4, 4) = or_one(information(5, 5));
-  return information;
-}
-
-Status read_vertex(const LineReader& line, bool is_2d, Lines& lines) {
-  const auto layout = is_2d ? "VERTEX_SE2 id x y theta" : "VERTEX_SE3:QUAT id x y z qx qy qz qw";
-  if (auto ok = line.expect_columns(is_2d ? 5 : 9, layout); !ok) return ok;
-  const auto id = line.integer(1, "vertex id");
-  if (!id) return tl::unexpected(id.error());
-  const auto pose = read_pose(line, 2, is_2d);
-  if (!pose) return tl::unexpected(pose.error());
-  lines.vertices.push_back({*id, *pose});
-  return {};
-}
-
-Status read_edge(const LineReader& line, bool is_2d, Lines& lines) {
-  const auto layout = is_2d ? "EDGE_SE2 from to, 3 of the pose, 6 of the information"
-                            : "EDGE_SE3:QUAT from to, 7 of the pose, 21 of the information";
-  if (auto ok = line.expect_columns(is_2d ? 12 : 31, layout); !ok) return ok;
-  const auto from = line.integer(1, "vertex id");
-  if (!from) return tl::unexpected(from.error());
-  const auto to = line.integer(2, "vertex id");
-  if (!to) return tl::unexpected(to.error());
-  if (*from == *to) return line.fail(ErrorCode::invalid, "edge from vertex {} to itself", *from);
-  const auto pose = read_pose(line, 3, is_2d);
-  if (!pose) return tl::unexpected(pose.error());
-  const auto information = read_information(line, is_2d ? 6 : 10, is_2d, lines.repairs);
-  if (!information) return tl::unexpected(information.error());
-  lines.edges.push_back({*from, *to, *pose, *information, line.line()});
-  return {};
-}
-
-Status read_line(const LineReader& line, Lines& lines) {
-  const std::string_view tag = line.columns()[0];
-  if (tag == "FIX") {
-    for (std::size_t i = 1; i < line.columns().size(); ++i) {
-      const auto id = line.integer(i, "vertex id");
-      if (!id) return tl::unexpected(id.error());
-      lines.fixed.push_back(*id);
-    }
-    return {};
-  }
-  const bool is_vertex = tag == "VERTEX_SE2" || tag == "VERTEX_SE3:QUAT";
-  const bool is_2d = tag == "VERTEX_SE2" || tag == "EDGE_SE2";
-  if (!is_vertex && tag != "EDGE_SE2" && tag != "EDGE_SE3:QUAT")
-    return line.fail(ErrorCode::unsupported,
-                     "tag is {}, expected VERTEX_SE2, EDGE_SE2, VERTEX_SE3:QUAT, EDGE_SE3:QUAT or FIX", shown(tag));
-  (is_2d ? lines.has_2d : lines.has_3d) = true;
-  if (lines.has_2d && lines.has_3d)
-    return line.fail(ErrorCode::unsupported, "tag is {} after lines of the other dimension, expected one of both", tag);
-  return is_vertex ? read_vertex(line, is_2d, lines) : read_edge(line, is_2d, lines);
-}
-
-/// Sorted ids of all poses; an error when a vertex comes twice.
-Result<std::vector<std::int64_t>> collect_ids(const Lines& lines, const std::string& name) {
-  std::vector<std::int64_t> ids;
-  for (const Vertex& vertex : lines.vertices) ids.push_back(vertex.id);
-  if (lines.vertices.empty())
-    for (const IdEdge& edge : lines.edges) ids.insert(ids.end(), {edge.from, edge.to});
-  std::sort(ids.begin(), ids.end());
-  const auto repeated = std::adjacent_find(ids.begin(), ids.end());
-  if (!lines.vertices.empty() && repeated != ids.end())
-    return fail(ErrorCode::invalid, "{}: vertex {} comes twice", name, *repeated);
-  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-  return ids;
+std::vector<std::int64_t> collect_ids(const G2oLines& lines, const std::map<std::int64_t, const G2oVertex*>& vertices) {
+  std::set<std::int64_t> ids;
+  for (const auto& [id, vertex] : vertices) ids.insert(id);
+  if (vertices.empty())
+    for (const G2oEdge& edge : lines.edges) ids.insert({edge.from, edge.to});
+  return {ids.begin(), ids.end()};
 }
 
 /// Ids to positions in `ids`.
@@ -182,36 +55,62 @@ class Positions {
   explicit Positions(const std::vector<std::int64_t>& ids) : ids_(ids) {}
   [[nodiscard]] Result<std::size_t> of(std::int64_t id, const std::string& where) const {
     const auto found = std::lower_bound(ids_.begin(), ids_.end(), id);
-    if (found == ids_.end() || *found != id)
-      return fail(ErrorCode::invalid, "{}: names vertex {}, which is not in the file", where, id);
-    return static_cast<std::size_t>(found - ids_.begin());
+    if (found != ids_.end() && *found == id) return static_cast<std::size_t>(found - ids_.begin());
+    const auto letter = letter_of(id);
+    const bool has_robot = letter && std::ranges::any_of(ids_, [&](auto other) { return letter_of(other) == letter; });
+    return fail(ErrorCode::invalid, "{}: names vertex {}, which is not in the file{}", where, vertex_name(id),
+                letter && !has_robot
+                    ? fmt::format("; give the file that has robot {}, too: several files are one graph", *letter)
+                    : "");
   }
 
  private:
   const std::vector<std::int64_t>& ids_;
 };
 
-Result<Lines> read_lines(std::string_view text, const std::string& name) {
-  LineReader line(text, name);
-  Lines lines;
-  while (line.next())
-    if (auto ok = read_line(line, lines); !ok) return tl::unexpected(ok.error());
-  return lines;
+bool is_same(const PoseGraphEdge& a, const PoseGraphEdge& b) {
+  return is_same(a.T_from_to, b.T_from_to) && a.information == b.information;
+}
+
+/// Leads edges to their vertices; one that is there twice to the digit counts once.
+Status add_edges(const G2oLines& lines, const Positions& positions, G2oFile& file) {
+  std::multimap<std::pair<std::size_t, std::size_t>, std::size_t> known;
+  file.graph.edges.reserve(lines.edges.size());
+  for (const G2oEdge& edge : lines.edges) {
+    const auto from = positions.of(edge.from, edge.where + ": edge");
+    if (!from) return tl::unexpected(from.error());
+    const auto to = positions.of(edge.to, edge.where + ": edge");
+    if (!to) return tl::unexpected(to.error());
+    const PoseGraphEdge read{*from, *to, edge.T_from_to, edge.information};
+    const auto [begin, end] = known.equal_range({*from, *to});
+    if (std::any_of(begin, end, [&](const auto& k) { return is_same(file.graph.edges[k.second], read); })) {
+      ++file.repeated_edges;
+      continue;
+    }
+    known.emplace(std::pair(*from, *to), file.graph.edges.size());
+    file.graph.edges.push_back(read);
+  }
+  return {};
+}
+
+std::string tags_of(const G2oLines& lines) {
+  return lines.left_out.empty() ? "" : fmt::format("; lines of other kinds: {}", counted(lines.left_out));
 }
 
 /// Without vertices, poses are the identity.
-Result<G2oFile> assemble(const Lines& lines, const std::string& name) {
-  auto ids = collect_ids(lines, name);
-  if (!ids) return tl::unexpected(ids.error());
-  if (ids->empty()) return fail(ErrorCode::parse, "{}: no vertex and no edge, expected a pose graph", name);
-
+Result<G2oFile> assemble(const G2oLines& lines, const std::string& name) {
+  const auto vertices = index_vertices(lines);
+  if (!vertices) return tl::unexpected(vertices.error());
   G2oFile file;
-  file.vertex_ids = std::move(*ids);
-  file.has_vertices = !lines.vertices.empty();
+  file.vertex_ids = collect_ids(lines, *vertices);
+  if (file.vertex_ids.empty())
+    return fail(ErrorCode::parse, "{}: no vertex and no edge, expected a pose graph{}", name, tags_of(lines));
+  file.has_vertices = !vertices->empty();
   file.is_2d = lines.has_2d;
+  file.indefinite_edges = lines.indefinite_edges;
+  file.worst_indefinite_share = lines.worst_indefinite_share;
+  file.left_out = lines.left_out;
   const Positions positions(file.vertex_ids);
-  file.indefinite_edges = lines.repairs.count;
-  file.worst_indefinite_share = lines.repairs.worst_share;
   for (const std::int64_t id : lines.fixed) {
     const auto found = positions.of(id, name + ": FIX");
     if (!found) return tl::unexpected(found.error());
@@ -219,18 +118,9 @@ Result<G2oFile> assemble(const Lines& lines, const std::string& name) {
   }
   std::sort(file.fixed.begin(), file.fixed.end());
   file.fixed.erase(std::unique(file.fixed.begin(), file.fixed.end()), file.fixed.end());
-  file.graph.edges.reserve(lines.edges.size());
-  for (const IdEdge& edge : lines.edges) {
-    const std::string where = fmt::format("{}:{}: edge", name, edge.line);
-    const auto from = positions.of(edge.from, where);
-    if (!from) return tl::unexpected(from.error());
-    const auto to = positions.of(edge.to, where);
-    if (!to) return tl::unexpected(to.error());
-    file.graph.edges.push_back({*from, *to, edge.T_from_to, edge.information});
-  }
-
+  if (auto ok = add_edges(lines, positions, file); !ok) return tl::unexpected(ok.error());
   file.graph.poses.resize(file.vertex_ids.size());
-  for (const Vertex& vertex : lines.vertices) file.graph.poses[*positions.of(vertex.id, name)] = vertex.pose;
+  for (const auto& [id, vertex] : *vertices) file.graph.poses[*positions.of(id, name)] = vertex->pose;
   return file;
 }
 
@@ -242,7 +132,7 @@ Status place_along_edges(G2oFile& file, const std::string& name) {
   for (std::size_t i = 0; i < file.graph.poses.size(); ++i)
     if (!file.graph.poses[i].translation.allFinite())
       return fail(ErrorCode::invalid, "{}: position of vertex {}, chained from the edges, is not finite", name,
-                  file.vertex_ids[i]);
+                  vertex_name(file.vertex_ids[i]));
   return {};
 }
 
@@ -265,8 +155,16 @@ void write_information(std::string& out, const Matrix6d& information, bool is_2d
 
 }  // namespace
 
+std::string counted(const std::map<std::string, std::size_t>& left_out) {
+  std::string out;
+  for (const auto& [tag, count] : left_out) out += fmt::format("{}{} x {}", out.empty() ? "" : ", ", count, tag);
+  return out;
+}
+
 Result<G2oFile> parse_g2o_edges(std::string_view text, const std::string& name) {
-  return read_lines(text, name).and_then([&](const Lines& lines) { return assemble(lines, name); });
+  G2oLines lines;
+  if (auto ok = internal::read_g2o_lines(text, name, lines); !ok) return tl::unexpected(ok.error());
+  return assemble(lines, name);
 }
 
 Result<G2oFile> parse_g2o(std::string_view text, const std::string& name) {
@@ -280,9 +178,21 @@ Result<G2oFile> read_g2o_edges(const std::string& path) {
   return read_file(path).and_then([&](const std::string& text) { return parse_g2o_edges(text, path); });
 }
 
-Result<G2oFile> read_g2o(const std::string& path) {
-  return read_file(path).and_then([&](const std::string& text) { return parse_g2o(text, path); });
+Result<G2oFile> read_g2o(std::span<const std::string> paths) {
+  G2oLines lines;
+  for (const std::string& path : paths) {
+    const auto text = read_file(path);
+    if (!text) return tl::unexpected(text.error());
+    if (auto ok = internal::read_g2o_lines(*text, path, lines); !ok) return tl::unexpected(ok.error());
+  }
+  const std::string name = fmt::format("{}", fmt::join(paths, " + "));
+  auto file = assemble(lines, name);
+  if (!file || file->has_vertices) return file;
+  if (auto ok = place_along_edges(*file, name); !ok) return tl::unexpected(ok.error());
+  return file;
 }
+
+Result<G2oFile> read_g2o(const std::string& path) { return read_g2o(std::span(&path, 1)); }
 
 std::string to_g2o(const G2oFile& file) {
   const auto& [poses, edges] = file.graph;

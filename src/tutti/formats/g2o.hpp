@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,7 +12,9 @@
 #include "tutti/model/pose_graph.hpp"
 
 /// Pose graphs as g2o text: VERTEX_SE3:QUAT, EDGE_SE3:QUAT or VERTEX_SE2, EDGE_SE2; FIX lines name vertices whose poses
-/// a solver must not move. One file is all SE(2) or all SE(3).
+/// a solver must not move. TORO's VERTEX2, EDGE2, VERTEX3 and EDGE3 are read, too. One file is all SE(2) or all SE(3).
+/// Lines of other kinds (priors, landmarks, parameters: any tag of capitals) are left out and counted. An edge that is
+/// there twice to the digit, as where two robots' files both have it, counts once.
 ///
 /// Information of an SE(3) edge is the upper triangle, row by row, in the tangent [translation; rotation vector] of
 /// PoseGraphEdge, as GTSAM and SE-Sync read these files. g2o itself perturbs rotations by the vector part of a
@@ -36,7 +40,11 @@ struct G2oFile {
   std::size_t indefinite_edges = 0;      ///< Edges whose information was replaced.
   /// The worst ratio, among them, of the most negative to the largest eigenvalue of a matrix (positive).
   double worst_indefinite_share = 0.0;
+  std::size_t repeated_edges = 0;               ///< Edges that were there before, to the digit.
+  std::map<std::string, std::size_t> left_out;  ///< Lines that are not read, by their tags.
 };
+/// "32 x EDGE_SE3_PRIOR, 2 x PARAMS_SE3OFFSET"
+std::string counted(const std::map<std::string, std::size_t>& left_out);
 
 /// Reads a pose graph; `name` stands for the text in errors, which name the line. Without VERTEX lines the smallest id
 /// is placed at the origin and every other pose follows along the path that uses the fewest edges between
@@ -44,6 +52,9 @@ struct G2oFile {
 /// every edge must name known vertices, and several components are allowed.
 Result<G2oFile> parse_g2o(std::string_view text, const std::string& name);
 Result<G2oFile> read_g2o(const std::string& path);
+/// Several files are one graph: one for each robot, where edges between robots are in one or both. A vertex that two of
+/// them have must have one pose.
+Result<G2oFile> read_g2o(std::span<const std::string> paths);
 /// The same for who needs the edges alone: without VERTEX lines every pose is the identity, and the graph need not be
 /// connected.
 Result<G2oFile> parse_g2o_edges(std::string_view text, const std::string& name);

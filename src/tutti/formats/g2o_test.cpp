@@ -214,7 +214,10 @@ TEST(G2o, WithVertexLinesSeveralComponentsAndFixAreFine) {
 TEST(G2o, ErrorsSayWhereAndWhat) {
   EXPECT_EQ(message_of(""), "g.g2o: no vertex and no edge, expected a pose graph");
   EXPECT_EQ(message_of("\nVERTEX_XY 0 1 1"),
-            "g.g2o:2: tag is 'VERTEX_XY', expected VERTEX_SE2, EDGE_SE2, VERTEX_SE3:QUAT, EDGE_SE3:QUAT or FIX");
+            "g.g2o: no vertex and no edge, expected a pose graph; lines of other kinds: 1 x VERTEX_XY");
+  EXPECT_EQ(message_of("\nhello 0 1 1"),
+            "g.g2o:2: tag is 'hello', expected one of g2o or TORO, as VERTEX_SE2, EDGE_SE2, VERTEX_SE3:QUAT, "
+            "EDGE_SE3:QUAT or FIX");
   const std::string too_far = " m, expected at most 1e+09 m along each axis";
   EXPECT_EQ(message_of("VERTEX_SE2 0 1 1e300 0"), "g.g2o:1: position is (1, 1e+300, 0)" + too_far);
   EXPECT_EQ(message_of("VERTEX_SE3:QUAT 0 1 2e9 3 0 0 0 1"), "g.g2o:1: position is (1, 2e+09, 3)" + too_far);
@@ -224,7 +227,8 @@ TEST(G2o, ErrorsSayWhereAndWhat) {
   EXPECT_EQ(message_of("VERTEX_SE2 0 1 1"), "g.g2o:1: row has 4 columns, expected 5 (VERTEX_SE2 id x y theta)");
   EXPECT_EQ(message_of("VERTEX_SE2 a 1 1 1"), "g.g2o:1: vertex id in column 2 is 'a', expected a 64-bit integer");
   EXPECT_EQ(message_of("VERTEX_SE2 0 1 inf 1"), "g.g2o:1: column 4 is 'inf', expected a finite number");
-  EXPECT_EQ(message_of("VERTEX_SE2 0 0 0 0\nVERTEX_SE2 0 0 0 0"), "g.g2o: vertex 0 comes twice");
+  EXPECT_EQ(message_of("VERTEX_SE2 0 0 0 0\nVERTEX_SE2 0 0 0 1"),
+            "g.g2o:2: vertex 0 is at g.g2o:1 already, with another pose: expected ids of their own in each file");
   EXPECT_EQ(message_of("VERTEX_SE2 0 0 0 0\nEDGE_SE2 0 1 1 0 0 1 0 0 1 0 1"),
             "g.g2o:2: edge: names vertex 1, which is not in the file");
   EXPECT_EQ(message_of("EDGE_SE2 3 3 1 0 0 1 0 0 1 0 1"), "g.g2o:1: edge from vertex 3 to itself");
@@ -310,9 +314,10 @@ struct RealGraph {
   const char* path;
   std::size_t poses, edges, closures;
   bool is_2d, has_vertices;
+  std::size_t repeated = 0;
 };
 
-/// Counts of data/SOURCES-lidar-kitti-graphs-bags.md.
+/// Counts of data/SOURCES-lidar-kitti-graphs-bags.md, where an edge that is there twice counts twice.
 TEST(G2o, RealFiles) {
   TUTTI_REQUIRE_SHARED("data/g2o");
   const std::vector<RealGraph> graphs = {
@@ -322,8 +327,8 @@ TEST(G2o, RealFiles) {
       {"g2o/smallGrid3D.g2o", 125, 297, 173, false, true},
       {"g2o/intel.g2o", 1728, 2512, 785, true, true},
       {"g2o/manhattan.g2o", 3500, 5453, 1954, true, false},
-      {"g2o/kitti_00.g2o", 4541, 4677, 137, true, false},
-      {"multi_robot/csail_two_robots/CSAIL.g2o", 1045, 1172, 128, true, false},
+      {"g2o/kitti_00.g2o", 4541, 4676, 136, true, false, 1},
+      {"multi_robot/csail_two_robots/CSAIL.g2o", 1045, 1171, 127, true, false, 1},
       {"multi_robot/csail_two_robots/CSAIL_robot1.g2o", 523, 522, 0, true, false},
       {"multi_robot/csail_two_robots/CSAIL_robot2.g2o", 522, 521, 0, true, false},
   };
@@ -332,6 +337,7 @@ TEST(G2o, RealFiles) {
     ASSERT_TRUE(file) << file.error().message;
     EXPECT_EQ(file->graph.poses.size(), expected.poses) << expected.path;
     EXPECT_EQ(file->graph.edges.size(), expected.edges) << expected.path;
+    EXPECT_EQ(file->repeated_edges, expected.repeated) << expected.path;
     EXPECT_EQ(file->is_2d, expected.is_2d) << expected.path;
     EXPECT_EQ(file->has_vertices, expected.has_vertices) << expected.path;
     std::size_t closures = 0;

@@ -295,9 +295,4 @@ bool looks_like_jrl(std::string_view text) {
   return first != std::string_view::npos && text[first] == '{';
 }
 
-Result<PyfgFile> read_pyfg_or_jrl(const std::string& path) {
-  return read_file(path).and_then(
-      [&](const std::string& text) { return looks_like_jrl(text) ? parse_jrl(text, path) : parse_pyfg(text, path); });
-}
-
 }  // namespace tutti::formats

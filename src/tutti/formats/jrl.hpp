@@ -25,7 +25,4 @@ Result<PyfgFile> parse_jrl(std::string_view text, const std::string& name);
 /// True if the text begins as an object of JSON does.
 bool looks_like_jrl(std::string_view text);
 
-/// Reads either format, as the file's content begins.
-Result<PyfgFile> read_pyfg_or_jrl(const std::string& path);
-
 }  // namespace tutti::formats

@@ -211,7 +211,7 @@ std::string to_pyfg(const PyfgFile& file) {
 
 std::optional<PyfgTimes> times_of(const PyfgFile& file) {
   const auto& vertices = file.vertices;
-  PyfgTimes out{.stamps = {}, .from = "of the vertices"};
+  PyfgTimes out{.stamps = {}, .from = file.stamps_from};
   std::vector<std::uint32_t> robots;
   for (const PyfgVertex& vertex : vertices) {
     robots.push_back(static_cast<std::uint32_t>(vertex.name.robot));

@@ -52,9 +52,10 @@ struct PyfgEdge {
 };
 
 struct PyfgFile {
-  std::vector<PyfgVertex> vertices;  ///< Sorted by name: by robot, then by number.
-  std::vector<PyfgEdge> edges;       ///< In file order.
-  std::size_t indefinite = 0;        ///< Covariances that were replaced.
+  std::vector<PyfgVertex> vertices;             ///< Sorted by name: by robot, then by number.
+  std::vector<PyfgEdge> edges;                  ///< In file order.
+  std::size_t indefinite = 0;                   ///< Covariances that were replaced.
+  std::string stamps_from = "of the vertices";  ///< For people: where the vertices' stamps are from.
 };
 
 /// Errors name file and line: an unknown tag, a wrong column count, a bad name, a vertex that is missing or comes

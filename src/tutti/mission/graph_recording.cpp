@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "tutti/base/config_io.hpp"
-#include "tutti/formats/jrl.hpp"
+#include "tutti/formats/fleet_graph.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -86,7 +86,7 @@ Error no_times(const PyfgFile& file) {
 }  // namespace
 
 Result<GraphRecording> read_graph_recording(const std::string& path, const std::string& robot) {
-  const auto file = formats::read_pyfg_or_jrl(path);
+  const auto file = formats::read_fleet_graph(path);
   if (!file) return tl::unexpected(file.error());
   const auto& vertices = file->vertices;
   const auto is_ours = [&](const formats::PyfgVertex& vertex) { return robot == std::string(1, vertex.name.robot); };
@@ -120,7 +120,7 @@ Result<GraphRecording> read_graph_recording(const std::string& path, const std::
 }
 
 Result<std::string> graph_mission(const std::string& file, const std::filesystem::path& data) {
-  const auto graph = formats::read_pyfg_or_jrl((data / file).string());
+  const auto graph = formats::read_fleet_graph((data / file).string());
   if (!graph) return tl::unexpected(graph.error());
   const auto scalar = [](std::string text) {
     return ConfigNode{.kind = ConfigNode::Kind::scalar, .scalar = std::move(text)};

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/formats/fleet_graph.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <vector>
+
+#include "tutti/base/file.hpp"
+#include "tutti/formats/graph_stamps.hpp"
+#include "tutti/formats/jrl.hpp"
+#include "tutti/formats/symbol_keys.hpp"
+
+namespace tutti::formats {
+namespace {
+
+/// The covariance to a positive semidefinite information; a direction that is not determined has a variance of 1e9 of
+/// the smallest.
+Matrix6d covariance_of(const Matrix6d& information) {
+  constexpr double kLeastShare = 1e-9;
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(information);
+  const Vector6d values = eigen.eigenvalues().cwiseMax(kLeastShare * eigen.eigenvalues().maxCoeff());
+  const Matrix6d out = eigen.eigenvectors() * values.cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
+  return 0.5 * (out + out.transpose());
+}
+
+/// For each vertex, whether an edge joins it to the one before.
+std::vector<bool> joined_to_previous(const G2oFile& graph) {
+  std::vector<bool> out(graph.vertex_ids.size(), false);
+  for (const PoseGraphEdge& edge : graph.graph.edges)
+    if (const auto [a, b] = std::minmax(edge.from, edge.to); b == a + 1) out[b] = true;
+  return out;
+}
+
+/// Robots by letters, or by gaps; numbers count along each robot, so that neighbours have consecutive ones.
+Result<std::vector<PyfgName>> names_of(const G2oFile& graph, const std::string& name) {
+  constexpr char kFirst = 'a', kLast = 'z';
+  const bool has_letters = std::ranges::all_of(graph.vertex_ids, [](auto id) { return letter_of(id).has_value(); });
+  const std::vector<bool> joined = joined_to_previous(graph);
+  std::vector<PyfgName> out;
+  for (std::size_t v = 0; v < graph.vertex_ids.size(); ++v) {
+    const char letter = has_letters ? *letter_of(graph.vertex_ids[v])
+                        : v == 0    ? kFirst
+                        : joined[v] ? out.back().robot
+                                    : static_cast<char>(out.back().robot + 1);
+    if (!has_letters && letter > kLast)
+      return fail(ErrorCode::unsupported,
+                  "{}: more than 26 vertices have no edge to the one before: expected odometry along increasing ids",
+                  name);
+    const bool goes_on = v > 0 && out.back().robot == letter;
+    out.push_back({letter, goes_on ? out.back().number + 1 : 0});
+  }
+  return out;
+}
+
+Result<PyfgFile> with_stamps(PyfgFile file, const G2oFile& graph, const std::string& path) {
+  const std::string beside = stamps_beside(path);
+  std::error_code unreadable;
+  if (!std::filesystem::exists(beside, unreadable)) return file;
+  const auto read = read_graph_stamps(beside);
+  if (!read) return tl::unexpected(read.error());
+  std::map<std::int64_t, Timestamp> stamps;
+  for (const VertexStamp& stamp : *read) stamps[stamp.vertex_id] = stamp.stamp;
+  for (std::size_t v = 0; v < graph.vertex_ids.size(); ++v) {
+    const auto found = stamps.find(graph.vertex_ids[v]);
+    if (found == stamps.end())
+      return fail(ErrorCode::invalid, "{}: has no line for vertex {} of {}", beside, vertex_name(graph.vertex_ids[v]),
+                  path);
+    file.vertices[v].stamp = found->second;
+  }
+  for (PyfgEdge& edge : file.edges) edge.stamp = file.vertices[std::max(edge.from, edge.to)].stamp;
+  file.stamps_from = "of " + std::filesystem::path(beside).filename().string();
+  return file;
+}
+
+}  // namespace
+
+Result<PyfgFile> as_fleet(const G2oFile& graph, const std::string& name) {
+  const auto names = names_of(graph, name);
+  if (!names) return tl::unexpected(names.error());
+  PyfgFile out{.indefinite = graph.indefinite_edges,
+               .stamps_from = "none in the file: the n-th pose of a robot counts as at n seconds"};
+  for (const PyfgName& vertex : *names)
+    out.vertices.push_back({.name = vertex, .stamp = Timestamp{} + static_cast<double>(vertex.number)});
+  for (const PoseGraphEdge& edge : graph.graph.edges)
+    out.edges.push_back({std::max(out.vertices[edge.from].stamp, out.vertices[edge.to].stamp),
+                         edge.from,
+                         edge.to,
+                         {edge.T_from_to, covariance_of(edge.information)}});
+  return out;
+}
+
+Result<PyfgFile> read_fleet_graph(const std::string& path) {
+  const auto text = read_file(path);
+  if (!text) return tl::unexpected(text.error());
+  if (looks_like_jrl(*text)) return parse_jrl(*text, path);
+  if (looks_like_pyfg(*text)) return parse_pyfg(*text, path);
+  const auto graph = parse_g2o_edges(*text, path);
+  if (!graph) return tl::unexpected(graph.error());
+  auto fleet = as_fleet(*graph, path);
+  return fleet ? with_stamps(std::move(*fleet), *graph, path) : fleet;
+}
+
+}  // namespace tutti::formats
