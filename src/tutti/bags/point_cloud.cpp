@@ -11,7 +11,16 @@
 namespace tutti::bags {
 namespace {
 
-enum Datatype : std::uint8_t { kInt32 = 5, kUint32 = 6, kFloat32 = 7, kFloat64 = 8 };
+enum Datatype : std::uint8_t {
+  kInt8 = 1,
+  kUint8 = 2,
+  kInt16 = 3,
+  kUint16 = 4,
+  kInt32 = 5,
+  kUint32 = 6,
+  kFloat32 = 7,
+  kFloat64 = 8
+};
 
 std::uint32_t size_of(std::uint8_t datatype) {
   constexpr std::array<std::uint32_t, 9> kSizes{0, 1, 1, 2, 2, 4, 4, 4, 8};
@@ -30,6 +39,14 @@ T number(const char* at, bool swapped) {
 
 double number(const char* at, std::uint8_t datatype, bool swapped) {
   switch (datatype) {
+    case kInt8:
+      return number<std::int8_t>(at, swapped);
+    case kUint8:
+      return number<std::uint8_t>(at, swapped);
+    case kInt16:
+      return number<std::int16_t>(at, swapped);
+    case kUint16:
+      return number<std::uint16_t>(at, swapped);
     case kInt32:
       return number<std::int32_t>(at, swapped);
     case kUint32:
@@ -41,7 +58,7 @@ double number(const char* at, std::uint8_t datatype, bool swapped) {
   }
 }
 
-/// The field with this name, which must be one number of 4 or 8 bytes within a point.
+/// The field with this name, which must be one number within a point.
 Result<RosPointField> field_of(const RosPointCloud& message, std::string_view name, bool may_be_integer) {
   const auto at = std::ranges::find(message.fields, name, &RosPointField::name);
   if (at == message.fields.end()) {
@@ -50,10 +67,10 @@ Result<RosPointField> field_of(const RosPointCloud& message, std::string_view na
     return fail(ErrorCode::invalid, "no field '{}', expected x, y and z among '{:.200}'", name, names);
   }
   const bool is_float = at->datatype == kFloat32 || at->datatype == kFloat64;
-  const bool is_integer = at->datatype == kInt32 || at->datatype == kUint32;
+  const bool is_integer = at->datatype >= kInt8 && at->datatype <= kUint32;
   if (!is_float && !(may_be_integer && is_integer))
     return fail(ErrorCode::unsupported, "field '{}' has datatype {}, expected 7 (float32) or 8 (float64){}", name,
-                at->datatype, may_be_integer ? ", 5 or 6 (32 bits)" : "");
+                at->datatype, may_be_integer ? ", 1 to 6 (integers)" : "");
   if (std::uint64_t{at->offset} + size_of(at->datatype) > message.point_step)
     return fail(ErrorCode::invalid, "field '{}' at byte {} of points of {} bytes", name, at->offset,
                 message.point_step);

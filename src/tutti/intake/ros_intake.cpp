@@ -207,6 +207,7 @@ Status RosIntake::take_points(std::string_view bytes, std::string_view type, Enc
   auto cloud = bags::to_timed_cloud(*message);
   if (!cloud) return tl::unexpected(cloud.error());
   if (cloud->cloud.points.empty()) return fail(ErrorCode::invalid, "holds no points");
+  if (config_.scan_times.deskewed != "yes") lidar::drop_stray_times(*cloud);
   auto times = lidar::find_message_times(*cloud, sensor_stamp, config_.scan_times);
   if (!times) return tl::unexpected(times.error());
   double after_s = 0.0;  // of the last point

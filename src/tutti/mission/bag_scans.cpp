@@ -7,12 +7,11 @@
 #include "tutti/bags/point_cloud.hpp"
 #include "tutti/mission/bag_messages.hpp"
 #include "tutti/mission/bag_recording.hpp"
+#include "tutti/mission/scan_folder.hpp"
 #include "tutti/perception/lidar/deskewed_scan.hpp"
 
 namespace tutti::mission {
 namespace {
-
-constexpr std::size_t kTriedScans = 5;  // scans that may be no good before the bag is refused
 
 class BagScans final : public ScanSource {
  public:
@@ -32,12 +31,15 @@ class BagScans final : public ScanSource {
     const std::size_t first = std::min(from(odometry.front().stamp), places_.size() - 1);
     const std::size_t last = std::max(first + 1, from(odometry.back().stamp));
     Result<std::optional<lidar::PointTimes>> found;
-    for (std::size_t i = first; i < std::min(first + kTriedScans, last); ++i) {
-      auto times = times_of(i, robot);
-      if (times || i == first) found = std::move(times);
+    std::size_t tried = 0;
+    for (const std::size_t i : samples_to_try(last - first)) {
+      auto times = times_of(first + i, robot);
+      if (times || tried++ == 0) found = std::move(times);
       if (found) break;
     }
-    if (!found) return in_context("not one of the first scans can be used, the first because", found.error());
+    if (!found)
+      return in_context(fmt::format("not one of {} scans that were tried can be used, the first because", tried),
+                        found.error());
     // At half of the odometry, a clock that starts with it at 0 can be distinguished from the time after the stamp.
     const auto later = times_of(first + (last - first) / 2, robot);
     times_ = later ? *later : *found;
@@ -70,10 +72,13 @@ class BagScans final : public ScanSource {
   }
 
   [[nodiscard]] Result<std::optional<lidar::PointTimes>> times_of(std::size_t sample, const RobotConfig& robot) const {
-    const auto cloud = read(places_.at(sample));
+    auto cloud = read(places_.at(sample));
     if (!cloud) return tl::unexpected(cloud.error());
-    auto times = lidar::find_message_times(*cloud, sensor_stamp(sample), robot.scan_times_config());
+    const lidar::ScanTimesConfig config = robot.scan_times_config();
+    const std::size_t strays = config.deskewed == "yes" ? 0 : lidar::drop_stray_times(*cloud);
+    auto times = lidar::find_message_times(*cloud, sensor_stamp(sample), config);
     if (!times) return in_context(name_of(places_[sample]), times.error());
+    if (*times) (*times)->strays = strays;
     return times;
   }
 

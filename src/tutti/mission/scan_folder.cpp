@@ -17,7 +17,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kTriedFiles = 5;  // scans that may be unreadable before the folder is refused
 constexpr std::array<const char*, 2> kExtensions = {".pcd", ".bin"};
 
 std::string stem_of(std::size_t number) { return fmt::format("{:06d}", number); }
@@ -58,6 +57,17 @@ Result<std::shared_ptr<const ScanFolder>> ScanFolder::open(fs::path folder, Scan
   return scans;
 }
 
+std::vector<std::size_t> samples_to_try(std::size_t count) {
+  constexpr std::size_t kFirst = 5;
+  std::vector<std::size_t> out;
+  for (std::size_t i = 0, step = 1; i < count; i += step) {
+    out.push_back(i);
+    if (i >= kFirst) step *= 2;
+  }
+  if (count > 0 && out.back() + 1 != count) out.push_back(count - 1);
+  return out;
+}
+
 /// A file without a time: then nobody knows whose the others are. They may be numbered from 1, or be of another
 /// recording.
 Status ScanFolder::check_numbers() const {
@@ -82,16 +92,19 @@ Status ScanFolder::check_numbers() const {
 
 Status ScanFolder::learn_times(const RobotConfig& robot) {
   Result<std::optional<lidar::PointTimes>> found = no_scans();
+  std::vector<std::size_t> there;
+  for (std::size_t sample = 0; sample < times_of_files_.stamps.size(); ++sample)
+    if (file_of(sample)) there.push_back(sample);
   std::size_t tried = 0;
-  for (std::size_t sample = 0; sample < times_of_files_.stamps.size() && tried < kTriedFiles; ++sample) {
-    if (!file_of(sample)) continue;
-    auto times = times_of(sample, robot);
+  for (const std::size_t i : samples_to_try(there.size())) {
+    auto times = times_of(there[i], robot);
     if (times || tried++ == 0) found = std::move(times);
     if (found) break;
   }
   if (!found && tried > 0)
-    return in_context(fmt::format("not one scan could be read: {} of {} tried failed, the first because", tried, tried),
-                      found.error());
+    return in_context(
+        fmt::format("not one scan could be read: all {} that were tried failed, the first because", tried),
+        found.error());
   if (!found) return tl::unexpected(found.error());
   // At half of the odometry, a clock that starts with it at 0 can be distinguished from the time since the sweep's
   // begin.
@@ -103,10 +116,13 @@ Status ScanFolder::learn_times(const RobotConfig& robot) {
 Result<std::optional<lidar::PointTimes>> ScanFolder::times_of(std::size_t sample, const RobotConfig& robot) const {
   const auto file = file_of(sample);
   if (!file) return no_scans();
-  const auto scan = read(*file);
+  auto scan = read(*file);
   if (!scan) return tl::unexpected(scan.error());
-  auto times = lidar::find_point_times(*scan, times_of_files_.stamps[sample], robot.scan_times_config());
+  const lidar::ScanTimesConfig config = robot.scan_times_config();
+  const std::size_t strays = config.deskewed == "yes" ? 0 : lidar::drop_stray_times(*scan);
+  auto times = lidar::find_point_times(*scan, times_of_files_.stamps[sample], config);
   if (!times) return in_context(file->string(), times.error());
+  if (*times) (*times)->strays = strays;
   return times;
 }
 

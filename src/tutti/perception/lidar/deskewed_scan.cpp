@@ -49,6 +49,7 @@ Result<Scan> deskewed(formats::TimedCloud measured, Timestamp stamp, const std::
                       const Pose3& T_body_lidar, const Trajectory& odometry, double offset_s) {
   Scan scan{.stamp = stamp + offset_s, .cloud = nullptr, .age_s = nullptr};
   if (times) {
+    drop_stray_times(measured);
     auto ages = point_ages(measured, stamp, *times);
     if (!ages) return tl::unexpected(ages.error());
     scan.age_s = std::make_shared<const std::vector<float>>(std::move(*ages));

@@ -16,8 +16,9 @@ namespace tutti::lidar {
 Trajectory with_ends(const Trajectory& odometry);
 
 /// The points of a sweep, measured in the sensor's frame, as if measured at once: in the body frame at `stamp`. Without
-/// `times` they are only transformed. `odometry`: with_ends(). `stamp` and absolute times are by the sensor's clock;
-/// with `offset_s` added they are odometry's. Errors are those of point_ages() and undistort().
+/// `times` they are only transformed; with them, points that drop_stray_times() takes out are left out. `odometry`:
+/// with_ends(). `stamp` and absolute times are by the sensor's clock; with `offset_s` added they are odometry's. Errors
+/// are those of point_ages() and undistort().
 Result<Scan> deskewed(formats::TimedCloud measured, Timestamp stamp, const std::optional<PointTimes>& times,
                       const Pose3& T_body_lidar, const Trajectory& odometry, double offset_s = 0.0);
 

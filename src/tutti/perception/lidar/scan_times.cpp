@@ -46,6 +46,30 @@ PointTimes::Zero zero_of(double first_s, double last_s, Timestamp stamp) {
 
 }  // namespace
 
+std::size_t drop_stray_times(formats::TimedCloud& scan) {
+  constexpr std::size_t kFewest = 10, kShare = 50;  // points, and one of how many may stray on either side
+  const std::size_t count = scan.times.size();
+  if (count < kFewest || scan.cloud.points.size() != count) return 0;
+  std::vector<double> times = scan.times;
+  if (!std::ranges::all_of(times, [](double time) { return std::isfinite(time); })) return 0;
+  const auto trimmed = static_cast<std::ptrdiff_t>(std::max<std::size_t>(1, count / kShare));
+  std::ranges::nth_element(times, times.begin() + trimmed);
+  const double low = times[static_cast<std::size_t>(trimmed)];
+  std::ranges::nth_element(times, times.end() - 1 - trimmed);
+  const double high = times[count - 1 - static_cast<std::size_t>(trimmed)];
+  const double span = high - low;
+  if (!(span > 0.0)) return 0;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (scan.times[i] < low - span || scan.times[i] > high + span) continue;
+    scan.times[kept] = scan.times[i];
+    scan.cloud.points[kept++] = scan.cloud.points[i];
+  }
+  scan.times.resize(kept);
+  scan.cloud.points.resize(kept);
+  return count - kept;
+}
+
 Result<std::optional<PointTimes>> find_point_times(const formats::TimedCloud& scan, Timestamp stamp,
                                                    const ScanTimesConfig& config) {
   if (config.deskewed == "yes") return std::optional<PointTimes>{};
@@ -132,9 +156,12 @@ std::string in_words(const std::optional<PointTimes>& times) {
   };
   const bool is_stated = times->zero == PointTimes::Zero::odometry_clock || times->zero == PointTimes::Zero::message;
   return fmt::format(
-      "scans are deskewed by the robot's odometry: their field '{}' is taken as {} {}{}", times->field, times->unit,
+      "scans are deskewed by the robot's odometry: their field '{}' is taken as {} {}{}{}", times->field, times->unit,
       zero(),
-      is_stated ? "" : fmt::format(", their poses as of the sweep's {}", times->pose_at_begin ? "begin" : "end"));
+      is_stated ? "" : fmt::format(", their poses as of the sweep's {}", times->pose_at_begin ? "begin" : "end"),
+      times->strays == 0 ? ""
+                         : fmt::format("; points whose time is none of the sweep's are left out ({} in the first scan)",
+                                       times->strays));
 }
 
 }  // namespace tutti::lidar

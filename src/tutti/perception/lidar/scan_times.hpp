@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -34,9 +35,15 @@ struct PointTimes {
   std::string unit;  ///< s, ms, us or ns
   double unit_s = 1.0;
   Zero zero = Zero::unknown;
+  std::size_t strays = 0;      ///< Points of the scan that was judged by that drop_stray_times() took out.
   bool pose_at_begin = false;  ///< The scan's odometry pose is of the sweep's begin, not its end; with odometry_clock
                                ///< and message the times give it.
 };
+
+/// Takes out of `scan` the points whose times are none of its sweep's, as some drivers write a few: those farther from
+/// the middle 96 % of the times than these last. Returns how many; none in scans of under ten points, or where nearly
+/// all times are the same.
+std::size_t drop_stray_times(formats::TimedCloud& scan);
 
 /// What the times of a robot's scans mean, judged by one scan whose odometry pose is of `stamp`. No value: the robot's
 /// scans are taken as deskewed. Errors: the settings want times that are missing, or the numbers are not those of a

@@ -95,6 +95,31 @@ TEST(ScanTimes, NumbersThatAreNoSweepsAreRefused) {
   EXPECT_TRUE(point_ages(scan_with({0.0, 50.0, 400.0}), Timestamp{}, times));
 }
 
+/// A few drivers give a few points the time of another sweep, or none at all.
+TEST(ScanTimes, FewTimesThatStrayAreLeftOutAndDoNotDecideTheUnit) {
+  for (const auto& [unit, unit_s] : {std::pair("s", 1.0), {"ns", 1e-9}}) {
+    std::vector<double> times;
+    for (int i = 0; i < 200; ++i) times.push_back(0.0005 * i / unit_s);
+    times[17] = 3.604 / unit_s;
+    times[150] = -40.0 / unit_s;
+    auto scan = scan_with(times);
+    for (std::size_t i = 0; i < times.size(); ++i) scan.cloud.points[i].x() = static_cast<float>(i);
+    EXPECT_EQ(drop_stray_times(scan), 2U);
+    ASSERT_EQ(scan.cloud.points.size(), 198U);
+    EXPECT_EQ(scan.cloud.points[17].x(), 18.0F);
+    EXPECT_EQ(scan.times[17], times[18]);
+    const auto found = find_point_times(scan, Timestamp{}, {});
+    ASSERT_TRUE(found && *found);
+    EXPECT_EQ((*found)->unit, unit);
+    EXPECT_EQ(drop_stray_times(scan), 0U);
+  }
+  auto few = scan_with({0.0, 0.1, 3.6});
+  EXPECT_EQ(drop_stray_times(few), 0U);
+  auto same = scan_with(std::vector<double>(100, 0.05));
+  same.times[3] = 0.0;
+  EXPECT_EQ(drop_stray_times(same), 0U);
+}
+
 TEST(ScanTimes, AreReportedInWords) {
   EXPECT_EQ(in_words(std::nullopt), "scans are taken as deskewed to the stamps of their poses");
   EXPECT_EQ(in_words(PointTimes{.field = "t", .unit = "ns", .unit_s = 1e-9, .zero = Zero::sweep_begin}),
