@@ -33,19 +33,27 @@ const PixelLayout* pixel_layout_of(std::string_view encoding) {
   return at == kLayouts.end() ? nullptr : &*at;
 }
 
+/// Without the zeros at the end, which some drivers write behind a model's coefficients.
+std::size_t count_coefficients(const std::vector<double>& d) {
+  std::size_t out = d.size();
+  while (out > 0 && d[out - 1] == 0.0) --out;
+  return out;
+}
+
+/// Without any distortion it is a pinhole, whatever the model is called. A model that has some must have it whole.
 Result<CameraKind> kind_of(const RosCameraInfo& message) {
   const std::string& model = message.distortion_model;
-  const std::size_t numbers = message.d.size();
+  const std::size_t given = message.d.size(), numbers = count_coefficients(message.d);
   if (numbers == 0) return CameraKind::pinhole;
-  if (model == "plumb_bob" && (numbers == 4 || (numbers == 5 && message.d[4] == 0.0))) return CameraKind::pinhole;
+  if (model == "plumb_bob" && given >= 4 && numbers <= 4) return CameraKind::pinhole;
   if (model == "plumb_bob" && numbers == 5) return CameraKind::rational;
-  if (model == "rational_polynomial" && numbers == 8) return CameraKind::rational;
-  if ((model == "equidistant" || model == "fisheye") && numbers == 4) return CameraKind::equidistant;
-  if (model == "double_sphere" && numbers == 2) return CameraKind::double_sphere;
+  if (model == "rational_polynomial" && given >= 8 && numbers <= 8) return CameraKind::rational;
+  if ((model == "equidistant" || model == "fisheye") && given >= 4 && numbers <= 4) return CameraKind::equidistant;
+  if (model == "double_sphere" && given >= 2 && numbers <= 2) return CameraKind::double_sphere;
   return fail(ErrorCode::unsupported,
-              "distortion_model '{:.40}' with {} numbers, expected plumb_bob (4 or 5), rational_polynomial (8), "
-              "equidistant (4) or double_sphere (2)",
-              model, numbers);
+              "distortion_model '{:.40}' with {} numbers, {} before the last zeros, expected plumb_bob (4 or 5), "
+              "rational_polynomial (8), equidistant (4) or double_sphere (2)",
+              model, given, numbers);
 }
 
 std::uint8_t mean_of_four(const std::uint8_t* at, std::size_t right, std::size_t below) {
@@ -76,9 +84,8 @@ Result<CameraModel> to_camera(const RosCameraInfo& message) {
                   .fy = message.k[4],
                   .cx = message.k[2],
                   .cy = message.k[5]};
-  const std::size_t numbers =
-      *kind == CameraKind::pinhole ? std::min<std::size_t>(4, message.d.size()) : message.d.size();
-  std::copy_n(message.d.begin(), numbers, out.distortion.begin());
+  std::copy_n(message.d.begin(), std::min(count_coefficients(message.d), out.distortion.size()),
+              out.distortion.begin());
   if (auto ok = check_camera(out); !ok) return in_context("is the camera calibrated?", ok.error());
   return out;
 }

@@ -21,6 +21,13 @@ TEST(BagCamera, EveryModelIsTaken) {
   EXPECT_EQ(kind(info("rational_polynomial", {0.1, 0.01, 0, 0, 0, 0.1, 0, 0})), CameraKind::rational);
   EXPECT_EQ(kind(info("fisheye", {0.01, 0, 0, 0})), CameraKind::equidistant);
   EXPECT_EQ(kind(info("", {})), CameraKind::pinhole);
+  EXPECT_EQ(kind(info("equidistant", {0.01, 0.02, 0, 0, 0})), CameraKind::equidistant);  // a T265
+  EXPECT_EQ(kind(info("rational_polynomial", {0.1, 0.01, 0, 0, 0, 0.1, 0, 0, 0, 0, 0, 0, 0, 0})), CameraKind::rational);
+  EXPECT_EQ(kind(info("rational_polynomial", {0, 0, 0, 0, 0, 0, 0, 0})), CameraKind::pinhole);
+  EXPECT_EQ(kind(info("None", {0, 0, 0, 0, 0})), CameraKind::pinhole);
+  EXPECT_EQ(kind(info("plumb_bob", {-0.3, 0.1, 0, 0, 0, 0, 0, 0})), CameraKind::pinhole);
+  EXPECT_FALSE(to_camera(info("rational_polynomial", {0.1, 0, 0, 0, 0, 0, 0, 0, 0.01, 0, 0, 0})));
+  EXPECT_FALSE(to_camera(info("equidistant", {0.01, 0.02})));
   const CameraModel camera = to_camera(info("plumb_bob", {-0.3, 0.1, 0.001, 0.002, 0.0})).value();
   EXPECT_EQ(camera.fy, 458.0);
   EXPECT_EQ(camera.cx, 370.0);

@@ -8,6 +8,7 @@
 #include "tutti/bags/internal/chunk.hpp"
 #include "tutti/bags/internal/cursor.hpp"
 #include "tutti/bags/internal/mcap_format.hpp"
+#include "tutti/bags/ros_types.hpp"
 
 namespace tutti::bags {
 namespace {
@@ -143,7 +144,7 @@ Status McapReader::take_statistics(const Record& record, std::string_view conten
 Status McapReader::define_schema(const Record& record, std::string_view content) {
   Cursor cursor(content);
   const auto id = cursor.number<std::uint16_t>("id");
-  const std::string name(cursor.counted("name"));
+  const std::string name = type_of_ros2(std::string(cursor.counted("name")));  // converted bags keep ROS 1's
   cursor.counted("encoding");
   cursor.counted("data");
   if (!cursor.ok()) return fail_at(record, ErrorCode::parse, "{}", *cursor.error());

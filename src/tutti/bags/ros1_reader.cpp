@@ -6,6 +6,7 @@
 
 #include "tutti/bags/internal/chunk.hpp"
 #include "tutti/bags/internal/cursor.hpp"
+#include "tutti/bags/ros_types.hpp"
 
 namespace tutti::bags {
 namespace {
@@ -14,13 +15,6 @@ using internal::Cursor;
 
 constexpr std::string_view kRos1Begin = "#ROSBAG V2.0\n";
 constexpr std::uint64_t kMaxHeaderBytes = 1 << 20;
-
-/// "nav_msgs/Odometry" is "nav_msgs/msg/Odometry" today, and tf's messages are tf2's.
-std::string type_of_ros2(const std::string& type) {
-  if (type == "tf/tfMessage") return "tf2_msgs/msg/TFMessage";
-  const std::size_t slash = type.find('/');
-  return slash == std::string::npos ? type : type.substr(0, slash) + "/msg" + type.substr(slash);
-}
 
 /// Calls `take(name, value)` for each field of a header; reports what is wrong.
 template <class Take>

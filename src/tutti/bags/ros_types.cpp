@@ -38,6 +38,13 @@ const RosType* find(std::string_view type) {
 
 std::span<const RosType> ros_types() { return kRosTypes; }
 
+std::string type_of_ros2(const std::string& type) {
+  if (type == "tf/tfMessage" || type == "tf/msg/tfMessage") return kTfType;
+  const std::size_t slash = type.find('/');
+  if (slash == std::string::npos || slash != type.rfind('/')) return type;
+  return type.substr(0, slash) + "/msg" + type.substr(slash);
+}
+
 Use use_of(std::string_view type) {
   const RosType* const found = find(type);
   return found == nullptr ? Use::nothing : found->use;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <span>
+#include <string>
 #include <string_view>
 #include <variant>
 #include <vector>
@@ -32,6 +33,9 @@ struct RosType {
 
 /// All of them, those of scans (kScanTypes) last.
 std::span<const RosType> ros_types();
+/// ROS 1's name of a type as ROS 2 has it: "nav_msgs/Odometry" is "nav_msgs/msg/Odometry" today, and tf's messages are
+/// tf2's. Other names stay as they are.
+std::string type_of_ros2(const std::string& type);
 /// Nothing for a type that is not among them.
 Use use_of(std::string_view type);
 /// Decodes as ros_messages.hpp has it; errors: also another type.
