@@ -46,6 +46,20 @@ TEST(RosFix, OfUnknownSurenessIsTakenAsUnsure) {
   }
 }
 
+TEST(RosFix, WithoutAnAltitudeItCountsInThePlane) {
+  RosNavSatFix flat = message();
+  flat.altitude_m = flat.position_covariance[8] = std::numeric_limits<double>::quiet_NaN();
+  const auto fix = heard(flat);
+  ASSERT_TRUE(fix && *fix);
+  EXPECT_TRUE((*fix)->is_flat);
+  EXPECT_TRUE((*fix)->is_stated);
+  EXPECT_EQ((*fix)->fix.antenna, (Geodetic{46.5, -7.9, 0.0}));
+  EXPECT_EQ((*fix)->fix.covariance(0, 1), 1.0);
+  EXPECT_EQ((*fix)->fix.covariance(1, 2), 0.0);
+  EXPECT_EQ((*fix)->fix.covariance(2, 2), kUnknownAltitude_m * kUnknownAltitude_m);
+  EXPECT_FALSE(heard(message()).value()->is_flat);
+}
+
 TEST(RosFix, OfAReceiverWithoutOneIsNoneAndGarbageIsDistinguished) {
   RosNavSatFix none = message(), nowhere = message(), skewed = message();
   none.status = -1;

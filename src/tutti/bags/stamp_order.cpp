@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <numeric>
 #include <optional>
 
 namespace tutti::bags {
@@ -54,6 +55,21 @@ std::pair<std::vector<StampOrder::Run>, Refused> runs_of(std::span<const Arrival
 }
 
 }  // namespace
+
+std::vector<std::size_t> log_order(std::span<const Arrival> arrivals) {
+  constexpr std::size_t kLong = 10;  // messages
+  std::vector<std::size_t> stored(arrivals.size());
+  std::iota(stored.begin(), stored.end(), std::size_t{0});
+  std::vector<std::size_t> logged = stored;
+  std::ranges::stable_sort(logged, {}, [&](std::size_t i) { return arrivals[i].logged; });
+  std::size_t stretches = 1, pieces = 1;  // of increasing times as stored; of stored order as sorted
+  for (std::size_t i = 1; i < arrivals.size(); ++i) {
+    stretches += arrivals[i].logged < arrivals[i - 1].logged ? 1 : 0;
+    pieces += logged[i] != logged[i - 1] + 1 ? 1 : 0;
+  }
+  const bool alternate = arrivals.size() < kLong * pieces && arrivals.size() >= kLong * stretches;
+  return alternate ? stored : logged;
+}
 
 StampOrder order_by_stamp(std::span<const Arrival> arrivals) {
   StampOrder out;

@@ -39,8 +39,12 @@ struct StampOrder {
   [[nodiscard]] std::string in_words() const;
 };
 
-/// `arrivals` are in the order of the bag. One stamp that is far ahead or behind starts no run: a clock starts again
-/// when the messages that follow go on behind it, too.
+/// Positions of `arrivals` by when they were logged. Chunks of an MCAP and rows of a db3 may be stored in any order.
+/// Where the recorder's own clock started again (messages of long stretches would alternate), they stay as stored.
+std::vector<std::size_t> log_order(std::span<const Arrival> arrivals);
+
+/// `arrivals` are in the order in which they were logged. One stamp that is far ahead or behind starts no run: a clock
+/// starts again when the messages that follow go on behind it, too.
 StampOrder order_by_stamp(std::span<const Arrival> arrivals);
 
 }  // namespace tutti::bags

@@ -66,5 +66,25 @@ TEST(StampOrder, ALongGapIsNoNewClock) {
   EXPECT_EQ(order.runs.size(), 1U);
 }
 
+TEST(StampOrder, ChunksInAnyOrderAreReadByTheirLogTimes) {
+  const auto logged = [](std::initializer_list<std::pair<int, int>> ranges) {
+    std::vector<Arrival> out;
+    for (const auto& [from, to] : ranges)
+      for (int i = from; i < to; ++i) out.push_back({Timestamp{i * 100'000'000LL}, Timestamp{i * 100'000'000LL}, 0});
+    return out;
+  };
+  const auto swapped = log_order(logged({{200, 300}, {0, 100}, {300, 400}, {100, 200}}));
+  EXPECT_EQ(swapped[0], 100U);
+  EXPECT_EQ(swapped[100], 300U);
+  EXPECT_EQ(swapped[399], 299U);
+  auto shuffled = logged({{0, 100}});
+  for (std::size_t i = 0; i < shuffled.size(); ++i) std::swap(shuffled[i], shuffled[(37 * i) % 100]);
+  const auto sorted = log_order(shuffled);
+  for (std::size_t i = 0; i < sorted.size(); ++i)
+    EXPECT_EQ(shuffled[sorted[i]].logged.ns, static_cast<std::int64_t>(i) * 100'000'000);
+  const auto again = log_order(logged({{0, 300}, {0, 200}}));  // the recorder's clock started again
+  EXPECT_TRUE(std::ranges::is_sorted(again));
+}
+
 }  // namespace stamp_order_test
 }  // namespace tutti::bags

@@ -11,7 +11,6 @@
 namespace tutti::bags {
 namespace {
 
-constexpr double kUnitTolerance = 1e-3;  // of a quaternion's norm, as in trajectory files
 constexpr double kExact = 1e-14;
 constexpr double kStill_m = 1e-3, kStill_rad = 1e-3;
 
@@ -39,6 +38,11 @@ Result<Pose3> to_pose(const Eigen::Vector3d& translation, const Eigen::Quaternio
   return Pose3{is_unit ? rotation : rotation.normalized(), translation};
 }
 
+bool is_scaled(const Eigen::Quaterniond& rotation) {
+  constexpr double kRounding = 1e-3;  // of numbers in single precision, or with four digits
+  return std::abs(rotation.norm() - 1.0) > kRounding;
+}
+
 std::string doubt_of_place(const Pose3& T_body_sensor) {
   constexpr double kFar_m = 10.0;
   const double far_m = T_body_sensor.translation.norm();
@@ -61,6 +65,9 @@ Status TransformTree::take(const RosTransform& transform, bool is_static) {
   const auto pose = to_pose(transform.translation, transform.rotation);
   const std::string parent = frame_name(transform.header.frame_id), child = frame_name(transform.child_frame_id);
   if (!pose) return in_context(fmt::format("transform {:.80} -> {:.80}", parent, child), pose.error());
+  if (is_scaled(transform.rotation))
+    add_problem(fmt::format("transform {:.80} -> {:.80}: orientation of norm {:.4g} was normalised", parent, child,
+                            transform.rotation.norm()));
   const Joint joint{parent, *pose, is_static};
   const auto [at, is_new] = joints_.try_emplace(child, joint);
   if (is_new) return {};
@@ -116,6 +123,8 @@ std::optional<Pose3> TransformTree::find(const std::string& to, const std::strin
       if (frame == other) return T_frame_to.inverse() * T_other_from;
   return std::nullopt;
 }
+
+std::string TransformTree::root_of(const std::string& frame) const { return ancestors(frame_name(frame)).back().first; }
 
 std::string TransformTree::frames() const {
   std::set<std::string> all;

@@ -16,9 +16,15 @@ namespace tutti::bags {
 /// The frame's name without ROS 1's leading slash: "/velodyne" is "velodyne".
 std::string frame_name(const std::string& frame);
 
-/// A pose from a message: finite, within kMaxCoordinate_m, with a quaternion of norm 1 within 0.001, which is
+/// By how much a quaternion's norm may differ from 1: as tf2 takes them.
+inline constexpr double kUnitTolerance = 1e-2;
+
+/// A pose from a message: finite, within kMaxCoordinate_m, with a quaternion of norm 1 within kUnitTolerance, which is
 /// normalised. Errors have the value.
 Result<Pose3> to_pose(const Eigen::Vector3d& translation, const Eigen::Quaterniond& rotation);
+
+/// True if the quaternion's norm differs from 1 by more than rounding leaves.
+bool is_scaled(const Eigen::Quaterniond& rotation);
 
 /// Doubts a sensor that is more than 10 m away from the body: "800.0 m from .., as if in millimetres"; else empty.
 std::string doubt_of_place(const Pose3& T_body_sensor);
@@ -39,6 +45,8 @@ class TransformTree {
   void add_problem(const std::string& problem, std::uint64_t count = 1);
   /// T_to_from, or no value when no chain of transforms that do not move joins the two frames.
   [[nodiscard]] std::optional<Pose3> find(const std::string& to, const std::string& from) const;
+  /// The frame at the end of the chain of transforms that do not move, from `frame` up; `frame` itself if it has none.
+  [[nodiscard]] std::string root_of(const std::string& frame) const;
   /// All frames that do not move, "base_link, lidar", for messages.
   [[nodiscard]] std::string frames() const;
 

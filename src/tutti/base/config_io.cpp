@@ -48,15 +48,33 @@ Result<std::vector<PathStep>> split_path(const std::string& key, const std::stri
   return steps;
 }
 
+/// The element of a list whose `name` is this: robots.bravo.
+ConfigNode* find_named(ConfigNode& list, const std::string& name) {
+  const auto at = std::ranges::find_if(list.list, [&](const ConfigNode& element) {
+    const ConfigNode* const found = element.find("name");
+    return found != nullptr && found->kind == ConfigNode::Kind::scalar && found->scalar == name;
+  });
+  return at == list.list.end() ? nullptr : &*at;
+}
+
+/// " (alpha, bravo)", where elements have names.
+std::string names_in(const ConfigNode& list) {
+  std::string out;
+  for (const ConfigNode& element : list.list)
+    if (const ConfigNode* const name = element.find("name")) out += (out.empty() ? "" : ", ") + name->scalar;
+  return out.empty() ? out : " (" + out + ")";
+}
+
 /// The child of a map (created when missing) or list that one step of a path names.
 Result<ConfigNode*> step_into(ConfigNode& node, const PathStep& step, const std::string& assignment) {
   const auto& name = step.name;
   if (node.kind == ConfigNode::Kind::list) {
+    if (ConfigNode* const named = find_named(node, name)) return named;
     std::size_t index = 0;
     const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), index);
     if (error != std::errc{} || end != name.data() + name.size() || index >= node.list.size())
-      return fail(ErrorCode::configuration, "--set {}: '{}' is no element of the list, which has {}", assignment, name,
-                  node.list.size());
+      return fail(ErrorCode::configuration, "--set {}: '{}' is no element of the list, which has {}{}", assignment,
+                  name, node.list.size(), names_in(node));
     return &node.list[index];
   }
   if (step.is_index)

@@ -47,8 +47,8 @@ Result<ConfigNode> parse_yaml(const std::string& text, const std::string& name);
 Result<ConfigNode> load_yaml(const std::string& path);
 /// YAML text that parse_yaml() reads back with the same content.
 std::string to_yaml(const ConfigNode& node);
-/// Applies "a.b.0.c=value" (list elements by index; a missing map key is created; the value is parsed as YAML). On an
-/// error `root` stays as it was.
+/// Applies "a.b.0.c=value" (list elements by index, or by their `name`; a missing map key is created; the value is
+/// parsed as YAML). On an error `root` stays as it was.
 Status apply_override(ConfigNode& root, const std::string& assignment);
 
 namespace config_internal {

@@ -221,12 +221,13 @@ TEST(Config, LoadsFiles) {
 
 TEST(Config, OverridesReachEverything) {
   ConfigNode root = parse("robots: [{name: alpha}, {name: bravo}]\n");
-  for (const char* assignment :
-       {"robots.1.voxel_m=0.5", "base.offset_m=[4, 5]", "min_inliers=7", "enable_feedback=false", "base.name=bravo"})
+  for (const char* assignment : {"robots.bravo.voxel_m=0.5", "robots.alpha.voxel_m=0.25", "base.offset_m=[4, 5]",
+                                 "min_inliers=7", "enable_feedback=false", "base.name=bravo"})
     ASSERT_TRUE(apply_override(root, assignment)) << assignment;
   Settings settings;
   const auto status = load_config(root, settings, "x.yaml");
   ASSERT_TRUE(status) << status.error().message;
+  EXPECT_EQ(settings.robots[0].voxel_m, 0.25);
   EXPECT_EQ(settings.robots[1].voxel_m, 0.5);
   EXPECT_EQ(settings.base.offset_m, (std::vector<double>{4.0, 5.0}));
   EXPECT_EQ(settings.min_inliers, 7);
@@ -261,7 +262,7 @@ TEST(Config, BadBracketsSayWhatIsExpected) {
     EXPECT_EQ(message(fmt::format("{}.name=x", key)),
               fmt::format("--set {}.name=x: '{}' names no element, expected its number: robots[0]", key, key));
   EXPECT_EQ(message("[0].name=x"), "--set [0].name=x: empty step in the key");
-  EXPECT_EQ(message("robots[1].name=x"), "--set robots[1].name=x: '1' is no element of the list, which has 1");
+  EXPECT_EQ(message("robots[1].name=x"), "--set robots[1].name=x: '1' is no element of the list, which has 1 (alpha)");
   EXPECT_EQ(message("seed[0]=x"), "--set seed[0]=x: [0] stands behind '3', expected a list that the file has");
   EXPECT_EQ(message("robot[0]=x"), "--set robot[0]=x: [0] stands behind nothing, expected a list that the file has");
 }

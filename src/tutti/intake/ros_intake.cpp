@@ -319,7 +319,8 @@ std::optional<Eigen::Vector3d> RosIntake::antenna_of(const std::string& frame) c
 
 std::optional<PositionFix> RosIntake::next_fix() {
   while (!fixes_.empty() && last_ && last_->stamp >= fixes_.front().fix.stamp) {
-    auto [fix, frame, is_stated] = std::move(fixes_.front());
+    auto [fix, frame, is_stated, is_flat] = std::move(fixes_.front());
+    static_cast<void>(is_flat);
     fixes_.pop_front();
     if (is_before_all(fix.stamp)) continue;
     const auto p_body_antenna = antenna_of(frame);

@@ -22,13 +22,30 @@ void take_pose(OdometryTrack& track, const BagMessage& message, Timestamp stamp,
   ++track.messages;
   const auto pose = bags::to_pose(position, q);
   if (!pose) return track.refused.add(track.messages, pose.error().message);
+  track.scaled += bags::is_scaled(q) ? 1 : 0;
   track.poses.push_back({stamp, *pose});
   track.arrivals.push_back({stamp, message.log_time, track.messages});
+}
+
+/// Puts items and arrivals, which are one for one, into the order in which they were logged, if the file has another.
+template <class Item>
+void put_in_log_order(std::vector<Item>& items, std::vector<bags::Arrival>& arrivals) {
+  const std::vector<std::size_t> order = bags::log_order(arrivals);
+  if (std::ranges::is_sorted(order)) return;
+  std::vector<Item> sorted;
+  std::vector<bags::Arrival> sorted_arrivals;
+  for (const std::size_t at : order) {
+    sorted.push_back(std::move(items[at]));
+    sorted_arrivals.push_back(arrivals[at]);
+  }
+  items = std::move(sorted);
+  arrivals = std::move(sorted_arrivals);
 }
 
 /// Items and arrivals are one for one.
 template <class Item>
 bags::StampOrder put_in_order(std::vector<Item>& items, std::vector<bags::Arrival>& arrivals, Refusals& refused) {
+  put_in_log_order(items, arrivals);
   bags::StampOrder order = bags::order_by_stamp(arrivals);
   for (const auto& [at, why] : order.refused) refused.add(arrivals[at].message, why);
   std::vector<Item> sorted;
@@ -76,6 +93,7 @@ class Indexer {
 
   /// Gives topics of images what is beside them.
   void end() {
+    for (auto& [topic, track] : index.scans) keep_frame(track, scan_frames_[topic]);
     for (auto& [topic, track] : index.images)
       if (const auto at = infos_.find(bags::camera_info_topic(topic, track.seen.is_compressed)); at != infos_.end())
         track.seen.info = at->second;
@@ -87,18 +105,36 @@ class Indexer {
   static void take_odometry(OdometryTrack& track, const BagMessage& message) {
     const auto odometry = bags::decode_odometry(message.data, encoding_of(message));
     if (!odometry) return refuse(track, odometry.error());
-    if (track.messages == 0) {
-      track.frame = bags::frame_name(odometry->header.frame_id);
-      track.body = bags::frame_name(odometry->child_frame_id);
-    }
+    if (track.frame.empty()) track.frame = bags::frame_name(odometry->header.frame_id);
+    if (track.body.empty()) track.body = bags::frame_name(odometry->child_frame_id);
     take_pose(track, message, odometry->header.stamp, odometry->pose.position, odometry->pose.orientation);
   }
 
   static void take_pose_stamped(OdometryTrack& track, const BagMessage& message) {
     const auto pose = bags::decode_pose_stamped(message.data, encoding_of(message));
     if (!pose) return refuse(track, pose.error());
-    if (track.messages == 0) track.frame = bags::frame_name(pose->header.frame_id);
+    if (track.frame.empty()) track.frame = bags::frame_name(pose->header.frame_id);
     take_pose(track, message, pose->header.stamp, pose->pose.position, pose->pose.orientation);
+  }
+
+  /// The frame that most scans have is the topic's, wherever the first ones were in.
+  static void keep_frame(ScanTrack& track, const std::vector<std::string>& frames) {
+    std::map<std::string, std::size_t> counts;
+    for (const std::string& frame : frames) ++counts[frame];
+    if (counts.empty()) return;
+    track.frame = std::ranges::max_element(counts, {}, [](const auto& entry) { return entry.second; })->first;
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      if (frames[i] != track.frame) {
+        track.refused.add(track.scans[i].message,
+                          fmt::format("frame '{:.80}', expected '{:.80}' as of most", frames[i], track.frame));
+        continue;
+      }
+      track.scans[kept] = track.scans[i];
+      track.arrivals[kept++] = track.arrivals[i];
+    }
+    track.scans.resize(kept);
+    track.arrivals.resize(kept);
   }
 
   void take_transforms(const BagMessage& message, bool is_static) {
@@ -121,15 +157,12 @@ class Indexer {
     }
   }
 
-  static void take_scan(ScanTrack& track, const BagMessage& message) {
+  void take_scan(ScanTrack& track, const BagMessage& message) {
     ++track.messages;
     const auto cloud = bags::decode_scan(message.channel->type, message.data, encoding_of(message));
     if (!cloud) return track.refused.add(track.messages, cloud.error().message);
     const std::string frame = bags::frame_name(cloud->header.frame_id);
-    if (track.scans.empty()) track.frame = frame;
-    if (frame != track.frame)
-      return track.refused.add(track.messages,
-                               fmt::format("frame '{:.80}', expected '{:.80}' as of the first", frame, track.frame));
+    scan_frames_[message.channel->topic].push_back(frame);
     track.scans.push_back({cloud->header.stamp, message.position, track.messages});
     track.arrivals.push_back({cloud->header.stamp, message.log_time, track.messages});
   }
@@ -145,9 +178,10 @@ class Indexer {
       ++track.without;
       return;
     }
-    const auto& [fix, frame, is_stated] = **decoded;
+    const auto& [fix, frame, is_stated, is_flat] = **decoded;
     if (track.fixes.empty()) track.frame = frame;
     track.unsure += is_stated ? 0 : 1;
+    track.flat += is_flat ? 1 : 0;
     track.fixes.push_back(fix);
     track.arrivals.push_back({fix.stamp, message.log_time, track.messages});
   }
@@ -156,8 +190,10 @@ class Indexer {
     const std::string& topic = message.channel->topic;
     const bags::RosEncoding encoding = encoding_of(message);
     const bags::Use use = bags::use_of(message.channel->type);
-    if (use == bags::Use::calibration && !infos_.contains(topic)) {
-      if (auto info = bags::decode_camera_info(message.data, encoding)) infos_.emplace(topic, std::move(*info));
+    if (use == bags::Use::calibration) {
+      const auto known = infos_.find(topic);
+      if (known != infos_.end() && known->second.k[0] > 0.0) return;
+      if (auto info = bags::decode_camera_info(message.data, encoding)) infos_[topic] = std::move(*info);
     } else if (use == bags::Use::imu) {
       take_imu(index.imu[topic], message);
     } else if (use == bags::Use::images) {
@@ -205,7 +241,8 @@ class Indexer {
 
   const std::string& pair_;
   bool with_images_;
-  std::map<std::string, bags::RosCameraInfo> infos_;  // the first message of each topic
+  std::map<std::string, bags::RosCameraInfo> infos_;             // of each topic the first that is calibrated
+  std::map<std::string, std::vector<std::string>> scan_frames_;  // of each scan of a topic
 };
 
 }  // namespace

@@ -34,8 +34,9 @@ struct OdometryTrack {
   Trajectory poses;  ///< Stamps increase: as bags::order_by_stamp() orders them.
   std::vector<bags::Arrival> arrivals;
   std::string frame, body;
-  std::uint64_t late = 0;  ///< Poses that were sorted in.
-  std::string restarts;    ///< What of the topic is used, where its clock starts again.
+  std::uint64_t late = 0;    ///< Poses that were sorted in.
+  std::uint64_t scaled = 0;  ///< Poses whose quaternion had to be normalised.
+  std::string restarts;      ///< What of the topic is used, where its clock starts again.
   std::uint64_t messages = 0;
   Refusals refused;
 };
@@ -79,6 +80,7 @@ struct FixTrack {
   std::string frame;
   std::uint64_t messages = 0;
   std::uint64_t without = 0;  ///< Messages that report no fix.
+  std::uint64_t flat = 0;     ///< Fixes without an altitude.
   std::uint64_t unsure = 0;   ///< Fixes that do not state their uncertainty.
   Refusals refused;
 };

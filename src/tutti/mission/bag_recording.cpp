@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
+#include "tutti/bags/robot_namespace.hpp"
 #include "tutti/bags/sensor_clock.hpp"
 
 namespace tutti::mission {
@@ -90,16 +92,39 @@ Result<const std::pair<const std::string, OdometryTrack>*> choose_odometry(const
               list_of(index.odometry), list_of(index.poses), list_of(index.transforms));
 }
 
-Result<Pose3> find_lidar(const BagIndex& index, const std::string& body, const std::string& lidar,
+/// "; refused were: transform base_link -> lidar: orientation of norm 0, .."
+std::string refused_transforms(const bags::TransformTree& tree) {
+  constexpr std::size_t kMost = 3;
+  std::string out;
+  std::size_t count = 0;
+  for (const auto& [problem, times] : tree.problems())
+    if (++count <= kMost) out += (out.empty() ? "; refused were: " : "; ") + problem;
+  return out;
+}
+
+/// Scans that were moved into the odometry's frame already lost where the LiDAR was.
+Error in_world(const BagIndex& index, const std::string& frame, const RobotConfig& robot) {
+  std::string others;
+  for (const auto& [topic, track] : index.scans)
+    if (has_any(track) && track.frame != frame) others = topic;
+  return {ErrorCode::invalid,
+          fmt::format("scans are in '{}', the odometry's own frame: they are moved into it already. Take the cloud of "
+                      "the body or of the sensor (of FAST-LIO /cloud_registered_body): {}",
+                      frame, flag(robot, "scans", others.empty() ? "TOPIC" : others))};
+}
+
+Result<Pose3> find_lidar(const BagIndex& index, const OdometryTrack& odometry, const std::string& lidar,
                          const RobotConfig& robot, std::string& note) {
   if (is_given(robot.T_body_lidar)) {
     note = "the LiDAR is where T_body_lidar says";
     return to_pose(robot.T_body_lidar);
   }
+  const std::string& body = odometry.body;
   if (body == lidar) {
     note = "scans are in the odometry's body frame";
     return Pose3{};
   }
+  if (lidar == odometry.frame && !lidar.empty()) return tl::unexpected(in_world(index, lidar, robot));
   if (body.empty()) {
     note = fmt::format("nothing says which body the odometry is of: taken as that of the scans, {}", lidar);
     return Pose3{};
@@ -111,14 +136,57 @@ Result<Pose3> find_lidar(const BagIndex& index, const std::string& body, const s
   const std::string frames = index.tree.frames();
   return fail(ErrorCode::invalid,
               "where the LiDAR is on the robot is not known: no transform from '{}' to '{}', frames that do not move "
-              "are: {}; say it: --set robots.0.T_body_lidar.translation_m=[x,y,z] (robots count from 0; in a mission "
-              "file: robots[].T_body_lidar; zeros where both frames are one)",
-              lidar, body, frames.empty() ? "none" : frames);
+              "are: {}{}; say it: --set robots.{}.T_body_lidar.translation_m=[x,y,z] (zeros where both "
+              "frames are one)",
+              lidar, body, frames.empty() ? "none" : frames, refused_transforms(index.tree), robot.name);
+}
+
+/// Odometry that names no body, or its own frame as one, is of the root of the sensor's transforms.
+void find_body(const BagIndex& index, const std::string& sensor, OdometryTrack& odometry,
+               std::vector<std::string>& notes) {
+  if (!odometry.body.empty() && odometry.body != odometry.frame) return;
+  odometry.body.clear();
+  const std::string root = index.tree.root_of(sensor);
+  if (root == bags::frame_name(sensor) || root == odometry.frame || bags::is_odometry_frame(root)) return;
+  odometry.body = root;
+  notes.push_back(fmt::format(
+      "nothing says which body the odometry is of: taken as {}, the root of the transforms to {}", root, sensor));
+}
+
+std::optional<std::string> frame_of_images(const BagIndex& index) {
+  for (const auto& [topic, track] : index.images)
+    if (track.seen.first) return track.seen.first->frame;
+  return std::nullopt;
+}
+
+/// Topics of scans without those that are in the odometry's frame, if others are left.
+std::map<std::string, ScanTrack> of_the_sensor(const BagIndex& index, const OdometryTrack& odometry,
+                                               std::vector<std::string>& notes) {
+  std::map<std::string, ScanTrack> out = index.scans;
+  std::erase_if(out, [&](const auto& entry) {
+    return has_any(entry.second) && !odometry.frame.empty() && entry.second.frame == odometry.frame;
+  });
+  if (out.size() == index.scans.size()) return out;
+  if (std::ranges::none_of(out, [](const auto& entry) { return has_any(entry.second); })) return index.scans;
+  for (const auto& [topic, track] : index.scans)
+    if (!out.contains(topic))
+      notes.push_back(fmt::format("{}: is in {}, the odometry's own frame, and not used", topic, track.frame));
+  return out;
 }
 
 void doubt_place(const std::string& topic, const Pose3& T_body_sensor, std::vector<std::string>& notes) {
   if (const std::string doubt = bags::doubt_of_place(T_body_sensor); !doubt.empty())
     notes.push_back(fmt::format("{}: the sensor is {}", topic, doubt));
+}
+
+/// Receivers of which not one message can be used.
+void note_no_fixes(const BagIndex& index, std::vector<std::string>& notes) {
+  for (const auto& [topic, track] : index.fixes) {
+    if (track.refused.count > 0) notes.push_back(note_of(topic, track.refused, track.messages));
+    if (track.without > 0)
+      notes.push_back(
+          fmt::format("{}: {} of {} messages are without a fix (status -1)", topic, track.without, track.messages));
+  }
 }
 
 /// When several topics have fixes, the user has to choose one: mostly all but one are made of that one.
@@ -127,7 +195,10 @@ Status take_fixes(const BagIndex& index, const std::string& body, const RobotCon
   std::vector<std::string> topics;
   for (const auto& [topic, track] : index.fixes)
     if (wanted.empty() ? !track.fixes.empty() : topic == wanted) topics.push_back(topic);
-  if (topics.empty() && wanted.empty()) return {};
+  if (topics.empty() && wanted.empty()) {
+    note_no_fixes(index, out.notes);
+    return {};
+  }
   if (topics.empty())
     return fail(ErrorCode::invalid, "topics.fixes: '{}' is not in the bag, or no sensor_msgs/NavSatFix", wanted);
   if (topics.size() > 1) {
@@ -140,6 +211,7 @@ Status take_fixes(const BagIndex& index, const std::string& body, const RobotCon
   out.fixes = track.fixes;
   if (track.refused.count > 0) out.notes.push_back(note_of(out.fix_topic, track.refused, track.messages));
   if (track.without > 0) out.fix_note += fmt::format("; {} messages without a fix", track.without);
+  if (track.flat > 0) out.fix_note += fmt::format("; {} have no altitude and count in the plane", track.flat);
   if (track.unsure > 0)
     out.fix_note += fmt::format("; {} do not say how sure they are, taken as {:g} m and {:g} m up", track.unsure,
                                 kUnknownFix_m, kUnknownFixUp_m);
@@ -190,6 +262,9 @@ Status take_scans(const OdometryTrack& odometry, const std::string& topic, ScanT
 /// What was left out of the odometry, and why.
 void note_odometry(const std::string& topic, const OdometryTrack& track, std::vector<std::string>& notes) {
   if (track.refused.count > 0) notes.push_back(note_of(topic, track.refused, track.messages));
+  if (track.scaled > 0)
+    notes.push_back(fmt::format("{}: {} of {} orientations are not of norm 1 within 0.001, and were normalised", topic,
+                                track.scaled, track.messages));
   if (track.late > 0)
     notes.push_back(fmt::format("{}: {} of {} messages came behind newer ones, and are sorted in", topic, track.late,
                                 track.messages));
@@ -212,9 +287,15 @@ Result<BagRecording> read_bag(const fs::path& data, const RobotConfig& robot, bo
   if (!odometry) return in_context(out.file, odometry.error());
   order_sensors(index, (*odometry)->second);
   out.notes.insert(out.notes.begin(), index.notes.begin(), index.notes.end());
-  const auto scans = choose(index.scans, robot.topics.scans, "scans", robot);
+  OdometryTrack track = (*odometry)->second;
+  const std::string source = (*odometry)->first;
+  const auto usable = of_the_sensor(index, track, out.notes);
+  const auto scans = choose(robot.topics.scans.empty() ? usable : index.scans, robot.topics.scans, "scans", robot);
   if (!scans) return in_context(out.file, scans.error());
-  const auto& [source, track] = **odometry;
+  if (*scans != nullptr)
+    find_body(index, (*scans)->second.frame, track, out.notes);
+  else if (const auto frame = frame_of_images(index))
+    find_body(index, *frame, track, out.notes);
   out.odometry = track.poses;
   std::string what = fmt::format("{}: odometry of {} ({})", out.file, source, in_words(track));
   note_odometry(source, track, out.notes);
@@ -229,7 +310,7 @@ Result<BagRecording> read_bag(const fs::path& data, const RobotConfig& robot, bo
   }
   const auto& [topic, seen] = **scans;
   std::string where;
-  const auto T_body_lidar = find_lidar(index, track.body, seen.frame, robot, where);
+  const auto T_body_lidar = find_lidar(index, track, seen.frame, robot, where);
   if (!T_body_lidar) return in_context(out.file, T_body_lidar.error());
   out.T_body_lidar = *T_body_lidar;
   if (auto ok = take_scans(track, topic, seen, robot, out); !ok) return in_context(out.file, ok.error());

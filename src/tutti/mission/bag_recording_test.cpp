@@ -328,7 +328,7 @@ TEST_F(Bags, FramesWithoutTransformsAreNamed) {
   std::erase_if(samples, [](const Sample& sample) { return sample.type == kTf; });
   write(samples);
   EXPECT_NE(problem().find("no transform from 'lidar' to 'base_link', frames that do not move are: none; say it: --set "
-                           "robots.0.T_body_lidar.translation_m=[x,y,z]"),
+                           "robots.alpha.T_body_lidar.translation_m=[x,y,z]"),
             std::string::npos)
       << problem();
 }

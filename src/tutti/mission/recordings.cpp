@@ -237,13 +237,23 @@ Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, 
   return out;
 }
 
+/// Advice that can be typed: "robots[].topics" is "robots.bravo.topics" of one robot.
+std::string with_name(std::string text, const std::string& robot) {
+  constexpr std::string_view kAny = "robots[].";
+  for (std::size_t at = text.find(kAny); at != std::string::npos; at = text.find(kAny, at))
+    text.replace(at, kAny.size(), "robots." + robot + ".");
+  return text;
+}
+
 Result<std::vector<MissionRecording>> replay_all(const MissionConfig& config, const fs::path& data,
                                                  const std::vector<ChangeOdometry>& changes) {
   std::vector<MissionRecording> out;
   for (const RobotConfig& robot : config.robots) {
     const ChangeOdometry change = out.size() < changes.size() ? changes[out.size()] : ChangeOdometry();
     auto loaded = replay(robot, data, config, change);
-    if (!loaded) return in_context("robot " + robot.name, loaded.error());
+    if (!loaded)
+      return fail(loaded.error().code, "robot {}: {}", robot.name, with_name(loaded.error().message, robot.name));
+    for (std::string& note : loaded->notes) note = with_name(std::move(note), robot.name);
     loaded->recording.robot = RobotId{static_cast<std::uint32_t>(out.size())};
     loaded->recording.name = robot.name;
     loaded->start_s = robot.start_s;

@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <iterator>
 
 #include "support/bags/robot_bag.hpp"
 #include "tutti/mission/bag_recording.hpp"
@@ -232,6 +234,92 @@ TEST_F(StrangerBags, AClockThatStartsAgainIsReportedAndTheLongerPartUsed) {
                                      "1699999998000000000 ns on (used)"
                                    : "messages 1 to 140 last 7.0 s from 1700000000000000000 ns on (used), messages");
   }
+}
+
+/// A chunk that is stored before one that was recorded earlier, as of writers with several threads.
+TEST_F(StrangerBags, ChunksInAnyOrderAreReadByTheirLogTimes) {
+  std::vector<Sample> samples = samples_of({});
+  std::ranges::stable_sort(samples, {}, &Sample::ns);
+  std::rotate(samples.begin() + 1, samples.begin() + 121, samples.end());
+  write_bytes(file_, mcap_of(samples, "", 20));
+  const auto bag = read("alpha");
+  ASSERT_TRUE(bag) << bag.error().message;
+  EXPECT_EQ(bag->odometry.size(), kPoses);
+  EXPECT_EQ(bag->scans.size(), kScans);
+  EXPECT_EQ(notes_of(bag).find("starts again"), std::string::npos) << notes_of(bag);
+}
+
+TEST_F(StrangerBags, OdometryWithoutABodyIsOfTheRootOfTheTransforms) {
+  for (const char* const body : {"", "odom"}) {
+    std::vector<Sample> samples = samples_of({.lidar_x_m = 0.4});
+    for (Sample& sample : samples)
+      if (sample.type == kOdometry) {
+        const Timestamp stamp{static_cast<std::int64_t>(sample.ns)};
+        sample.data = odometry_of(stamp, at_x(stamp - kStart), "odom", body);
+      }
+    write({samples});
+    const auto bag = read("alpha");
+    ASSERT_TRUE(bag) << bag.error().message;
+    EXPECT_EQ(bag->T_body_lidar.translation.x(), 0.4);
+    expect_note(bag, "nothing says which body the odometry is of: taken as base_link, the root of the transforms to");
+  }
+}
+
+TEST_F(StrangerBags, NormsThatTf2TakesAreNormalisedAndSaid) {
+  std::vector<Sample> samples = samples_of({});
+  for (Sample& sample : samples)
+    if (sample.type == kOdometry) {
+      const Timestamp stamp{static_cast<std::int64_t>(sample.ns)};
+      Pose3 pose = at_x(stamp - kStart);
+      pose.rotation.coeffs() *= 1.004;
+      sample.data = odometry_of(stamp, pose, "odom", "base_link");
+    }
+  write({samples});
+  const auto bag = read("alpha");
+  ASSERT_TRUE(bag) << bag.error().message;
+  EXPECT_NEAR(bag->odometry.back().pose.rotation.norm(), 1.0, 1e-12);
+  expect_note(bag, "/odom: 200 of 200 orientations are not of norm 1 within 0.001, and were normalised");
+}
+
+TEST_F(StrangerBags, ARefusedTransformIsNamedWhereItIsMissing) {
+  std::vector<Sample> samples = samples_of({});
+  Pose3 never_set = at_x(0.3);
+  never_set.rotation.coeffs().setZero();
+  samples.front().data = tf_of(kStart, {{"base_link", "lidar", never_set}});
+  write({samples});
+  expect_note(read("alpha"), "refused were: transform base_link -> lidar: orientation of norm 0, expected 1 within");
+}
+
+/// FAST-LIO's /cloud_registered and the like.
+TEST_F(StrangerBags, ScansInTheOdometrysFrameAreTheMapsAlready) {
+  std::vector<Sample> samples = samples_of({}), moved;
+  for (Sample sample : samples) {
+    const Timestamp stamp{static_cast<std::int64_t>(sample.ns)};
+    if (sample.type == kCloud) sample = sample_of("/registered", kCloud, stamp, cloud_of(stamp, "odom", {{1, 2, 3}}));
+    moved.push_back(std::move(sample));
+  }
+  write({moved});
+  expect_note(read("alpha"), "scans are in 'odom', the odometry's own frame: they are moved into it already");
+  std::ranges::copy_if(samples, std::back_inserter(moved), [](const Sample& sample) { return sample.type == kCloud; });
+  write({moved});
+  const auto bag = read("alpha");
+  ASSERT_TRUE(bag) << bag.error().message;
+  EXPECT_EQ(bag->scan_topic, "/points");
+  expect_note(bag, "/registered: is in odom, the odometry's own frame, and not used");
+}
+
+/// Drivers that get their parameters late.
+TEST_F(StrangerBags, TheFrameOfMostScansCountsNotOfTheFirst) {
+  std::vector<Sample> samples = samples_of({});
+  int first = 0;
+  for (Sample& sample : samples)
+    if (sample.type == kCloud && first++ < 3)
+      sample.data = cloud_of(Timestamp{static_cast<std::int64_t>(sample.ns)} - 0.05, "", {{1, 2, 3}});
+  write({samples});
+  const auto bag = read("alpha");
+  ASSERT_TRUE(bag) << bag.error().message;
+  EXPECT_EQ(bag->scans.size(), kScans - 3);
+  expect_note(bag, "/points: 3 of 40 messages refused, the first because: message 1: frame '', expected 'lidar' as of");
 }
 
 TEST_F(StrangerBags, ALidarTensOfMetresAwayIsDoubted) {
