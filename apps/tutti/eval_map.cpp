@@ -96,9 +96,9 @@ Result<Pose3> initial_transform(const EvalMapOptions& options) {
   return Pose3{};
 }
 
-Result<PointCloud> load(const std::string& path) {
-  auto cloud = formats::read_ply(path);
-  if (cloud && cloud->points.empty())
+Result<formats::PlacedCloud> load(const std::string& path) {
+  auto cloud = formats::read_placed_ply(path);
+  if (cloud && cloud->cloud.points.empty())
     return fail(ErrorCode::invalid, "{}: holds no point, expected at least one", path);
   return cloud;
 }
@@ -133,26 +133,30 @@ Result<Pose3> refine(const PointCloud& map, const PointCloud& survey, const Pose
 Result<MapReport> evaluate(const EvalMapOptions& options) {
   auto initial = initial_transform(options);
   if (!initial) return tl::unexpected(initial.error());
-  auto map = load(options.map_path);
-  if (!map) return tl::unexpected(map.error());
-  auto survey = load(options.survey_path);
-  if (!survey) return tl::unexpected(survey.error());
-  MapReport report{.map_points = map->points.size(), .survey_points = survey->points.size(), .T_survey_map = *initial};
-  if (const Eigen::Vector3f* lost = lidar::first_skipped(*map, options.voxel_m))
+  auto placed_map = load(options.map_path), placed_survey = load(options.survey_path);
+  if (!placed_map) return tl::unexpected(placed_map.error());
+  if (!placed_survey) return tl::unexpected(placed_survey.error());
+  PointCloud &map = placed_map->cloud, &survey = placed_survey->cloud;
+  // Clouds are floats near their own origins; between these, the transform stays in double.
+  const Pose3 T_survey_near{Eigen::Quaterniond::Identity(), placed_survey->origin};
+  const Pose3 T_map_near{Eigen::Quaterniond::Identity(), placed_map->origin};
+  Pose3 T_near = T_survey_near.inverse() * *initial * T_map_near;
+  MapReport report{.map_points = map.points.size(), .survey_points = survey.points.size(), .T_survey_map = *initial};
+  if (const Eigen::Vector3f* lost = lidar::first_skipped(map, options.voxel_m))
     return fail(
         ErrorCode::invalid,
         "{}: the point at ({:g}, {:g}, {:g}) m is more than 2^20 voxels of {:g} m from the origin: expected all "
         "within {:g} m; take a larger --voxel",
         options.map_path, lost->x(), lost->y(), lost->z(), options.voxel_m, options.voxel_m * 0x1p20);
-  *map = lidar::voxel_downsample(*map, options.voxel_m);
+  map = lidar::voxel_downsample(map, options.voxel_m);
   if (options.refine) {
-    const auto refined = refine(*map, *survey, *initial, report);
+    const auto refined = refine(map, survey, T_near, report);
     if (!refined) return tl::unexpected(refined.error());
-    report.T_survey_map = *refined;
+    T_near = *refined;
+    report.T_survey_map = T_survey_near * T_near * T_map_near.inverse();
   }
-  const auto there = evaluation::summarise(evaluation::CloudIndex(*survey).distances(*map, report.T_survey_map));
-  const auto back =
-      evaluation::summarise(evaluation::CloudIndex(*map).distances(*survey, report.T_survey_map.inverse()));
+  const auto there = evaluation::summarise(evaluation::CloudIndex(survey).distances(map, T_near));
+  const auto back = evaluation::summarise(evaluation::CloudIndex(map).distances(survey, T_near.inverse()));
   if (!there || !back)
     return fail(ErrorCode::invalid, "{}: no distance to {} could be measured", options.map_path, options.survey_path);
   report.map_to_survey = *there;

@@ -102,7 +102,9 @@ Status skip(LineReader& line, std::string_view& data, bool ascii, const Element&
 
 }  // namespace
 
-Result<PointCloud> parse_ply(std::string_view bytes, const std::string& name) {
+namespace {
+
+Result<PlacedCloud> parse_vertices(std::string_view bytes, const std::string& name, bool moves) {
   LineReader line(bytes, name);
   const auto header = read_ply_header(line);
   if (!header) return tl::unexpected(header.error());
@@ -118,21 +120,37 @@ Result<PointCloud> parse_ply(std::string_view bytes, const std::string& name) {
       continue;
     }
     if (element.has_list) return fail(ErrorCode::unsupported, "{}: vertices hold lists, expected plain numbers", name);
-    const auto& layout = element.layout;
+    auto layout = element.layout;
+    layout.moves = moves;
     for (const auto& coordinate : layout.xyz)
       if (!coordinate.found)
         return fail(ErrorCode::parse, "{}: vertex properties x, y and z expected, at least one is not there", name);
     if (ascii) {
       auto records = ascii_points(line, element.count, layout);
       if (!records) return tl::unexpected(records.error());
-      return PointCloud{std::move(records->points)};
+      return PlacedCloud{{std::move(records->points)}, records->origin};
     }
     if (data.size() / layout.stride < element.count)
       return fail(ErrorCode::parse, "{}: {} bytes of data, expected {} vertices of {} bytes", name, data.size(),
                   element.count, layout.stride);
-    return PointCloud{binary_points(data, element.count, layout).points};
+    auto records = binary_points(data, element.count, layout);
+    return PlacedCloud{{std::move(records.points)}, records.origin};
   }
   return fail(ErrorCode::parse, "{}: no element vertex in the header", name);
+}
+
+}  // namespace
+
+Result<PointCloud> parse_ply(std::string_view bytes, const std::string& name) {
+  return parse_vertices(bytes, name, false).map([](PlacedCloud&& placed) { return std::move(placed.cloud); });
+}
+
+Result<PlacedCloud> parse_placed_ply(std::string_view bytes, const std::string& name) {
+  return parse_vertices(bytes, name, true);
+}
+
+Result<PlacedCloud> read_placed_ply(const std::string& path) {
+  return read_file(path).and_then([&](const std::string& bytes) { return parse_placed_ply(bytes, path); });
 }
 
 Result<PointCloud> read_ply(const std::string& path) {

@@ -35,4 +35,13 @@ Status write_ply(const std::string& path, std::span<const Eigen::Vector3f> point
 Result<PointCloud> parse_ply(std::string_view bytes, const std::string& name);
 Result<PointCloud> read_ply(const std::string& path);
 
+/// A cloud whose points are given from `origin` on, so that those of a survey in UTM keep their digits as floats.
+struct PlacedCloud {
+  PointCloud cloud;
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< Whole metres, beyond 1 km; or zero.
+};
+/// As parse_ply(), subtracting the origin before coordinates are rounded to float.
+Result<PlacedCloud> parse_placed_ply(std::string_view bytes, const std::string& name);
+Result<PlacedCloud> read_placed_ply(const std::string& path);
+
 }  // namespace tutti::formats

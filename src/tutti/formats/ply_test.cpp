@@ -109,5 +109,22 @@ TEST(Ply, WritesFiles) {
   EXPECT_EQ(read_ply("/no/such.ply").error().code, ErrorCode::io);
 }
 
+TEST(Ply, ASurveyFarFromTheOriginKeepsItsDigits) {
+  const std::string text =
+      "ply\nformat ascii 1.0\nelement vertex 2\nproperty double x\nproperty double y\nproperty double z\nend_header\n"
+      "448000.131 5572000.302 310.07\n448001.132 5572000.802 310.08\n";
+  const auto placed = parse_placed_ply(text, "s.ply");
+  ASSERT_TRUE(placed) << placed.error().message;
+  EXPECT_EQ(placed->origin, Eigen::Vector3d(448000, 5572000, 310));
+  EXPECT_NEAR(placed->cloud.points[0].y(), 0.302, 1e-6);
+  EXPECT_NEAR(placed->cloud.points[1].x(), 1.132, 1e-6);
+  const auto near = parse_placed_ply(
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+      "property float z\nend_header\n1 2 3\n",
+      "n.ply");
+  EXPECT_EQ(near->origin, Eigen::Vector3d(0, 0, 0));
+  EXPECT_EQ(near->cloud.points[0], Eigen::Vector3f(1, 2, 3));
+}
+
 }  // namespace ply_test
 }  // namespace tutti::formats

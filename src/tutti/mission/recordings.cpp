@@ -175,6 +175,16 @@ Result<Trajectory> recorded_odometry(const Sources& sources, const RobotConfig& 
   return read_trajectory(robot.odometry, data, is_numbered ? nullptr : &report);
 }
 
+/// Odometry that begins far from its origin, as in UTM, is moved there: clouds in single precision would lose digits.
+/// The origin is in whole metres; nothing where it is near.
+std::optional<Eigen::Vector3d> take_origin(Trajectory& odometry) {
+  constexpr double kFar_m = 10'000.0;  // where a float's steps are a millimetre
+  const Eigen::Vector3d origin = odometry.front().pose.translation.array().round();
+  if (origin.norm() < kFar_m) return std::nullopt;
+  for (StampedPose& sample : odometry) sample.pose.translation -= origin;
+  return origin;
+}
+
 /// One for each sample of `odometry`, the first of which is number `from`.
 std::vector<Matrix6d> covariances_of(const Sources& sources, const RobotConfig& robot, const Trajectory& odometry,
                                      std::size_t from) {
@@ -211,6 +221,13 @@ Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, 
     raw = std::move(changed.odometry);
     out.T_odom_recorded = changed.T_odom_recorded;
     if (changed.is_bent) out.T_common_odom.reset();  // a bent trajectory has no one true frame any more
+  }
+  if (const auto origin = take_origin(raw)) {
+    out.T_odom_recorded = Pose3{Eigen::Quaterniond::Identity(), -*origin} * out.T_odom_recorded;
+    out.notes.push_back(
+        fmt::format("{}: odometry begins far from its origin: it is given, as is the map, from "
+                    "({:.0f} {:.0f} {:.0f}) m on",
+                    robot.name, origin->x(), origin->y(), origin->z()));
   }
   if (out.T_common_odom) out.T_common_odom = *out.T_common_odom * out.T_odom_recorded.inverse();
   if (!robot.scans.empty()) {

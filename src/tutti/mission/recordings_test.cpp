@@ -45,6 +45,21 @@ TEST_F(Recordings, AreReplayedAsTheyAre) {
   EXPECT_LT(local({}, *input->robots.front().T_common_odom).norm(), 1e-12);
 }
 
+/// As in UTM: floats have steps of half a metre there.
+TEST_F(Recordings, FarFromTheOriginAreGivenFromANearerOne) {
+  Trajectory far = recorded_;
+  const Eigen::Vector3d utm(448'000.25, 5'572'000.5, 310.0);
+  for (StampedPose& sample : far) sample.pose.translation += utm;
+  ASSERT_TRUE(formats::write_tum((folder_ / "odometry.tum").string(), far).has_value());
+  const auto input = load_input(config_, folder_, 1);
+  ASSERT_TRUE(input.has_value()) << input.error().message;
+  const MissionRecording& robot = input->robots.front();
+  EXPECT_LT((robot.recording.odometry.front().pose.translation - Eigen::Vector3d(0.25, -0.5, 0.0)).norm(), 1e-6);
+  EXPECT_LT(local(far[7].pose, *robot.T_common_odom * robot.recording.odometry[7].pose).norm(), 1e-6);
+  EXPECT_EQ(robot.notes.front(),
+            "a: odometry begins far from its origin: it is given, as is the map, from (448000 5572001 310) m on");
+}
+
 TEST_F(Recordings, ErrorsNameTheRobotOnce) {
   config_.robots[0].to_share = 0.01;
   EXPECT_EQ(problem(), "robot a: 1 odometry poses to replay, expected at least 2");

@@ -29,8 +29,12 @@ double number_in(const char* record, const NumberField& field) {
 /// `number` of a field.
 template <class Number>
 void append(Records& records, const RecordLayout& layout, const Number& number) {
-  const Eigen::Vector3f p(to_float(number(layout.xyz[0])), to_float(number(layout.xyz[1])),
-                          to_float(number(layout.xyz[2])));
+  constexpr double kFar_m = 1000.0;  // where a float's steps are a tenth of a millimetre
+  const Eigen::Vector3d at(number(layout.xyz[0]), number(layout.xyz[1]), number(layout.xyz[2]));
+  if (layout.moves && records.points.empty() && at.allFinite() && at.norm() > kFar_m)
+    records.origin = at.array().round();
+  const Eigen::Vector3d near = at - records.origin;
+  const Eigen::Vector3f p(to_float(near.x()), to_float(near.y()), to_float(near.z()));
   if (!p.allFinite()) return;
   records.points.push_back(p);
   if (layout.time.found) records.times.push_back(number(layout.time));

@@ -31,6 +31,7 @@ struct RecordLayout {
   std::string_view time_name;  ///< and what it calls that.
   std::size_t stride = 0;      ///< Bytes a record.
   std::size_t columns = 0;     ///< Columns a record.
+  bool moves = false;          ///< Points far from the origin are read from a nearer one: Records::origin.
 };
 
 /// Infinite where the value is beyond a float's range (a plain cast would be undefined).
@@ -40,6 +41,7 @@ float to_float(double value);
 struct Records {
   std::vector<Eigen::Vector3f> points;
   std::vector<double> times;
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< To be added to the points, in double.
 };
 
 /// From `count` binary records.
