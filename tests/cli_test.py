@@ -6,6 +6,7 @@ import json
 import math
 import os
 import pathlib
+import signal
 import sqlite3
 import subprocess
 import sys
@@ -154,7 +155,7 @@ class CommandLine(unittest.TestCase):
     def test_usage_errors_exit_2(self):
         self.expect(tutti(), 2)
         self.expect(tutti("dance"), 2)
-        self.expect(tutti("run"), 2, "MISSION.yaml, --bag NAME=BAG or --graph FLEET.pyfg")
+        self.expect(tutti("run"), 2, "MISSION.yaml, BAG.., --bag NAME=BAG or --graph FLEET.pyfg")
         self.expect(tutti("run", "mine.yaml", "--bag", "alpha=bag"), 2, "excludes")
         self.expect(tutti("run", "--bag", "alpha"), 2, "'alpha': expected --bag NAME=BAG")
         self.expect(tutti("run", "--bag", "alpha=none", "--topic", "alpha.scan=/a"), 2, "alpha.scan=/a", "NAME.scans=")
@@ -235,6 +236,20 @@ class CommandLine(unittest.TestCase):
         # The effective configuration is a mission file that runs again with the same result.
         self.expect(tutti("run", out / "config.yaml", "--out", self.path / "again", "--seed", 7), 0)
         self.assertEqual((out / "report.json").read_text(), (self.path / "again" / "report.json").read_text())
+
+    def test_a_stopped_mission_writes_what_is_there(self):
+        out, kept = self.path / "out", self.path / "kept.tutti"
+        command = [TUTTI, "demo", *BRIEF, "--rate", "10", "--out", str(out), "--map", str(kept)]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as mission:
+            while "%" not in mission.stderr.readline():
+                pass
+            mission.send_signal(signal.SIGINT)
+            printed, said = mission.communicate(timeout=60)
+        self.assertEqual(mission.returncode, 0, said)
+        self.assertIn("stopping: report and map of what is there are made", said)
+        self.assertRegex(printed, r"stopped at [0-9]+ of 30 s")
+        self.assertTrue((out / "report.json").exists())
+        self.expect(tutti("map", "info", kept), 0, "alpha")
 
     def test_a_mission_removes_nothing_of_the_users(self):
         data = self.path / "data"
@@ -710,6 +725,30 @@ class CommandLine(unittest.TestCase):
         self.expect(tutti("run", "--graph", one, "--out", self.path / "gap"), 1, "no odometry from a9 to a10")
         one.write_text("\n".join(edges) + f"\nEDGE_SE3:QUAT 1.67e9 a3 b7 {pose} {covariance}\n")
         self.expect(tutti("run", "--graph", one), 2, "one.pyfg:40: names vertex b7")
+
+    def test_graphs_of_robots_in_files_of_their_own_are_one(self):
+        def vertex(name, x):
+            return f"VERTEX_SE3:QUAT {(ord(name[0]) << 56) + int(name[1:])} {x} 0 0 0 0 0 1\n"
+
+        def edge(a, b, x):
+            ids = [(ord(name[0]) << 56) + int(name[1:]) for name in (a, b)]
+            information = " ".join("100" if i in (0, 6, 11, 15, 18, 20) else "0" for i in range(21))
+            return f"EDGE_SE3:QUAT {ids[0]} {ids[1]} {x} 0 0 0 0 0 1 {information}\n"
+
+        between = edge("a3", "b3", 1.0)
+        for robot in "ab":
+            (self.path / f"{robot}.g2o").write_text(
+                "EDGE_SE3_PRIOR 0 0 0 0\n" + "".join(vertex(f"{robot}{k}", k) for k in range(20)) +
+                "".join(edge(f"{robot}{k - 1}", f"{robot}{k}", 1.0) for k in range(1, 20)) + between)
+        a, b, out = self.path / "a.g2o", self.path / "b.g2o", self.path / "o.g2o"
+        for robust in ([], ["--robust"]):
+            self.expect(tutti("optimise", *robust, a, b, "-o", out), 0, "1 edges are there twice", "2 x EDGE_SE3_PRIOR")
+        self.expect(tutti("optimise", a, "-o", out), 1, "names vertex b3", "give the file that has robot b")
+        both = self.path / "both.g2o"
+        both.write_text(a.read_text() + b.read_text())
+        self.expect(tutti("run", "--graph", both, "--out", self.path / "run"), 0, "report.html")
+        robots = json.loads((self.path / "run/report.json").read_text())["robots"]
+        self.assertEqual([(robot["name"], robot["keyframes"]) for robot in robots], [("a", 20), ("b", 20)])
 
     def test_missions_of_the_repository_are_valid(self):
         for mission in sorted((SOURCE / "missions").glob("*.yaml")):

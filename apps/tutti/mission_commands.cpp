@@ -4,12 +4,14 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <filesystem>
 #include <iostream>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "commands.hpp"
@@ -31,7 +33,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// One line on stderr that is rewritten on a terminal, and a line every ten per cent elsewhere.
+/// One line on stderr that is rewritten on a terminal, and elsewhere a line every ten per cent or half a minute.
 class ProgressLine {
  public:
   void operator()(const mission::Progress& progress) {
@@ -39,13 +41,14 @@ class ProgressLine {
     const std::string maps = progress.components == 0   ? "no map yet"
                              : progress.components == 1 ? "1 map"
                                                         : fmt::format("{} maps (not joined yet)", progress.components);
-    const std::string line = fmt::format("{:4.0f} % of {:.0f} s   {} submaps, {} closures, {}", 100.0 * share,
-                                         progress.duration_s, progress.submaps, progress.closures, maps);
+    const std::string line = fmt::format("{:4.0f} % of {:.0f} s   {} submaps, {} closures, {}{}", 100.0 * share,
+                                         progress.duration_s, progress.submaps, progress.closures, maps, rest(share));
     if (terminal_) {
       std::cerr << "\r\033[K" << line << std::flush;
       open_ = true;
-    } else if (share >= next_) {
+    } else if (share >= next_ || Clock::now() - said_ > kSilence) {
       std::cerr << line << '\n';
+      said_ = Clock::now();
       while (next_ <= share) next_ += 0.1;
     }
   }
@@ -55,9 +58,23 @@ class ProgressLine {
   }
 
  private:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::chrono::seconds kSilence{30};
+
+  /// ", about 3 min yet"; empty until it can be told.
+  [[nodiscard]] std::string rest(double share) const {
+    constexpr double kTold = 0.02, kMinute_s = 60.0;
+    const double spent_s = std::chrono::duration<double>(Clock::now() - begun_).count();
+    if (share < kTold || share >= 1.0 || spent_s < 1.0) return "";
+    const double rest_s = spent_s * (1.0 - share) / share;
+    return rest_s < 2.0 * kMinute_s ? fmt::format(", about {:.0f} s yet", rest_s)
+                                    : fmt::format(", about {:.0f} min yet", rest_s / kMinute_s);
+  }
+
   bool terminal_ = isatty(STDERR_FILENO) != 0;
   bool open_ = false;
   double next_ = 0.1;
+  Clock::time_point begun_ = Clock::now(), said_ = begun_;
 };
 
 /// What `run` and `demo` share.
@@ -119,6 +136,12 @@ int run_and_report(const Result<lab::MissionConfig>& config, MissionArguments& a
   }
   ProgressLine progress;
   arguments.run.progress = std::ref(progress);
+  program::stop_on_signals();
+  arguments.run.stop = [said = false]() mutable {
+    if (program::stop_asked() && !std::exchange(said, true))
+      std::cerr << "\ntutti: stopping: report and map of what is there are made; once more ends at once\n";
+    return program::stop_asked().load();
+  };
   const auto record = lab::run_mission(*config, arguments.run);
   progress.close();
   if (!record) {
@@ -231,8 +254,12 @@ void add_run_command(CLI::App& app, int& exit_code) {
       "correct the robots, and write a report (report.html, report.json, trajectories, graph, map).\n"
       "The same mission, data and seed give the same report.json.");
   const auto bags = std::make_shared<std::vector<std::string>>(), topics = std::make_shared<std::vector<std::string>>();
-  auto* mission =
-      command->add_option("mission", arguments->mission, "Mission file, or 'demo'")->type_name("MISSION.yaml");
+  const auto inputs = std::make_shared<std::vector<std::string>>();
+  auto* mission = command
+                      ->add_option("mission", *inputs,
+                                   "Mission file, or 'demo'; or bags, one a robot, or a folder of such: robots are "
+                                   "called as the files")
+                      ->type_name("MISSION.yaml|BAG...");
   auto* bag =
       command
           ->add_option(
@@ -243,10 +270,11 @@ void add_run_command(CLI::App& app, int& exit_code) {
           ->excludes(mission);
   const auto graph = std::make_shared<std::string>();
   command
-      ->add_option("--graph", *graph,
-                   "Instead of a mission file: a pose graph of several robots with times, PyFG or JRL. Robots are "
-                   "called by their\n"
-                   "letters; closures come when they arrived then, and vertices are the reference")
+      ->add_option(
+          "--graph", *graph,
+          "Instead of a mission file: a pose graph of several robots, PyFG, JRL or g2o (where it has no times, the "
+          "n-th pose of a\nrobot is at n seconds). Robots are called by their letters; closures come when "
+          "they arrived then,\nand vertices of PyFG and JRL are the reference")
       ->type_name("FLEET.pyfg")
       ->excludes(mission)
       ->excludes(bag);
@@ -255,21 +283,28 @@ void add_run_command(CLI::App& app, int& exit_code) {
                    "Of a bag where several topics would do: --topic alpha.scans=/points,\n"
                    "--topic alpha.odometry=/odom, or two frames of /tf: --topic 'alpha.odometry=odom->base_link'.\n"
                    "KIND is odometry, scans, images, depth (of the one camera; none: no depth), imu or fixes")
-      ->type_name("NAME.KIND=TOPIC")
-      ->needs(bag);
+      ->type_name("NAME.KIND=TOPIC");
   command->add_option("--data", arguments->run.data, "Folder that the mission's file names are relative to")
       ->type_name("DIR");
   add_mission_options(*command, *arguments);
-  command->callback([arguments, bags, topics, graph, &exit_code] {
+  command->callback([arguments, inputs, bags, topics, graph, &exit_code] {
     const auto run_text = [&](const fs::path& name, const char* option, const Result<std::string>& text) {
       if (arguments->out.empty()) arguments->out = fs::path("out") / name;
       exit_code = run_and_report(
           text ? lab::parse_mission(*text, option, arguments->assignments) : tl::unexpected(text.error()), *arguments);
     };
+    if (!inputs->empty() && !mission::is_mission_file(inputs->front())) {
+      const auto named = mission::name_bags(*inputs, arguments->run.data);
+      return run_text("bags", "run", named ? mission::bag_mission(*named, *topics) : tl::unexpected(named.error()));
+    }
+    if (inputs->size() > 1) throw CLI::ValidationError("mission", "expected one mission file, or bags");
+    if (!inputs->empty()) arguments->mission = inputs->front();
     if (!bags->empty()) return run_text("bags", "--bag", mission::bag_mission(*bags, *topics));
+    if (!topics->empty()) throw CLI::RequiredError("--topic requires --bag");
     if (!graph->empty())
       return run_text(fs::path(*graph).stem(), "--graph", mission::graph_mission(*graph, arguments->run.data));
-    if (arguments->mission.empty()) throw CLI::RequiredError("MISSION.yaml, --bag NAME=BAG or --graph FLEET.pyfg");
+    if (arguments->mission.empty())
+      throw CLI::RequiredError("MISSION.yaml, BAG.., --bag NAME=BAG or --graph FLEET.pyfg");
     if (arguments->out.empty()) arguments->out = fs::path("out") / arguments->mission.stem();
     exit_code = run_and_report(lab::load_mission(arguments->mission, arguments->assignments), *arguments);
   });

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <string_view>
 #include <utility>
 
@@ -24,7 +25,113 @@ Result<std::pair<std::string, std::string>> split(const std::string& argument, c
   return std::pair(argument.substr(0, at), argument.substr(at + 1));
 }
 
+namespace fs = std::filesystem;
+
+bool is_bag_file(const fs::path& path) {
+  constexpr std::array<std::string_view, 3> kEndings{".mcap", ".db3", ".bag"};
+  fs::path name = path.filename();
+  if (name.extension() == ".zstd" || name.extension() == ".gz") name = name.stem();
+  return std::ranges::find(kEndings, name.extension().string()) != kEndings.end();
+}
+
+/// "run" of run.mcap, run_0.mcap and run_12.db3.zstd: files of one recording of rosbag2 differ by the number.
+std::string recording_of(const fs::path& file) {
+  std::string name = file.filename().string();
+  name = name.substr(0, name.find('.'));
+  const std::size_t last = name.find_last_not_of("0123456789");
+  const bool is_numbered = last != std::string::npos && last + 1 < name.size() && name[last] == '_';
+  return is_numbered && last > 0 ? name.substr(0, last) : name;
+}
+
+struct Inside {
+  std::vector<fs::path> files, bags;  ///< Bags' files, and folders that hold some.
+  bool is_described = false;          ///< By a metadata.yaml.
+};
+Inside look_into(const fs::path& folder) {
+  Inside out;
+  std::error_code failure;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, failure)) {
+    if (entry.path().filename() == "metadata.yaml") out.is_described = true;
+    if (entry.is_regular_file(failure) && is_bag_file(entry.path())) out.files.push_back(entry.path());
+    if (!entry.is_directory(failure)) continue;
+    for (const fs::directory_entry& below : fs::directory_iterator(entry.path(), failure))
+      if (is_bag_file(below.path())) {
+        out.bags.push_back(entry.path());
+        break;
+      }
+  }
+  std::ranges::sort(out.files);
+  std::ranges::sort(out.bags);
+  return out;
+}
+
+std::string joined(const std::vector<fs::path>& paths) {
+  std::string out;
+  for (const fs::path& path : paths) out += (out.empty() ? "" : " ") + path.string();
+  return out;
+}
+
+/// The bags in a folder, or the folder itself where it is one.
+Result<std::vector<fs::path>> bags_in(const fs::path& folder) {
+  Inside inside = look_into(folder);
+  const bool is_one = std::ranges::all_of(
+      inside.files, [&](const fs::path& file) { return recording_of(file) == recording_of(inside.files.front()); });
+  if (inside.bags.empty() && !inside.files.empty() && (inside.is_described || is_one)) return std::vector{folder};
+  if (inside.bags.empty() && inside.files.size() > 1)
+    return fail(ErrorCode::configuration,
+                "{} holds {} bags and no metadata.yaml: are they one robot each? tutti run {}; or files of one robot? "
+                "tutti run --bag {}={}",
+                folder.string(), inside.files.size(), joined(inside.files), recording_of(folder), folder.string());
+  std::vector<fs::path> out = std::move(inside.bags);
+  out.insert(out.end(), inside.files.begin(), inside.files.end());
+  if (out.empty())
+    return fail(ErrorCode::configuration,
+                "{}: holds no bag, expected .mcap, .db3 or .bag files, or folders of rosbag2's with them",
+                folder.string());
+  return out;
+}
+
+/// As robots may be called: letters, digits, '_' and '-'.
+std::string as_name(const fs::path& path) {
+  fs::path last = path.has_filename() ? path.filename() : path.parent_path().filename();
+  std::string out = last.string().substr(0, last.string().find('.', 1));
+  std::ranges::replace_if(
+      out, [](unsigned char c) { return std::isalnum(c) == 0 && c != '_' && c != '-'; }, '_');
+  return out;
+}
+
 }  // namespace
+
+bool is_mission_file(const std::string& input) {
+  const std::string ending = fs::path(input).extension().string();
+  return input == "demo" || ending == ".yaml" || ending == ".yml";
+}
+
+Result<std::vector<std::string>> name_bags(const std::vector<std::string>& inputs, const fs::path& data) {
+  std::vector<fs::path> bags;
+  for (const std::string& input : inputs) {
+    std::error_code failure;
+    if (!fs::exists(data / input, failure))
+      return fail(ErrorCode::io, "{}: is not there, expected a mission file (.yaml), a bag or a folder of bags",
+                  (data / input).string());
+    if (!fs::is_directory(data / input, failure)) {
+      bags.emplace_back(input);
+      continue;
+    }
+    const auto inside = bags_in(data / input);
+    if (!inside) return tl::unexpected(inside.error());
+    for (const fs::path& bag : *inside) bags.push_back(data.empty() ? bag : bag.lexically_relative(data));
+  }
+  std::vector<std::string> names, out;
+  for (const fs::path& bag : bags) {
+    const std::string plain = as_name(bag);
+    std::string name = plain;
+    for (int k = 2; std::ranges::find(names, name) != names.end(); ++k) name = fmt::format("{}_{}", plain, k);
+    names.push_back(name);
+    out.push_back(name + "=" + bag.string());
+  }
+  return out;
+}
 
 Result<std::string> bag_mission(const std::vector<std::string>& bags, const std::vector<std::string>& topics) {
   ConfigNode robots{.kind = ConfigNode::Kind::list};

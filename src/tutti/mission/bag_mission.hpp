@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -12,5 +13,13 @@ namespace tutti::mission {
 /// are "alpha=recordings/alpha"; `topics` are "alpha.scans=/points", for odometry, scans, images, depth, imu or
 /// fixes. Fails with the word that is not understood.
 Result<std::string> bag_mission(const std::vector<std::string>& bags, const std::vector<std::string>& topics);
+
+/// True of "demo" and of YAML files: what is no bag.
+bool is_mission_file(const std::string& input);
+
+/// Bags of robots as bag_mission() takes them, "a=FOLDER/a.mcap", of files and folders below `data`: a file or a folder
+/// of rosbag2's is a robot, called as the file; a folder of such is a robot for each. Fails where a folder holds
+/// several files of which nothing says whether they are one bag, with both lines that may be meant.
+Result<std::vector<std::string>> name_bags(const std::vector<std::string>& inputs, const std::filesystem::path& data);
 
 }  // namespace tutti::mission

@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <set>
 #include <thread>
+#include <utility>
 
 #include "tutti/base/check.hpp"
 #include "tutti/base/freed_memory.hpp"
@@ -79,6 +81,7 @@ class MissionRun {
     carry_out(*server_port_, server_->resume(now()));
     double next_progress_s = kProgress_s;
     while (true) {
+      if (!would_end_s_ && options_.stop && options_.stop()) would_end_s_ = std::exchange(duration_s_, time_s_);
       const double sample_s = next_sample();
       if (sample_s == kNever)
         for (Robot& robot : robots_) {
@@ -297,6 +300,7 @@ class MissionRun {
   std::uint64_t revision_ = 0;
   double time_s_ = 0.0;
   double duration_s_ = 0.0;
+  std::optional<double> would_end_s_;  // once it was told to stop: then nothing is replayed any more
   double server_latency_ms_ = 0.0;
 };
 
@@ -345,6 +349,7 @@ MissionRecord MissionRun::record() {
                               .status = actor.node().status(now())});
   }
   MissionRecord record = make_record(mission);
+  if (would_end_s_) record.notes.push_back(fmt::format("stopped at {:.0f} of {:.0f} s", duration_s_, *would_end_s_));
   record_timing(record);
   record.view = std::make_shared<const ViewRecord>(
       std::move(view_).finish(shown_map(), status(), *node::SubmapFrames::of(store_)));
@@ -383,6 +388,8 @@ Result<MissionRecord> run_mission(const MissionConfig& config, const RunOptions&
 
 Result<MissionRecord> run_mission(const MissionConfig& config, MissionParts parts, const RunOptions& options) {
   if (const auto ok = check_links(config, parts.input.robots); !ok) return tl::unexpected(ok.error());
+  if (options.stop && options.stop())
+    return fail(ErrorCode::invalid, "stopped before the mission began: nothing to report");
   MissionRun mission(config, options, std::move(parts));
   mission.run();
   if (const auto ok = mission.check_scans(); !ok) return tl::unexpected(ok.error());

@@ -48,6 +48,9 @@ struct RunOptions {
   std::function<void(const Progress&)> progress;
   /// Called after every update of the map.
   std::function<void(const server::MapServer&)> updated;
+  /// Asked between steps. Once it is true the mission ends as if recordings ended there, with a note on that. Not set:
+  /// never.
+  std::function<bool()> stop;
   /// Called with the server's store when the mission is over.
   std::function<Status(const storage::TableStore&)> keep_map;
 };
@@ -59,7 +62,7 @@ double duration_of(const MissionConfig& config, const std::vector<MissionRecordi
 /// nodes are the ones that programs are made of, with a simulated radio between them, and nobody kills any. The same
 /// configuration, data and seed give the same record (except its timing), whatever the number of threads or the rate.
 /// Fails when a radio is configured for a robot that the mission does not have, when all scans of a robot fail, or when
-/// keep_map does.
+/// keep_map does; and when `stop` is true before it began.
 Result<MissionRecord> run_mission(const MissionConfig& config, MissionParts parts, const RunOptions& options);
 /// The same with the mission's recordings as they are and the configured verifier; also fails when recordings cannot be
 /// loaded.
