@@ -47,7 +47,8 @@ void note_first(TopicInfo& topic, const BagMessage& message) {
 }
 
 void note_message(TopicInfo& topic, const BagMessage& message) {
-  if (topic.count++ == 0 && topic.use != Use::nothing) note_first(topic, message);
+  const bool is_uncalibrated = topic.use == Use::calibration && !(topic.calibration && topic.calibration->k[0] > 0.0);
+  if ((topic.count++ == 0 && topic.use != Use::nothing) || is_uncalibrated) note_first(topic, message);
   topic.first = std::min(topic.first, message.log_time);
   topic.last = std::max(topic.last, message.log_time);
 }
@@ -91,13 +92,23 @@ ImageTopic image_topic(const BagInfo& info, const TopicInfo& topic) {
   return out;
 }
 
+/// Why a robot would not use the topic's images; empty where it would.
+std::string refusal_of(const ImageTopic& images) {
+  const auto camera = images.camera();
+  return camera ? "" : ", of no use: " + camera.error().message;
+}
+
 /// Without those that show depth.
 std::string list_of(const BagInfo& info, Use use) {
   std::string out;
-  for (const TopicInfo& topic : info.topics)
-    if (is_understood(topic, use) && !image_topic(info, topic).shows_depth())
-      out += fmt::format("{}{}{}", out.empty() ? "" : "; ", topic.topic,
-                         topic.frames.empty() ? "" : " (" + topic.frames + ")");
+  for (const TopicInfo& topic : info.topics) {
+    if (!is_understood(topic, use)) continue;
+    const ImageTopic images = image_topic(info, topic);
+    if (images.shows_depth()) continue;
+    out += fmt::format("{}{}{}{}", out.empty() ? "" : "; ", topic.topic,
+                       topic.frames.empty() ? "" : " (" + topic.frames + ")",
+                       use == Use::images ? refusal_of(images) : "");
+  }
   return out;
 }
 

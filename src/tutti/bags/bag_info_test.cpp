@@ -107,6 +107,11 @@ TEST(BagInfo, DepthIsNoCameraAndItsOwnIsNamed) {
       "depth        /bare/image_raw (optical, 16UC1, 640 x 480, no CameraInfo); /raw/image_raw (optical, 32FC1, 320 "
       "x 480); no depth is used: none is registered to /color/image_raw: /raw/image_raw: 320 x 480 "
       "pixels, expected 640 x 480 as of /color/image_raw");
+  add_images("/alone", "mono8", 640, false);
+  EXPECT_EQ(
+      row_of("images"),
+      "images       /alone/image_raw (optical), of no use: /alone/image_raw: no sensor_msgs/CameraInfo beside it; "
+      "/color/image_raw (optical)");
   add_images("/aligned", "16UC1", 640, true);
   EXPECT_TRUE(row_of("depth").ends_with("; /aligned/image_raw goes with /color/image_raw")) << row_of("depth");
   add_images("/second", "16UC1", 640, true);

@@ -18,6 +18,13 @@ Status ImageTopic::check_picture() const {
               shows_depth() ? ", but depth" : "");
 }
 
+Result<CameraModel> ImageTopic::camera() const {
+  if (const Status ok = check_picture(); !ok) return tl::unexpected(ok.error());
+  if (!info) return fail(ErrorCode::invalid, "{}: no sensor_msgs/CameraInfo beside it", topic);
+  const auto model = to_camera(*info);
+  return model ? model : in_context(topic, model.error());
+}
+
 std::uint32_t ImageTopic::width_px() const { return info && shows_picture() ? info->width : first->width_px; }
 std::uint32_t ImageTopic::height_px() const { return info && shows_picture() ? info->height : first->height_px; }
 

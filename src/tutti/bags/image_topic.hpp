@@ -8,6 +8,7 @@
 #include "tutti/bags/depth.hpp"
 #include "tutti/bags/ros_messages.hpp"
 #include "tutti/base/result.hpp"
+#include "tutti/geometry/camera.hpp"
 
 namespace tutti::bags {
 
@@ -23,6 +24,8 @@ struct ImageTopic {
   [[nodiscard]] bool shows_picture() const;
   /// Fails, naming topic and encoding, unless it shows pictures.
   [[nodiscard]] Status check_picture() const;
+  /// The camera of its pictures; fails, naming the topic, unless it shows some and is calibrated beside them.
+  [[nodiscard]] Result<CameraModel> camera() const;
   /// The size in the first message, which there must be, or of pictures the calibration's, if there is one; 0: of
   /// a file other than PNG.
   [[nodiscard]] std::uint32_t width_px() const;

@@ -23,6 +23,16 @@ TEST(ImageTopic, ShowsWhatItsFirstMessageDoes) {
   EXPECT_EQ(topic("/flow", "32FC2").check_picture().error().message, "/flow: encoding '32FC2' is no picture");
 }
 
+TEST(ImageTopic, ACameraIsCalibratedBesideItsPictures) {
+  EXPECT_EQ(topic("/flow", "32FC2").camera().error().message, "/flow: encoding '32FC2' is no picture");
+  ImageTopic seen = topic("/image", "mono8");
+  EXPECT_EQ(seen.camera().error().message, "/image: no sensor_msgs/CameraInfo beside it");
+  seen.info = RosCameraInfo{.height = 480, .width = 640};
+  EXPECT_NE(seen.camera().error().message.find("/image: is the camera calibrated?"), std::string::npos);
+  seen.info->k = {500, 0, 320, 0, 500, 240, 0, 0, 1};
+  EXPECT_TRUE(seen.camera().has_value());
+}
+
 TEST(ImageTopic, OfPicturesTheCalibrationsSizeCounts) {
   RosCameraInfo info;
   info.width = 1280;

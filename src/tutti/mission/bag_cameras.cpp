@@ -19,10 +19,8 @@ constexpr const char* kNoDepth = "none";
 
 Result<BagCamera> camera_of(const BagIndex& index, const ImageTrack& track, const std::string& body) {
   const bags::ImageTopic& seen = track.seen;
-  if (const Status ok = seen.check_picture(); !ok) return tl::unexpected(ok.error());
-  if (!seen.info) return fail(ErrorCode::invalid, "{}: no sensor_msgs/CameraInfo beside it", seen.topic);
-  const auto model = bags::to_camera(*seen.info);
-  if (!model) return in_context(seen.topic, model.error());
+  const auto model = seen.camera();
+  if (!model) return tl::unexpected(model.error());
   const auto T_body_camera = index.tree.find(body, seen.first->frame);
   if (!T_body_camera)
     return fail(ErrorCode::invalid, "{}: no transform from '{}' to '{}'", seen.topic, seen.first->frame, body);
