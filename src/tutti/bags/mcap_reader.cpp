@@ -144,8 +144,8 @@ Status McapReader::take_statistics(const Record& record, std::string_view conten
 Status McapReader::define_schema(const Record& record, std::string_view content) {
   Cursor cursor(content);
   const auto id = cursor.number<std::uint16_t>("id");
-  const std::string name = type_of_ros2(std::string(cursor.counted("name")));  // converted bags keep ROS 1's
-  cursor.counted("encoding");
+  std::string name(cursor.counted("name"));
+  if (cursor.counted("encoding") == "ros1msg") name = type_of_ros2(name);  // a converted bag
   cursor.counted("data");
   if (!cursor.ok()) return fail_at(record, ErrorCode::parse, "{}", *cursor.error());
   if (id == 0) return fail_at(record, ErrorCode::parse, "id 0, expected 1 or more");

@@ -89,7 +89,9 @@ TEST_F(Marks, WhatIsNoneIsRefusedWithASentence) {
   refused("photo", "data:image/jpeg;base64,~~~", "photo");
   refused("photo", data_url("<svg onload='alert(1)'/>"), "neither");
   refused("photo", data_url(kJpeg + std::string(MapMark::kMostPhotoBytes, ' ')), "1048576");
-  EXPECT_EQ(client().Post("/api/mark", ours(), std::string(9U << 20U, ' '), "application/json")->status, 413);
+  const auto too_large = client().Post("/api/mark", ours(), std::string(9U << 20U, ' '), "application/json");
+  ASSERT_TRUE(too_large) << httplib::to_string(too_large.error());
+  EXPECT_EQ(too_large->status, 413);
   EXPECT_EQ(client().Post("/api/mark", {}, a_mark().dump(), "application/json")->status, 403) << "another site's form";
   EXPECT_TRUE(only_marks(events()).empty());
 }
