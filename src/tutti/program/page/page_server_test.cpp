@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <chrono>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -199,6 +200,31 @@ TEST_F(PageServer, WithCredentialsShowsNothingToStrangersAndLetsOperatorsDecide)
   }
   EXPECT_EQ(http.Post("/api/logout", ours(anna), "{}", "application/json")->status, 200);
   EXPECT_EQ(decide("alpha/0-bravo/1", "accept", ours(anna)), "401");
+}
+
+/// The right counts when the decision is there, and not only when its head has come.
+TEST_F(PageServer, WhoLogsOutWhileADecisionIsSentDoesNotDecide) {
+  fs::create_directories(folder_);
+  auto pki = pki::Pki::make(folder_ / "pki", "cave").value();
+  ASSERT_TRUE(pki.add(bus::BusRole::operates, "anna", {}));
+  start(folder_ / "pki");
+  const std::string anna = sign_in(pki, "anna"), body = R"({"closure":"alpha/0-bravo/1","wish":"reject"})";
+  auto http = client();
+  const auto answer = http.Post(
+      "/api/decide", ours(anna), body.size(),
+      [&](std::size_t offset, std::size_t length, httplib::DataSink& sink) {
+        if (offset == 0) {
+          std::this_thread::sleep_for(std::chrono::milliseconds(300));  // the head is looked at meanwhile
+          auto other = client();
+          EXPECT_EQ(other.Post("/api/logout", ours(anna), "{}", "application/json")->status, 200);
+        }
+        return sink.write(body.data() + offset, length);
+      },
+      "application/json");
+  ASSERT_TRUE(answer) << httplib::to_string(answer.error());
+  EXPECT_EQ(answer->status, 401) << answer->body;
+  const std::scoped_lock lock(mutex_);
+  EXPECT_TRUE(decisions_.empty());
 }
 
 /// Prometheus cannot sign, and has the file of a credential.

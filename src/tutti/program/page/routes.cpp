@@ -235,6 +235,14 @@ class Routes {
     return site_.sign_in.visitor(token_of(request), program::Clock::steady_s());
   }
 
+  /// Whether a visitor may decide; otherwise the answer states why not.
+  static bool decides(const Visitor& visitor, Response& response) {
+    if (visitor.may_decide) return true;
+    say(response, visitor.may_see ? 403 : 401,
+        visitor.may_see ? "viewers do not decide" : "sign in with an operator's credential");
+    return false;
+  }
+
   /// Whether a request that changes something is refused before its body is read; the answer states why.
   bool refuses_unread(const Request& request, Response& response) {
     if (request.get_header_value("X-Tutti") != "1") {
@@ -246,11 +254,7 @@ class Routes {
       say(response, 413, fmt::format("who is not signed in sends at most {} bytes", kMostStrangersBody));
       return true;
     }
-    const Visitor visitor = who(request);
-    if (visitor.may_decide) return false;
-    say(response, visitor.may_see ? 403 : 401,
-        visitor.may_see ? "viewers do not decide" : "sign in with an operator's credential");
-    return true;
+    return !decides(who(request), response);
   }
 
   /// A handler for those who may see.
@@ -277,7 +281,8 @@ class Routes {
   template <class Call>
   httplib::Server::Handler decided(Call call) {
     return posted([this, call](const Request& request, const Json& body, Response& response) {
-      call(who(request), body, response);
+      const Visitor visitor = who(request);  // who may have logged out, or been revoked, while the body came
+      if (decides(visitor, response)) call(visitor, body, response);
     });
   }
 
