@@ -207,7 +207,6 @@ Status RosIntake::take_points(std::string_view bytes, std::string_view type, Enc
   auto cloud = bags::to_timed_cloud(*message);
   if (!cloud) return tl::unexpected(cloud.error());
   if (cloud->cloud.points.empty()) return fail(ErrorCode::invalid, "holds no points");
-  if (config_.scan_times.deskewed != "yes") lidar::drop_stray_times(*cloud);
   auto times = lidar::find_message_times(*cloud, sensor_stamp, config_.scan_times);
   if (!times) return tl::unexpected(times.error());
   double after_s = 0.0;  // of the last point
@@ -215,6 +214,7 @@ Status RosIntake::take_points(std::string_view bytes, std::string_view type, Enc
     const auto ages = lidar::point_ages(*cloud, sensor_stamp, **times);
     if (!ages) return tl::unexpected(ages.error());
     after_s = std::max(0.0, -double{std::ranges::min(*ages)});
+    (*times)->strays = 0;  // each scan has others, and the note is of all
   }
   drop_from(stamp, scans_, [](const Waiting& waiting) { return waiting.stamp; });
   if (scans_.size() >= kMostScans) scans_.pop_front();  // odometry has ended
@@ -319,20 +319,20 @@ std::optional<Eigen::Vector3d> RosIntake::antenna_of(const std::string& frame) c
 
 std::optional<PositionFix> RosIntake::next_fix() {
   while (!fixes_.empty() && last_ && last_->stamp >= fixes_.front().fix.stamp) {
-    auto [fix, frame, is_stated, is_flat] = std::move(fixes_.front());
-    static_cast<void>(is_flat);
+    bags::ReceivedFix received = std::move(fixes_.front());
     fixes_.pop_front();
+    PositionFix& fix = received.fix;
     if (is_before_all(fix.stamp)) continue;
-    const auto p_body_antenna = antenna_of(frame);
+    const auto p_body_antenna = antenna_of(received.frame);
     fix.p_body_antenna = p_body_antenna.value_or(Eigen::Vector3d::Zero());
-    is_unsure_ = is_unsure_ || !is_stated;
+    is_unsure_ = is_unsure_ || !received.is_stated;
     std::string how =
         p_body_antenna ? fmt::format("fixes are of an antenna at [{:.2f} {:.2f} {:.2f}] m of the body",
                                      fix.p_body_antenna.x(), fix.p_body_antenna.y(), fix.p_body_antenna.z())
                        : fmt::format(
                              "fixes are taken as of an antenna at the body's origin: no transform from '{}' to '{}' on "
                              "/tf_static; a mission file's robots[].antenna_m may say where it is",
-                             plain(frame), plain(frames_->body));
+                             plain(received.frame), plain(frames_->body));
     if (const std::string doubt = bags::doubt_of_place({Eigen::Quaterniond::Identity(), fix.p_body_antenna});
         !doubt.empty())
       how += "; the antenna is " + doubt;

@@ -74,11 +74,8 @@ class BagScans final : public ScanSource {
   [[nodiscard]] Result<std::optional<lidar::PointTimes>> times_of(std::size_t sample, const RobotConfig& robot) const {
     auto cloud = read(places_.at(sample));
     if (!cloud) return tl::unexpected(cloud.error());
-    const lidar::ScanTimesConfig config = robot.scan_times_config();
-    const std::size_t strays = config.deskewed == "yes" ? 0 : lidar::drop_stray_times(*cloud);
-    auto times = lidar::find_message_times(*cloud, sensor_stamp(sample), config);
+    auto times = lidar::find_message_times(*cloud, sensor_stamp(sample), robot.scan_times_config());
     if (!times) return in_context(name_of(places_[sample]), times.error());
-    if (*times) (*times)->strays = strays;
     return times;
   }
 

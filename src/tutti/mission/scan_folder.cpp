@@ -118,11 +118,8 @@ Result<std::optional<lidar::PointTimes>> ScanFolder::times_of(std::size_t sample
   if (!file) return no_scans();
   auto scan = read(*file);
   if (!scan) return tl::unexpected(scan.error());
-  const lidar::ScanTimesConfig config = robot.scan_times_config();
-  const std::size_t strays = config.deskewed == "yes" ? 0 : lidar::drop_stray_times(*scan);
-  auto times = lidar::find_point_times(*scan, times_of_files_.stamps[sample], config);
+  auto times = lidar::find_point_times(*scan, times_of_files_.stamps[sample], robot.scan_times_config());
   if (!times) return in_context(file->string(), times.error());
-  if (*times) (*times)->strays = strays;
   return times;
 }
 

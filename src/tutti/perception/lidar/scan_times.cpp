@@ -70,7 +70,7 @@ std::size_t drop_stray_times(formats::TimedCloud& scan) {
   return count - kept;
 }
 
-Result<std::optional<PointTimes>> find_point_times(const formats::TimedCloud& scan, Timestamp stamp,
+Result<std::optional<PointTimes>> find_point_times(formats::TimedCloud& scan, Timestamp stamp,
                                                    const ScanTimesConfig& config) {
   if (config.deskewed == "yes") return std::optional<PointTimes>{};
   const auto without = [&](const std::string& what) -> Result<std::optional<PointTimes>> {
@@ -78,11 +78,12 @@ Result<std::optional<PointTimes>> find_point_times(const formats::TimedCloud& sc
     return fail(ErrorCode::invalid, "{}, but scans_deskewed is 'no'", what);
   };
   if (scan.times.empty()) return without("points carry no time");
+  const std::size_t strays = drop_stray_times(scan);
   const auto range = range_of(scan);
   if (!range) return tl::unexpected(range.error());
   const auto [first, last] = *range;
   if (first == last) return without(fmt::format("all points have the same {}", scan.time_field));
-  PointTimes times{.field = scan.time_field, .unit = config.unit};
+  PointTimes times{.field = scan.time_field, .unit = config.unit, .strays = strays};
   for (const auto& [name, unit_s] : kUnits)
     if (config.unit == "auto" ? is_sweep(unit_s * (last - first)) : config.unit == name) {
       times.unit = name;
@@ -97,7 +98,7 @@ Result<std::optional<PointTimes>> find_point_times(const formats::TimedCloud& sc
   return times;
 }
 
-Result<std::optional<PointTimes>> find_message_times(const formats::TimedCloud& scan, Timestamp stamp,
+Result<std::optional<PointTimes>> find_message_times(formats::TimedCloud& scan, Timestamp stamp,
                                                      const ScanTimesConfig& config) {
   auto times = find_point_times(scan, stamp, config);
   if (!times || !*times || (*times)->zero == PointTimes::Zero::odometry_clock) return times;
