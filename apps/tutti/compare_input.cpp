@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/graph_stamps.hpp"
@@ -75,18 +76,13 @@ Result<std::vector<formats::VertexStamp>> vertex_stamps(const std::string& path,
   if (stamps_path.empty()) return numbers_as_stamps(path, file);
   auto stamps = formats::read_graph_stamps(stamps_path);
   if (!stamps) return tl::unexpected(stamps.error());
-  std::map<std::int64_t, formats::VertexStamp> by_id;
-  for (const auto& stamp : *stamps) by_id[stamp.vertex_id] = stamp;
-  std::vector<formats::VertexStamp> out;
-  for (const std::int64_t id : file.vertex_ids) {
-    const auto found = by_id.find(id);
-    if (found == by_id.end())
-      return fail(ErrorCode::invalid, "{}: has no line for vertex {} of {}", stamps_path, id, path);
-    out.push_back(found->second);
-  }
-  if (stamps_path != formats::stamps_beside(path) && by_id.size() != out.size())
-    return fail(ErrorCode::invalid, "{}: {} vertices, expected the {} of {}, or {} beside it", path, out.size(),
-                by_id.size(), stamps_path, formats::stamps_beside(path));
+  auto out = formats::rows_of(file.vertex_ids, *stamps, stamps_path, path);
+  if (!out || stamps_path == formats::stamps_beside(path)) return out;
+  std::set<std::int64_t> stated;
+  for (const auto& stamp : *stamps) stated.insert(stamp.vertex_id);
+  if (stated.size() != out->size())
+    return fail(ErrorCode::invalid, "{}: {} vertices, expected the {} of {}, or {} beside it", path, out->size(),
+                stated.size(), stamps_path, formats::stamps_beside(path));
   return out;
 }
 

@@ -69,7 +69,7 @@ bool are_times(const NamedGraph& graph) {
 void count_seconds(NamedGraph& graph) {
   graph.robots.stamps.clear();
   for (const KeyframeId& id : graph.robots.vertices) graph.robots.stamps.push_back(Timestamp{} + id.index);
-  graph.stamps_from = "none in the file: the n-th pose of a robot counts as at n seconds";
+  graph.stamps_from = formats::kCountedSeconds;
 }
 
 Result<NamedGraph> from_pyfg(const GraphSource& source) {
@@ -137,9 +137,7 @@ Robots robots_by_letters(const formats::G2oFile& file) {
 }
 
 Result<Robots> robots_by_gaps(const GraphSource& source, const formats::G2oFile& file) {
-  std::vector<bool> joined(file.vertex_ids.size(), false);
-  for (const PoseGraphEdge& edge : file.graph.edges)
-    if (const auto [a, b] = std::minmax(edge.from, edge.to); b == a + 1) joined[b] = true;
+  const std::vector<bool> joined = formats::joined_to_previous(file);
   Robots out;
   for (std::size_t v = 0; v < joined.size(); ++v) {
     if (!joined[v]) out.names.push_back(fmt::format("{}", out.names.size()));
@@ -239,10 +237,10 @@ Result<NamedGraph> name_graph(const GraphSource& source, const formats::G2oFile&
                  .left_out = file.left_out};
   std::map<std::int64_t, formats::VertexStamp> stamps;
   for (const auto& stamp : stated) stamps[stamp.vertex_id] = stamp;
-  for (const std::int64_t id : file.vertex_ids)
-    if (!stamps.empty() && !stamps.contains(id))
-      return fail(ErrorCode::invalid, "{}: has no line for vertex {} of {}", formats::stamps_beside(source.path), id,
-                  source.path);
+  if (!stated.empty())
+    if (const auto rows = formats::rows_of(file.vertex_ids, stated, formats::stamps_beside(source.path), source.path);
+        !rows)
+      return tl::unexpected(rows.error());
   const bool has_letters =
       std::ranges::all_of(file.vertex_ids, [](auto id) { return formats::letter_of(id).has_value(); });
   Robots robots;

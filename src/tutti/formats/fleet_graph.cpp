@@ -4,7 +4,6 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <filesystem>
-#include <map>
 #include <vector>
 
 #include "tutti/base/file.hpp"
@@ -23,14 +22,6 @@ Matrix6d covariance_of(const Matrix6d& information) {
   const Vector6d values = eigen.eigenvalues().cwiseMax(kLeastShare * eigen.eigenvalues().maxCoeff());
   const Matrix6d out = eigen.eigenvectors() * values.cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
   return 0.5 * (out + out.transpose());
-}
-
-/// For each vertex, whether an edge joins it to the one before.
-std::vector<bool> joined_to_previous(const G2oFile& graph) {
-  std::vector<bool> out(graph.vertex_ids.size(), false);
-  for (const PoseGraphEdge& edge : graph.graph.edges)
-    if (const auto [a, b] = std::minmax(edge.from, edge.to); b == a + 1) out[b] = true;
-  return out;
 }
 
 /// Robots by letters, or by gaps; numbers count along each robot, so that neighbours have consecutive ones.
@@ -60,15 +51,9 @@ Result<PyfgFile> with_stamps(PyfgFile file, const G2oFile& graph, const std::str
   if (!std::filesystem::exists(beside, unreadable)) return file;
   const auto read = read_graph_stamps(beside);
   if (!read) return tl::unexpected(read.error());
-  std::map<std::int64_t, Timestamp> stamps;
-  for (const VertexStamp& stamp : *read) stamps[stamp.vertex_id] = stamp.stamp;
-  for (std::size_t v = 0; v < graph.vertex_ids.size(); ++v) {
-    const auto found = stamps.find(graph.vertex_ids[v]);
-    if (found == stamps.end())
-      return fail(ErrorCode::invalid, "{}: has no line for vertex {} of {}", beside, vertex_name(graph.vertex_ids[v]),
-                  path);
-    file.vertices[v].stamp = found->second;
-  }
+  const auto rows = rows_of(graph.vertex_ids, *read, beside, path);
+  if (!rows) return tl::unexpected(rows.error());
+  for (std::size_t v = 0; v < rows->size(); ++v) file.vertices[v].stamp = (*rows)[v].stamp;
   for (PyfgEdge& edge : file.edges) edge.stamp = file.vertices[std::max(edge.from, edge.to)].stamp;
   file.stamps_from = "of " + std::filesystem::path(beside).filename().string();
   return file;
@@ -79,8 +64,7 @@ Result<PyfgFile> with_stamps(PyfgFile file, const G2oFile& graph, const std::str
 Result<PyfgFile> as_fleet(const G2oFile& graph, const std::string& name) {
   const auto names = names_of(graph, name);
   if (!names) return tl::unexpected(names.error());
-  PyfgFile out{.indefinite = graph.indefinite_edges,
-               .stamps_from = "none in the file: the n-th pose of a robot counts as at n seconds"};
+  PyfgFile out{.indefinite = graph.indefinite_edges, .stamps_from = kCountedSeconds};
   for (const PyfgName& vertex : *names)
     out.vertices.push_back({.name = vertex, .stamp = Timestamp{} + static_cast<double>(vertex.number)});
   for (const PoseGraphEdge& edge : graph.graph.edges)

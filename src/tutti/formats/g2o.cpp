@@ -24,16 +24,12 @@ using internal::G2oLines;
 using internal::G2oVertex;
 using internal::kPlanarAxes;
 
-bool is_same(const Pose3& a, const Pose3& b) {
-  return a.translation == b.translation && a.rotation.coeffs() == b.rotation.coeffs();
-}
-
 /// The vertices by id, each once; an error when one comes twice with different poses.
 Result<std::map<std::int64_t, const G2oVertex*>> index_vertices(const G2oLines& lines) {
   std::map<std::int64_t, const G2oVertex*> out;
   for (const G2oVertex& vertex : lines.vertices) {
     const auto [at, is_new] = out.try_emplace(vertex.id, &vertex);
-    if (!is_new && !is_same(at->second->pose, vertex.pose))
+    if (!is_new && !(at->second->pose == vertex.pose))
       return fail(ErrorCode::invalid,
                   "{}: vertex {} is at {} already, with another pose: expected ids of their own in each file",
                   vertex.where, vertex_name(vertex.id), at->second->where);
@@ -69,7 +65,7 @@ class Positions {
 };
 
 bool is_same(const PoseGraphEdge& a, const PoseGraphEdge& b) {
-  return is_same(a.T_from_to, b.T_from_to) && a.information == b.information;
+  return a.T_from_to == b.T_from_to && a.information == b.information;
 }
 
 /// Leads edges to their vertices; one that is there twice to the digit counts once.
@@ -158,6 +154,13 @@ void write_information(std::string& out, const Matrix6d& information, bool is_2d
 std::string counted(const std::map<std::string, std::size_t>& left_out) {
   std::string out;
   for (const auto& [tag, count] : left_out) out += fmt::format("{}{} x {}", out.empty() ? "" : ", ", count, tag);
+  return out;
+}
+
+std::vector<bool> joined_to_previous(const G2oFile& graph) {
+  std::vector<bool> out(graph.vertex_ids.size(), false);
+  for (const PoseGraphEdge& edge : graph.graph.edges)
+    if (const auto [a, b] = std::minmax(edge.from, edge.to); b == a + 1) out[b] = true;
   return out;
 }
 

@@ -46,6 +46,9 @@ struct G2oFile {
 /// "32 x EDGE_SE3_PRIOR, 2 x PARAMS_SE3OFFSET"
 std::string counted(const std::map<std::string, std::size_t>& left_out);
 
+/// For each vertex, whether an edge joins it to the one before: without one, another robot begins there.
+std::vector<bool> joined_to_previous(const G2oFile& graph);
+
 /// Reads a pose graph; `name` stands for the text in errors, which name the line. Without VERTEX lines the smallest id
 /// is placed at the origin and every other pose follows along the path that uses the fewest edges between
 /// non-consecutive ids (along odometry, where that is complete); the graph must then be connected. With VERTEX lines

@@ -7,9 +7,11 @@
 #include <filesystem>
 #include <iterator>
 #include <limits>
+#include <map>
 
 #include "tutti/base/file.hpp"
 #include "tutti/formats/internal/text.hpp"
+#include "tutti/formats/symbol_keys.hpp"
 
 namespace tutti::formats {
 namespace {
@@ -68,6 +70,20 @@ Result<std::vector<VertexStamp>> parse_graph_stamps(std::string_view text, const
 
 Result<std::vector<VertexStamp>> read_graph_stamps(const std::string& path) {
   return read_file(path).and_then([&](const std::string& text) { return parse_graph_stamps(text, path); });
+}
+
+Result<std::vector<VertexStamp>> rows_of(std::span<const std::int64_t> vertex_ids, std::span<const VertexStamp> rows,
+                                         const std::string& path, const std::string& graph) {
+  std::map<std::int64_t, VertexStamp> by_id;
+  for (const VertexStamp& row : rows) by_id[row.vertex_id] = row;
+  std::vector<VertexStamp> out;
+  for (const std::int64_t id : vertex_ids) {
+    const auto found = by_id.find(id);
+    if (found == by_id.end())
+      return fail(ErrorCode::invalid, "{}: has no line for vertex {} of {}", path, vertex_name(id), graph);
+    out.push_back(found->second);
+  }
+  return out;
 }
 
 Status write_graph_stamps(const std::string& path, std::span<const VertexStamp> stamps) {

@@ -23,6 +23,9 @@ struct VertexStamp {
   friend bool operator==(const VertexStamp&, const VertexStamp&) = default;
 };
 
+/// For people: where the times of a graph without stamps are from.
+inline constexpr const char* kCountedSeconds = "none in the file: the n-th pose of a robot counts as at n seconds";
+
 /// The path at which the stamps of a graph's file are expected: "x_stamps.csv" beside "x.g2o".
 std::string stamps_beside(const std::string& graph_path);
 
@@ -33,6 +36,10 @@ bool are_times(std::span<const std::uint32_t> robots, std::span<const Timestamp>
 /// The rows in file order. Errors name file and line.
 Result<std::vector<VertexStamp>> parse_graph_stamps(std::string_view text, const std::string& name);
 Result<std::vector<VertexStamp>> read_graph_stamps(const std::string& path);
+/// The row of each of these vertices, in their order. An error names the file, `path`, and the vertex of `graph` that
+/// has none.
+Result<std::vector<VertexStamp>> rows_of(std::span<const std::int64_t> vertex_ids, std::span<const VertexStamp> rows,
+                                         const std::string& path, const std::string& graph);
 Status write_graph_stamps(const std::string& path, std::span<const VertexStamp> stamps);
 
 }  // namespace tutti::formats

@@ -245,11 +245,12 @@ Result<Trajectory> read_trajectory(const std::string& path, std::string_view for
   return read_file(path).and_then([&](const std::string& text) -> Result<Trajectory> {
     const TrajectoryLayout layout = internal::find_layout(text, format);
     // A matrix or a quaternion with w first may pass for TUM's columns, and be another pose.
-    if (const auto looks = internal::find_layout(text, "auto");
-        format == "tum" && !layout.is_named &&
-        (looks.is_matrix || (looks.format == "euroc" && layout.stamp_exponent == -9)))
-      return fail(ErrorCode::parse, "{}: it is read as tum, and looks like {}: state format: {}", path, looks.format,
-                  looks.format);
+    if (format == "tum" && !layout.is_named) {
+      const TrajectoryLayout looks = internal::find_layout(text, "auto");
+      if (looks.is_matrix || (looks.format == "euroc" && layout.stamp_exponent == -9))
+        return fail(ErrorCode::parse, "{}: it is read as tum, and looks like {}: state format: {}", path, looks.format,
+                    looks.format);
+    }
     auto read = read_rows(text, path, layout, kitti_rate_hz, {}, report);
     if (read) return read;
     return fail(read.error().code, "{}; {} as {}: state another format (tum, euroc or kitti) if it is one",

@@ -32,12 +32,16 @@ bool is_header(std::span<const std::string_view> columns) {
   return std::ranges::none_of(columns, [](std::string_view c) { return parse_number(c).has_value(); });
 }
 
+std::string lower(std::string_view text) {
+  std::string out(text);
+  std::ranges::transform(out, out.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return out;
+}
+
 /// Without its unit, in small letters: "p_RS_R_x [m]" is "p_rs_r_x".
 std::string plain(std::string_view name) {
-  std::string out;
-  for (const char c : name.substr(0, name.find_first_of("[(")))
-    if (std::string_view(" \"'%").find(c) == std::string_view::npos)
-      out += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  std::string out = lower(name.substr(0, name.find_first_of("[(")));
+  std::erase_if(out, [](char c) { return std::string_view(" \"'%").find(c) != std::string_view::npos; });
   return out.substr(std::min(out.find_first_not_of("_./"), out.size()));
 }
 
@@ -72,8 +76,7 @@ bool is_stamp(const std::string& name) {
 }
 
 std::optional<int> unit_in(std::string_view name) {
-  std::string small;
-  for (const char c : name) small += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const std::string small = lower(name);
   constexpr std::array kUnits = {std::pair("ns", -9), std::pair("us", -6), std::pair("ms", -3), std::pair("s", 0),
                                  std::pair("sec", 0)};
   for (const auto& [unit, exponent] : kUnits)
@@ -257,12 +260,10 @@ TrajectoryLayout find_layout(std::string_view text, std::string_view format) {
     return out;
   }
   if (format == "kitti") {
-    out.format = "kitti";
-    out.columns = kitti_layout().columns;
-    out.count = kitti_layout().count;
-    out.is_matrix = true;
-    out.stamp.reset();
-    return out;
+    TrajectoryLayout kitti = kitti_layout();
+    kitti.separator = out.separator;
+    kitti.header_rows = out.header_rows;
+    return kitti;
   }
   const Stamps stamps = look_at_stamps(text, out, named ? named->stamp : 0);
   const bool has_commas = out.separator != Separator::whitespace;
