@@ -10,14 +10,12 @@
 #include "tutti/bags/ros_messages.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/geometry/pose3.hpp"
+#include "tutti/geometry/so3.hpp"
 
 namespace tutti::bags {
 
 /// The frame's name without ROS 1's leading slash: "/velodyne" is "velodyne".
 std::string frame_name(const std::string& frame);
-
-/// By how much a quaternion's norm may differ from 1: as tf2 takes them.
-inline constexpr double kUnitTolerance = 1e-2;
 
 /// A pose from a message: finite, within kMaxCoordinate_m, with a quaternion of norm 1 within kUnitTolerance, which is
 /// normalised. Errors have the value.

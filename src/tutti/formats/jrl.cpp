@@ -11,9 +11,9 @@
 #include <utility>
 #include <vector>
 
-#include "tutti/base/file.hpp"
 #include "tutti/formats/internal/semidefinite.hpp"
 #include "tutti/formats/internal/text.hpp"
+#include "tutti/geometry/so3.hpp"
 
 namespace tutti::formats {
 namespace {
@@ -110,9 +110,8 @@ Result<Pose3> jrl_pose(const JrlValue& value) {
     return value.fail(ErrorCode::invalid, "position is ({:g}, {:g}, {:g}) m, expected at most {:g} m along each axis",
                       p.x(), p.y(), p.z(), kMaxCoordinate_m);
   const Eigen::Quaterniond q((*wxyz)[0], (*wxyz)[1], (*wxyz)[2], (*wxyz)[3]);
-  if (!(std::abs(q.norm() - 1.0) <= internal::kUnitTolerance))
-    return value.fail(ErrorCode::invalid, "quaternion has norm {:.6g}, expected 1 within {}", q.norm(),
-                      internal::kUnitTolerance);
+  if (!(std::abs(q.norm() - 1.0) <= kUnitTolerance))
+    return value.fail(ErrorCode::invalid, "quaternion has norm {:.6g}, expected 1 within {}", q.norm(), kUnitTolerance);
   return Pose3{q.normalized(), p};
 }
 

@@ -10,6 +10,10 @@ namespace tutti {
 
 inline constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 
+/// By how much the norm of a quaternion in a file or message may differ from 1 before it is normalised: as tf2 takes
+/// them, and as two decimals of a rotation of 90 degrees leave it.
+inline constexpr double kUnitTolerance = 1e-2;
+
 /// The matrix [v] of the cross product: skew(v) u = v x u.
 Eigen::Matrix3d skew(const Eigen::Vector3d& v);
 

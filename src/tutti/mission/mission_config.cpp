@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kShortestUpdate_s = 0.001;
 constexpr std::size_t kLongestName = 64;
-constexpr double kUnitTolerance = 1e-3;  // of a quaternion's norm, as in trajectory files
+constexpr double kRounding = 1e-3;  // of a quaternion's norm
 
 using Problem = std::function<void(std::string)>;
 
@@ -156,9 +156,9 @@ Result<Pose3> to_pose(const LidarPoseConfig& config) {
   if (!translation_m.empty()) pose.translation = Eigen::Vector3d(translation_m.data());
   if (!xyzw.empty()) {
     const Eigen::Quaterniond q(xyzw[3], xyzw[0], xyzw[1], xyzw[2]);
-    if (!(std::abs(q.norm() - 1.0) <= kUnitTolerance))
+    if (!(std::abs(q.norm() - 1.0) <= kRounding))
       return fail(ErrorCode::configuration, "quaternion_xyzw: norm is {:.6g}, expected 1 within {}", q.norm(),
-                  kUnitTolerance);
+                  kRounding);
     pose.rotation = q.normalized();
   }
   if (!rpy_deg.empty())

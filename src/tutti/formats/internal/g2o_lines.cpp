@@ -16,7 +16,7 @@
 namespace tutti::formats::internal {
 namespace {
 
-/// What a line of a kind that is read holds.
+/// The columns of a line of a kind that is read.
 struct Tag {
   std::string_view name;
   bool is_vertex = false;

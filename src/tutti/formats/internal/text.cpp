@@ -6,6 +6,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "tutti/geometry/so3.hpp"
+
 namespace tutti::formats::internal {
 namespace {
 

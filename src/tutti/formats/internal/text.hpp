@@ -17,8 +17,6 @@ namespace tutti::formats::internal {
 /// Stamps are kept within +-2^61 ns (years 1896 to 2043), so that the difference of any two fits an int64 twice.
 inline constexpr std::int64_t kMaxStampNs = std::int64_t{1} << 61;
 constexpr bool is_in_range(Timestamp stamp) { return -kMaxStampNs <= stamp.ns && stamp.ns <= kMaxStampNs; }
-/// Quaternions off unit norm by more than this are refused: two decimals of a rotation of 90 degrees stay within it.
-inline constexpr double kUnitTolerance = 1e-2;
 
 /// All of `text` must be the number. NaN and infinity are numbers here; callers decide.
 std::optional<double> parse_number(std::string_view text);
