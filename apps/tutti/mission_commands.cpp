@@ -46,9 +46,9 @@ class ProgressLine {
     if (terminal_) {
       std::cerr << "\r\033[K" << line << std::flush;
       open_ = true;
-    } else if (share >= next_ || Clock::now() - said_ > kSilence) {
+    } else if (share >= next_ || Clock::now() - printed_ > kSilence) {
       std::cerr << line << '\n';
-      said_ = Clock::now();
+      printed_ = Clock::now();
       while (next_ <= share) next_ += 0.1;
     }
   }
@@ -61,11 +61,11 @@ class ProgressLine {
   using Clock = std::chrono::steady_clock;
   static constexpr std::chrono::seconds kSilence{30};
 
-  /// ", about 3 min yet"; empty until it can be told.
+  /// ", about 3 min yet"; empty until it can be estimated.
   [[nodiscard]] std::string rest(double share) const {
-    constexpr double kTold = 0.02, kMinute_s = 60.0;
+    constexpr double kLeastShare = 0.02, kMinute_s = 60.0;
     const double spent_s = std::chrono::duration<double>(Clock::now() - begun_).count();
-    if (share < kTold || share >= 1.0 || spent_s < 1.0) return "";
+    if (share < kLeastShare || share >= 1.0 || spent_s < 1.0) return "";
     const double rest_s = spent_s * (1.0 - share) / share;
     return rest_s < 2.0 * kMinute_s ? fmt::format(", about {:.0f} s yet", rest_s)
                                     : fmt::format(", about {:.0f} min yet", rest_s / kMinute_s);
@@ -74,7 +74,7 @@ class ProgressLine {
   bool terminal_ = isatty(STDERR_FILENO) != 0;
   bool open_ = false;
   double next_ = 0.1;
-  Clock::time_point begun_ = Clock::now(), said_ = begun_;
+  Clock::time_point begun_ = Clock::now(), printed_ = begun_;
 };
 
 /// What `run` and `demo` share.
@@ -137,8 +137,8 @@ int run_and_report(const Result<lab::MissionConfig>& config, MissionArguments& a
   ProgressLine progress;
   arguments.run.progress = std::ref(progress);
   program::stop_on_signals();
-  arguments.run.stop = [said = false]() mutable {
-    if (program::stop_asked() && !std::exchange(said, true))
+  arguments.run.stop = [is_announced = false]() mutable {
+    if (program::stop_asked() && !std::exchange(is_announced, true))
       std::cerr << "\ntutti: stopping: report and map of what is there are made; once more ends at once\n";
     return program::stop_asked().load();
   };

@@ -62,12 +62,12 @@ std::vector<std::size_t> log_order(std::span<const Arrival> arrivals) {
   std::iota(stored.begin(), stored.end(), std::size_t{0});
   std::vector<std::size_t> logged = stored;
   std::ranges::stable_sort(logged, {}, [&](std::size_t i) { return arrivals[i].logged; });
-  std::size_t stretches = 1, pieces = 1;  // of increasing times as stored; of stored order as sorted
+  std::size_t stretches = 1, runs = 1;  // of increasing times as stored; of stored order as sorted
   for (std::size_t i = 1; i < arrivals.size(); ++i) {
     stretches += arrivals[i].logged < arrivals[i - 1].logged ? 1 : 0;
-    pieces += logged[i] != logged[i - 1] + 1 ? 1 : 0;
+    runs += logged[i] != logged[i - 1] + 1 ? 1 : 0;
   }
-  const bool alternate = arrivals.size() < kLong * pieces && arrivals.size() >= kLong * stretches;
+  const bool alternate = arrivals.size() < kLong * runs && arrivals.size() >= kLong * stretches;
   return alternate ? stored : logged;
 }
 

@@ -300,7 +300,7 @@ class MissionRun {
   std::uint64_t revision_ = 0;
   double time_s_ = 0.0;
   double duration_s_ = 0.0;
-  std::optional<double> would_end_s_;  // once it was told to stop: then nothing is replayed any more
+  std::optional<double> would_end_s_;  // once it is to stop: then nothing is replayed any more
   double server_latency_ms_ = 0.0;
 };
 

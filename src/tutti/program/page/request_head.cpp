@@ -41,7 +41,7 @@ bool is_text(std::string_view line) {
                              [](char c) { return c == '\t' || (static_cast<unsigned char>(c) >= 32 && c != 127); });
 }
 
-/// What the headers ask for, while they are read.
+/// Collects the headers while they are read.
 struct Reader {
   RequestHead head;
   std::optional<std::size_t> length;

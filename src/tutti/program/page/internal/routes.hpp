@@ -38,7 +38,7 @@ class DecisionInbox {
     const std::scoped_lock lock(mutex_);
     return std::exchange(asked_, {});
   }
-  /// Nobody takes any more: who waits for an answer is told that there is none.
+  /// Nobody takes any more: who waits for an answer learns that there is none.
   void close() {
     const std::scoped_lock lock(mutex_);
     is_closed_ = true;
