@@ -16,8 +16,9 @@
 namespace tutti::page {
 namespace {
 
-constexpr int kMostRequests = 100;  // on one connection
-constexpr int kBacklog = 128;       // connections that wait with the kernel
+constexpr int kMostRequests = 100;       // on one connection
+constexpr int kBacklog = 128;            // connections that wait with the kernel
+constexpr int kReceiveBuffer = 1 << 17;  // bytes a connection: the kernel, left alone, gives up to 32 MB
 constexpr auto kLookForRoom = std::chrono::milliseconds(50);
 
 /// As many threads as connections are served at a time. Who comes then waits in the kernel's queue, and takes no file
@@ -93,7 +94,10 @@ int GuardedServer::bind(const std::string& host, int port) {
     port = bind_to_any_port(host);
   else if (!bind_to_port(host, port))
     port = -1;
-  if (port > 0) static_cast<void>(::listen(svr_sock_, kBacklog));  // cpp-httplib asks for five
+  if (port > 0) {
+    static_cast<void>(setsockopt(svr_sock_, SOL_SOCKET, SO_RCVBUF, &kReceiveBuffer, sizeof(kReceiveBuffer)));
+    static_cast<void>(::listen(svr_sock_, kBacklog));  // cpp-httplib asks for five
+  }
   return port;
 }
 

@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kBodyRate = 16384.0, kWriteRate = 4096.0;  // bytes a second
 constexpr double kLinger_s = 3.0;
-constexpr std::size_t kMostLingered = 16 * kMostBody;
+constexpr std::size_t kMostLingered = 2 * kMostBody;  // of a body that is too long
 constexpr std::string_view kEmptyLine = "\r\n\r\n";
 
 double now_s() { return program::Clock::steady_s(); }
