@@ -40,8 +40,7 @@ Optimised optimise(const Graph& graph, const std::string& loss, const std::strin
   const auto roles = roles_from_numbering(poses);
   SolverConfig config{.max_iterations = max_iterations, .initialisation = initialisation};
   if (loss != "gnc") {
-    config.loss = loss;
-    config.loss_scale = 3.0;  // standard deviations, as tutti optimise
+    config.loss = {estimation::loss_kind(loss), 3.0};  // standard deviations, as tutti optimise
   }
   PoseGraphSolution solution = loss == "gnc"
                                    ? solve_pose_graph_gnc(poses, {.solver = config}, roles, graph.file.fixed).solution

@@ -52,8 +52,7 @@ Outcome optimise(const formats::G2oFile& file, const OptimiseOptions& options) {
   if (options.loss == "gnc") {
     out.solution = solve_pose_graph_gnc(graph, {.solver = config}, roles, file.fixed).solution;
   } else {
-    config.loss = options.loss;
-    config.loss_scale = 3.0;  // standard deviations
+    config.loss = {loss_kind(options.loss), 3.0};  // standard deviations
     out.solution = solve_pose_graph(graph, config, roles, file.fixed);
   }
   graph.poses = out.solution.poses;

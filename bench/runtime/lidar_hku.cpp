@@ -111,8 +111,7 @@ double joint_rmse(const std::vector<Sample>& samples, const std::vector<Judgemen
     for (const auto& closure : judgement.verdict.closures) add(closure.from, closure.to, closure.measurement);
   roles.resize(graph.edges.size(), estimation::EdgeRole::robust);
   estimation::SolverConfig config;
-  config.loss = "cauchy";
-  config.loss_scale = 3.0;
+  config.loss = {estimation::LossKind::cauchy, 3.0};
   std::vector<Eigen::Vector3d> estimate;
   for (const auto& pose : estimation::solve_pose_graph(graph, config, roles).poses)
     estimate.push_back(pose.translation);

@@ -51,7 +51,7 @@ bool is_binary(double weight) { return weight == 0.0 || weight == 1.0; }
 
 PoseGraphSolution least_squares(const PoseGraph& graph, const GncConfig& config, std::span<const std::size_t> fixed) {
   SolverConfig plain = config.solver;
-  plain.loss = "none";
+  plain.loss = {};
   return solve_pose_graph(graph, plain, {}, fixed);
 }
 

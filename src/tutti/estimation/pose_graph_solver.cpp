@@ -54,7 +54,7 @@ PoseGraphSolution solve_pose_graph(const PoseGraph& graph, const SolverConfig& c
     solution.summary.termination = Termination::singular;
     return solution;
   }
-  const internal::EdgeCosts costs{.loss = {loss_kind(config.loss), config.loss_scale}, .roles = roles, .scale = {}};
+  const internal::EdgeCosts costs{.loss = config.loss, .roles = roles, .scale = {}};
   internal::GraphEquations equations(graph, structure);
   solution.summary = internal::minimise(equations, solution.poses, costs, config);
   if (costs.loss.kind != LossKind::none) {

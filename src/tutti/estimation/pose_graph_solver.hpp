@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tutti/base/config.hpp"
+#include "tutti/estimation/robust_loss.hpp"
 #include "tutti/estimation/termination.hpp"
 #include "tutti/model/pose_graph.hpp"
 
@@ -16,14 +17,12 @@ struct SolverConfig {
   int max_iterations = 50;                ///< Limit on the Gauss-Newton steps; 0 only initialises.
   double relative_cost_tolerance = 1e-9;  ///< Converged when a step can lower the cost by less than this share of it.
   std::string initialisation = "chordal";
-  std::string loss = "none";
-  double loss_scale = 1.0;  ///< Scale of the loss, in standard deviations.
+  RobustLoss loss;  ///< On the robust edges, in standard deviations.
 
   template <class V>
   void describe(V& v) {
     v.field("initialisation", initialisation, one_of({"chordal", "given"}),
             "Where to start: from the measurements alone, or from the given poses.");
-    v.field("loss", loss, one_of({"none", "huber", "cauchy", "geman_mcclure"}), "Robust loss on the robust edges.");
   }
 };
 

@@ -200,15 +200,15 @@ TEST(PoseGraphSolver, StepHalvingNeverRaisesTheCost) {
 }
 
 TEST(PoseGraphSolver, RobustLossSavesTheMapFromAFewWrongEdges) {
-  for (const char* loss : {"huber", "cauchy", "geman_mcclure"}) {
+  for (const char* loss : {"huber", "cauchy"}) {
     Rng rng(9);
     auto random = random_graph(rng, 80, 60, 1.0);
     for (std::size_t k = 0; k < 4; ++k)
       random.graph.edges.push_back({10 * k, 79 - 7 * k, random_pose(rng), random.graph.edges[0].information});
     const auto roles = roles_from_numbering(random.graph);
-    SolverConfig config{.initialisation = "given", .loss = loss, .loss_scale = 3.0};
+    SolverConfig config{.initialisation = "given", .loss = {loss_kind(loss), 3.0}};
     const auto robust = solve_pose_graph(random.graph, config, roles);
-    config.loss = "none";
+    config.loss = {};
     const auto plain = solve_pose_graph(random.graph, config, roles);
     const double error = largest_position_difference(robust.poses, random.truth);
     EXPECT_LT(error, 0.5 * largest_position_difference(plain.poses, random.truth)) << loss;

@@ -16,8 +16,6 @@ double RobustLoss::rho(double s) const {
       return s <= c2 ? s : 2.0 * scale * std::sqrt(s) - c2;
     case LossKind::cauchy:
       return c2 * std::log1p(s / c2);
-    case LossKind::geman_mcclure:
-      return c2 * s / (c2 + s);
   }
   return s;
 }
@@ -31,10 +29,6 @@ double RobustLoss::weight(double s) const {
       return s <= c2 ? 1.0 : scale / std::sqrt(s);
     case LossKind::cauchy:
       return c2 / (c2 + s);
-    case LossKind::geman_mcclure: {
-      const double w = c2 / (c2 + s);
-      return w * w;
-    }
   }
   return 1.0;
 }
@@ -44,16 +38,14 @@ double RobustLoss::curvature(double s) const {
   const double c2 = scale * scale;
   double share = 1.0;
   if (kind == LossKind::cauchy) share = (c2 - s) / (c2 + s);
-  if (kind == LossKind::geman_mcclure) share = (c2 - 3.0 * s) / (c2 + s);
   return share > kConvex ? share : 1.0;  // Huber's is 1 or 0
 }
 
 LossKind loss_kind(const std::string& name) {
   if (name == "none") return LossKind::none;
   if (name == "huber") return LossKind::huber;
-  if (name == "cauchy") return LossKind::cauchy;
-  TUTTI_CHECK(name == "geman_mcclure", "unknown loss '{}'", name);
-  return LossKind::geman_mcclure;
+  TUTTI_CHECK(name == "cauchy", "unknown loss '{}'", name);
+  return LossKind::cauchy;
 }
 
 }  // namespace tutti::estimation

@@ -6,12 +6,11 @@
 namespace tutti::estimation {
 
 /// What a factor with whitened squared error s = r^T Omega r costs, rho(s), with c = scale (same unit as sqrt(s)):
-///   none            rho = s
-///   huber           rho = s for s <= c^2, else 2 c sqrt(s) - c^2
-///   cauchy          rho = c^2 log(1 + s / c^2)
-///   geman_mcclure   rho = c^2 s / (c^2 + s)
+///   none     rho = s
+///   huber    rho = s for s <= c^2, else 2 c sqrt(s) - c^2
+///   cauchy   rho = c^2 log(1 + s / c^2)
 /// All have rho(0) = 0 and rho'(0) = 1, so inliers weigh what they weigh without a loss.
-enum class LossKind { none, huber, cauchy, geman_mcclure };
+enum class LossKind { none, huber, cauchy };
 
 struct RobustLoss {
   LossKind kind = LossKind::none;
@@ -26,7 +25,7 @@ struct RobustLoss {
   [[nodiscard]] double curvature(double s) const;
 };
 
-/// The kind of a name in a configuration ("none", "huber", "cauchy", "geman_mcclure"); another name is a bug of the
+/// The kind of a name on the command line or in Python ("none", "huber", "cauchy"); another name is a bug of the
 /// caller.
 LossKind loss_kind(const std::string& name);
 

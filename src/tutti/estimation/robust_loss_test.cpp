@@ -8,7 +8,7 @@
 namespace tutti::estimation {
 namespace robust_loss_test {
 
-constexpr LossKind kKinds[] = {LossKind::none, LossKind::huber, LossKind::cauchy, LossKind::geman_mcclure};
+constexpr LossKind kKinds[] = {LossKind::none, LossKind::huber, LossKind::cauchy};
 
 TEST(RobustLoss, WeightIsTheDerivative) {
   for (const LossKind kind : kKinds)
@@ -22,7 +22,7 @@ TEST(RobustLoss, WeightIsTheDerivative) {
 }
 
 TEST(RobustLoss, CurvatureIsTheSecondDerivativeWhereConvex) {
-  for (const LossKind kind : {LossKind::none, LossKind::cauchy, LossKind::geman_mcclure})
+  for (const LossKind kind : {LossKind::none, LossKind::cauchy})
     for (const double scale : {0.5, 1.0, 3.0})
       for (const double share : {1e-3, 0.1, 0.25, 0.6, 2.0, 10.0}) {
         const RobustLoss loss{kind, scale};
@@ -45,11 +45,10 @@ TEST(RobustLoss, LeavesInliersAloneAndGrowsSlower) {
       EXPECT_GT(loss.weight(s), 0.0);
     }
   }
-  EXPECT_LT((RobustLoss{LossKind::geman_mcclure, 2.0}.rho(1e9)), 4.0);  // bounded by c^2
 }
 
 TEST(RobustLoss, KnowsItsNames) {
-  EXPECT_EQ(loss_kind("geman_mcclure"), LossKind::geman_mcclure);
+  EXPECT_EQ(loss_kind("huber"), LossKind::huber);
   EXPECT_THROW(loss_kind("tukey"), std::logic_error);
 }
 

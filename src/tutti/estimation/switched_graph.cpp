@@ -98,7 +98,7 @@ SwitchedGraph::SwitchedGraph(const PoseGraph& graph, std::span<const EdgeRole> r
     : state_(std::make_unique<State>(State{.graph = graph, .config = config, .roles = {roles.begin(), roles.end()}})) {
   TUTTI_CHECK(roles.size() == graph.edges.size(), "{} roles, {} edges", roles.size(), graph.edges.size());
   State& s = *state_;
-  s.config.loss = "none";
+  s.config.loss = {};
   s.reduced = reduce_chains(graph, roles);
   s.structure = internal::analyse_blocks(s.reduced.graph);
   s.equations = std::make_unique<internal::GraphEquations>(s.reduced.graph, s.structure);

@@ -6,15 +6,15 @@
 #include "tutti/base/config.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/estimation/bundle/bundle_problem.hpp"
+#include "tutti/estimation/robust_loss.hpp"
 
 namespace tutti::bundle {
 
 struct BundleConfig {
   int max_iterations = 30;                ///< Limit on the Levenberg-Marquardt steps.
   double relative_cost_tolerance = 1e-4;  ///< Converged when a step lowers the cost by less than this share of it.
-  std::string loss = "cauchy";
-  double loss_scale = 2.0;           ///< Scale of `loss`, in standard deviations of a view.
-  double odometry_loss_scale = 5.0;  ///< Scale of the Cauchy loss on odometry, in standard deviations.
+  estimation::RobustLoss view_loss{estimation::LossKind::cauchy, 2.0};  ///< In standard deviations of a view.
+  estimation::RobustLoss odometry_loss{estimation::LossKind::cauchy, 5.0};
   double odometry_scale_sigma = 0.02;
   double gyro_random_walk = 1e-4;           ///< Random walk of the gyro's bias, rad/s^2/sqrt(Hz).
   double accelerometer_random_walk = 4e-3;  ///< Random walk of the accelerometer's bias, m/s^3/sqrt(Hz).
@@ -25,7 +25,6 @@ struct BundleConfig {
 
   template <class V>
   void describe(V& v) {
-    v.field("loss", loss, one_of({"none", "huber", "cauchy", "geman_mcclure"}), "Robust loss on the views.");
     v.field("odometry_scale_sigma", odometry_scale_sigma, greater_than(0.0),
             "By how much odometry may be wrong in scale all along its trajectory, beside its covariance.");
   }

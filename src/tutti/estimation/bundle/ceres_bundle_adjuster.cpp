@@ -180,8 +180,8 @@ class CeresProblem {
  public:
   CeresProblem(const BundleProblem& problem, const internal::ProblemStructure& structure, const BundleConfig& config,
                const BundleSolution& start)
-      : view_loss_({estimation::loss_kind(config.loss), config.loss_scale}),
-        odometry_loss_({estimation::LossKind::cauchy, config.odometry_loss_scale}),
+      : view_loss_(config.view_loss),
+        odometry_loss_(config.odometry_loss),
         poses_(start.T_world_body.size()),
         gravities_(start.gravity.size()),
         values_(16 * poses_ + 3 * (gravities_ + start.landmarks.size())),
@@ -196,7 +196,7 @@ class CeresProblem {
       Eigen::Map<Eigen::Vector3d>{landmark(l)} = start.landmarks[l];
     for (std::size_t k = 0; k < poses_; ++k) ceres_.AddParameterBlock(pose(k), 7, &manifold_);
     for (const std::size_t k : structure.anchors) ceres_.SetParameterBlockConstant(pose(k));
-    add_views(problem, config);
+    add_views(problem);
     for (const auto& odometry : problem.odometry)
       ceres_.AddResidualBlock(new OdometryCost(odometry.measurement), &odometry_loss_, pose(odometry.from),
                               pose(odometry.to));
@@ -243,11 +243,10 @@ class CeresProblem {
     return options;
   }
 
-  void add_views(const BundleProblem& problem, const BundleConfig& config) {
-    ceres::LossFunction* loss = config.loss == "none" ? nullptr : &view_loss_;
+  void add_views(const BundleProblem& problem) {
     for (const auto& view : problem.observations)
-      ceres_.AddResidualBlock(new ProjectionCost(problem.cameras[view.camera].camera, view), loss, pose(view.keyframe),
-                              landmark(view.landmark));
+      ceres_.AddResidualBlock(new ProjectionCost(problem.cameras[view.camera].camera, view), &view_loss_,
+                              pose(view.keyframe), landmark(view.landmark));
   }
 
   void add_imu(const BundleProblem& problem, const internal::ProblemStructure& structure, const BundleConfig& config) {

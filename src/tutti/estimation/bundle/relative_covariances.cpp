@@ -101,22 +101,21 @@ void add_landmark(std::span<const BundleObservation* const> views, const BundleP
 
 void add_views(const BundleProblem& problem, const BundleSolution& solution, const BundleConfig& config,
                Blocks& blocks) {
-  const estimation::RobustLoss loss{estimation::loss_kind(config.loss), config.loss_scale};
   const double variance = std::max(1.0, view_variance(problem, solution));
   std::vector<std::vector<const BundleObservation*>> views(problem.landmarks.size());
   for (const auto& view : problem.observations) views[view.landmark].push_back(&view);
-  for (const auto& of_landmark : views) add_landmark(of_landmark, problem, solution, loss, variance, blocks);
+  for (const auto& of_landmark : views)
+    add_landmark(of_landmark, problem, solution, config.view_loss, variance, blocks);
 }
 
 /// The lengths of a robot's steps err by one share beside what each errs by itself.
 void add_odometry(const BundleProblem& problem, const BundleSolution& solution, const BundleConfig& config,
                   const Nodes& nodes, Blocks& blocks) {
-  const estimation::RobustLoss loss{estimation::LossKind::cauchy, config.odometry_loss_scale};
   for (const auto& odometry : problem.odometry) {
     const auto at = estimation::linearise_between(solution.T_world_body[odometry.from],
                                                   solution.T_world_body[odometry.to], odometry.measurement.T_a_b);
     const Matrix6d root = odometry.measurement.covariance.llt().matrixL().solve(Matrix6d::Identity());
-    const double weight = std::sqrt(loss.weight((root * at.residual).squaredNorm()));
+    const double weight = std::sqrt(config.odometry_loss.weight((root * at.residual).squaredNorm()));
     const Pose3& T_from_to = odometry.measurement.T_a_b;
     Matrix6d J_scale = Matrix6d::Zero();  // the residual's translation is in the frame of the step's end
     J_scale.col(0).head<3>() = -(T_from_to.rotation.conjugate() * T_from_to.translation);

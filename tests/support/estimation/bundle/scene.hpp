@@ -236,8 +236,8 @@ inline RefinementConfig exact_config() {
   config.merge.odometry_sigma_m = 0.0;
   config.merge.odometry_sigma_deg = 0.0;
   config.merge.max_reprojection_px = 40.0;
-  config.bundle.loss = "none";
-  config.bundle.odometry_loss_scale = 1e3;
+  config.bundle.view_loss = {};
+  config.bundle.odometry_loss.scale = 1e3;
   config.bundle.odometry_scale_sigma = 1e-6;
   config.bundle.relative_cost_tolerance = 1e-9;
   return config;
