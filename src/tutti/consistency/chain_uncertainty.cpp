@@ -30,7 +30,8 @@ constexpr Index kProbes = 48;
 constexpr double kKnownFarBetter = 0.25;
 constexpr Index kMostDirections = 4;
 constexpr double kFinest = 127.0;
-/// A closure on which the map hinges is doubted by half when odometry finds it as unlikely as this of a right one.
+/// A group of closures on which the map hinges is doubted by half when odometry finds it as unlikely as the worst of
+/// all such groups, if all are right, is with this probability.
 constexpr double kStillRight = 0.9;
 
 /// Errors of one kind in the axes of `world`: n x (3 columns).
@@ -180,14 +181,22 @@ std::vector<KnownDirection> directions(const MatrixXd& P, const MatrixXd& O) {
   return out;
 }
 
-/// With the closure right, the squared length of its shift in odometry's covariance is about chi-square with 6 degrees
-/// of freedom; D^2 beyond its quantile speaks for a wrong one with odds exp((D^2 - quantile) / 2). That share of the
-/// shift is doubted, of the closure of which it is largest.
-std::optional<KnownDirection> doubted(const MatrixXd& O, const MatrixXd& shifts) {
+/// With the group right, the squared length of its shift in odometry's covariance is about chi-square, with six degrees
+/// of freedom for each place that it tells of, and no more than all closures tell together, which is what P leaves of
+/// O. D^2 beyond the quantile of the worst of so many groups speaks for a wrong one with odds exp((D^2 - quantile) /
+/// 2). That share of the shift is doubted, of the group of which it is largest.
+std::optional<KnownDirection> doubted(const MatrixXd& P, const MatrixXd& O, const MatrixXd& shifts,
+                                      std::span<const std::size_t> places) {
+  if (shifts.cols() == 0) return std::nullopt;
   Eigen::VectorXd largest = Eigen::VectorXd::Zero(O.rows());
   const Eigen::LDLT<MatrixXd> odometry(O);
-  for (const auto& shift : shifts.colwise()) {
-    const double beyond = shift.dot(odometry.solve(shift)) - chi_square_quantile(kStillRight, 6.0);
+  const double probability = std::pow(kStillRight, 1.0 / static_cast<double>(shifts.cols()));
+  const double told = static_cast<double>(O.rows()) - odometry.solve(P).trace();
+  for (Index c = 0; c < shifts.cols(); ++c) {
+    const Eigen::VectorXd shift = shifts.col(c);
+    const double own = 6.0 * static_cast<double>(places[static_cast<std::size_t>(c)]);
+    const double beyond =
+        shift.dot(odometry.solve(shift)) - chi_square_quantile(probability, std::max(6.0, std::min(own, told)));
     const Eigen::VectorXd share = shift / (1.0 + std::exp(-0.5 * beyond));
     if (share.squaredNorm() > largest.squaredNorm()) largest = share;
   }
@@ -205,6 +214,8 @@ ChainUncertainty chain_uncertainty(const ProxyGraph& graph, const ChainId& chain
               known.samples.rows(), known.samples.cols(), n);
   TUTTI_CHECK(known.shifts.cols() == 0 || known.shifts.rows() == 6 * n, "{} x {} shifts of {} nodes",
               known.shifts.rows(), known.shifts.cols(), n);
+  TUTTI_CHECK(known.shift_places.size() == static_cast<std::size_t>(known.shifts.cols()), "{} groups, {} shifts",
+              known.shift_places.size(), known.shifts.cols());
   const internal::RigidMotion rigid(nodes);
   Errors samples = in_world(nodes, known.samples);
   free_of_gauge(rigid, samples);
@@ -227,8 +238,9 @@ ChainUncertainty chain_uncertainty(const ProxyGraph& graph, const ChainId& chain
       spread_shifts.middleRows<6>(6 * k) = known.shifts.middleRows<6>(6 * static_cast<Index>(node));
   }
   const MatrixXd seen = seen_from_first(poses), odometry = by_odometry(poses, known.spread_odometry);
-  out.directions = directions(seen * known.spread_covariance * seen.transpose(), odometry);
-  out.doubted = doubted(odometry, seen * spread_shifts);
+  const MatrixXd covariance = seen * known.spread_covariance * seen.transpose();
+  out.directions = directions(covariance, odometry);
+  out.doubted = doubted(covariance, odometry, seen * spread_shifts, known.shift_places);
   return out;
 }
 

@@ -14,9 +14,10 @@ namespace tutti::consistency {
 struct ChainKnowledge {
   /// (6 n) x samples: joint draws of the nodes' errors, with zero mean.
   Eigen::MatrixXd samples;
-  /// (6 n) x closures: for each closure on which the map hinges, how the nodes would move without it. May have no
-  /// columns.
+  /// (6 n) x groups: for each group of closures on which the map hinges, how the nodes would move without it. May have
+  /// no columns.
   Eigen::MatrixXd shifts;
+  std::vector<std::size_t> shift_places;  ///< Per column of shifts, of how many places along the chain the group tells.
   /// (6 m) x (6 m): joint covariance of the spread nodes, m = ChainUncertainty::spread(n).size(). Empty: directions are
   /// left out.
   Eigen::MatrixXd spread_covariance;
@@ -33,7 +34,7 @@ inline constexpr Eigen::Index kLeastSamples = 16;
 /// coefficient is that along its worst direction, from the samples' covariance shrunk towards its mean (oracle
 /// approximating shrinkage, OAS). Directions: at most four vectors v, those with the smallest v^T P v / v^T O v below a
 /// quarter. P is the map's covariance of the spread nodes as seen from the first, O is odometry's. Doubted: the shift
-/// by one closure, multiplied by a share that grows the less likely odometry finds it.
+/// by one group of closures, multiplied by a share that grows the less likely odometry finds it.
 ///
 /// `products`, unless null, is increased by the number of filtered columns times the products with the graph's
 /// Laplacian that each of them took.

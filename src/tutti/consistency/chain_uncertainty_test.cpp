@@ -222,6 +222,7 @@ TEST(ChainUncertainty, WhatOneClosureMeasuresAgainstOdometryIsDoubted) {
   ChainKnowledge known = usual_map().knowledge(scene.graph, kBravo);
   const auto turned_by = [&](double angle_rad) {  // evenly, from node 40 to 80
     known.shifts = MatrixXd::Zero(6 * kNodes, 2);
+    known.shift_places = {1, 1};
     std::vector<Eigen::Vector3d> moved;
     for (std::size_t n = 0; n < kNodes; ++n) {
       Vector6d shift = Vector6d::Zero();

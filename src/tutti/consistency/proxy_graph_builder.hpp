@@ -43,8 +43,8 @@ struct ProxyGraphConfig {
         "Which nodes stay: 'budget' meets node_budget and is reproducible; 'paper' keeps u_max(n) >= 0 (eq. 3) once "
         "the graph exceeds node_budget.");
     v.field("shape_deletions", shape_deletions, between(0.0, 10'000.0),
-            "And that any one closure may be wrong: how many of those on which the map hinges, the most influential "
-            "ones, are taken away one by one to see what would change; 0 = none.");
+            "And that the closures of any one pair of places may be wrong: how many of such groups on which the map "
+            "hinges, the most influential ones, are taken away one by one to see what would change; 0 = none.");
   }
 };
 

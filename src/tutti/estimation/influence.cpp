@@ -24,38 +24,13 @@ namespace {
 using internal::BlockStructure;
 using internal::EdgeSlot;
 using internal::SelectedInverse;
-using Matrix6x12d = Eigen::Matrix<double, 6, 12>;
-using Vector12d = Eigen::Matrix<double, 12, 1>;
 
 /// Less than this share of what is known of a direction comes from elsewhere: nothing does.
 constexpr double kAlone = 1e-9;
 /// Less than this share comes from elsewhere: where that would have its ends is not known to first order.
 constexpr double kHardlyKnown = 1e-4;
-
-/// The force on its ends that has the effect of taking the edge away.
-struct Pull {
-  std::size_t edge = 0;
-  double distance = 0.0;
-  Vector12d force;  ///< shift = H^-1 force
-};
-
-Pull pull_of(std::size_t e, const PoseGraphEdge& edge, std::span<const Pose3> poses,
-             const Eigen::Matrix<double, 12, 12>& covariance) {
-  const BetweenLinearisation factor = linearise_between(poses[edge.from], poses[edge.to], edge.T_from_to);
-  const Matrix6d root = edge.information.llt().matrixL();  // Omega = root root^T
-  Matrix6x12d J;
-  J << factor.J_i, factor.J_j;
-  const Matrix6x12d whitened = root.transpose() * J;
-  const Matrix6d own = whitened * covariance * whitened.transpose();  // of 1 in all: the share that the edge knows
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(own);
-  Vector6d missed = eigen.eigenvectors().transpose() * (root.transpose() * factor.residual);
-  for (int d = 0; d < 6; ++d) {
-    const double others = 1.0 - eigen.eigenvalues()(d);
-    missed(d) = others > kAlone ? missed(d) / others : 0.0;
-  }
-  const Vector6d w = eigen.eigenvectors() * missed;
-  return {e, std::sqrt(std::max(0.0, w.dot(own * w))), whitened.transpose() * w};
-}
+/// Less than this share comes from elsewhere: where that would have its ends is not known at all.
+constexpr double kUnknown = 1e-7;
 
 /// An edge in the units of its own standard deviations.
 struct Whitened {
@@ -125,6 +100,11 @@ class GroupLoss {
     if (ends_.empty()) return {};
     return known_.matrixU().solve(others_.solve(known_.matrixU() * force_));
   }
+  /// The length of what the loss moves of all poses, in the covariance of all.
+  [[nodiscard]] double distance() const {
+    if (ends_.empty()) return 0.0;
+    return others_.solve(known_.matrixU() * force_).norm();
+  }
   /// The squared length of what the loss moves between the ends of one of its edges, in the covariance of the rest.
   [[nodiscard]] double misfit_at(const Whitened& edge) const {
     if (ends_.empty()) return 0.0;
@@ -151,6 +131,14 @@ class GroupLoss {
   Eigen::VectorXd force_;  // J^T r
   Eigen::LLT<Eigen::MatrixXd> known_, others_;
   double least_known_ = 0.0;
+};
+
+/// The force on its ends that has the effect of taking a group away.
+struct Pull {
+  std::size_t group = 0;
+  double distance = 0.0;
+  std::vector<int> ends;
+  Eigen::VectorXd force;  ///< shift = H^-1 force
 };
 
 /// The normal equations at the optimum, factorised, of the graph without what only passes odometry on, and the groups
@@ -186,6 +174,22 @@ struct GroupEquations {
       out.push_back(whiten(edge(e), structure.edges[position(e)], structure.component[edge(e).from], at));
     return out;
   }
+  /// How the nodes of `graph`, all of them, at `poses`, move by each: 6 rows per node, a column per pull.
+  Eigen::MatrixXd moves_by(std::span<const Pull> pulls, const PoseGraph& graph, std::span<const Pose3> poses) {
+    const auto columns = static_cast<Eigen::Index>(pulls.size());
+    Eigen::MatrixXd shifts = Eigen::MatrixXd::Zero(6 * structure.variables, columns);
+    for (Eigen::Index c = 0; c < columns; ++c) {
+      const Pull& pull = pulls[static_cast<std::size_t>(c)];
+      for (std::size_t end = 0; end < pull.ends.size(); ++end)
+        shifts.col(c).segment<6>(6 * pull.ends[end]) = pull.force.segment<6>(static_cast<Eigen::Index>(6 * end));
+    }
+    equations->hessian().solve(shifts);
+    Eigen::MatrixXd moves = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(6 * reduced.nodes.size()), columns);
+    for (std::size_t node = 0; node < reduced.nodes.size(); ++node)
+      if (const int v = structure.variable[node]; v >= 0)
+        moves.middleRows<6>(static_cast<Eigen::Index>(6 * node)) = shifts.middleRows<6>(6 * v);
+    return expand_moves(graph, reduced, poses, moves);
+  }
 
   ReducedGraph reduced;
   std::vector<Pose3> at;  // of reduced nodes
@@ -197,52 +201,30 @@ struct GroupEquations {
 }  // namespace
 
 std::vector<Influence> largest_influences(const PoseGraph& graph, std::span<const Pose3> poses,
-                                          std::span<const std::size_t> candidates, std::size_t count,
+                                          std::span<const EdgeRole> roles,
+                                          std::span<const std::vector<std::size_t>> groups, std::size_t count,
                                           double least_distance) {
   TUTTI_CHECK(poses.size() == graph.poses.size(), "{} poses, {} nodes", poses.size(), graph.poses.size());
-  if (candidates.empty() || count == 0) return {};
-  std::vector<EdgeRole> roles(graph.edges.size(), EdgeRole::trusted);
-  for (const std::size_t e : candidates) {
-    TUTTI_CHECK(e < graph.edges.size(), "edge {} of {}", e, graph.edges.size());
-    roles[e] = EdgeRole::robust;
-  }
-  const ReducedGraph reduced = reduce_chains(graph, roles, {}, poses);
-  std::vector<Pose3> at;
-  for (const std::size_t node : reduced.nodes) at.push_back(poses[node]);
-  const BlockStructure structure = internal::analyse_blocks(reduced.graph);
-  internal::GraphEquations equations(reduced.graph, structure);
-  equations.linearise(at, {}, true);
-  if (structure.variables == 0 || !equations.hessian().factorise()) return {};
+  if (groups.empty() || count == 0) return {};
+  GroupEquations equations(graph, poses, roles, groups, {});
+  if (!equations.is_determined) return {};
   std::vector<Pull> pulls;
   {  // the inverse is as large as the factor, and goes before the shifts come
-    const SelectedInverse inverse(equations.hessian().factor().copy());
-    for (const std::size_t e : candidates) {
-      const EdgeSlot& slot = structure.edges[*reduced.edge[e]];
-      Pull pull = pull_of(e, graph.edges[e], poses, inverse.ends(slot));
-      if (pull.distance > least_distance) pulls.push_back(std::move(pull));
+    const SelectedInverse inverse(equations.equations->hessian().factor().copy());
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      const GroupLoss loss(equations.whitened(groups[g]), inverse);
+      if (!(loss.least_known() > kUnknown)) continue;
+      if (const double distance = loss.distance(); distance > least_distance)
+        pulls.push_back({g, distance, loss.ends(), loss.force()});
     }
   }
   if (pulls.empty()) return {};
   std::ranges::stable_sort(pulls, std::greater(), &Pull::distance);
   pulls.resize(std::min(count, pulls.size()));
-
-  Eigen::MatrixXd shifts = Eigen::MatrixXd::Zero(6 * structure.variables, static_cast<Eigen::Index>(pulls.size()));
-  for (std::size_t k = 0; k < pulls.size(); ++k) {
-    const EdgeSlot& slot = structure.edges[*reduced.edge[pulls[k].edge]];
-    auto column = shifts.col(static_cast<Eigen::Index>(k));
-    if (slot.from >= 0) column.segment<6>(6 * slot.from) = pulls[k].force.head<6>();
-    if (slot.to >= 0) column.segment<6>(6 * slot.to) = pulls[k].force.tail<6>();
-  }
-  equations.hessian().solve(shifts);
-
-  Eigen::MatrixXd moves = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(6 * reduced.nodes.size()), shifts.cols());
-  for (std::size_t node = 0; node < reduced.nodes.size(); ++node)
-    if (const int v = structure.variable[node]; v >= 0)
-      moves.middleRows<6>(static_cast<Eigen::Index>(6 * node)) = shifts.middleRows<6>(6 * v);
-  moves = expand_moves(graph, reduced, poses, moves);
+  const Eigen::MatrixXd moves = equations.moves_by(pulls, graph, poses);
   std::vector<Influence> out;
   for (std::size_t k = 0; k < pulls.size(); ++k)
-    out.push_back({pulls[k].edge, pulls[k].distance, moves.col(static_cast<Eigen::Index>(k))});
+    out.push_back({pulls[k].group, pulls[k].distance, moves.col(static_cast<Eigen::Index>(k))});
   return out;
 }
 

@@ -11,24 +11,26 @@
 
 namespace tutti::estimation {
 
-/// What removing one edge does to the optimum.
+/// What taking one group of edges away does to the optimum.
 struct Influence {
-  std::size_t edge = 0;   ///< Into graph.edges.
+  std::size_t group = 0;
   double distance = 0.0;  ///< Mahalanobis length of `shift` in the covariance of all poses.
-  /// 6 rows per node, right tangents: without the edge the pose is retract(pose, shift), to first order.
+  /// 6 rows per node, right tangents: without the group the pose is retract(pose, shift), to first order.
   Eigen::VectorXd shift;
 };
 
-/// The edges among `candidates` (positions in graph.edges) whose removal moves the optimum `poses` farthest in units of
-/// its uncertainty: those of a distance above `least_distance`, at most `count`, farthest first. Case deletion (Cook,
-/// "Detection of influential observations in linear regression", 1977): with residual r, Jacobian J and information
-/// Omega of the edge, H the Hessian of all edges and C = J H^-1 J^T,
-///   shift = H^-1 J^T (Omega^-1 - C)^-1 r,   distance^2 = shift^T H shift,
-/// so one selected inverse serves all candidates, and each chosen edge takes one more solution. In a direction in which
-/// only the edge holds its two ends together it has no residual, so removing it moves nothing. The first node of each
-/// connected component does not move. Empty for a graph that does not determine its poses.
+/// The groups of edges (positions in graph.edges) whose loss moves the optimum `poses` farthest in units of its
+/// uncertainty: those of a distance above `least_distance`, at most `count`, farthest first. Case deletion (Cook,
+/// "Detection of influential observations in linear regression", 1977), a group at a time: with r the whitened
+/// residuals of the group's edges, J their whitened Jacobians, H the Hessian of all edges and K = J H^-1 J^T <= 1,
+///   shift = H^-1 J^T (I - K)^-1 r,   distance^2 = shift^T H shift,
+/// so one factorisation and one selected inverse serve all groups, and each chosen one takes one more solution. A group
+/// that alone holds its ends together in some direction is left out: nothing else says where they would be. The first
+/// node of each connected component does not move. Empty for a graph that does not determine its poses. `roles` as in
+/// solve_pose_graph(); an edge of a group must not be within a run of trusted steps.
 std::vector<Influence> largest_influences(const PoseGraph& graph, std::span<const Pose3> poses,
-                                          std::span<const std::size_t> candidates, std::size_t count,
+                                          std::span<const EdgeRole> roles,
+                                          std::span<const std::vector<std::size_t>> groups, std::size_t count,
                                           double least_distance = 0.0);
 
 /// Per group of edges (positions in graph.edges), how far the group moves the place that it is about, in units of what

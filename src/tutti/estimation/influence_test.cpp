@@ -23,10 +23,18 @@ std::vector<Pose3> optimum(const PoseGraph& graph) {
   return result.poses;
 }
 
-std::vector<std::size_t> closures_of(const PoseGraph& graph) {
-  std::vector<std::size_t> out(graph.edges.size() - (graph.poses.size() - 1));
-  std::iota(out.begin(), out.end(), graph.poses.size() - 1);
+using Groups = std::vector<std::vector<std::size_t>>;
+
+/// Each closure by itself.
+Groups closures_of(const PoseGraph& graph) {
+  Groups out;
+  for (std::size_t e = graph.poses.size() - 1; e < graph.edges.size(); ++e) out.push_back({e});
   return out;
+}
+
+std::vector<Influence> influences_of(const PoseGraph& graph, const std::vector<Pose3>& poses, const Groups& groups,
+                                     std::size_t count, double least_distance = 0.0) {
+  return largest_influences(graph, poses, roles_from_numbering(graph), groups, count, least_distance);
 }
 
 PoseGraph without(PoseGraph graph, std::size_t edge) {
@@ -39,15 +47,16 @@ PoseGraph without(PoseGraph graph, const std::vector<std::size_t>& group) {
   return graph;
 }
 
-TEST(Influence, IsWhatTakingTheEdgeAwayDoes) {
+TEST(Influence, IsWhatTakingTheGroupAwayDoes) {
   for (std::uint64_t seed = 0; seed < 6; ++seed) {
     Rng rng(seed);
-    PoseGraph graph = random_graph(rng, 40, 6, 0.02).graph;
+    const PoseGraph graph = random_graph(rng, 40, 8, 0.02).graph;
     const std::vector<Pose3> poses = optimum(graph);
-    const auto influences = largest_influences(graph, poses, closures_of(graph), 3);
-    ASSERT_EQ(influences.size(), 3U);
+    const Groups groups = {{39}, {40}, {41, 43}, {42}, {44, 45, 46}};
+    const auto influences = influences_of(graph, poses, groups, 4);
+    ASSERT_EQ(influences.size(), 4U);
     for (const Influence& influence : influences) {
-      const PoseGraph less = without(graph, influence.edge);
+      const PoseGraph less = without(graph, groups[influence.group]);
       const std::vector<Pose3> moved = optimum(less);
       double off = 0.0, largest = 0.0;
       for (std::size_t k = 0; k < poses.size(); ++k) {
@@ -55,7 +64,7 @@ TEST(Influence, IsWhatTakingTheEdgeAwayDoes) {
         off = std::max(off, (truly - influence.shift.segment<6>(static_cast<Eigen::Index>(6 * k))).norm());
         largest = std::max(largest, truly.norm());
       }
-      EXPECT_LT(off, 0.05 * largest) << seed << " edge " << influence.edge;
+      EXPECT_LT(off, 0.05 * largest) << seed << " group " << influence.group;
     }
   }
 }
@@ -65,18 +74,18 @@ TEST(Influence, TheFarthestComeFirstAndInTheirOwnMeasure) {
   PoseGraph graph = random_graph(rng, 60, 12, 0.05).graph;
   graph.edges[64].T_from_to.translation.y() += 1.0;  // one of twelve is wrong
   const std::vector<Pose3> poses = optimum(graph);
-  const auto all = largest_influences(graph, poses, closures_of(graph), 100);
+  const auto all = influences_of(graph, poses, closures_of(graph), 100);
   ASSERT_EQ(all.size(), 12U);
-  EXPECT_EQ(all[0].edge, 64U);
+  EXPECT_EQ(all[0].group, 64U - 59U);
   for (std::size_t k = 1; k < all.size(); ++k) EXPECT_GE(all[k - 1].distance, all[k].distance);
-  const auto far = largest_influences(graph, poses, closures_of(graph), 100, all[4].distance);
+  const auto far = influences_of(graph, poses, closures_of(graph), 100, all[4].distance);
   ASSERT_EQ(far.size(), 4U);
-  EXPECT_EQ(far.back().edge, all[3].edge);
-  EXPECT_TRUE(largest_influences(graph, poses, closures_of(graph), 100, all[0].distance).empty());
-  const auto three = largest_influences(graph, poses, closures_of(graph), 3);
+  EXPECT_EQ(far.back().group, all[3].group);
+  EXPECT_TRUE(influences_of(graph, poses, closures_of(graph), 100, all[0].distance).empty());
+  const auto three = influences_of(graph, poses, closures_of(graph), 3);
   ASSERT_EQ(three.size(), 3U);
   for (std::size_t k = 0; k < 3; ++k) {
-    EXPECT_EQ(three[k].edge, all[k].edge);
+    EXPECT_EQ(three[k].group, all[k].group);
     // distance^2 = shift^T H shift, H the sum over all edges.
     double energy = 0.0;
     for (const PoseGraphEdge& edge : graph.edges) {
@@ -89,19 +98,12 @@ TEST(Influence, TheFarthestComeFirstAndInTheirOwnMeasure) {
   }
 }
 
-TEST(Influence, AnEdgeThatAloneHoldsItsEndsTogetherMovesNothing) {
+TEST(Influence, AGroupThatAloneHoldsItsEndsTogetherIsLeftOut) {
   Rng rng(3);
   const PoseGraph graph = random_graph(rng, 20, 0, 0.1).graph;  // a chain
-  const std::vector<Pose3> poses = optimum(graph);
-  const std::vector<std::size_t> steps{0, 7, 18};
-  for (const Influence& influence : largest_influences(graph, poses, steps, 3)) {
-    EXPECT_LT(influence.distance, 1e-6);
-    EXPECT_LT(influence.shift.norm(), 1e-6);
-  }
-  EXPECT_TRUE(largest_influences(graph, poses, steps, 3, 1e-3).empty());
+  const std::vector<EdgeRole> all_may_be_wrong(graph.edges.size(), EdgeRole::robust);
+  EXPECT_TRUE(largest_influences(graph, optimum(graph), all_may_be_wrong, Groups{{0}, {7, 8}, {18}}, 3).empty());
 }
-
-using Groups = std::vector<std::vector<std::size_t>>;
 
 TEST(GroupMisfits, AreWhatTakingTheGroupAwayDoes) {
   for (std::uint64_t seed = 0; seed < 4; ++seed) {
@@ -225,11 +227,10 @@ TEST(GroupRemovals, AClosureOfTheFixedNodeWithItselfMovesNothing) {
 TEST(Influence, NothingToSay) {
   Rng rng(3);
   PoseGraph graph = random_graph(rng, 20, 2, 0.1).graph;
-  const std::vector<std::size_t> none;
-  EXPECT_TRUE(largest_influences(graph, graph.poses, none, 3).empty());
-  EXPECT_TRUE(largest_influences(graph, graph.poses, closures_of(graph), 0).empty());
+  EXPECT_TRUE(influences_of(graph, graph.poses, {}, 3).empty());
+  EXPECT_TRUE(influences_of(graph, graph.poses, closures_of(graph), 0).empty());
   for (PoseGraphEdge& edge : graph.edges) edge.information.setZero();
-  EXPECT_TRUE(largest_influences(graph, graph.poses, closures_of(graph), 3).empty());
+  EXPECT_TRUE(influences_of(graph, graph.poses, closures_of(graph), 3).empty());
 }
 
 }  // namespace influence_test

@@ -85,7 +85,7 @@ struct KnownDirection {
 
 /// How sure the server is of the shape of one chain's trajectory (docs/math.md): the standard deviations of its errors
 /// in the wavelets of the chain's own proximity graph, and along the directions that closures determine. Also has which
-/// part of the shape depends on a single closure that odometry contradicts.
+/// part of the shape depends on one pair of places whose closures odometry contradicts.
 struct ChainUncertainty {
   static constexpr std::size_t kBlock = 10;  ///< Nodes that share one sigma.
   /// Number of evenly spread nodes that directions refer to; fewer on short chains.
@@ -107,9 +107,9 @@ struct ChainUncertainty {
   PoseSigma whole;
   std::vector<ScaleUncertainty> scales;  ///< Those of the Meyer filter bank on the chain's graph; scale 0 = largest.
   std::vector<KnownDirection> directions;
-  /// The part of the shape that rests on a single closure contradicted by odometry, as a shift. A robot that shall not
-  /// follow it moves spread node k >= 1, as seen from the first, by sigma (position_k / 127, rotation_scale rotation_k
-  /// / 127), in m and rad.
+  /// The part of the shape that rests on one pair of places contradicted by odometry, as a shift. A robot that shall
+  /// not follow it moves spread node k >= 1, as seen from the first, by sigma (position_k / 127, rotation_scale
+  /// rotation_k / 127), in m and rad.
   std::optional<KnownDirection> doubted;
   friend bool operator==(const ChainUncertainty&, const ChainUncertainty&) = default;
 };

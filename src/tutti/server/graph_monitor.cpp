@@ -16,6 +16,7 @@
 #include "tutti/consistency/chain_uncertainty.hpp"
 #include "tutti/estimation/influence.hpp"
 #include "tutti/geometry/covariance.hpp"
+#include "tutti/judge/closure_groups.hpp"
 #include "tutti/server/georeference.hpp"
 #include "tutti/server/map_components.hpp"
 #include "tutti/server/map_posterior.hpp"
@@ -60,26 +61,61 @@ std::vector<Repair> repairs(const MapEstimate& map, const ChainId& chain, const 
   return out;
 }
 
-/// The map hinges on a closure without which it would move by more than its own uncertainty lets one expect of the
-/// worst of all its closures (six numbers each), but for this probability. What moves it less is part of that
+/// The map hinges on a group of closures without which it would move by more than its own uncertainty lets one expect
+/// of the worst of all its groups (six numbers each), but for this probability. What moves it less is part of that
 /// uncertainty.
 constexpr double kFalseHinge = 0.01;
 
-/// By how much the nodes would move without the one or the other accepted closure on which the map hinges, for those
-/// that move it most: (6 nodes) x closures, right tangents.
-Eigen::MatrixXd shifts_without_a_closure(const MapEstimate& map, const PoseGraph& on_earth,
-                                         const std::vector<std::size_t>& nodes, std::size_t count) {
+/// By how much the nodes would move without the one or the other group of accepted closures on which the map hinges,
+/// for those that move it most. Two places that look alike make all closures between them wrong, so a group counts as
+/// one witness, and goes as one.
+struct Hinges {
+  Eigen::MatrixXd shifts;                        ///< (6 nodes) x groups, right tangents.
+  std::vector<std::vector<std::size_t>> groups;  ///< Positions in map.graph.edges.
+};
+
+Hinges hinges_of(const MapEstimate& map, const PoseGraph& on_earth, const std::vector<std::size_t>& nodes,
+                 std::size_t count) {
   std::vector<std::size_t> closures(map.graph.edges.size() - map.odometry_edges);
   std::iota(closures.begin(), closures.end(), map.odometry_edges);
-  if (closures.empty()) return Eigen::MatrixXd(static_cast<Eigen::Index>(6 * nodes.size()), 0);
-  const double probability = 1.0 - kFalseHinge / static_cast<double>(closures.size());
-  const auto influences = estimation::largest_influences(on_earth, on_earth.poses, closures, count,
-                                                         std::sqrt(chi_square_quantile(probability, 6.0)));
-  Eigen::MatrixXd out(static_cast<Eigen::Index>(6 * nodes.size()), static_cast<Eigen::Index>(influences.size()));
-  for (Eigen::Index c = 0; c < out.cols(); ++c)
+  const auto groups = judge::closure_groups(map.nodes, map.graph.edges, closures);
+  std::vector<estimation::Influence> influences;
+  if (!groups.empty()) {
+    std::vector<estimation::EdgeRole> roles(on_earth.edges.size(), estimation::EdgeRole::trusted);
+    for (const std::size_t e : closures) roles[e] = estimation::EdgeRole::robust;
+    const double probability = 1.0 - kFalseHinge / static_cast<double>(groups.size());
+    influences = estimation::largest_influences(on_earth, on_earth.poses, roles, groups, count,
+                                                std::sqrt(chi_square_quantile(probability, 6.0)));
+  }
+  const auto rows = static_cast<Eigen::Index>(6 * nodes.size());
+  Hinges out{.shifts = Eigen::MatrixXd(rows, static_cast<Eigen::Index>(influences.size())), .groups = {}};
+  for (const estimation::Influence& influence : influences) {
+    const auto c = static_cast<Eigen::Index>(out.groups.size());
     for (std::size_t k = 0; k < nodes.size(); ++k)
-      out.col(c).segment<6>(static_cast<Eigen::Index>(6 * k)) =
-          influences[static_cast<std::size_t>(c)].shift.segment<6>(static_cast<Eigen::Index>(6 * nodes[k]));
+      out.shifts.col(c).segment<6>(static_cast<Eigen::Index>(6 * k)) =
+          influence.shift.segment<6>(static_cast<Eigen::Index>(6 * nodes[k]));
+    out.groups.push_back(groups[influence.group]);
+  }
+  return out;
+}
+
+/// How many places along a chain each group tells of: no more than it has closures, nor than there are spread nodes
+/// from its first closure to its last at either end.
+std::vector<std::size_t> places_told(const MapEstimate& map, const std::vector<std::vector<std::size_t>>& groups,
+                                     std::span<const std::size_t> spread) {
+  const auto between = [&](std::size_t first, std::size_t last) {
+    return std::ranges::upper_bound(spread, last) - std::ranges::lower_bound(spread, first);
+  };
+  std::vector<std::size_t> out;
+  for (const auto& group : groups) {
+    std::ptrdiff_t most = 1;
+    for (const auto end : {&PoseGraphEdge::from, &PoseGraphEdge::to}) {
+      const auto at = [&](std::size_t e) { return map.graph.edges[e].*end; };
+      const auto [first, last] = std::ranges::minmax(group, {}, at);
+      most = std::max(most, between(at(first), at(last)));
+    }
+    out.push_back(std::min(group.size(), static_cast<std::size_t>(most)));
+  }
   return out;
 }
 
@@ -147,8 +183,7 @@ std::vector<ChainUncertainty> uncertainties(const MapEstimate& map, const PoseGr
   }
   posterior.reset();
   ++work.factorisations;
-  const Eigen::MatrixXd shifts =
-      shifts_without_a_closure(map, on_earth, kept, static_cast<std::size_t>(config.shape_deletions));
+  const Hinges hinges = hinges_of(map, on_earth, kept, static_cast<std::size_t>(config.shape_deletions));
   for (Chain& chain : chains) {
     const auto first = static_cast<Eigen::Index>(6 * chain.begin);
     const auto rows = static_cast<Eigen::Index>(6 * (chain.end - chain.begin));
@@ -157,7 +192,8 @@ std::vector<ChainUncertainty> uncertainties(const MapEstimate& map, const PoseGr
     };
     out.push_back(consistency::chain_uncertainty(graph, map.nodes[kept[chain.begin]].id.chain,
                                                  {.samples = of_chain(samples),
-                                                  .shifts = of_chain(shifts),
+                                                  .shifts = of_chain(hinges.shifts),
+                                                  .shift_places = places_told(map, hinges.groups, chain.spread),
                                                   .spread_covariance = std::move(chain.covariance),
                                                   .spread_odometry = spread_odometry(map, chain.spread, weights)},
                                                  &work.products));

@@ -241,6 +241,39 @@ TEST(MonitorGraph, WhatHangsOnOneClosureThatOdometryContradictsIsDoubted) {
   EXPECT_LT(doubted_m(estimate_map(submaps, all, {}), 32), 0.1 * doubted_m(bent, 32));
 }
 
+// However many closures two places that look alike make, they are one witness.
+TEST(MonitorGraph, WhatHangsOnOnePairOfPlacesIsDoubtedHoweverManyClosuresItMade) {
+  const RobotId robot{0};
+  SubmapSet submaps;
+  for (Submap& submap : test::make_submaps(robot, {.sigma_m = 0.1, .sigma_rad = 0.02}, Rng(4)))
+    submaps[submap.id] = std::make_shared<const Submap>(std::move(submap));
+  VerdictSet lone{*verdicts_of(submaps, test::TestVerifier(4)).rbegin()};
+  std::vector<LoopClosure>& closures = lone.begin()->second.closures;
+  closures[0].measurement.T_a_b.translation.x() += 9.0;
+  const auto pose = [&](const KeyframeId& id) {
+    for (const auto& [key, submap] : submaps)
+      for (const Keyframe& keyframe : submap->keyframes)
+        if (id == KeyframeId{key.chain, keyframe.index}) return keyframe.T_odom_body;
+    throw std::logic_error("no such keyframe");
+  };
+  const auto doubted_m = [&] {
+    const auto doubted = monitor_graph(estimate_map(submaps, lone, {}), 1, {}).uncertainties.at(0).doubted;
+    return doubted ? doubted->sigma : 0.0;
+  };
+  const double of_one = doubted_m();
+  ASSERT_GT(of_one, 0.1);
+  const LoopClosure first = closures[0];
+  for (int k = 1; k <= 2; ++k) {  // those of the next keyframes say the same
+    LoopClosure next = first;
+    next.from.index += k;
+    next.to.index += k;
+    next.measurement.T_a_b = pose(next.from).inverse() * pose(first.from) * first.measurement.T_a_b *
+                             pose(first.to).inverse() * pose(next.to);
+    closures.push_back(next);
+  }
+  EXPECT_GT(doubted_m(), 0.5 * of_one);
+}
+
 TEST(MonitorGraph, SaysNothingThatTheMapLeavesOpen) {
   MapEstimate map;
   for (std::uint32_t k = 0; k < 2; ++k)
