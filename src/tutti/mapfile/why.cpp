@@ -11,9 +11,8 @@
 #include <tuple>
 #include <utility>
 
+#include "tutti/node/refused_rows.hpp"
 #include "tutti/server/map_components.hpp"
-#include "tutti/storage/map_tables.hpp"
-#include "tutti/wire/codec.hpp"
 
 namespace tutti::mapfile {
 namespace {
@@ -45,26 +44,6 @@ std::optional<RobotId> robot_called(const Content& content, const std::string& n
   for (const auto& [id, submap] : content.submaps)
     if (std::to_string(id.chain.robot.value) == name) return id.chain.robot;
   return std::nullopt;
-}
-
-/// The answers that refused a pair of these two robots.
-Result<std::vector<std::pair<SubmapPair, Refusal>>> refused_between(const storage::TableStore& store, RobotId robot,
-                                                                    RobotId other) {
-  std::vector<std::pair<SubmapPair, Refusal>> out;
-  Status ok;
-  const auto scanned = store.scan(map_tables::kAnswers, {}, [&](std::string_view, std::string_view bytes) {
-    const auto answer = wire::decode_verdicts(bytes);
-    if (!answer && answer.error().code != ErrorCode::unsupported) ok = tl::unexpected(answer.error());
-    if (!answer) return ok.has_value();
-    for (const ClosureVerdict& verdict : answer->verdicts) {
-      const auto robots = std::minmax(verdict.pair.first.chain.robot, verdict.pair.second.chain.robot);
-      if (verdict.refusal && robots == std::minmax(robot, other)) out.emplace_back(verdict.pair, *verdict.refusal);
-    }
-    return true;
-  });
-  if (!scanned) return tl::unexpected(scanned.error());
-  if (!ok) return in_context("the map's table 'answers'", ok.error());
-  return out;
 }
 
 NearMiss miss_of(const server::ClosureNames& names, const SubmapPair& pair, const Refusal& refusal,
@@ -139,16 +118,16 @@ Result<WhyNotJoined> why_not_joined(const storage::TableStore& store, const Cont
   for (const auto& [name, found] : {std::pair(robot, first), std::pair(other, second)})
     if (!found) return fail(ErrorCode::invalid, "the map has no robot '{}'", plain_text(name));
   if (first == second) return fail(ErrorCode::invalid, "{} and {}: expected two robots", robot, other);
-  auto refused = refused_between(store, *first, *second);
-  if (!refused) return tl::unexpected(refused.error());
   const server::ClosureNames names = content.closure_names();
   const server::MapComponents components = server::choose_components(map);
-  WhyNotJoined out{.compared = refused->size()};
+  WhyNotJoined out;
   std::vector<NearMiss> all;
-  for (const auto& [pair, refusal] : *refused) {
+  const auto read = node::read_refusals(store, *first, *second, [&](const SubmapPair& pair, const Refusal& refusal) {
+    ++out.compared;
     ++out.stopped_by[kind_of(refusal.reason).words];
     all.push_back(miss_of(names, pair, refusal, to_string(refusal)));
-  }
+  });
+  if (!read) return tl::unexpected(read.error());
   for (const ClosureInfo& info : closures(content, map)) {
     const auto robots = std::minmax(info.pair.first.chain.robot, info.pair.second.chain.robot);
     if (robots != std::minmax(*first, *second)) continue;

@@ -9,6 +9,7 @@
 
 #include "tutti/base/plain_text.hpp"
 #include "tutti/node/decisions.hpp"
+#include "tutti/node/refused_rows.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/storage/map_tables.hpp"
 #include "tutti/wire/codec.hpp"
@@ -103,7 +104,7 @@ void ServerNode::ask_waiting(Timestamp now, Step& step) {
 }
 
 void ServerNode::keep(const Verdicts& refused, Step& step) {
-  if (!refused.verdicts.empty()) step.writes.push_back({map_tables::kAnswers, refused.job, wire::encode(refused)});
+  std::ranges::move(rows_of_refusals(refused), std::back_inserter(step.writes));
 }
 
 /// It has ended every worker that had it (bus::Port::receive()). If the job has many pairs, one of them may have
