@@ -31,6 +31,10 @@ export const LIMITS = {
   fetches: 6,
   /** Rows that a list shows before it asks for a filter. */
   rows: 200,
+  /** So many alerts of one cause are one line. */
+  folds: 3,
+  /** Robots beyond which the list is dense and has a search. */
+  dense_robots: 12,
   /** Alerts that were acknowledged, remembered by this browser. */
   acknowledged: 500,
   /** A picture that moves has fewer points when it takes longer, but never fewer than these. */

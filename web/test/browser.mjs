@@ -71,7 +71,8 @@ test("a robot goes silent: grey, a circle, an alert; comes back and drains", () 
     server.tick(30);
     await page.until("bravo is silent", () => document.querySelectorAll(".robot.silent").length === 1);
     assert.match((await page.texts(".robot.silent .detail"))[0], /May be within [23]\d\.\d\sm/);
-    assert.match((await page.texts(".alert b")).join(), /bravo is silent/);
+    assert.ok((await page.texts(".alert")).some((text) => /^silent.*bravo/.test(text)), (await page.texts(".alert")).join());
+    assert.deepEqual(await page.texts(".robot b"), ["bravo", "alpha", "charlie"], "who is missed stands first");
     const ring = await page.evaluate(() => tutti.app.robots[1].reach_m);
     assert.ok(ring > 25 && ring < 40, `${ring} m`);
     mission.silent.delete(1);
@@ -92,8 +93,36 @@ test("an alert is acknowledged once, and stays so over a reload", () =>
     await page.until("the inbox is empty", () => /Everything is acknowledged/.test(document.querySelector(".alerts").textContent));
     await page.reload();
     await page.until("loaded", () => tutti.app.ready && document.querySelector(".alerts")?.textContent.includes("acknowledged"));
-    assert.equal((await page.texts(".alert.seen b"))[0], "charlie is not joined to the map");
+    assert.match((await page.texts(".alert.seen"))[0], /^its part of the map is joined to no other.*charlie/);
   }));
+
+test("of a hundred robots one cause is one line, who is missed stands first, and a search finds the others", () => {
+  const robots = Array.from({ length: 100 }, (_, i) => `r${String(i).padStart(2, "0")}`);
+  const apart = robots.map((_, i) => i).filter((i) => i % 10 === 3);
+  return served(small({ robots, submaps: 2, points: 50, apart }), async (page, server, mission) => {
+    for (const number of [17, 42, 63, 88]) mission.silent.set(number, mission.time);
+    mission.troubled.set(5, "no scans for 20 s");
+    server.tick(30);
+    await page.until("four are silent", () => document.querySelectorAll(".robot.silent").length === 4);
+    const names = await page.texts(".robot b");
+    assert.equal(names.length, 100);
+    assert.deepEqual(names.slice(0, 6), ["r17", "r42", "r63", "r88", "r05", "r00"]);
+    const alerts = await page.texts(".alert");
+    assert.equal(alerts.length, 2, alerts.join("\n"));
+    assert.match(alerts[0], /^4 robots: silent.*r17, r42, r63, r88/);
+    assert.match(alerts[1], /^10 robots: its part of the map is joined to no other/);
+    await page.press("Unfold");
+    await page.until("each of the four", () => document.querySelectorAll(".alert").length === 6);
+    await page.press("Fold");
+    await page.until("one line", () => document.querySelectorAll(".alert").length === 2);
+    await page.press("Acknowledge 4");
+    await page.until("they are acknowledged", () => /^4 robots: silent/.test(document.querySelector(".alert.seen")?.textContent));
+    await page.fill('[aria-label="Search robots"]', "r42");
+    await page.until("one is found", () => document.querySelectorAll(".robot").length === 1);
+    await page.fill('[aria-label="Search robots"]', "trouble");
+    await page.until("the troubled one is found", () => document.querySelector(".robot b").textContent === "r05" && /no scans for 20 s/.test(document.querySelector(".robot").textContent));
+  });
+});
 
 test("a closure is inspected, rejected by name, taken back", () =>
   served(small(), async (page, server) => {

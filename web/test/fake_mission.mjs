@@ -67,6 +67,7 @@ export class FakeMission {
     this.closures = new Map();
     this.marks = new Map();
     this.silent = new Map(); // robot -> since
+    this.troubled = new Map(); // robot -> why
     this.clouds = new Map();
     this.backlog = robots.map(() => 0);
     this.revision = 0;
@@ -146,7 +147,7 @@ export class FakeMission {
       const silent = this.silent.has(number) ? this.time - this.silent.get(number) : 0;
       const own = this.submaps.filter((s) => s.robot === number).length;
       const backlog = this.backlog[number];
-      return { number, last_seen_s_ago: 0.4 + silent, last_update_s_ago: 4 + silent, submaps: own, refused_submaps: 0, conflict: "", name, session: 1, start: 1, version: "0.3.0", backlog_submaps: backlog, backlog_bytes: 14000 * backlog, heard_epoch: 1, heard_revision: this.revision, update_age_s: 4.2, keyframes: own * 10, T_odom_body: { translation_m: pose_along(number, this.time * 0.9).p, quaternion_xyzw: [0, 0, 0, 1] }, alerts: 0, finished: false, jobs_done: 0, trouble: "", can: [], submaps_begun: own, battery_v: 24.1, battery_percent: 90 - 31 * number, unread_submaps: 0 };
+      return { number, last_seen_s_ago: 0.4 + silent, last_update_s_ago: 4 + silent, submaps: own, refused_submaps: 0, conflict: "", name, session: 1, start: 1, version: "0.3.0", backlog_submaps: backlog, backlog_bytes: 14000 * backlog, heard_epoch: 1, heard_revision: this.revision, update_age_s: 4.2, keyframes: own * 10, T_odom_body: { translation_m: pose_along(number, this.time * 0.9).p, quaternion_xyzw: [0, 0, 0, 1] }, alerts: 0, finished: false, jobs_done: 0, trouble: this.troubled.get(number) ?? "", can: [], submaps_begun: own, battery_v: 24.1, battery_percent: 90 - 31 * (number % 3), unread_submaps: 0 };
     });
     return { time_ns: this.time * 1e9, wall_ns: Date.now() * 1e6, version: "0.3.0", epoch: 1, revision: this.revision, submaps: this.submaps.length, closures: this.poses().accepted, components: 1 + this.apart.size, pending_jobs: 2, has_news: false, robots, workers: [{ number: 1, last_seen_s_ago: 0.6, name: "worker-1", jobs_done: 120 }], refusals: [], trouble: "", incarnation: 1, verifier: "cloud 7", former_pairs: 0, waiting: 0, why_waiting: "", words: [] };
   }
@@ -154,9 +155,9 @@ export class FakeMission {
   alerts() {
     const out = [];
     for (const [number, since] of this.silent)
-      out.push({ id: `silent-${number}`, severity: "warning", what: `${this.robots[number]} is silent`, where: `last heard at ${this.robots[number]}/${this.submaps.length / this.robots.length - 1}`, since_s: since, todo: "Wait until it is in reach again, or send somebody to the circle.", robot: number, submap: null, closure: null });
+      out.push({ id: `robot/${number}/silent`, severity: "warning", what: "silent", where: this.robots[number], since_s: since, todo: "Wait until it is in reach again, or send somebody to the circle.", robot: number, submap: null, closure: null });
     for (const number of this.apart)
-      out.push({ id: `apart-${number}`, severity: "info", what: `${this.robots[number]} is not joined to the map`, where: `all ${this.robots[number]}'s submaps`, since_s: 30, todo: "Ask “why not joined”, or add a closure by hand where both were.", robot: number, submap: null, closure: null });
+      out.push({ id: `map/${number}/alone`, severity: "info", what: "its part of the map is joined to no other", where: this.robots[number], since_s: 30, todo: "Ask “why not joined”, or add a closure by hand where both were.", robot: number, submap: null, closure: null });
     return out;
   }
 

@@ -20,8 +20,10 @@ async function picture(name, url, steps, size = {}) {
   await page.close();
 }
 
-async function live(name, steps, size) {
-  const mission = new FakeMission();
+/** A fleet of which ten are not joined yet. */
+const hundred = () => new FakeMission({ robots: Array.from({ length: 100 }, (_, i) => `r${String(i).padStart(2, "0")}`), submaps: 2, points: 400, apart: [3, 13, 23, 33, 43, 53, 63, 73, 83, 93] });
+
+async function live(name, steps, size, mission = new FakeMission()) {
   const server = await new FakeServer(mission).start();
   await picture(name, `http://127.0.0.1:${server.port}/`, (page) => steps(page, server, mission), size);
   await server.stop();
@@ -57,6 +59,11 @@ if (what === "live") {
     mission.time += 1;
     server.send(mission.correct(0.15));
   });
+  await live("room_of_a_hundred", async (page, server, mission) => {
+    for (const number of [17, 42, 63, 88]) mission.silent.set(number, mission.time);
+    mission.troubled.set(5, "no scans for 20 s");
+    server.tick(30);
+  }, {}, hundred());
   await live("room_closure", async (page) => {
     await page.press("Closures");
     await page.press(/^Refused/);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-/** The inbox: what, where, since when, what to do. Acknowledged once; this browser remembers it. */
+/** The inbox: what, where, since when, what to do. Many of one kind are one line that unfolds. Acknowledged once; this browser remembers it. */
 import type { App } from "../app";
 import { moment, span } from "../format";
 import { LIMITS } from "../limits";
@@ -25,6 +25,44 @@ function acknowledge(app: App, alerts: Alert[], yes: boolean): void {
   app.say("options");
 }
 
+/** Alerts of one cause differ in the robots, sessions and places that their ids have. */
+const cause_of = (alert: Alert): string => `${alert.severity} ${alert.id.replace(/\d+/g, "*")}`;
+const unfolded = new Set<string>();
+
+/** In the order of each cause's first alert. */
+function lines(app: App, view: View, alerts: Alert[], seen: boolean): Child[] {
+  const causes = new Map<string, Alert[]>();
+  for (const alert of alerts) {
+    const cause = cause_of(alert);
+    const same = causes.get(cause);
+    if (same) same.push(alert);
+    else causes.set(cause, [alert]);
+  }
+  return [...causes].map(([cause, same]) => (same.length < LIMITS.folds ? same.map((alert) => line(app, view, alert, seen)) : group(app, view, cause, same, seen)));
+}
+
+function group(app: App, view: View, cause: string, alerts: Alert[], seen: boolean): Child {
+  const [first] = alerts;
+  const robots = new Set(alerts.map((a) => a.robot).filter((r) => r !== null)).size;
+  const what = alerts.every((a) => a.what === first.what) ? first.what : first.what.replace(/\d+([.,]\d+)*/g, "…");
+  const since = Math.min(...alerts.map((a) => a.since_s ?? Infinity));
+  const key = `${seen ? "seen " : ""}${cause}`;
+  const open = unfolded.has(key);
+  const fold = (): void => {
+    if (!unfolded.delete(key)) unfolded.add(key);
+    app.say("options");
+  };
+  return h("div", { class: "cause" },
+    h("article", { class: `alert ${first.severity}${seen ? " seen" : ""}` },
+      h("div", { class: "line" }, h("b", {}, robots > 1 ? `${robots} robots: ` : `${alerts.length} times: `, what), h("span", { class: "seen" }, Number.isFinite(since) ? span(app.shown() - since) : "")),
+      h("p", { class: "names" }, alerts.map((a) => a.where).filter((x) => x).join(", ")),
+      first.todo ? h("p", { class: "todo" }, first.todo) : null,
+      h("div", { class: "row" },
+        button(seen ? "Show as new again" : `Acknowledge ${alerts.length}`, () => acknowledge(app, alerts, !seen), { key: `ack ${key}` }),
+        button(open ? "Fold" : "Unfold", fold, { key: `fold ${key}`, "aria-expanded": String(open) }))),
+    open ? alerts.map((alert) => line(app, view, alert, seen)) : null);
+}
+
 export function alerts_panel(app: App, view: View): HTMLElement {
   return panel(app, ["data", "time", "tick", "options"], { class: "alerts" }, () => {
     const all = app.store.get("alerts", app.at()) ?? [];
@@ -33,9 +71,9 @@ export function alerts_panel(app: App, view: View): HTMLElement {
     return [
       open.length > 1 ? h("div", { class: "row end" }, button("Acknowledge all", () => acknowledge(app, open, true), { class: "plain" })) : null,
       open.length === 0 ? h("p", { class: "empty" }, all.length === 0 ? "Nothing to do." : "Everything is acknowledged.") : null,
-      open.map((alert) => line(app, view, alert, false)),
+      lines(app, view, open, false),
       seen.length > 0 ? h("h3", {}, "Acknowledged, still so") : null,
-      seen.map((alert) => line(app, view, alert, true)),
+      lines(app, view, seen, true),
     ];
   });
 }

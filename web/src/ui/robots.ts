@@ -12,19 +12,42 @@ import { button, h, held, icon, panel, swatch } from "./dom";
 import type { Child } from "./dom";
 
 export function robots_panel(app: App, view: View): HTMLElement {
-  return panel(app, ["data", "selection", "time", "tick", "options", "tool"], { class: "robots" }, () => [
-    h("h2", {}, "Robots", h("small", {}, summary(app.robots))),
-    app.robots.length === 0 ? h("p", { class: "empty" }, "No robot was heard yet.") : null,
-    ordered(app).slice(0, LIMITS.rows).map((robot) => card(app, view, robot)),
-    app.robots.length > LIMITS.rows ? h("p", { class: "empty" }, `and ${app.robots.length - LIMITS.rows} more`) : null,
-    workers(app),
-  ]);
+  const filter = { words: "" };
+  const heading = panel(app, ["data", "time", "tick"], {}, () => {
+    search.hidden = app.robots.length <= LIMITS.dense_robots;
+    return [h("h2", {}, "Robots", h("small", {}, summary(app.robots)))];
+  });
+  const search = h("input", { type: "search", placeholder: "Search: a name, silent, trouble, …", "aria-label": "Search robots", hidden: true });
+  search.addEventListener("input", () => {
+    filter.words = search.value.toLowerCase().trim();
+    app.say("options");
+  });
+  const list = panel(app, ["data", "selection", "time", "tick", "options", "tool"], {}, () => {
+    const dense = app.robots.length > LIMITS.dense_robots;
+    const found = ordered(app).filter((robot) => !dense || words_of(robot).includes(filter.words));
+    return [
+      app.robots.length === 0 ? h("p", { class: "empty" }, "No robot was heard yet.") : found.length === 0 ? h("p", { class: "empty" }, "None fits the search.") : null,
+      found.slice(0, LIMITS.rows).map((robot) => card(app, view, robot, dense)),
+      found.length > LIMITS.rows ? h("p", { class: "empty" }, `and ${found.length - LIMITS.rows} more: search to see them`) : null,
+      workers(app),
+    ];
+  });
+  return h("div", { class: "robots" }, heading, search, list);
 }
 
-/** In the phase of recovery, those that are missed stand first. */
+const is_away = (robot: RobotView): boolean => robot.presence === "silent" || robot.presence === "lost";
+const is_troubled = ({ status }: RobotView): boolean =>
+  status !== null && (status.trouble !== "" || status.conflict !== "" || (status.battery_percent !== null && status.battery_percent < 15));
+
+/** What the search looks at. */
+function words_of(robot: RobotView): string {
+  const { status } = robot;
+  return [robot.name, is_away(robot) ? "silent" : robot.presence, is_troubled(robot) ? "trouble" : "", status?.trouble, status?.conflict].join(" ").toLowerCase();
+}
+
+/** The silent stand first, the longest silent before all, then the troubled; in the phase of recovery, those with nothing to send last. */
 function ordered(app: App): RobotView[] {
-  if (app.phase !== "recover") return app.robots;
-  const rank = (r: RobotView) => (r.presence === "lost" || r.presence === "silent" ? -(r.silent_s ?? 0) : r.drain.state === "empty" ? 2 : 1);
+  const rank = (r: RobotView): number => (is_away(r) ? -(r.silent_s ?? 0) : is_troubled(r) ? 1 : app.phase === "recover" && r.drain.state === "empty" ? 3 : 2);
   return [...app.robots].sort((a, b) => rank(a) - rank(b));
 }
 
@@ -34,15 +57,26 @@ function summary(robots: RobotView[]): string {
     .filter(([count]) => count !== 0).map(([count, word]) => `${count} ${word}`).join(", ");
 }
 
-function card(app: App, view: View, robot: RobotView): HTMLElement {
+function card(app: App, view: View, robot: RobotView, dense: boolean): HTMLElement {
   const chosen = app.selection?.kind === "robot" && app.selection.number === robot.number;
-  const away = robot.presence === "silent" || robot.presence === "lost";
+  const away = is_away(robot);
+  if (dense && !chosen) return row(app, view, robot);
   const colour = css(robot_rgb(robot.index, app.dark));
   const body = h("button", { type: "button", class: "who", key: `robot ${robot.number}`, "aria-pressed": String(chosen), on: { click: () => choose(app, view, robot, chosen) } },
     h("span", { class: "line" }, swatch(away ? "var(--soft)" : colour), h("b", {}, robot.name), h("span", { class: "seen" }, seen(app, robot))),
     h("span", { class: "icons" }, icons(app, robot), h("span", { class: "right" }, many(robot.submaps, "submap"))),
     details(app, robot), held(app, `robot/${robot.number}`), chosen ? radio(app, robot) : null);
   return h("article", { class: `robot ${robot.presence}${chosen ? " chosen" : ""}` }, body, chosen ? actions(app, view, robot) : null);
+}
+
+/** One of many: a line, with what is wrong in it. */
+function row(app: App, view: View, robot: RobotView): HTMLElement {
+  const wrong = robot.status?.conflict || robot.status?.trouble;
+  const colour = is_away(robot) ? "var(--soft)" : css(robot_rgb(robot.index, app.dark));
+  const body = h("button", { type: "button", class: "who", key: `robot ${robot.number}`, "aria-pressed": "false", on: { click: () => choose(app, view, robot, false) } },
+    h("span", { class: "line" }, swatch(colour), h("b", {}, robot.name), h("span", { class: "icons" }, icons(app, robot)), h("span", { class: "seen" }, seen(app, robot))),
+    wrong ? h("span", { class: "detail bad" }, wrong) : null, held(app, `robot/${robot.number}`));
+  return h("article", { class: `robot brief ${robot.presence}` }, body);
 }
 
 function choose(app: App, view: View, robot: RobotView, chosen: boolean): void {
@@ -75,7 +109,7 @@ function seen(app: App, robot: RobotView): Child {
 /** What a robot can do now. */
 function icons(app: App, robot: RobotView): Child[] {
   const { status } = robot;
-  const away = robot.presence === "silent" || robot.presence === "lost";
+  const away = is_away(robot);
   const joined = robot.newest !== null && app.world.placed.has(robot.newest.id);
   const largest = Math.max(0, ...[...app.world.parts.values()].map((p) => p.submaps));
   const part = robot.newest ? app.world.parts.get(app.world.placed.get(robot.newest.id)?.component ?? -1) : undefined;
@@ -100,7 +134,7 @@ function details(app: App, robot: RobotView): Child[] {
   const { status, drain } = robot;
   const out: Child[] = [];
   const line = (text: Child, severity = "") => out.push(h("span", { class: `detail ${severity}` }, text));
-  const away = robot.presence === "silent" || robot.presence === "lost";
+  const away = is_away(robot);
   if (away) line(`May be within ${metres(robot.reach_m)} of where it was seen (drove ${robot.speed_mps.toFixed(1)} m/s)`, "warn");
   if (status && status.backlog_submaps > 0) line(`Backlog ${many(status.backlog_submaps, "submap")}, ${bytes(status.backlog_bytes)} · ${drains(robot, drain)}`, drain.state === "grows" ? "warn" : "");
   if (status?.conflict) line(status.conflict, "bad");
@@ -134,7 +168,7 @@ function radio(app: App, robot: RobotView): Child[] {
 }
 
 function drains(robot: RobotView, drain: RobotView["drain"]): string {
-  if (robot.presence === "silent" || robot.presence === "lost") return "waits for the link";
+  if (is_away(robot)) return "waits for the link";
   return drain.state === "drains" ? `sent in ${span(drain.seconds)}` : drain.state === "grows" ? "grows" : "not moving";
 }
 
