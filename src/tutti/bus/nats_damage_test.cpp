@@ -128,6 +128,16 @@ TEST_F(NatsDamage, ABusThatHasLostItsStoreIsSetUpAgain) {
   EXPECT_TRUE(within(10.0, [&] { return !worker->receive().empty(); }));
 }
 
+TEST_F(NatsDamage, JobsThatNobodyTakesAreKnownSinceWhen) {
+  NatsNetwork network;
+  const auto hub = open_hub(network, 0.8);
+  send(*hub, Endpoint::any_worker(), MessageKind::job, 0);
+  ASSERT_TRUE(within(10.0, [&] { return hub->state().jobs_untaken_s > 1.0; }));
+  const auto worker = network.open(Endpoint::worker(1));
+  EXPECT_TRUE(within(10.0, [&] { return !worker->receive().empty(); }));
+  EXPECT_TRUE(within(5.0, [&] { return hub->state().jobs_untaken_s == 0.0; })) << "it is being worked on";
+}
+
 TEST_F(NatsDamage, AJobThatEndsEveryWorkerComesBackAndTheOthersStay) {
   NatsNetwork network;
   const auto hub = open_hub(network, 0.8);

@@ -115,6 +115,8 @@ LinkState JetStreamPort::state() const {
                   .last_error = last_error_};
   if (const auto since = outbox_.unconfirmed_since(); since && state.connected)
     state.unconfirmed_s = std::chrono::duration<double>(Clock::now() - *since).count();
+  if (untaken_since_ && state.connected)
+    state.jobs_untaken_s = std::chrono::duration<double>(Clock::now() - *untaken_since_).count();
   return state;
 }
 

@@ -130,6 +130,11 @@ void JetStreamPort::watch() {
     const std::scoped_lock guard(mutex_);
     given_in_vain_ = given > 0 && deliveries >= LinkState::kGivenInVain * given ? deliveries : 0;
   };
+  const auto note_untaken = [&](bool is_untaken) {
+    const std::scoped_lock guard(mutex_);
+    if (!is_untaken) untaken_since_.reset();
+    if (is_untaken && !untaken_since_) untaken_since_ = Clock::now();
+  };
   const auto is_there = [&](const std::string& stream, const NatsConnection& connection) {
     const auto there = connection.has_stream(stream);
     if (!there) note(there.error().message);
@@ -147,6 +152,8 @@ void JetStreamPort::watch() {
     const bool is_left = (*state)->messages > (*state)->pending + (*state)->given;
     const bool is_held_back = (*state)->pending > 0 && (*state)->asked && (*state)->deliveries == watched.deliveries &&
                               (*state)->given < kMostUnacknowledged && !(stream != jobs && is_full());
+    if (stream == jobs)
+      note_untaken((*state)->pending > 0 && (*state)->given == 0 && (*state)->deliveries == watched.deliveries);
     watched.deliveries = (*state)->deliveries;
     if ((*state)->gone != watched.gone || (*state)->given == 0 || watched.deliveries < watched.deliveries_then) {
       watched.gone = (*state)->gone;

@@ -37,6 +37,8 @@ struct LinkState {
   /// was given kGivenInVain times on average. 0: jobs are answered.
   std::uint64_t given_in_vain = 0;
   static constexpr std::uint64_t kGivenInVain = 3;
+  /// Server's port only: for how long jobs have waited while no worker had one.
+  double jobs_untaken_s = 0.0;
   std::string last_error = {};
 };
 

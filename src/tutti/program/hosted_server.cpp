@@ -12,7 +12,7 @@
 namespace tutti::program {
 
 HostedServer::HostedServer(std::unique_ptr<node::ServerNode> node, const storage::TableStore& map, std::string version,
-                           std::function<std::string()> trouble, const bool& is_over,
+                           std::function<std::string(const MissionStatus&)> trouble, const bool& is_over,
                            const std::vector<std::unique_ptr<MapViewer>>& viewers, const Clock& clock, MakeMap make_map)
     : node_(std::move(node)),
       shown_maps_(map),
@@ -70,7 +70,7 @@ bus::Envelope HostedServer::mission_status(Timestamp now) {
   MissionStatus status = node_->mission_status(now);
   status.version = version_;
   status.wall_ns = static_cast<std::int64_t>(wall_clock_ns());
-  status.trouble = trouble_();
+  status.trouble = trouble_(status);
   for (const auto& viewer : viewers_) viewer->show_status(status, radio_.sums());
   return node::to_viewers(std::move(status));
 }

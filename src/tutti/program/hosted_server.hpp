@@ -27,7 +27,7 @@ class HostedServer final : public Hosted {
   /// `map` is the node's store; `trouble` is what is wrong with the program. `is_over`: the mission is another
   /// server's. All must outlive this.
   HostedServer(std::unique_ptr<node::ServerNode> node, const storage::TableStore& map, std::string version,
-               std::function<std::string()> trouble, const bool& is_over,
+               std::function<std::string(const MissionStatus&)> trouble, const bool& is_over,
                const std::vector<std::unique_ptr<MapViewer>>& viewers, const Clock& clock,
                MakeMap make_map = &node::make_map);
   Answer start(Timestamp now) override { return counted({node_->resume(now), {}}); }
@@ -62,7 +62,7 @@ class HostedServer final : public Hosted {
   std::unique_ptr<node::ServerNode> node_;
   mapfile::ShownMaps shown_maps_;
   std::string version_;
-  std::function<std::string()> trouble_;
+  std::function<std::string(const MissionStatus&)> trouble_;
   const bool& is_over_;
   const std::vector<std::unique_ptr<MapViewer>>& viewers_;
   const Clock& clock_;

@@ -48,7 +48,8 @@ class HostedServerTest : public testing::Test {
     parts.open_node = [this, make_map](bus::Port&) -> Result<std::unique_ptr<Hosted>> {
       auto node = node::ServerNode::open({kAlpha.robot}, std::make_shared<node::test::EvenVerifier>(), {}, 1, store_);
       return std::make_unique<HostedServer>(
-          std::move(*node), store_, "1", [] { return std::string(); }, is_over_, viewers_, clock_, make_map);
+          std::move(*node), store_, "1", [](const MissionStatus&) { return std::string(); }, is_over_, viewers_, clock_,
+          make_map);
     };
     return std::make_unique<Host>(std::move(parts), clock_, *log_);
   }

@@ -3,11 +3,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <string_view>
 #include <utility>
 
 namespace tutti::program {
 namespace {
+
+constexpr double kWorkerIsThere_s = 30.0;  // fifteen of its statuses, or as many fewer as a mission is played faster
 
 /// ": why", without the bus's address, which most errors of a port begin with and the sentence has already.
 std::string why_of(const bus::LinkState& state) {
@@ -58,6 +61,17 @@ std::vector<LinkWatch::Line> LinkWatch::check(const bus::LinkState& state, doubl
     say(Level::info, fmt::format("the bus {} stores again", state.url));
   }
   return out;
+}
+
+std::string untaken_trouble(const bus::LinkState& state, const MissionStatus& status) {
+  const auto workers = std::ranges::count_if(status.workers, [&](const MissionStatus::Worker& worker) {
+    return status.time - worker.last_seen < kWorkerIsThere_s;
+  });
+  if (workers == 0 || status.pending_jobs == 0 || state.jobs_untaken_s < kUntaken_s) return {};
+  return fmt::format(
+      "jobs wait ({}), workers are there ({}), and for {:.0f} s none has taken one: start the workers again (tutti "
+      "worker; the server's own starts with the server)",
+      status.pending_jobs, workers, state.jobs_untaken_s);
 }
 
 bool AnewWatch::connects_anew(bool is_in_vain, bool holds_job, double wall_s) {

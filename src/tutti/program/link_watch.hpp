@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tutti/bus/port.hpp"
+#include "tutti/model/status.hpp"
 #include "tutti/program/event_log.hpp"
 
 namespace tutti::program {
@@ -37,6 +38,11 @@ class LinkWatch {
   std::uint64_t made_anew_ = 0;
   std::string trouble_;
 };
+
+/// Jobs wait, workers are heard, and none has taken one for kUntaken_s, which nothing else notices: such a worker says
+/// that it is well. In a sentence with what to do; empty: that is not so.
+std::string untaken_trouble(const bus::LinkState& state, const MissionStatus& status);
+inline constexpr double kUntaken_s = 30.0;
 
 /// Decides when a worker's port is to connect anew: the bus gives jobs to workers and gets no answers
 /// (LinkState::given_in_vain), and this worker has none. So they are given to an old request, or over a connection that

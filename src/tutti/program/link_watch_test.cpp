@@ -104,5 +104,20 @@ TEST(LinkWatch, JobsGivenInVainAndWhatTheBusDoesNotAllowAreAlerts) {
   EXPECT_TRUE(watch.check(state, 4).empty());
 }
 
+TEST(LinkWatch, JobsThatWaitWhileNoWorkerThatIsThereTakesOneAreTrouble) {
+  bus::LinkState state{.url = "nats://base:4222", .connected = true, .jobs_untaken_s = 45.0};
+  MissionStatus status{.time = Timestamp{} + 100.0};
+  status.pending_jobs = 22;
+  EXPECT_EQ(untaken_trouble(state, status), "") << "there is no worker: it says so elsewhere";
+  status.workers.push_back({.number = 1, .last_seen = Timestamp{} + 98.0, .status = {}});
+  EXPECT_TRUE(has(untaken_trouble(state, status), "jobs wait (22), workers are there (1), and for 45 s none"))
+      << untaken_trouble(state, status);
+  state.jobs_untaken_s = 12.0;
+  EXPECT_EQ(untaken_trouble(state, status), "") << "one that has just given its job back rests for 10 s";
+  state.jobs_untaken_s = 45.0;
+  status.workers.front().last_seen = Timestamp{} + 10.0;
+  EXPECT_EQ(untaken_trouble(state, status), "") << "it has ended";
+}
+
 }  // namespace link_watch_test
 }  // namespace tutti::program

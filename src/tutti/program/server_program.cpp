@@ -154,6 +154,7 @@ class ServerProgram {
   void tend();
   void tend_bus();
   [[nodiscard]] std::string robot_command() const;
+  [[nodiscard]] std::string trouble(const MissionStatus& status) const;
 
   const ServerOptions& options_;
   const ServerSettings& settings_ = options_.settings;
@@ -185,8 +186,14 @@ Result<std::unique_ptr<Hosted>> ServerProgram::open_node() {
   auto node = node::ServerNode::open(std::move(robots), verifier_, config, folder_->made_ns(), *store_);
   if (!node) return in_context((folder_->path() / kMapFile).string(), node.error());
   return std::make_unique<HostedServer>(
-      std::move(*node), *store_, options_.version, [this] { return host_->all_trouble(); }, is_over_, viewers_,
-      *clock_);
+      std::move(*node), *store_, options_.version, [this](const MissionStatus& status) { return trouble(status); },
+      is_over_, viewers_, *clock_);
+}
+
+std::string ServerProgram::trouble(const MissionStatus& status) const {
+  const std::string known = host_->all_trouble();
+  const auto link = host_->link();
+  return known.empty() && link ? untaken_trouble(*link, status) : known;
 }
 
 Status ServerProgram::check_lease(const bus::MissionLease::State& seen) const {

@@ -113,6 +113,7 @@ class JetStreamPort final : public Port {
   std::unordered_set<std::uint64_t> jobs_sent_;  ///< Hashes of their ids; the server's.
   std::uint64_t strange_jobs_ = 0;
   std::uint64_t given_in_vain_ = 0;
+  std::optional<std::chrono::steady_clock::time_point> untaken_since_;  ///< Jobs wait, and nobody has one.
   std::uint64_t refused_ = 0;
   std::string last_error_;
 

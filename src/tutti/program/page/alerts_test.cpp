@@ -116,5 +116,15 @@ TEST(Alerts, AMapShowsWhoIsAlone) {
   EXPECT_EQ(alone->where, alone->robot == RobotId{1} ? "bravo" : "alpha");
 }
 
+TEST(Alerts, WhatTroublesTheServerIsAnError) {
+  MissionStatus status = status_at(100.0, 99.0);
+  status.trouble = "jobs wait (22), workers are there (1), and for 45 s none has taken one";
+  const auto found = Alerts().of_status(status);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found.front().id, "server/trouble");
+  EXPECT_EQ(found.front().severity, "error");
+  EXPECT_EQ(found.front().what, status.trouble);
+}
+
 }  // namespace alerts_test
 }  // namespace tutti::page
