@@ -80,9 +80,14 @@ void print(const mapfile::ClosureFit& fit) {
 
 /// What each verifier and operator found of it, and what was measured.
 void print_origin(const mapfile::ClosureInfo& info) {
-  if (info.decision)
-    fmt::print("decision     {}{} at {}\n", to_string(info.decision->wish),
-               info.decision->by.empty() ? "" : " by " + info.decision->by, time_of(info.decision->given_ns));
+  if (info.decision) {
+    const ClosureDecision& given = *info.decision;
+    fmt::print("decision     {}{} at {}{}\n", to_string(given.wish), given.by.empty() ? "" : " by " + given.by,
+               time_of(given.given_ns),
+               given.counts_from_ns() == given.given_ns
+                   ? ""
+                   : fmt::format(", by a clock that was ahead: counts from {}", time_of(given.taken_ns)));
+  }
   if (info.verdict) {
     const ClosureVerdict& verdict = *info.verdict;
     fmt::print("verified     by {}{}, verifier {}\n",

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -30,9 +31,13 @@ struct ClosureDecision {
   std::string closure;  ///< Name of the pair (server/closure_names.hpp) at the time of the decision.
   Wish wish = Wish::withdraw;
   std::string by;             ///< Who decided, for people; may be empty.
-  std::int64_t given_ns = 0;  ///< When, since the Unix epoch.
+  std::int64_t given_ns = 0;  ///< When, since the Unix epoch, by the operator's clock.
   /// With `accept`: a closure that the operator has added, beside those that were found; at most one.
   std::vector<LoopClosure> by_hand = {};
+  /// When the server took it, by the server's clock; 0: it did not say. Whatever a message claims, the server replaces.
+  std::int64_t taken_ns = 0;
+  /// From when on it counts: a clock that is ahead makes no decision later than the server took it.
+  [[nodiscard]] std::int64_t counts_from_ns() const { return taken_ns > 0 ? std::min(given_ns, taken_ns) : given_ns; }
   template <class V>
   void describe(V& v) {
     constexpr std::size_t kMostBytes = 200;
@@ -41,6 +46,7 @@ struct ClosureDecision {
     v.field(3, "by", by, {.text = FieldRule::Text::any, .at_most = kMostBytes});
     v.field(4, "given_ns", given_ns);
     v.field(5, "by_hand", by_hand, {.at_most = 1});
+    v.field(6, "taken_ns", taken_ns);
   }
   friend bool operator==(const ClosureDecision&, const ClosureDecision&) = default;
 };
@@ -57,7 +63,8 @@ inline ClosureDecision with_sessions(ClosureDecision decision, const SubmapPair&
 /// True if decision `a` counts and not `b`, both being on one pair: the later one counts. Decisions of the same time
 /// are ordered by their other fields, so that the outcome does not depend on the order of arrival.
 inline bool holds_over(const ClosureDecision& a, const ClosureDecision& b) {
-  return std::tie(a.given_ns, a.wish, a.by, a.closure) > std::tie(b.given_ns, b.wish, b.by, b.closure);
+  const std::int64_t a_ns = a.counts_from_ns(), b_ns = b.counts_from_ns();
+  return std::tie(a_ns, a.wish, a.by, a.closure) > std::tie(b_ns, b.wish, b.by, b.closure);
 }
 
 /// The decision that counts for each pair. Withdrawals are kept too, so that an older decision which arrives late

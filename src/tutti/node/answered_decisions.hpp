@@ -14,6 +14,8 @@ class AnsweredDecisions {
   /// Notes the answer to a decision: `frame` is the message as it came, `why` is why the decision is not stored
   /// (empty: it is).
   void note(const std::string& frame, const std::string& why);
+  /// True if this message is among these and is stored.
+  [[nodiscard]] bool is_stored(const std::string& frame) const;
   [[nodiscard]] const std::vector<MissionStatus::Decision>& all() const { return decisions_; }
 
  private:

@@ -32,22 +32,28 @@ void ServerNode::receive_decision(const bus::Envelope& envelope, Timestamp now, 
   auto decision = wire::decode_decision(*envelope.bytes);
   if (!decision) return refuse(envelope, decision.error().message, now, step);
   if (!envelope.user.empty()) decision->by = plain_text(envelope.user, kLongestName);  // whatever it claims
-  const auto is_late = take_decision(envelope, *decision, now, step);
+  const std::int64_t now_ns = config_.wall_ns ? config_.wall_ns() : 0;
+  decision->taken_ns = now_ns;
+  if (decision->counts_from_ns() < decision->given_ns && decisions_.is_stored(*envelope.bytes))
+    return note_decision(*envelope.bytes, {});  // once more: it is not decided anew, later
+  const auto is_late = take_decision(*decision, now, step);
   if (!is_late) refuse(envelope, is_late.error().message, now, step);
   note_decision(*envelope.bytes, !is_late ? is_late.error().message : *is_late ? "a later decision on it holds" : "");
 }
 
-Result<bool> ServerNode::take_decision(const bus::Envelope& envelope, const ClosureDecision& decision, Timestamp now,
-                                       Step& step) {
+Result<bool> ServerNode::take_decision(const ClosureDecision& decision, Timestamp now, Step& step) {
   const auto pair = closure_names().find(decision.closure);
   if (!pair) return tl::unexpected(pair.error());
   const DecisionSet& decisions = server_.state().decisions;
   const auto known = decisions.find(*pair);
   const auto before = known == decisions.end() ? std::nullopt : std::optional(known->second);
   if (auto taken = server_.receive(*pair, decision); !taken) return tl::unexpected(taken.error());
-  if (before == decisions.at(*pair)) return before != decision;
-  step.writes.push_back(
-      {map_tables::kDecisions, key_of(*pair), envelope.user.empty() ? *envelope.bytes : wire::encode(decision)});
+  if (before == decisions.at(*pair)) {
+    ClosureDecision same = with_sessions(decision, *pair);
+    same.taken_ns = before->taken_ns;
+    return before != same;
+  }
+  step.writes.push_back({map_tables::kDecisions, key_of(*pair), wire::encode(decision)});
   step.emit(now, DecisionTaken{*pair, decision.wish});
   operator_decided_ = true;
   send_jobs(std::nullopt, now, 0, config_.pairs_per_job, step);
@@ -62,8 +68,11 @@ void ServerNode::note_decision(const std::string& frame, const std::string& why)
 void ServerNode::recall_decisions() {
   std::vector<ClosureDecision> given;
   for (const auto& [pair, decision] : server_.state().decisions) given.push_back(decision);
-  std::ranges::sort(given, {}, &ClosureDecision::given_ns);
-  for (const ClosureDecision& decision : given) note_decision(wire::encode(decision), {});
+  std::ranges::sort(given, {}, &ClosureDecision::counts_from_ns);
+  for (ClosureDecision& decision : given) {
+    decision.taken_ns = 0;  // as it was sent
+    note_decision(wire::encode(decision), {});
+  }
 }
 
 std::map<RobotId, std::string> ServerNode::robot_names() const {

@@ -52,6 +52,9 @@ struct ServerNodeConfig {
   /// Why the robot of this number cannot be called so, by what the bus proves; empty text: it can. Empty: nothing is
   /// proved.
   std::function<std::string(RobotId, const std::string&)> name_objection = {};
+  /// The server's clock, since the Unix epoch: no decision counts as later than it came. Empty: decisions count from
+  /// when their operators say.
+  std::function<std::int64_t()> wall_ns = {};
 };
 
 /// The server as a node: MapServer with its store and messages. It takes submaps, verdicts and operators' decisions,
@@ -143,7 +146,7 @@ class ServerNode {
   void receive_returned_refinement(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_decision(const bus::Envelope& envelope, Timestamp now, Step& step);
   /// True when a decision on this pair that was given later counts instead.
-  Result<bool> take_decision(const bus::Envelope& envelope, const ClosureDecision& decision, Timestamp now, Step& step);
+  Result<bool> take_decision(const ClosureDecision& decision, Timestamp now, Step& step);
   void note_decision(const std::string& frame, const std::string& why);
   /// Answers the decisions that are stored.
   void recall_decisions();

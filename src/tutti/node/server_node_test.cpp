@@ -321,6 +321,39 @@ TEST_F(ServerNodeTest, AnOperatorsDecisionIsStoredAndSurvivesEveryRestart) {
   EXPECT_EQ(accepted(), all);
 }
 
+/// Of an operator whose clock is a year ahead.
+TEST_F(ServerNodeTest, ADecisionCountsFromWhenItCameAndNotFromAClockThatIsAhead) {
+  fill();
+  const SubmapPair pair{{kAlpha, 0}, {kBravo, 2}};
+  const ClosureDecision ahead{"0/0-1/2", Wish::reject, "ada", 1'000'000}, right{"0/0-1/2", Wish::accept, "eve", 101};
+  const auto holds = [&] { return node_->map_server().state().decisions.at(pair); };
+  std::int64_t wall_ns = 100;
+  start({RobotId{0}, RobotId{1}}, {.wall_ns = [&] { return wall_ns; }});
+  const bus::Envelope liar = test::envelope(ahead);
+  receive(liar);
+  EXPECT_EQ(holds().by, "ada");
+  EXPECT_EQ(holds().given_ns, 1'000'000) << "both times are stored";
+  EXPECT_EQ(holds().taken_ns, 100);
+  wall_ns = 102;
+  EXPECT_EQ(reported<DecisionTaken>(receive(test::envelope(right))), 1U);
+  EXPECT_EQ(holds().by, "eve");
+  receive(liar);  // a bus may bring it again
+  EXPECT_EQ(holds().by, "eve");
+  receive(test::envelope(ClosureDecision{"0/0-1/2", Wish::withdraw, "ada", 99}));  // late, and not of a wrong clock
+  EXPECT_EQ(holds().wish, Wish::accept);
+}
+
+TEST_F(ServerNodeTest, WhatProgramsBeforeStoredOfAClockThatWasAheadIsOverruled) {
+  fill();
+  const SubmapPair pair{{kAlpha, 0}, {kBravo, 2}};
+  receive(test::envelope(ClosureDecision{"0/0-1/2", Wish::reject, "ada", 1'000'000}));  // a server without a clock
+  std::int64_t wall_ns = 100;
+  start({RobotId{0}, RobotId{1}}, {.wall_ns = [&] { return wall_ns; }});
+  wall_ns = 102;
+  receive(test::envelope(ClosureDecision{"0/0-1/2", Wish::accept, "eve", 101}));
+  EXPECT_EQ(node_->map_server().state().decisions.at(pair).by, "eve");
+}
+
 TEST_F(ServerNodeTest, NobodyElseDecidesAndNotOnWhatIsNotThere) {
   fill();
   const auto before = store_->tables();

@@ -178,6 +178,7 @@ Result<std::unique_ptr<Hosted>> ServerProgram::open_node() {
   node::ServerNodeConfig config{
       .server = settings_.server, .refiner = settings_.verifiers.refiner(), .accepts_others = settings_.accepts_others};
   config.incarnation = any_incarnation();
+  config.wall_ns = [] { return static_cast<std::int64_t>(wall_clock_ns()); };
   if (guard_)
     config.name_objection = [this](RobotId robot, const std::string& name) { return guard_->objection(robot, name); };
   config.job_timeout_s *= std::max(1.0, options_.rate);  // a bus waits in wall time

@@ -109,7 +109,7 @@ std::string closure_json(const ShownMap& map, const mapfile::ClosureInfo& info) 
                 {"reason", info.reason}};
   out["word"] = info.decision ? FieldJson{{"wish", to_string(info.decision->wish)},
                                           {"by", info.decision->by},
-                                          {"wall_ns", info.decision->given_ns}}
+                                          {"wall_ns", info.decision->counts_from_ns()}}
                               : FieldJson(nullptr);
   out["links"] = FieldJson::array();
   for (const mapfile::ClosureFit& fit : info.closures) out["links"].push_back(link_json(map, info, fit));
