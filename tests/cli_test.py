@@ -121,7 +121,9 @@ class CommandLine(unittest.TestCase):
             return tutti("pki", *words, "--pki", pki)
 
         self.expect(run("list"), 1, "users", "tutti pki init")
-        self.expect(run("init", "--mission", "cave"), 0, "mission cave")
+        self.expect(run("init", "--mission", "cave", "--name", "base/local"), 2, "'base/local'", "10.0.0.1")
+        self.expect(run("init", "--mission", "cave", "--name", "base.local", "--name", "10.0.0.1"), 0, "mission cave")
+        self.expect(run("list"), 0, "for bus.tutti, base.local, 10.0.0.1")
         self.expect(run("init", "--mission", "cave"), 2, "already")
         alpha = pathlib.Path(run("add-robot", "alpha").stdout.strip())
         self.assertEqual(alpha.stat().st_mode & 0o777, 0o600)
@@ -130,7 +132,9 @@ class CommandLine(unittest.TestCase):
         self.expect(run("add-robot", "carla", "--number", "3"), 2, "bravo")
         for role in ("worker", "operator", "viewer"):
             self.expect(run(f"add-{role}", f"a-{role}"), 0, f"a-{role}.cred")
+        self.expect(run("renew", "--name", "cellar.local"), 0)
         self.expect(run("renew"), 0)
+        self.expect(run("list"), 0, "for bus.tutti, base.local, 10.0.0.1, cellar.local")
         self.expect(run("renew", "alpha", "--days", "5"), 0, "alpha.cred")
         self.expect(run("revoke", "alpha"), 0)
         self.expect(run("revoke", "nobody"), 2, "nobody")

@@ -24,6 +24,7 @@ struct PkiOptions {
   std::filesystem::path folder = "pki";
   std::string mission = "tutti";
   std::string name;
+  std::vector<std::string> names;  // of the bus's certificate
   std::optional<std::uint32_t> number;
   int days = pki::kDays;
 };
@@ -34,7 +35,7 @@ int end_of(const Status& done) {
 }
 
 Status init(const PkiOptions& options) {
-  const auto made = pki::Pki::make(options.folder, options.mission, options.days);
+  const auto made = pki::Pki::make(options.folder, options.mission, options.days, options.names);
   if (!made) return tl::unexpected(made.error());
   fmt::print("{}: the authority of mission {}. Whoever has this folder lets in whom they like.\n",
              options.folder.string(), options.mission);
@@ -67,7 +68,7 @@ Status revoke(const PkiOptions& options) {
 Status renew(const PkiOptions& options) {
   auto there = pki::Pki::open(options.folder);
   if (!there) return tl::unexpected(there.error());
-  if (Status done = there->renew(options.name, options.days); !done) return done;
+  if (Status done = there->renew(options.name, options.days, options.names); !done) return done;
   if (!options.name.empty()) fmt::print("{}\n", there->credential(options.name).string());
   return {};
 }
@@ -77,7 +78,10 @@ Status list(const PkiOptions& options) {
   if (!there) return tl::unexpected(there.error());
   const auto until = there->bus_until();
   if (!until) return tl::unexpected(until.error());
-  fmt::print("mission {}, the bus's certificate is valid until {}\n", there->mission(), *until);
+  const auto names = there->bus_names();
+  if (!names) return tl::unexpected(names.error());
+  fmt::print("mission {}, the bus's certificate is valid until {}, for {}\n", there->mission(), *until,
+             fmt::join(*names, ", "));
   fmt::print("{:<9} {:<24} {:>10} {:<8} {}\n", "role", "name", "number", "state", "valid until");
   for (const pki::Member& member : there->members())
     fmt::print("{:<9} {:<24} {:>10} {:<8} {}\n", name(member.user.role), member.user.name, member.user.number,
@@ -101,6 +105,15 @@ void add_days(CLI::App& command, int& days) {
       ->type_name("N")
       ->check(CLI::Range(1, pki::kAuthorityDays))
       ->capture_default_str();
+}
+
+void add_names(CLI::App& command, std::vector<std::string>& names) {
+  command
+      .add_option(
+          "--name", names,
+          "A name or an address of this machine, under which browsers open its page; may be given several times")
+      ->type_name("HOST")
+      ->allow_extra_args(false);
 }
 
 void add_member(CLI::App& app, BusRole role, const char* help, int& exit_code) {
@@ -129,7 +142,8 @@ void add_pki_command(CLI::App& app, int& exit_code) {
       "its role and no others (docs/security.md). A server that runs with --pki follows within two seconds.");
   command->require_subcommand(1);
   command->footer(
-      "Example: tutti pki init --mission cave; tutti pki add-robot alpha; tutti pki add-operator anna;\n"
+      "Example: tutti pki init --mission cave --name base.local --name 10.0.0.1; tutti pki add-robot alpha; tutti pki "
+      "add-operator anna;\n"
       "         tutti server --pki pki --mission cave --listen 0.0.0.0:4222 --state /var/lib/tutti-server\n"
       "         tutti robot --name alpha --credentials alpha.cred --bus tls://BASE:4222 --mission cave ..\n");
   const auto made = std::make_shared<PkiOptions>(), revoked = std::make_shared<PkiOptions>(),
@@ -140,6 +154,7 @@ void add_pki_command(CLI::App& app, int& exit_code) {
       ->type_name("NAME")
       ->capture_default_str();
   add_days(*one, made->days);
+  add_names(*one, made->names);
   add_member(*command, BusRole::robot,
              "A robot: writes as itself, reads what is its own. Prints its credential's file.", exit_code);
   add_member(*command, BusRole::worker, "A worker: takes jobs and answers them.", exit_code);
@@ -152,8 +167,9 @@ void add_pki_command(CLI::App& app, int& exit_code) {
   one = add_one(*command, "renew",
                 "A new certificate, with the key that is there: the bus's, or of NAME. Nobody needs to start again.",
                 renewed, exit_code, renew);
-  one->add_option("name", renewed->name, "Whose; default: the bus's")->type_name("NAME");
+  one->add_option("member", renewed->name, "Whose; default: the bus's")->type_name("NAME");
   add_days(*one, renewed->days);
+  add_names(*one, renewed->names);
   add_one(*command, "list", "Who is known, and until when.", listed, exit_code, list);
 }
 

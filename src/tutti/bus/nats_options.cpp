@@ -51,10 +51,13 @@ std::string advice_to(const BusUser& member, natsStatus status, const std::strin
     return fmt::format("the bus does not know the key of {}: revoked, expired, or of another folder of `tutti pki`",
                        to_string(member));
   if (status == NATS_SSL_ERROR && detail.find("certificate") != std::string::npos)
-    return "the bus's certificate is not of the credential's authority: another bus, or another folder of `tutti pki`";
+    return "the bus's certificate is not of the credential's authority (another bus, or another folder of `tutti "
+           "pki`), or has expired by this machine's clock, which may be wrong: compare `date -u` on both";
   if (status == NATS_SSL_ERROR || status == NATS_PROTOCOL_ERROR || status == NATS_IO_ERROR)
-    return fmt::format("the bus hung up: has the certificate of {} expired (tutti pki list, tutti pki renew)?",
-                       to_string(member));
+    return fmt::format(
+        "the bus hung up: has the certificate of {} expired (tutti pki list, tutti pki renew), or is the bus's "
+        "clock wrong (date -u)?",
+        to_string(member));
   return {};
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/pki/certificates.hpp"
 
+#include <arpa/inet.h>
 #include <fmt/format.h>
 #include <openssl/bio.h>
 #include <openssl/err.h>
@@ -10,11 +11,14 @@
 #include <openssl/x509.h>
 #include <openssl/x509v3.h>
 
+#include <algorithm>
 #include <array>
+#include <cctype>
 #include <ctime>
 #include <memory>
 #include <utility>
-#include <vector>
+
+#include "tutti/base/plain_text.hpp"
 
 namespace tutti::pki {
 namespace {
@@ -28,6 +32,8 @@ struct OpenSslFree {
 };
 template <class T>
 using Owned = std::unique_ptr<T, OpenSslFree>;
+
+constexpr std::size_t kLongestHostName = 253;
 
 tl::unexpected<Error> failure(const char* doing) {
   std::array<char, 256> why{};
@@ -49,11 +55,17 @@ Owned<X509> certificate_of(const std::string& text) {
   return Owned<X509>(PEM_read_bio_X509(reader_of(text).get(), nullptr, nullptr, nullptr));
 }
 
-/// A day before now, for clocks that are behind.
+/// From 1970 on: a robot without a battery for its clock, or without NTP, may be years behind.
 bool set_times(X509* made, int days) {
   constexpr long kDay_s = 24L * 3600L;
-  return X509_gmtime_adj(X509_getm_notBefore(made), days > 0 ? -kDay_s : (days - 1) * kDay_s) != nullptr &&
+  return ASN1_TIME_set(X509_getm_notBefore(made), 0) != nullptr &&
          X509_gmtime_adj(X509_getm_notAfter(made), days * kDay_s) != nullptr;
+}
+
+bool is_address(const std::string& name) {
+  std::array<unsigned char, 16> address{};
+  return inet_pton(AF_INET, name.c_str(), address.data()) == 1 ||
+         inet_pton(AF_INET6, name.c_str(), address.data()) == 1;
 }
 
 bool set_number(X509* made) {
@@ -103,8 +115,18 @@ Result<bus::Certificate> make_authority(const std::string& name, int days) {
                {NID_subject_key_identifier, "hash"}});
 }
 
+Status check_host_name(const std::string& name) {
+  const auto fits = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '.' || c == '-'; };
+  if (is_address(name) || (!name.empty() && name.size() <= kLongestHostName && std::ranges::all_of(name, fits)))
+    return {};
+  return fail(
+      ErrorCode::configuration,
+      "name '{}': expected that of a machine (base.local: letters, digits, '.' and '-') or an address (10.0.0.1)",
+      plain_text(name));
+}
+
 Result<bus::Certificate> make_certificate(const bus::Certificate& authority, const std::string& name, bool is_bus,
-                                          int days) {
+                                          int days, const std::vector<std::string>& more_names) {
   const Owned<X509> issuer = certificate_of(authority.text);
   const Owned<EVP_PKEY> signer(PEM_read_bio_PrivateKey(reader_of(authority.key).get(), nullptr, nullptr, nullptr));
   if (!issuer || !signer) return failure("the authority's certificate and key");
@@ -112,12 +134,39 @@ Result<bus::Certificate> make_certificate(const bus::Certificate& authority, con
                                                       {NID_key_usage, "critical,digitalSignature"},
                                                       {NID_ext_key_usage, is_bus ? "serverAuth" : "clientAuth"},
                                                       {NID_authority_key_identifier, "keyid"}};
-  if (is_bus) extensions.emplace_back(NID_subject_alt_name, "DNS:" + name);
+  std::string names = "DNS:" + name;
+  for (const std::string& more : more_names) {
+    if (Status ok = check_host_name(more); !ok) return tl::unexpected(ok.error());
+    if (more != name) names += (is_address(more) ? ",IP:" : ",DNS:") + more;
+  }
+  if (is_bus) extensions.emplace_back(NID_subject_alt_name, names);
   return make(name, days, issuer.get(), signer.get(), extensions);
 }
 
 Result<std::string> valid_until(const std::string& certificate) {
   return holder_of(certificate_of(certificate).get()).map(&CertificateHolder::until);
+}
+
+Result<std::vector<std::string>> names_of(const std::string& certificate) {
+  const Owned<X509> from = certificate_of(certificate);
+  if (!from) return failure("a certificate");
+  const std::unique_ptr<GENERAL_NAMES, decltype(&GENERAL_NAMES_free)> all(
+      static_cast<GENERAL_NAMES*>(X509_get_ext_d2i(from.get(), NID_subject_alt_name, nullptr, nullptr)),
+      &GENERAL_NAMES_free);
+  std::vector<std::string> out;
+  for (int i = 0; i < sk_GENERAL_NAME_num(all.get()); ++i) {
+    int kind = 0;
+    const auto* const value =
+        static_cast<const ASN1_STRING*>(GENERAL_NAME_get0_value(sk_GENERAL_NAME_value(all.get(), i), &kind));
+    const auto* const bytes = ASN1_STRING_get0_data(value);
+    const auto size = static_cast<std::size_t>(ASN1_STRING_length(value));
+    std::array<char, INET6_ADDRSTRLEN> address{};
+    if (kind == GEN_DNS) out.emplace_back(reinterpret_cast<const char*>(bytes), size);
+    if (kind == GEN_IPADD &&
+        inet_ntop(size == 4 ? AF_INET : AF_INET6, bytes, address.data(), address.size()) != nullptr)
+      out.emplace_back(address.data());
+  }
+  return out;
 }
 
 Result<CertificateHolder> holder_of(const X509* certificate) {

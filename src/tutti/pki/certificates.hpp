@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "tutti/base/result.hpp"
 #include "tutti/bus/bus_credentials.hpp"
@@ -10,14 +11,18 @@ struct x509_st;
 
 namespace tutti::pki {
 
-/// Certificates by OpenSSL: keys of the curve P-256, signed with SHA-256. `days` is how long they are valid from now
-/// on. Errors are OpenSSL's.
+/// Certificates by OpenSSL: keys of the curve P-256, signed with SHA-256. They are valid from 1970 on, for clocks that
+/// are behind; `days` is for how long from now. Errors are OpenSSL's.
 
 /// Makes that of an authority, which signs the others.
 Result<bus::Certificate> make_authority(const std::string& name, int days);
-/// Makes that of a bus under `name`, or of somebody who connects to it.
+/// Makes that of a bus under `name` and `more_names` (of machines, and addresses), or of somebody who connects to it.
 Result<bus::Certificate> make_certificate(const bus::Certificate& authority, const std::string& name, bool is_bus,
-                                          int days);
+                                          int days, const std::vector<std::string>& more_names = {});
+/// Whether a bus's certificate can have this name.
+Status check_host_name(const std::string& name);
+/// The names and addresses of a bus's certificate, the first one first.
+Result<std::vector<std::string>> names_of(const std::string& certificate);
 /// "2027-01-31 12:00:00 UTC", until when a certificate is valid.
 Result<std::string> valid_until(const std::string& certificate);
 /// Whose a certificate is, as given to make_certificate(), and until when it is valid. Who signed it is for the TLS

@@ -2,8 +2,13 @@
 #include "tutti/pki/certificates.hpp"
 
 #include <gtest/gtest.h>
+#include <openssl/pem.h>
+#include <openssl/x509.h>
 
+#include <ctime>
+#include <memory>
 #include <string>
+#include <vector>
 
 namespace tutti::pki {
 namespace certificates_test {
@@ -22,6 +27,35 @@ TEST(CertificatesTest, EachIsAnotherAndSaysUntilWhen) {
   EXPECT_LT(valid_until(one->text).value(), valid_until(other->text).value());
   EXPECT_LT(valid_until(other->text).value(), valid_until(authority->text).value());
   EXPECT_EQ(valid_until(one->text)->size(), std::string("2027-01-31 12:00:00 UTC").size());
+}
+
+TEST(CertificatesTest, ThatOfABusHasTheNamesOfItsMachineToo) {
+  const auto authority = make_authority("authority", 10).value();
+  const auto bus =
+      make_certificate(authority, "bus.tutti", true, 1, {"base.local", "10.0.0.1", "fe80::1", "bus.tutti"});
+  ASSERT_TRUE(bus) << bus.error().message;
+  EXPECT_EQ(names_of(bus->text).value(), (std::vector<std::string>{"bus.tutti", "base.local", "10.0.0.1", "fe80::1"}));
+  EXPECT_TRUE(names_of(authority.text)->empty());
+  for (const char* wrong : {"", "a b", "base.local,DNS:bank.example", "*", "base/"}) {
+    const auto refused = make_certificate(authority, "bus.tutti", true, 1, {wrong});
+    ASSERT_FALSE(refused) << wrong;
+    EXPECT_NE(refused.error().message.find("base.local"), std::string::npos) << "what is expected";
+  }
+}
+
+/// A robot without a battery for its clock begins in 1970, or with the day of its image.
+TEST(CertificatesTest, TheyAreValidForAClockThatIsYearsBehind) {
+  const auto authority = make_authority("authority", 10).value();
+  for (const auto& made : {authority, make_certificate(authority, "bus.tutti", true, 1).value(),
+                           make_certificate(authority, "robot alpha", false, 1).value()}) {
+    const std::unique_ptr<BIO, decltype(&BIO_free)> text(
+        BIO_new_mem_buf(made.text.data(), static_cast<int>(made.text.size())), &BIO_free);
+    const std::unique_ptr<X509, decltype(&X509_free)> read(PEM_read_bio_X509(text.get(), nullptr, nullptr, nullptr),
+                                                           &X509_free);
+    ASSERT_NE(read, nullptr);
+    std::time_t in_1971 = 365L * 24L * 3600L;
+    EXPECT_LT(X509_cmp_time(X509_get0_notBefore(read.get()), &in_1971), 0);
+  }
 }
 
 TEST(CertificatesTest, WhatIsNoCertificateIsRefused) {

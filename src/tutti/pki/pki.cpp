@@ -98,7 +98,10 @@ class Pki::Turn {
   Status state_;
 };
 
-Result<Pki> Pki::make(const fs::path& folder, const std::string& mission, int days) {
+Result<Pki> Pki::make(const fs::path& folder, const std::string& mission, int days,
+                      const std::vector<std::string>& names) {
+  for (const std::string& name : names)
+    if (Status ok = check_host_name(name); !ok) return tl::unexpected(ok.error());
   if (Status ok = bus::check_mission_name(mission); !ok) return tl::unexpected(ok.error());
   std::error_code ignored;
   Pki pki(fs::absolute(folder).lexically_normal());
@@ -115,7 +118,7 @@ Result<Pki> Pki::make(const fs::path& folder, const std::string& mission, int da
   pki.mission_ = mission;
   Status done = write_private(pki.folder_ / kAuthority, authority->text);
   if (done) done = write_private(pki.folder_ / kAuthorityKey, authority->key);
-  if (done) done = pki.make_bus_certificate(days);
+  if (done) done = pki.make_bus_certificate(days, names);
   if (done) done = pki.write();
   if (!done) return tl::unexpected(done.error());
   if (const auto server = pki.add(bus::BusRole::server, kServer, std::nullopt, days); !server)
@@ -172,10 +175,10 @@ Result<std::string> Pki::bus_configuration(const std::string& now) const {
       bus::authorization(mission_, users));
 }
 
-Status Pki::make_bus_certificate(int days) const {
+Status Pki::make_bus_certificate(int days, const std::vector<std::string>& names) const {
   const auto authority = read_certificate(folder_ / kAuthority, folder_ / kAuthorityKey);
   if (!authority) return tl::unexpected(authority.error());
-  const auto made = make_certificate(*authority, bus::kBusName, true, days);
+  const auto made = make_certificate(*authority, bus::kBusName, true, days, names);
   if (!made) return tl::unexpected(made.error());
   if (Status done = write_private(folder_ / kBusKey, made->key); !done) return done;
   return write_private(folder_ / kBusCertificate, made->text);
@@ -243,11 +246,15 @@ Status Pki::revoke(const std::string& name) {
   return {};
 }
 
-Status Pki::renew(const std::string& name, int days) {
+Status Pki::renew(const std::string& name, int days, const std::vector<std::string>& more_names) {
   const Turn turn(*this);
   if (!turn.state()) return turn.state();
   if (name.empty()) {
-    if (Status done = make_bus_certificate(days); !done) return done;
+    auto names = bus_names();
+    if (!names) return tl::unexpected(names.error());
+    for (const std::string& more : more_names)
+      if (std::ranges::count(*names, more) == 0) names->push_back(more);
+    if (Status done = make_bus_certificate(days, *names); !done) return done;
     return write();
   }
   Member* const member = find(name);
@@ -259,6 +266,12 @@ Status Pki::renew(const std::string& name, int days) {
     return fail(ErrorCode::invalid, "{}: another key than {} has", credential(name).string(), to_string(member->user));
   if (Status done = write_credential(member->user, credentials->key, days, member->until); !done) return done;
   return write();
+}
+
+Result<std::vector<std::string>> Pki::bus_names() const {
+  const auto text = read_file((folder_ / kBusCertificate).string());
+  if (!text) return tl::unexpected(text.error());
+  return names_of(*text);
 }
 
 Result<std::string> Pki::bus_until() const {

@@ -36,7 +36,9 @@ inline constexpr int kDays = 397;
 class Pki {
  public:
   /// Makes the folder, which must not be one already, and the server's own credential.
-  static Result<Pki> make(const std::filesystem::path& folder, const std::string& mission, int days = kDays);
+  /// The bus's certificate also has `names`, of machines or addresses, under which browsers open its page.
+  static Result<Pki> make(const std::filesystem::path& folder, const std::string& mission, int days = kDays,
+                          const std::vector<std::string>& names = {});
   static Result<Pki> open(const std::filesystem::path& folder);
 
   /// Makes a member, and returns the file with its credential. `number` is a robot's; others are counted. Fails when
@@ -45,8 +47,9 @@ class Pki {
                                     int days = kDays);
   /// Its key opens nothing any more; the credential is removed.
   Status revoke(const std::string& name);
-  /// A new certificate for a member, with the key that it has; with no name for the bus. Whoever is connected stays so.
-  Status renew(const std::string& name, int days = kDays);
+  /// A new certificate for a member, with the key that it has; with no name for the bus, whose certificate keeps its
+  /// names and gets `more_names`. Whoever is connected stays so.
+  Status renew(const std::string& name, int days = kDays, const std::vector<std::string>& more_names = {});
 
   /// The blocks `tls`, `authorization` and `accounts` of nats-server's configuration, with the rights of all who are
   /// not revoked and, at this time (utc_text()), have a certificate that has not expired.
@@ -55,6 +58,8 @@ class Pki {
   [[nodiscard]] const std::vector<Member>& members() const { return members_; }
   /// Until when the bus's certificate is valid.
   [[nodiscard]] Result<std::string> bus_until() const;
+  /// Its names and addresses, bus::kBusName first.
+  [[nodiscard]] Result<std::vector<std::string>> bus_names() const;
   [[nodiscard]] std::filesystem::path credential(const std::string& name) const;
 
  private:
@@ -63,7 +68,7 @@ class Pki {
   class Turn;
   Status read();
   [[nodiscard]] Status write() const;
-  Status make_bus_certificate(int days) const;
+  [[nodiscard]] Status make_bus_certificate(int days, const std::vector<std::string>& names) const;
   [[nodiscard]] Status write_credential(const bus::BusUser& user, const bus::NatsKey& key, int days,
                                         std::string& until) const;
   [[nodiscard]] Member* find(const std::string& name);

@@ -2,8 +2,10 @@
 #include "tutti/program/page/page_server.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -13,6 +15,7 @@
 #include <utility>
 
 #include "tutti/bus/bus_address.hpp"
+#include "tutti/bus/bus_credentials.hpp"
 #include "tutti/pki/pki.hpp"
 #include "tutti/program/clock.hpp"
 #include "tutti/program/incarnation.hpp"
@@ -28,6 +31,16 @@ using program::Clock, program::Level, mapfile::ShownMap;
 
 constexpr double kPeriod_s = 1.0;  // at least between two maps that are shown
 constexpr double kRestPerWork = 4.0;
+
+/// Where a browser finds a page that listens at `host`: nobody can open 0.0.0.0.
+std::string host_to_open(const std::string& host, const std::vector<std::string>& names) {
+  if (host != "0.0.0.0" && host != "::") return host;
+  const auto named = std::ranges::find_if(names, [](const std::string& name) { return name != bus::kBusName; });
+  if (named != names.end()) return *named;
+  std::array<char, 256> own{};
+  static_cast<void>(gethostname(own.data(), own.size() - 1));
+  return own[0] == '\0' ? "localhost" : own.data();
+}
 
 class PageViewer final : public program::MapViewer {
  public:
@@ -56,6 +69,12 @@ class PageViewer final : public program::MapViewer {
     server_ = std::make_unique<GuardedServer>();
     if (!pki.empty() && !server_->use_tls({pki / pki::kBusCertificate, pki / pki::kBusKey, pki / pki::kAuthority}))
       return fail(ErrorCode::io, "--view: the certificate of {} cannot be used", pki.string());
+    if (!pki.empty()) {
+      const auto there = pki::Pki::open(pki);
+      auto names = there ? there->bus_names() : tl::unexpected(there.error());
+      if (!names) return in_context("--view", names.error());
+      site_.names = std::move(*names);
+    }
     add_routes(*server_, site_);
     const int port = server_->bind(address.host, address.port);
     if (port < 0)
@@ -64,8 +83,8 @@ class PageViewer final : public program::MapViewer {
     site_.is_secure = !pki.empty();
     listens_ = std::thread([this] { server_->listen_after_bind(); });
     makes_ = std::jthread([this](const std::stop_token& stop) { make_all(stop); });
-    const std::string url =
-        fmt::format("{}://{}/", pki.empty() ? "http" : "https", to_string(bus::HostPort{address.host, port}));
+    const std::string url = fmt::format("{}://{}/", pki.empty() ? "http" : "https",
+                                        to_string(bus::HostPort{host_to_open(address.host, site_.names), port}));
     say_(Level::info, "the page is at " + url);
     if (announce_) announce_(url);
     return {};

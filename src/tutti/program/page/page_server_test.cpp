@@ -202,6 +202,45 @@ TEST_F(PageServer, WithCredentialsShowsNothingToStrangersAndLetsOperatorsDecide)
   EXPECT_EQ(decide("alpha/0-bravo/1", "accept", ours(anna)), "401");
 }
 
+/// Whoever has imported the authority opens the page without a warning, under the names that it was made for.
+TEST_F(PageServer, IsServedUnderTheNamesOfItsCertificate) {
+  fs::create_directories(folder_);
+  const std::vector<std::string> names{"base.local"};
+  ASSERT_TRUE(pki::Pki::make(folder_ / "pki", "cave", pki::kDays, names));
+  start(folder_ / "pki");
+  auto http = client();
+  for (const char* host : {"base.local", "bus.tutti", "127.0.0.1"})
+    EXPECT_EQ(http.Get("/api/me", {{"Host", fmt::format("{}:8080", host)}})->status, 200) << host;
+  EXPECT_EQ(http.Get("/api/me", {{"Host", "evil.example:8080"}})->status, 421);
+  const auto [host, port] = std::pair(std::string("127.0.0.1"), std::stoi(url_.substr(url_.rfind(':') + 1)));
+  httplib::SSLClient trusting(host, port);
+  trusting.set_ca_cert_path((folder_ / "pki" / pki::kAuthority).string());
+  trusting.enable_server_certificate_verification(true);
+  EXPECT_FALSE(trusting.Get("/api/me")) << "the address is not in the certificate";
+  httplib::SSLClient named("base.local", port);
+  named.set_hostname_addr_map({{"base.local", "127.0.0.1"}});
+  named.set_ca_cert_path((folder_ / "pki" / pki::kAuthority).string());
+  named.enable_server_certificate_verification(true);
+  const auto answer = named.Get("/api/me");
+  ASSERT_TRUE(answer) << httplib::to_string(answer.error());
+  EXPECT_EQ(answer->status, 200);
+}
+
+TEST_F(PageServer, TheUrlOfAPageThatListensEverywhereCanBeOpened) {
+  fs::create_directories(folder_);
+  const std::vector<std::string> names{"base.local"};
+  ASSERT_TRUE(pki::Pki::make(folder_ / "pki", "cave", pki::kDays, names));
+  sockaddr_in free{};
+  socklen_t size = sizeof free;
+  free.sin_family = AF_INET;
+  const int one = socket(AF_INET, SOCK_STREAM, 0);  // which port is free
+  ASSERT_EQ(bind(one, reinterpret_cast<const sockaddr*>(&free), sizeof free), 0);
+  ASSERT_EQ(getsockname(one, reinterpret_cast<sockaddr*>(&free), &size), 0);
+  close(one);
+  start(folder_ / "pki", fmt::format("0.0.0.0:{}", ntohs(free.sin_port)));
+  EXPECT_TRUE(url_.starts_with("https://base.local:")) << url_;
+}
+
 /// The right counts when the decision is there, and not only when its head has come.
 TEST_F(PageServer, WhoLogsOutWhileADecisionIsSentDoesNotDecide) {
   fs::create_directories(folder_);

@@ -5,6 +5,7 @@
 #include <httplib.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <charconv>
@@ -46,7 +47,7 @@ std::string token_of(const Request& request) {
 }
 
 /// A page of somebody else's, under a name of his own that leads here, is not to read or decide.
-bool is_our_host(const std::string& header) {
+bool is_our_host(const std::string& header, const std::vector<std::string>& names) {
   const auto at = bus::parse_host_port(header);
   if (!at) return false;
   std::array<char, 256> own{};
@@ -54,7 +55,8 @@ bool is_our_host(const std::string& header) {
   const std::string& host = at->host;
   const bool is_address =
       host.find_first_not_of("0123456789.") == std::string::npos || host.find(':') != std::string::npos;
-  return is_address || host == "localhost" || host == own.data() || host == std::string(own.data()) + ".local";
+  return is_address || host == "localhost" || host == own.data() || host == std::string(own.data()) + ".local" ||
+         std::ranges::count(names, host) > 0;
 }
 
 std::string cookie(const std::string& token, bool is_secure) {
@@ -310,10 +312,12 @@ void add_routes(httplib::Server& server, Site& site) {
                               {"X-Content-Type-Options", "nosniff"},
                               {"Referrer-Policy", "no-referrer"},
                               {"Cross-Origin-Resource-Policy", "same-origin"}});
-  server.set_pre_routing_handler([routes](const Request& request, Response& response) {
+  server.set_pre_routing_handler([routes, &site](const Request& request, Response& response) {
     using enum httplib::Server::HandlerResponse;
-    if (!is_our_host(request.get_header_value("Host"))) {
-      say(response, 421, "this page is served under addresses and this machine's name only");
+    if (!is_our_host(request.get_header_value("Host"), site.names)) {
+      say(response, 421,
+          "this page is served under addresses, this machine's name and those of its certificate only (tutti pki renew "
+          "--name NAME, then start the server again)");
       return Handled;
     }
     return request.method == "POST" && routes->refuses_unread(request, response) ? Handled : Unhandled;

@@ -54,8 +54,8 @@ class ServedPage : public ::testing::Test {
     viewer_.reset();
     fs::remove_all(folder_);
   }
-  void start(const fs::path& pki = {}) {
-    PageOptions options{.listen = "0", .announce = [this](const std::string& url) { url_ = url; }};
+  void start(const fs::path& pki = {}, const std::string& listen = "0") {
+    PageOptions options{.listen = listen, .announce = [this](const std::string& url) { url_ = url; }};
     auto made = serve_page(options, {.name = "cave",
                                      .version = "1",
                                      .map = store_,
