@@ -9,7 +9,7 @@ set(TUTTI_DEBIAN_DEV
   "Eigen3::Eigen=libeigen3-dev" "tl::expected=libexpected-dev" "fmt::fmt=libfmt-dev" "yaml-cpp=libyaml-cpp-dev"
   "protobuf::libprotobuf-lite=libprotobuf-dev" "PNG::PNG=libpng-dev" "ZLIB::ZLIB=zlib1g-dev" "Threads::Threads=" "Ceres::ceres=libceres-dev"
   "tutti::cholmod=libsuitesparse-dev" "tutti::lapacke=liblapacke-dev, libopenblas-dev" "tutti::zstd=libzstd-dev"
-  "tutti::lz4=liblz4-dev" "tutti::bz2=libbz2-dev" "tutti::crypto=libssl-dev" "tutti::sqlite=libsqlite3-dev" "tutti::nats=libnats-dev"
+  "tutti::lz4=liblz4-dev" "tutti::bz2=libbz2-dev" "tutti::crypto=libssl-dev" "tutti::ssl=libssl-dev" "tutti::sqlite=libsqlite3-dev" "tutti::nats=libnats-dev"
   "tutti::turbojpeg=libturbojpeg0-dev"
   "tutti::opencv=libopencv-core-dev, libopencv-imgproc-dev, libopencv-features2d-dev, libopencv-video-dev")
 

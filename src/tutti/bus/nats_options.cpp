@@ -33,8 +33,7 @@ natsStatus sign(char** /*why*/, unsigned char** signature, int* size, const char
 bool secure(natsOptions* made, const BusUrl& url, const BusCredentials& credentials) {
   if (!credentials.known) return url.scheme != "tls" || natsOptions_SetSecure(made, true) == NATS_OK;
   const Certificate& own = credentials.certificate;
-  return natsOptions_SetSecure(made, true) == NATS_OK &&
-         natsOptions_SetCATrustedCertificates(made, credentials.authority.c_str()) == NATS_OK &&
+  return secure_by_authority(made, credentials.authority) &&
          natsOptions_SetCertificatesChain(made, own.text.c_str(), own.key.c_str()) == NATS_OK &&
          natsOptions_SetExpectedHostname(made, kBusName) == NATS_OK &&
          natsOptions_SetIgnoreDiscoveredServers(made, true) == NATS_OK &&

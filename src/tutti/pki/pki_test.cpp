@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 
 #include <chrono>
+#include <cstdlib>
 #include <filesystem>
 #include <string>
 
@@ -14,6 +15,7 @@
 #include "tutti/bus/internal/nats_connection.hpp"
 #include "tutti/bus/mission_lease.hpp"
 #include "tutti/bus/transport.hpp"
+#include "tutti/pki/certificates.hpp"
 
 namespace tutti::pki {
 namespace pki_test {
@@ -178,6 +180,35 @@ TEST_F(PkiTest, WhoHasNoCertificateOfOursIsNotLetIn) {
   const auto refusals = child_->take_refusals();
   EXPECT_GE(refusals.all.size(), 3U);
   for (const bus::BusRefusal& refusal : refusals.all) EXPECT_EQ(refusal.key, "");
+}
+
+/// An authority of the system's store, as of a company that looks into its traffic, signs buses of the right name.
+TEST_F(PkiTest, ABusOfAnAuthorityThatOnlyTheSystemTrustsIsNotOurs) {
+  const auto foreign = make_authority("company", 10).value();
+  const auto bus = make_certificate(foreign, bus::kBusName, true, 10).value();
+  const fs::path store = folder_ / "system.pem";
+  ASSERT_TRUE(write_file((folder_ / "pki" / kBusCertificate).string(), bus.text));
+  ASSERT_TRUE(write_file((folder_ / "pki" / kBusKey).string(), bus.key));
+  ASSERT_TRUE(write_file(store.string(), foreign.text));
+  setenv("SSL_CERT_FILE", store.c_str(), 1);  // OpenSSL's system store
+  const auto server = credentials("server");
+  auto of_foreign = server;
+  of_foreign.authority = foreign.text;
+  const auto ready = bus::NatsChild::start(folder_ / "bus", {.rights = pki_->bus_configuration("").value(),
+                                                             .credentials = of_foreign,
+                                                             .max_store_bytes = 256U << 20U,
+                                                             .min_free_bytes = 0});
+  bus::BusOptions where{.url = ready ? (*ready)->url() : "", .mission = "cave", .credentials = of_foreign};
+  const auto there = bus::NatsConnection::open(where, "foreign");
+  where.credentials = server;
+  const auto refused = bus::NatsConnection::open(where, "ours");
+  unsetenv("SSL_CERT_FILE");
+  ASSERT_TRUE(ready.has_value()) << ready.error().message;
+  EXPECT_TRUE(there.has_value()) << there.error().message;
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_NE(refused.error().message.find("not of the credential's authority"), std::string::npos)
+      << refused.error().message;
+  EXPECT_NE(refused.error().message.find("date -u"), std::string::npos) << "a robot's clock may be the reason";
 }
 
 /// A bus without rights: who expects TLS learns so, not that something is not available.

@@ -37,6 +37,9 @@ inline constexpr std::chrono::milliseconds kNatsAnswer{5000};
 /// Parts that a consumer has been given and has not acknowledged; then the bus waits. More than an inbox can hold.
 inline constexpr std::uint64_t kMostUnacknowledged = 65'536;
 
+/// TLS with a bus whose certificate this authority (PEM) has signed, and no other, whatever the system trusts.
+bool secure_by_authority(natsOptions* options, const std::string& authority);
+
 /// Null: libnats does not take them. `credentials` must outlive the connection.
 NatsOwned<natsOptions> make_options(const BusUrl& url, const BusCredentials& credentials, const std::string& name);
 
