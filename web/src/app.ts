@@ -82,7 +82,7 @@ export class App {
       },
       ready: (keys) => {
         this.ready = true;
-        this.store.retain(keys);
+        if (keys) this.store.retain(keys);
         if (this.live) void this.ask_me();
         this.refresh("data");
       },

@@ -262,10 +262,26 @@ test("the server is killed, and back within three seconds", () =>
     await server.stop();
     await page.until("the page says so", () => /silent|No server/.test(document.querySelector(".badge").textContent));
     server.mission.time += 60;
+    Object.assign(server, { incarnation: 2, sent: [] });
     await server.start(port);
     const start = Date.now();
     await page.until("live again", () => document.querySelector(".badge").textContent === "Live");
     console.log(`    live again ${Date.now() - start} ms after the server`);
+    assert.equal(await page.evaluate(() => tutti.app.world.placed.size), 72);
+  }));
+
+test("a connection is cut: only what is new is sent again, and what ended meanwhile ends", () =>
+  served(small(), async (page, server, mission) => {
+    const [name] = mission.closures.keys();
+    const before = server.sent.length;
+    for (const listener of server.listeners) listener.destroy();
+    server.listeners.clear();
+    server.send(mission.message(`closure/${name}`, null)); // nobody hears it
+    server.tick(30);
+    const missed = server.sent.length - before;
+    await page.until("it is there again", () => document.querySelector(".badge").textContent === "Live");
+    await page.until("the closure is gone", (gone) => !tutti.app.store.get("closure", Infinity, gone), name);
+    assert.equal(server.sent.length, before + missed, "nothing of the map was sent again");
     assert.equal(await page.evaluate(() => tutti.app.world.placed.size), 72);
   }));
 

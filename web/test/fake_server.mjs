@@ -16,7 +16,7 @@ export class FakeServer {
     this.held = new Map();
     this.photos = new Map();
     this.asked = []; // POST requests, for tests
-    this.events = 0;
+    this.sent = []; // messages, in order: an event's id is this start's number and a place here
   }
 
   async start(port = 0) {
@@ -50,7 +50,8 @@ export class FakeServer {
     this.write(this.event(message));
   }
   event(message) {
-    return `id: ${++this.events}\ndata: ${JSON.stringify(message)}\n\n`;
+    this.sent.push(message);
+    return `id: ${this.incarnation}-${this.sent.length}\ndata: ${JSON.stringify(message)}\n\n`;
   }
   write(text) {
     for (const listener of this.listeners) listener.write(text);
@@ -65,7 +66,7 @@ export class FakeServer {
     if (url.pathname === "/api/me") return this.say(response, 200, this.me);
     const may_see = !this.me.login || this.me.role !== null;
     if (!may_see && request.method !== "POST") return this.say(response, 401, { error: "sign in with an operator's or viewer's credential" });
-    if (url.pathname === "/api/events") return this.stream(response);
+    if (url.pathname === "/api/events") return this.stream(response, request.headers["last-event-id"] ?? "");
     if (url.pathname.startsWith("/api/cloud/")) {
       const [, , , robot, , index] = url.pathname.split("/");
       return response.writeHead(200, { "Content-Type": "application/octet-stream", "Cache-Control": "immutable" }).end(this.mission.cloud(Number(robot), Number(index)));
@@ -87,10 +88,13 @@ export class FakeServer {
     for (const listener of this.listeners) listener.end();
   }
 
-  stream(response) {
+  stream(response, last) {
+    const [incarnation, heard] = last.split("-").map(Number);
+    const resumed = incarnation === this.incarnation && Number.isInteger(heard);
     response.writeHead(200, { "Content-Type": "text/event-stream", "Cache-Control": "no-store" });
-    response.write(`event: begin\ndata: ${JSON.stringify({ incarnation: this.incarnation })}\n\n`);
-    for (const message of [...this.mission.everything(), this.holders()]) response.write(this.event(message)); // also to who was cut off
+    response.write(`event: begin\ndata: ${JSON.stringify({ incarnation: this.incarnation, resumed })}\n\n`);
+    if (resumed) this.sent.slice(heard).forEach((message, i) => response.write(`id: ${incarnation}-${heard + i + 1}\ndata: ${JSON.stringify(message)}\n\n`));
+    else for (const message of [...this.mission.everything(), this.holders()]) response.write(this.event(message));
     response.write("event: ready\ndata: {}\n\n");
     this.listeners.add(response);
     response.on("close", () => this.listeners.delete(response));

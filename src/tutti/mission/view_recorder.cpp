@@ -26,7 +26,7 @@ void ViewRecorder::take(const mapfile::ShownMap& map, const std::optional<Missio
     alerts = page::joined(std::move(alerts), alerts_.of_status(*status));
   }
   board_.put(page::alerts_message(alerts, time_s));
-  for (const auto& message : board_.after(before)) messages_.push_back(*message);
+  for (const auto& message : board_.after(before)) messages_.push_back(message->message());
 }
 
 ViewRecord ViewRecorder::finish(const mapfile::ShownMap& last, const std::optional<MissionStatus>& status,

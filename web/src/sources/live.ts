@@ -5,10 +5,12 @@ import type { Callbacks, LinkState, Source } from "./source";
 import { SseParser } from "./sse";
 import type { SseEvent } from "./sse";
 
-/** Messages of `tutti server --view` as server-sent events. Reconnects by itself; everything is then sent again. */
+/** Messages of `tutti server --view` as server-sent events. Reconnects by itself; what is new since the last one is then sent. */
 export class LiveSource implements Source {
   readonly mode = "live";
   private incarnation: string | null = null;
+  /** Of the last message that came. */
+  private last = "";
   private link: LinkState = { state: "connecting", heard_ms: 0, why: "" };
   private abort = new AbortController();
   /** Keys since the connection was made, until all was sent. */
@@ -55,7 +57,8 @@ export class LiveSource implements Source {
   private async listen(on: Callbacks): Promise<void> {
     this.abort = new AbortController();
     const late = setTimeout(() => this.abort.abort(), 1000 * TIMES.server_silent_s);
-    const answer = await fetch("/api/events", { signal: this.abort.signal, cache: "no-store" }).finally(() => clearTimeout(late));
+    const headers: Record<string, string> = this.last ? { "Last-Event-ID": this.last } : {};
+    const answer = await fetch("/api/events", { signal: this.abort.signal, cache: "no-store", headers }).finally(() => clearTimeout(late));
     if (answer.status === 401) return this.set({ state: "locked", heard_ms: performance.now(), why: "" }, on);
     if (!answer.ok || !answer.body) throw new Error(`the server answers ${answer.status}`);
     this.seen = new Set();
@@ -71,18 +74,21 @@ export class LiveSource implements Source {
 
   private hear(event: SseEvent, on: Callbacks): void {
     if (event.event === "ready") {
-      if (this.seen) on.ready(this.seen);
+      on.ready(this.seen);
       this.seen = null;
       return;
     }
     const data: unknown = JSON.parse(event.data);
     if (event.event === "begin") {
-      const incarnation = JSON.stringify((data as { incarnation?: unknown }).incarnation ?? null);
+      const begin = data as { incarnation?: unknown; resumed?: boolean };
+      const incarnation = JSON.stringify(begin.incarnation ?? null);
+      if (begin.resumed) this.seen = null; // what is not sent again is still so
       if (this.incarnation !== null && this.incarnation !== incarnation) on.reset();
       this.incarnation = incarnation;
     } else if (event.event === "message") {
       this.seen?.add((data as Message).key);
       on.message(data as Message);
+      this.last = event.id;
     }
   }
 

@@ -7,8 +7,8 @@ export interface Callbacks {
   message: (message: Message) => void;
   /** All before is void. */
   reset: () => void;
-  /** All that was known has been sent: these keys. */
-  ready: (keys: ReadonlySet<string>) => void;
+  /** All that was known has been sent: these keys; null: what was new since the last message, and all others stay. */
+  ready: (keys: ReadonlySet<string> | null) => void;
   link: (link: LinkState) => void;
 }
 

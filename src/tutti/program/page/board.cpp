@@ -12,32 +12,37 @@ std::string to_json(const Message& message) {
          ",\"value\":" + message.value + "}";
 }
 
-bool Board::put(Message message) {
+Posted::Posted(const Message& message, std::uint64_t sequence)
+    : key_(message.key),
+      time_s_(message.time_s),
+      sequence_(sequence),
+      json_(to_json(message)),
+      value_at_(json_.size() - message.value.size() - 1) {}
+
+bool Board::put(const Message& message) {
   auto [found, is_new] = by_key_.try_emplace(message.key);
-  Entry& entry = found->second;
-  if (!is_new && entry.message->value == message.value) return false;
-  if (!is_new) order_.erase(entry.sequence);
-  entry.sequence = ++sequence_;
+  if (!is_new && found->second->value() == message.value) return false;
+  if (!is_new) order_.erase(found->second->sequence());
+  found->second = std::make_shared<const Posted>(message, ++sequence_);
   order_.emplace(sequence_, message.key);
-  entry.message = std::make_shared<const Message>(std::move(message));
   return true;
 }
 
 /// What has ended stays as "null": a page that was away is to hear of it.
-void Board::put_all(std::string_view prefix, std::vector<Message> messages, double time_s) {
+void Board::put_all(std::string_view prefix, const std::vector<Message>& messages, double time_s) {
   std::set<std::string, std::less<>> keys;
   for (const Message& message : messages) keys.insert(message.key);
   std::vector<std::string> ended;
   for (auto entry = by_key_.lower_bound(prefix); entry != by_key_.end() && entry->first.starts_with(prefix); ++entry)
     if (!keys.contains(entry->first)) ended.push_back(entry->first);
   for (std::string& key : ended) put({std::move(key), time_s, "null"});
-  for (Message& message : messages) put(std::move(message));
+  for (const Message& message : messages) put(message);
 }
 
-std::vector<std::shared_ptr<const Message>> Board::after(std::uint64_t sequence) const {
-  std::vector<std::shared_ptr<const Message>> out;
+std::vector<std::shared_ptr<const Posted>> Board::after(std::uint64_t sequence) const {
+  std::vector<std::shared_ptr<const Posted>> out;
   for (auto next = order_.upper_bound(sequence); next != order_.end(); ++next)
-    out.push_back(by_key_.find(next->second)->second.message);
+    out.push_back(by_key_.find(next->second)->second);
   return out;
 }
 

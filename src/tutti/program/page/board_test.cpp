@@ -8,7 +8,7 @@ namespace board_test {
 
 std::vector<std::string> keys(const Board& board, std::uint64_t after) {
   std::vector<std::string> out;
-  for (const auto& message : board.after(after)) out.push_back(message->key + "=" + message->value);
+  for (const auto& message : board.after(after)) out.push_back(message->message().key + "=" + message->message().value);
   return out;
 }
 using Keys = std::vector<std::string>;
@@ -24,6 +24,18 @@ TEST(Board, GivesWhoComesLateTheLastOfEachKeyInOrder) {
   EXPECT_EQ(keys(board, seen), Keys());
   board.put({"b", 3.0, "2"});
   EXPECT_EQ(keys(board, seen), Keys{"b=2"});
+}
+
+/// Thirty-two who watch a map of 100 MB take no 3 GB.
+TEST(Board, HasOneTextForAllWhoWatch) {
+  Board board;
+  board.put({"a", 1.0, "[1]"});
+  const auto one = board.after(0), other = board.after(0);
+  EXPECT_EQ(one.front()->json(), R"({"key":"a","t":1.0,"value":[1]})");
+  EXPECT_EQ(one.front()->json().data(), other.front()->json().data());
+  EXPECT_EQ(one.front()->value(), "[1]");
+  EXPECT_EQ(one.front()->message(), (Message{"a", 1.0, "[1]"}));
+  EXPECT_EQ(one.front()->sequence(), 1U);
 }
 
 TEST(Board, EndsWhatIsNoLongerAmongThoseOfAPrefix) {

@@ -24,12 +24,16 @@ class LiveBoard {
     changed_.notify_all();
   }
   /// What was put after `sequence`, which then counts it; waits for it at most so long. Empty after close().
-  std::vector<std::shared_ptr<const Message>> wait_after(std::uint64_t& sequence, std::chrono::milliseconds at_most) {
+  std::vector<std::shared_ptr<const Posted>> wait_after(std::uint64_t& sequence, std::chrono::milliseconds at_most) {
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, at_most, [&] { return closed_ || board_.sequence() > sequence; });
-    auto out = closed_ ? std::vector<std::shared_ptr<const Message>>() : board_.after(sequence);
+    auto out = closed_ ? std::vector<std::shared_ptr<const Posted>>() : board_.after(sequence);
     sequence = board_.sequence();
     return out;
+  }
+  /// The same without waiting.
+  std::vector<std::shared_ptr<const Posted>> after(std::uint64_t& sequence) {
+    return wait_after(sequence, std::chrono::milliseconds(0));
   }
   void close() {
     {

@@ -51,6 +51,38 @@ TEST_F(PageServer, ShowsTheMissionToWhoComesLate) {
   EXPECT_NE(page->get_header_value("Content-Security-Policy").find("default-src 'none'"), std::string::npos);
 }
 
+TEST_F(PageServer, WhoWasCutOffIsSentWhatIsNew) {
+  start();
+  events_with_map();
+  const std::string all = event_text();
+  EXPECT_NE(all.find(R"("resumed":false)"), std::string::npos);
+  EXPECT_NE(all.find("\"key\":\"submap/"), std::string::npos);
+  const std::size_t last = all.rfind("id: ") + 4;
+  const std::string id = all.substr(last, all.find('\n', last) - last);
+  std::string since = event_text({{"Last-Event-ID", id}});
+  EXPECT_NE(since.find(R"("resumed":true)"), std::string::npos) << since;
+  EXPECT_EQ(since.find("\"key\""), std::string::npos) << since;
+  viewer_->show_status({.time = Timestamp{} + 7.0, .revision = 4}, {});
+  since = event_text({{"Last-Event-ID", id}});
+  EXPECT_NE(since.find(R"("key":"status")"), std::string::npos) << since;
+  EXPECT_EQ(since.find("\"key\":\"submap/"), std::string::npos) << since;
+  for (const char* wrong : {"1-1", "", "nonsense", "1", "-"})
+    EXPECT_NE(event_text({{"Last-Event-ID", wrong}}).find("\"key\":\"submap/"), std::string::npos) << wrong;
+}
+
+/// The first message that does not arrive is the first to be sent again.
+TEST_F(PageServer, EveryMessageHasANumberOfItsOwn) {
+  start();
+  events_with_map();
+  const std::string all = event_text();
+  std::set<std::string> ids;
+  std::size_t messages = 0;
+  for (std::size_t at = all.find("id: "); at != std::string::npos; at = all.find("id: ", at + 1), ++messages)
+    ids.insert(all.substr(at, all.find('\n', at) - at));
+  EXPECT_GT(messages, 20U);
+  EXPECT_EQ(ids.size(), messages);
+}
+
 TEST_F(PageServer, ADecisionIsTheServersToTakeOrNot) {
   start();
   EXPECT_EQ(decide("alpha/0-bravo/1", "reject", ours()), "200");

@@ -34,6 +34,7 @@ constexpr const char *kLogin = "/api/login", *kLogout = "/api/logout";
 constexpr int kMostWatchers = 32;
 constexpr std::size_t kMostPoints = 20'000;  // of one submap's cloud
 constexpr auto kSignOfLife = std::chrono::milliseconds(1000);
+constexpr std::size_t kSentAtOnce = 64U << 10U;
 constexpr auto kAnswer = std::chrono::seconds(10);  // the server's thread may be at a map
 constexpr const char* kPolicy =
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'; img-src "
@@ -99,28 +100,56 @@ class Routes {
     say(response, Json::object());
   }
 
-  /// Everything that is known, then what is new, until the watcher goes or may no longer watch.
+  /// Everything that is known, or what is new since the last message that the watcher names, then what is new, until he
+  /// goes or may no longer watch.
   void events(const Request& request, Response& response) {
     if (watchers_ >= kMostWatchers) return say(response, 503, fmt::format("{} others watch already", kMostWatchers));
     ++watchers_;
     response.set_header("Cache-Control", "no-store");
+    const auto heard = heard_before(request.get_header_value("Last-Event-ID"));
     response.set_chunked_content_provider(
         "text/event-stream",
-        [this, token = token_of(request), sequence = std::uint64_t{0}, is_first = true](
-            std::size_t, httplib::DataSink& sink) mutable {
+        [this, token = token_of(request), sequence = heard.value_or(0), is_resumed = heard.has_value(),
+         is_first = true](std::size_t, httplib::DataSink& sink) mutable {
           std::string text;
-          if (is_first) text = fmt::format("event: begin\ndata: {{\"incarnation\":{}}}\n\n", site_.incarnation);
-          for (const auto& message : site_.board.wait_after(sequence, kSignOfLife))
-            text += fmt::format("id: {}\ndata: {}\n\n", sequence, to_json(*message));
+          if (is_first)
+            text = fmt::format("event: begin\ndata: {{\"incarnation\":{},\"resumed\":{}}}\n\n", site_.incarnation,
+                               is_resumed);
+          const auto messages = is_first ? site_.board.after(sequence) : site_.board.wait_after(sequence, kSignOfLife);
+          bool goes_on = !site_.board.is_closed() && site_.sign_in.visitor(token, program::Clock::steady_s()).may_see;
+          for (const auto& message : messages) {
+            text += fmt::format("id: {}-{}\ndata: ", site_.incarnation, message->sequence());
+            goes_on = goes_on && put(message->json(), text, sink);
+            text += "\n\n";
+          }
           if (std::exchange(is_first, false)) text += "event: ready\ndata: {}\n\n";
-          if (text.empty()) text = ": here\n\n";
-          const bool goes_on = !site_.board.is_closed() &&
-                               site_.sign_in.visitor(token, program::Clock::steady_s()).may_see &&
-                               sink.write(text.data(), text.size());
+          if (messages.empty() && text.empty()) text = ": here\n\n";
+          goes_on = goes_on && sink.write(text.data(), text.size());
           if (!goes_on) sink.done();
           return goes_on;
         },
         [this](bool) { --watchers_; });
+  }
+
+  /// The number behind "INCARNATION-"; nothing of another start, or of no such text: he gets everything.
+  [[nodiscard]] std::optional<std::uint64_t> heard_before(const std::string& id) const {
+    const std::string own = fmt::format("{}-", site_.incarnation);
+    std::uint64_t out = 0;
+    if (!id.starts_with(own)) return std::nullopt;
+    const auto [end, error] = std::from_chars(id.data() + own.size(), id.data() + id.size(), out);
+    return error == std::errc() && end == id.data() + id.size() ? std::optional(out) : std::nullopt;
+  }
+
+  /// Puts `shared` behind the text that is to be sent, and sends both when they are many: a large one is copied
+  /// nowhere.
+  static bool put(const std::string& shared, std::string& text, httplib::DataSink& sink) {
+    if (text.size() + shared.size() < kSentAtOnce) {
+      text += shared;
+      return true;
+    }
+    const bool sent = sink.write(text.data(), text.size()) && sink.write(shared.data(), shared.size());
+    text.clear();
+    return sent;
   }
 
   void cloud(const Request& request, Response& response) {

@@ -102,16 +102,20 @@ class ServedPage : public ::testing::Test {
     if (!cookie.empty()) out.emplace("Cookie", cookie);
     return out;
   }
-  /// Everything until "ready", by key.
-  std::map<std::string, json> events(const httplib::Headers& headers = {}) {
+  /// What is sent until "ready".
+  [[nodiscard]] std::string event_text(const httplib::Headers& headers = {}) const {
     std::string text;
     auto http = client();
     http.Get("/api/events", headers, [&](const char* data, std::size_t size) {
       text.append(data, size);
       return text.find("event: ready") == std::string::npos;
     });
+    return text;
+  }
+  /// The same by key.
+  std::map<std::string, json> events(const httplib::Headers& headers = {}) {
     std::map<std::string, json> out;
-    std::istringstream lines(text);
+    std::istringstream lines(event_text(headers));
     std::string line;
     while (std::getline(lines, line))
       if (line.starts_with("data: {\"key\"")) {
