@@ -139,6 +139,7 @@ TEST_F(RobotStoreTest, WhatIsNotDamagedIsLeftAlone) {
   fs::remove(file_);
   storage::Schema newer = storage::robot_schema();
   newer.version += 1;
+  newer.tables.emplace_back("of_the_future");
   ASSERT_TRUE(storage::open_sqlite_store(file_, newer, {.min_free_bytes = 0}).has_value());
   EXPECT_EQ(open_robot_store(folder_, kNow_ns).error().code, ErrorCode::unsupported);
   EXPECT_EQ(files(), (std::set<std::string>{"robot.tutti"}));

@@ -167,10 +167,22 @@ TEST_F(SqliteSalvage, ATreeWhosePagesAreSharedEnds) {
   EXPECT_FALSE(lost->empty());
 }
 
+TEST_F(SqliteSalvage, AFlippedBitOfTheVersionLosesNothing) {
+  for (std::size_t bit = 0; bit < 32; ++bit) {
+    std::string flipped = whole_;
+    flipped[60 + bit / 8] = static_cast<char>(flipped[60 + bit / 8] ^ (1 << (bit % 8)));
+    write(flipped);
+    const auto lost = salvage();
+    ASSERT_TRUE(lost.has_value()) << "bit " << bit << ": " << lost.error().message;
+    EXPECT_EQ(taken_, rows_);
+  }
+}
+
 TEST_F(SqliteSalvage, WhatIsNoStoreOrAnotherIsNotTaken) {
   EXPECT_FALSE(salvage(map_schema()).has_value());
   Schema older = kSchema;
   older.version = 1;
+  older.tables = {"apples"};
   EXPECT_EQ(salvage(older).error().code, ErrorCode::unsupported);
   ASSERT_TRUE(write_file(file().string(), "garbage"));
   EXPECT_FALSE(salvage().has_value());

@@ -117,12 +117,32 @@ TEST_F(SqliteStoreTest, OtherKindsAndVersionsAreRefused) {
   expect_says(refusal(map_schema()), {"some.tutti", "holds a test, expected a map"});
   Schema old = kSchema;
   old.version = 1;
+  old.tables = {"apples"};
   expect_says(refusal(old), {"a test of version 2, this program reads versions 1 to 1", "newer"});
   Schema more = kSchema;
   more.tables.emplace_back("plums");
   expect_says(refusal(more), {"other tables"});
   run_sql("CREATE TRIGGER evil AFTER INSERT ON apples BEGIN DELETE FROM pears; END");
   expect_says(refusal(), {"other tables", "evil"});
+}
+
+/// The version is 32 bits without a hash; which tables there are says whether it can be right.
+TEST_F(SqliteStoreTest, AFlippedBitOfTheVersionIsMended) {
+  EXPECT_TRUE(open()->commit(one("a", "1")));
+  const std::string whole = read_file(file()).value();
+  constexpr std::size_t kVersionAt = 60;  // https://www.sqlite.org/fileformat2.html, 1.3.10
+  for (std::size_t bit = 0; bit < 32; ++bit) {
+    std::string flipped = whole;
+    flipped[kVersionAt + bit / 8] = static_cast<char>(flipped[kVersionAt + bit / 8] ^ (1 << (bit % 8)));
+    ASSERT_TRUE(write_file(file(), flipped));
+    fs::remove(file().string() + "-wal");
+    for (int start = 0; start < 2; ++start) {
+      const auto store = open_sqlite_store(file(), kSchema, {.min_free_bytes = 0});
+      ASSERT_TRUE(store.has_value()) << "bit " << bit << ": " << store.error().message;
+      EXPECT_EQ((*store)->read("apples", "a").value(), "1");
+    }
+    EXPECT_EQ(read_file(file()).value().substr(kVersionAt, 4), whole.substr(kVersionAt, 4)) << bit;
+  }
 }
 
 TEST_F(SqliteStoreTest, AnOlderVersionGetsTheTablesThatItLacks) {

@@ -16,10 +16,12 @@ namespace tutti::storage {
 
 /// What a store is for and which tables it has. A store is never opened as one of another kind, nor one of a newer
 /// version than the schema's. A newer version has all tables of the older ones; an older store gets the tables that it
-/// lacks, empty, when it is opened.
+/// lacks, empty, when it is opened. The version is in one place of the file, where a flipped bit makes another of it,
+/// so the tables are its witness: every newer version has a table that the older ones do not have, and a file without
+/// one is not newer, whatever it says.
 struct Schema {
   std::string kind;                 ///< "map" or "robot", in the file and in messages.
-  std::uint32_t version = 1;        ///< Raised when tables or the meaning of their bytes change.
+  std::uint32_t version = 1;        ///< Raised when a table is added; one that means something else gets another name.
   std::vector<std::string> tables;  ///< Lower-case letters and underscores, each once.
   friend bool operator==(const Schema&, const Schema&) = default;
 };

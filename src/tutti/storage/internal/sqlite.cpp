@@ -19,6 +19,12 @@ std::string sql_of_store(const Schema& schema) {
   return sql + fmt::format("PRAGMA application_id={};PRAGMA user_version={};COMMIT", kApplicationId, schema.version);
 }
 
+std::string sql_of_strange_tables(const Schema& schema) {
+  std::string known = "'store'";
+  for (const std::string& table : schema.tables) known += ", '" + table + "'";
+  return "SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND name NOT IN (" + known + ")";
+}
+
 std::int64_t hash_of(std::string_view key, std::string_view bytes) {
   return static_cast<std::int64_t>(content_hash(bytes, content_hash(key)));
 }

@@ -56,6 +56,9 @@ std::string sql_of_table(const std::string& table);
 /// Makes all of an empty store, in one transaction.
 std::string sql_of_store(const Schema& schema);
 
+/// How many tables a file has that are not the schema's: SQL for one number.
+std::string sql_of_strange_tables(const Schema& schema);
+
 /// FNV-1a over the key, then over the bytes. Any change within eight neighbouring bits changes it.
 std::int64_t hash_of(std::string_view key, std::string_view bytes);
 /// For messages: hexadecimal, as SQLite's x'..' wants it.
