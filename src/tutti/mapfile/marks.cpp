@@ -10,6 +10,7 @@
 #include "tutti/base/file.hpp"
 #include "tutti/base/utc_text.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/mapfile/picture.hpp"
 #include "tutti/server/georeference.hpp"
 #include "tutti/server/map_posterior.hpp"
 #include "tutti/wire/field_bytes.hpp"
@@ -33,8 +34,8 @@ Status check(const MapMark& mark, const std::string& photo, std::size_t known) {
   if (photo.size() > MapMark::kMostPhotoBytes)
     return fail(ErrorCode::invalid, "the photo has {} bytes, expected at most {}", photo.size(),
                 MapMark::kMostPhotoBytes);
-  if (!photo.empty() && picture_type(photo).empty())
-    return fail(ErrorCode::invalid, "the photo is neither a JPEG nor a PNG file");
+  if (!photo.empty())
+    if (Status ok = check_picture(photo); !ok) return ok;
   if (mark.words.empty() && photo.empty()) return fail(ErrorCode::invalid, "a mark has words or a photo");
   if (auto ok = wire::check_fields(mark); !ok) return in_context("mark", ok.error());
   return {};

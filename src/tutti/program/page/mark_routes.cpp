@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <charconv>
 
+#include "tutti/mapfile/picture.hpp"
 #include "tutti/program/clock.hpp"
 #include "tutti/program/page/base64.hpp"
 #include "tutti/program/page/view.hpp"
@@ -83,7 +84,7 @@ void remove_mark(Site& site, const Json& body, Response& response) {
 void show_photo(const Site& site, const Request& request, Response& response) {
   const auto number = number_of(request.matches[1]);
   const auto photo = number ? mapfile::read_photo(site.store, *number) : Result<std::optional<std::string>>();
-  if (!photo || !*photo || picture_type(**photo).empty()) return say(response, 404, "there is no such photo");
+  if (!photo || !*photo || !mapfile::check_picture(**photo)) return say(response, 404, "there is no such photo");
   response.set_header("Cache-Control", "private, max-age=31536000, immutable");
   response.set_content(**photo, std::string(picture_type(**photo)));
 }

@@ -88,6 +88,10 @@ TEST_F(Marks, WhatIsNoneIsRefusedWithASentence) {
   refused("photo", "https://elsewhere.example/photo.jpg", "photo");
   refused("photo", "data:image/jpeg;base64,~~~", "photo");
   refused("photo", data_url("<svg onload='alert(1)'/>"), "neither");
+  refused("photo", data_url("\x89PNG\r\n\x1a\n" + std::string("\0\0\0\rIHDR\0\0>\x80\0\0>\x80\x8\x2", 18)),
+          "16000 x 16000");
+  refused("photo", data_url(std::string("\xff\xd8\xff\xe0\0\x4..\xff\xc2\0\x11\x8\xff\xff\xff\xff\x3", 18)),
+          "65535 x 65535");
   refused("photo", data_url(kJpeg + std::string(MapMark::kMostPhotoBytes, ' ')), "1048576");
   const auto too_large = client().Post("/api/mark", ours(), std::string(9U << 20U, ' '), "application/json");
   ASSERT_TRUE(too_large) << httplib::to_string(too_large.error());

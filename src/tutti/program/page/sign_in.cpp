@@ -2,6 +2,7 @@
 #include "tutti/program/page/sign_in.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "tutti/base/utc_text.hpp"
 #include "tutti/pki/pki.hpp"
@@ -62,7 +63,11 @@ Result<std::string> SignIn::open(const std::string& key, const std::string& nonc
   if (!is_for_people(known->user))
     return fail(ErrorCode::invalid, "{}: the page is for operators and viewers (tutti pki add-operator, add-viewer)",
                 to_string(known->user));
-  make_room(sessions_, now_s, kMost, [](const Session& session) { return session.until_s; });
+  std::erase_if(sessions_, [&](const auto& entry) { return entry.second.until_s < now_s; });
+  const auto is_own = [&](const auto& entry) { return entry.second.key == key; };
+  while (static_cast<std::size_t>(std::ranges::count_if(sessions_, is_own)) >= kMostOfMember)
+    sessions_.erase(std::ranges::min_element(
+        sessions_, {}, [&](const auto& entry) { return std::pair(entry.second.key != key, entry.second.until_s); }));
   std::string token = pki::random_token();
   sessions_[token] = {key, now_s + kSession_s};
   return token;

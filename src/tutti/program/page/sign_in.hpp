@@ -44,7 +44,8 @@ class SignIn {
   static constexpr double kNonce_s = 60.0;
   static constexpr double kSession_s = 12.0 * 3600.0;
   static constexpr double kLookAgain_s = 1.0;
-  static constexpr std::size_t kMost = 1000;  ///< Nonces, and sessions; the oldest goes.
+  static constexpr std::size_t kMost = 1000;       ///< Nonces; the oldest goes.
+  static constexpr std::size_t kMostOfMember = 8;  ///< Sessions of one key; that member's oldest goes.
 
  private:
   struct Session {

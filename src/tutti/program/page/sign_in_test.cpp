@@ -85,6 +85,15 @@ TEST_F(SignInTest, AFloodOfNoncesTakesNoMoreThanSoMany) {
   EXPECT_TRUE(open("anna", 1.0));
 }
 
+TEST_F(SignInTest, WhoLogsInOftenThrowsOutNobodyElse) {
+  const auto anna = open("anna", 0.0), first = open("vera", 0.0);
+  std::string last;
+  for (int i = 0; i < 1001; ++i) last = open("vera", 1.0).value();
+  EXPECT_TRUE(at_->visitor(*anna, 2.0).may_decide);
+  EXPECT_TRUE(at_->visitor(last, 2.0).may_see);
+  EXPECT_FALSE(at_->visitor(*first, 2.0).may_see) << "a member's own oldest session goes";
+}
+
 TEST(SignInWithoutCredentials, EverybodyMayDoAll) {
   SignIn open({});
   EXPECT_TRUE(open.visitor("", 0.0).may_decide);
