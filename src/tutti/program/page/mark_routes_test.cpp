@@ -93,7 +93,7 @@ TEST_F(Marks, WhatIsNoneIsRefusedWithASentence) {
   refused("photo", data_url(std::string("\xff\xd8\xff\xe0\0\x4..\xff\xc2\0\x11\x8\xff\xff\xff\xff\x3", 18)),
           "65535 x 65535");
   refused("photo", data_url(kJpeg + std::string(MapMark::kMostPhotoBytes, ' ')), "1048576");
-  const auto too_large = client().Post("/api/mark", ours(), std::string(9U << 20U, ' '), "application/json");
+  const auto too_large = client().Post("/api/mark", ours(), std::string(3U << 20U, ' '), "application/json");
   ASSERT_TRUE(too_large) << httplib::to_string(too_large.error());
   EXPECT_EQ(too_large->status, 413);
   EXPECT_EQ(client().Post("/api/mark", {}, a_mark().dump(), "application/json")->status, 403) << "another site's form";

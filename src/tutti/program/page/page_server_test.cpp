@@ -93,7 +93,7 @@ TEST_F(PageServer, ADecisionIsTheServersToTakeOrNot) {
   auto http = client();
   EXPECT_EQ(http.Post("/api/decide", ours(), "[", "application/json")->status, 400);
   EXPECT_EQ(http.Post("/api/decide", ours(), R"({"wish":7})", "application/json")->status, 400);
-  const auto refused = http.Post("/api/decide", ours(), std::string(9U << 20U, ' '), "application/json");
+  const auto refused = http.Post("/api/decide", ours(), std::string(3U << 20U, ' '), "application/json");
   ASSERT_TRUE(refused) << httplib::to_string(refused.error());
   EXPECT_EQ(refused->status, 413);
   const std::scoped_lock lock(mutex_);
