@@ -11,6 +11,7 @@ import sqlite3
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 TUTTI, SOURCE = sys.argv[1], pathlib.Path(sys.argv[2])
@@ -144,6 +145,15 @@ class CommandLine(unittest.TestCase):
                           ["worker", "a-worker", "valid"], ["operator", "a-operator", "valid"], ["viewer", "a-viewer", "valid"]])
         self.expect(tutti("status", "--bus", "tls://127.0.0.1:1", "--credentials", pki / "credentials/bravo.cred"), 2,
                     "robot bravo (number 3)", "viewer")
+        viewer = pki / "credentials/a-viewer.cred"
+        wish = ["map", "closure", "reject", "a/1-b/2", "--bus", "tls://127.0.0.1:1", "--credentials", viewer]
+        begun = time.monotonic()
+        done = tutti(*wish)
+        self.assertLess(time.monotonic() - begun, 20, "without a bus: it is not asked")
+        self.expect(done, 2, "viewer a-viewer", "operators alone decide", "tutti pki add-operator")
+        self.assertNotIn("chmod", done.stderr)
+        viewer.chmod(0o644)
+        self.expect(tutti(*wish), 2, "0644", f"chmod 600 {viewer}")
         self.expect(tutti("server", "--state", self.path / "s", "--listen", "0.0.0.0", "--mission", "cave"), 2, "--pki")
         self.expect(tutti("server", "--state", self.path / "s", "--pki", pki, "--mission", "tunnel"), 2, "'cave'", "'tunnel'")
 

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <fmt/format.h>
+#include <sys/stat.h>
+
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <cstdlib>
 #include <memory>
 #include <string>
@@ -28,6 +32,10 @@ inline void take_credentials(const std::string& file, bus::BusOptions& options) 
   auto taken = file.empty() ? bus::parse_credentials(given) : bus::read_credentials(file);
   if (!taken) refuse(file.empty() ? "TUTTI_CREDENTIALS" : "--credentials", taken.error());
   options.credentials = std::move(*taken);
+  struct stat status {};
+  if (!file.empty() && stat(file.c_str(), &status) == 0 && (status.st_mode & (S_IRWXO | S_IWGRP)) != 0)
+    fmt::print(stderr, "tutti: warning: {}: others of this machine may read or change it (mode {:04o}): chmod 600 {}\n",
+               file, status.st_mode & 07777U, file);
 }
 
 inline constexpr const char* kBusHelp = "The bus, as the server prints it";

@@ -181,6 +181,12 @@ int decide(const ClosureOptions& options, Wish wish) {
   const auto& known = options.bus.credentials.known;
   const ClosureDecision decision{options.closure, wish, known ? known->name : options.by,
                                  std::chrono::duration_cast<std::chrono::nanoseconds>(now).count()};
+  if (!options.bus.url.empty() && known && known->role != bus::BusRole::operates)
+    return complain(kCommand,
+                    fmt::format("the credential is that of {}, and operators alone decide: --credentials with one that "
+                                "`tutti pki add-operator NAME` makes",
+                                to_string(*known)),
+                    2);
   if (auto ok = wire::validate(decision); !ok) return complain(kCommand, ok.error().message, 2);
   if (!options.bus.url.empty()) {
     if (auto sent = send(options, decision); !sent) return complain(kCommand, sent.error().message);

@@ -18,6 +18,7 @@
 #include <cstring>
 #include <fstream>
 #include <mutex>
+#include <string_view>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -132,6 +133,10 @@ class NatsChild::Process {
 
  private:
   void run(std::vector<std::string>& command, int lock) {
+    std::vector<char*> environment;  // whoever reads that of nats-server gets no credential
+    for (char** one = environ; *one != nullptr; ++one)
+      if (!std::string_view(*one).starts_with("TUTTI_")) environment.push_back(*one);
+    environment.push_back(nullptr);
     std::vector<char*> arguments;
     for (std::string& argument : command) arguments.push_back(argument.data());
     arguments.push_back(nullptr);
@@ -149,8 +154,9 @@ class NatsChild::Process {
       dup2(log_.file, STDOUT_FILENO);
       dup2(log_.file, STDERR_FILENO);
       fcntl(lock, F_SETFD, 0);
-      execvp(arguments[0], arguments.data());
-      if (errno == ENOENT && std::strcmp(arguments[0], "nats-server") == 0) execv(kElsewhere, arguments.data());
+      execvpe(arguments[0], arguments.data(), environment.data());
+      if (errno == ENOENT && std::strcmp(arguments[0], "nats-server") == 0)
+        execve(kElsewhere, arguments.data(), environment.data());
       const int error = errno;
       static_cast<void>(!write(errors[1], &error, sizeof error));
       _exit(1);

@@ -13,6 +13,8 @@
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <string>
 #include <thread>
 
@@ -74,6 +76,17 @@ TEST_F(NatsChildTest, StartsOnAFreePortOfThisMachineAndStopsWithItsOwner) {
   child = start();
   ASSERT_NE(child, nullptr);
   EXPECT_EQ(child->url(), url);  // where robots expect it
+}
+
+TEST_F(NatsChildTest, HasNoCredentialInItsEnvironment) {
+  setenv("TUTTI_CREDENTIALS", "anna:secret", 1);
+  const auto child = start();
+  unsetenv("TUTTI_CREDENTIALS");
+  ASSERT_NE(child, nullptr);
+  std::ifstream file("/proc/" + std::to_string(child->pid()) + "/environ");
+  const std::string environment{std::istreambuf_iterator<char>(file), {}};
+  EXPECT_NE(environment.find("PATH="), std::string::npos);
+  EXPECT_EQ(environment.find("secret"), std::string::npos);
 }
 
 TEST_F(NatsChildTest, WhoKillsItGetsItAgainAtTheSameAddress) {

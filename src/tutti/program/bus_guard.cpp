@@ -32,7 +32,12 @@ std::vector<std::string> BusGuard::check(const std::string& now) {
   std::vector<std::string> lines;
   const auto there = pki::Pki::open(folder_);
   auto rights = there ? there->bus_configuration(now) : tl::unexpected(there.error());
-  if (!rights) return lines;
+  unread_ = rights ? 0 : unread_ + 1;
+  if (!rights) {
+    why_unread_ = rights.error().message;
+    if (unread_ == kMostUnread) lines.push_back(trouble());
+    return lines;
+  }
   rights_ = std::move(*rights);
   robots_.clear();
   for (const pki::Member& member : there->members()) {
@@ -47,6 +52,11 @@ std::vector<std::string> BusGuard::check(const std::string& now) {
                                   to_string(member.user), member.until, name));
   }
   return lines;
+}
+
+std::string BusGuard::trouble() const {
+  if (unread_ < kMostUnread) return {};
+  return fmt::format("the folder of --pki cannot be read, so nobody new is let in and nobody revoked: {}", why_unread_);
 }
 
 /// Whose key somebody gave who was not let in and so has not proved to have it; empty: nobody's.

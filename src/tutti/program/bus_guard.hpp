@@ -28,6 +28,9 @@ class BusGuard {
   /// Reads the folder again, in which members come and go. Called once a second. Returns, as lines for the log, whose
   /// certificate has expired since it was last called.
   std::vector<std::string> check(const std::string& now);
+  /// Why the folder could not be read kMostUnread times in a row: nobody is let in or revoked meanwhile. Empty: it can.
+  [[nodiscard]] std::string trouble() const;
+  static constexpr int kMostUnread = 5;
   /// What the bus has refused, as lines for the log: who, what, and how many so far; of each member, and of all
   /// strangers together, as Throttle lets through.
   [[nodiscard]] std::vector<std::string> lines(const bus::NatsChild::Refusals& refusals, double wall_s);
@@ -44,6 +47,8 @@ class BusGuard {
   std::string rights_;
   std::map<std::string, pki::Member> users_;  // by key
   std::set<std::string> expired_;             // keys
+  int unread_ = 0;                            // how often in a row
+  std::string why_unread_;
   std::map<RobotId, std::string> robots_;
   Throttle throttle_;
   std::uint64_t refused_ = 0;

@@ -79,6 +79,25 @@ TEST_F(BusGuardTest, WhoseCertificateHasExpiredHasNoRightsUntilItIsRenewed) {
   EXPECT_TRUE(has("server")) << "without its own bus there is no mission";
 }
 
+TEST_F(BusGuardTest, AFolderThatCannotBeReadIsTroubleAndWhatWasReadCounts) {
+  ASSERT_TRUE(pki::Pki::make(folder_, "cave"));
+  auto guard = BusGuard::open(folder_, "cave", kNow).value();
+  const std::string rights = guard.rights();
+  std::filesystem::rename(folder_ / "users", folder_ / "elsewhere");
+  std::vector<std::string> lines;
+  for (int i = 0; i < BusGuard::kMostUnread; ++i) {
+    EXPECT_EQ(guard.trouble(), "") << "it may be being changed";
+    lines = guard.check(kNow);
+  }
+  EXPECT_NE(guard.trouble().find("users"), std::string::npos) << guard.trouble();
+  EXPECT_EQ(lines, std::vector<std::string>{guard.trouble()}) << "it is in the log, once";
+  EXPECT_TRUE(guard.check(kNow).empty());
+  EXPECT_EQ(guard.rights(), rights);
+  std::filesystem::rename(folder_ / "elsewhere", folder_ / "users");
+  EXPECT_TRUE(guard.check(kNow).empty());
+  EXPECT_EQ(guard.trouble(), "");
+}
+
 TEST_F(BusGuardTest, ARobotHasTheNameOfItsCredential) {
   auto pki = pki::Pki::make(folder_, "cave").value();
   auto guard = BusGuard::open(folder_, "cave", kNow).value();

@@ -289,7 +289,7 @@ Status ServerProgram::start() {
                             .status_file = folder_->path() / kStatusFile,
                             .table_aside = map_tables::kMeta,
                             .version = options_.version,
-                            .trouble = [this] { return trouble_; }},
+                            .trouble = [this] { return trouble_.empty() && guard_ ? guard_->trouble() : trouble_; }},
                 *clock_, *log_);
   if (Status opened = host_->open(); !opened) return opened;
   const ViewedMission viewed{.name = settings_.mission,

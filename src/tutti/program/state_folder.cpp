@@ -66,6 +66,7 @@ Status StateFolder::read_or_make(const std::string& owner, const std::string& br
   }
   // A program that was killed here before has left the beginnings of lock and owner.
   std::set<fs::path> known{path_ / "lock", beside_of(file)};
+  if (fs::is_directory(path_ / "lost+found", error)) known.insert(path_ / "lost+found");  // a disk of its own
   if (!brought.empty())
     for (const char* end : {"", "-wal", "-shm"}) known.insert(path_ / (brought + end));
   for (const auto& entry : fs::directory_iterator(path_, error))

@@ -68,6 +68,15 @@ TEST_F(StateFolderTest, IsOneOwnersAndOneProgramsAtATime) {
   EXPECT_EQ(refused("robot alpha"), "");
 }
 
+TEST_F(StateFolderTest, MayBeADiskOfItsOwn) {
+  fs::create_directories(folder_ / "lost+found");
+  EXPECT_TRUE(StateFolder::open(folder_, "robot alpha").has_value());
+  fs::remove_all(folder_);
+  fs::create_directories(folder_);
+  std::ofstream(folder_ / "lost+found") << "a file of somebody's";
+  EXPECT_FALSE(StateFolder::open(folder_, "robot alpha").has_value());
+}
+
 TEST_F(StateFolderTest, AKillWhileItIsMadeLeavesWhatTheNextStartTakes) {
   fs::create_directories(folder_);
   std::ofstream(folder_ / "lock");
