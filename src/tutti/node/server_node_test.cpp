@@ -321,7 +321,7 @@ TEST_F(ServerNodeTest, AnOperatorsDecisionIsStoredAndSurvivesEveryRestart) {
   EXPECT_EQ(accepted(), all);
 }
 
-/// Of an operator whose clock is a year ahead.
+/// The operator's clock is a year ahead.
 TEST_F(ServerNodeTest, ADecisionCountsFromWhenItCameAndNotFromAClockThatIsAhead) {
   fill();
   const SubmapPair pair{{kAlpha, 0}, {kBravo, 2}};

@@ -95,7 +95,7 @@ struct Site {
         marks(mission.map) {}
 
   bool is_secure = false;
-  std::vector<std::string> names;  ///< Of the certificate: this page is served under them, too.
+  std::vector<std::string> names;  ///< Those of the certificate, under which it is served, too.
   const std::string mission_name;
   const storage::TableStore& store;  ///< The map's.
   const std::shared_ptr<const server::ClosureVerifier> verifier;
