@@ -94,7 +94,7 @@ void note_last_seen(ProxyGraph& graph) {
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
     const ProxyNode& node = graph.nodes[i];
     if (i + 1 == graph.nodes.size() || graph.nodes[i + 1].chain.robot != node.chain.robot)
-      graph.last_seen.push_back({node.chain, node.stamp, node.T_world_body});
+      graph.last_seen.push_back({node.chain, node.stamp, node.T_world_body, {}});
   }
 }
 
@@ -133,7 +133,7 @@ void see_last_in(ProxyGraph& graph, const ChainId& chain) {
   const std::span<const ProxyNode> nodes = nodes_of(graph, chain);
   if (nodes.empty()) return;
   for (LastSeen& seen : graph.last_seen)
-    if (seen.chain.robot == chain.robot) seen = {chain, nodes.back().stamp, nodes.back().T_world_body};
+    if (seen.chain.robot == chain.robot) seen = {chain, nodes.back().stamp, nodes.back().T_world_body, seen.name};
 }
 
 ProxyGraph own_part(const ProxyGraph& whole, RobotId robot) {

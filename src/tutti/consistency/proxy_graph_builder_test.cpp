@@ -136,6 +136,7 @@ ProxyGraph any_graph() {
     }
   ProxyGraph graph = build_proxy_graph(7, nodes, components, {.node_budget = *rc::gen::element(0, 30)});
   graph.epoch = 3;
+  for (LastSeen& seen : graph.last_seen) seen.name = "robot-" + std::to_string(seen.chain.robot.value);
   for (const ChainComponent& entry : components)
     graph.uncertainties.push_back(
         even_uncertainty(entry.chain, tutti::nodes_of(graph, entry.chain).size(), {0.1, 0.01}));

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -54,6 +55,7 @@ struct LastSeen {
   ChainId chain;
   Timestamp stamp;
   Pose3 T_world_body;
+  std::string name;  ///< What the robot calls itself; empty where the server does not know.
   friend bool operator==(const LastSeen&, const LastSeen&) = default;
 };
 

@@ -13,9 +13,11 @@ bus::Envelope to_robot(RobotId robot, bus::MessageKind kind, std::shared_ptr<con
   return {bus::Endpoint::server(), bus::Endpoint::of(robot), kind, {}, std::move(bytes)};
 }
 
-void Broadcast::send(ProxyGraphMessage map, std::shared_ptr<const server::Beliefs> beliefs,
-                     const std::set<RobotId>& robots, const ChangeWatch::LoneClosures& lone, Timestamp now,
-                     Step& step) {
+void Broadcast::send(ProxyGraphMessage map, const std::map<RobotId, std::string>& names,
+                     std::shared_ptr<const server::Beliefs> beliefs, const std::set<RobotId>& robots,
+                     const ChangeWatch::LoneClosures& lone, Timestamp now, Step& step) {
+  for (LastSeen& seen : map.graph.last_seen)
+    if (const auto found = names.find(seen.chain.robot); found != names.end()) seen.name = found->second;
   last_ = std::make_shared<const ProxyGraphMessage>(std::move(map));
   std::shared_ptr<const std::string> whole;
   for (const RobotId robot : robots) {

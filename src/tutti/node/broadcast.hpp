@@ -25,9 +25,10 @@ class Broadcast {
   /// With `to_all` every robot is sent the whole map, as in the paper (ServerConfig::broadcast).
   explicit Broadcast(bool to_all) : to_all_(to_all) {}
 
-  /// Sends a new map, which rests on `beliefs`, to the robots that are to follow it by `lone` (ChangeWatch::take);
-  /// without `lone` to all.
-  void send(ProxyGraphMessage map, std::shared_ptr<const server::Beliefs> beliefs, const std::set<RobotId>& robots,
+  /// Sends a new map, in which robots have these `names`, and which rests on `beliefs`, to the robots that are to
+  /// follow it by `lone` (ChangeWatch::take); without `lone` to all.
+  void send(ProxyGraphMessage map, const std::map<RobotId, std::string>& names,
+            std::shared_ptr<const server::Beliefs> beliefs, const std::set<RobotId>& robots,
             const ChangeWatch::LoneClosures& lone, Timestamp now, Step& step);
   /// When some robot is to be sent the last map if no other one is made before.
   [[nodiscard]] std::optional<Timestamp> next_review() const { return watch_.next_review(); }

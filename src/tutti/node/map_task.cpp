@@ -24,8 +24,9 @@ MapOfTask make_map(MapTask task) {
   };
   ProxyGraphMessage message = std::move(out.made.message);
   message.graph.incarnation = task.incarnation;
-  out.broadcast.send(std::move(message), std::make_shared<const server::Beliefs>(server::beliefs_of(made.map)),
-                     task.robots, task.follow ? nullptr : ChangeWatch::LoneClosures(lone), task.begun, out.step);
+  out.broadcast.send(std::move(message), task.names,
+                     std::make_shared<const server::Beliefs>(server::beliefs_of(made.map)), task.robots,
+                     task.follow ? nullptr : ChangeWatch::LoneClosures(lone), task.begun, out.step);
   return out;
 }
 

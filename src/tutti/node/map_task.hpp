@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <set>
+#include <string>
 
 #include "tutti/base/timestamp.hpp"
 #include "tutti/node/broadcast.hpp"
@@ -20,7 +22,8 @@ struct MapTask {
   Timestamp begun;
   std::uint32_t incarnation = 0;
   std::set<RobotId> robots;
-  bool follow = false;  ///< A change of mind does not wait.
+  std::map<RobotId, std::string> names;  ///< What robots are called.
+  bool follow = false;                   ///< A change of mind does not wait.
   Broadcast broadcast;
 };
 

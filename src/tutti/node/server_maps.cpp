@@ -35,6 +35,7 @@ std::optional<MapTask> ServerNode::begin_map(Timestamp now) {
                .begun = now,
                .incarnation = config_.incarnation,
                .robots = robots_,
+               .names = robot_names(),
                .follow = config_.server.change_of_mind != "wait" || operator_decided,
                .broadcast = std::move(broadcast_)};
   for (const RobotId robot : robots_)

@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <limits>
 #include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "support/node/stored_server.hpp"
 #include "tutti/node/decisions.hpp"
+#include "tutti/node/status_envelope.hpp"
 #include "tutti/node/worker_node.hpp"
 #include "tutti/storage/memory_store.hpp"
 
@@ -102,6 +104,21 @@ TEST_F(MapBeingMade, AServerThatIsKilledMeanwhileMakesItAgain) {
   start({RobotId{0}, RobotId{1}}, {});
   EXPECT_EQ(updates(done(node_->on_timer(node_->next_timer().value()))), std::vector<std::size_t>{10});
   EXPECT_EQ(node_->map_server().state().revision, 1U);
+}
+
+TEST_F(MapBeingMade, TellsRobotsNamesThatHaveBeenReported) {
+  const auto names = [&] {
+    std::vector<std::string> out;
+    for (const LastSeen& seen : node_->broadcast().last_seen) out.push_back(seen.name);
+    return out;
+  };
+  done(node_->end_map(make_map(std::move(*task_)), now_));
+  EXPECT_EQ(names(), (std::vector<std::string>{"", ""}));
+  receive(to_server(bus::Endpoint::of(kBravo.robot), {.name = "bravo", .session = 7, .start = 1}));
+  take_both(4);
+  now_ = *node_->next_timer();
+  done(node_->on_timer(now_));
+  EXPECT_EQ(names(), (std::vector<std::string>{"", "bravo"}));
 }
 
 TEST_F(MapBeingMade, HasNewsUntilItIsThere) {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -11,6 +12,8 @@
 #include "support/program/full_disk.hpp"
 #include "support/program/hosting.hpp"
 #include "support/robot/drifting_robot.hpp"
+#include "tutti/storage/memory_store.hpp"
+#include "tutti/wire/codec.hpp"
 
 namespace tutti::program {
 namespace fed_robot_test {
@@ -96,6 +99,26 @@ TEST_F(FedRobotTest, TakesWhatIsFedAndSaysHowFarItIsStored) {
   feed(200, kOdometry.size());
   turns(100);
   expect_the_robot_of_all_that_was_fed();
+}
+
+TEST(RobotView, CallsTeamMatesAsTheMissionDoesElseAsTheMapDoes) {
+  storage::MemoryStore store(storage::robot_schema());
+  const auto node = node::RobotNode::open(kRobot, 7, {}, store).value();
+  for (std::size_t i = 0; i < 200; ++i) static_cast<void>(node->add_odometry(sample(i), {}));
+  const auto called = [&](std::uint64_t revision, const std::string& in_map, std::map<RobotId, std::string> names) {
+    ProxyGraphMessage message = robot::test::broadcast(node->agent(), revision, robot::test::kWorld);
+    message.graph.last_seen.front().name = in_map;
+    static_cast<void>(node->receive({bus::Endpoint::server(),
+                                     bus::Endpoint::of(kRobot),
+                                     bus::MessageKind::proxy_graph,
+                                     {},
+                                     std::make_shared<const std::string>(wire::encode(message))},
+                                    {}));
+    return RobotView("alpha", std::move(names)).state(*node).team_mates.at(0).name;
+  };
+  EXPECT_EQ(called(1, "", {}), "robot 9");  // a server of before
+  EXPECT_EQ(called(2, "nine", {}), "nine");
+  EXPECT_EQ(called(3, "nine", {{RobotId{9}, "bravo"}}), "bravo");
 }
 
 TEST_F(FedRobotTest, AFullDiskCostsTheMapAndNeverThePose) {

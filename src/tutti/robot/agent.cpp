@@ -239,7 +239,7 @@ void RobotAgent::locate_others(const ProxyGraph& graph, std::span<const consiste
   T_map_world_ = T_map_world;
   for (const LastSeen& seen : graph.last_seen)
     if (seen.chain.robot != chain_.robot && component_of(graph, seen.chain) == component_of(graph, chain_))
-      state_.whereabouts.push_back({seen.chain.robot, seen.stamp, T_map_world * seen.T_world_body});
+      state_.whereabouts.push_back({seen.chain.robot, seen.stamp, T_map_world * seen.T_world_body, seen.name});
 }
 
 AgentHead RobotAgent::head() const {

@@ -50,6 +50,7 @@ struct Whereabouts {
   RobotId robot;
   Timestamp stamp;
   Pose3 T_map_body;
+  std::string name;  ///< LastSeen::name
 };
 
 /// What one proxy graph changed on the robot.

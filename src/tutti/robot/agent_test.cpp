@@ -251,7 +251,8 @@ TEST(Agent, SynchronisesWithItsOwnSessionAndSeesTheOthersInTheirNewest) {
   both.graph.nodes.insert(both.graph.nodes.begin(), older.begin(), older.end());
   both.graph.nodes.push_back(newest);
   both.graph.components = {{{RobotId{1}, 4}, 0}, {agent.chain(), 0}, {RobotId{9}, 1}, {newest.chain, 0}};
-  both.graph.last_seen = {{agent.chain(), at(239), {}}, {newest.chain, newest.stamp, newest.T_world_body}};
+  both.graph.last_seen = {{agent.chain(), at(239), {}, "one"},
+                          {newest.chain, newest.stamp, newest.T_world_body, "nine"}};
 
   RobotAgent alone(RobotId{1}, {}, agent.state());
   const UpdateSummary expected = alone.receive(message), update = agent.receive(both);
@@ -262,6 +263,7 @@ TEST(Agent, SynchronisesWithItsOwnSessionAndSeesTheOthersInTheirNewest) {
   ASSERT_EQ(agent.whereabouts().size(), 1U);
   EXPECT_EQ(agent.whereabouts()[0].robot, RobotId{9});
   EXPECT_EQ(agent.whereabouts()[0].stamp, at(2));
+  EXPECT_EQ(agent.whereabouts()[0].name, "nine");
 }
 
 // 300 MB an hour otherwise, at 200 Hz.

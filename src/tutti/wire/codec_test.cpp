@@ -204,7 +204,8 @@ RC_GTEST_PROP(ProxyGraphCodec, RoundTrip, ()) {
     RC_ASSERT((difference.cwiseAbs().array() <= 0.25 * (sigma * sigma.transpose()).array() + 1e-300).all());
   }
   RC_ASSERT(std::ranges::equal(in.last_seen, out.last_seen, [](const LastSeen& x, const LastSeen& y) {
-    return x.chain == y.chain && x.stamp == y.stamp && near(x.T_world_body, y.T_world_body, 5e-4, 1e-4);
+    return x.chain == y.chain && x.stamp == y.stamp && x.name == y.name &&
+           near(x.T_world_body, y.T_world_body, 5e-4, 1e-4);
   }));
   for (std::size_t i = 0; i < in.edges.size(); ++i) {
     RC_ASSERT(out.edges[i].a == in.edges[i].a);
@@ -241,6 +242,8 @@ ProxyGraphMessage later(ProxyGraphMessage message, Rng& rng) {
     if (rng.bernoulli(0.9)) node.T_world_body = bend * node.T_world_body;
     if (rng.bernoulli(0.5)) node.covariance *= rng.uniform(0.5, 1.5);
   }
+  for (LastSeen& seen : graph.last_seen)
+    if (rng.bernoulli(0.3)) seen.name = "another";
   if (rng.bernoulli(0.5) && !graph.nodes.empty() && graph.edges.empty() && graph.uncertainties.empty())
     graph.nodes.erase(graph.nodes.begin() + static_cast<std::ptrdiff_t>(rng.index(graph.nodes.size())));
   return message;
@@ -562,6 +565,7 @@ TEST(Validate, ProxyGraph) {
                      {"component of robot 0 does not come after",
                       [](M& m) { m.graph.components[1].chain = m.graph.components[0].chain; }},
                      {"does not come after robot", [](M& m) { m.graph.last_seen.push_back(m.graph.last_seen[0]); }},
+                     {"a name of 5 letters", [](M& m) { m.graph.last_seen[0].name = "a/b c"; }},
                      {"has no component", [](M& m) { m.graph.last_seen[0].chain.session += 1; }},
                      {"has no component", [](M& m) { m.graph.components.pop_back(); }},
                      {"as last seen: pose", [](M& m) { m.graph.last_seen[0].T_world_body.translation.x() = kNan; }},

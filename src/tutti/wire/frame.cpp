@@ -73,7 +73,8 @@ const char* name(MessageKind kind) {
 //                a graph, so the older ones are not read.
 //   cloud        came with 2, and is the same since
 //   receipt      2 what is refused, and whose the number is
-//   agent state  2 how sure the robot is of its pose, 3 images, 4 rows; 5 waiting sensors, odometry's jumps, fixes
+//   agent state  2 how sure the robot is of its pose, 3 images, 4 rows; 5 waiting sensors, odometry's jumps, fixes;
+//                6 team-mates' names
 Versions versions(MessageKind kind) {
   switch (kind) {
     case MessageKind::submap:
@@ -100,7 +101,7 @@ Versions versions(MessageKind kind) {
     case MessageKind::refinement:
       return {.oldest = 1, .current = 1};
     case MessageKind::agent_state:
-      return {.oldest = 3, .current = 5};
+      return {.oldest = 3, .current = 6};
   }
   return {};
 }

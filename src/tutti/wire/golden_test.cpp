@@ -135,8 +135,8 @@ TEST(Golden, ProxyGraph) {
                           {{{127, -5, 0}, {3, -127, 64}, 2.5, 0.02}},
                           KnownDirection{{1, 127, 0}, {127, 2, -3}, 0.5, 1.5}},
                          {seven, {0.5, 0.01}, {{}, {{{0.03, 0.002}}}}, {}, {}}};
-  graph.last_seen = {{RobotId{0}, {3'000'000'007}, {kQuarterTurn, {1.5, -0.25, 0}}},
-                     {seven, {2'000'000'008}, {kQuarterTurn, {-9, 100, 2}}}};
+  graph.last_seen = {{RobotId{0}, {3'000'000'007}, {kQuarterTurn, {1.5, -0.25, 0}}, {}},
+                     {seven, {2'000'000'008}, {kQuarterTurn, {-9, 100, 2}}, {}}};
   const auto check = [&](const ProxyGraphMessage& decoded, unsigned) {
     EXPECT_EQ(decoded.header, message.header);
     EXPECT_EQ(decoded.graph.epoch, graph.epoch);

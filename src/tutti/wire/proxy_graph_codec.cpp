@@ -32,7 +32,7 @@ bool code_last_seen(Coder& coder, const std::vector<ChainComponent>& chains, con
     for (std::size_t i = 0; i < pose.size(); ++i) pose[i] = coder.code(poses[i], pose[i]);
     const auto T_world_body = dequantise(pose, kProxyPoseSteps);
     if (!T_world_body) return false;
-    add(LastSeen{entry.chain, {stamp_ns}, *T_world_body});
+    add(LastSeen{entry.chain, {stamp_ns}, *T_world_body, {}});
   }
   return true;
 }
@@ -157,6 +157,32 @@ Status read_components(const v1::ProxyGraph& in, ProxyGraph& graph) {
   return {};
 }
 
+/// What a robot is called in `graph`; empty where that is not known.
+std::string_view name_in(const ProxyGraph& graph, RobotId robot) {
+  const auto seen = std::ranges::find(graph.last_seen, robot, [](const LastSeen& one) { return one.chain.robot; });
+  return seen == graph.last_seen.end() ? std::string_view() : seen->name;
+}
+
+/// Names seldom change, so a delta repeats none. (A name that was known and is not any more stays known.)
+void write_names(const ProxyGraph& graph, const ProxyGraph& base, v1::ProxyGraph& out) {
+  for (const LastSeen& seen : graph.last_seen)
+    out.add_last_seen_name(seen.name == name_in(base, seen.chain.robot) ? std::string() : seen.name);
+  if (std::ranges::all_of(out.last_seen_name(), &std::string::empty)) out.clear_last_seen_name();
+}
+
+/// Needs the graph's body.
+Status read_names(const v1::ProxyGraph& in, const ProxyGraph& base, ProxyGraph& graph) {
+  const auto named = static_cast<std::size_t>(in.last_seen_name_size());
+  if (named != 0 && named != graph.last_seen.size())
+    return fail(ErrorCode::parse, "{} names of {} robots last seen", named, graph.last_seen.size());
+  for (std::size_t i = 0; i < graph.last_seen.size(); ++i) {
+    LastSeen& seen = graph.last_seen[i];
+    if (named != 0) seen.name = in.last_seen_name(static_cast<int>(i));
+    if (seen.name.empty()) seen.name = name_in(base, seen.chain.robot);
+  }
+  return {};
+}
+
 /// `base`: an empty graph for a message that needs none.
 std::string encode(const ProxyGraphMessage& message, MessageKind kind, const ProxyGraph& base) {
   expect_valid(validate(message));
@@ -187,6 +213,7 @@ std::string encode(const ProxyGraphMessage& message, MessageKind kind, const Pro
     out.set_base_revision(base.revision);
   }
   write_body(graph, base, runs, out);
+  write_names(graph, base, out);
   const bool sessions = std::ranges::any_of(graph.components, [](const auto& c) { return c.chain.session != 0; });
   for (const ChainComponent& component : graph.components) {
     out.add_component_robot(component.chain.robot.value);
@@ -211,6 +238,7 @@ Result<ProxyGraphMessage> decode(const v1::ProxyGraph& in, const ProxyGraph& bas
   if (!runs) return in_context(where, runs.error());
   if (auto ok = read_components(in, graph); !ok) return in_context(where, ok.error());
   if (auto ok = read_body(in, base, *runs, graph); !ok) return in_context(where, ok.error());
+  if (auto ok = read_names(in, base, graph); !ok) return in_context(where, ok.error());
   if (auto ok = validate(message); !ok) return tl::unexpected(ok.error());
   return message;
 }

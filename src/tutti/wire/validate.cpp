@@ -162,6 +162,9 @@ Status check_last_seen(const ProxyGraph& graph) {
                   to_string(graph.last_seen[i - 1].chain));
     if (!component_of(graph, seen.chain)) return fail(ErrorCode::invalid, "{} has no component", where);
     if (auto ok = FieldChecker::check_value(seen.T_world_body); !ok) return in_context(where, ok.error());
+    if (seen.name.empty()) continue;
+    if (auto ok = FieldChecker::check(seen.name, {.text = FieldRule::Text::name}); !ok)
+      return in_context(where, ok.error());
   }
   return {};
 }

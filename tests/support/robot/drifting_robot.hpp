@@ -56,7 +56,7 @@ inline ProxyGraphMessage broadcast(const RobotAgent& agent, std::uint64_t revisi
   message.graph.nodes.push_back({.chain = RobotId{9}, .stamp = at(3), .T_world_body = T_world_true * true_pose(7)});
   message.graph.components = {{agent.chain(), 0}, {RobotId{9}, 0}};
   const ProxyNode& other = message.graph.nodes.back();
-  message.graph.last_seen = {{other.chain, other.stamp, other.T_world_body}};
+  message.graph.last_seen = {{other.chain, other.stamp, other.T_world_body, {}}};
   return message;
 }
 

@@ -135,7 +135,8 @@ inline ProxyGraphMessage any_proxy_graph(Rng& rng, std::size_t chains, std::size
     }
     const ProxyNode& last = graph.nodes.back();
     if (r % 2 == 1) graph.last_seen.pop_back();  // in the session before
-    graph.last_seen.push_back({chain, last.stamp, last.T_world_body});
+    graph.last_seen.push_back(
+        {chain, last.stamp, last.T_world_body, r % 4 < 2 ? "robot-" + std::to_string(r / 2) : std::string()});
     if (r % 2 == 0) graph.uncertainties.push_back(any_uncertainty(rng, chain, graph.nodes.size() - first));
     if (!reduced) continue;
     for (std::size_t a = first; a < graph.nodes.size(); ++a)

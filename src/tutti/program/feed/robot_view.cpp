@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "tutti/consistency/alerts.hpp"
 #include "tutti/geometry/so3.hpp"
 
@@ -77,10 +79,10 @@ FeedState RobotView::state(const node::RobotNode& node) const {
       out.alerts.push_back({begun_, since, since, since});
   if (jump_ && out.newest && out.newest->stamp - jump_->until < kJumpAlert_s) out.alerts.push_back(*jump_);
   for (const robot::Whereabouts& other : agent.whereabouts()) {
-    const auto name = names_.find(other.robot);
-    out.team_mates.push_back({other.robot,
-                              name == names_.end() ? fmt::format("robot {}", other.robot.value) : name->second,
-                              other.stamp, other.T_map_body});
+    const auto given = names_.find(other.robot);
+    std::string name = given == names_.end() ? other.name : given->second;
+    if (name.empty()) name = fmt::format("robot {}", other.robot.value);  // its server does not tell
+    out.team_mates.push_back({other.robot, std::move(name), other.stamp, other.T_map_body});
   }
   return out;
 }

@@ -69,6 +69,7 @@ struct Mission {
       if (rng.bernoulli(0.05)) {
         ProxyGraphMessage message = robot::test::broadcast(agent, i, robot::test::kWorld);
         for (ProxyNode& node : message.graph.nodes) node.T_world_body.translation.x() += 0.05 * rng.normal();
+        message.graph.last_seen.front().name = "nine";
         const auto summary = agent.receive(message);
         sent += std::to_string(summary.constraints) + ' ';
       }
@@ -106,6 +107,8 @@ RC_GTEST_PROP(AgentState, ComesBackToTheBit, ()) {
   RC_ASSERT(back.submaps.recent == state.submaps.recent);
   RC_ASSERT(back.submaps.finished.size() == state.submaps.finished.size());
   RC_ASSERT(back.whereabouts.size() == state.whereabouts.size());
+  RC_ASSERT(std::ranges::equal(back.whereabouts, state.whereabouts, {}, &robot::Whereabouts::name,
+                               &robot::Whereabouts::name));
   RC_ASSERT(back.sequence == state.sequence);
   RC_ASSERT(encode(back) == encode(state));
 }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <type_traits>
 #include <vector>
 
@@ -22,6 +23,7 @@ class Writer {
   void number(const double& x) { out_.add_number(x); }
   void coordinate(const float& x) { out_.add_coordinate(x); }
   [[nodiscard]] bool has_more() const { return true; }
+  [[nodiscard]] bool has_names() const { return true; }
   /// A list's length; returns how many elements follow.
   template <class T>
   std::size_t length(const std::vector<T>& list) {
@@ -37,7 +39,8 @@ class Writer {
 class Reader {
  public:
   /// `version`: of the frame. States of before kComplete may end early, at places where has_more() asks.
-  Reader(const v1::AgentState& in, std::uint16_t version) : in_(in), may_end_(version < kComplete) {}
+  Reader(const v1::AgentState& in, std::uint16_t version)
+      : in_(in), may_end_(version < kComplete), has_names_(version >= kNames) {}
   void integer(std::uint64_t& x) { x = next(in_.integer(), integers_); }
   void number(double& x) { x = next(in_.number(), numbers_); }
   void coordinate(float& x) { x = next(in_.coordinate(), coordinates_); }
@@ -52,6 +55,7 @@ class Reader {
     return list.size();
   }
   [[nodiscard]] bool has_more() const { return !may_end_ || integers_ < in_.integer_size(); }
+  [[nodiscard]] bool has_names() const { return has_names_; }
   [[nodiscard]] bool is_complete() const {
     return !short_ && integers_ == in_.integer_size() && numbers_ == in_.number_size() &&
            coordinates_ == in_.coordinate_size();
@@ -64,9 +68,9 @@ class Reader {
     short_ = true;
     return 0;
   }
-  static constexpr std::uint16_t kComplete = 5;
+  static constexpr std::uint16_t kComplete = 5, kNames = 6;
   const v1::AgentState& in_;
-  bool may_end_;
+  bool may_end_, has_names_;
   int integers_ = 0, numbers_ = 0, coordinates_ = 0;
   bool short_ = false;
 };
@@ -342,6 +346,16 @@ void pass_fixes(A& a, robot::SubmapBuilderState& builder) {
   pass(a, builder.heard_fix);
   for (robot::FinishedSubmap& finished : builder.finished) pass(a, finished.submap.fixes);
 }
+/// What team-mates are called; states of before kNames do not have it.
+template <class A>
+void pass_names(A& a, AgentState& state) {
+  if (!a.has_names()) return;
+  for (robot::Whereabouts& other : state.whereabouts) {
+    std::vector<std::uint8_t> letters(other.name.begin(), other.name.end());
+    pass(a, letters);
+    other.name.assign(letters.begin(), letters.end());
+  }
+}
 template <class A>
 void pass(A& a, AgentState& state) {
   pass(a, state.session);
@@ -369,6 +383,7 @@ void pass(A& a, AgentState& state) {
   pass_waiting(a, state.submaps);
   pass_watch(a, state);
   pass_fixes(a, state.submaps);
+  pass_names(a, state);
 }
 
 }  // namespace tutti::wire::archive

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tutti/geometry/pose3.hpp"
+#include "tutti/wire/field_bytes.hpp"
 
 namespace tutti::wire {
 namespace {
@@ -17,7 +18,10 @@ bool is_sound(const Pose3& T) { return is_valid(T); }
 bool is_sound(const RelativePose& measured) { return is_sound(measured.T_a_b) && measured.covariance.allFinite(); }
 bool is_sound(const lidar::PosedCloud& scan) { return is_sound(scan.T_submap_body); }
 bool is_sound(const TrackedImages& images) { return check_images(images).has_value(); }
-bool is_sound(const robot::Whereabouts& other) { return is_sound(other.T_map_body); }
+bool is_sound(const robot::Whereabouts& other) {
+  return is_sound(other.T_map_body) &&
+         (other.name.empty() || FieldChecker::check(other.name, {.text = FieldRule::Text::name}));
+}
 bool is_sound(const SubmapFix& fix) {
   return check_fix(fix.antenna, fix.covariance, fix.p_keyframe_antenna).has_value();
 }
