@@ -386,6 +386,9 @@ class CommandLine(unittest.TestCase):
         self.expect(tutti("map", "export", self.path / "map", "--grid", "g.yaml", "--low", 2, "--high", 1), 2, "--low")
         self.expect(tutti("export", self.path / "out", "-o", self.path / "out.mcap"), 0, "messages of", "topics")
         self.expect(tutti("bag", "info", self.path / "out.mcap"), 0, "/alpha/corrected", "nav_msgs/msg/Path", "/tf_static")
+        self.assertIn(b"jsonschema", (self.path / "out.mcap").read_bytes())
+        self.expect(tutti("export", self.path / "out", "-o", self.path / "out.mcap", "--ros-only"), 0, "messages of", "topics")
+        self.assertNotIn(b"jsonschema", (self.path / "out.mcap").read_bytes())
         self.expect(tutti("export", self.path, "-o", self.path / "x.mcap"), 1, "report.json")
         self.expect(tutti("export", self.path / "none", "-o", self.path / "x.mcap"), 1, "none")
 

@@ -80,7 +80,8 @@ Status export_all(const ExportOptions& options) {
   }
   for (const auto& [format, file] : *wanted) {
     if (auto made = make_folder_of(file); !made) return made;
-    const auto report = is_folder ? format->of_run(options.input, file) : format->of_map(map, options.settings, file);
+    const auto report =
+        is_folder ? format->of_run(options.input, options.settings, file) : format->of_map(map, options.settings, file);
     if (!report) return tl::unexpected(report.error());
     fmt::print("{}\n", *report);
   }
@@ -106,6 +107,9 @@ void add_export_command(CLI::App& parent, int& exit_code) {
         ->add_option(fmt::format("--{}", format.name), options->by_name[format.name],
                      fmt::format("{}{}", format.help, format.of_run == nullptr ? "\nOnly of a map's file." : ""))
         ->type_name(format.ending == "/" ? "DIR/" : fmt::format("FILE{}", format.ending));
+  command->add_flag(
+      "--ros-only", options->settings.ros_only,
+      "In .mcap nothing but ROS's messages, as rosbag2 plays it: what else is JSON is diagnostics there.");
   AddOptions add{*command};
   options->settings.describe(add);
   command->footer(

@@ -22,19 +22,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Result<std::string> write_mcap(const Result<Scene>& scene, const fs::path& out) {
+Result<std::string> write_mcap(const Result<Scene>& scene, const FormatSettings& settings, const fs::path& out) {
   if (!scene) return tl::unexpected(scene.error());
-  return write_scene(*scene, out.string()).map([&](const WrittenScene& written) {
+  return write_scene(*scene, out.string(), settings.ros_only).map([&](const WrittenScene& written) {
     return fmt::format("{}: {} messages of {} topics", out.string(), written.messages, written.topics);
   });
 }
 
-Result<std::string> mcap_of_map(const MapSource& map, const FormatSettings&, const fs::path& out) {
-  return write_mcap(scene_of_map(*map.store, map.content, map.estimate), out);
+Result<std::string> mcap_of_map(const MapSource& map, const FormatSettings& settings, const fs::path& out) {
+  return write_mcap(scene_of_map(*map.store, map.content, map.estimate), settings, out);
 }
 
-Result<std::string> mcap_of_run(const fs::path& folder, const fs::path& out) {
-  return write_mcap(scene_of_run(folder.string()), out);
+Result<std::string> mcap_of_run(const fs::path& folder, const FormatSettings& settings, const fs::path& out) {
+  return write_mcap(scene_of_run(folder.string()), settings, out);
 }
 
 Status copy_of(const fs::path& from, const fs::path& to) {
@@ -52,7 +52,7 @@ Result<std::string> g2o_of_map(const MapSource& map, const FormatSettings&, cons
   });
 }
 
-Result<std::string> g2o_of_run(const fs::path& folder, const fs::path& out) {
+Result<std::string> g2o_of_run(const fs::path& folder, const FormatSettings&, const fs::path& out) {
   const fs::path graph = folder / "graph.g2o";
   return copy_of(graph, out)
       .and_then([&] { return copy_of(formats::stamps_beside(graph.string()), formats::stamps_beside(out.string())); })
@@ -65,7 +65,7 @@ Result<std::string> tum_of_map(const MapSource& map, const FormatSettings&, cons
   });
 }
 
-Result<std::string> tum_of_run(const fs::path& folder, const fs::path& out) {
+Result<std::string> tum_of_run(const fs::path& folder, const FormatSettings&, const fs::path& out) {
   if (auto made = make_folder(out); !made) return tl::unexpected(made.error());
   constexpr std::string_view kEnd = "_server.tum";
   std::vector<std::string> files;
@@ -91,7 +91,7 @@ Result<std::string> ply_of_map(const MapSource& map, const FormatSettings&, cons
                      cloud->of_the_largest ? "" : "; the largest part of the map has no clouds, this is of another");
 }
 
-Result<std::string> ply_of_run(const fs::path& folder, const fs::path& out) {
+Result<std::string> ply_of_run(const fs::path& folder, const FormatSettings&, const fs::path& out) {
   return copy_of(folder / "map.ply", out).map([&] { return out.string() + ": the server's map"; });
 }
 
@@ -107,7 +107,8 @@ Result<std::string> marks_of_map(const MapSource& map, const FormatSettings&, co
 constexpr std::array kFormats{
     Format{"mcap", ".mcap",
            "For Foxglove, Rerun and PlotJuggler: trajectories (nav_msgs/Path, and poses over time), /tf, the cloud,\n"
-           "closures (markers by their state), alerts (/diagnostics), and JSON; docs/report.md has the topics.",
+           "closures (markers by their state), alerts (/diagnostics), and JSON; docs/report.md has the topics.\n"
+           "rosbag2 plays it if it is written with --ros-only.",
            mcap_of_map, mcap_of_run},
     Format{"g2o", ".g2o", "The joint pose graph; beside it which keyframe each vertex is.", g2o_of_map, g2o_of_run},
     Format{"tum", "/", "Every session's trajectory in the joint map, as NAME.tum.", tum_of_map, tum_of_run},

@@ -28,6 +28,7 @@ Result<MapSource> open_map(const std::filesystem::path& file, bool live);
 struct FormatSettings {
   grids::MapGridConfig grid;
   double voxel_m = 0.2;
+  bool ros_only = false;  ///< MCAP files have no JSON (write_scene).
   template <class V>
   void describe(V& v) {
     v.field("resolution", grid.grid.resolution_m, between(0.01, 10.0), "Edge of the grid's cells.");
@@ -52,7 +53,8 @@ struct Format {
   std::string_view help;
   using OfMap = Result<std::string>(const MapSource& map, const FormatSettings& settings,
                                     const std::filesystem::path& out);
-  using OfRun = Result<std::string>(const std::filesystem::path& folder, const std::filesystem::path& out);
+  using OfRun = Result<std::string>(const std::filesystem::path& folder, const FormatSettings& settings,
+                                    const std::filesystem::path& out);
   OfMap* of_map;
   OfRun* of_run;  ///< From a folder that `tutti run` has written; null: the folder lacks what the format needs.
 };

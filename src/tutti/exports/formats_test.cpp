@@ -110,10 +110,10 @@ TEST_F(Formats, WhatAMissionsFolderHasIsTheSameFile) {
   for (const Format& format : all_formats()) {
     const std::string out = file("again") + std::string(format.ending);
     if (format.of_run == nullptr) continue;
-    const auto report = format.of_run(run, out);
+    const auto report = format.of_run(run, {}, out);
     ASSERT_TRUE(report) << format.name << ": " << report.error().message;
     EXPECT_TRUE(report->starts_with(out)) << *report;
-    const auto nothing = format.of_run(folder_ / "none", out);
+    const auto nothing = format.of_run(folder_ / "none", {}, out);
     ASSERT_FALSE(nothing) << format.name;
     EXPECT_NE(nothing.error().message.find("none"), std::string::npos) << nothing.error().message;
   }

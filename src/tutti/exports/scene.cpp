@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/exports/scene.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -41,8 +43,8 @@ std::pair<Timestamp, Timestamp> span_of(const Scene& scene) {
 /// Turns a scene into messages; `shift_ns` is added to every stamp.
 class Messages {
  public:
-  Messages(const Scene& scene, Timestamp begin, std::int64_t shift_ns)
-      : scene_(scene), begin_{begin.ns + shift_ns}, shift_ns_(shift_ns) {}
+  Messages(const Scene& scene, Timestamp begin, std::int64_t shift_ns, bool ros_only)
+      : scene_(scene), begin_{begin.ns + shift_ns}, shift_ns_(shift_ns), ros_only_(ros_only) {}
 
   std::vector<Message> all() {
     add_transforms();
@@ -51,8 +53,7 @@ class Messages {
     for (const Scene::Cloud& cloud : scene_.clouds) add(cloud);
     add_closures();
     for (const Scene::Alert& alert : scene_.alerts) add(alert);
-    for (const Scene::Numbers& numbers : scene_.numbers)
-      add_json(numbers.topic, "tutti/Numbers/" + numbers.topic, shifted(numbers.stamp), to_json(numbers.values));
+    for (const Scene::Numbers& numbers : scene_.numbers) add(numbers);
     std::ranges::stable_sort(out_, {}, &Message::stamp);
     return std::move(out_);
   }
@@ -115,12 +116,7 @@ class Messages {
       const auto [at, is_new] = of_state.try_emplace({closure.frame, closure.between_robots});
       bags::RosLines& lines = at->second;
       lines.points.insert(lines.points.end(), {closure.from, closure.to});
-      ordered_json json{{"name", closure.name},
-                        {"state", closure.state},
-                        {"reason", closure.reason},
-                        {"between_robots", closure.between_robots}};
-      json.update(to_json(closure.numbers));
-      add_json("closures", "tutti/Closure", shifted(closure.stamp), json);
+      add_numbers(closure);
     }
     for (auto& [state, markers] : by_state) {
       std::vector<bags::RosLines> array;
@@ -140,14 +136,65 @@ class Messages {
     }
   }
 
+  void add_numbers(const Scene::Closure& closure) {
+    if (ros_only_) {
+      add_diagnostic("closures", closure.stamp,
+                     {.level = static_cast<std::uint8_t>(closure.state == "rejected" ? 1 : 0),
+                      .name = closure.name,
+                      .message = closure.reason.empty() ? closure.state : closure.state + ": " + closure.reason,
+                      .hardware_id = {},
+                      .values = to_text(closure.numbers)});
+      return;
+    }
+    ordered_json json{{"name", closure.name},
+                      {"state", closure.state},
+                      {"reason", closure.reason},
+                      {"between_robots", closure.between_robots}};
+    json.update(to_json(closure.numbers));
+    add_json("closures", "tutti/msg/Closure", shifted(closure.stamp), json);
+  }
+
+  void add(const Scene::Numbers& numbers) {
+    if (ros_only_)
+      add_diagnostic(
+          numbers.topic, numbers.stamp,
+          {.level = 0, .name = numbers.topic, .message = {}, .hardware_id = {}, .values = to_text(numbers.values)});
+    else
+      add_json(numbers.topic, type_of(numbers), shifted(numbers.stamp), to_json(numbers.values));
+  }
+
   void add(const Scene::Alert& alert) {
-    const bags::RosDiagnostic status{.level = static_cast<std::uint8_t>(alert.is_error ? 2 : 1),
-                                     .name = alert.name,
-                                     .message = alert.message,
-                                     .hardware_id = {},
-                                     .values = alert.values};
-    add(shifted(alert.stamp), "diagnostics", "diagnostic_msgs/msg/DiagnosticArray",
-        encode({shifted(alert.stamp), ""}, std::span(&status, 1)));
+    add_diagnostic("diagnostics", alert.stamp,
+                   {.level = static_cast<std::uint8_t>(alert.is_error ? 2 : 1),
+                    .name = alert.name,
+                    .message = alert.message,
+                    .hardware_id = {},
+                    .values = alert.values});
+  }
+
+  void add_diagnostic(const std::string& topic, Timestamp stamp, const bags::RosDiagnostic& status) {
+    add(shifted(stamp), topic, "diagnostic_msgs/msg/DiagnosticArray",
+        encode({shifted(stamp), ""}, std::span(&status, 1)));
+  }
+
+  /// A name as ROS's types have them, of the topic's: "alpha/to_server" is tutti/msg/NumbersAlphaToServer.
+  static std::string type_of(const Scene::Numbers& numbers) {
+    std::string out = "tutti/msg/Numbers";
+    bool begins = true;
+    for (const char c : numbers.topic) {
+      const auto letter = static_cast<unsigned char>(c);
+      if (std::isalnum(letter) != 0) out += static_cast<char>(begins ? std::toupper(letter) : letter);
+      begins = std::isalnum(letter) == 0;
+    }
+    return out;
+  }
+
+  static std::vector<std::pair<std::string, std::string>> to_text(
+      const std::vector<std::pair<std::string, double>>& values) {
+    std::vector<std::pair<std::string, std::string>> out;
+    for (const auto& [name, value] : values)
+      if (std::isfinite(value)) out.emplace_back(name, fmt::format("{}", value));
+    return out;
   }
 
   static ordered_json to_json(const std::vector<std::pair<std::string, double>>& values) {
@@ -173,6 +220,7 @@ class Messages {
   const Scene& scene_;
   Timestamp begin_;
   std::int64_t shift_ns_;
+  bool ros_only_;
   std::map<std::string, std::string> schemas_;
   std::vector<Message> out_;
 };
@@ -185,14 +233,14 @@ std::string ros_name(std::string name) {
   return name.empty() || std::isdigit(static_cast<unsigned char>(name[0])) != 0 ? "robot_" + name : name;
 }
 
-Result<WrittenScene> write_scene(const Scene& scene, const std::string& path) {
+Result<WrittenScene> write_scene(const Scene& scene, const std::string& path, bool ros_only) {
   const auto [first, last] = span_of(scene);
   if (first > last)
     return fail(ErrorCode::invalid, "{}: there is nothing to write: no trajectory, closure or number", path);
   const std::int64_t shift_ns = first.ns < 0 ? -first.ns : 0;
   auto bag = bags::RosWriter::create(path);
   if (!bag) return tl::unexpected(bag.error());
-  const std::vector<Message> messages = Messages(scene, first, shift_ns).all();
+  const std::vector<Message> messages = Messages(scene, first, shift_ns, ros_only).all();
   for (const Message& message : messages) {
     const Status ok = message.schema.empty()
                           ? bag->write(message.topic, message.type, message.stamp, message.data, message.durability)

@@ -85,7 +85,9 @@ struct WrittenScene {
 /// at the first stamp; what moves (/tf, each trajectory once more as PoseStamped and, in the earth's frame, as
 /// NavSatFix, numbers and closures as JSON, alerts in /diagnostics) at its own. If there are stamps before 1970, all
 /// stamps are moved so that the first is at 1970. A scene without any stamp is an error.
-Result<WrittenScene> write_scene(const Scene& scene, const std::string& path);
+/// With `ros_only` every message is one of ROS, as rosbag2 needs it, which plays no file with a channel of JSON:
+/// numbers and closures are diagnostic_msgs/DiagnosticArray on the same topics then.
+Result<WrittenScene> write_scene(const Scene& scene, const std::string& path, bool ros_only = false);
 
 /// A part of a topic's or frame's name that ROS allows: other letters become '_', and a name that is empty or begins
 /// with a digit gets "robot_" in front.

@@ -11,6 +11,8 @@
 #include "support/bags/mcap_core.hpp"
 #include "tutti/bags/bag_info.hpp"
 #include "tutti/bags/bag_reader.hpp"
+#include "tutti/bags/ros_definitions.hpp"
+#include "tutti/base/file.hpp"
 
 namespace tutti::exports {
 namespace scene_test {
@@ -51,10 +53,10 @@ TEST(Scene, EverythingIsInTheFileAtItsTime) {
   EXPECT_EQ(topics, (std::map<std::string, std::pair<std::string, std::uint64_t>>{
                         {"/alpha/server", {"nav_msgs/msg/Path", 1}},
                         {"/alpha/server/pose", {"geometry_msgs/msg/PoseStamped", 2}},
-                        {"/closures", {"tutti/Closure", 2}},
+                        {"/closures", {"tutti/msg/Closure", 2}},
                         {"/closures/accepted", {"visualization_msgs/msg/MarkerArray", 1}},
                         {"/closures/rejected", {"visualization_msgs/msg/MarkerArray", 1}},
-                        {"/course", {"tutti/Numbers/course", 1}},
+                        {"/course", {"tutti/msg/NumbersCourse", 1}},
                         {"/diagnostics", {"diagnostic_msgs/msg/DiagnosticArray", 1}},
                         {"/map", {"sensor_msgs/msg/PointCloud2", 1}},
                         {"/tf", {"tf2_msgs/msg/TFMessage", 2}},
@@ -66,6 +68,24 @@ TEST(Scene, EverythingIsInTheFileAtItsTime) {
   EXPECT_TRUE(has(
       R"(/closures 1001000000000 {"name":"alpha/0-bravo/1","state":"accepted","reason":"","between_robots":true,"off_m":0.5})"));
   EXPECT_TRUE(has(R"(/course 1001000000000 {"closures_accepted":3})"));
+}
+
+/// rosbag2 plays no file with a channel that is not CDR, and no type that is not PACKAGE/msg/NAME.
+TEST(Scene, ForRosAloneEverythingIsAMessageOfRos) {
+  const fs::path path = file("ros_only.mcap");
+  const auto written = write_scene(scene(Timestamp{1'000'000'000'000}), path.string(), true);
+  ASSERT_TRUE(written) << written.error().message;
+  EXPECT_EQ(written->messages, write_scene(scene(Timestamp{1'000'000'000'000}), file("all.mcap").string())->messages);
+  const auto reader = bags::open_bag(path.string()).value();
+  for (const bags::TopicInfo& topic : bags::inspect(*reader).topics) {
+    EXPECT_TRUE(bags::has_ros_definition(topic.type)) << topic.type;
+    EXPECT_EQ(topic.problem, "") << topic.topic;
+    if (topic.topic == "/course" || topic.topic == "/closures") {
+      EXPECT_EQ(topic.type, "diagnostic_msgs/msg/DiagnosticArray");
+    }
+  }
+  const std::string bytes = read_file(path.string()).value();
+  for (const char* text : {"jsonschema", "tutti/msg"}) EXPECT_EQ(bytes.find(text), std::string::npos) << text;
 }
 
 TEST(Scene, StampsBefore1970AreMovedTogether) {
