@@ -100,7 +100,7 @@ class CommandLine(unittest.TestCase):
                         + record(4, one + one + counted(b"/talk\x1b[2J") + counted(b"cdr") + counted(b""))
                         + record(5, one + bytes(4) + time + time + b"hello") + b"\x05cut")
         self.expect(tutti("bag", "info", bag), 0, "/talk?[2J", "std_msgs/msg/String", "2023-11-14 22:13:20.250",
-                    "odometry     missing", "scans        none", "cut off")
+                    "odometry     missing", "scans        none", "cut off", "\nnot ready: ", "no odometry: expected a topic of")
         self.expect(tutti("bag", "info", self.path), 0, "no metadata.yaml", "cut off")
         self.expect(tutti("bag", "info", self.path / "none.mcap"), 1, "none.mcap: cannot be opened")
         other = self.path / "other.mcap"

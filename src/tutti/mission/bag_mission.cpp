@@ -91,16 +91,15 @@ Result<std::vector<fs::path>> bags_in(const fs::path& folder) {
   return out;
 }
 
-/// As robots may be called: letters, digits, '_' and '-'.
-std::string as_name(const fs::path& path) {
+}  // namespace
+
+std::string robot_of_bag(const fs::path& path) {
   fs::path last = path.has_filename() ? path.filename() : path.parent_path().filename();
   std::string out = last.string().substr(0, last.string().find('.', 1));
   std::ranges::replace_if(
       out, [](unsigned char c) { return std::isalnum(c) == 0 && c != '_' && c != '-'; }, '_');
   return out;
 }
-
-}  // namespace
 
 bool is_mission_file(const std::string& input) {
   const std::string ending = fs::path(input).extension().string();
@@ -124,7 +123,7 @@ Result<std::vector<std::string>> name_bags(const std::vector<std::string>& input
   }
   std::vector<std::string> names, out;
   for (const fs::path& bag : bags) {
-    const std::string plain = as_name(bag);
+    const std::string plain = robot_of_bag(bag);
     std::string name = plain;
     for (int k = 2; std::ranges::find(names, name) != names.end(); ++k) name = fmt::format("{}_{}", plain, k);
     names.push_back(name);
