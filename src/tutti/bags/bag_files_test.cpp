@@ -108,6 +108,29 @@ TEST_F(BagFolders, AFileThatIsMissingCostsItsMessages) {
   EXPECT_NE(read.notes[0].find("other.mcap: is not named by metadata.yaml"), std::string::npos) << read.notes[0];
 }
 
+TEST_F(BagFolders, WhatSomethingElseHasPackedIsNamedWithWhatToType) {
+  fs::create_directories(folder_);
+  const auto said = [&](const char* name, const std::string& bytes) {
+    write_bytes(folder_ / name, bytes);
+    const auto bag = open_bag((folder_ / name).string());
+    return bag ? std::string("opened") : bag.error().message;
+  };
+  for (const auto& [name, bytes, packer, line] :
+       {std::tuple{"a.mcap.gz", std::string("\x1f\x8b\x08 and so on"), "gzip", "first: gunzip -k "},
+        {"a.tar.gz", std::string("\x1f\x8b\x08 and so on"), "gzip", "first: tar xf "},
+        {"a.bag.bz2", std::string("BZh91AY"), "bzip2", "first: bunzip2 -k "},
+        {"a.mcap.xz",
+         std::string("\xfd"
+                     "7zXZ\0\0",
+                     7),
+         "xz", "first: unxz -k "},
+        {"a.zip", std::string("PK\x03\x04\x14"), "zip", "first: unzip "}}) {
+    const std::string message = said(name, bytes);
+    EXPECT_NE(message.find(std::string("is packed with ") + packer), std::string::npos) << message;
+    EXPECT_TRUE(message.ends_with(line + (folder_ / name).string())) << message;
+  }
+}
+
 TEST_F(BagFolders, BrokenMetadataIsOnlyNoted) {
   write_rosbag2(folder_, samples(), Storage::db3, Packing::none, 5);
   write_bytes(folder_ / "metadata.yaml", "rosbag2_bagfile_information: 3\n");
