@@ -75,6 +75,7 @@ Status export_all(const ExportOptions& options) {
     auto opened = exports::open_map(options.input, options.live);
     if (!opened) return tl::unexpected(opened.error());
     map = std::move(*opened);
+    if (!map.why_copied.empty()) fmt::print("note: {}: a copy of it is read, as with --live\n", map.why_copied);
     if (map.estimate.components > 1)
       fmt::print("note: {} components, of which each has a frame of its own\n", map.estimate.components);
   }
@@ -98,8 +99,8 @@ void add_export_command(CLI::App& parent, int& exit_code) {
       ->required();
   command->add_flag(
       "--live", options->live,
-      "A server may have the map open, now or meanwhile: it is copied to the folder for temporary files (TMPDIR) "
-      "first, and neither changed nor locked.");
+      "A server may open the map meanwhile: it is copied to the folder for temporary files (TMPDIR) first, and neither "
+      "changed nor locked. A map that a server has open is always read so.");
   command->add_option("-o,--output", options->outputs, "Where to write it; the ending says in which format.")
       ->type_name("FILE");
   for (const Format& format : exports::all_formats())

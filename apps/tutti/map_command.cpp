@@ -254,7 +254,7 @@ void add_map_command(CLI::App& app, int& exit_code) {
   CLI::App* map = app.add_subcommand(
       "map",
       "Look into maps, export and join them, and say which closures are right. On files that no server has open, but "
-      "for 'export --live'.");
+      "for 'export'.");
   map->require_subcommand(1);
 
   const auto folder = std::make_shared<std::string>(".");

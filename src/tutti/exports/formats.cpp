@@ -128,11 +128,17 @@ constexpr std::array kFormats{
 
 Result<MapSource> open_map(const fs::path& file, bool live) {
   auto store = live ? mapfile::open_copy(file) : mapfile::open(file);
+  std::string why_copied;
+  if (!store && !live)
+    if (auto copy = mapfile::open_copy(file)) {
+      why_copied = store.error().message;
+      store = std::move(copy);
+    }
   if (!store) return tl::unexpected(store.error());
   auto content = mapfile::read(**store);
   if (!content) return tl::unexpected(content.error());
   auto estimate = mapfile::estimate(*content);
-  return MapSource{file, std::move(*store), std::move(*content), std::move(estimate)};
+  return MapSource{file, std::move(*store), std::move(*content), std::move(estimate), why_copied};
 }
 
 std::span<const Format> all_formats() { return kFormats; }

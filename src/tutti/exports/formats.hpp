@@ -20,8 +20,10 @@ struct MapSource {
   std::unique_ptr<storage::TableStore> store;
   mapfile::Content content;
   server::MapEstimate estimate;
+  std::string why_copied;  ///< Why the file itself could not be opened, and a copy was; empty otherwise.
 };
-/// `live`: a server may have the map open, so a copy of it is read (mapfile::open_copy).
+/// A copy of the map is read (mapfile::open_copy) with `live`, because a server may have it open or come to, and where
+/// the file itself cannot be opened, as when a server has it.
 Result<MapSource> open_map(const std::filesystem::path& file, bool live);
 
 /// What can be set about the formats; fields have the names of the options.

@@ -12,6 +12,7 @@
 #include "tutti/base/file.hpp"
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/graph_stamps.hpp"
+#include "tutti/storage/sqlite_store.hpp"
 
 namespace tutti::exports {
 namespace formats_test {
@@ -121,6 +122,23 @@ TEST_F(Formats, WhatAMissionsFolderHasIsTheSameFile) {
   EXPECT_EQ(read_file(file("again_stamps.csv")).value(), read_file((run / "graph_stamps.csv").string()).value());
   EXPECT_EQ(read_file(file("again.ply")).value(), read_file((run / "map.ply").string()).value());
   EXPECT_EQ(read_file(file("again/1.tum")).value(), read_file((run / "1_server.tum").string()).value());
+}
+
+TEST_F(Formats, AMapThatAServerHasOpenIsReadFromACopy) {
+  const fs::path path = folder_ / "map.tutti";
+  {
+    const auto store = storage::open_sqlite_store(path, storage::map_schema(), {.min_free_bytes = 0}).value();
+    mapfile::test::Mapper mapper({RobotId{0}}, *store);
+    mapper.walk(ChainId(RobotId{0}, 5), 1, ground);
+    const auto map = open_map(path, false);
+    ASSERT_TRUE(map) << map.error().message;
+    EXPECT_NE(map->why_copied.find("map.tutti: is open in another program"), std::string::npos) << map->why_copied;
+    EXPECT_EQ(map->content.submaps.size(), mapper.server().state().submaps.size());
+  }
+  EXPECT_EQ(open_map(path, false)->why_copied, "");
+  const auto none = open_map(folder_ / "none", false);
+  ASSERT_FALSE(none);
+  EXPECT_NE(none.error().message.find("no such file"), std::string::npos) << none.error().message;
 }
 
 TEST_F(Formats, AMapWithoutCloudsIsNoCloud) {
