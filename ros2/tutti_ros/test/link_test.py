@@ -60,6 +60,10 @@ class Reconnecting(unittest.TestCase):
         self.assertEqual(link.counts["odometry_missed"], 26)  # the last of all has none behind it
         self.add(link, 1000)
         self.assertEqual(link.counts["odometry_missed"], 26, "a pause")
+        for i in range(40):
+            if i < 20 or i % 3:
+                self.add_scan(link, i)
+        self.assertEqual(link.counts["scans_missed"], 6)
 
     def filled(self, count=10, **limits):
         link = Link(**limits)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What /diagnostics reports of the robot."""
 OK, WARN, ERROR = 0, 1, 2  # diagnostic_msgs/DiagnosticStatus
-COUNTED = ("odometry", "odometry_missed", "scans", "fixes", "images", "imu", "corrections", "refused", "jumps", "forgotten_while_away")
+COUNTED = ("odometry", "odometry_missed", "scans", "scans_missed", "fixes", "images", "imu", "corrections", "refused", "jumps", "forgotten_while_away")
 
 
 def diagnosis(link, correction, situation, trouble, is_alive=True):

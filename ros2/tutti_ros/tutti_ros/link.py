@@ -68,7 +68,8 @@ class Link:
     def __init__(self, most_samples=20_000, most_bytes=64 * 1024 * 1024, **hello):
         self.hello, self.most_samples, self.most_bytes = hello, most_samples, most_bytes
         self.state, self.why, self.wait_s = "away", "not connected yet", FIRST_WAIT_S
-        self.counts, self.missed = collections.Counter(), MissedCount()
+        self.counts = collections.Counter()
+        self.missed = {kind: MissedCount() for kind in ("odometry", "scans")}
         self.kept = collections.deque()
         self.heavy, self.heavy_bytes = collections.deque(), 0  # those of `kept` that are no odometry
         self.waiting = collections.deque()  # those of `kept` that are to be sent on this connection
@@ -82,10 +83,10 @@ class Link:
         """A message that begins with a header, and is counted as `counted`."""
         sample = Sample(stamp_ns(cdr), raw_frame(topic, kind, cdr), counted)
         self.kept.append(sample)
-        if counted == "odometry":
-            self.missed.note(sample.stamp_ns)
-            self.counts["odometry_missed"] = self.missed.count
-        else:
+        if counted in self.missed:
+            self.missed[counted].note(sample.stamp_ns)
+            self.counts[f"{counted}_missed"] = self.missed[counted].count
+        if counted != "odometry":
             self.heavy.append(sample)
             self.heavy_bytes += len(sample.frame)
         if self.state == "feeding":

@@ -200,6 +200,8 @@ Status RosIntake::take_points(std::string_view bytes, std::string_view type, Enc
   const auto message = bags::decode_scan(type, bytes, encoding);
   if (!message) return tl::unexpected(message.error());
   const Timestamp sensor_stamp = message->header.stamp, stamp = sensor_stamp + config_.scan_offset_s;
+  missed_scans_.note(sensor_stamp);
+  counts_.missed_scans = missed_scans_.count();
   if (known_ && stamp <= *known_) return {};
   if (Status ok = scan_clock_.check(stamp, stamps_.newest()); !ok) return ok;
   if (std::string doubt = scan_clock_.take_doubt(); !doubt.empty()) note_ = "scans: " + doubt;

@@ -120,7 +120,7 @@ class RosIntake {
   std::string take_note() { return std::exchange(note_, {}); }
   struct Counts {
     std::uint64_t odometry = 0, scans = 0, fixes = 0, refused = 0;
-    std::uint64_t missed = 0;  ///< Odometry that was published and never heard (MissedCount).
+    std::uint64_t missed = 0, missed_scans = 0;  ///< Odometry, scans that were published and never heard (MissedCount).
   };
   [[nodiscard]] const Counts& counts() const { return counts_; }
 
@@ -167,7 +167,7 @@ class RosIntake {
   bool unseen_ = false;              ///< Nobody has observed the motion to the next sample.
   bool is_unsure_ = false;           ///< A fix came without covariance.
   std::string how_, how_fixed_, note_;
-  MissedCount missed_;
+  MissedCount missed_, missed_scans_;
   Counts counts_;
 };
 

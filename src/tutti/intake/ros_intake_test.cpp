@@ -217,6 +217,22 @@ TEST(RosIntake, FixesWaitForTheirOdometryAndTheirAntennaIsWhereStaticTransformsS
   EXPECT_EQ(intake.counts().fixes, 5U);
 }
 
+TEST(RosIntake, WhatIsPublishedAndNotHeardIsCounted) {
+  RosIntake intake({});
+  for (int i = 0; i < 40; ++i) {
+    const std::int64_t stamp = kStart + i * kPeriod;
+    if (i < 20 || i % 4 != 0) {
+      ASSERT_TRUE(intake.add_odometry(odometry(stamp)));
+    }
+    if (i < 20 || i % 3 != 0) {
+      ASSERT_TRUE(intake.add_points(points(stamp, kAtOnce)));
+    }
+    feed(intake);
+  }
+  EXPECT_EQ(intake.counts().missed, 5U);
+  EXPECT_EQ(intake.counts().missed_scans, 6U);  // the last of all has none behind it
+}
+
 TEST(RosIntake, AMissionMaySayWhereTheAntennaIs) {
   RosIntake intake({.odometry_frames = {},
                     .covariance = {},

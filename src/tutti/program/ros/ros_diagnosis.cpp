@@ -15,6 +15,7 @@ bags::RosDiagnostic diagnosis(const RosSituation& situation) {
   add("odometry", situation.counts.odometry);
   add("odometry_missed", situation.counts.missed);
   add("scans", situation.counts.scans);
+  add("scans_missed", situation.counts.missed_scans);
   add("fixes", situation.counts.fixes);
   add("refused", situation.counts.refused);
   add("in_map", situation.in_map);

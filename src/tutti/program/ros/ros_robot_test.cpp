@@ -248,7 +248,9 @@ TEST_F(RosRobots, ScansThatComeBeforeTheirTransformWaitForIt) {
   EXPECT_EQ(said().find("no transform"), std::string::npos) << said();
   EXPECT_TRUE(::tutti::test::within(kPatience_s, [&] {
     const auto all = taken(*diagnostics);
-    return std::ranges::any_of(all, [](const std::string& cdr) { return cdr.find("odometry_missed") != cdr.npos; });
+    return std::ranges::any_of(all, [](const std::string& cdr) {
+      return cdr.find("odometry_missed") != cdr.npos && cdr.find("scans_missed") != cdr.npos;
+    });
   }));
 }
 
