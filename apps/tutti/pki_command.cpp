@@ -112,8 +112,7 @@ void add_names(CLI::App& command, std::vector<std::string>& names) {
       .add_option(
           "--name", names,
           "A name or an address of this machine, under which browsers open its page; may be given several times")
-      ->type_name("HOST")
-      ->allow_extra_args(false);
+      ->type_name("HOST");
 }
 
 void add_member(CLI::App& app, BusRole role, const char* help, int& exit_code) {

@@ -183,21 +183,26 @@ std::vector<KnownDirection> directions(const MatrixXd& P, const MatrixXd& O) {
 
 /// With the group right, the squared length of its shift in odometry's covariance is about chi-square, with six degrees
 /// of freedom for each place that it tells of, and no more than all closures tell together, which is what P leaves of
-/// O. D^2 beyond the quantile of the worst of so many groups speaks for a wrong one with odds exp((D^2 - quantile) /
-/// 2). That share of the shift is doubted, of the group of which it is largest.
+/// O. Where the other groups contradict odometry, too, it is odometry that is worse than it says: by as much as they
+/// have it in the mean. D^2 beyond the quantile of the worst of so many groups speaks for a wrong one with odds
+/// exp((D^2 - quantile) / 2). That share of the shift is doubted, of the group of which it is largest.
 std::optional<KnownDirection> doubted(const MatrixXd& P, const MatrixXd& O, const MatrixXd& shifts,
                                       std::span<const std::size_t> places) {
   if (shifts.cols() == 0) return std::nullopt;
-  Eigen::VectorXd largest = Eigen::VectorXd::Zero(O.rows());
   const Eigen::LDLT<MatrixXd> odometry(O);
-  const double probability = std::pow(kStillRight, 1.0 / static_cast<double>(shifts.cols()));
   const double told = static_cast<double>(O.rows()) - odometry.solve(P).trace();
+  Eigen::VectorXd D2(shifts.cols()), freedom(shifts.cols());
   for (Index c = 0; c < shifts.cols(); ++c) {
-    const Eigen::VectorXd shift = shifts.col(c);
-    const double own = 6.0 * static_cast<double>(places[static_cast<std::size_t>(c)]);
-    const double beyond =
-        shift.dot(odometry.solve(shift)) - chi_square_quantile(probability, std::max(6.0, std::min(own, told)));
-    const Eigen::VectorXd share = shift / (1.0 + std::exp(-0.5 * beyond));
+    D2(c) = shifts.col(c).dot(odometry.solve(shifts.col(c)));
+    freedom(c) = std::max(6.0, std::min(6.0 * static_cast<double>(places[static_cast<std::size_t>(c)]), told));
+  }
+  const double probability = std::pow(kStillRight, 1.0 / static_cast<double>(shifts.cols()));
+  const double all = D2.cwiseQuotient(freedom).sum(), others = static_cast<double>(shifts.cols() - 1);
+  Eigen::VectorXd largest = Eigen::VectorXd::Zero(O.rows());
+  for (Index c = 0; c < shifts.cols(); ++c) {
+    const double worse = others > 0.0 ? std::max(1.0, (all - D2(c) / freedom(c)) / others) : 1.0;
+    const double beyond = D2(c) / worse - chi_square_quantile(probability, freedom(c));
+    const Eigen::VectorXd share = shifts.col(c) / (1.0 + std::exp(-0.5 * beyond));
     if (share.squaredNorm() > largest.squaredNorm()) largest = share;
   }
   if (largest.norm() < internal::kRounding.position_m) return std::nullopt;
