@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 
+#include "tutti/bags/ros_types.hpp"
+
 namespace tutti::bags {
 namespace {
 
@@ -71,17 +73,10 @@ constexpr std::array kTypes{
     NearType{"foxglove_msgs/CompressedVideo", kVideo},
 };
 
-/// "velodyne_msgs/msg/VelodyneScan" as ROS 1 calls it.
-std::string short_name(std::string_view type) {
-  std::string out(type);
-  if (const std::size_t at = out.find("/msg/"); at != std::string::npos) out.erase(at, 4);
-  return out;
-}
-
 }  // namespace
 
 std::string_view way_on(std::string_view type) {
-  const std::string name = short_name(type);
+  const std::string name = type_of_ros1(type);
   const auto* found = std::ranges::find_if(kTypes, [&](const NearType& near) {
     return near.name.ends_with('/') ? name.starts_with(near.name) : name == near.name;
   });

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "tutti/bags/internal/sha256.hpp"
+#include "tutti/bags/ros_types.hpp"
 #include "tutti/base/check.hpp"
 
 namespace tutti::bags {
@@ -114,9 +115,8 @@ std::string_view fields_of(std::string_view name) {
 
 /// "nav_msgs/msg/Odometry" to "nav_msgs/Odometry", and back.
 std::string short_name(std::string_view type) {
-  const std::size_t at = type.find("/msg/");
-  TUTTI_CHECK(at != std::string_view::npos, "type '{}'", type);
-  return std::string(type.substr(0, at)).append(type.substr(at + 4));
+  TUTTI_CHECK(type.find("/msg/") != std::string_view::npos, "type '{}'", type);
+  return type_of_ros1(type);
 }
 std::string full_name(std::string_view name) {
   const std::size_t at = name.find('/');

@@ -45,6 +45,12 @@ std::string type_of_ros2(const std::string& type) {
   return type.substr(0, slash) + "/msg" + type.substr(slash);
 }
 
+std::string type_of_ros1(std::string_view type) {
+  std::string out(type);
+  if (const std::size_t at = out.find("/msg/"); at != std::string::npos) out.erase(at, 4);
+  return out;
+}
+
 Use use_of(std::string_view type) {
   const RosType* const found = find(type);
   return found == nullptr ? Use::nothing : found->use;

@@ -36,6 +36,9 @@ std::span<const RosType> ros_types();
 /// ROS 1's name of a type as ROS 2 has it: "nav_msgs/Odometry" is "nav_msgs/msg/Odometry" today, and tf's messages are
 /// tf2's. Other names stay as they are.
 std::string type_of_ros2(const std::string& type);
+/// ROS 2's name of a type as ROS 1 and definitions have it: "nav_msgs/msg/Odometry" is "nav_msgs/Odometry". Other names
+/// stay as they are.
+std::string type_of_ros1(std::string_view type);
 /// Nothing for a type that is not among them.
 Use use_of(std::string_view type);
 /// Decodes as ros_messages.hpp has it; errors: also another type.
