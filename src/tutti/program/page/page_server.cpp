@@ -2,10 +2,8 @@
 #include "tutti/program/page/page_server.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -37,9 +35,8 @@ std::string host_to_open(const std::string& host, const std::vector<std::string>
   if (host != "0.0.0.0" && host != "::") return host;
   const auto named = std::ranges::find_if(names, [](const std::string& name) { return name != bus::kBusName; });
   if (named != names.end()) return *named;
-  std::array<char, 256> own{};
-  static_cast<void>(gethostname(own.data(), own.size() - 1));
-  return own[0] == '\0' ? "localhost" : own.data();
+  const std::string own = own_host_name();
+  return own.empty() ? "localhost" : own;
 }
 
 class PageViewer final : public program::MapViewer {

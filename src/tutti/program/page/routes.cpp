@@ -51,12 +51,11 @@ std::string token_of(const Request& request) {
 bool is_our_host(const std::string& header, const std::vector<std::string>& names) {
   const auto at = bus::parse_host_port(header);
   if (!at) return false;
-  std::array<char, 256> own{};
-  static_cast<void>(gethostname(own.data(), own.size() - 1));
+  const std::string own = own_host_name();
   const std::string& host = at->host;
   const bool is_address =
       host.find_first_not_of("0123456789.") == std::string::npos || host.find(':') != std::string::npos;
-  return is_address || host == "localhost" || host == own.data() || host == std::string(own.data()) + ".local" ||
+  return is_address || host == "localhost" || host == own || host == own + ".local" ||
          std::ranges::count(names, host) > 0;
 }
 
@@ -323,6 +322,12 @@ class Routes {
 };
 
 }  // namespace
+
+std::string own_host_name() {
+  std::array<char, 256> own{};
+  static_cast<void>(gethostname(own.data(), own.size() - 1));
+  return own.data();
+}
 
 void say(Response& response, int status, const std::string& error) {
   response.status = status;

@@ -113,5 +113,7 @@ struct Site {
 
 /// Everything that the page asks for (docs/page.md). `site` outlives the server.
 void add_routes(httplib::Server& server, Site& site);
+/// This machine's name; empty: it has none.
+std::string own_host_name();
 
 }  // namespace tutti::page
