@@ -49,6 +49,14 @@ Whitened whiten(const PoseGraphEdge& edge, const EdgeSlot& slot, int component, 
 
 using Group = std::vector<Whitened>;
 
+/// The force on its ends that has the effect of taking a group away.
+struct Pull {
+  std::size_t group = 0;
+  double distance = 0.0;  ///< The length of what it moves of all poses, in the covariance of all.
+  std::vector<int> ends;  ///< Variables.
+  Eigen::VectorXd force;  ///< J^T (I - K)^-1 r; shift = H^-1 force
+};
+
 /// What the loss of a group does, to first order, seen from the ends of its edges: closures come by the product of the
 /// keyframes that they join, so the ends are far fewer than the edges. With C = L L^T the rows and columns of H^-1 at
 /// the ends, J and r the Jacobian and the residuals of all edges there, M = L^T J^T J L has the eigenvalues of K, and
@@ -94,16 +102,10 @@ class GroupLoss {
   /// The least share of any direction that comes from elsewhere, to within what a factorisation tells; 0 where the loss
   /// is not known.
   [[nodiscard]] double least_known() const { return least_known_; }
-  /// The variables at the group's ends, and the force there, J^T (I - K)^-1 r, that moves all poses as its loss does.
-  [[nodiscard]] const std::vector<int>& ends() const { return ends_; }
-  [[nodiscard]] Eigen::VectorXd force() const {
-    if (ends_.empty()) return {};
-    return known_.matrixU().solve(others_.solve(known_.matrixU() * force_));
-  }
-  /// The length of what the loss moves of all poses, in the covariance of all.
-  [[nodiscard]] double distance() const {
-    if (ends_.empty()) return 0.0;
-    return others_.solve(known_.matrixU() * force_).norm();
+  [[nodiscard]] Pull pull(std::size_t group) const {
+    if (ends_.empty()) return {group, 0.0, {}, {}};
+    const Eigen::VectorXd whitened = others_.solve(known_.matrixU() * force_);
+    return {group, whitened.norm(), ends_, known_.matrixU().solve(whitened)};
   }
   /// The squared length of what the loss moves between the ends of one of its edges, in the covariance of the rest.
   [[nodiscard]] double misfit_at(const Whitened& edge) const {
@@ -131,14 +133,6 @@ class GroupLoss {
   Eigen::VectorXd force_;  // J^T r
   Eigen::LLT<Eigen::MatrixXd> known_, others_;
   double least_known_ = 0.0;
-};
-
-/// The force on its ends that has the effect of taking a group away.
-struct Pull {
-  std::size_t group = 0;
-  double distance = 0.0;
-  std::vector<int> ends;
-  Eigen::VectorXd force;  ///< shift = H^-1 force
 };
 
 /// The normal equations at the optimum, factorised, of the graph without what only passes odometry on, and the groups
@@ -214,8 +208,7 @@ std::vector<Influence> largest_influences(const PoseGraph& graph, std::span<cons
     for (std::size_t g = 0; g < groups.size(); ++g) {
       const GroupLoss loss(equations.whitened(groups[g]), inverse);
       if (!(loss.least_known() > kUnknown)) continue;
-      if (const double distance = loss.distance(); distance > least_distance)
-        pulls.push_back({g, distance, loss.ends(), loss.force()});
+      if (Pull pull = loss.pull(g); pull.distance > least_distance) pulls.push_back(std::move(pull));
     }
   }
   if (pulls.empty()) return {};
@@ -262,12 +255,12 @@ Eigen::MatrixXd group_removals(const PoseGraph& graph, std::span<const Pose3> po
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const GroupLoss loss(equations.whitened(groups[g]), inverse);
     if (!(loss.least_known() > kHardlyKnown)) continue;
-    const Eigen::VectorXd force = loss.force();
+    const Pull pull = loss.pull(g);
     auto moves = out.col(static_cast<Eigen::Index>(g));
     moves.setZero();
-    for (std::size_t k = 0; k < loss.ends().size(); ++k)
+    for (std::size_t k = 0; k < pull.ends.size(); ++k)
       moves +=
-          columns.middleRows<6>(6 * loss.ends()[k]).transpose() * force.segment<6>(static_cast<Eigen::Index>(6 * k));
+          columns.middleRows<6>(6 * pull.ends[k]).transpose() * pull.force.segment<6>(static_cast<Eigen::Index>(6 * k));
   }
   return out;
 }

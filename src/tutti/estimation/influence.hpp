@@ -11,9 +11,9 @@
 
 namespace tutti::estimation {
 
-/// What taking one group of edges away does to the optimum.
+/// How the optimum changes without one group of edges.
 struct Influence {
-  std::size_t group = 0;
+  std::size_t group = 0;  ///< Into the groups asked.
   double distance = 0.0;  ///< Mahalanobis length of `shift` in the covariance of all poses.
   /// 6 rows per node, right tangents: without the group the pose is retract(pose, shift), to first order.
   Eigen::VectorXd shift;
