@@ -182,19 +182,19 @@ std::vector<KnownDirection> directions(const MatrixXd& P, const MatrixXd& O) {
 }
 
 /// With the group right, the squared length of its shift in odometry's covariance is about chi-square, with six degrees
-/// of freedom for each place that it tells of, and no more than all closures tell together, which is what P leaves of
-/// O. Where the other groups contradict odometry, too, it is odometry that is worse than it says: by as much as they
+/// of freedom for each place that it measures, and no more than all closures measure together, which is what P leaves
+/// of O. Where the other groups contradict odometry, too, it is odometry that is worse than it says: by as much as they
 /// have it in the mean. D^2 beyond the quantile of the worst of so many groups speaks for a wrong one with odds
 /// exp((D^2 - quantile) / 2). That share of the shift is doubted, of the group of which it is largest.
 std::optional<KnownDirection> doubted(const MatrixXd& P, const MatrixXd& O, const MatrixXd& shifts,
                                       std::span<const std::size_t> places) {
   if (shifts.cols() == 0) return std::nullopt;
   const Eigen::LDLT<MatrixXd> odometry(O);
-  const double told = static_cast<double>(O.rows()) - odometry.solve(P).trace();
+  const double measured = static_cast<double>(O.rows()) - odometry.solve(P).trace();
   Eigen::VectorXd D2(shifts.cols()), freedom(shifts.cols());
   for (Index c = 0; c < shifts.cols(); ++c) {
     D2(c) = shifts.col(c).dot(odometry.solve(shifts.col(c)));
-    freedom(c) = std::max(6.0, std::min(6.0 * static_cast<double>(places[static_cast<std::size_t>(c)]), told));
+    freedom(c) = std::max(6.0, std::min(6.0 * static_cast<double>(places[static_cast<std::size_t>(c)]), measured));
   }
   const double probability = std::pow(kStillRight, 1.0 / static_cast<double>(shifts.cols()));
   const double all = D2.cwiseQuotient(freedom).sum(), others = static_cast<double>(shifts.cols() - 1);

@@ -17,7 +17,7 @@ struct ChainKnowledge {
   /// (6 n) x groups: for each group of closures on which the map hinges, how the nodes would move without it. May have
   /// no columns.
   Eigen::MatrixXd shifts;
-  std::vector<std::size_t> shift_places;  ///< Per column of shifts, of how many places along the chain the group tells.
+  std::vector<std::size_t> shift_places;  ///< Per column of shifts, how many places along the chain the group measures.
   /// (6 m) x (6 m): joint covariance of the spread nodes, m = ChainUncertainty::spread(n).size(). Empty: directions are
   /// left out.
   Eigen::MatrixXd spread_covariance;

@@ -17,7 +17,7 @@ Result<std::string> bag_mission(const std::vector<std::string>& bags, const std:
 /// True of "demo" and of YAML files: what is no bag.
 bool is_mission_file(const std::string& input);
 
-/// What a robot is called whose bag this is: the file's or folder's name up to a dot, of letters, digits, '_' and '-'.
+/// The name of the robot whose bag this is: the file's or folder's name up to a dot, of letters, digits, '_' and '-'.
 std::string robot_of_bag(const std::filesystem::path& bag);
 
 /// Bags of robots as bag_mission() takes them, "a=FOLDER/a.mcap", of files and folders below `data`: a file or a folder

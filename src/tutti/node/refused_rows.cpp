@@ -29,10 +29,10 @@ std::string behind(std::string prefix) {
   return prefix;
 }
 
-/// The rows of keys from `from` on and below `to` ("": to the end), in pieces.
-class Pieces {
+/// The rows of keys from `from` on and below `to` ("": to the end), in batches.
+class Batches {
  public:
-  Pieces(const storage::TableStore& store, std::string from, std::string to)
+  Batches(const storage::TableStore& store, std::string from, std::string to)
       : store_(store), from_(std::move(from)), to_(std::move(to)) {}
   /// Empty: there are no more.
   Result<std::vector<std::string>> next() {
@@ -75,8 +75,8 @@ Result<std::size_t> read_refusals(const storage::TableStore& store, RobotId robo
   for (const auto& [from, to] : {std::pair(own, behind(own)), std::pair(std::string(), std::string(kAside)),
                                  std::pair(behind(std::string(kAside)), std::string(kBetween)),
                                  std::pair(behind(std::string(kBetween)), std::string())}) {
-    Pieces pieces(store, from, to);
-    for (auto rows = pieces.next();; rows = pieces.next()) {
+    Batches batches(store, from, to);
+    for (auto rows = batches.next();; rows = batches.next()) {
       if (!rows) return tl::unexpected(rows.error());
       if (rows->empty()) break;
       looked_at += rows->size();

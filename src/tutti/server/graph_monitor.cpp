@@ -99,10 +99,10 @@ Hinges hinges_of(const MapEstimate& map, const PoseGraph& on_earth, const std::v
   return out;
 }
 
-/// How many places along a chain each group tells of: no more than it has closures, nor than there are spread nodes
+/// How many places along a chain each group measures: no more than it has closures, nor than there are spread nodes
 /// from its first closure to its last at either end.
-std::vector<std::size_t> places_told(const MapEstimate& map, const std::vector<std::vector<std::size_t>>& groups,
-                                     std::span<const std::size_t> spread) {
+std::vector<std::size_t> places_of(const MapEstimate& map, const std::vector<std::vector<std::size_t>>& groups,
+                                   std::span<const std::size_t> spread) {
   const auto between = [&](std::size_t first, std::size_t last) {
     return std::ranges::upper_bound(spread, last) - std::ranges::lower_bound(spread, first);
   };
@@ -193,7 +193,7 @@ std::vector<ChainUncertainty> uncertainties(const MapEstimate& map, const PoseGr
     out.push_back(consistency::chain_uncertainty(graph, map.nodes[kept[chain.begin]].id.chain,
                                                  {.samples = of_chain(samples),
                                                   .shifts = of_chain(hinges.shifts),
-                                                  .shift_places = places_told(map, hinges.groups, chain.spread),
+                                                  .shift_places = places_of(map, hinges.groups, chain.spread),
                                                   .spread_covariance = std::move(chain.covariance),
                                                   .spread_odometry = spread_odometry(map, chain.spread, weights)},
                                                  &work.products));

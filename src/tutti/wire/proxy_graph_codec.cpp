@@ -157,7 +157,7 @@ Status read_components(const v1::ProxyGraph& in, ProxyGraph& graph) {
   return {};
 }
 
-/// What a robot is called in `graph`; empty where that is not known.
+/// A robot's name in `graph`; empty where that is not known.
 std::string_view name_in(const ProxyGraph& graph, RobotId robot) {
   const auto seen = std::ranges::find(graph.last_seen, robot, [](const LastSeen& one) { return one.chain.robot; });
   return seen == graph.last_seen.end() ? std::string_view() : seen->name;

@@ -45,9 +45,9 @@ struct PointTimes {
 /// all times are the same.
 std::size_t drop_stray_times(formats::TimedCloud& scan);
 
-/// What the times of a robot's scans mean, judged by one scan whose odometry pose is of `stamp`, without the points
-/// that drop_stray_times() takes out of it. No value: the robot's scans are taken as deskewed. Errors: the settings
-/// want times that are missing, or the numbers are not those of a sweep.
+/// Finds what the times of a robot's scans mean, judged by one scan whose odometry pose is of `stamp`, without the
+/// points that drop_stray_times() takes out of it. No value: the robot's scans are taken as deskewed. Errors: the
+/// settings want times that are missing, or the numbers are not those of a sweep.
 Result<std::optional<PointTimes>> find_point_times(formats::TimedCloud& scan, Timestamp stamp,
                                                    const ScanTimesConfig& config);
 /// As find_point_times(), for a ROS message: drivers give times relative to the message's stamp, or by its clock, and

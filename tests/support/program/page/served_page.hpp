@@ -102,7 +102,7 @@ class ServedPage : public ::testing::Test {
     if (!cookie.empty()) out.emplace("Cookie", cookie);
     return out;
   }
-  /// What is sent until "ready".
+  /// The text that is sent until "ready".
   [[nodiscard]] std::string event_text(const httplib::Headers& headers = {}) const {
     std::string text;
     auto http = client();

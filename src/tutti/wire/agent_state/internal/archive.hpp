@@ -346,7 +346,7 @@ void pass_fixes(A& a, robot::SubmapBuilderState& builder) {
   pass(a, builder.heard_fix);
   for (robot::FinishedSubmap& finished : builder.finished) pass(a, finished.submap.fixes);
 }
-/// What team-mates are called; states of before kNames do not have it.
+/// Team-mates' names; states of before kNames do not have them.
 template <class A>
 void pass_names(A& a, AgentState& state) {
   if (!a.has_names()) return;
