@@ -181,7 +181,7 @@ No sockets, clocks or threads inside: how messages travel, and when it optimises
           "verifier_settings"_a = py::dict(), "epoch"_a = 1,
           R"(robots: their numbers. verifier: who finds closures, 'lidar' from the submaps' clouds, or an object of yours with
 is_candidate(first, second), cheap, and verify(first, second), which returns Closures or None, of two Submaps, as a function of
-these alone. settings: {"change_of_mind": "follow"}, those of `tutti settings --of server` below server; verifier_settings:
+these alone. settings: {"unchanged_every_s": 0}, those of `tutti settings --of server` below server; verifier_settings:
 {"min_submap_gap": 3}, those below closures. epoch: larger than at any start before. ValueError: a setting.)")
       .def(
           "receive", &receive_message, "message"_a,

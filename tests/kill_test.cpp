@@ -103,13 +103,13 @@ struct Program {
 
 class Mission {
  public:
-  /// `refiner`: null for a map that is its pose graph's. `change_of_mind`: the server's setting. What waits is sent at
-  /// once by a server that starts again: with "wait" robots get other maps meanwhile than without a kill.
+  /// `refiner`: null for a map that is its pose graph's. `unchanged_every_s`: the server's setting. What it keeps back
+  /// is sent at once by a server that starts again, so robots get other maps meanwhile than without a kill.
   Mission(const World& world, const bus::LinkConfig& link, Killer& killer,
-          std::shared_ptr<const server::MapRefiner> refiner = nullptr, std::string change_of_mind = "follow")
+          std::shared_ptr<const server::MapRefiner> refiner = nullptr, double unchanged_every_s = 0.0)
       : world_(world),
         refiner_(std::move(refiner)),
-        change_of_mind_(std::move(change_of_mind)),
+        unchanged_every_s_(unchanged_every_s),
         network_(bus::SimulatedRadio(Timestamp{}, link, 1), Timestamp{}),
         killer_(killer) {
     server_.self = Endpoint::server();
@@ -178,7 +178,7 @@ class Mission {
     program.store = std::make_unique<storage::MemoryStore>(storage::map_schema(), std::move(program.saved));
     node::ServerNodeConfig config{.pairs_per_job = 3, .job_timeout_s = 30.0};
     config.server.update_least_s = kUpdatePeriod_s;
-    config.server.change_of_mind = change_of_mind_;
+    config.server.unchanged_every_s = unchanged_every_s_;
     config.refiner = refiner_;
     return std::move(node::ServerNode::open(world_.robots, world_.verifier, config, kEpoch, *program.store).value());
   }
@@ -320,7 +320,7 @@ class Mission {
 
   const World& world_;
   const std::shared_ptr<const server::MapRefiner> refiner_;
-  std::string change_of_mind_;
+  double unchanged_every_s_;
   bus::SimulatedNetwork network_;
   Killer& killer_;
   Timestamp now_;
@@ -418,10 +418,10 @@ TEST_F(Kill, WhereMapsWaitTrajectoriesEndTheSame) {
   const bus::LinkConfig at_once{.latency_s = 0.0};
   const auto refiner = std::make_shared<const server::test::Shrinker>();
   Killer nobody;
-  Mission undisturbed(world_, at_once, nobody, refiner, "wait");
+  Mission undisturbed(world_, at_once, nobody, refiner, 20.0);
   undisturbed.run();
   Killer killer = planned(nobody, Rng(100), 1);
-  Mission mission(world_, at_once, killer, refiner, "wait");
+  Mission mission(world_, at_once, killer, refiner, 20.0);
   mission.run();
   mission.expect_settled();
   EXPECT_GT(count(killer), 50U);

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <map>
 #include <memory>
 #include <set>
@@ -27,8 +26,6 @@ using internal::SelectedInverse;
 
 /// Less than this share of what is known of a direction comes from elsewhere: nothing does.
 constexpr double kAlone = 1e-9;
-/// Less than this share comes from elsewhere: where that would have its ends is not known to first order.
-constexpr double kHardlyKnown = 1e-4;
 /// Less than this share comes from elsewhere: where that would have its ends is not known at all.
 constexpr double kUnknown = 1e-7;
 
@@ -139,8 +136,8 @@ class GroupLoss {
 /// in it.
 struct GroupEquations {
   GroupEquations(const PoseGraph& graph, std::span<const Pose3> poses, std::span<const EdgeRole> roles,
-                 std::span<const std::vector<std::size_t>> groups, std::span<const std::size_t> nodes)
-      : reduced(reduce_chains(graph, roles, nodes, poses)) {
+                 std::span<const std::vector<std::size_t>> groups)
+      : reduced(reduce_chains(graph, roles, {}, poses)) {
     for (const std::size_t node : reduced.nodes) at.push_back(poses[node]);
     std::vector<std::pair<std::size_t, std::size_t>> pairs;  // every end of a group with every other
     for (const auto& group : groups) {
@@ -200,7 +197,7 @@ std::vector<Influence> largest_influences(const PoseGraph& graph, std::span<cons
                                           double least_distance) {
   TUTTI_CHECK(poses.size() == graph.poses.size(), "{} poses, {} nodes", poses.size(), graph.poses.size());
   if (groups.empty() || count == 0) return {};
-  GroupEquations equations(graph, poses, roles, groups, {});
+  GroupEquations equations(graph, poses, roles, groups);
   if (!equations.is_determined) return {};
   std::vector<Pull> pulls;
   {  // the inverse is as large as the factor, and goes before the shifts come
@@ -225,7 +222,7 @@ std::vector<double> group_misfits(const PoseGraph& graph, std::span<const Pose3>
                                   std::span<const std::vector<std::size_t>> groups) {
   std::vector<double> out(groups.size(), 0.0);
   if (groups.empty()) return out;
-  GroupEquations equations(graph, poses, roles, groups, {});
+  GroupEquations equations(graph, poses, roles, groups);
   if (!equations.is_determined) return out;
   const SelectedInverse inverse(equations.equations->hessian().take_factor());
   for (std::size_t g = 0; g < groups.size(); ++g)
@@ -233,35 +230,6 @@ std::vector<double> group_misfits(const PoseGraph& graph, std::span<const Pose3>
       const GroupLoss loss(group, inverse);
       if (loss.least_known() > 0.0) out[g] = loss.misfit_at(group[group.size() / 2]);
     }
-  return out;
-}
-
-Eigen::MatrixXd group_removals(const PoseGraph& graph, std::span<const Pose3> poses, std::span<const EdgeRole> roles,
-                               std::span<const std::vector<std::size_t>> groups, std::span<const std::size_t> nodes) {
-  const auto rows = static_cast<Eigen::Index>(6 * nodes.size());
-  Eigen::MatrixXd out = Eigen::MatrixXd::Constant(rows, static_cast<Eigen::Index>(groups.size()),
-                                                  std::numeric_limits<double>::infinity());
-  GroupEquations equations(graph, poses, roles, groups, nodes);
-  if (!equations.is_determined) return out;
-  // The columns of H^-1 at the nodes serve all groups, as H^-1 is symmetric.
-  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(6 * equations.structure.variables, rows);
-  for (std::size_t k = 0; k < nodes.size(); ++k) {
-    const auto node = std::ranges::lower_bound(equations.reduced.nodes, nodes[k]) - equations.reduced.nodes.begin();
-    const int v = equations.structure.variable[static_cast<std::size_t>(node)];
-    if (v >= 0) columns.block<6, 6>(6 * v, static_cast<Eigen::Index>(6 * k)).setIdentity();
-  }
-  equations.equations->hessian().solve(columns);
-  const SelectedInverse inverse(equations.equations->hessian().take_factor());
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    const GroupLoss loss(equations.whitened(groups[g]), inverse);
-    if (!(loss.least_known() > kHardlyKnown)) continue;
-    const Pull pull = loss.pull(g);
-    auto moves = out.col(static_cast<Eigen::Index>(g));
-    moves.setZero();
-    for (std::size_t k = 0; k < pull.ends.size(); ++k)
-      moves +=
-          columns.middleRows<6>(6 * pull.ends[k]).transpose() * pull.force.segment<6>(static_cast<Eigen::Index>(6 * k));
-  }
   return out;
 }
 

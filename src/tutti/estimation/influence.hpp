@@ -46,12 +46,4 @@ std::vector<Influence> largest_influences(const PoseGraph& graph, std::span<cons
 std::vector<double> group_misfits(const PoseGraph& graph, std::span<const Pose3> poses, std::span<const EdgeRole> roles,
                                   std::span<const std::vector<std::size_t>> groups);
 
-/// How taking each group of edges away moves `nodes`, to first order: with r, J and K of a group as above, all poses
-/// move by H^-1 J^T (I - K)^-1 r. 6 rows per node, right tangents, and a column per group; the first node of each
-/// connected component does not move. One factorisation, one selected inverse and six solutions a node serve all
-/// groups. Infinite where hardly anything but the group holds its ends together, so that the first order is useless,
-/// and in a graph that does not determine its poses. `groups`, `roles` as in group_misfits().
-Eigen::MatrixXd group_removals(const PoseGraph& graph, std::span<const Pose3> poses, std::span<const EdgeRole> roles,
-                               std::span<const std::vector<std::size_t>> groups, std::span<const std::size_t> nodes);
-
 }  // namespace tutti::estimation

@@ -127,42 +127,6 @@ TEST(GroupMisfits, AreWhatTakingTheGroupAwayDoes) {
   }
 }
 
-TEST(GroupRemovals, MoveNodesAsTakingTheGroupAwayDoes) {
-  for (std::uint64_t seed = 0; seed < 4; ++seed) {
-    Rng rng(seed);
-    PoseGraph graph = random_graph(rng, 40, 9, 0.02).graph;
-    for (std::size_t e = 39; e < 42; ++e) graph.edges[e].T_from_to.translation.y() += 0.02;
-    const std::vector<Pose3> poses = optimum(graph);
-    const Groups groups = {{39, 40, 41}, {44, 46}, {47}};
-    const std::vector<std::size_t> nodes = {3, 11, 25, 39};
-    const auto roles = roles_from_numbering(graph);
-    const Eigen::MatrixXd moves = group_removals(graph, poses, roles, groups, nodes);
-    ASSERT_EQ(moves.rows(), 24);
-    ASSERT_EQ(moves.cols(), 3);
-    for (std::size_t g = 0; g < groups.size(); ++g) {
-      const std::vector<Pose3> moved = optimum(without(graph, groups[g]));
-      Eigen::VectorXd truly(24);
-      for (std::size_t k = 0; k < nodes.size(); ++k)
-        truly.segment<6>(static_cast<Eigen::Index>(6 * k)) = local(poses[nodes[k]], moved[nodes[k]]);
-      const auto first_order = moves.col(static_cast<Eigen::Index>(g));
-      EXPECT_LT((truly - first_order).norm(), 0.1 * truly.norm() + 1e-6) << seed << " group " << g;
-    }
-    const std::vector<std::size_t> one = {25};
-    EXPECT_LT((group_removals(graph, poses, roles, groups, one) - moves.middleRows<6>(12)).norm(), 1e-12);
-  }
-}
-
-TEST(GroupRemovals, WhereOnlyTheGroupHoldsItsEndsTheFirstOrderSaysNothing) {
-  Rng rng(3);
-  const PoseGraph graph = random_graph(rng, 20, 1, 0.1).graph;
-  const Groups groups = {{7}, {19}};  // a step of a chain with one closure, and the closure
-  const std::vector<std::size_t> nodes = {0, 19};
-  PoseGraph chain = graph;
-  chain.edges.pop_back();
-  EXPECT_TRUE(group_removals(graph, optimum(graph), {}, groups, nodes).rightCols<1>().allFinite());
-  EXPECT_FALSE(group_removals(chain, optimum(chain), {}, Groups{{7}}, nodes).allFinite());
-}
-
 /// Each of five agrees with the odometry of a ring, and so do all of them: many are no more evidence than one.
 TEST(GroupMisfits, DoNotGrowWithTheGroup) {
   PoseGraph graph;
@@ -214,13 +178,11 @@ TEST(GroupMisfits, EdgesOfAnotherComponentSayNothing) {
 }
 
 // Submaps that follow each other share a keyframe: a closure of it with itself, where nothing moves.
-TEST(GroupRemovals, AClosureOfTheFixedNodeWithItselfMovesNothing) {
+TEST(GroupMisfits, AClosureOfTheFixedNodeWithItselfMovesNothing) {
   Rng rng(3);
   PoseGraph graph = random_graph(rng, 20, 3, 0.1).graph;
   graph.edges.push_back({0, 0, Pose3{}});
   const Groups groups = {{graph.edges.size() - 1}};
-  const std::vector<std::size_t> nodes = {5, 19};
-  EXPECT_EQ(group_removals(graph, optimum(graph), {}, groups, nodes).norm(), 0.0);
   EXPECT_EQ(group_misfits(graph, optimum(graph), {}, groups).front(), 0.0);
 }
 

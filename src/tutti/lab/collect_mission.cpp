@@ -192,11 +192,7 @@ Result<mission::MissionEvents> read_course(const fs::path& folder, std::uint64_t
       consistency::MapChange change;
       static_cast<void>(read_json_fields(event, change));
       course.take(mission::ChangeOfMindRecord{RobotId{event.value("robot", std::uint32_t{0})},
-                                              event.value("time_s", 0.0),
-                                              {},
-                                              event.value("outcome", ""),
-                                              change,
-                                              event.value("reason", "")});
+                                              event.value("time_s", 0.0), change, event.value("reason", "")});
     }
     const bool is_new_failure = what == "verification_failed" &&
                                 failed.insert(event.value("first", "") + " " + event.value("second", "")).second;

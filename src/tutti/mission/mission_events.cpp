@@ -21,21 +21,8 @@ void MissionEvents::take(const node::Event& event) {
                         .degrees_of_freedom = update->degrees_of_freedom,
                         .from_measurements = update->from_measurements});
   if (const auto* changed = std::get_if<node::ChangeOfMind>(&event.what))
-    take(ChangeOfMindRecord{changed->robot,
-                            static_cast<double>(event.time.ns) / 1e9,
-                            {},
-                            node::to_string(changed->outcome),
-                            changed->change,
+    take(ChangeOfMindRecord{changed->robot, static_cast<double>(event.time.ns) / 1e9, changed->change,
                             server::to_string(changed->reason)});
-}
-
-void MissionEvents::take(const ChangeOfMindRecord& change) {
-  if (change.outcome == node::to_string(node::ChangeOutcome::waits)) return changes_of_mind_.push_back(change);
-  const auto same = [&](const ChangeOfMindRecord& known) { return known.robot == change.robot && !known.settled_s; };
-  const auto waiting = std::ranges::find_if(changes_of_mind_, same);
-  if (waiting == changes_of_mind_.end()) return;  // the lines before it are lost
-  waiting->settled_s = change.since_s;
-  waiting->outcome = change.outcome;
 }
 
 void MissionEvents::note_refusals(MissionRecord& record) const {

@@ -3,6 +3,7 @@
 
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tutti/mission/record.hpp"
@@ -15,7 +16,7 @@ namespace tutti::mission {
 class MissionEvents {
  public:
   void take(const node::Event& event);
-  void take(const ChangeOfMindRecord& change);
+  void take(ChangeOfMindRecord change) { changes_of_mind_.push_back(std::move(change)); }
   /// Sets how many accepted closures of the latest map update are wrong.
   void set_wrong(std::size_t wrong) { updates_.back().wrong = wrong; }
 

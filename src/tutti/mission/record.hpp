@@ -243,12 +243,10 @@ struct MapUpdateRecord {
 };
 
 /// An update whose map differed from the one that a robot followed by more than that had allowed for
-/// (node/change_watch.hpp).
+/// (consistency/change_of_mind.hpp).
 struct ChangeOfMindRecord {
   RobotId robot;
-  double since_s = 0.0;             ///< Mission time of that update, which the robot was not sent.
-  std::optional<double> settled_s;  ///< Mission time of the update that decided; nothing when none did.
-  std::string outcome;              ///< "waits", "stands" or "gone"
+  double time_s = 0.0;  ///< Mission time of that update.
   consistency::MapChange change;
   std::string reason;  ///< In words.
 };

@@ -140,14 +140,13 @@ void note_changes_of_mind(MissionRecord& record) {
     std::ranges::copy_if(record.server.changes_of_mind, std::back_inserter(changes),
                          [&](const ChangeOfMindRecord& change) { return change.robot == robot.id; });
     if (changes.empty()) continue;
-    const auto gone = std::ranges::count(changes, "gone", &ChangeOfMindRecord::outcome);
     const auto greatest = std::ranges::max_element(
         changes, {}, [](const ChangeOfMindRecord& change) { return change.change.translation_m; });
-    record.notes.push_back(fmt::format(
-        "{}: the map changed its mind {}, and changed it back {} of these; {} waits for a change to stand before "
-        "it follows. The greatest was {:.2f} m at {:.0f} s ({}): {}",
-        robot.name, changes.size() == 1 ? "once" : fmt::format("{} times", changes.size()), gone, robot.name,
-        greatest->change.translation_m, greatest->since_s, greatest->outcome, greatest->reason));
+    record.notes.push_back(
+        fmt::format("{}: the map changed its mind {}, by more than it had allowed for. The greatest change was {:.2f} "
+                    "m at {:.0f} s: {}",
+                    robot.name, changes.size() == 1 ? "once" : fmt::format("{} times", changes.size()),
+                    greatest->change.translation_m, greatest->time_s, greatest->reason));
   }
 }
 

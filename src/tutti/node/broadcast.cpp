@@ -14,27 +14,24 @@ bus::Envelope to_robot(RobotId robot, bus::MessageKind kind, std::shared_ptr<con
 }
 
 void Broadcast::send(ProxyGraphMessage map, const std::map<RobotId, std::string>& names,
-                     std::shared_ptr<const server::Beliefs> beliefs, const std::set<RobotId>& robots,
-                     const ChangeWatch::LoneClosures& lone, Timestamp now, Step& step) {
+                     std::shared_ptr<const server::Beliefs> beliefs, const std::set<RobotId>& robots, bool at_once,
+                     Timestamp now, Step& step) {
   for (LastSeen& seen : map.graph.last_seen)
     if (const auto found = names.find(seen.chain.robot); found != names.end()) seen.name = found->second;
   last_ = std::make_shared<const ProxyGraphMessage>(std::move(map));
   std::shared_ptr<const std::string> whole;
   for (const RobotId robot : robots) {
     ProxyGraph own = consistency::own_part(last_->graph, robot);
-    ChangeWatch::Decision decision = watch_.take(robot, {own, beliefs}, lone, now);
+    const FollowedMaps::Decision decision = followed_.take(robot, {own, beliefs}, at_once, now);
     if (decision.send) send_last(robot, std::move(own), whole, step);
-    for (ChangeOfMind& report : decision.reports) step.emit(now, std::move(report));
+    if (decision.changed) step.emit(now, *decision.changed);
   }
 }
 
 void Broadcast::send_waiting(const std::set<RobotId>& robots, Timestamp now, Step& step) {
   std::shared_ptr<const std::string> whole;
   for (const RobotId robot : robots)
-    if (auto late = watch_.follow(robot, now)) {
-      send_last(robot, consistency::own_part(last_->graph, robot), whole, step);
-      if (late->report) step.emit(now, std::move(*late->report));
-    }
+    if (followed_.follow(robot, now)) send_last(robot, consistency::own_part(last_->graph, robot), whole, step);
 }
 
 void Broadcast::send_last(RobotId robot, ProxyGraph own, std::shared_ptr<const std::string>& whole, Step& step) {

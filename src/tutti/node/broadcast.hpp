@@ -10,7 +10,7 @@
 
 #include "tutti/bus/envelope.hpp"
 #include "tutti/model/messages.hpp"
-#include "tutti/node/change_watch.hpp"
+#include "tutti/node/followed_maps.hpp"
 #include "tutti/node/step.hpp"
 
 namespace tutti::node {
@@ -18,20 +18,20 @@ namespace tutti::node {
 /// A message from the server to one robot.
 bus::Envelope to_robot(RobotId robot, bus::MessageKind kind, std::shared_ptr<const std::string> bytes);
 
-/// Sends the server's maps to robots: each gets its own part (consistency::own_part) once that is to be followed
-/// (ChangeWatch), encoded as differences from what it was sent before where that saves bytes.
+/// Sends the server's maps to robots: each gets its own part (consistency::own_part) when there is something to correct
+/// (FollowedMaps), encoded as differences from what it was sent before where that saves bytes.
 class Broadcast {
  public:
   /// With `to_all` every robot is sent the whole map, as in the paper (ServerConfig::broadcast).
-  explicit Broadcast(bool to_all) : to_all_(to_all) {}
+  Broadcast(bool to_all, double unchanged_every_s) : to_all_(to_all), followed_(unchanged_every_s) {}
 
   /// Sends a new map, in which robots have these `names`, and which rests on `beliefs`, to the robots that are to
-  /// follow it by `lone` (ChangeWatch::take); without `lone` to all.
+  /// follow it (FollowedMaps::take).
   void send(ProxyGraphMessage map, const std::map<RobotId, std::string>& names,
-            std::shared_ptr<const server::Beliefs> beliefs, const std::set<RobotId>& robots,
-            const ChangeWatch::LoneClosures& lone, Timestamp now, Step& step);
+            std::shared_ptr<const server::Beliefs> beliefs, const std::set<RobotId>& robots, bool at_once,
+            Timestamp now, Step& step);
   /// When some robot is to be sent the last map if no other one is made before.
-  [[nodiscard]] std::optional<Timestamp> next_review() const { return watch_.next_review(); }
+  [[nodiscard]] std::optional<Timestamp> next_review() const { return followed_.next_review(); }
   /// Sends the last map to the robots that are to be sent it now.
   void send_waiting(const std::set<RobotId>& robots, Timestamp now, Step& step);
   /// The last map; empty before the first.
@@ -46,7 +46,7 @@ class Broadcast {
 
   bool to_all_;
   std::shared_ptr<const ProxyGraphMessage> last_ = std::make_shared<const ProxyGraphMessage>();
-  ChangeWatch watch_;
+  FollowedMaps followed_;
   /// What a robot was last sent in full, and what was sent as differences from it since.
   struct Base {
     ProxyGraph graph;

@@ -12,7 +12,7 @@
 #include "tutti/model/closure_decision.hpp"
 #include "tutti/model/loop_closure.hpp"
 #include "tutti/model/refinement.hpp"
-#include "tutti/node/change_watch.hpp"
+#include "tutti/node/followed_maps.hpp"
 #include "tutti/robot/agent.hpp"
 
 /// What has happened at a node, for those who keep a record. Durations are not in it, because the same inputs must give

@@ -58,7 +58,7 @@ TEST(Incarnation, AStateThatIsLostWithoutAClockComesBack) {
 TEST(Incarnation, ThatHasTheWholeMapGetsNothingAgain) {
   Site site;
   site.walk(200);
-  site.pass(ChangeWatch::kAnyway_s);  // by then it has the last map, which corrects nothing
+  site.pass(server::ServerConfig{}.unchanged_every_s);  // by then it has the last map, which corrects nothing
   const std::size_t updates = site.events_of<RobotUpdated>().size();
   for (int start = 0; start < 5; ++start) {
     site.start_server();

@@ -4,7 +4,6 @@
 #include <memory>
 #include <utility>
 
-#include "tutti/server/change_support.hpp"
 #include "tutti/server/update_cost.hpp"
 
 namespace tutti::node {
@@ -17,16 +16,11 @@ MapOfTask make_map(MapTask task) {
                 .step = {}};
   const server::MadeMap& made = out.made;
   out.pace.cost_s = server::counted_cost_s(made);
-  const auto lone = [&](const ChangeWatch::Map& followed, const ProxyGraph& own) {
-    return server::change_support(made.map, *followed.beliefs, followed.own, own, own.nodes.front().chain,
-                                  made.job.map.gnc.solver)
-        .lone_closures;
-  };
   ProxyGraphMessage message = std::move(out.made.message);
   message.graph.incarnation = task.incarnation;
   out.broadcast.send(std::move(message), task.names,
-                     std::make_shared<const server::Beliefs>(server::beliefs_of(made.map)), task.robots,
-                     task.follow ? nullptr : ChangeWatch::LoneClosures(lone), task.begun, out.step);
+                     std::make_shared<const server::Beliefs>(server::beliefs_of(made.map)), task.robots, task.at_once,
+                     task.begun, out.step);
   return out;
 }
 

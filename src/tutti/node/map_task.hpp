@@ -23,7 +23,7 @@ struct MapTask {
   std::uint32_t incarnation = 0;
   std::set<RobotId> robots;
   std::map<RobotId, std::string> names;  ///< What robots are called.
-  bool follow = false;                   ///< A change of mind does not wait.
+  bool at_once = false;                  ///< Robots are sent it whatever it says.
   Broadcast broadcast;
 };
 

@@ -36,7 +36,7 @@ std::optional<MapTask> ServerNode::begin_map(Timestamp now) {
                .incarnation = config_.incarnation,
                .robots = robots_,
                .names = robot_names(),
-               .follow = config_.server.change_of_mind != "wait" || operator_decided,
+               .at_once = operator_decided,
                .broadcast = std::move(broadcast_)};
   for (const RobotId robot : robots_)
     if (const auto owner = registry_.owner(robot)) task.job.owners.push_back(*owner);

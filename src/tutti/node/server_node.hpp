@@ -214,7 +214,8 @@ class ServerNode {
   std::optional<MapCounts> stored_counts_;
   bool has_map_ = false;
   bool is_making_map_ = false;
-  Broadcast broadcast_{config_.server.broadcast == "all"};  // the task has it while a map is made
+  // the task has it while a map is made
+  Broadcast broadcast_{config_.server.broadcast == "all", config_.server.unchanged_every_s};
   std::shared_ptr<const ProxyGraph> last_broadcast_ = broadcast_.last();
   bool operator_decided_ = false;  // since the last map
 };

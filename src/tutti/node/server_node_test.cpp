@@ -165,7 +165,7 @@ TEST_F(ServerNodeTest, SendsDeltasWhileTheyAreSmallerThanWhatIsSentOnAverage) {
   std::size_t full = 0, deltas = 0, messages = 0, bytes = 0;
   for (std::uint32_t i = 0; i < 40; ++i) {
     receive(test::submap(kAlpha, i));
-    now_ = *node_->next_timer() + ChangeWatch::kAnyway_s;  // whether or not it concerns the robot
+    now_ = *node_->next_timer() + server::ServerConfig{}.unchanged_every_s;  // whether or not it concerns the robot
     for (const bus::Envelope& sent : done(node_->on_timer(now_)).messages) {
       if (sent.to != Endpoint::of(kAlpha.robot)) continue;
       ProxyGraphMessage message;
@@ -502,11 +502,9 @@ class LostMetreVerifier final : public server::ClosureVerifier {
 class ChangedMap : public ServerNodeTest {
  protected:
   /// The next update changes its mind.
-  void reach(const std::string& setting) {
+  void reach() {
     verifier_ = std::make_shared<LostMetreVerifier>();
-    ServerNodeConfig config{.pairs_per_job = 1000};
-    config.server.change_of_mind = setting;
-    start({RobotId{0}}, config);
+    start({RobotId{0}}, {.pairs_per_job = 1000});
     std::vector<Step> jobs;
     for (std::uint32_t i = 0; i < 18; ++i) jobs.push_back(receive(test::submap(kAlpha, i)));
     now_ = *node_->next_timer();
@@ -514,40 +512,20 @@ class ChangedMap : public ServerNodeTest {
     for (const Step& step : jobs) answer(step);
     now_ = *node_->next_timer();
   }
-  static std::vector<ChangeOutcome> outcomes(const Step& step) {
-    std::vector<ChangeOutcome> out;
-    for (const Event& event : step.events)
-      if (const auto* change = std::get_if<ChangeOfMind>(&event.what)) out.push_back(change->outcome);
-    return out;
-  }
 };
 
-TEST_F(ChangedMap, IsSentOnceItHasStood) {
-  reach("wait");
+TEST_F(ChangedMap, IsSentAtOnceAndReported) {
+  reach();
   const Step changed = done(node_->on_timer(now_));
-  EXPECT_TRUE(of_kind(changed, MessageKind::proxy_graph).empty());
-  EXPECT_EQ(outcomes(changed), std::vector{ChangeOutcome::waits});
-  ASSERT_EQ(node_->next_timer(), now_ + ChangeWatch::kStands_s);  // with or without news
-  const std::size_t updates = node_->map_server().work().updates;
-  now_ = *node_->next_timer();
-  const Step stands = done(node_->on_timer(now_));
-  EXPECT_EQ(outcomes(stands), std::vector{ChangeOutcome::stands});
-  const auto graphs = of_kind(stands, MessageKind::proxy_graph);
+  const auto graphs = of_kind(changed, MessageKind::proxy_graph);
   ASSERT_EQ(graphs.size(), 1U);
   EXPECT_EQ(wire::decode_proxy_graph(*graphs[0].bytes)->graph.nodes.size(), node_->broadcast().nodes.size());
-  EXPECT_EQ(node_->map_server().work().updates, updates);  // nothing is computed again
+  EXPECT_EQ(reported<ChangeOfMind>(changed), 1U);
   EXPECT_EQ(node_->next_timer(), std::nullopt);
 }
 
-TEST_F(ChangedMap, IsSentAtOnceToRobotsThatDoNotWait) {
-  reach("follow");
-  const Step changed = done(node_->on_timer(now_));
-  EXPECT_EQ(of_kind(changed, MessageKind::proxy_graph).size(), 1U);
-  EXPECT_EQ(outcomes(changed), std::vector<ChangeOutcome>{});
-}
-
 TEST_F(ChangedMap, IsSentAtOnceAfterAnOperatorsDecision) {
-  reach("wait");
+  reach();
   const auto& verdicts = node_->map_server().state().verdicts;
   ASSERT_FALSE(verdicts.empty());
   const std::string name = server::ClosureNames({}, {kAlpha}).of(verdicts.begin()->first);
@@ -555,7 +533,6 @@ TEST_F(ChangedMap, IsSentAtOnceAfterAnOperatorsDecision) {
   EXPECT_EQ(reported<DecisionTaken>(heard), 1U);
   const Step changed = done(node_->on_timer(now_));
   EXPECT_EQ(of_kind(changed, MessageKind::proxy_graph).size(), 1U);
-  EXPECT_EQ(outcomes(changed), std::vector<ChangeOutcome>{});
 }
 
 }  // namespace server_node_test

@@ -139,21 +139,14 @@ EventReport report_of(const node::MapUpdated& map) {
 EventReport report_of(const node::ChangeOfMind& report) {
   const consistency::MapChange& change = report.change;
   const std::string reason = server::to_string(report.reason);
-  const std::string what = fmt::format(
-      "the map's change of mind about robot {} ({:.2f} m, {:.1f} degrees, {:.1f} times what it allowed for)",
-      report.robot.value, change.translation_m, change.rotation_rad * 180.0 / std::numbers::pi, change.significance);
-  const bool waits = report.outcome == node::ChangeOutcome::waits;
-  Json json{{"event", "change_of_mind"},
-            {"robot", report.robot.value},
-            {"outcome", to_string(report.outcome)},
-            {"reason", reason}};
+  Json json{{"event", "change_of_mind"}, {"robot", report.robot.value}, {"reason", reason}};
   json.update(json_of_fields(change));
-  return {
-      std::move(json),
-      waits ? fmt::format("{} waits for another update: {}", what, reason)
-            : fmt::format("{} {}", what,
-                          report.outcome == node::ChangeOutcome::stands ? "stands, and is followed" : "is gone again"),
-      waits ? Level::warning : Level::info};
+  return {std::move(json),
+          fmt::format("the map changed its mind about robot {} by {:.2f} m and {:.1f} degrees, {:.1f} times what it "
+                      "allowed for: {}",
+                      report.robot.value, change.translation_m, change.rotation_rad * 180.0 / std::numbers::pi,
+                      change.significance, reason),
+          Level::warning};
 }
 EventReport report_of(const node::RobotUpdated& robot) {
   const robot::UpdateSummary& update = robot.summary;

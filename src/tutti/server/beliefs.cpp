@@ -62,7 +62,6 @@ std::string to_string(const ChangeReason& reason) {
   add(reason.recovered, "segments of its odometry are believed again");
   if (parts.empty()) add(reason.elsewhere, "closures of other robots changed");
   if (parts.empty()) parts.emplace_back("what its odometry and closures are worth was judged anew");
-  if (reason.lone > 0) parts.push_back(fmt::format("and all of it rests on one place ({} closures)", reason.lone));
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 

@@ -28,7 +28,6 @@ struct ChangeReason {
   std::size_t failed = 0;     ///< Segments of the chain's odometry that count as failed now and did not before,
   std::size_t recovered = 0;  ///< and the reverse. A segment that only changes its ends counts as neither.
   std::size_t elsewhere = 0;  ///< Closures of other chains that were found, taken up or dropped.
-  std::size_t lone = 0;       ///< Closures of the one pair of places on which all of it rests (change_support.hpp).
   friend bool operator==(const ChangeReason&, const ChangeReason&) = default;
 };
 /// Compares what two maps take for true, as it concerns one chain.

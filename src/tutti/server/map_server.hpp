@@ -35,7 +35,7 @@ struct ServerConfig {
   double update_least_s = 0.5;
   double update_share = 0.25;
   std::string broadcast = "own";
-  std::string change_of_mind = "wait";
+  double unchanged_every_s = 20.0;
   int candidates_per_submap = 100;
   template <class V>
   void describe(V& v) {
@@ -58,11 +58,9 @@ struct ServerConfig {
             "What a robot is sent of the map: 'own' = the proxy nodes of its newest session, how sure the map is of "
             "them, and where the others were last seen; 'all' = everybody's (the paper). It does the same with both.");
     v.field(
-        "change_of_mind", change_of_mind, one_of({"wait", "follow"}),
-        "A map that differs from the one a robot follows by more than three of that map's own standard deviations: "
-        "'wait' = the robot is sent it once more about it says the same (of another pair of places, if odometry must "
-        "have failed for it), or an operator has spoken since, and what has nothing to correct is sent seldom; "
-        "'follow' = every map at once.");
+        "unchanged_every_s", unchanged_every_s, at_least(0.0),
+        "A map that has nothing to correct for a robot (none of its closures changed, and it lies within one standard "
+        "deviation of what the robot was sent) is sent to it so long after the last one; 0: at once, as all others.");
     v.field("candidates_per_submap", candidates_per_submap, at_least(0),
             "LiDAR: a pair of submaps is verified when either is among so many that look most alike to the other from "
             "above, robots taking turns. With no more submaps than that, these are all pairs. 0: all pairs always.");

@@ -34,9 +34,7 @@ Json segment_json(const RobotRecord& robot, const Segment& segment, const Json& 
 Json change_of_mind_json(const RobotRecord& robot, const ChangeOfMindRecord& change) {
   return segment_json(robot, change.change,
                       {{"robot", robot.name},
-                       {"since_s", number(change.since_s)},
-                       {"settled_s", number(change.settled_s)},
-                       {"outcome", change.outcome},
+                       {"time_s", number(change.time_s)},
                        {"significance", number(change.change.significance)},
                        {"translation_m", number(change.change.translation_m)},
                        {"rotation_rad", number(change.change.rotation_rad)},

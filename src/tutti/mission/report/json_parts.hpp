@@ -14,7 +14,7 @@ namespace tutti::mission {
 using Json = nlohmann::ordered_json;
 
 /// The version of report.json and timing.json; keys are added without a new one.
-constexpr int kReportFormat = 2;
+constexpr int kReportFormat = 3;
 /// The text of a file. Foreign text with broken UTF-8 must not make the writer throw.
 std::string dump(const Json& json);
 /// Rounded to 1 / per_unit, so that the shortest text that reads back the same is short; null unless finite.

@@ -26,7 +26,7 @@ void expect_keys(const json& object, const std::vector<std::string>& wanted) {
 
 TEST(ReportJson, HasTheDocumentedKeys) {
   const json report = json::parse(report_json(test::example_record()));
-  EXPECT_EQ(report["format"], 2);
+  EXPECT_EQ(report["format"], 3);
   expect_keys(report, {"mission", "seed", "default_policy", "robots", "server", "transforms", "input", "notes",
                        "association", "rpe_interval", "duration_s", "description"});
   ASSERT_EQ(report["robots"].size(), 2U);
@@ -268,7 +268,7 @@ TEST(ReportJson, EmptyMission) {
   EXPECT_TRUE(report["robots"].empty());
   EXPECT_TRUE(report["transforms"].empty());
   EXPECT_EQ(report["server"]["components"], 0);
-  EXPECT_EQ(json::parse(timing_json(MissionRecord{}))["format"], 2);
+  EXPECT_EQ(json::parse(timing_json(MissionRecord{}))["format"], 3);
 }
 
 TEST(ReportJson, BrokenUtf8DoesNotThrow) {
