@@ -15,7 +15,7 @@ packages=(
 clang=() # compiles what sanitizers check; another Debian or Ubuntu has another one, and GCC does it too, in twice the time
 for option in "$@"; do
   case "$option" in
-    --tests) packages+=(libgtest-dev libgmock-dev librapidcheck-dev clang-format python3 python3-protobuf python3-numpy pybind11-dev python3-dev python3-venv mold dpkg-dev groff-base) ;;
+    --tests) packages+=(libgtest-dev libgmock-dev librapidcheck-dev clang-format python3 python3-protobuf python3-numpy pybind11-dev python3-dev python3-venv mold dpkg-dev groff-base universal-ctags) ;;
     --sanitize) clang=(clang-16 libclang-rt-16-dev) ;;
     --python) packages+=(pybind11-dev python3-dev python3-numpy python3-venv) ;;
     --bench) packages+=(libbenchmark-dev) ;;
