@@ -434,6 +434,21 @@ class CommandLine(unittest.TestCase):
         (self.path / "few.tum").write_text("".join(way[:3]))
         self.expect(tutti("eval", self.path / "few.tum", self.path / "way.tum"), 0)
 
+    def test_eval_takes_another_scale_and_another_clock(self):
+        truth = self.write_way("truth.tum")
+        rows = [[float(x) for x in line.split()] for line in truth.read_text().splitlines()]
+        small = self.path / "small.tum"  # half as large, its clock 50 s behind
+        small.write_text("".join("%.1f %.6f %.6f %.6f %.9f %.9f %.9f %.9f\n" % (row[0] - 50.0, row[1] / 2, row[2] / 2, row[3] / 2, *row[4:]) for row in rows))
+        both = json.loads(tutti("eval", small, truth, "--offset", 50, "--scale", "--json").stdout)
+        self.assertAlmostEqual(both["scale"], 2.0, places=4)
+        self.assertLess(both["ate"]["max_m"], 1e-3)
+        self.assertEqual((both["offset_s"], both["alignment"], both["association"]["pairs"]), (50.0, "Sim3", len(rows)))
+        self.assertGreater(json.loads(tutti("eval", small, truth, "--offset", 50, "--json").stdout)["ate"]["rmse_m"], 5.0)
+        self.assertEqual(json.loads(tutti("eval", small, truth, "--scale", "--json").stdout)["association"]["pairs"], len(rows) - 250)
+        self.expect(tutti("eval", small, truth, "--offset", 50, "--scale"), 0, "Sim(3), scale 2.0000", "50 s added")
+        self.expect(tutti("eval", small, truth, "--offset", -500), 1, "--offset")
+        self.expect(tutti("eval", "--map", small, truth, "--scale"), 2, "--map")
+
     def write_way(self, name, bend_at=None, seconds=100, start=10.0):
         """A pose every 0.2 s along a way of 1 m/s; from `bend_at` seconds on it runs off to the left."""
         lines, x, y, heading = [], 0.0, 0.0, 0.0

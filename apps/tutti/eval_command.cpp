@@ -25,6 +25,8 @@ struct EvalOptions {
   double kitti_rate_hz = 10.0;
   std::optional<double> max_difference_s;  // set: nearest stamp instead of interpolation
   double max_gap_s = evaluation::AssociationConfig{}.max_gap_s;
+  double offset_s = 0.0;
+  bool scale = false;
   double rpe_time_s = 1.0;
   double rpe_distance_m = 10.0;
   bool json = false;
@@ -35,6 +37,7 @@ struct EvalOptions {
 struct Report {
   Trajectory estimate;
   Trajectory reference;
+  double scale = 1.0;  // of the estimate's positions
   evaluation::AteResult ate;
   std::optional<evaluation::RpeResult> rpe_time;
   std::optional<evaluation::RpeResult> rpe_distance;
@@ -61,13 +64,16 @@ Result<Report> evaluate(const EvalOptions& options) {
   const evaluation::AssociationConfig config = {.interpolate = !options.max_difference_s,
                                                 .max_gap_s = options.max_gap_s,
                                                 .max_difference_s = options.max_difference_s.value_or(0.0)};
-  const auto pairs = evaluation::associate(*estimate, *reference, config);
+  for (StampedPose& pose : *estimate) pose.stamp = pose.stamp + options.offset_s;
+  auto pairs = evaluation::associate(*estimate, *reference, config);
+  const double scale = options.scale ? evaluation::best_scale(pairs) : 1.0;
+  if (options.scale) pairs = evaluation::scaled(pairs, scale);
   const auto ate = evaluation::ate(pairs);
   if (!ate)
     return fail(
         ErrorCode::invalid,
         "no pose of {} has a reference: its stamps are {:.3f} to {:.3f} s, those of {} {:.3f} to {:.3f} s; expected "
-        "overlapping times (--max-gap and --max-difference say how close)",
+        "overlapping times (--max-gap and --max-difference say how close, --offset by how much a clock is off)",
         options.estimate_path, seconds(estimate->front().stamp), seconds(estimate->back().stamp),
         options.reference_path, seconds(reference->front().stamp), seconds(reference->back().stamp));
   // One pose lies on its reference after any alignment, and two nearly do: that error could not be anything but small.
@@ -79,7 +85,7 @@ Result<Report> evaluate(const EvalOptions& options) {
                 ate->pairs, estimate->size(), options.estimate_path, options.reference_path, kLeastPairs);
   auto rpe_time = evaluation::rpe_over_time(pairs, options.rpe_time_s);
   auto rpe_distance = evaluation::rpe_over_distance(pairs, options.rpe_distance_m);
-  return Report{std::move(*estimate), std::move(*reference), *ate, rpe_time, rpe_distance};
+  return Report{std::move(*estimate), std::move(*reference), scale, *ate, rpe_time, rpe_distance};
 }
 
 std::string rpe_line(const std::optional<evaluation::RpeResult>& rpe) {
@@ -98,7 +104,11 @@ void print_table(const EvalOptions& options, const Report& report) {
              options.max_difference_s
                  ? fmt::format("with the nearest reference stamp within {} s", *options.max_difference_s)
                  : fmt::format("reference interpolated across gaps of up to {} s", options.max_gap_s));
-  fmt::print("{:<12} one rigid transform SE(3), no scale, least squares of positions\n\n", "aligned");
+  if (options.offset_s != 0.0) fmt::print("{:<12} {} s added to the estimate's stamps\n", "offset", options.offset_s);
+  if (options.scale)
+    fmt::print("{:<12} one similarity Sim(3), scale {:.6f}, least squares of positions\n\n", "aligned", report.scale);
+  else
+    fmt::print("{:<12} one rigid transform SE(3), no scale, least squares of positions\n\n", "aligned");
   fmt::print("{:<20} {:>10} {:>10} {:>10} {:>10}\n", "ATE", "rmse", "mean", "median", "max");
   fmt::print("{:<20} {:>10.4f} {:>10.4f} {:>10.4f} {:>10.4f}\n", "  position [m]", ate.rmse_m, ate.mean_m, ate.median_m,
              ate.max_m);
@@ -127,7 +137,9 @@ void print_json(const EvalOptions& options, const Report& report) {
   const Json out = {{"estimate", {{"path", options.estimate_path}, {"poses", report.estimate.size()}}},
                     {"reference", {{"path", options.reference_path}, {"poses", report.reference.size()}}},
                     {"association", association},
-                    {"alignment", "SE3"},
+                    {"offset_s", options.offset_s},
+                    {"alignment", options.scale ? "Sim3" : "SE3"},
+                    {"scale", report.scale},
                     {"ate",
                      {{"rmse_m", ate.rmse_m},
                       {"mean_m", ate.mean_m},
@@ -143,6 +155,8 @@ void print_json(const EvalOptions& options, const Report& report) {
 }
 
 int run(EvalOptions options) {
+  if (options.map && (options.scale || options.offset_s != 0.0))
+    return complain("eval", "--scale and --offset are for trajectories, --map compares point clouds", 2);
   if (options.map) {
     options.map_options.map_path = options.estimate_path;
     options.map_options.survey_path = options.reference_path;
@@ -194,7 +208,8 @@ void add_eval_command(CLI::App& app, int& exit_code) {
       app.add_subcommand("eval", "Error of a trajectory against a reference, or of a map against a survey");
   command->footer(
       "ATE, absolute trajectory error: distance between the two after the one rigid transform of EST (rotation and\n"
-      "translation, no scale) that brings their positions closest together. Says how true the trajectory is as a "
+      "translation, no scale without --scale) that brings their positions closest together. Says how true the "
+      "trajectory is as a "
       "whole.\n"
       "RPE, relative pose error: error of the motion over a fixed time or a fixed distance travelled, from every pose\n"
       "on. Says how fast EST drifts; needs no alignment.\n\n"
@@ -219,6 +234,11 @@ void add_eval_command(CLI::App& app, int& exit_code) {
              "SECONDS", finite(true));
   add_number(*command, "--max-gap", options->max_gap_s,
              "Interpolate only between reference poses at most this far apart", "SECONDS", finite(true));
+  add_number(*command, "--offset", options->offset_s,
+             "Add this to EST's stamps before they are paired: EST's clock is behind by so much", "SECONDS",
+             within(-1e10, 1e10));
+  command->add_flag("--scale", options->scale,
+                    "Also scale EST's positions as fits best, for one camera, which cannot know how large things are");
   add_number(*command, "--rpe-time", options->rpe_time_s, "Interval of the RPE over time", "SECONDS");
   add_number(*command, "--rpe-distance", options->rpe_distance_m, "Interval of the RPE over distance", "METRES");
   command->add_option("--format", options->format, "Format of both files; auto looks at each file's columns")

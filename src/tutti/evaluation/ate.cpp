@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/evaluation/ate.hpp"
 
+#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -43,6 +44,31 @@ std::optional<AteResult> ate_aligned(std::span<const PosePair> pairs, const Pose
                    .max_m = errors_m.back(),
                    .rmse_deg = std::sqrt(sum_rad2 / n) * 180.0 / std::numbers::pi,
                    .T_reference_estimate = T_reference_estimate};
+}
+
+double best_scale(std::span<const PosePair> pairs) {
+  Eigen::Vector3d reference_mean = Eigen::Vector3d::Zero(), estimate_mean = reference_mean;
+  for (const PosePair& pair : pairs) {
+    reference_mean += pair.reference.translation / static_cast<double>(pairs.size());
+    estimate_mean += pair.estimate.translation / static_cast<double>(pairs.size());
+  }
+  Eigen::Matrix3d together = Eigen::Matrix3d::Zero();
+  double spread_m2 = 0.0;
+  for (const PosePair& pair : pairs) {
+    const Eigen::Vector3d estimate = pair.estimate.translation - estimate_mean;
+    together += (pair.reference.translation - reference_mean) * estimate.transpose();
+    spread_m2 += estimate.squaredNorm();
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(together);
+  Eigen::Vector3d D = svd.singularValues();
+  if (together.determinant() < 0.0) D.z() = -D.z();
+  return spread_m2 > 0.0 && D.sum() > 0.0 ? D.sum() / spread_m2 : 1.0;
+}
+
+std::vector<PosePair> scaled(std::span<const PosePair> pairs, double scale) {
+  std::vector<PosePair> out(pairs.begin(), pairs.end());
+  for (PosePair& pair : out) pair.estimate.translation *= scale;
+  return out;
 }
 
 }  // namespace tutti::evaluation

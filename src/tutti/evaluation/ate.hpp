@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "tutti/evaluation/association.hpp"
 
@@ -28,5 +29,11 @@ struct AteResult {
 std::optional<AteResult> ate(std::span<const PosePair> pairs);
 /// As ate(), under a given alignment.
 std::optional<AteResult> ate_aligned(std::span<const PosePair> pairs, const Pose3& T_reference_estimate);
+
+/// By what the estimate's positions are multiplied for the similarity Sim(3) that brings them closest to the reference
+/// (Umeyama, PAMI 1991, eq. 42): what one camera alone cannot know. 1 where fewer than two places differ.
+double best_scale(std::span<const PosePair> pairs);
+/// The pairs with the estimate's positions multiplied by `scale`, about its frame's origin.
+std::vector<PosePair> scaled(std::span<const PosePair> pairs, double scale);
 
 }  // namespace tutti::evaluation

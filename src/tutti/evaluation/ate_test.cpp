@@ -51,6 +51,27 @@ RC_GTEST_PROP(Ate, DoesNotDependOnEitherFrame, ()) {
   RC_ASSERT(std::abs(here->median_m - there->median_m) < 1e-7);
 }
 
+RC_GTEST_PROP(BestScale, IsFoundWhateverTheFrames, ()) {
+  Draw draw;
+  const double scale = draw.rng.uniform(0.1, 10.0);
+  const auto pairs = scaled(moved(draw.pairs(4, 0.0), draw.pose(), draw.pose()), 1.0 / scale);
+  RC_ASSERT(std::abs(best_scale(pairs) / scale - 1.0) < 1e-9);
+  RC_ASSERT(ate(scaled(pairs, scale))->max_m < 1e-7);
+}
+
+RC_GTEST_PROP(BestScale, LeavesLessThanScalesNearIt, ()) {
+  Draw draw;
+  const auto pairs = draw.pairs(4);
+  const double best = best_scale(pairs);
+  for (const double other : {0.99, 1.01})
+    RC_ASSERT(ate(scaled(pairs, best))->rmse_m <= ate(scaled(pairs, other * best))->rmse_m + 1e-9);
+}
+
+TEST(BestScale, OfOnePlaceIsOne) {
+  EXPECT_EQ(best_scale(std::vector<PosePair>{}), 1.0);
+  EXPECT_EQ(best_scale(std::vector<PosePair>(3, PosePair{{}, at({1, 2, 3}), at({4, 5, 6})})), 1.0);
+}
+
 RC_GTEST_PROP(Ate, OfATrajectoryWithItselfIsZeroAndFindsTheMotion, ()) {
   Draw draw;
   const Pose3 T = draw.pose();
