@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -10,11 +11,13 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "bus_options.hpp"
 #include "commands.hpp"
 #include "options.hpp"
 #include "tutti/bus/mission_lease.hpp"
+#include "tutti/bus/nats_child.hpp"
 #include "tutti/node/status_text.hpp"
 #include "tutti/program/field_json.hpp"
 #include "tutti/wire/codec.hpp"
@@ -122,7 +125,25 @@ int watch(bus::Port& port, View& view, const StatusOptions& options) {
   }
 }
 
-int run(const StatusOptions& options) {
+/// The one bus of this machine, for who does not say which.
+Result<std::string> bus_here() {
+  const std::vector<std::string> found = bus::buses_of_this_machine();
+  if (found.size() == 1) return found.front();
+  if (found.empty())
+    return fail(ErrorCode::invalid,
+                "no server of yours runs a bus on this machine; of another machine or user say --bus URL, which the "
+                "server prints when it starts");
+  return fail(ErrorCode::invalid, "{} servers run a bus on this machine: say --bus {}", found.size(),
+              fmt::join(found, " or --bus "));
+}
+
+int run(StatusOptions options) {
+  if (options.bus.url.empty()) {
+    auto found = bus_here();
+    if (!found) return complain("status", found.error().message, 2);
+    options.bus.url = std::move(*found);
+    fmt::print(stderr, "tutti status: --bus {}\n", options.bus.url);
+  }
   bus::BusOptions where = options.bus;
   auto mission = bus::served_mission(where, std::min(bus::kLookForServer_s, options.wait_s));
   if (!mission) return complain("status", mission.error().message, 2);
@@ -141,8 +162,9 @@ void add_status_command(CLI::App& app, int& exit_code) {
       "status", "Who is there, and how the mission stands: what the server on this bus says every two seconds.");
   command->footer(
       "Exit codes: 0 the server is there; 1 no bus, or no server (then what it said last); 2 usage.\n"
-      "Example: tutti status --bus nats://127.0.0.1:4222 --watch\n");
-  add_bus_options(*command, options->bus)->required();
+      "Without --bus the server on this machine is asked.\n"
+      "Example: tutti status --watch\n");
+  add_bus_options(*command, options->bus);
   command->add_flag("--json", options->json, "One JSON object on a line instead of a table");
   command->add_flag("--watch", options->watch, "Go on, and show it again whenever something is new");
   add_mission_name(*command, options->bus.mission, kServedMission);

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <sys/file.h>
 #include <sys/prctl.h>
+#include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -83,6 +84,8 @@ std::string url_in(const fs::path& ports) {
   const std::size_t end = text.find('"', begin);
   return begin == std::string::npos || end == std::string::npos ? "" : text.substr(begin, end - begin);
 }
+
+fs::path ports_file(const fs::path& folder, int pid) { return folder / fmt::format("nats-server_{}.ports", pid); }
 
 int port_of(const std::string& url) { return std::atoi(url.substr(url.rfind(':') + 1).c_str()); }
 
@@ -231,7 +234,7 @@ Status NatsChild::check_disk(std::uint64_t needed) const {
 /// The port and the address are known, and JetStream answers.
 Status NatsChild::wait_until_ready() {
   const auto end = Clock::now() + std::chrono::duration<double>(options_.start_timeout_s);
-  const fs::path ports = folder_ / fmt::format("nats-server_{}.ports", pid_);
+  const fs::path ports = ports_file(folder_, pid_);
   while (true) {
     if (const std::string url = url_in(ports); !url.empty() && is_ready(url, options_)) {
       url_ = url;
@@ -339,6 +342,27 @@ NatsChild::Refusals NatsChild::take_refusals() {
       ++out.more;
   }
   if (log_read_ > kMostLog && truncate(file.c_str(), 0) == 0) log_read_ = 0;
+  return out;
+}
+
+std::vector<std::string> buses_of_this_machine() {
+  std::vector<std::string> out;
+  std::error_code gone;  // processes end while they are looked at
+  for (const auto& process : fs::directory_iterator("/proc", gone)) {
+    const int pid = std::atoi(process.path().filename().c_str());
+    struct stat owner {};
+    if (pid <= 0 || ::stat(process.path().c_str(), &owner) != 0 || (owner.st_uid != geteuid() && owner.st_uid != 0))
+      continue;
+    if (read_file((process.path() / "comm").string()).value_or("") != "nats-server\n") continue;
+    const std::string command = read_file((process.path() / "cmdline").string()).value_or("");
+    const std::size_t flag = command.find(std::string("\0-c\0", 4));  // ends of arguments are zeros
+    if (flag == std::string::npos) continue;
+    const fs::path file = command.substr(flag + 4).c_str();
+    if (file.filename() != kConfiguration) continue;
+    const fs::path folder = fs::read_symlink(process.path() / "cwd", gone) / file.parent_path();
+    if (std::string url = url_in(ports_file(folder, pid)); !url.empty()) out.push_back(std::move(url));
+  }
+  std::ranges::sort(out);
   return out;
 }
 

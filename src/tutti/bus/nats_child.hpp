@@ -91,4 +91,8 @@ class NatsChild {
   int pid_ = -1;
 };
 
+/// Where the buses listen that this user's or root's servers run on this machine, found by their nats-servers' command
+/// lines in /proc; sorted. Those of other users are left out, as anybody can call a program nats-server.
+std::vector<std::string> buses_of_this_machine();
+
 }  // namespace tutti::bus

@@ -9,6 +9,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -60,6 +61,15 @@ bool soon(Condition&& condition) {
 
 void expect_says(const std::string& message, std::initializer_list<const char*> parts) {
   for (const char* part : parts) EXPECT_NE(message.find(part), std::string::npos) << part << " in: " << message;
+}
+
+TEST_F(NatsChildTest, IsFoundOnThisMachineWhileItRuns) {
+  auto child = start();
+  ASSERT_NE(child, nullptr);
+  const std::string url = child->url();
+  EXPECT_EQ(std::ranges::count(buses_of_this_machine(), url), 1);
+  child.reset();
+  EXPECT_EQ(std::ranges::count(buses_of_this_machine(), url), 0);
 }
 
 TEST_F(NatsChildTest, StartsOnAFreePortOfThisMachineAndStopsWithItsOwner) {
