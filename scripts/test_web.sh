@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# The page of web/: types, unit tests in Node, that web/dist is what the sources make, and a headless Chromium that drives it.
+# The page of web/: form, types, unit tests in Node, that web/dist is what the sources make, and a headless Chromium that drives it.
 # Skips, and reports it, without what it needs; without an option it installs Chromium and Node where they are missing.
 #   scripts/test_web.sh [--write | --quick | --chromium | --programs TUTTI | --log-in TUTTI]
 # --write: renews web/dist instead of comparing it; --quick: no Chromium; --chromium: nothing else;
@@ -46,7 +46,8 @@ if [ "$mode" = --programs ] || [ "$mode" = --log-in ]; then
 fi
 
 if [ "$mode" != --chromium ]; then
-  say "types and page"
+  say "form, types and page"
+  npx prettier --check --log-level warn . || { echo "not as the formatter writes it: npx prettier --write . in web/" >&2; exit 1; }
   npx tsc --noEmit
   out=dist
   if [ "$mode" != --write ]; then

@@ -19,7 +19,8 @@ async function ask(path: string, body?: unknown, at_most_ms: number = TIMES.answ
     throw new Error("The server does not answer.");
   }
   const json = (await answer.json().catch(() => null)) as { error?: unknown } | null;
-  if (!answer.ok) throw new Error(typeof json?.error === "string" ? json.error : `The server answers ${answer.status}.`);
+  if (!answer.ok)
+    throw new Error(typeof json?.error === "string" ? json.error : `The server answers ${answer.status}.`);
   return json ?? {};
 }
 
@@ -31,14 +32,24 @@ export const api = {
   register: async (from: SubmapId, to: SubmapId, T_from_to: Pose | null): Promise<Registration> =>
     decode_registration(await ask("/api/register", { from, to, T_from_to })),
   /** The value of `poses` that the map would have with what was registered; takes as long as an update of the map. */
-  change: async (look: number): Promise<unknown> => ((await ask("/api/change", { look }, TIMES.change_ms)) as { poses?: unknown }).poses,
+  change: async (look: number): Promise<unknown> =>
+    ((await ask("/api/change", { look }, TIMES.change_ms)) as { poses?: unknown }).poses,
   keep_closure: async (from: SubmapId, to: SubmapId, T_from_to: Pose, by: string): Promise<string> =>
     String(((await ask("/api/closure", { from, to, T_from_to, by })) as { name?: unknown }).name ?? ""),
-  mark: (submap: SubmapId, at: Vec3, text: string, photo: string | null, by: string) => ask("/api/mark", { submap, at, text, photo, by }),
+  mark: (submap: SubmapId, at: Vec3, text: string, photo: string | null, by: string) =>
+    ask("/api/mark", { submap, at, text, photo, by }),
   unmark: (id: string) => ask("/api/unmark", { id }),
   hold: (what: string, by: string) => ask("/api/hold", { what, by }),
   why: async (from: string, to: string): Promise<Why> =>
     decode_why(await ask(`/api/why?from=${encodeURIComponent(from)}&to=${encodeURIComponent(to)}`)),
 };
 
-export const kNobody: Me = { login: false, name: "", role: null, mission: "", may_decide: false, nonce: "", offers: [] };
+export const kNobody: Me = {
+  login: false,
+  name: "",
+  role: null,
+  mission: "",
+  may_decide: false,
+  nonce: "",
+  offers: [],
+};

@@ -56,7 +56,10 @@ export class App {
   constructor(readonly source: Source) {
     this.live = source.mode === "live";
     this.store = new Store(!this.live, soon);
-    this.clouds = new Clouds((name) => source.cloud(name, this.store.get("submap", Infinity, name)), () => this.cloud_came());
+    this.clouds = new Clouds(
+      (name) => source.cloud(name, this.store.get("submap", Infinity, name)),
+      () => this.cloud_came(),
+    );
     this.phase = this.live ? memory.read<Phase>("phase", "explore") : "debrief";
     if (!(this.phase in PHASES)) this.phase = "explore";
     this.options = default_options();
@@ -70,11 +73,12 @@ export class App {
   start(): void {
     if (this.live) void this.ask_me(); // before messages: without a credential none comes
     this.source.start({
-      message: (m) => this.hear(m.t, () => {
-        this.store.apply(m);
-        const colours = m.key === "mission" ? this.store.get("mission")?.robot_colours : null;
-        if (colours) set_robot_colours(colours); // before anything is drawn
-      }),
+      message: (m) =>
+        this.hear(m.t, () => {
+          this.store.apply(m);
+          const colours = m.key === "mission" ? this.store.get("mission")?.robot_colours : null;
+          if (colours) set_robot_colours(colours); // before anything is drawn
+        }),
       reset: () => {
         this.store.clear();
         this.clouds.clear();
@@ -165,7 +169,9 @@ export class App {
 
   /** Who else inspects this now: a robot or a closure that two people decide on is to be known to both. */
   holders(what: string): string[] {
-    return (this.store.get("held", this.at()) ?? []).filter((held) => held.what === what && held.by !== this.name()).map((held) => held.by);
+    return (this.store.get("held", this.at()) ?? [])
+      .filter((held) => held.what === what && held.by !== this.name())
+      .map((held) => held.by);
   }
   /** As the server knows this person; "": it does not. */
   name(): string {
@@ -183,7 +189,10 @@ export class App {
   }
 
   robot_index(number: number): number {
-    return Math.max(0, this.robots.findIndex((r) => r.number === number));
+    return Math.max(
+      0,
+      this.robots.findIndex((r) => r.number === number),
+    );
   }
   robot_name(number: number): string {
     return this.robots.find((r) => r.number === number)?.name ?? `robot ${number}`;
@@ -196,7 +205,12 @@ export class App {
     this.robots = robots_at(this.store, this.at(), this.now());
     if (topic !== "tick") {
       const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
-      this.world.update(this.store, this.at(), topic === "data" && this.time === null && !calm && this.ready, performance.now());
+      this.world.update(
+        this.store,
+        this.at(),
+        topic === "data" && this.time === null && !calm && this.ready,
+        performance.now(),
+      );
       this.correction = correction_at(this.store, this.at());
       for (const { submap } of this.world.placed.values()) if (submap.points > 0) this.clouds.want(submap.id);
     }

@@ -22,7 +22,8 @@ export function decode_cloud(bytes: ArrayBuffer): Cloud {
   const head = new DataView(bytes);
   const step_m = head.getFloat32(0, true);
   const n = head.getUint32(4, true);
-  if (bytes.byteLength !== kHeader + 6 * n) throw new Error(`a cloud of ${n} points in ${bytes.byteLength} bytes, expected ${kHeader + 6 * n}`);
+  if (bytes.byteLength !== kHeader + 6 * n)
+    throw new Error(`a cloud of ${n} points in ${bytes.byteLength} bytes, expected ${kHeader + 6 * n}`);
   if (!(step_m > 0) || !Number.isFinite(step_m)) throw new Error(`a cloud with a step of ${step_m} m`);
   const xyz = new Int16Array(bytes, kHeader, 3 * n); // machines with a browser are little-endian
   return { step_m, n, xyz, ...bounds(xyz, step_m) };

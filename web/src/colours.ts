@@ -28,9 +28,22 @@ function along(stops: Rgb[], share: number): Rgb {
 }
 
 /** Dark blue over green to yellow, even in lightness (after viridis). */
-const kEven: Rgb[] = [[68, 52, 140], [56, 98, 158], [36, 140, 150], [44, 178, 120], [140, 208, 70], [253, 231, 60]];
+const kEven: Rgb[] = [
+  [68, 52, 140],
+  [56, 98, 158],
+  [36, 140, 150],
+  [44, 178, 120],
+  [140, 208, 70],
+  [253, 231, 60],
+];
 /** Good to bad: blue, pale, orange, red. */
-const kBad: Rgb[] = [[60, 130, 220], [110, 200, 210], [240, 210, 110], [240, 140, 60], [225, 60, 60]];
+const kBad: Rgb[] = [
+  [60, 130, 220],
+  [110, 200, 210],
+  [240, 210, 110],
+  [240, 140, 60],
+  [225, 60, 60],
+];
 
 export const even = (share: number): Rgb => along(kEven, share);
 export const bad = (share: number): Rgb => along(kBad, share);

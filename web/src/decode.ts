@@ -98,7 +98,12 @@ function status(value: unknown): s.Status {
     workers: maybe_list(f.workers, "workers", worker_status),
     refused: maybe_list(f.refusals, "refusals", (r, what) => {
       const e = fields(r, what);
-      return { from: words(e.from, "from"), kind: words(e.kind, "kind"), count: count(e.count, "count"), why: words(e.last_why, "last_why") };
+      return {
+        from: words(e.from, "from"),
+        kind: words(e.kind, "kind"),
+        count: count(e.count, "count"),
+        why: words(e.last_why, "last_why"),
+      };
     }),
     trouble: words(f.trouble, "trouble"),
     verifier: words(f.verifier, "verifier"),
@@ -145,13 +150,19 @@ function poses(value: unknown, ids: IdTable): s.Poses {
   const places = entries.map(([id]) => ids.place(id));
   const rows = new Float64Array((Math.max(-1, ...places) + 1) * POSE_ROW).fill(Number.NaN);
   entries.forEach(([id, row], i) => {
-    if (!Array.isArray(row) || row.length < 8) throw new DecodeError(`submaps.${id}: expected 8 to ${POSE_ROW} numbers`);
+    if (!Array.isArray(row) || row.length < 8)
+      throw new DecodeError(`submaps.${id}: expected 8 to ${POSE_ROW} numbers`);
     const first = places[i] * POSE_ROW;
     for (let k = 0; k < 8; ++k) rows[first + k] = number(row[k], id);
     rows[first + 8] = maybe(row[8], id) ?? Number.NaN;
     rows[first + 9] = maybe(row[9], id) ?? Number.NaN;
   });
-  return { revision: count(f.revision, "revision"), accepted: count(f.accepted, "accepted"), components: count(f.components, "components"), rows };
+  return {
+    revision: count(f.revision, "revision"),
+    accepted: count(f.accepted, "accepted"),
+    components: count(f.components, "components"),
+    rows,
+  };
 }
 
 export function gate(value: unknown, what: string): s.Gate {
@@ -216,12 +227,25 @@ function disagreement(value: unknown): s.Disagreement {
     nodes: list(f.nodes, "nodes", (n, what) => {
       const e = fields(n, what);
       const significance = list(e.significance, "significance", number);
-      return { submap: e.submap ? text(e.submap, "submap") : null, t: number(e.t, "t"), distance_m: count(e.distance_m, "distance_m"), d_m: maybe_list(e.d, "d", number), significance };
+      return {
+        submap: e.submap ? text(e.submap, "submap") : null,
+        t: number(e.t, "t"),
+        distance_m: count(e.distance_m, "distance_m"),
+        d_m: maybe_list(e.d, "d", number),
+        significance,
+      };
     }),
     origins: maybe_list(f.origins, "origins", (o, what) => {
       const e = fields(o, what);
       const n = (key: string) => count(e[key], key);
-      return { from_s: n("from_s"), until_s: n("until_s"), translation_m: n("translation_m"), rotation_rad: n("rotation_rad"), significance: n("significance"), alert: e.alert === true };
+      return {
+        from_s: n("from_s"),
+        until_s: n("until_s"),
+        translation_m: n("translation_m"),
+        rotation_rad: n("rotation_rad"),
+        significance: n("significance"),
+        alert: e.alert === true,
+      };
     }),
   };
 }
@@ -231,7 +255,12 @@ function trajectory(value: unknown): s.Trajectory {
   const rows = list(f.points, "points", (p, what) => numbers<[number, number, number, number]>(p, what, 4));
   const points = new Float64Array(rows.length * 4);
   rows.forEach((row, i) => points.set(row, 4 * i));
-  return { robot: maybe(f.robot, "robot"), component: count(f.component, "component"), name: words(f.name, "name"), points };
+  return {
+    robot: maybe(f.robot, "robot"),
+    component: count(f.component, "component"),
+    name: words(f.name, "name"),
+    points,
+  };
 }
 
 function errors(value: unknown): s.Errors {
@@ -248,7 +277,8 @@ function survey(value: unknown): s.Survey {
 }
 
 /** Photos are the server's, or pictures inside the message; anything else could be fetched from elsewhere. */
-export const is_photo = (url: string): boolean => /^(\/api\/photo\/\d{1,20}|data:image\/(jpeg|png);base64,[A-Za-z0-9+/=]*)$/.test(url);
+export const is_photo = (url: string): boolean =>
+  /^(\/api\/photo\/\d{1,20}|data:image\/(jpeg|png);base64,[A-Za-z0-9+/=]*)$/.test(url);
 
 function mark(value: unknown): s.Mark {
   const f = fields(value, "mark");
@@ -269,11 +299,16 @@ function held(value: unknown, what: string): s.Held {
 }
 
 function radio(value: unknown): Map<number, s.RadioBytes> {
-  const sums = (of: unknown) => Object.fromEntries(Object.entries(of === undefined ? {} : fields(of, "radio")).map(([kind, bytes]) => [kind, number(bytes, kind)]));
-  return new Map(Object.entries(fields(value, "radio")).map(([robot, of]) => {
-    const f = fields(of, robot);
-    return [Number(robot), { up: sums(f.up), down: sums(f.down) }];
-  }));
+  const sums = (of: unknown) =>
+    Object.fromEntries(
+      Object.entries(of === undefined ? {} : fields(of, "radio")).map(([kind, bytes]) => [kind, number(bytes, kind)]),
+    );
+  return new Map(
+    Object.entries(fields(value, "radio")).map(([robot, of]) => {
+      const f = fields(of, robot);
+      return [Number(robot), { up: sums(f.up), down: sums(f.down) }];
+    }),
+  );
 }
 
 /** Every kind of key and what reads its values. */
@@ -293,7 +328,8 @@ export const DECODERS: { [K in s.Kind]: (value: unknown, ids: IdTable) => s.Valu
   timing: (value) => fields(value, "timing"),
   settings: (value) => text(value, "settings"),
   compare: (value) => fields(value, "compare"),
-  odometry: (value) => new Map(Object.entries(fields(fields(value, "odometry").submaps, "submaps")).map(([id, T]) => [id, pose(T, id)])),
+  odometry: (value) =>
+    new Map(Object.entries(fields(fields(value, "odometry").submaps, "submaps")).map(([id, T]) => [id, pose(T, id)])),
   mark,
   held: (value) => list(value, "held", held),
   radio,

@@ -52,10 +52,21 @@ export function robots_at(store: Store, t: number, now: number): RobotView[] {
       names.set(robot ?? 0, name);
     }
   const sorted = [...by_number].sort(([a], [b]) => a - b);
-  return sorted.map(([number, { status: own, submaps }], place) => view_of(store, t, age, number, place, own, submaps, names.get(number)));
+  return sorted.map(([number, { status: own, submaps }], place) =>
+    view_of(store, t, age, number, place, own, submaps, names.get(number)),
+  );
 }
 
-function view_of(store: Store, t: number, age_s: number, number: number, index: number, status: RobotStatus | null, submaps: Submap[], otherwise?: string): RobotView {
+function view_of(
+  store: Store,
+  t: number,
+  age_s: number,
+  number: number,
+  index: number,
+  status: RobotStatus | null,
+  submaps: Submap[],
+  otherwise?: string,
+): RobotView {
   submaps.sort((a, b) => a.until_s - b.until_s);
   const newest = submaps.at(-1) ?? null;
   const silent_s = status?.last_seen_s_ago == null ? null : status.last_seen_s_ago + age_s;
@@ -64,7 +75,19 @@ function view_of(store: Store, t: number, age_s: number, number: number, index: 
   const away = presence === "silent" || presence === "lost";
   const name = status?.name || newest?.name.split("/")[0] || otherwise || `robot ${number}`;
   const reach_m = away && silent_s !== null ? Math.min(REACH_M, Math.max(speed_mps, SLOWEST_MPS) * silent_s) : 0;
-  return { number, index, name, status, presence, silent_s, newest, submaps: submaps.length, speed_mps, reach_m, drain: drain_of(store, t, number) };
+  return {
+    number,
+    index,
+    name,
+    status,
+    presence,
+    silent_s,
+    newest,
+    submaps: submaps.length,
+    speed_mps,
+    reach_m,
+    drain: drain_of(store, t, number),
+  };
 }
 
 /** As the program reports it, whose alerts follow from the same. */
@@ -95,7 +118,8 @@ export function drain_of(store: Store, t: number, robot: number): Drain {
   const now = last < 0 ? null : backlog(last);
   if (now === null || now === 0) return { state: "empty", seconds: null };
   let first = last;
-  while (first > 0 && track!.times[last] - track!.times[first] < TIMES.drain_window_s && backlog(first - 1) !== null) --first;
+  while (first > 0 && track!.times[last] - track!.times[first] < TIMES.drain_window_s && backlog(first - 1) !== null)
+    --first;
   const time = track!.times[last] - track!.times[first];
   const drained = (backlog(first) ?? now) - now;
   if (time <= 0 || drained === 0) return { state: "waits", seconds: null };
@@ -160,10 +184,15 @@ export function correction_between(store: Store, t: number, was: Poses, after: P
     const at = p * POSE_ROW;
     const [part, old] = [after.rows[at], was.rows[at]];
     if (keeper.get(part) !== old || heir.get(old) !== part) continue;
-    const [now, then] = [after.rows.subarray(at + 1, at + 8), was.rows.subarray(at + 1, at + 8)].map((row) => Array.from(row));
+    const [now, then] = [after.rows.subarray(at + 1, at + 8), was.rows.subarray(at + 1, at + 8)].map((row) =>
+      Array.from(row),
+    );
     if (!shift.has(part)) shift.set(part, compose(now, inverse(then)));
     before.rows.set(compose(shift.get(part)!, then), at + 1);
-    moved_m[p] = distance(before.rows.subarray(at + 1, at + 4) as unknown as number[], after.rows.subarray(at + 1, at + 4) as unknown as number[]);
+    moved_m[p] = distance(
+      before.rows.subarray(at + 1, at + 4) as unknown as number[],
+      after.rows.subarray(at + 1, at + 4) as unknown as number[],
+    );
     if (moved_m[p] > largest_m) [largest_m, largest] = [moved_m[p], store.id_at(p)];
   }
   const joined = [...sizes.values()].reduce((sum, parts) => sum + parts.size - 1, 0);
@@ -176,8 +205,6 @@ export function time_range(store: Store, now: number): { first: number; last: nu
   const last = Math.max(now, store.newest, mission && mission.mode !== "live" ? (mission.duration_s ?? 0) : 0);
   return { first: mission && mission.mode !== "live" ? 0 : Math.min(store.oldest, last), last };
 }
-
-
 
 /** The worst disagreement of every submap with its robot's odometry, over all scales. */
 export function worst_disagreement(store: Store, t: number): Map<SubmapId, number> {

@@ -5,7 +5,9 @@ const known = (x: Figure): x is number => typeof x === "number" && Number.isFini
 
 export function metres(x: Figure): string {
   if (!known(x)) return "-";
-  return Math.abs(x) >= 1000 ? `${(x / 1000).toFixed(2)}\u00a0km` : `${x.toFixed(Math.abs(x) >= 100 ? 0 : Math.abs(x) >= 10 ? 1 : Math.abs(x) >= 1 ? 2 : 3)}\u00a0m`;
+  return Math.abs(x) >= 1000
+    ? `${(x / 1000).toFixed(2)}\u00a0km`
+    : `${x.toFixed(Math.abs(x) >= 100 ? 0 : Math.abs(x) >= 10 ? 1 : Math.abs(x) >= 1 ? 2 : 3)}\u00a0m`;
 }
 
 export function bytes(x: Figure): string {
@@ -33,7 +35,13 @@ export function moment(s: Figure): string {
 }
 
 export const milliseconds = (ms: Figure): string =>
-  !known(ms) ? "-" : ms < 1 ? `${(1000 * ms).toFixed(0)}\u00a0µs` : ms < 1000 ? `${ms.toFixed(ms < 10 ? 2 : ms < 100 ? 1 : 0)}\u00a0ms` : span(ms / 1000);
+  !known(ms)
+    ? "-"
+    : ms < 1
+      ? `${(1000 * ms).toFixed(0)}\u00a0µs`
+      : ms < 1000
+        ? `${ms.toFixed(ms < 10 ? 2 : ms < 100 ? 1 : 0)}\u00a0ms`
+        : span(ms / 1000);
 
 export const share = (x: Figure, digits = 1): string => (known(x) ? `${(100 * x).toFixed(digits)}\u00a0%` : "-");
 export const degrees = (x: Figure): string => (known(x) ? `${x.toFixed(2)}°` : "-");
@@ -41,13 +49,15 @@ export const degrees = (x: Figure): string => (known(x) ? `${x.toFixed(2)}°` : 
 /** A measured value with its unit; three figures that count. */
 export function figure(x: Figure, unit = ""): string {
   if (!known(x)) return "-";
-  const digits = x === 0 || Math.abs(x) >= 100 || Number.isInteger(x) ? 0 : Math.abs(x) >= 10 ? 1 : Math.abs(x) >= 1 ? 2 : 3;
+  const digits =
+    x === 0 || Math.abs(x) >= 100 || Number.isInteger(x) ? 0 : Math.abs(x) >= 10 ? 1 : Math.abs(x) >= 1 ? 2 : 3;
   return `${x.toFixed(digits)}${unit ? `\u00a0${unit}` : ""}`;
 }
 
 export const many = (n: number, one: string, several = `${one}s`): string => `${n} ${n === 1 ? one : several}`;
 
 /** When, by the watch on the wall; from ns since 1970. */
-export const wall = (ns: number | null): string => (ns ? new Date(ns / 1e6).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" }) : "");
+export const wall = (ns: number | null): string =>
+  ns ? new Date(ns / 1e6).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" }) : "";
 
 const two = (n: number): string => String(n).padStart(2, "0");

@@ -10,8 +10,16 @@ import type { Store } from "./store";
 /** The value as a program sends it, so that the same page reads it again. Most are kept as they came. */
 const ENCODERS: { [K in Kind]?: (value: never, store: Store) => unknown } = {
   mission: (m: Mission) => ({ ...m, mode: "report" }),
-  poses: (p: Poses, store: Store) => ({ ...p, rows: undefined, submaps: Object.fromEntries(rows_of_submaps(p, store)) }),
-  status: (s: Status) => ({ ...s, robots: s.robots.map((r) => ({ ...r, T_odom_body: r.position && { translation_m: r.position } })), refusals: s.refused.map((r) => ({ ...r, last_why: r.why })) }),
+  poses: (p: Poses, store: Store) => ({
+    ...p,
+    rows: undefined,
+    submaps: Object.fromEntries(rows_of_submaps(p, store)),
+  }),
+  status: (s: Status) => ({
+    ...s,
+    robots: s.robots.map((r) => ({ ...r, T_odom_body: r.position && { translation_m: r.position } })),
+    refusals: s.refused.map((r) => ({ ...r, last_why: r.why })),
+  }),
   disagreement: (d: Disagreement) => ({ ...d, nodes: d.nodes.map((n) => ({ ...n, d: n.d_m })) }),
 };
 
@@ -45,10 +53,16 @@ async function with_photo(mark: Mark): Promise<Mark> {
   const answer = await fetch(mark.photo);
   if (!answer.ok) return { ...mark, photo: null };
   const photo = await answer.blob();
-  return { ...mark, photo: await new Promise<string>((resolve, reject) => {
-    const reader = Object.assign(new FileReader(), { onload: () => resolve(String(reader.result)), onerror: () => reject(reader.error!) });
-    reader.readAsDataURL(photo);
-  }) };
+  return {
+    ...mark,
+    photo: await new Promise<string>((resolve, reject) => {
+      const reader = Object.assign(new FileReader(), {
+        onload: () => resolve(String(reader.result)),
+        onerror: () => reject(reader.error!),
+      });
+      reader.readAsDataURL(photo);
+    }),
+  };
 }
 
 /** Made of parts: the page itself has this text exactly once. */

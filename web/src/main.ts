@@ -19,7 +19,19 @@ const theme = new ThemeChoice(app);
 
 const view = new View(app, new URLSearchParams(location.search).get("draw"));
 const middle = h("main", { class: "middle" }, view.element, tool_bar(app, view), legend(app, view));
-document.body.append(h("div", { class: `room ${app.live ? "live" : "report"}` }, top_bar(app, theme), app.live ? h("aside", { class: "people" }, robots_panel(app, view)) : null, middle, splitter(app), side_panel(app, view), new Timeline(app).element), h("div", { id: "notices", "aria-live": "polite" }));
+document.body.append(
+  h(
+    "div",
+    { class: `room ${app.live ? "live" : "report"}` },
+    top_bar(app, theme),
+    app.live ? h("aside", { class: "people" }, robots_panel(app, view)) : null,
+    middle,
+    splitter(app),
+    side_panel(app, view),
+    new Timeline(app).element,
+  ),
+  h("div", { id: "notices", "aria-live": "polite" }),
+);
 app.on(() => {
   const open = app.live ? open_alerts(app).length : 0;
   document.title = `${open ? `(${open}) ` : ""}${app.store.get("mission")?.name ?? ""} – Tutti`;

@@ -45,7 +45,19 @@ export interface Options {
 export function default_options(): Options {
   return {
     colour: "robot",
-    layers: { clouds: true, tracks: true, accepted: true, candidate: false, rejected: false, robots: true, reach: true, ghost: true, marks: true, survey: false, estimates: false },
+    layers: {
+      clouds: true,
+      tracks: true,
+      accepted: true,
+      candidate: false,
+      rejected: false,
+      robots: true,
+      reach: true,
+      ghost: true,
+      marks: true,
+      survey: false,
+      estimates: false,
+    },
     low_m: null,
     high_m: null,
     section: false,
@@ -58,11 +70,38 @@ export function default_options(): Options {
 
 /** The phases of a mission: what is loud in each. */
 export const PHASES = {
-  deploy: { name: "Deploy", help: "Is everybody here, and joined?", tab: "alerts", colour: "robot", layers: { candidate: false, rejected: false } },
-  explore: { name: "Explore", help: "Where is everybody, and what is mapped?", tab: "alerts", colour: "robot", layers: { candidate: false, rejected: false } },
-  recover: { name: "Recover", help: "Who is silent, and where may he be?", tab: "alerts", colour: "age", layers: { reach: true, rejected: false } },
-  debrief: { name: "Debrief", help: "How good is the map, and why?", tab: "closures", colour: "sigma", layers: { rejected: true, candidate: true } },
-} as const satisfies Record<string, { name: string; help: string; tab: string; colour: ColourMode; layers: Partial<Record<Layer, boolean>> }>;
+  deploy: {
+    name: "Deploy",
+    help: "Is everybody here, and joined?",
+    tab: "alerts",
+    colour: "robot",
+    layers: { candidate: false, rejected: false },
+  },
+  explore: {
+    name: "Explore",
+    help: "Where is everybody, and what is mapped?",
+    tab: "alerts",
+    colour: "robot",
+    layers: { candidate: false, rejected: false },
+  },
+  recover: {
+    name: "Recover",
+    help: "Who is silent, and where may he be?",
+    tab: "alerts",
+    colour: "age",
+    layers: { reach: true, rejected: false },
+  },
+  debrief: {
+    name: "Debrief",
+    help: "How good is the map, and why?",
+    tab: "closures",
+    colour: "sigma",
+    layers: { rejected: true, candidate: true },
+  },
+} as const satisfies Record<
+  string,
+  { name: string; help: string; tab: string; colour: ColourMode; layers: Partial<Record<Layer, boolean>> }
+>;
 export type Phase = keyof typeof PHASES;
 
 /** What this browser remembers; a page opened as a file may not be allowed to. */

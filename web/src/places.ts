@@ -17,7 +17,11 @@ const kGap_m = 10;
 const kAround_m = 6;
 
 /** The largest part stays where its frame has it; the others follow to its right, by number, in rows not wider than three of it. */
-export function place_parts(poses: Poses, submaps: Iterable<[string, Submap]>, place_of: (id: string) => number): Map<number, Part> {
+export function place_parts(
+  poses: Poses,
+  submaps: Iterable<[string, Submap]>,
+  place_of: (id: string) => number,
+): Map<number, Part> {
   const parts = measure(poses, submaps, place_of);
   const order = [...parts.values()].sort((a, b) => b.submaps - a.submaps || a.component - b.component);
   const first = order.shift();
@@ -41,14 +45,28 @@ export function place_parts(poses: Poses, submaps: Iterable<[string, Submap]>, p
   return parts;
 }
 
-function measure(poses: Poses, submaps: Iterable<[string, Submap]>, place_of: (id: string) => number): Map<number, Part> {
+function measure(
+  poses: Poses,
+  submaps: Iterable<[string, Submap]>,
+  place_of: (id: string) => number,
+): Map<number, Part> {
   const parts = new Map<number, Part>();
   for (const [id, submap] of submaps) {
     const at = place_of(id) * POSE_ROW;
     const component = at < 0 ? NaN : poses.rows[at];
     if (!Number.isFinite(component)) continue;
     let part = parts.get(component);
-    if (!part) parts.set(component, (part = { component, offset: [0, 0, 0], low: [Infinity, Infinity, Infinity], high: [-Infinity, -Infinity, -Infinity], submaps: 0 }));
+    if (!part)
+      parts.set(
+        component,
+        (part = {
+          component,
+          offset: [0, 0, 0],
+          low: [Infinity, Infinity, Infinity],
+          high: [-Infinity, -Infinity, -Infinity],
+          submaps: 0,
+        }),
+      );
     ++part.submaps;
     const T = poses.rows.subarray(at + 1, at + 8) as unknown as number[];
     for (const point of submap.path) {

@@ -101,7 +101,8 @@ export class Raster {
         if (behind <= 0) continue;
         const keep = (256 / (1 + (strength * 12 * behind) / d)) | 0;
         const c = pixels[i];
-        pixels[i] = 0xff000000 | ((((c & 0xff00ff) * keep) >>> 8) & 0xff00ff) | ((((c & 0xff00) * keep) >>> 8) & 0xff00);
+        pixels[i] =
+          0xff000000 | ((((c & 0xff00ff) * keep) >>> 8) & 0xff00ff) | ((((c & 0xff00) * keep) >>> 8) & 0xff00);
       }
   }
 

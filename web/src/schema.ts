@@ -161,7 +161,14 @@ export interface Disagreement {
   /** By scale: the difference, and over what chance explains (above 1 it is none). `submap` only in a running mission. */
   nodes: { submap: SubmapId | null; t: number; distance_m: number; d_m: number[]; significance: number[] }[];
   /** Where odometry left the map. */
-  origins: { from_s: number; until_s: number; translation_m: number; rotation_rad: number; significance: number; alert: boolean }[];
+  origins: {
+    from_s: number;
+    until_s: number;
+    translation_m: number;
+    rotation_rad: number;
+    significance: number;
+    alert: boolean;
+  }[];
 }
 
 export interface Trajectory {

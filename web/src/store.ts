@@ -93,7 +93,10 @@ export class Store {
   everything(): { key: string; kind: Kind; t: number; value: unknown }[] {
     const out: { key: string; kind: Kind; t: number; value: unknown }[] = [];
     for (const [kind, named] of this.tracks)
-      for (const [name, track] of named) track.times.forEach((t, i) => out.push({ key: name === "" ? kind : `${kind}/${name}`, kind, t, value: track.values[i] }));
+      for (const [name, track] of named)
+        track.times.forEach((t, i) =>
+          out.push({ key: name === "" ? kind : `${kind}/${name}`, kind, t, value: track.values[i] }),
+        );
     return out.sort((a, b) => a.t - b.t);
   }
 

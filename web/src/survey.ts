@@ -18,7 +18,11 @@ export class SurveyDistance {
     this.next = new Int32Array(survey.n).fill(-1);
     const { xyz, step_m: s } = survey;
     for (let i = 0; i < survey.n; ++i) {
-      const cell = cell_of(Math.floor((s * xyz[3 * i]) / kCell_m), Math.floor((s * xyz[3 * i + 1]) / kCell_m), Math.floor((s * xyz[3 * i + 2]) / kCell_m));
+      const cell = cell_of(
+        Math.floor((s * xyz[3 * i]) / kCell_m),
+        Math.floor((s * xyz[3 * i + 1]) / kCell_m),
+        Math.floor((s * xyz[3 * i + 2]) / kCell_m),
+      );
       this.next[i] = this.first.get(cell) ?? -1;
       this.first.set(cell, i);
     }
@@ -33,7 +37,11 @@ export class SurveyDistance {
     const s = cloud.step_m;
     for (let i = 0; i < cloud.n; ++i) {
       const [x, y, z] = [s * cloud.xyz[3 * i], s * cloud.xyz[3 * i + 1], s * cloud.xyz[3 * i + 2]];
-      const d = this.nearest(m[0] * x + m[1] * y + m[2] * z + m[3], m[4] * x + m[5] * y + m[6] * z + m[7], m[8] * x + m[9] * y + m[10] * z + m[11]);
+      const d = this.nearest(
+        m[0] * x + m[1] * y + m[2] * z + m[3],
+        m[4] * x + m[5] * y + m[6] * z + m[7],
+        m[8] * x + m[9] * y + m[10] * z + m[11],
+      );
       shades[i] = Math.min(255, Math.round((255 * d) / SurveyDistance.most_m));
     }
     this.known.set(id, { T, shades });
@@ -57,4 +65,5 @@ export class SurveyDistance {
 }
 
 /** One number per cell; 17 bits an axis. */
-const cell_of = (a: number, b: number, c: number): number => ((a + 65536) * 131072 + (b + 65536)) * 131072 + (c + 65536);
+const cell_of = (a: number, b: number, c: number): number =>
+  ((a + 65536) * 131072 + (b + 65536)) * 131072 + (c + 65536);

@@ -23,7 +23,8 @@ async function served(mission, run, options) {
   const server = await new FakeServer(mission, options).start();
   const page = await browser.open(`http://127.0.0.1:${server.port}/`);
   try {
-    if (server.me.role !== null || !server.me.login) await page.until("all submaps are placed", (n) => tutti.app.world.placed.size >= n, mission.submaps.length);
+    if (server.me.role !== null || !server.me.login)
+      await page.until("all submaps are placed", (n) => tutti.app.world.placed.size >= n, mission.submaps.length);
     await run(page, server, mission);
     assert.deepEqual(page.errors, [], "errors on the page");
   } finally {
@@ -38,7 +39,7 @@ test("three robots live: all in one frame, parts apart, clouds come", () =>
     assert.deepEqual(await page.texts(".robot b"), ["alpha", "bravo", "charlie"]);
     assert.match((await page.texts(".badge"))[0], /Live/);
     assert.match((await page.texts(".facts"))[0], /3 robots · 72 submaps · \d+ closures · 2 parts/);
-    assert.ok(await page.pixels() > 3000, "the picture is not empty");
+    assert.ok((await page.pixels()) > 3000, "the picture is not empty");
   }));
 
 test("all of the map is in sight until somebody looks elsewhere, and a map that goes to another frame stays in sight", () =>
@@ -48,7 +49,13 @@ test("all of the map is in sight until somebody looks elsewhere, and a map that 
     const moves_to = async (origin) => {
       mission.origin = origin;
       server.send(mission.correct(0.1));
-      await page.until("all has glided there", (revision) => tutti.app.world.poses.revision === revision && [...tutti.app.world.placed.values()].every((p) => p.T === p.target), mission.revision);
+      await page.until(
+        "all has glided there",
+        (revision) =>
+          tutti.app.world.poses.revision === revision &&
+          [...tutti.app.world.placed.values()].every((p) => p.T === p.target),
+        mission.revision,
+      );
       await page.pause(300); // a picture later
     };
     await moves_to([300, -200, 40]); // as when it is joined to another map
@@ -57,7 +64,11 @@ test("all of the map is in sight until somebody looks elsewhere, and a map that 
     await page.evaluate(() => tutti.view.eye.look_at([300, -200, 40], 15));
     const looked_at = await where();
     await moves_to([301, -200, 40]);
-    assert.deepEqual(await where(), looked_at, "what somebody chose to look at stays while something is to be seen there");
+    assert.deepEqual(
+      await where(),
+      looked_at,
+      "what somebody chose to look at stays while something is to be seen there",
+    );
     await moves_to([-150, 0, 0]);
     await page.until("the map is found again", (n) => tutti.view.last.points >= n, count);
     await page.evaluate(() => tutti.view.eye.look_at([1000, 0, 0], 15)); // at nothing, of one's own will
@@ -71,7 +82,10 @@ test("a robot goes silent: grey, a circle, an alert; comes back and drains", () 
     server.tick(30);
     await page.until("bravo is silent", () => document.querySelectorAll(".robot.silent").length === 1);
     assert.match((await page.texts(".robot.silent .detail"))[0], /May be within [23]\d\.\d\sm/);
-    assert.ok((await page.texts(".alert")).some((text) => /^silent.*bravo/.test(text)), (await page.texts(".alert")).join());
+    assert.ok(
+      (await page.texts(".alert")).some((text) => /^silent.*bravo/.test(text)),
+      (await page.texts(".alert")).join(),
+    );
     assert.deepEqual(await page.texts(".robot b"), ["bravo", "alpha", "charlie"], "who is missed stands first");
     const ring = await page.evaluate(() => tutti.app.robots[1].reach_m);
     assert.ok(ring > 25 && ring < 40, `${ring} m`);
@@ -84,15 +98,22 @@ test("a robot goes silent: grey, a circle, an alert; comes back and drains", () 
     mission.backlog[1] = 28;
     server.tick(60);
     await page.until("bravo is back", () => document.querySelectorAll(".robot.silent").length === 0);
-    await page.until("its backlog drains", () => [...document.querySelectorAll(".robot .detail")].some((d) => /Backlog 28 submaps.*sent in/.test(d.textContent)));
+    await page.until("its backlog drains", () =>
+      [...document.querySelectorAll(".robot .detail")].some((d) => /Backlog 28 submaps.*sent in/.test(d.textContent)),
+    );
   }));
 
 test("an alert is acknowledged once, and stays so over a reload", () =>
   served(small(), async (page) => {
     await page.press("Acknowledge");
-    await page.until("the inbox is empty", () => /Everything is acknowledged/.test(document.querySelector(".alerts").textContent));
+    await page.until("the inbox is empty", () =>
+      /Everything is acknowledged/.test(document.querySelector(".alerts").textContent),
+    );
     await page.reload();
-    await page.until("loaded", () => tutti.app.ready && document.querySelector(".alerts")?.textContent.includes("acknowledged"));
+    await page.until(
+      "loaded",
+      () => tutti.app.ready && document.querySelector(".alerts")?.textContent.includes("acknowledged"),
+    );
     assert.match((await page.texts(".alert.seen"))[0], /^its part of the map is joined to no other.*charlie/);
   }));
 
@@ -116,11 +137,18 @@ test("of a hundred robots one cause is one line, who is missed stands first, and
     await page.press("Fold");
     await page.until("one line", () => document.querySelectorAll(".alert").length === 2);
     await page.press("Acknowledge 4");
-    await page.until("they are acknowledged", () => /^4 robots: silent/.test(document.querySelector(".alert.seen")?.textContent));
+    await page.until("they are acknowledged", () =>
+      /^4 robots: silent/.test(document.querySelector(".alert.seen")?.textContent),
+    );
     await page.fill('[aria-label="Search robots"]', "r42");
     await page.until("one is found", () => document.querySelectorAll(".robot").length === 1);
     await page.fill('[aria-label="Search robots"]', "trouble");
-    await page.until("the troubled one is found", () => document.querySelector(".robot b").textContent === "r05" && /no scans for 20 s/.test(document.querySelector(".robot").textContent));
+    await page.until(
+      "the troubled one is found",
+      () =>
+        document.querySelector(".robot b").textContent === "r05" &&
+        /no scans for 20 s/.test(document.querySelector(".robot").textContent),
+    );
   });
 });
 
@@ -129,16 +157,26 @@ test("a closure is inspected, rejected by name, taken back", () =>
     await page.press("Closures");
     await page.press(/^In the map/);
     await page.click(".closure");
-    await page.until("both clouds are laid over each other", () => document.querySelector(".inspector .pair canvas") !== null);
+    await page.until(
+      "both clouds are laid over each other",
+      () => document.querySelector(".inspector .pair canvas") !== null,
+    );
     assert.match((await page.texts(".inspector .gates")).join(), /overlap0\.610 at least 0\.300/);
     await page.press("Reject");
     await page.fill("dialog input", "eva");
     await page.press("Use it");
     await page.until("it is refused", () => /refused/.test(document.querySelector(".inspector .state").textContent));
-    assert.deepEqual([server.asked[0].path, server.asked[0].body.wish, server.asked[0].body.by], ["/api/decide", "reject", "eva"]);
-    await page.until("the word is shown", () => /eva said reject/.test(document.querySelector(".inspector").textContent));
+    assert.deepEqual(
+      [server.asked[0].path, server.asked[0].body.wish, server.asked[0].body.by],
+      ["/api/decide", "reject", "eva"],
+    );
+    await page.until("the word is shown", () =>
+      /eva said reject/.test(document.querySelector(".inspector").textContent),
+    );
     await page.press(/^Take back/);
-    await page.until("it is in the map again", () => /in the map/.test(document.querySelector(".inspector .state").textContent));
+    await page.until("it is in the map again", () =>
+      /in the map/.test(document.querySelector(".inspector .state").textContent),
+    );
     assert.equal(server.asked[1].body.wish, "withdraw");
   }));
 
@@ -147,19 +185,27 @@ test("a closure by hand joins two parts, the map follows, and it is undone", () 
     await page.evaluate(() => localStorage.setItem("tutti.by", JSON.stringify("eva")));
     await page.reload();
     await page.until("loaded", () => tutti.app.world.placed.size === 72 && tutti.app.may("register"));
-    const pair = server.mission.closures.values().find?.((c) => c.from[0] === "0" && c.to[0] === "2") ?? [...server.mission.closures.values()].find((c) => c.from[0] === "0" && c.to[0] === "2");
+    const pair =
+      server.mission.closures.values().find?.((c) => c.from[0] === "0" && c.to[0] === "2") ??
+      [...server.mission.closures.values()].find((c) => c.from[0] === "0" && c.to[0] === "2");
     const [from, to] = [pair.from, pair.to].map((id) => server.mission.submaps.find((s) => s.id === id).name);
     await page.press("By hand");
     await page.fill('[aria-label="First submap"]', from);
     await page.fill('[aria-label="Second submap"]', to);
     await page.press("Register");
     await page.until("they fit", () => /They fit/.test(document.querySelector(".by-hand").textContent));
-    await page.until("what it would change", () => /would join 2 parts of the map.*would move by up to \d\.\d+\sm \((alpha|bravo)\/\d+\); .*Dashed/.test(document.querySelector(".by-hand").textContent));
+    await page.until("what it would change", () =>
+      /would join 2 parts of the map.*would move by up to \d\.\d+\sm \((alpha|bravo)\/\d+\); .*Dashed/.test(
+        document.querySelector(".by-hand").textContent,
+      ),
+    );
     assert.equal(await page.evaluate(() => tutti.app.preview.joined), 1);
     await page.press("Keep it in the map");
     await page.until("one part", () => tutti.app.world.parts.size === 1);
     assert.equal(server.asked.at(-1).body.by, "eva");
-    await page.until("everything glided to its place", () => [...tutti.app.world.placed.values()].every((p) => p.T === p.target));
+    await page.until("everything glided to its place", () =>
+      [...tutti.app.world.placed.values()].every((p) => p.T === p.target),
+    );
     await page.press("Undo");
     await page.until("two parts again", () => tutti.app.world.parts.size === 2);
   }));
@@ -201,7 +247,10 @@ test("a mark's photo is made small, shown, and is in the file that is saved", ()
     writeFileSync(file, await page.page.screenshot());
     await page.press("Marks");
     await page.press("New mark");
-    await page.click_in(".middle .view", await page.evaluate(() => tutti.view.eye.project(tutti.app.world.placed.get("0:1/5").target).slice(0, 2)));
+    await page.click_in(
+      ".middle .view",
+      await page.evaluate(() => tutti.view.eye.project(tutti.app.world.placed.get("0:1/5").target).slice(0, 2)),
+    );
     await page.until("the form", () => document.querySelector('.marks [aria-label="Photo"]') !== null);
     await (await page.page.$('.marks [aria-label="Photo"]')).uploadFile(file);
     await page.until("its picture", () => document.querySelector(".marks img") !== null);
@@ -224,10 +273,14 @@ test("two people see what the other looks at, and hinder nobody", () =>
     server.held.set("boris", `closure/${name}`);
     server.held.set("carla", "robot/1");
     server.send(server.holders());
-    await page.until("carla is at bravo", () => /carla looks at this/.test(document.querySelectorAll(".robot")[1].textContent));
+    await page.until("carla is at bravo", () =>
+      /carla looks at this/.test(document.querySelectorAll(".robot")[1].textContent),
+    );
     await page.press("Closures");
     await page.click(".closure");
-    await page.until("boris is at the closure", () => /boris looks at this/.test(document.querySelector(".inspector").textContent));
+    await page.until("boris is at the closure", () =>
+      /boris looks at this/.test(document.querySelector(".inspector").textContent),
+    );
     await page.until("eva says where she is", () => tutti.app.store.get("held").some((held) => held.by === "eva"));
     assert.equal(server.held.get("eva"), `closure/${name}`);
     assert.doesNotMatch((await page.texts(".inspector")).join(), /eva/, "who sees himself learns nothing");
@@ -239,12 +292,18 @@ test("two people see what the other looks at, and hinder nobody", () =>
 test("what a robot sends and is sent is shown by kind", () =>
   served(small(), async (page, server, mission) => {
     for (const bytes of [1000, 61_000]) {
-      server.send(mission.message("radio", { 0: { up: { submap: bytes, status: 300 }, down: { "proxy graph": 2500 } } }));
+      server.send(
+        mission.message("radio", { 0: { up: { submap: bytes, status: 300 }, down: { "proxy graph": 2500 } } }),
+      );
       mission.time += 60;
       server.tick(0);
     }
     await page.click(".robot .who");
-    await page.until("up and down", () => /Sent 61\.3\skB · 1\.00\skB\/s: submap 61\.0\skB, status 300\sB.*Was sent 2\.50\skB · 0\sB\/s: proxy graph 2\.50\skB/.test(document.querySelector(".robot").textContent));
+    await page.until("up and down", () =>
+      /Sent 61\.3\skB · 1\.00\skB\/s: submap 61\.0\skB, status 300\sB.*Was sent 2\.50\skB · 0\sB\/s: proxy graph 2\.50\skB/.test(
+        document.querySelector(".robot").textContent,
+      ),
+    );
   }));
 
 test("why two robots are not joined: candidates with gate and limit, and on to joining by hand", () =>
@@ -253,7 +312,10 @@ test("why two robots are not joined: candidates with gate and limit, and on to j
     await page.until("an answer", () => document.querySelectorAll(".why .alert").length === 3);
     assert.match((await page.texts(".why .alert p"))[0], /overlap: 0\.270, limit 0\.300/);
     await page.press("Join by hand");
-    await page.until("the pair is filled in", () => document.querySelector('[aria-label="Second submap"]')?.value === "charlie/11");
+    await page.until(
+      "the pair is filled in",
+      () => document.querySelector('[aria-label="Second submap"]')?.value === "charlie/11",
+    );
   }));
 
 test("the server is killed, and back within three seconds", () =>
@@ -286,10 +348,13 @@ test("a connection is cut: only what is new is sent again, and what ended meanwh
   }));
 
 test("a late joiner sees all of a long mission at once", () =>
-  served(new FakeMission({ robots: ["a", "b", "c", "d", "e", "f"], submaps: 60, points: 1500, apart: [] }), async (page) => {
-    await page.until("all clouds", () => tutti.app.clouds.points === 360 * 1500);
-    assert.equal(await page.evaluate(() => tutti.app.store.unread.count), 0);
-  }));
+  served(
+    new FakeMission({ robots: ["a", "b", "c", "d", "e", "f"], submaps: 60, points: 1500, apart: [] }),
+    async (page) => {
+      await page.until("all clouds", () => tutti.app.clouds.points === 360 * 1500);
+      assert.equal(await page.evaluate(() => tutti.app.store.unread.count), 0);
+    },
+  ));
 
 test("time is scrubbed: what was known then, and nothing can be decided there", () =>
   served(small(), async (page) => {
@@ -297,47 +362,84 @@ test("time is scrubbed: what was known then, and nothing can be decided there", 
     await page.until("ten submaps each", () => tutti.app.world.placed.size === 30);
     await page.until("the page says so", () => /Past: 0:01:40/.test(document.querySelector(".badge").textContent));
     await page.until("no decision is offered", () =>
-      [...document.querySelectorAll(".tabs button")].every((b) => b.textContent !== "By hand"));
+      [...document.querySelectorAll(".tabs button")].every((b) => b.textContent !== "By hand"),
+    );
     await page.press("Live");
     await page.until("all again", () => tutti.app.world.placed.size === 72);
   }));
 
 test("a viewer is offered no decisions, and what the program does not offer is not shown", () =>
-  served(small(), async (page) => {
-    await page.until("me", () => tutti.app.me.role === "viewer");
-    const tabs = await page.texts(".tabs button");
-    assert.deepEqual(tabs.filter((t) => /hand|Why|Marks/.test(t)), ["Why not?"]);
-    await page.press("Closures");
-    await page.click(".closure");
-    await page.until("inspected", () => document.querySelector(".inspector h2") !== null);
-    assert.deepEqual(await page.texts(".decide button"), []);
-  }, { me: { login: true, role: "viewer", name: "vera", may_decide: false, offers: ["decide", "register", "closure", "mark", "why"] } }));
+  served(
+    small(),
+    async (page) => {
+      await page.until("me", () => tutti.app.me.role === "viewer");
+      const tabs = await page.texts(".tabs button");
+      assert.deepEqual(
+        tabs.filter((t) => /hand|Why|Marks/.test(t)),
+        ["Why not?"],
+      );
+      await page.press("Closures");
+      await page.click(".closure");
+      await page.until("inspected", () => document.querySelector(".inspector h2") !== null);
+      assert.deepEqual(await page.texts(".decide button"), []);
+    },
+    {
+      me: {
+        login: true,
+        role: "viewer",
+        name: "vera",
+        may_decide: false,
+        offers: ["decide", "register", "closure", "mark", "why"],
+      },
+    },
+  ));
 
 test("who has a credential logs in with it, and its seed stays in the page", () =>
-  served(small(), async (page, server, mission) => {
-    await page.until("a login is asked for", () => document.querySelector('[aria-label="Credential file"]') !== null);
-    assert.deepEqual((await page.texts(".tabs button")).filter((t) => /By hand|Why|Marks/.test(t)), []);
-    assert.deepEqual(await page.texts(".badge"), ["Not logged in"]);
-    assert.match((await page.texts(".legend-box"))[0], /Log in/);
-    assert.equal(await page.evaluate(() => tutti.app.world.placed.size), 0);
-    const { text, seed_text, open } = credential();
-    const file = join(work, "eva.credential");
-    writeFileSync(file, text);
-    await (await page.page.$('[aria-label="Credential file"]')).uploadFile(file);
-    await page.until("eva is there", () => document.querySelector(".person b")?.textContent === "eva");
-    await page.until("she may decide", () => [...document.querySelectorAll(".tabs button")].some((b) => b.textContent === "By hand"));
-    await page.until("all submaps are placed", (n) => tutti.app.world.placed.size >= n, mission.submaps.length);
-    const [login] = server.asked;
-    assert.deepEqual([login.path, login.body.nonce, login.body.key], ["/api/login", "nonce 7", "UEVA"]);
-    assert.ok(verify(null, Buffer.from("nonce 7"), open, Buffer.from(login.body.signature, "base64")), "the signature is hers");
-    assert.equal(JSON.stringify(server.asked).includes(seed_text.slice(4, 40)), false);
-    server.lock();
-    await page.until("a session that is over asks for another", () => document.querySelector('[aria-label="Credential file"]') !== null);
-    await (await page.page.$('[aria-label="Credential file"]')).uploadFile(file);
-    await page.until("she is there again", () => /Live/.test(document.querySelector(".badge").textContent) && tutti.app.me.name === "eva");
-    await page.press("Log out");
-    await page.until("a login is asked for after she has gone", () => document.querySelector('[aria-label="Credential file"]') !== null);
-  }, { me: { login: true, role: null, may_decide: false, nonce: "nonce 7" } }));
+  served(
+    small(),
+    async (page, server, mission) => {
+      await page.until("a login is asked for", () => document.querySelector('[aria-label="Credential file"]') !== null);
+      assert.deepEqual(
+        (await page.texts(".tabs button")).filter((t) => /By hand|Why|Marks/.test(t)),
+        [],
+      );
+      assert.deepEqual(await page.texts(".badge"), ["Not logged in"]);
+      assert.match((await page.texts(".legend-box"))[0], /Log in/);
+      assert.equal(await page.evaluate(() => tutti.app.world.placed.size), 0);
+      const { text, seed_text, open } = credential();
+      const file = join(work, "eva.credential");
+      writeFileSync(file, text);
+      await (await page.page.$('[aria-label="Credential file"]')).uploadFile(file);
+      await page.until("eva is there", () => document.querySelector(".person b")?.textContent === "eva");
+      await page.until("she may decide", () =>
+        [...document.querySelectorAll(".tabs button")].some((b) => b.textContent === "By hand"),
+      );
+      await page.until("all submaps are placed", (n) => tutti.app.world.placed.size >= n, mission.submaps.length);
+      const [login] = server.asked;
+      assert.deepEqual([login.path, login.body.nonce, login.body.key], ["/api/login", "nonce 7", "UEVA"]);
+      assert.ok(
+        verify(null, Buffer.from("nonce 7"), open, Buffer.from(login.body.signature, "base64")),
+        "the signature is hers",
+      );
+      assert.equal(JSON.stringify(server.asked).includes(seed_text.slice(4, 40)), false);
+      server.lock();
+      await page.until(
+        "a session that is over asks for another",
+        () => document.querySelector('[aria-label="Credential file"]') !== null,
+      );
+      await (await page.page.$('[aria-label="Credential file"]')).uploadFile(file);
+      await page.until(
+        "she is there again",
+        () => /Live/.test(document.querySelector(".badge").textContent) && tutti.app.me.name === "eva",
+      );
+      await page.press("Log out");
+      await page.until(
+        "a login is asked for after she has gone",
+        () => document.querySelector('[aria-label="Credential file"]') !== null,
+      );
+    },
+    { me: { login: true, role: null, may_decide: false, nonce: "nonce 7" } },
+  ));
 
 /** As `tutti pki` writes it, with a key made here. */
 function credential() {
@@ -350,7 +452,10 @@ function credential() {
     for (let i = 0; i < 8; ++i) crc = crc & 0x8000 ? ((crc << 1) ^ 0x1021) & 0xffff : (crc << 1) & 0xffff;
   }
   const bits = [...bytes, crc & 255, crc >> 8].map((b) => b.toString(2).padStart(8, "0")).join("");
-  const seed_text = bits.match(/.{1,5}/g).map((b) => "ABCDEFGHIJKLMNOPQRSTUVWXYZ234567"[parseInt(b.padEnd(5, "0"), 2)]).join("");
+  const seed_text = bits
+    .match(/.{1,5}/g)
+    .map((b) => "ABCDEFGHIJKLMNOPQRSTUVWXYZ234567"[parseInt(b.padEnd(5, "0"), 2)])
+    .join("");
   const text = `tutti-credential 1\nmission: adit north\nrole: operator\nname: eva\nnumber: 1\nnkey: UEVA\n-----BEGIN USER NKEY SEED-----\n${seed_text}\n-----END USER NKEY SEED-----\n`;
   return { text, seed_text, open: publicKey };
 }
@@ -358,8 +463,17 @@ function credential() {
 const kHostile = '<img src=x onerror="window.hacked=1"><script>window.hacked=1</script>';
 test("scripts in names, words, reasons and photos do nothing", async () => {
   const mission = small({ robots: [kHostile, "bravo", "charlie"], name: kHostile });
-  for (const c of mission.closures.values()) Object.assign(c, { reason: kHostile, verifier: kHostile, word: { wish: "reject", by: kHostile, wall_ns: 1 } });
-  mission.marks.set("m1", { id: "m1", submap: "0:1/2", at: [0, 0, 0], text: kHostile, by: kHostile, wall_ns: 1, photo: "data:text/html,<script>window.hacked=1</script>" });
+  for (const c of mission.closures.values())
+    Object.assign(c, { reason: kHostile, verifier: kHostile, word: { wish: "reject", by: kHostile, wall_ns: 1 } });
+  mission.marks.set("m1", {
+    id: "m1",
+    submap: "0:1/2",
+    at: [0, 0, 0],
+    text: kHostile,
+    by: kHostile,
+    wall_ns: 1,
+    photo: "data:text/html,<script>window.hacked=1</script>",
+  });
   mission.silent.set(0, mission.time - 20);
   await served(mission, async (page) => {
     for (const tab of ["Closures", "Marks", "Odometry", /^Alerts/]) {
@@ -385,8 +499,19 @@ test("the mission so far is saved as one file, which opens offline as it was", (
     const file = join(work, "saved.html");
     writeFileSync(file, text);
     const saved = await browser.open(`file://${file}`);
-    await saved.until("the map and its clouds", (n) => tutti.app.world.placed.size === 72 && tutti.view.last.points >= n, 72 * kPoints);
-    const state = () => [tutti.app.store.size(), tutti.app.store.unread.count, [...tutti.app.store.all("closure")].length, tutti.app.robots.map((r) => [r.name, r.speed_mps]), [...tutti.app.world.placed.values()].map((p) => p.target), tutti.app.correction.largest_m];
+    await saved.until(
+      "the map and its clouds",
+      (n) => tutti.app.world.placed.size === 72 && tutti.view.last.points >= n,
+      72 * kPoints,
+    );
+    const state = () => [
+      tutti.app.store.size(),
+      tutti.app.store.unread.count,
+      [...tutti.app.store.all("closure")].length,
+      tutti.app.robots.map((r) => [r.name, r.speed_mps]),
+      [...tutti.app.world.placed.values()].map((p) => p.target),
+      tutti.app.correction.largest_m,
+    ];
     assert.deepEqual(await saved.evaluate(state), await page.evaluate(state));
     assert.deepEqual(saved.errors, []);
     await saved.close();
@@ -401,14 +526,22 @@ test("a report opens as a file without a network, and its time can be scrubbed",
   await page.until("clouds", () => tutti.view.last.points > 100_000);
   assert.match((await page.texts(".report .cards.wide .value")).join(), /2\.32\sm → 0\.059\sm/);
   assert.match((await page.texts(".report")).join(), /A note with <b>markup<\/b>/);
-  assert.equal(await page.evaluate(() => getComputedStyle(document.querySelector(".report .cards.wide .swatch")).backgroundColor), "rgb(79, 179, 255)", "alpha's colour");
+  assert.equal(
+    await page.evaluate(() => getComputedStyle(document.querySelector(".report .cards.wide .swatch")).backgroundColor),
+    "rgb(79, 179, 255)",
+    "alpha's colour",
+  );
   await page.until("four pictures", () => document.querySelectorAll(".report figure canvas").length === 4);
   assert.ok((await page.texts(".report h2")).includes("Who drifted where and when"));
   await page.evaluate(() => tutti.app.set_time(120));
   await page.until("a third of the submaps", () => tutti.app.world.placed.size === 24);
   assert.equal((await page.texts("button")).filter((t) => /Accept|Reject|By hand/.test(t)).length, 0);
   assert.deepEqual(page.errors, []);
-  assert.deepEqual(page.requests.filter((url) => !/^(file|data|blob):/.test(url)), [], "nothing is fetched");
+  assert.deepEqual(
+    page.requests.filter((url) => !/^(file|data|blob):/.test(url)),
+    [],
+    "nothing is fetched",
+  );
   await page.close();
 });
 
@@ -416,11 +549,45 @@ test("a comparison has trajectories, figures and curves, and no submaps", async 
   const t = 60;
   const points = Array.from({ length: 60 }, (_, i) => [i, i, 0.1 * i, 0]);
   const scales = [{ length_m: 60, significance: 3.2, worst_s: 41, position_m: 0.23, rotation_rad: 0.02, since_s: 0 }];
-  const compare = { format: 2, a: "truth.tum", b: "odometry.tum", disagree: true, tolerance_m: 0.02, tolerance_deg: 0.23, notes: [], robots: [{ name: "", poses: 60, paired: 60, nodes: 30, way_m: 60, duration_s: 60, aligned: { rmse_m: 0.134, max_m: 0.3, rmse_deg: 1.4 }, scales, origins: [], constraints: [] }] };
+  const compare = {
+    format: 2,
+    a: "truth.tum",
+    b: "odometry.tum",
+    disagree: true,
+    tolerance_m: 0.02,
+    tolerance_deg: 0.23,
+    notes: [],
+    robots: [
+      {
+        name: "",
+        poses: 60,
+        paired: 60,
+        nodes: 30,
+        way_m: 60,
+        duration_s: 60,
+        aligned: { rmse_m: 0.134, max_m: 0.3, rmse_deg: 1.4 },
+        scales,
+        origins: [],
+        constraints: [],
+      },
+    ],
+  };
   const messages = [
-    { key: "mission", t: 0, value: { name: "odometry.tum against truth.tum", mode: "compare", version: "0.3.0", duration_s: 60 } },
-    ...["onboard", "reference"].map((kind) => ({ key: `trajectory/robot/${kind}`, t, value: { name: "robot", robot: 0, component: 0, points } })),
-    { key: "errors/robot", t, value: { robot: 0, against: "reference", names: ["onboard"], points: points.map(([s]) => [s, 0.01 * s]) } },
+    {
+      key: "mission",
+      t: 0,
+      value: { name: "odometry.tum against truth.tum", mode: "compare", version: "0.3.0", duration_s: 60 },
+    },
+    ...["onboard", "reference"].map((kind) => ({
+      key: `trajectory/robot/${kind}`,
+      t,
+      value: { name: "robot", robot: 0, component: 0, points },
+    })),
+    {
+      key: "errors/robot",
+      t,
+      value: { robot: 0, against: "reference", names: ["onboard"], points: points.map(([s]) => [s, 0.01 * s]) },
+    },
     { key: "compare", t, value: compare },
   ];
   const file = join(work, "compare.html");
@@ -439,12 +606,20 @@ test("WebGL draws the same picture as the CPU, in all colours, heights and secti
   const server = await new FakeServer(mission).start();
   const with_webgl = await Browser.launch(WEBGL);
   const size = { width: 1000, height: 600 }; // software draws every pixel of WebGL's
-  const pages = [await browser.open(`http://127.0.0.1:${server.port}/?draw=cpu`, size), await with_webgl.open(`http://127.0.0.1:${server.port}/?draw=gpu`, size)];
+  const pages = [
+    await browser.open(`http://127.0.0.1:${server.port}/?draw=cpu`, size),
+    await with_webgl.open(`http://127.0.0.1:${server.port}/?draw=gpu`, size),
+  ];
   const shares = [];
   for (const page of pages) {
     await page.until("clouds are drawn", (n) => tutti.view.last.points >= n, 24 * kPoints);
     const counts = [];
-    for (const options of [{ edges: false }, { low_m: 0.5 }, { low_m: null, section: true, section_at: [10, 0], section_rad: 1.5708, section_half_m: 4 }, { section: false, colour: "height" }]) {
+    for (const options of [
+      { edges: false },
+      { low_m: 0.5 },
+      { low_m: null, section: true, section_at: [10, 0], section_rad: 1.5708, section_half_m: 4 },
+      { section: false, colour: "height" },
+    ]) {
       await page.evaluate((o) => (tutti.app.set_options(o), tutti.view.eye.look_at([20, 0, 0], 60)), options);
       await page.pause(400);
       counts.push(await page.pixels());
@@ -453,7 +628,9 @@ test("WebGL draws the same picture as the CPU, in all colours, heights and secti
     assert.deepEqual(page.errors, []);
   }
   console.log(`    pixels that are not background: CPU ${shares[0]}, WebGL ${shares[1]}`);
-  shares[0].forEach((n, i) => assert.ok(n > 500 && Math.abs(shares[1][i] - n) < 0.15 * n, `picture ${i}: ${n} and ${shares[1][i]} pixels`));
+  shares[0].forEach((n, i) =>
+    assert.ok(n > 500 && Math.abs(shares[1][i] - n) < 0.15 * n, `picture ${i}: ${n} and ${shares[1][i]} pixels`),
+  );
   await with_webgl.close();
   await server.stop();
 });
@@ -465,7 +642,10 @@ test("a distance is measured between two places", () =>
     await page.evaluate(() => tutti.view.eye.top());
     await page.pause(300);
     for (const id of ["0:1/1", "0:1/4"]) {
-      await page.click_in(".middle .view", await page.evaluate((name) => tutti.view.eye.project(tutti.app.world.placed.get(name).target).slice(0, 2), id));
+      await page.click_in(
+        ".middle .view",
+        await page.evaluate((name) => tutti.view.eye.project(tutti.app.world.placed.get(name).target).slice(0, 2), id),
+      );
       await page.pause(200);
     }
     const measured = await page.evaluate(() => tutti.view.tool.spots.map((s) => s.world));
@@ -493,10 +673,15 @@ test("a hundred robots and a million points: the first picture, frames a second,
         await new Promise((resolve) => requestAnimationFrame(resolve));
         ++frames;
       }
-      return { last: tutti.view.last, frames: ((tutti.view.last.pictures - before) * 1000) / (performance.now() - start) };
+      return {
+        last: tutti.view.last,
+        frames: ((tutti.view.last.pictures - before) * 1000) / (performance.now() - start),
+      };
     });
     const heap = await page.heap_mb();
-    console.log(`    ${await page.evaluate(() => tutti.view.painter.name)}: first picture ${(first_ms / 1000).toFixed(1)} s, all points ${(all / 1000).toFixed(1)} s after the page was asked for; ${frames.toFixed(0)} frames/s moving (the last ${last.points} points in ${last.ms.toFixed(0)} ms); JS heap ${heap.toFixed(0)} MB`);
+    console.log(
+      `    ${await page.evaluate(() => tutti.view.painter.name)}: first picture ${(first_ms / 1000).toFixed(1)} s, all points ${(all / 1000).toFixed(1)} s after the page was asked for; ${frames.toFixed(0)} frames/s moving (the last ${last.points} points in ${last.ms.toFixed(0)} ms); JS heap ${heap.toFixed(0)} MB`,
+    );
     assert.ok(heap < 500, `${heap} MB`);
     assert.ok(frames > 0, "it moves"); // how fast, a machine that others use cannot show
   });
@@ -510,7 +695,7 @@ for (const { name, run } of tests) {
   try {
     await run().catch(async (error) => {
       // A busy machine draws late: what fails twice is wrong.
-      console.log(`     ${browser.lives ? error.stack ?? error : "Chromium itself ended"} in: ${name}; once more`);
+      console.log(`     ${browser.lives ? (error.stack ?? error) : "Chromium itself ended"} in: ${name}; once more`);
       if (!browser.lives) browser = await Browser.launch();
       await run();
     });

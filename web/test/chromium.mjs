@@ -5,7 +5,16 @@ import puppeteer from "puppeteer-core";
 const kNoGpu = ["--disable-gpu"];
 /** WebGL in software: slow, but the same pictures as a GPU makes. */
 export const WEBGL = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
-const kFlags = ["--no-sandbox", "--disable-dev-shm-usage", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync", "--js-flags=--expose-gc"];
+const kFlags = [
+  "--no-sandbox",
+  "--disable-dev-shm-usage",
+  "--disable-quic",
+  "--no-first-run",
+  "--disable-background-networking",
+  "--disable-component-update",
+  "--disable-sync",
+  "--js-flags=--expose-gc",
+];
 
 /** Panels are drawn within 200 ms after what they show has changed. */
 const kDrawn_ms = 250;
@@ -13,7 +22,11 @@ const kDrawn_ms = 250;
 export class Browser {
   static async launch(graphics = kNoGpu, more = {}) {
     const out = new Browser();
-    out.browser = await puppeteer.launch({ ...more, executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: [...kFlags, ...graphics] });
+    out.browser = await puppeteer.launch({
+      ...more,
+      executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
+      args: [...kFlags, ...graphics],
+    });
     return out;
   }
   async open(url, { width = 1280, height = 800, light = false } = {}) {
@@ -39,7 +52,13 @@ export class Page {
     Object.assign(this, { page, context, errors: [], requests: [] });
     page.on("pageerror", (error) => this.errors.push(error.stack ?? error.message));
     // A connection that was refused is what some tests are about; anything else on the console is a mistake.
-    page.on("console", (message) => message.type() === "error" && !/net::ERR|Failed to load resource/.test(message.text()) && this.errors.push(message.text()));
+    page.on(
+      "console",
+      (message) =>
+        message.type() === "error" &&
+        !/net::ERR|Failed to load resource/.test(message.text()) &&
+        this.errors.push(message.text()),
+    );
     page.on("request", (request) => this.requests.push(request.url()));
   }
   evaluate(run, ...args) {
@@ -49,9 +68,12 @@ export class Page {
   async until(what, condition, argument, timeout = 30_000) {
     const end = Date.now() + timeout;
     for (let why = ""; ; await this.pause(50)) {
-      if (await this.page.evaluate(condition, argument).catch((error) => void (why = error.message))) return this.pause(kDrawn_ms);
+      if (await this.page.evaluate(condition, argument).catch((error) => void (why = error.message)))
+        return this.pause(kDrawn_ms);
       if (Date.now() < end) continue;
-      throw new Error(`not seen within ${timeout} ms: ${what}. ${why} The page: ${(await this.page.evaluate(() => document.body.innerText)).slice(-1200)} ${this.errors.join("; ")}`);
+      throw new Error(
+        `not seen within ${timeout} ms: ${what}. ${why} The page: ${(await this.page.evaluate(() => document.body.innerText)).slice(-1200)} ${this.errors.join("; ")}`,
+      );
     }
   }
   texts(selector) {
@@ -60,8 +82,21 @@ export class Page {
   /** Presses the button with this text. */
   async press(text) {
     const source = text instanceof RegExp ? text.source : `^${text.replace(/[?.*+()]/g, "\\$&")}( \\d+)?$`;
-    await this.until(`a button ${text}`, (pattern) => [...document.querySelectorAll("button")].some((b) => new RegExp(pattern).test(b.textContent) && b.offsetParent !== null), source);
-    await this.page.evaluate((pattern) => [...document.querySelectorAll("button")].find((b) => new RegExp(pattern).test(b.textContent) && b.offsetParent !== null).click(), source);
+    await this.until(
+      `a button ${text}`,
+      (pattern) =>
+        [...document.querySelectorAll("button")].some(
+          (b) => new RegExp(pattern).test(b.textContent) && b.offsetParent !== null,
+        ),
+      source,
+    );
+    await this.page.evaluate(
+      (pattern) =>
+        [...document.querySelectorAll("button")]
+          .find((b) => new RegExp(pattern).test(b.textContent) && b.offsetParent !== null)
+          .click(),
+      source,
+    );
   }
   async click(selector) {
     await this.until(selector, (s) => document.querySelector(s) !== null, selector);
@@ -74,13 +109,17 @@ export class Page {
   }
   async fill(selector, text) {
     await this.until(selector, (s) => document.querySelector(s) !== null, selector);
-    await this.page.evaluate((s, value) => {
-      const input = document.querySelector(s);
-      input.focus();
-      input.value = value;
-      input.dispatchEvent(new Event("input", { bubbles: true }));
-      input.dispatchEvent(new Event("change", { bubbles: true }));
-    }, selector, text);
+    await this.page.evaluate(
+      (s, value) => {
+        const input = document.querySelector(s);
+        input.focus();
+        input.value = value;
+        input.dispatchEvent(new Event("input", { bubbles: true }));
+        input.dispatchEvent(new Event("change", { bubbles: true }));
+      },
+      selector,
+      text,
+    );
   }
   /** Why the first robot and this one are not joined. */
   async ask_why(other) {

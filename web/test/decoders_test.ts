@@ -30,7 +30,10 @@ test("what is no cloud is refused", () => {
 });
 
 test("clouds above the bound become thinner, all of them alike", async () => {
-  const clouds = new Clouds((name) => Promise.resolve(buffer(cloud_of(0, Number(name), 600_000) as Buffer)), () => {});
+  const clouds = new Clouds(
+    (name) => Promise.resolve(buffer(cloud_of(0, Number(name), 600_000) as Buffer)),
+    () => {},
+  );
   for (let i = 0; i < 8; ++i) clouds.want(String(i));
   while (clouds.waiting > 0) await new Promise((resolve) => setTimeout(resolve, 5));
   assert.ok(clouds.points <= 4_000_000, `${clouds.points} points`);
@@ -48,12 +51,16 @@ test("poses: inner frames cancel", () => {
 });
 
 test("server-sent events arrive whole, however they are cut", () => {
-  const text = ": alive\n\nevent: begin\ndata: {\"incarnation\": 3}\n\nid: 7\ndata: {\"key\":\r\ndata: \"a\"}\r\n\r\n: alive\n\nevent: ready\ndata: {}\n\n";
+  const text =
+    ': alive\n\nevent: begin\ndata: {"incarnation": 3}\n\nid: 7\ndata: {"key":\r\ndata: "a"}\r\n\r\n: alive\n\nevent: ready\ndata: {}\n\n';
   for (const step of [1, 3, 7, 1000]) {
     const events: SseEvent[] = [];
     const parser = new SseParser((event) => events.push(event));
     for (let i = 0; i < text.length; i += step) parser.feed(text.slice(i, i + step));
-    assert.deepEqual(events.map((e) => e.event), ["begin", "message", "ready"]);
+    assert.deepEqual(
+      events.map((e) => e.event),
+      ["begin", "message", "ready"],
+    );
     assert.equal(events[1].data, '{"key":\n"a"}');
     assert.equal(events[1].id, "7");
   }
@@ -79,7 +86,10 @@ const kSeedText = (() => {
   const all = [...bytes, crc & 255, crc >> 8];
   let bits = "";
   for (const byte of all) bits += byte.toString(2).padStart(8, "0");
-  return bits.match(/.{1,5}/g)!.map((b) => "ABCDEFGHIJKLMNOPQRSTUVWXYZ234567"[parseInt(b.padEnd(5, "0"), 2)]).join("");
+  return bits
+    .match(/.{1,5}/g)!
+    .map((b) => "ABCDEFGHIJKLMNOPQRSTUVWXYZ234567"[parseInt(b.padEnd(5, "0"), 2)])
+    .join("");
 })();
 const credential = (role: string, seed = kSeedText) =>
   `tutti-credential 1\nmission: m\nrole: ${role}\nname: eva\nnumber: 3\nnkey: UABC\n-----BEGIN USER NKEY SEED-----\n${seed}\n-----END USER NKEY SEED-----\n`;
@@ -89,16 +99,29 @@ test("a credential is read, and its seed signs", async () => {
   assert.match(kSeedText, /^SU/);
   const read = read_credential(credential("operator"));
   assert.deepEqual([read.name, read.role, read.key], ["eva", "operator", "UABC"]);
-  assert.deepEqual([...read.seed], Array.from({ length: 32 }, (_, i) => i));
+  assert.deepEqual(
+    [...read.seed],
+    Array.from({ length: 32 }, (_, i) => i),
+  );
   const signature = Buffer.from(await sign(read.seed, "nonce"), "base64");
   const { createPrivateKey, createPublicKey, verify } = await import("node:crypto");
-  const key = createPrivateKey({ key: Buffer.concat([Buffer.from("302e020100300506032b657004220420", "hex"), Buffer.from(read.seed)]), format: "der", type: "pkcs8" });
+  const key = createPrivateKey({
+    key: Buffer.concat([Buffer.from("302e020100300506032b657004220420", "hex"), Buffer.from(read.seed)]),
+    format: "der",
+    type: "pkcs8",
+  });
   assert.ok(verify(null, Buffer.from("nonce"), createPublicKey(key), signature));
 });
 
 test("what is no credential of a person is refused with a sentence", () => {
   assert.throws(() => read_credential("hello"), /no credential/);
   assert.throws(() => read_credential(credential("robot")), /credential of a robot/);
-  assert.throws(() => read_credential(credential("operator", kSeedText.slice(0, 20) + (kSeedText[20] === "A" ? "B" : "A") + kSeedText.slice(21))), /damaged/);
+  assert.throws(
+    () =>
+      read_credential(
+        credential("operator", kSeedText.slice(0, 20) + (kSeedText[20] === "A" ? "B" : "A") + kSeedText.slice(21)),
+      ),
+    /damaged/,
+  );
   assert.equal(base32("MFRGG").length, 3);
 });

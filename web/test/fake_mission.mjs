@@ -21,7 +21,15 @@ function pose_along(robot, s) {
   return { p: [wave, round - u, 0], yaw: -Math.PI / 2 };
 }
 
-const pose_of = ({ p, yaw }, shift = [0, 0, 0]) => [p[0] + shift[0], p[1] + shift[1], p[2] + shift[2], 0, 0, Math.sin(yaw / 2), Math.cos(yaw / 2)];
+const pose_of = ({ p, yaw }, shift = [0, 0, 0]) => [
+  p[0] + shift[0],
+  p[1] + shift[1],
+  p[2] + shift[2],
+  0,
+  0,
+  Math.sin(yaw / 2),
+  Math.cos(yaw / 2),
+];
 
 /** p in the frame of a pose that only turns about z. */
 function into(T, p) {
@@ -51,16 +59,38 @@ export function cloud_of(robot, index, points, speed = 0.9) {
     const side = radius * Math.cos(angle);
     const up = Math.max(-1.2, Math.min(1.7, radius * Math.sin(angle)));
     const world = [at.p[0] - Math.sin(at.yaw) * side, at.p[1] + Math.cos(at.yaw) * side, at.p[2] + up];
-    into(T, world).forEach((x, k) => bytes.writeInt16LE(Math.max(-32000, Math.min(32000, Math.round(x / step_m))), 8 + 6 * i + 2 * k));
+    into(T, world).forEach((x, k) =>
+      bytes.writeInt16LE(Math.max(-32000, Math.min(32000, Math.round(x / step_m))), 8 + 6 * i + 2 * k),
+    );
   }
   return bytes;
 }
 
 /** As the program sends them. */
-export const kSaid = { robot_silent_s: 10, robot_colours: { light: [[15, 111, 181], [194, 65, 12], [11, 143, 106]], dark: [[79, 179, 255], [255, 138, 76], [47, 211, 160]] } };
+export const kSaid = {
+  robot_silent_s: 10,
+  robot_colours: {
+    light: [
+      [15, 111, 181],
+      [194, 65, 12],
+      [11, 143, 106],
+    ],
+    dark: [
+      [79, 179, 255],
+      [255, 138, 76],
+      [47, 211, 160],
+    ],
+  },
+};
 
 export class FakeMission {
-  constructor({ robots = ["alpha", "bravo", "charlie"], submaps = 24, points = 6000, apart = [2], name = "adit north" } = {}) {
+  constructor({
+    robots = ["alpha", "bravo", "charlie"],
+    submaps = 24,
+    points = 6000,
+    apart = [2],
+    name = "adit north",
+  } = {}) {
     Object.assign(this, { robots, points, name });
     this.apart = new Set(apart); // robots that nothing joins yet
     this.submaps = [];
@@ -81,8 +111,23 @@ export class FakeMission {
   submap(robot, index) {
     const begin = index * kSubmap_s * 0.9;
     const T = pose_of(pose_along(robot, begin));
-    const path = Array.from({ length: kKeyframes }, (_, k) => into(T, pose_along(robot, begin + (k * kSubmap_s * 0.9) / (kKeyframes - 1)).p).map((x) => Math.round(1e3 * x) / 1e3));
-    return { id: `${robot}:1/${index}`, name: `${this.robots[robot]}/${index}`, robot, session: "1", index, from_s: index * kSubmap_s, until_s: (index + 1) * kSubmap_s, path, points: this.points, bytes: 8 + 6 * this.points };
+    const path = Array.from({ length: kKeyframes }, (_, k) =>
+      into(T, pose_along(robot, begin + (k * kSubmap_s * 0.9) / (kKeyframes - 1)).p).map(
+        (x) => Math.round(1e3 * x) / 1e3,
+      ),
+    );
+    return {
+      id: `${robot}:1/${index}`,
+      name: `${this.robots[robot]}/${index}`,
+      robot,
+      session: "1",
+      index,
+      from_s: index * kSubmap_s,
+      until_s: (index + 1) * kSubmap_s,
+      path,
+      points: this.points,
+      bytes: 8 + 6 * this.points,
+    };
   }
 
   truth(robot, index) {
@@ -100,7 +145,12 @@ export class FakeMission {
         if (Math.hypot(T[0], T[1]) > 7) continue;
         const joined = !this.apart.has(a.robot) && !this.apart.has(b.robot);
         const luck = next();
-        this.add_closure(a, b, T, luck < 0.25 ? "rejected" : joined || a.robot === b.robot ? "accepted" : luck < 0.6 ? "candidate" : "rejected");
+        this.add_closure(
+          a,
+          b,
+          T,
+          luck < 0.25 ? "rejected" : joined || a.robot === b.robot ? "accepted" : luck < 0.6 ? "candidate" : "rejected",
+        );
       }
   }
 
@@ -108,12 +158,32 @@ export class FakeMission {
     const name = `${a.name}-${b.name}`;
     const refused = state === "rejected";
     this.closures.set(name, {
-      name, from: a.id, to: b.id, state, by_hand,
+      name,
+      from: a.id,
+      to: b.id,
+      state,
+      by_hand,
       reason: refused ? "overlap: 0.16, at least 0.30 needed" : "",
       word: by ? { wish: "accept", by, wall_ns: Date.now() * 1e6 } : null,
-      verifier: "cloud 7", worker: "worker-1", verified_ns: Date.now() * 1e6,
-      links: [{ at_from: a.path[5], at_to: b.path[5], T_from_to, misfit_m: refused ? 1.31 : 0.041, misfit_deg: refused ? 4.2 : 0.31, chi2: refused ? 88.1 : 3.4, reason: "" }],
-      evidence: [{ reason: "overlap", value: refused ? 0.16 : 0.61, limit: 0.3, unit: "", at_least: true, ok: !refused }, { reason: "plane RMSE", value: 0.043, limit: 0.12, unit: "m", ok: true }, { reason: "free to slide", value: 0.21, limit: 0.05, unit: "", at_least: true, ok: true }],
+      verifier: "cloud 7",
+      worker: "worker-1",
+      verified_ns: Date.now() * 1e6,
+      links: [
+        {
+          at_from: a.path[5],
+          at_to: b.path[5],
+          T_from_to,
+          misfit_m: refused ? 1.31 : 0.041,
+          misfit_deg: refused ? 4.2 : 0.31,
+          chi2: refused ? 88.1 : 3.4,
+          reason: "",
+        },
+      ],
+      evidence: [
+        { reason: "overlap", value: refused ? 0.16 : 0.61, limit: 0.3, unit: "", at_least: true, ok: !refused },
+        { reason: "plane RMSE", value: 0.043, limit: 0.12, unit: "m", ok: true },
+        { reason: "free to slide", value: 0.21, limit: 0.05, unit: "", at_least: true, ok: true },
+      ],
     });
     return name;
   }
@@ -130,7 +200,18 @@ export class FakeMission {
       const T = this.truth(s.robot, s.index);
       const bend = (this.wobble * s.index) / 20;
       const held = s.index === 0 ? 0 : s.index > 20 ? 1 : 3;
-      submaps[s.id] = [this.component(s.robot), T[0] + bend * Math.sin(s.robot + 1) + this.origin[0], T[1] + bend * 0.6 + this.origin[1], T[2] + this.origin[2], T[3], T[4], T[5], T[6], held, 0.02 + 0.01 * s.index];
+      submaps[s.id] = [
+        this.component(s.robot),
+        T[0] + bend * Math.sin(s.robot + 1) + this.origin[0],
+        T[1] + bend * 0.6 + this.origin[1],
+        T[2] + this.origin[2],
+        T[3],
+        T[4],
+        T[5],
+        T[6],
+        held,
+        0.02 + 0.01 * s.index,
+      ];
     }
     return { revision: this.revision, accepted, components: 1 + this.apart.size, submaps };
   }
@@ -147,23 +228,115 @@ export class FakeMission {
       const silent = this.silent.has(number) ? this.time - this.silent.get(number) : 0;
       const own = this.submaps.filter((s) => s.robot === number).length;
       const backlog = this.backlog[number];
-      return { number, last_seen_s_ago: 0.4 + silent, last_update_s_ago: 4 + silent, submaps: own, refused_submaps: 0, conflict: "", name, session: 1, start: 1, version: "0.3.0", backlog_submaps: backlog, backlog_bytes: 14000 * backlog, heard_epoch: 1, heard_revision: this.revision, update_age_s: 4.2, keyframes: own * 10, T_odom_body: { translation_m: pose_along(number, this.time * 0.9).p, quaternion_xyzw: [0, 0, 0, 1] }, alerts: 0, finished: false, jobs_done: 0, trouble: this.troubled.get(number) ?? "", can: [], submaps_begun: own, battery_v: 24.1, battery_percent: 90 - 31 * (number % 3), unread_submaps: 0 };
+      return {
+        number,
+        last_seen_s_ago: 0.4 + silent,
+        last_update_s_ago: 4 + silent,
+        submaps: own,
+        refused_submaps: 0,
+        conflict: "",
+        name,
+        session: 1,
+        start: 1,
+        version: "0.3.0",
+        backlog_submaps: backlog,
+        backlog_bytes: 14000 * backlog,
+        heard_epoch: 1,
+        heard_revision: this.revision,
+        update_age_s: 4.2,
+        keyframes: own * 10,
+        T_odom_body: { translation_m: pose_along(number, this.time * 0.9).p, quaternion_xyzw: [0, 0, 0, 1] },
+        alerts: 0,
+        finished: false,
+        jobs_done: 0,
+        trouble: this.troubled.get(number) ?? "",
+        can: [],
+        submaps_begun: own,
+        battery_v: 24.1,
+        battery_percent: 90 - 31 * (number % 3),
+        unread_submaps: 0,
+      };
     });
-    return { time_ns: this.time * 1e9, wall_ns: Date.now() * 1e6, version: "0.3.0", epoch: 1, revision: this.revision, submaps: this.submaps.length, closures: this.poses().accepted, components: 1 + this.apart.size, pending_jobs: 2, has_news: false, robots, workers: [{ number: 1, last_seen_s_ago: 0.6, name: "worker-1", jobs_done: 120 }], refusals: [], trouble: "", incarnation: 1, verifier: "cloud 7", former_pairs: 0, waiting: 0, why_waiting: "", words: [] };
+    return {
+      time_ns: this.time * 1e9,
+      wall_ns: Date.now() * 1e6,
+      version: "0.3.0",
+      epoch: 1,
+      revision: this.revision,
+      submaps: this.submaps.length,
+      closures: this.poses().accepted,
+      components: 1 + this.apart.size,
+      pending_jobs: 2,
+      has_news: false,
+      robots,
+      workers: [{ number: 1, last_seen_s_ago: 0.6, name: "worker-1", jobs_done: 120 }],
+      refusals: [],
+      trouble: "",
+      incarnation: 1,
+      verifier: "cloud 7",
+      former_pairs: 0,
+      waiting: 0,
+      why_waiting: "",
+      words: [],
+    };
   }
 
   alerts() {
     const out = [];
     for (const [number, since] of this.silent)
-      out.push({ id: `robot/${number}/silent`, severity: "warning", what: "silent", where: this.robots[number], since_s: since, todo: "Wait until it is in reach again, or send somebody to the circle.", robot: number, submap: null, closure: null });
+      out.push({
+        id: `robot/${number}/silent`,
+        severity: "warning",
+        what: "silent",
+        where: this.robots[number],
+        since_s: since,
+        todo: "Wait until it is in reach again, or send somebody to the circle.",
+        robot: number,
+        submap: null,
+        closure: null,
+      });
     for (const number of this.apart)
-      out.push({ id: `map/${number}/alone`, severity: "info", what: "its part of the map is joined to no other", where: this.robots[number], since_s: 30, todo: "Ask “why not joined”, or add a closure by hand where both were.", robot: number, submap: null, closure: null });
+      out.push({
+        id: `map/${number}/alone`,
+        severity: "info",
+        what: "its part of the map is joined to no other",
+        where: this.robots[number],
+        since_s: 30,
+        todo: "Ask “why not joined”, or add a closure by hand where both were.",
+        robot: number,
+        submap: null,
+        closure: null,
+      });
     return out;
   }
 
   disagreement(robot) {
-    const nodes = this.submaps.filter((s) => s.robot === robot).map((s) => ({ submap: s.id, t: s.from_s, distance_m: 9 * s.index, d: [1, 0.3, 0.1, 0.1], significance: [0.3 + 0.02 * s.index, 0.4 + (s.index > 12 && s.index < 16 ? 2.1 : 0.2), 0.2, 0.1].map((x) => x * (1 + 0.2 * robot)) }));
-    const origins = robot === 0 ? [] : [{ from_s: 120, until_s: 150, scale: 1, place: [0, 0, 0], translation_m: 0.42, rotation_rad: 0.03, significance: 2.6, alert: robot === 2 }];
+    const nodes = this.submaps
+      .filter((s) => s.robot === robot)
+      .map((s) => ({
+        submap: s.id,
+        t: s.from_s,
+        distance_m: 9 * s.index,
+        d: [1, 0.3, 0.1, 0.1],
+        significance: [0.3 + 0.02 * s.index, 0.4 + (s.index > 12 && s.index < 16 ? 2.1 : 0.2), 0.2, 0.1].map(
+          (x) => x * (1 + 0.2 * robot),
+        ),
+      }));
+    const origins =
+      robot === 0
+        ? []
+        : [
+            {
+              from_s: 120,
+              until_s: 150,
+              scale: 1,
+              place: [0, 0, 0],
+              translation_m: 0.42,
+              rotation_rad: 0.03,
+              significance: 2.6,
+              alert: robot === 2,
+            },
+          ];
     return { robot, component: 0, scale_length_m: [120, 40, 13, 4], nodes, origins };
   }
 
@@ -173,13 +346,33 @@ export class FakeMission {
 
   /** All that is known now. */
   everything() {
-    const out = [this.message("mission", { name: this.name, description: "Three robots in a made-up mine.", version: "0.3.0", mode: "live", duration_s: null, robots: this.robots, ...kSaid })];
+    const out = [
+      this.message("mission", {
+        name: this.name,
+        description: "Three robots in a made-up mine.",
+        version: "0.3.0",
+        mode: "live",
+        duration_s: null,
+        robots: this.robots,
+        ...kSaid,
+      }),
+    ];
     for (const s of this.submaps) out.push({ key: `submap/${s.id}`, t: s.until_s, value: s });
-    out.push(this.message("poses", this.poses()), this.message("status", this.status()), this.message("alerts", this.alerts()));
+    out.push(
+      this.message("poses", this.poses()),
+      this.message("status", this.status()),
+      this.message("alerts", this.alerts()),
+    );
     for (const c of this.closures.values()) out.push(this.message(`closure/${c.name}`, c));
     for (const m of this.marks.values()) out.push(this.message(`mark/${m.id}`, m));
     this.robots.forEach((name, r) => out.push(this.message(`disagreement/${name}`, this.disagreement(r))));
-    out.push(this.message("refusals", [{ reason: "overlap", count: 812 }, { reason: "no alignment comes near", count: 640 }, { reason: "free to slide", count: 77 }]));
+    out.push(
+      this.message("refusals", [
+        { reason: "overlap", count: 812 },
+        { reason: "no alignment comes near", count: 640 },
+        { reason: "free to slide", count: 77 },
+      ]),
+    );
     return out;
   }
 

@@ -19,7 +19,15 @@ export function recorded_mission({ robots = ["alpha", "bravo"], submaps = 36, po
   const clouds = {};
   const say = (key, value) => messages.push(mission.message(key, value));
   mission.time = 0;
-  say("mission", { name, description: "Two robots in a made-up mine.", version: "0.3.0", mode: "report", duration_s: submaps * 10, robots, ...kSaid });
+  say("mission", {
+    name,
+    description: "Two robots in a made-up mine.",
+    version: "0.3.0",
+    mode: "report",
+    duration_s: submaps * 10,
+    robots,
+    ...kSaid,
+  });
   for (let i = 0; i < submaps; ++i) {
     mission.time = 10 * (i + 1);
     for (let r = 0; r < robots.length; ++r) {
@@ -33,10 +41,30 @@ export function recorded_mission({ robots = ["alpha", "bravo"], submaps = 36, po
     for (const c of mission.closures.values()) say(`closure/${c.name}`, c);
     messages.push(mission.correct(i === submaps - 1 ? 0 : 0.6 + 0.5 * Math.sin(i / 4)));
     say("status", mission.status());
-    say("alerts", i > 20 && i < 26 ? [{ id: "a", severity: "warning", what: "bravo's odometry leaves the map", where: "bravo/21", since_s: 210, todo: "Drive back to a place that is mapped.", robot: 1, submap: "1:1/21", closure: null }] : []);
+    say(
+      "alerts",
+      i > 20 && i < 26
+        ? [
+            {
+              id: "a",
+              severity: "warning",
+              what: "bravo's odometry leaves the map",
+              where: "bravo/21",
+              since_s: 210,
+              todo: "Drive back to a place that is mapped.",
+              robot: 1,
+              submap: "1:1/21",
+              closure: null,
+            },
+          ]
+        : [],
+    );
   }
   robots.forEach((robot, r) => add_estimates(mission, say, robot, r));
-  say("refusals", [{ reason: "overlap", count: 812 }, { reason: "no alignment comes near", count: 640 }]);
+  say("refusals", [
+    { reason: "overlap", count: 812 },
+    { reason: "no alignment comes near", count: 640 },
+  ]);
   say("report", JSON.parse(read("./data/report.json")));
   say("timing", JSON.parse(read("./data/timing.json")));
   say("settings", "mission: demo\nseed: 1\nrobots:\n  - name: alpha\n");
@@ -59,11 +87,24 @@ function add_estimates(mission, say, robot, r) {
       points.server.push([t, ...p]);
       points.corrected.push([t, p[0] + 0.03, p[1], p[2]]);
       points.onboard.push([t, p[0] + drift, p[1] - drift, p[2]]);
-      errors.push([t, 0.02 + Math.SQRT2 * drift, 0.05 + 0.02 * Math.sin(t / 9), t < 20 ? null : 0.04 + 0.015 * Math.sin(t / 7), t < 20 ? null : 0.2 + 0.1 * Math.sin(t / 11), t]);
+      errors.push([
+        t,
+        0.02 + Math.SQRT2 * drift,
+        0.05 + 0.02 * Math.sin(t / 9),
+        t < 20 ? null : 0.04 + 0.015 * Math.sin(t / 7),
+        t < 20 ? null : 0.2 + 0.1 * Math.sin(t / 11),
+        t,
+      ]);
     }
   }
-  for (const [kind, list] of Object.entries(points)) say(`trajectory/${robot}/${kind}`, { robot: r, component: 0, name: robot, points: list });
-  say(`errors/${robot}`, { robot: r, names: ["onboard", "corrected", "server", "born", "distance"], against: "reference", points: errors });
+  for (const [kind, list] of Object.entries(points))
+    say(`trajectory/${robot}/${kind}`, { robot: r, component: 0, name: robot, points: list });
+  say(`errors/${robot}`, {
+    robot: r,
+    names: ["onboard", "corrected", "server", "born", "distance"],
+    against: "reference",
+    points: errors,
+  });
   say(`disagreement/${robot}`, mission.disagreement(r));
 }
 
@@ -80,7 +121,9 @@ function add_survey(mission, say, clouds) {
     const yaw = 2 * Math.atan2(T[5], T[6]);
     const k = Math.floor(i / submaps.length) % s.points;
     const [x, y, z] = [0, 2, 4].map((o) => 0.005 * cloud.readInt16LE(8 + 6 * k + o));
-    [T[0] + Math.cos(yaw) * x - Math.sin(yaw) * y, T[1] + Math.sin(yaw) * x + Math.cos(yaw) * y, T[2] + z].forEach((v, o) => bytes.writeInt16LE(Math.round(v / 0.005), 8 + 6 * i + 2 * o));
+    [T[0] + Math.cos(yaw) * x - Math.sin(yaw) * y, T[1] + Math.sin(yaw) * x + Math.cos(yaw) * y, T[2] + z].forEach(
+      (v, o) => bytes.writeInt16LE(Math.round(v / 0.005), 8 + 6 * i + 2 * o),
+    );
   }
   clouds.survey = bytes.toString("base64");
   say("survey", { cloud: "survey", component: 0 });
@@ -93,4 +136,5 @@ function add_survey(mission, say, clouds) {
   say("odometry", { submaps: odometry });
 }
 
-if (process.argv[1] === new URL(import.meta.url).pathname) writeFileSync(process.argv[2], fill(read("../dist/index.html"), recorded_mission()));
+if (process.argv[1] === new URL(import.meta.url).pathname)
+  writeFileSync(process.argv[2], fill(read("../dist/index.html"), recorded_mission()));

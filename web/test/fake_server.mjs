@@ -5,12 +5,22 @@ import { createServer } from "node:http";
 import { FakeMission, relative } from "./fake_mission.mjs";
 
 const kPage = new URL("../dist/index.html", import.meta.url);
-const kPolicy = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'; img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+const kPolicy =
+  "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'; img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 export class FakeServer {
   constructor(mission = new FakeMission(), options = {}) {
     this.mission = mission;
-    this.me = { login: false, name: "", role: null, mission: mission.name, may_decide: true, nonce: "n", offers: ["decide", "register", "closure", "mark", "hold", "why", "disagreement"], ...options.me };
+    this.me = {
+      login: false,
+      name: "",
+      role: null,
+      mission: mission.name,
+      may_decide: true,
+      nonce: "n",
+      offers: ["decide", "register", "closure", "mark", "hold", "why", "disagreement"],
+      ...options.me,
+    };
     this.incarnation = 1;
     this.listeners = new Set();
     this.held = new Map();
@@ -20,7 +30,10 @@ export class FakeServer {
   }
 
   async start(port = 0) {
-    this.server = createServer((request, response) => void this.answer(request, response).catch((error) => this.say(response, 500, { error: String(error) })));
+    this.server = createServer(
+      (request, response) =>
+        void this.answer(request, response).catch((error) => this.say(response, 500, { error: String(error) })),
+    );
     await new Promise((resolve) => this.server.listen(port, "127.0.0.1", resolve));
     this.port = this.server.address().port;
     this.sign = setInterval(() => this.write(": alive\n\n"), 1000);
@@ -36,7 +49,10 @@ export class FakeServer {
   }
 
   holders() {
-    return this.mission.message("held", [...this.held].map(([by, what]) => ({ by, what })));
+    return this.mission.message(
+      "held",
+      [...this.held].map(([by, what]) => ({ by, what })),
+    );
   }
 
   /** Lets time go on, and informs everybody. */
@@ -62,22 +78,35 @@ export class FakeServer {
 
   async answer(request, response) {
     const url = new URL(request.url, "http://localhost");
-    if (url.pathname === "/") return response.writeHead(200, { "Content-Type": "text/html; charset=utf-8", "Content-Security-Policy": kPolicy }).end(readFileSync(kPage));
+    if (url.pathname === "/")
+      return response
+        .writeHead(200, { "Content-Type": "text/html; charset=utf-8", "Content-Security-Policy": kPolicy })
+        .end(readFileSync(kPage));
     if (url.pathname === "/api/me") return this.say(response, 200, this.me);
     const may_see = !this.me.login || this.me.role !== null;
-    if (!may_see && request.method !== "POST") return this.say(response, 401, { error: "sign in with an operator's or viewer's credential" });
+    if (!may_see && request.method !== "POST")
+      return this.say(response, 401, { error: "sign in with an operator's or viewer's credential" });
     if (url.pathname === "/api/events") return this.stream(response, request.headers["last-event-id"] ?? "");
     if (url.pathname.startsWith("/api/cloud/")) {
       const [, , , robot, , index] = url.pathname.split("/");
-      return response.writeHead(200, { "Content-Type": "application/octet-stream", "Cache-Control": "immutable" }).end(this.mission.cloud(Number(robot), Number(index)));
+      return response
+        .writeHead(200, { "Content-Type": "application/octet-stream", "Cache-Control": "immutable" })
+        .end(this.mission.cloud(Number(robot), Number(index)));
     }
-    if (url.pathname.startsWith("/api/photo/")) return response.writeHead(200, { "Content-Type": "image/jpeg" }).end(this.photos.get(url.pathname.split("/").at(-1)));
+    if (url.pathname.startsWith("/api/photo/"))
+      return response
+        .writeHead(200, { "Content-Type": "image/jpeg" })
+        .end(this.photos.get(url.pathname.split("/").at(-1)));
     if (url.pathname === "/api/why") return this.say(response, 200, this.why(url.searchParams));
-    if (request.method !== "POST" || request.headers["x-tutti"] !== "1") return this.say(response, 404, { error: "Not offered." });
+    if (request.method !== "POST" || request.headers["x-tutti"] !== "1")
+      return this.say(response, 404, { error: "Not offered." });
     let text = "";
     for await (const chunk of request) text += chunk;
     const body = JSON.parse(text);
-    if (!this.me.may_decide && !["/api/login", "/api/logout"].includes(url.pathname)) return this.say(response, may_see ? 403 : 401, { error: may_see ? "viewers do not decide" : "sign in with an operator's credential" });
+    if (!this.me.may_decide && !["/api/login", "/api/logout"].includes(url.pathname))
+      return this.say(response, may_see ? 403 : 401, {
+        error: may_see ? "viewers do not decide" : "sign in with an operator's credential",
+      });
     this.asked.push({ path: url.pathname, body });
     this.post(url.pathname, body, response);
   }
@@ -93,7 +122,12 @@ export class FakeServer {
     const resumed = incarnation === this.incarnation && Number.isInteger(heard);
     response.writeHead(200, { "Content-Type": "text/event-stream", "Cache-Control": "no-store" });
     response.write(`event: begin\ndata: ${JSON.stringify({ incarnation: this.incarnation, resumed })}\n\n`);
-    if (resumed) this.sent.slice(heard).forEach((message, i) => response.write(`id: ${incarnation}-${heard + i + 1}\ndata: ${JSON.stringify(message)}\n\n`));
+    if (resumed)
+      this.sent
+        .slice(heard)
+        .forEach((message, i) =>
+          response.write(`id: ${incarnation}-${heard + i + 1}\ndata: ${JSON.stringify(message)}\n\n`),
+        );
     else for (const message of [...this.mission.everything(), this.holders()]) response.write(this.event(message));
     response.write("event: ready\ndata: {}\n\n");
     this.listeners.add(response);
@@ -126,7 +160,16 @@ export class FakeServer {
       const [a, b] = [submap(body.from), submap(body.to)];
       const T = relative(mission.truth(a.robot, a.index), mission.truth(b.robot, b.index));
       const found = Math.hypot(T[0], T[1]) < 15;
-      return ok({ found, why: found ? "Both clouds fit." : "no alignment comes near", T_from_to: T, evidence: [{ reason: "overlap", value: found ? 0.55 : 0.04, limit: 0.3, unit: "", at_least: true, ok: found }, { reason: "plane RMSE", value: 0.05, limit: 0.12, unit: "m", ok: true }], look: found ? 1 : null });
+      return ok({
+        found,
+        why: found ? "Both clouds fit." : "no alignment comes near",
+        T_from_to: T,
+        evidence: [
+          { reason: "overlap", value: found ? 0.55 : 0.04, limit: 0.3, unit: "", at_least: true, ok: found },
+          { reason: "plane RMSE", value: 0.05, limit: 0.12, unit: "m", ok: true },
+        ],
+        look: found ? 1 : null,
+      });
     }
     if (path === "/api/change") {
       const [apart, wobble] = [mission.apart, mission.wobble];
@@ -170,7 +213,8 @@ export class FakeServer {
     for (const id of [closure.from, closure.to]) {
       const robot = Number(id.split(":")[0]);
       if (robot !== 2) continue;
-      if (closure.state === "accepted" && closure.from.split(":")[0] !== closure.to.split(":")[0]) mission.apart.delete(robot);
+      if (closure.state === "accepted" && closure.from.split(":")[0] !== closure.to.split(":")[0])
+        mission.apart.delete(robot);
       else if (closure.by_hand) mission.apart.add(robot);
     }
     this.send(mission.message(`closure/${closure.name}`, closure));
@@ -182,8 +226,41 @@ export class FakeServer {
     const { robots, submaps } = this.mission;
     const [a, b] = [robots.indexOf(search.get("from")), robots.indexOf(search.get("to"))];
     const of = (robot, index) => submaps.find((s) => s.robot === robot && s.index === index);
-    const candidate = (i, j, reason, value, limit, unit, hint, nearest = false) => ({ pair: `${of(a, i).name}-${of(b, j).name}`, from: of(a, i).id, to: of(b, j).id, reason, value, limit, unit, nearest, hint });
-    return { sentence: `41 pairs of ${robots[a]} and ${robots[b]} were looked at; none was taken.`, candidates: [candidate(4, 11, "overlap", 0.27, 0.3, "", "Drive the same stretch once more, slower.", true), candidate(7, 2, "free to slide", 0.02, 0.05, "", "A straight tunnel looks the same everywhere: drive on to a junction."), candidate(9, 9, "plane RMSE", 0.19, 0.12, "m", "Clouds differ: something moved, or odometry slipped inside the submap.")] };
+    const candidate = (i, j, reason, value, limit, unit, hint, nearest = false) => ({
+      pair: `${of(a, i).name}-${of(b, j).name}`,
+      from: of(a, i).id,
+      to: of(b, j).id,
+      reason,
+      value,
+      limit,
+      unit,
+      nearest,
+      hint,
+    });
+    return {
+      sentence: `41 pairs of ${robots[a]} and ${robots[b]} were looked at; none was taken.`,
+      candidates: [
+        candidate(4, 11, "overlap", 0.27, 0.3, "", "Drive the same stretch once more, slower.", true),
+        candidate(
+          7,
+          2,
+          "free to slide",
+          0.02,
+          0.05,
+          "",
+          "A straight tunnel looks the same everywhere: drive on to a junction.",
+        ),
+        candidate(
+          9,
+          9,
+          "plane RMSE",
+          0.19,
+          0.12,
+          "m",
+          "Clouds differ: something moved, or odometry slipped inside the submap.",
+        ),
+      ],
+    };
   }
 }
 

@@ -23,7 +23,11 @@ async function log_in(page, file) {
 async function play(browser) {
   started.run("pki", "init", "--mission", "page", "--pki", pki);
   const add = (role, name, ...more) => started.run("pki", `add-${role}`, name, "--pki", pki, ...more).trim(); // its file
-  const files = { eva: add("operator", "eva"), vera: add("viewer", "vera"), alpha: add("robot", "alpha", "--number", "0") };
+  const files = {
+    eva: add("operator", "eva"),
+    vera: add("viewer", "vera"),
+    alpha: add("robot", "alpha", "--number", "0"),
+  };
   const { bus, page: url } = await started.server("--pki", pki, "--mission", "page");
   assert.match(url, /^https:/);
   started.robot("alpha", bus, "--credentials", files.alpha, "--mission", "page");
@@ -32,7 +36,9 @@ async function play(browser) {
   await stranger.until("a login is asked for", asks, undefined, kPatience_ms);
   assert.deepEqual(await stranger.texts(".badge"), ["Not logged in"]);
   await log_in(stranger, files.alpha);
-  await stranger.until("it says why a robot's credential is none", () => /credential of a robot/.test(document.querySelector("#notices").textContent));
+  await stranger.until("it says why a robot's credential is none", () =>
+    /credential of a robot/.test(document.querySelector("#notices").textContent),
+  );
   assert.equal(await stranger.evaluate(() => tutti.app.store.get("mission")), null, "a stranger sees nothing");
   step("who has no credential is asked for one, and sees nothing");
 
@@ -41,7 +47,9 @@ async function play(browser) {
   await eva.until("the operator sees the map", sees, undefined, kPatience_ms);
   assert.equal((await eva.texts(".person b"))[0], "eva");
   await eva.press("Marks");
-  await eva.until("she may mark", () => [...document.querySelectorAll("button")].some((b) => b.textContent === "New mark"));
+  await eva.until("she may mark", () =>
+    [...document.querySelectorAll("button")].some((b) => b.textContent === "New mark"),
+  );
   await eva.reload();
   await eva.until("she is known after a reload", sees, undefined, kPatience_ms);
   assert.equal((await eva.texts(".person b"))[0], "eva");
@@ -51,7 +59,10 @@ async function play(browser) {
   await log_in(vera, files.vera);
   await vera.until("the viewer sees the map", sees, undefined, kPatience_ms);
   assert.equal((await vera.texts(".person"))[0].startsWith("vera viewer"), true);
-  assert.deepEqual((await vera.texts(".tabs button")).filter((t) => /By hand|Marks/.test(t)), []);
+  assert.deepEqual(
+    (await vera.texts(".tabs button")).filter((t) => /By hand|Marks/.test(t)),
+    [],
+  );
   step("a viewer logs in, and may decide nothing");
 
   const kept = join(started.work, "kept.cred"); // somebody has a copy

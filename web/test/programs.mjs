@@ -17,10 +17,17 @@ const { work } = started;
 /** The process ids of the bus that the server has started. */
 const buses_of = (server) =>
   execFileSync("ps", ["--ppid", String(server.pid), "-o", "pid=,comm="], { encoding: "utf8" })
-    .split("\n").filter((line) => /nats-server/.test(line)).map((line) => Number.parseInt(line, 10));
+    .split("\n")
+    .filter((line) => /nats-server/.test(line))
+    .map((line) => Number.parseInt(line, 10));
 
 const until_presence = (page, name, wanted) =>
-  page.until(`${name} is ${wanted}`, ([n, all]) => all.includes(tutti.app.robots.find((r) => r.name === n)?.presence), [name, wanted], kPatience_ms);
+  page.until(
+    `${name} is ${wanted}`,
+    ([n, all]) => all.includes(tutti.app.robots.find((r) => r.name === n)?.presence),
+    [name, wanted],
+    kPatience_ms,
+  );
 const step = (what) => console.log(`ok   ${what}`);
 
 async function play(browser) {
@@ -31,14 +38,36 @@ async function play(browser) {
   const robots = { bravo: started.robot("bravo", bus) };
   await page.until("bravo is in the picture", () => tutti.app.world.placed.size > 0, undefined, kPatience_ms);
   robots.alpha = started.robot("alpha", bus); // whose map takes bravo's into another frame, out of the picture that there was
-  await page.until("alpha and bravo are joined", () => tutti.app.world.parts.size === 1 && new Set([...tutti.app.world.placed.values()].map((p) => p.submap.robot)).size === 2 && (tutti.app.world.poses?.accepted ?? 0) > 0, undefined, kPatience_ms);
+  await page.until(
+    "alpha and bravo are joined",
+    () =>
+      tutti.app.world.parts.size === 1 &&
+      new Set([...tutti.app.world.placed.values()].map((p) => p.submap.robot)).size === 2 &&
+      (tutti.app.world.poses?.accepted ?? 0) > 0,
+    undefined,
+    kPatience_ms,
+  );
   await page.until("clouds are drawn", () => tutti.view.last.points > 1000, undefined, kPatience_ms);
   assert.match((await page.texts(".badge"))[0], /Live/);
   step("two robots in one map, live");
 
   robots.charlie = started.robot("charlie", bus, "--set", "simulation.lidar.range_sigma_m=0.5"); // fits nobody's scans
-  await page.until("charlie is in the picture, apart from the others", () => tutti.app.robots.some((r) => r.name === "charlie" && r.submaps > 1) && tutti.app.world.parts.size === 2, undefined, kPatience_ms);
-  await page.until("that is an alert", () => /charlie/.test([...document.querySelectorAll(".alert")].find((a) => /joined to no other/.test(a.textContent))?.textContent ?? ""), undefined, kPatience_ms);
+  await page.until(
+    "charlie is in the picture, apart from the others",
+    () => tutti.app.robots.some((r) => r.name === "charlie" && r.submaps > 1) && tutti.app.world.parts.size === 2,
+    undefined,
+    kPatience_ms,
+  );
+  await page.until(
+    "that is an alert",
+    () =>
+      /charlie/.test(
+        [...document.querySelectorAll(".alert")].find((a) => /joined to no other/.test(a.textContent))?.textContent ??
+          "",
+      ),
+    undefined,
+    kPatience_ms,
+  );
   step("a third robot comes later, and is said to be joined to nobody");
 
   const [killed] = buses_of(server);
@@ -46,10 +75,18 @@ async function play(browser) {
   const then = await page.evaluate(() => tutti.app.store.track("status").times.at(-1));
   process.kill(killed, "SIGKILL");
   const at = Date.now();
-  await page.until("all robots are heard over another bus", (t) => {
-    const { times, values } = tutti.app.store.track("status");
-    return values.at(-1).robots.length === 3 && values.at(-1).robots.every((r) => r.finished || times.at(-1) - r.last_seen_s_ago > t + 2);
-  }, then, kPatience_ms);
+  await page.until(
+    "all robots are heard over another bus",
+    (t) => {
+      const { times, values } = tutti.app.store.track("status");
+      return (
+        values.at(-1).robots.length === 3 &&
+        values.at(-1).robots.every((r) => r.finished || times.at(-1) - r.last_seen_s_ago > t + 2)
+      );
+    },
+    then,
+    kPatience_ms,
+  );
   console.log(`    heard again ${Date.now() - at} ms after the bus was killed`);
   const [again] = buses_of(server);
   assert.ok(again > 0 && again !== killed, "the server has started another");
@@ -60,36 +97,74 @@ async function play(browser) {
   await until_presence(page, "bravo", ["silent", "lost"]);
   await page.until("its card says so", () => document.querySelectorAll(".robot.silent, .robot.lost").length === 1);
   assert.match((await page.texts(".robot.silent .detail, .robot.lost .detail")).join(), /May be within/);
-  const is_alert = (wanted) => [...document.querySelectorAll(".alert:not(.seen)")].some((a) => /silent/.test(a.textContent) && /bravo/.test(a.textContent)) === wanted;
+  const is_alert = (wanted) =>
+    [...document.querySelectorAll(".alert:not(.seen)")].some(
+      (a) => /silent/.test(a.textContent) && /bravo/.test(a.textContent),
+    ) === wanted;
   await page.until("an alert says so", is_alert, true, kPatience_ms);
   robots.bravo.kill("SIGCONT");
   await until_presence(page, "bravo", ["here", "finished"]);
-  await page.until("it has sent what it had", () => tutti.app.robots.find((r) => r.name === "bravo").drain.state === "empty", undefined, kPatience_ms);
+  await page.until(
+    "it has sent what it had",
+    () => tutti.app.robots.find((r) => r.name === "bravo").drain.state === "empty",
+    undefined,
+    kPatience_ms,
+  );
   await page.until("nothing says so any more", is_alert, false);
   step("a robot goes silent, comes back and drains");
 
   await page.press("Closures");
   await page.press(/^In the map/);
   await page.click(".closure");
-  await page.until("both clouds are laid over each other", () => document.querySelector(".inspector .pair canvas") !== null);
+  await page.until(
+    "both clouds are laid over each other",
+    () => document.querySelector(".inspector .pair canvas") !== null,
+  );
   assert.match((await page.texts(".inspector .gates")).join(), /overlap/i);
   const before = await page.evaluate(() => tutti.app.world.poses.accepted);
   await page.press("Reject");
-  await page.until("it is out of the map", () => /refused/.test(document.querySelector(".inspector .state").textContent), undefined, kPatience_ms);
-  await page.until("eva's word stands beside it", () => /eva said reject/.test(document.querySelector(".inspector").textContent));
+  await page.until(
+    "it is out of the map",
+    () => /refused/.test(document.querySelector(".inspector .state").textContent),
+    undefined,
+    kPatience_ms,
+  );
+  await page.until("eva's word stands beside it", () =>
+    /eva said reject/.test(document.querySelector(".inspector").textContent),
+  );
   await page.press(/^Take back/);
-  await page.until("it is in the map again", () => /in the map/.test(document.querySelector(".inspector .state").textContent), undefined, kPatience_ms);
+  await page.until(
+    "it is in the map again",
+    () => /in the map/.test(document.querySelector(".inspector .state").textContent),
+    undefined,
+    kPatience_ms,
+  );
   step(`a closure of ${before} is inspected, rejected, taken back`);
 
   for (const name of Object.keys(robots)) await until_presence(page, name, ["finished"]);
   assert.equal(await page.evaluate(() => tutti.app.world.parts.size), 2);
   await page.ask_why("charlie");
-  await page.until("why they are not joined", () => document.querySelectorAll(".why .alert").length > 0, undefined, kPatience_ms);
+  await page.until(
+    "why they are not joined",
+    () => document.querySelectorAll(".why .alert").length > 0,
+    undefined,
+    kPatience_ms,
+  );
   const [pair] = await page.texts(".why .alert b");
   await page.press("Join by hand");
   await page.press("Register");
-  await page.until("both are laid over each other", () => document.querySelector(".by-hand .gates") !== null, undefined, kPatience_ms);
-  await page.until("what it would change", () => /would join 2 parts/.test(document.querySelector(".by-hand").textContent), undefined, kPatience_ms);
+  await page.until(
+    "both are laid over each other",
+    () => document.querySelector(".by-hand .gates") !== null,
+    undefined,
+    kPatience_ms,
+  );
+  await page.until(
+    "what it would change",
+    () => /would join 2 parts/.test(document.querySelector(".by-hand").textContent),
+    undefined,
+    kPatience_ms,
+  );
   await page.press(/^Keep it /);
   await page.until("the map follows: one part", () => tutti.app.world.parts.size === 1, undefined, kPatience_ms);
   await page.press("Undo");
@@ -103,7 +178,12 @@ async function play(browser) {
   await page.evaluate(() => tutti.view.fit());
   await page.until("the picture stands still", () => tutti.view.last.points > 0);
   await page.pause(500);
-  await page.click_in(".middle .view", await page.evaluate(() => tutti.view.eye.project([...tutti.app.world.placed.values()].find((p) => p.submap.robot === 0).target).slice(0, 2)));
+  await page.click_in(
+    ".middle .view",
+    await page.evaluate(() =>
+      tutti.view.eye.project([...tutti.app.world.placed.values()].find((p) => p.submap.robot === 0).target).slice(0, 2),
+    ),
+  );
   await page.fill(".marks textarea", "door, locked");
   await page.evaluate(() => document.activeElement.blur()); // as a press on "Photo" does
   await (await page.page.$('.marks [aria-label="Photo"]')).uploadFile(photo);
@@ -119,7 +199,13 @@ async function play(browser) {
 
   const late = await browser.open(url);
   const submaps = await page.evaluate(() => tutti.app.world.placed.size);
-  await late.until("all that the first page has", (n) => tutti.app.world.placed.size === n && tutti.app.clouds.points > 0 && document.querySelector(".robot") !== null, submaps, kPatience_ms);
+  await late.until(
+    "all that the first page has",
+    (n) =>
+      tutti.app.world.placed.size === n && tutti.app.clouds.points > 0 && document.querySelector(".robot") !== null,
+    submaps,
+    kPatience_ms,
+  );
   assert.equal(await late.evaluate(() => tutti.app.store.unread.count), 0);
   assert.deepEqual(late.errors, []);
   await late.close();

@@ -11,10 +11,20 @@ const kAll: Window3 = { low_m: -Infinity, high_m: Infinity, section: null, ramp_
 const ramp = (colour: number) => new Uint32Array(256).fill(colour);
 /** Looks along -z: x to the right, y up, depth is -z. */
 const kView = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, -1, 0, 0, 0, 0];
-const painted = (points: number[], colour: number, size = 1): Painted => ({ xyz: Int16Array.from(points), count: points.length / 3, step_m: 0.1, T_world: rows_of([0, 0, 0, 0, 0, 0, 1]), ramp: ramp(colour), size });
+const painted = (points: number[], colour: number, size = 1): Painted => ({
+  xyz: Int16Array.from(points),
+  count: points.length / 3,
+  step_m: 0.1,
+  T_world: rows_of([0, 0, 0, 0, 0, 0, 1]),
+  ramp: ramp(colour),
+  size,
+});
 
 test("the nearest point wins, whatever the order", () => {
-  for (const order of [[0, 1], [1, 0]]) {
+  for (const order of [
+    [0, 1],
+    [1, 0],
+  ]) {
     const raster = new Raster();
     raster.resize(10, 10);
     raster.begin(0);
@@ -80,7 +90,24 @@ test("parts that are not joined lie beside each other, the largest where it is",
   const rows: number[] = [];
   for (let i = 0; i < 6; ++i) {
     const component = i < 3 ? 4 : i < 5 ? 1 : 2;
-    submaps.push([`0:1/${i}`, { id: `0:1/${i}`, name: "", robot: 0, session: "1", index: i, from_s: 0, until_s: 0, path: [[0, 0, 0], [5, 0, 0]], points: 0, bytes: 0 }]);
+    submaps.push([
+      `0:1/${i}`,
+      {
+        id: `0:1/${i}`,
+        name: "",
+        robot: 0,
+        session: "1",
+        index: i,
+        from_s: 0,
+        until_s: 0,
+        path: [
+          [0, 0, 0],
+          [5, 0, 0],
+        ],
+        points: 0,
+        bytes: 0,
+      },
+    ]);
     rows.push(component, i, 0, 0, 0, 0, 0, 1, NaN, NaN);
   }
   const poses: Poses = { revision: 0, accepted: 0, components: 3, rows: Float64Array.from(rows) };

@@ -11,7 +11,19 @@ const here = dirname(fileURLToPath(import.meta.url));
 const out = mkdtempSync(join(tmpdir(), "tutti-web-test-"));
 const files = readdirSync(here).filter((name) => name.endsWith("_test.ts"));
 if (files.length === 0) throw new Error(`no tests in ${here}`);
-await build({ entryPoints: files.map((name) => join(here, name)), bundle: true, platform: "node", format: "esm", outdir: out, outExtension: { ".js": ".mjs" }, logLevel: "warning" });
-const run = spawnSync(process.execPath, ["--expose-gc", "--test", ...files.map((name) => join(out, name.replace(/\.ts$/, ".mjs")))], { stdio: "inherit" });
+await build({
+  entryPoints: files.map((name) => join(here, name)),
+  bundle: true,
+  platform: "node",
+  format: "esm",
+  outdir: out,
+  outExtension: { ".js": ".mjs" },
+  logLevel: "warning",
+});
+const run = spawnSync(
+  process.execPath,
+  ["--expose-gc", "--test", ...files.map((name) => join(out, name.replace(/\.ts$/, ".mjs")))],
+  { stdio: "inherit" },
+);
 rmSync(out, { recursive: true });
 process.exit(run.status ?? 1);

@@ -11,7 +11,12 @@ const browser = await Browser.launch();
 /** One picture: where, what is done before it, how large. */
 async function picture(name, url, steps, size = {}) {
   const page = await browser.open(url, { width: 1280, height: 800, ...size });
-  await page.until("the map is drawn", () => tutti.app.ready && (tutti.view.last.points > 0 || tutti.app.world.placed.size === 0), undefined, 30_000);
+  await page.until(
+    "the map is drawn",
+    () => tutti.app.ready && (tutti.view.last.points > 0 || tutti.app.world.placed.size === 0),
+    undefined,
+    30_000,
+  );
   await page.pause(1500);
   await steps(page);
   await page.pause(1800);
@@ -21,7 +26,13 @@ async function picture(name, url, steps, size = {}) {
 }
 
 /** A fleet of which ten are not joined yet. */
-const hundred = () => new FakeMission({ robots: Array.from({ length: 100 }, (_, i) => `r${String(i).padStart(2, "0")}`), submaps: 2, points: 400, apart: [3, 13, 23, 33, 43, 53, 63, 73, 83, 93] });
+const hundred = () =>
+  new FakeMission({
+    robots: Array.from({ length: 100 }, (_, i) => `r${String(i).padStart(2, "0")}`),
+    submaps: 2,
+    points: 400,
+    apart: [3, 13, 23, 33, 43, 53, 63, 73, 83, 93],
+  });
 
 async function live(name, steps, size, mission = new FakeMission()) {
   const server = await new FakeServer(mission).start();
@@ -45,11 +56,16 @@ if (what === "live") {
     await page.evaluate(() => document.querySelector(".report .plot")?.scrollIntoView({ block: "center" }));
     await page.evaluate(() => tutti.app.set_cursor(200));
   });
-  await picture("report_trust", url, async (page) => {
-    await page.press("Closures");
-    await page.evaluate(() => tutti.app.set_options({ colour: "sigma" }));
-    await page.click(".closure");
-  }, { light: true });
+  await picture(
+    "report_trust",
+    url,
+    async (page) => {
+      await page.press("Closures");
+      await page.evaluate(() => tutti.app.set_options({ colour: "sigma" }));
+      await page.click(".closure");
+    },
+    { light: true },
+  );
 } else {
   await live("room", async (page, server, mission) => {
     mission.silent.set(1, mission.time);
@@ -59,11 +75,16 @@ if (what === "live") {
     mission.time += 1;
     server.send(mission.correct(0.15));
   });
-  await live("room_of_a_hundred", async (page, server, mission) => {
-    for (const number of [17, 42, 63, 88]) mission.silent.set(number, mission.time);
-    mission.troubled.set(5, "no scans for 20 s");
-    server.tick(30);
-  }, {}, hundred());
+  await live(
+    "room_of_a_hundred",
+    async (page, server, mission) => {
+      for (const number of [17, 42, 63, 88]) mission.silent.set(number, mission.time);
+      mission.troubled.set(5, "no scans for 20 s");
+      server.tick(30);
+    },
+    {},
+    hundred(),
+  );
   await live("room_closure", async (page) => {
     await page.press("Closures");
     await page.press(/^Refused/);
@@ -87,8 +108,12 @@ if (what === "live") {
     await page.press("Debrief");
     await page.evaluate(() => tutti.view.eye.move(0, 0, 0.6));
   });
-  await live("room_tablet", async (page) => {
-    await page.press("Odometry");
-  }, { width: 820, height: 1180 });
+  await live(
+    "room_tablet",
+    async (page) => {
+      await page.press("Odometry");
+    },
+    { width: 820, height: 1180 },
+  );
 }
 await browser.close();

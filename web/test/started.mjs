@@ -9,7 +9,12 @@ import { createInterface } from "node:readline";
 export class Started {
   /** `rate`: times as fast as the robots walk; statuses come by the wall clock. */
   constructor(tutti, mission, rate) {
-    Object.assign(this, { tutti, common: [mission, "--rate", String(rate)], work: mkdtempSync(join(tmpdir(), "tutti-web-")), programs: [] });
+    Object.assign(this, {
+      tutti,
+      common: [mission, "--rate", String(rate)],
+      work: mkdtempSync(join(tmpdir(), "tutti-web-")),
+      programs: [],
+    });
   }
   start(words, stderr) {
     const program = spawn(this.tutti, words, { stdio: ["ignore", "pipe", stderr] });
@@ -22,7 +27,10 @@ export class Started {
   }
   /** The server, where robots reach it and where its page is, as it reports itself. */
   async server(...more) {
-    const program = this.start(["server", ...this.common, ...more, "--state", join(this.work, "server"), "--view", "0"], "pipe");
+    const program = this.start(
+      ["server", ...this.common, ...more, "--state", join(this.work, "server"), "--view", "0"],
+      "pipe",
+    );
     let bus, page;
     await new Promise((resolve, reject) => {
       for (const stream of [program.stdout, program.stderr])
@@ -37,7 +45,22 @@ export class Started {
     return { program, bus, page };
   }
   robot(name, bus, ...more) {
-    const program = this.start(["robot", ...this.common, ...more, "--name", name, "--bus", bus, "--state", join(this.work, name), "--session", "0"], "inherit");
+    const program = this.start(
+      [
+        "robot",
+        ...this.common,
+        ...more,
+        "--name",
+        name,
+        "--bus",
+        bus,
+        "--state",
+        join(this.work, name),
+        "--session",
+        "0",
+      ],
+      "inherit",
+    );
     program.stdout.resume();
     return program;
   }
@@ -46,7 +69,11 @@ export class Started {
       program.kill("SIGCONT");
       program.kill("SIGTERM");
     }
-    await Promise.all(this.programs.map((p) => p.exitCode !== null || p.signalCode !== null || new Promise((resolve) => p.on("exit", resolve))));
+    await Promise.all(
+      this.programs.map(
+        (p) => p.exitCode !== null || p.signalCode !== null || new Promise((resolve) => p.on("exit", resolve)),
+      ),
+    );
     rmSync(this.work, { recursive: true });
   }
 }

@@ -33,7 +33,11 @@ test("the same messages again change nothing", () => {
 test("after a gap, what was not sent again is gone, and what was stays", () => {
   const mission = new FakeMission();
   const store = filled(mission);
-  store.apply({ key: "mark/m1", t: 241, value: { id: "m1", submap: "0:1/3", at: [0, 0, 0], text: "door", by: "eva", wall_ns: 1, photo: null } });
+  store.apply({
+    key: "mark/m1",
+    t: 241,
+    value: { id: "m1", submap: "0:1/3", at: [0, 0, 0], text: "door", by: "eva", wall_ns: 1, photo: null },
+  });
   const keys = new Set((mission.everything() as Message[]).map((m) => m.key));
   store.retain(keys);
   assert.equal(store.get("mark", Infinity, "m1"), null);
@@ -71,25 +75,42 @@ test("keys of newer programs are passed over", () => {
 test("a photo is a picture inside the message, or none", () => {
   const store = filled();
   const mark = (photo: string) => {
-    store.apply({ key: "mark/p", t: store.newest + 1, value: { id: "p", submap: "0:1/3", at: [0, 0, 0], text: "", by: "", photo } });
+    store.apply({
+      key: "mark/p",
+      t: store.newest + 1,
+      value: { id: "p", submap: "0:1/3", at: [0, 0, 0], text: "", by: "", photo },
+    });
     return store.get("mark", Infinity, "p")?.photo;
   };
   assert.equal(mark("data:image/jpeg;base64,AAAA"), "data:image/jpeg;base64,AAAA");
-  for (const bad of ["https://example.org/x.jpg", "javascript:alert(1)", "data:image/svg+xml;base64,AAAA", "data:text/html,<b>"]) assert.equal(mark(bad), null);
+  for (const bad of [
+    "https://example.org/x.jpg",
+    "javascript:alert(1)",
+    "data:image/svg+xml;base64,AAAA",
+    "data:text/html,<b>",
+  ])
+    assert.equal(mark(bad), null);
 });
 
 test("a part whose frame moves as a whole was not corrected, nor one that was parted", () => {
   const mission = new FakeMission();
   const store = filled(mission);
   const shift = (poses: ReturnType<FakeMission["poses"]>, robot: number, by: number) => {
-    for (const [id, row] of Object.entries(poses.submaps) as [string, number[]][]) if (id.startsWith(`${robot}:`)) row[1] += by;
+    for (const [id, row] of Object.entries(poses.submaps) as [string, number[]][])
+      if (id.startsWith(`${robot}:`)) row[1] += by;
     return poses;
   };
   mission.time += 10;
   store.apply(mission.message("poses", shift(mission.poses(), 2, 53)) as Message);
   assert.ok(correction_at(store, Infinity)!.largest_m < 1e-6, `${correction_at(store, Infinity)!.largest_m} m`);
   const [place] = [...store.all("submap")].filter(([id]) => id.startsWith("2:")).map(([id]) => store.place_of(id));
-  assert.ok(Math.abs(correction_at(store, Infinity)!.before.rows[place * POSE_ROW + 1] - store.get("poses")!.rows[place * POSE_ROW + 1]) < 1e-6, "the ghost lies on it");
+  assert.ok(
+    Math.abs(
+      correction_at(store, Infinity)!.before.rows[place * POSE_ROW + 1] -
+        store.get("poses")!.rows[place * POSE_ROW + 1],
+    ) < 1e-6,
+    "the ghost lies on it",
+  );
   mission.apart.add(1);
   mission.time += 10;
   store.apply(mission.message("poses", shift(mission.poses(), 1, 20)) as Message);
@@ -156,7 +177,7 @@ test("a backlog that shrinks tells when it is empty", () => {
 /** What is kept once nothing more can be freed: arrays are freed by another thread, after the collector. */
 async function held_bytes(collect: () => void): Promise<number> {
   let least = Infinity;
-  for (let unchanged = 0; unchanged < 5; ) {
+  for (let unchanged = 0; unchanged < 5;) {
     collect();
     await new Promise((resolve) => setTimeout(resolve, 20));
     const { heapUsed, arrayBuffers } = process.memoryUsage();
@@ -189,5 +210,7 @@ test("a day of messages does not grow the page", async () => {
   assert.equal(store.track("status")!.times[0], 1000, "the first status is still there");
   const grown = (heap[1] - heap[0]) / 1e6;
   assert.ok(grown < 10, `the heap grew by ${grown.toFixed(1)} MB from a quarter of the day to its end`);
-  console.log(`a day: ${JSON.stringify(size)}, heap and arrays ${(heap[0] / 1e6).toFixed(1)} MB, then ${(heap[1] / 1e6).toFixed(1)} MB`);
+  console.log(
+    `a day: ${JSON.stringify(size)}, heap and arrays ${(heap[0] / 1e6).toFixed(1)} MB, then ${(heap[1] / 1e6).toFixed(1)} MB`,
+  );
 });

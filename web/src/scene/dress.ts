@@ -97,9 +97,13 @@ export class Dresser {
       const centre = transform(placed.T, cloud.centre);
       if (!all && !eye.sees(centre, cloud.radius_m)) continue;
       points += cloud.n;
-      const ramp = d.options.colour === "height" ? this.height : this.ramp(colour_of(placed, d, scales), d.faint(id), d.dark);
+      const ramp =
+        d.options.colour === "height" ? this.height : this.ramp(colour_of(placed, d, scales), d.faint(id), d.dark);
       const shades = d.options.colour === "survey" ? d.distances(id, cloud, placed.target) : null;
-      out.set(id, { ...painted(cloud, placed.T, shades ? this.bad : ramp, eye, centre), ...(shades ? { shades } : {}) });
+      out.set(id, {
+        ...painted(cloud, placed.T, shades ? this.bad : ramp, eye, centre),
+        ...(shades ? { shades } : {}),
+      });
     }
     if (points > most) for (const cloud of out.values()) cloud.count = Math.ceil((cloud.count * most) / points);
     return out;
@@ -154,19 +158,35 @@ export function legend_of(world: World, d: Dressing): Legend {
     case "age":
       return scale("seen last", (x) => even(1 - x), "now", `${span(s.age_s)} ago`);
     case "sigma":
-      if (![...world.placed.values()].some((p) => Number.isFinite(p.sigma_m))) return { title: "uncertainty: not computed", entries: [], scale: null };
+      if (![...world.placed.values()].some((p) => Number.isFinite(p.sigma_m)))
+        return { title: "uncertainty: not computed", entries: [], scale: null };
       return scale("uncertainty of position, one sigma", bad, "0 m", metres(s.sigma_m));
     case "survey":
       return scale("distance to the survey's nearest point", bad, "0", `${100 * SurveyDistance.most_m} cm or more`);
     case "disagreement":
       return scale("disagreement, times the threshold", bad, "0", `${kMostDisagreement} or more`);
     case "held":
-      return { title: "closures that hold it", entries: kHolding.map((h) => ({ colour: css(h.colour), label: h.label })), scale: null };
+      return {
+        title: "closures that hold it",
+        entries: kHolding.map((h) => ({ colour: css(h.colour), label: h.label })),
+        scale: null,
+      };
     case "part":
-      return { title: "part of the map", entries: [...world.parts.values()].map((p) => ({ colour: css(robot_rgb(p.component, d.dark)), label: `part ${p.component + 1}` })), scale: null };
+      return {
+        title: "part of the map",
+        entries: [...world.parts.values()].map((p) => ({
+          colour: css(robot_rgb(p.component, d.dark)),
+          label: `part ${p.component + 1}`,
+        })),
+        scale: null,
+      };
     default: {
       const numbers = [...new Set([...world.placed.values()].map((p) => p.submap.robot))].sort((a, b) => a - b);
-      return { title: "robot", entries: numbers.map((n) => ({ colour: css(robot_rgb(d.colour_index(n), d.dark)), label: d.robot_name(n) })), scale: null };
+      return {
+        title: "robot",
+        entries: numbers.map((n) => ({ colour: css(robot_rgb(d.colour_index(n), d.dark)), label: d.robot_name(n) })),
+        scale: null,
+      };
     }
   }
 }

@@ -54,7 +54,9 @@ export class Eye {
     other.fov = (360 / Math.PI) * Math.atan((Math.tan(half) * Math.min(this.camera.aspect, 2)) / aspect);
     other.aspect = aspect;
     other.updateProjectionMatrix();
-    return Float64Array.from(this.product.multiplyMatrices(other.projectionMatrix, this.camera.matrixWorldInverse).elements);
+    return Float64Array.from(
+      this.product.multiplyMatrices(other.projectionMatrix, this.camera.matrixWorldInverse).elements,
+    );
   }
 
   /** Pixels and depth of a point of the world; null behind the camera. */
@@ -143,7 +145,11 @@ export class Eye {
     const back = this.camera.position.clone().sub(this.controls.target);
     const a = this.heading;
     const d = this.distance;
-    const step = new Vector3((Math.cos(a) * right - Math.sin(a) * forward) * d, (Math.sin(a) * right + Math.cos(a) * forward) * d, 0);
+    const step = new Vector3(
+      (Math.cos(a) * right - Math.sin(a) * forward) * d,
+      (Math.sin(a) * right + Math.cos(a) * forward) * d,
+      0,
+    );
     this.controls.target.add(step);
     back.applyAxisAngle(this.camera.up, turn).multiplyScalar(zoom);
     this.camera.position.copy(this.controls.target).add(back);

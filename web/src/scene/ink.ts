@@ -68,7 +68,13 @@ export class Ink {
 
   /** A ring on the ground around p. */
   ring(p: readonly number[], radius_m: number, stroke: Stroke, fill?: string): void {
-    const points = Array.from({ length: 65 }, (_, i) => this.eye.project([p[0] + radius_m * Math.cos((i * Math.PI) / 32), p[1] + radius_m * Math.sin((i * Math.PI) / 32), p[2]]));
+    const points = Array.from({ length: 65 }, (_, i) =>
+      this.eye.project([
+        p[0] + radius_m * Math.cos((i * Math.PI) / 32),
+        p[1] + radius_m * Math.sin((i * Math.PI) / 32),
+        p[2],
+      ]),
+    );
     if (points.some((q) => q === null)) return;
     this.pen(stroke);
     this.c.beginPath();
@@ -139,7 +145,8 @@ export class Ink {
     for (const s of this.segments) {
       const away = to_segment(x, y, s);
       const rank = order.indexOf(s.target.kind);
-      if (away <= s.reach && (!best || rank < best.rank || (rank === best.rank && away < best.away))) best = { rank, away, target: s.target };
+      if (away <= s.reach && (!best || rank < best.rank || (rank === best.rank && away < best.away)))
+        best = { rank, away, target: s.target };
     }
     return best?.target ?? null;
   }

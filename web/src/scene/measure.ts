@@ -23,6 +23,13 @@ export class Measure implements Tool {
     ink.line([a, b], { colour: "#fff", width: 2 });
     const flat = Math.hypot(a[0] - b[0], a[1] - b[1]);
     const middle = a.map((x, k) => (x + b[k]) / 2);
-    ink.label(middle, `${metres(distance(a, b))}  (flat ${metres(flat)}, height ${metres(b[2] - a[2])})`, "#fff", "rgba(0,0,0,.9)", undefined, true);
+    ink.label(
+      middle,
+      `${metres(distance(a, b))}  (flat ${metres(flat)}, height ${metres(b[2] - a[2])})`,
+      "#fff",
+      "rgba(0,0,0,.9)",
+      undefined,
+      true,
+    );
   }
 }

@@ -1,6 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /** Two ways to draw points: on the CPU, or with WebGL where there is a GPU. */
-import { BufferAttribute, BufferGeometry, DataTexture, Matrix4, Points, RGBAFormat, Scene, ShaderMaterial, UnsignedByteType, Vector2, Vector4, WebGLRenderer } from "three";
+import {
+  BufferAttribute,
+  BufferGeometry,
+  DataTexture,
+  Matrix4,
+  Points,
+  RGBAFormat,
+  Scene,
+  ShaderMaterial,
+  UnsignedByteType,
+  Vector2,
+  Vector4,
+  WebGLRenderer,
+} from "three";
 import type { PerspectiveCamera } from "three";
 import { Raster } from "../raster";
 import type { Painted, Window3 } from "../raster";
@@ -12,7 +25,14 @@ export interface Painter {
   readonly name: string;
   resize(width: number, height: number, ratio: number): void;
   /** `clouds` by name, `view` as Raster.draw() takes it. `light`: with shaded edges. */
-  draw(clouds: Map<string, Painted>, view: ArrayLike<number>, camera: PerspectiveCamera, window: Window3, background: Rgb, light: boolean): void;
+  draw(
+    clouds: Map<string, Painted>,
+    view: ArrayLike<number>,
+    camera: PerspectiveCamera,
+    window: Window3,
+    background: Rgb,
+    light: boolean,
+  ): void;
 }
 
 export class CpuPainter implements Painter {
@@ -26,10 +46,20 @@ export class CpuPainter implements Painter {
     this.canvas.width = width;
     this.canvas.height = height;
     this.raster.resize(width, height);
-    this.image = width && height ? new ImageData(new Uint8ClampedArray(this.raster.pixels.buffer as ArrayBuffer), width, height) : null;
+    this.image =
+      width && height
+        ? new ImageData(new Uint8ClampedArray(this.raster.pixels.buffer as ArrayBuffer), width, height)
+        : null;
   }
 
-  draw(clouds: Map<string, Painted>, view: ArrayLike<number>, _camera: PerspectiveCamera, window: Window3, background: Rgb, light: boolean): void {
+  draw(
+    clouds: Map<string, Painted>,
+    view: ArrayLike<number>,
+    _camera: PerspectiveCamera,
+    window: Window3,
+    background: Rgb,
+    light: boolean,
+  ): void {
     if (!this.image) return;
     this.raster.begin(abgr(background));
     for (const cloud of clouds.values()) this.raster.draw(cloud, view, window);
@@ -59,7 +89,10 @@ export class GpuPainter implements Painter {
   readonly name = "GPU";
   private renderer = new WebGLRenderer({ canvas: this.canvas, antialias: false, powerPreference: "high-performance" });
   private scene = new Scene();
-  private drawn = new Map<string, { xyz: Int16Array; shades?: Uint8Array; points: Points<BufferGeometry, ShaderMaterial> }>();
+  private drawn = new Map<
+    string,
+    { xyz: Int16Array; shades?: Uint8Array; points: Points<BufferGeometry, ShaderMaterial> }
+  >();
   private textures = new Map<Uint32Array, DataTexture>();
   private ratio = 1;
 
@@ -69,7 +102,13 @@ export class GpuPainter implements Painter {
     this.renderer.setSize(width, height, false);
   }
 
-  draw(clouds: Map<string, Painted>, _view: ArrayLike<number>, camera: PerspectiveCamera, window: Window3, background: Rgb): void {
+  draw(
+    clouds: Map<string, Painted>,
+    _view: ArrayLike<number>,
+    camera: PerspectiveCamera,
+    window: Window3,
+    background: Rgb,
+  ): void {
     for (const [name, { points }] of this.drawn) points.visible = clouds.has(name);
     for (const [name, cloud] of clouds) this.place(name, cloud, window);
     this.renderer.setClearColor((background[0] << 16) | (background[1] << 8) | background[2]);
@@ -87,7 +126,24 @@ export class GpuPainter implements Painter {
     const { points } = held;
     const T = cloud.T_world;
     const s = cloud.step_m;
-    points.matrix = new Matrix4().set(T[0] * s, T[1] * s, T[2] * s, T[3], T[4] * s, T[5] * s, T[6] * s, T[7], T[8] * s, T[9] * s, T[10] * s, T[11], 0, 0, 0, 1);
+    points.matrix = new Matrix4().set(
+      T[0] * s,
+      T[1] * s,
+      T[2] * s,
+      T[3],
+      T[4] * s,
+      T[5] * s,
+      T[6] * s,
+      T[7],
+      T[8] * s,
+      T[9] * s,
+      T[10] * s,
+      T[11],
+      0,
+      0,
+      0,
+      1,
+    );
     points.geometry.setDrawRange(0, cloud.count);
     const u = points.material.uniforms;
     const plane = window.section;
@@ -97,15 +153,27 @@ export class GpuPainter implements Painter {
     u.ramp_range.value.set(window.ramp_low_m, window.ramp_high_m);
     u.size.value = cloud.size * this.ratio;
     u.use_own.value = cloud.shades ? 1 : 0;
-    if (cloud.shades && held.shades !== cloud.shades) points.geometry.setAttribute("own", new BufferAttribute((held.shades = cloud.shades), 1, true));
+    if (cloud.shades && held.shades !== cloud.shades)
+      points.geometry.setAttribute("own", new BufferAttribute((held.shades = cloud.shades), 1, true));
     u.ramp.value = this.texture(cloud.ramp);
   }
 
   private make(xyz: Int16Array): Points<BufferGeometry, ShaderMaterial> {
     const geometry = new BufferGeometry();
     geometry.setAttribute("position", new BufferAttribute(xyz, 3));
-    const uniforms = { section: { value: new Vector4() }, section_half: { value: 0 }, slab: { value: new Vector2() }, ramp_range: { value: new Vector2() }, size: { value: 1 }, use_own: { value: 0 }, ramp: { value: null } };
-    const points = new Points(geometry, new ShaderMaterial({ vertexShader: kVertex, fragmentShader: kFragment, uniforms }));
+    const uniforms = {
+      section: { value: new Vector4() },
+      section_half: { value: 0 },
+      slab: { value: new Vector2() },
+      ramp_range: { value: new Vector2() },
+      size: { value: 1 },
+      use_own: { value: 0 },
+      ramp: { value: null },
+    };
+    const points = new Points(
+      geometry,
+      new ShaderMaterial({ vertexShader: kVertex, fragmentShader: kFragment, uniforms }),
+    );
     points.matrixAutoUpdate = false;
     points.frustumCulled = false;
     this.scene.add(points);

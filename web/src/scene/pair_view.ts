@@ -11,7 +11,16 @@ import { Ink } from "./ink";
 import { CpuPainter } from "./painters";
 import { palette_of } from "./picture";
 
-export const kPairColours: { dark: [Rgb, Rgb]; light: [Rgb, Rgb] } = { dark: [[79, 179, 255], [255, 168, 76]], light: [[15, 111, 181], [200, 80, 10]] };
+export const kPairColours: { dark: [Rgb, Rgb]; light: [Rgb, Rgb] } = {
+  dark: [
+    [79, 179, 255],
+    [255, 168, 76],
+  ],
+  light: [
+    [15, 111, 181],
+    [200, 80, 10],
+  ],
+};
 
 export interface Pair {
   from: SubmapId;
@@ -75,7 +84,14 @@ export class PairView {
       const centre = transform(T, cloud.centre);
       low = Math.min(low, centre[2] - 2);
       high = Math.max(high, centre[2] + 3);
-      clouds.set(id, { xyz: cloud.xyz, count: cloud.n, step_m: cloud.step_m, T_world: rows_of(T), ramp: ramp_of(colours[i], app.dark), size: 1 });
+      clouds.set(id, {
+        xyz: cloud.xyz,
+        count: cloud.n,
+        step_m: cloud.step_m,
+        T_world: rows_of(T),
+        ramp: ramp_of(colours[i], app.dark),
+        size: 1,
+      });
     });
     const window = { low_m: -Infinity, high_m: Infinity, section: null, ramp_low_m: low, ramp_high_m: high };
     this.painter.draw(clouds, eye.matrix, eye.camera, window, app.dark ? [14, 18, 26] : [244, 243, 239], false);
@@ -89,10 +105,15 @@ export class PairView {
     [pair.from, pair.to].forEach((id, i) => {
       const path = this.app.store.get("submap", Infinity, id)?.path ?? [];
       const T = poses[i];
-      if (T) this.ink.line(path.map((p) => transform(T, p)), { colour: `rgb(${colours[i].join()})`, width: 2.5 });
+      if (T)
+        this.ink.line(
+          path.map((p) => transform(T, p)),
+          { colour: `rgb(${colours[i].join()})`, width: 2.5 },
+        );
     });
     if (!relative) this.ink.text(14, 24, "The map does not join these two.", palette.soft, palette.halo);
-    else if (!this.app.clouds.get(pair.from) && !this.app.clouds.get(pair.to)) this.ink.text(14, 24, "No clouds.", palette.soft, palette.halo);
+    else if (!this.app.clouds.get(pair.from) && !this.app.clouds.get(pair.to))
+      this.ink.text(14, 24, "No clouds.", palette.soft, palette.halo);
   }
 
   /** Once per pair, as soon as both clouds are there. */
@@ -110,7 +131,8 @@ export class PairView {
       const m = rows_of(T);
       const half = cloud?.half_m ?? [5, 5, 1];
       for (let k = 0; k < 3; ++k) {
-        const reach = Math.abs(m[4 * k] * half[0]) + Math.abs(m[4 * k + 1] * half[1]) + Math.abs(m[4 * k + 2] * half[2]);
+        const reach =
+          Math.abs(m[4 * k] * half[0]) + Math.abs(m[4 * k + 1] * half[1]) + Math.abs(m[4 * k + 2] * half[2]);
         low[k] = Math.min(low[k], centre[k] - reach);
         high[k] = Math.max(high[k], centre[k] + reach);
       }

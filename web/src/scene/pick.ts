@@ -29,7 +29,15 @@ export function nearest_point(app: App, eye: Eye, x: number, y: number): Spot | 
     const s = cloud.step_m;
     for (let i = 0; i < cloud.xyz.length; i += 3) {
       const [a, b, c] = [s * cloud.xyz[i], s * cloud.xyz[i + 1], s * cloud.xyz[i + 2]];
-      offer(id, [T[0] * a + T[1] * b + T[2] * c + T[3], T[4] * a + T[5] * b + T[6] * c + T[7], T[8] * a + T[9] * b + T[10] * c + T[11]], 1);
+      offer(
+        id,
+        [
+          T[0] * a + T[1] * b + T[2] * c + T[3],
+          T[4] * a + T[5] * b + T[6] * c + T[7],
+          T[8] * a + T[9] * b + T[10] * c + T[11],
+        ],
+        1,
+      );
     }
   }
   const found = best as { score: number; submap: string; world: Vec3 } | null;

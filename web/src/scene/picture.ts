@@ -26,8 +26,32 @@ export interface Palette {
 }
 export const palette_of = (dark: boolean): Palette =>
   dark
-    ? { ink: "#e7e9ee", soft: "#9aa4b2", halo: "rgba(12,16,23,.85)", accent: "#4fb3ff", accepted: "#2fd3a0", within: "#5f8fd8", candidate: "#e6b422", rejected: "#ff5d75", ghost: "#f2e8c9", mark: "#ffd54a", onboard: "#ff8a4c" }
-    : { ink: "#1d2430", soft: "#5d6675", halo: "rgba(255,255,255,.88)", accent: "#0072b2", accepted: "#00855f", within: "#3f6fb8", candidate: "#a67c00", rejected: "#c8203c", ghost: "#5a4a12", mark: "#b8860b", onboard: "#c24e00" };
+    ? {
+        ink: "#e7e9ee",
+        soft: "#9aa4b2",
+        halo: "rgba(12,16,23,.85)",
+        accent: "#4fb3ff",
+        accepted: "#2fd3a0",
+        within: "#5f8fd8",
+        candidate: "#e6b422",
+        rejected: "#ff5d75",
+        ghost: "#f2e8c9",
+        mark: "#ffd54a",
+        onboard: "#ff8a4c",
+      }
+    : {
+        ink: "#1d2430",
+        soft: "#5d6675",
+        halo: "rgba(255,255,255,.88)",
+        accent: "#0072b2",
+        accepted: "#00855f",
+        within: "#3f6fb8",
+        candidate: "#a67c00",
+        rejected: "#c8203c",
+        ghost: "#5a4a12",
+        mark: "#b8860b",
+        onboard: "#c24e00",
+      };
 
 export const state_colour = (p: Palette, state: ClosureState, within = false): string =>
   state === "accepted" ? (within ? p.within : p.accepted) : state === "candidate" ? p.candidate : p.rejected;
@@ -56,7 +80,11 @@ function draw_tracks(app: App, ink: Ink): void {
     const loud = chosen === null || chosen === robot;
     const colour = css(robot_rgb(app.robot_index(robot), app.dark), loud ? 0.95 : 0.3);
     const points = path.map((p) => transform(placed.T, p));
-    ink.line(points, { colour, width: chosen === robot ? 3 : 1.8 }, { kind: "submap", id: placed.id, at: points[points.length >> 1] ?? [0, 0, 0] });
+    ink.line(
+      points,
+      { colour, width: chosen === robot ? 3 : 1.8 },
+      { kind: "submap", id: placed.id, at: points[points.length >> 1] ?? [0, 0, 0] },
+    );
   }
 }
 
@@ -101,9 +129,14 @@ function draw_closures(app: App, ink: Ink, palette: Palette): void {
       if (closure.state !== state) continue;
       const ends = ends_of(app, closure);
       if (!ends) continue;
-      const within = app.world.placed.get(closure.from)?.submap.robot === app.world.placed.get(closure.to)?.submap.robot;
+      const within =
+        app.world.placed.get(closure.from)?.submap.robot === app.world.placed.get(closure.to)?.submap.robot;
       const dash = state === "candidate" ? [5, 4] : state === "rejected" ? [2, 4] : [];
-      ink.line(ends, { colour: state_colour(palette, state, within), width: closure.by_hand ? 2.6 : 1.2, dash }, { kind: "closure", name });
+      ink.line(
+        ends,
+        { colour: state_colour(palette, state, within), width: closure.by_hand ? 2.6 : 1.2, dash },
+        { kind: "closure", name },
+      );
     }
   }
 }
@@ -125,7 +158,8 @@ function draw_selection(app: App, ink: Ink, palette: Palette): void {
     if (!placed) return;
     const points = placed.submap.path.map((p) => transform(placed.T, p));
     ink.line(points, { colour: palette.ink, width: 4.5 });
-    if (points[0]) ink.label(points[points.length >> 1], placed.submap.name, palette.ink, palette.halo, undefined, true);
+    if (points[0])
+      ink.label(points[points.length >> 1], placed.submap.name, palette.ink, palette.halo, undefined, true);
   }
 }
 
@@ -137,7 +171,12 @@ function draw_robots(app: App, ink: Ink, palette: Palette): void {
     const colour = away ? "#8a929e" : css(robot_rgb(robot.index, app.dark));
     const target = { kind: "robot", number: robot.number } as const;
     if (away && app.options.layers.reach && robot.reach_m > 0)
-      ink.ring(at, robot.reach_m, { colour: palette.candidate, dash: [6, 5], width: 1.5 }, app.dark ? "rgba(230,180,34,.09)" : "rgba(166,124,0,.10)");
+      ink.ring(
+        at,
+        robot.reach_m,
+        { colour: palette.candidate, dash: [6, 5], width: 1.5 },
+        app.dark ? "rgba(230,180,34,.09)" : "rgba(166,124,0,.10)",
+      );
     if (!app.options.layers.robots) continue;
     const chosen = app.selection?.kind === "robot" && app.selection.number === robot.number;
     ink.dot(at, chosen ? 8 : 6, colour, chosen ? palette.ink : palette.halo, target);
@@ -161,11 +200,24 @@ function draw_ghost(app: App, ink: Ink, palette: Palette): void {
     if (points[middle] && now) ink.line([points[middle], now], { colour: palette.ghost, width: 1 });
   }
   const at = app.world.placed.get(largest);
-  if (at) ink.label(transform(at.T, at.submap.path[at.submap.path.length >> 1] ?? [0, 0, 0]), `corrected by ${metres(largest_m)}`, palette.ghost, palette.halo, undefined, true);
+  if (at)
+    ink.label(
+      transform(at.T, at.submap.path[at.submap.path.length >> 1] ?? [0, 0, 0]),
+      `corrected by ${metres(largest_m)}`,
+      palette.ghost,
+      palette.halo,
+      undefined,
+      true,
+    );
 }
 
 /** Where everything would be if a closure by hand were kept; parts that it joins come to the part that keeps its frame. */
-function draw_preview(app: App, { before, after, moved_m, largest, largest_m, keeper }: Correction, ink: Ink, palette: Palette): void {
+function draw_preview(
+  app: App,
+  { before, after, moved_m, largest, largest_m, keeper }: Correction,
+  ink: Ink,
+  palette: Palette,
+): void {
   for (const [id, placed] of app.world.placed) {
     const at = app.store.place_of(id) * POSE_ROW;
     const part = keeper.get(after.rows[at]);
@@ -176,10 +228,19 @@ function draw_preview(app: App, { before, after, moved_m, largest, largest_m, ke
     ink.line(points, { colour: palette.ghost, width: 1.6, dash: [4, 4] });
     const middle = points.length >> 1;
     const now = app.world.point(id, placed.submap.path[middle] ?? [0, 0, 0]);
-    if (points[middle] && now && part === before.rows[at]) ink.line([now, points[middle]], { colour: palette.ghost, width: 1 });
+    if (points[middle] && now && part === before.rows[at])
+      ink.line([now, points[middle]], { colour: palette.ghost, width: 1 });
   }
   const at = app.world.placed.get(largest);
-  if (at && largest_m > TIMES.ghost_m) ink.label(transform(at.T, at.submap.path[at.submap.path.length >> 1] ?? [0, 0, 0]), `would move by ${metres(largest_m)}`, palette.ghost, palette.halo, undefined, true);
+  if (at && largest_m > TIMES.ghost_m)
+    ink.label(
+      transform(at.T, at.submap.path[at.submap.path.length >> 1] ?? [0, 0, 0]),
+      `would move by ${metres(largest_m)}`,
+      palette.ghost,
+      palette.halo,
+      undefined,
+      true,
+    );
 }
 
 function draw_marks(app: App, ink: Ink, palette: Palette): void {
@@ -200,7 +261,8 @@ function draw_part_names(app: App, ink: Ink, palette: Palette): void {
   const largest = Math.max(...[...parts.values()].map((p) => p.submaps));
   for (const part of parts.values()) {
     const at = [0, 1, 2].map((k) => (k === 1 ? part.low[1] : (part.low[k] + part.high[k]) / 2) + part.offset[k]);
-    const text = part.submaps === largest ? `part ${part.component + 1}` : `part ${part.component + 1}: not joined, placed beside`;
+    const text =
+      part.submaps === largest ? `part ${part.component + 1}` : `part ${part.component + 1}: not joined, placed beside`;
     const spot = ink.eye.project(at);
     if (spot) ink.text(spot[0] - 20, spot[1] + 24, text, palette.soft, palette.halo);
   }
@@ -230,7 +292,8 @@ function draw_cursor(app: App, ink: Ink, palette: Palette, t: number): void {
 /** Estimates nearer than this to the map have a dot and no text. */
 const kLabelled_m = 0.3;
 
-const estimate_colour = (palette: Palette, kind: string): string => (kind === "onboard" ? palette.onboard : kind === "corrected" ? palette.accent : palette.ink);
+const estimate_colour = (palette: Palette, kind: string): string =>
+  kind === "onboard" ? palette.onboard : kind === "corrected" ? palette.accent : palette.ink;
 
 function draw_scale(ink: Ink, palette: Palette): void {
   const { eye } = ink;
@@ -240,7 +303,10 @@ function draw_scale(ink: Ink, palette: Palette): void {
   const length = [5, 2, 1].map((m) => m * decade).find((m) => m <= most) ?? decade;
   const [x, y] = [18, eye.height - 20];
   const width = length * per_m;
-  for (const stroke of [{ colour: palette.halo, width: 5 }, { colour: palette.ink, width: 1.6 }]) {
+  for (const stroke of [
+    { colour: palette.halo, width: 5 },
+    { colour: palette.ink, width: 1.6 },
+  ]) {
     ink.bar(x, y, x + width, y, stroke);
     ink.bar(x, y - 5, x, y + 1, stroke);
     ink.bar(x + width, y - 5, x + width, y + 1, stroke);
@@ -252,7 +318,10 @@ function draw_scale(ink: Ink, palette: Palette): void {
 /** Where the map's x and y go. */
 function draw_compass(ink: Ink, palette: Palette, x: number, y: number): void {
   const a = ink.eye.heading;
-  for (const [name, right, up] of [["x", Math.cos(a), -Math.sin(a)], ["y", Math.sin(a), Math.cos(a)]] as const) {
+  for (const [name, right, up] of [
+    ["x", Math.cos(a), -Math.sin(a)],
+    ["y", Math.sin(a), Math.cos(a)],
+  ] as const) {
     ink.bar(x, y, x + 20 * right, y - 20 * up, { colour: palette.soft, width: 1.5 });
     ink.text(x + 26 * right - 3, y - 26 * up + 4, name, palette.soft, palette.halo);
   }

@@ -32,7 +32,10 @@ export interface Tool {
   draw(ink: Ink): void;
 }
 
-const kBackground = { dark: [14, 18, 26] as [number, number, number], light: [244, 243, 239] as [number, number, number] };
+const kBackground = {
+  dark: [14, 18, 26] as [number, number, number],
+  light: [244, 243, 239] as [number, number, number],
+};
 
 export class View {
   readonly element = document.createElement("div");
@@ -55,14 +58,20 @@ export class View {
   private distance: SurveyDistance | null = null;
 
   /** `wanted`: "cpu" or "gpu" instead of what the machine has. */
-  constructor(private readonly app: App, wanted: string | null = null) {
+  constructor(
+    private readonly app: App,
+    wanted: string | null = null,
+  ) {
     this.element.className = "view";
     this.painter = (wanted ?? (this.gpu ? "gpu" : "cpu")) === "gpu" ? new GpuPainter() : new CpuPainter();
     this.eye = new Eye(this.element, () => this.move());
     this.ink = new Ink(this.eye);
     this.element.append(this.painter.canvas, this.ink.canvas);
     this.element.tabIndex = 0;
-    this.element.setAttribute("aria-label", "3-D map: arrows move, Q and E turn, plus and minus zoom, T looks from above, F shows all");
+    this.element.setAttribute(
+      "aria-label",
+      "3-D map: arrows move, Q and E turn, plus and minus zoom, T looks from above, F shows all",
+    );
     new ResizeObserver(() => this.resize()).observe(this.element);
     this.listen();
     app.on((topic) => this.hear(topic));
@@ -179,7 +188,14 @@ export class View {
     const clouds = this.dresser.dress(app.world, app.clouds, eye, dressing, moves ? this.affordable() : Infinity);
     this.add_survey(clouds, dressing);
     const fast = !moves || this.last.ms < TIMES.moving_ms;
-    this.painter.draw(clouds, eye.matrix, eye.camera, window_of(app.world, app.options), app.dark ? kBackground.dark : kBackground.light, app.options.edges && fast);
+    this.painter.draw(
+      clouds,
+      eye.matrix,
+      eye.camera,
+      window_of(app.world, app.options),
+      app.dark ? kBackground.dark : kBackground.light,
+      app.options.edges && fast,
+    );
     draw_picture(app, this.ink);
     this.tool?.draw(this.ink);
     let points = 0;
@@ -201,7 +217,11 @@ export class View {
     if (!survey) return;
     this.app.clouds.want(survey.cloud);
     const cloud = this.app.clouds.get(survey.cloud);
-    if (cloud) clouds.set(survey.cloud, this.dresser.survey(cloud, this.eye, dressing, this.app.world.offset_of(survey.component)));
+    if (cloud)
+      clouds.set(
+        survey.cloud,
+        this.dresser.survey(cloud, this.eye, dressing, this.app.world.offset_of(survey.component)),
+      );
   }
 
   private listen(): void {

@@ -11,7 +11,8 @@ export function position_of(app: App, robot: RobotView): Vec3 | null {
   if (!newest) return null;
   const placed = app.world.placed.get(newest.id);
   if (!placed) return null;
-  if (newest.T_odom_submap && status?.position && status.session === newest.session) return transform(compose(placed.T, inverse(newest.T_odom_submap)), status.position);
+  if (newest.T_odom_submap && status?.position && status.session === newest.session)
+    return transform(compose(placed.T, inverse(newest.T_odom_submap)), status.position);
   return transform(placed.T, newest.path.at(-1) ?? [0, 0, 0]);
 }
 
@@ -23,7 +24,10 @@ export function place_at(app: App, robot: number, t: number): Vec3 | null {
     const at = ((t - from_s) / Math.max(until_s - from_s, 1e-6)) * (path.length - 1);
     const i = Math.min(Math.floor(at), path.length - 1);
     const next = path[Math.min(i + 1, path.length - 1)];
-    return transform(placed.T, path[i].map((x, k) => x + (at - i) * (next[k] - x)));
+    return transform(
+      placed.T,
+      path[i].map((x, k) => x + (at - i) * (next[k] - x)),
+    );
   }
   return null;
 }

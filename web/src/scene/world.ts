@@ -47,7 +47,16 @@ export class World {
       const same = old !== undefined && old.target.every((x, k) => Math.abs(x - target[k]) < 1e-9);
       const T = old && animate ? old.T : target;
       moved ||= old !== undefined && !same;
-      this.placed.set(id, { id, submap, component: part.component, T, start: same ? old.start : T, target, holding: rows[at + 8], sigma_m: rows[at + 9] });
+      this.placed.set(id, {
+        id,
+        submap,
+        component: part.component,
+        T,
+        start: same ? old.start : T,
+        target,
+        holding: rows[at + 8],
+        sigma_m: rows[at + 9],
+      });
     }
     if (moved && animate) this.moving_since = now_ms;
     this.measure();
@@ -59,7 +68,8 @@ export class World {
     const share = Math.min(1, Math.max(0, (now_ms - this.moving_since) / TIMES.animation_ms));
     const eased = share * share * (3 - 2 * share);
     for (const placed of this.placed.values())
-      if (placed.T !== placed.target) placed.T = eased >= 1 ? placed.target : between(placed.start, placed.target, eased);
+      if (placed.T !== placed.target)
+        placed.T = eased >= 1 ? placed.target : between(placed.start, placed.target, eased);
     return share < 1;
   }
 
@@ -88,7 +98,11 @@ export class World {
           this.low[k] = Math.min(this.low[k], points[i + 1 + k]);
           this.high[k] = Math.max(this.high[k], points[i + 1 + k]);
         }
-    if (!Number.isFinite(this.low[0])) [this.low, this.high] = [[-10, -10, -2], [10, 10, 2]];
+    if (!Number.isFinite(this.low[0]))
+      [this.low, this.high] = [
+        [-10, -10, -2],
+        [10, 10, 2],
+      ];
   }
 
   private measure(): void {
@@ -99,6 +113,10 @@ export class World {
         this.low[k] = Math.min(this.low[k], part.low[k] + part.offset[k]);
         this.high[k] = Math.max(this.high[k], part.high[k] + part.offset[k]);
       }
-    if (!Number.isFinite(this.low[0])) [this.low, this.high] = [[-10, -10, -2], [10, 10, 2]];
+    if (!Number.isFinite(this.low[0]))
+      [this.low, this.high] = [
+        [-10, -10, -2],
+        [10, 10, 2],
+      ];
   }
 }

@@ -25,7 +25,9 @@ export class LiveSource implements Source {
 
   async cloud(name: string, submap: Submap | null): Promise<ArrayBuffer> {
     if (!submap) throw new Error(`cloud ${name}: no submap`);
-    const answer = await fetch(`/api/cloud/${submap.robot}/${encodeURIComponent(submap.session || "0")}/${submap.index}`);
+    const answer = await fetch(
+      `/api/cloud/${submap.robot}/${encodeURIComponent(submap.session || "0")}/${submap.index}`,
+    );
     if (!answer.ok) throw new Error(`cloud ${name}: ${answer.status}`);
     return answer.arrayBuffer();
   }
@@ -58,7 +60,9 @@ export class LiveSource implements Source {
     this.abort = new AbortController();
     const late = setTimeout(() => this.abort.abort(), 1000 * TIMES.server_silent_s);
     const headers: Record<string, string> = this.last ? { "Last-Event-ID": this.last } : {};
-    const answer = await fetch("/api/events", { signal: this.abort.signal, cache: "no-store", headers }).finally(() => clearTimeout(late));
+    const answer = await fetch("/api/events", { signal: this.abort.signal, cache: "no-store", headers }).finally(() =>
+      clearTimeout(late),
+    );
     if (answer.status === 401) return this.set({ state: "locked", heard_ms: performance.now(), why: "" }, on);
     if (!answer.ok || !answer.body) throw new Error(`the server answers ${answer.status}`);
     this.seen = new Set();

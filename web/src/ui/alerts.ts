@@ -12,9 +12,11 @@ import type { Child } from "./dom";
 const acknowledged = new Set<string>(memory.read<string[]>("acknowledged", []));
 
 /** An alert of another mission, or one that came again later, is another one. */
-const mark_of = (app: App, alert: Alert): string => `${app.store.get("mission")?.name ?? ""} ${alert.id} ${Math.round(alert.since_s ?? 0)}`;
+const mark_of = (app: App, alert: Alert): string =>
+  `${app.store.get("mission")?.name ?? ""} ${alert.id} ${Math.round(alert.since_s ?? 0)}`;
 
-export const open_alerts = (app: App): Alert[] => (app.store.get("alerts", app.at()) ?? []).filter((a) => !acknowledged.has(mark_of(app, a)));
+export const open_alerts = (app: App): Alert[] =>
+  (app.store.get("alerts", app.at()) ?? []).filter((a) => !acknowledged.has(mark_of(app, a)));
 
 function acknowledge(app: App, alerts: Alert[], yes: boolean): void {
   for (const alert of alerts)
@@ -38,7 +40,11 @@ function lines(app: App, view: View, alerts: Alert[], seen: boolean): Child[] {
     if (same) same.push(alert);
     else causes.set(cause, [alert]);
   }
-  return [...causes].map(([cause, same]) => (same.length < LIMITS.folds ? same.map((alert) => line(app, view, alert, seen)) : group(app, view, cause, same, seen)));
+  return [...causes].map(([cause, same]) =>
+    same.length < LIMITS.folds
+      ? same.map((alert) => line(app, view, alert, seen))
+      : group(app, view, cause, same, seen),
+  );
 }
 
 function group(app: App, view: View, cause: string, alerts: Alert[], seen: boolean): Child {
@@ -52,15 +58,38 @@ function group(app: App, view: View, cause: string, alerts: Alert[], seen: boole
     if (!unfolded.delete(key)) unfolded.add(key);
     app.say("options");
   };
-  return h("div", { class: "cause" },
-    h("article", { class: `alert ${first.severity}${seen ? " seen" : ""}` },
-      h("div", { class: "line" }, h("b", {}, robots > 1 ? `${robots} robots: ` : `${alerts.length} times: `, what), h("span", { class: "seen" }, Number.isFinite(since) ? span(app.shown() - since) : "")),
-      h("p", { class: "names" }, alerts.map((a) => a.where).filter((x) => x).join(", ")),
+  return h(
+    "div",
+    { class: "cause" },
+    h(
+      "article",
+      { class: `alert ${first.severity}${seen ? " seen" : ""}` },
+      h(
+        "div",
+        { class: "line" },
+        h("b", {}, robots > 1 ? `${robots} robots: ` : `${alerts.length} times: `, what),
+        h("span", { class: "seen" }, Number.isFinite(since) ? span(app.shown() - since) : ""),
+      ),
+      h(
+        "p",
+        { class: "names" },
+        alerts
+          .map((a) => a.where)
+          .filter((x) => x)
+          .join(", "),
+      ),
       first.todo ? h("p", { class: "todo" }, first.todo) : null,
-      h("div", { class: "row" },
-        button(seen ? "Show as new again" : `Acknowledge ${alerts.length}`, () => acknowledge(app, alerts, !seen), { key: `ack ${key}` }),
-        button(open ? "Fold" : "Unfold", fold, { key: `fold ${key}`, "aria-expanded": String(open) }))),
-    open ? alerts.map((alert) => line(app, view, alert, seen)) : null);
+      h(
+        "div",
+        { class: "row" },
+        button(seen ? "Show as new again" : `Acknowledge ${alerts.length}`, () => acknowledge(app, alerts, !seen), {
+          key: `ack ${key}`,
+        }),
+        button(open ? "Fold" : "Unfold", fold, { key: `fold ${key}`, "aria-expanded": String(open) }),
+      ),
+    ),
+    open ? alerts.map((alert) => line(app, view, alert, seen)) : null,
+  );
 }
 
 export function alerts_panel(app: App, view: View): HTMLElement {
@@ -69,8 +98,16 @@ export function alerts_panel(app: App, view: View): HTMLElement {
     const open = open_alerts(app);
     const seen = all.filter((a) => !open.includes(a));
     return [
-      open.length > 1 ? h("div", { class: "row end" }, button("Acknowledge all", () => acknowledge(app, open, true), { class: "plain" })) : null,
-      open.length === 0 ? h("p", { class: "empty" }, all.length === 0 ? "Nothing to do." : "Everything is acknowledged.") : null,
+      open.length > 1
+        ? h(
+            "div",
+            { class: "row end" },
+            button("Acknowledge all", () => acknowledge(app, open, true), { class: "plain" }),
+          )
+        : null,
+      open.length === 0
+        ? h("p", { class: "empty" }, all.length === 0 ? "Nothing to do." : "Everything is acknowledged.")
+        : null,
       lines(app, view, open, false),
       seen.length > 0 ? h("h3", {}, "Acknowledged, still so") : null,
       lines(app, view, seen, true),
@@ -80,13 +117,30 @@ export function alerts_panel(app: App, view: View): HTMLElement {
 
 function line(app: App, view: View, alert: Alert, seen: boolean): Child {
   const goes = alert.robot !== null || alert.submap !== null || alert.closure !== null;
-  return h("article", { class: `alert ${alert.severity}${seen ? " seen" : ""}` },
-    h("div", { class: "line" }, h("b", {}, alert.what), h("span", { class: "seen", title: alert.since_s === null ? "" : `since ${moment(alert.since_s)}` }, alert.since_s === null ? "" : span(app.shown() - alert.since_s))),
+  return h(
+    "article",
+    { class: `alert ${alert.severity}${seen ? " seen" : ""}` },
+    h(
+      "div",
+      { class: "line" },
+      h("b", {}, alert.what),
+      h(
+        "span",
+        { class: "seen", title: alert.since_s === null ? "" : `since ${moment(alert.since_s)}` },
+        alert.since_s === null ? "" : span(app.shown() - alert.since_s),
+      ),
+    ),
     alert.where ? h("p", {}, alert.where) : null,
     alert.todo ? h("p", { class: "todo" }, alert.todo) : null,
-    h("div", { class: "row" },
-      button(seen ? "Show as new again" : "Acknowledge", () => acknowledge(app, [alert], !seen), { key: `ack ${alert.id}` }),
-      goes ? button("Show", () => show(app, view, alert), { key: `show ${alert.id}` }) : null));
+    h(
+      "div",
+      { class: "row" },
+      button(seen ? "Show as new again" : "Acknowledge", () => acknowledge(app, [alert], !seen), {
+        key: `ack ${alert.id}`,
+      }),
+      goes ? button("Show", () => show(app, view, alert), { key: `show ${alert.id}` }) : null,
+    ),
+  );
 }
 
 function show(app: App, view: View, alert: Alert): void {

@@ -29,15 +29,60 @@ export function beside(app: App, view: View): HTMLElement {
   if (survey) app.clouds.want(survey.cloud);
   const makers = new Makers(app, view);
   const pictures: Picture[] = [
-    { name: "onboard", words: "by each robot's odometry alone", offered: () => odometry !== null, clouds: () => makers.placed((id) => odometry!.get(id) ?? null) },
-    { name: "server", words: "the joint map", offered: () => true, clouds: () => makers.placed((id) => app.world.placed.get(id)?.T ?? null) },
+    {
+      name: "onboard",
+      words: "by each robot's odometry alone",
+      offered: () => odometry !== null,
+      clouds: () => makers.placed((id) => odometry!.get(id) ?? null),
+    },
+    {
+      name: "server",
+      words: "the joint map",
+      offered: () => true,
+      clouds: () => makers.placed((id) => app.world.placed.get(id)?.T ?? null),
+    },
     { name: "survey", words: "what is really there", offered: () => survey !== null, clouds: () => makers.survey() },
-    { name: "distance", words: "the joint map, by its distance to the survey's nearest point", offered: () => survey !== null, clouds: () => makers.distance() },
+    {
+      name: "distance",
+      words: "the joint map, by its distance to the survey's nearest point",
+      offered: () => survey !== null,
+      clouds: () => makers.distance(),
+    },
   ];
   const shown = pictures.filter((p) => p.offered()).map((picture) => ({ picture, painter: new CpuPainter() }));
-  const figures = shown.map(({ picture, painter }) => h("figure", {}, painter.canvas, h("figcaption", {}, h("b", {}, picture.name), ` ${picture.words}`)));
-  const element = h("section", {}, h("h2", {}, "The map beside the survey"), h("p", { class: "lead" }, "Every picture shows the same place at the same scale; move the big one, and these follow."), h("div", { class: "figures" }, figures),
-    survey ? h("p", { class: "row key" }, h("span", { class: "scale" }, h("span", {}, "0"), h("span", { class: "gradient", style: { background: `linear-gradient(90deg,${[0, 0.25, 0.5, 0.75, 1].map((x) => `rgb(${bad(x).map(Math.round).join()})`).join()})` } }), h("span", {}, `${100 * SurveyDistance.most_m} cm or more`)), h("span", {}, "distance to the survey")) : null);
+  const figures = shown.map(({ picture, painter }) =>
+    h("figure", {}, painter.canvas, h("figcaption", {}, h("b", {}, picture.name), ` ${picture.words}`)),
+  );
+  const element = h(
+    "section",
+    {},
+    h("h2", {}, "The map beside the survey"),
+    h(
+      "p",
+      { class: "lead" },
+      "Every picture shows the same place at the same scale; move the big one, and these follow.",
+    ),
+    h("div", { class: "figures" }, figures),
+    survey
+      ? h(
+          "p",
+          { class: "row key" },
+          h(
+            "span",
+            { class: "scale" },
+            h("span", {}, "0"),
+            h("span", {
+              class: "gradient",
+              style: {
+                background: `linear-gradient(90deg,${[0, 0.25, 0.5, 0.75, 1].map((x) => `rgb(${bad(x).map(Math.round).join()})`).join()})`,
+              },
+            }),
+            h("span", {}, `${100 * SurveyDistance.most_m} cm or more`),
+          ),
+          h("span", {}, "distance to the survey"),
+        )
+      : null,
+  );
   for (const { painter } of shown) painter.resize(kWidth, kHeight);
   let waiting = false;
   const draw = (): void => {
@@ -45,7 +90,14 @@ export function beside(app: App, view: View): HTMLElement {
     if (!element.isConnected || !view.eye.width) return;
     const matrix = view.eye.reshaped(kWidth / kHeight);
     for (const { picture, painter } of shown) {
-      painter.draw(picture.clouds(), matrix, view.eye.camera, window_of(app.world, app.options), app.dark ? [14, 18, 26] : [244, 243, 239], false);
+      painter.draw(
+        picture.clouds(),
+        matrix,
+        view.eye.camera,
+        window_of(app.world, app.options),
+        app.dark ? [14, 18, 26] : [244, 243, 239],
+        false,
+      );
     }
   };
   view.on_draw(() => {
@@ -62,11 +114,24 @@ class Makers {
   private grey = ramp_of([140, 150, 165], true);
   private bad = Uint32Array.from({ length: 256 }, (_, i) => abgr(bad(i / 255)));
 
-  constructor(private readonly app: App, private readonly view: View) {}
+  constructor(
+    private readonly app: App,
+    private readonly view: View,
+  ) {}
 
   placed(pose: (id: string) => Pose | null): Map<string, Painted> {
     const { app, view } = this;
-    const out = this.dresser.dress(app.world, app.clouds, view.eye, { ...view.dressing(), options: { ...app.options, colour: "robot", layers: { ...app.options.layers, clouds: true } } }, Infinity, true);
+    const out = this.dresser.dress(
+      app.world,
+      app.clouds,
+      view.eye,
+      {
+        ...view.dressing(),
+        options: { ...app.options, colour: "robot", layers: { ...app.options.layers, clouds: true } },
+      },
+      Infinity,
+      true,
+    );
     for (const [id, painted] of out) {
       const T = pose(id);
       if (T) painted.T_world = rows_of(T);
@@ -83,7 +148,21 @@ class Makers {
 
   survey(): Map<string, Painted> {
     const cloud = this.survey_cloud();
-    return cloud ? new Map([["survey", { xyz: cloud.xyz, count: cloud.n, step_m: cloud.step_m, T_world: rows_of([0, 0, 0, 0, 0, 0, 1]), ramp: this.grey, size: 1 }]]) : new Map();
+    return cloud
+      ? new Map([
+          [
+            "survey",
+            {
+              xyz: cloud.xyz,
+              count: cloud.n,
+              step_m: cloud.step_m,
+              T_world: rows_of([0, 0, 0, 0, 0, 0, 1]),
+              ramp: this.grey,
+              size: 1,
+            },
+          ],
+        ])
+      : new Map();
   }
 
   /** Points by their distance to the survey, computed once per cloud. */
@@ -92,7 +171,16 @@ class Makers {
     const out = new Map<string, Painted>();
     for (const [id, placed] of this.app.world.placed) {
       const cloud = this.app.clouds.get(id);
-      if (cloud && distances) out.set(id, { xyz: cloud.xyz, count: cloud.n, step_m: cloud.step_m, T_world: rows_of(placed.T), ramp: this.bad, size: 1, shades: distances.shades(id, cloud, placed.target) });
+      if (cloud && distances)
+        out.set(id, {
+          xyz: cloud.xyz,
+          count: cloud.n,
+          step_m: cloud.step_m,
+          T_world: rows_of(placed.T),
+          ramp: this.bad,
+          size: 1,
+          shades: distances.shades(id, cloud, placed.target),
+        });
     }
     return out;
   }

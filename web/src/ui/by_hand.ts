@@ -42,7 +42,11 @@ function begin(app: App, change: Partial<Draft>): void {
 
 class Pick implements Tool {
   readonly name: string;
-  constructor(private readonly app: App, private readonly view: View, private readonly end: "from" | "to") {
+  constructor(
+    private readonly app: App,
+    private readonly view: View,
+    private readonly end: "from" | "to",
+  ) {
     this.name = `Point at the ${end === "from" ? "first" : "second"} place`;
   }
   point(spot: Spot): void {
@@ -67,7 +71,11 @@ export function by_hand_panel(app: App, view: View): HTMLElement {
     const { from, to } = draft;
     if (from && to) clouds.show({ from, to, measured: draft.answer?.T_from_to ?? draft.guess });
     return [
-      h("p", { class: "lead" }, "Join two places that you know to be the same. Tutti lays their clouds over each other; nothing is in the map before you keep it."),
+      h(
+        "p",
+        { class: "lead" },
+        "Join two places that you know to be the same. Tutti lays their clouds over each other; nothing is in the map before you keep it.",
+      ),
       end_row(app, view, "from"),
       end_row(app, view, "to"),
       from && to ? [clouds.element, nudges(app), ask_row(app)] : null,
@@ -81,14 +89,34 @@ function end_row(app: App, view: View, end: "from" | "to"): Child {
   const id = draft[end];
   const submaps = [...app.store.all("submap")].map(([, s]) => s).sort((a, b) => a.robot - b.robot || a.index - b.index);
   const list = `submaps-${end}`;
-  const input = h("input", { type: "text", list, placeholder: "Robot/number", value: id ? app.submap_name(id) : "", "aria-label": end === "from" ? "First submap" : "Second submap", on: { change: ((e: Event) => {
-    const name = (e.target as HTMLInputElement).value.trim();
-    (e.target as HTMLInputElement).blur();
-    const found = submaps.find((s) => s.name === name);
-    if (found) set_end(app, end, found.id);
-    else if (name) notice(`There is no submap ${name}.`, "error");
-  }) as () => void } });
-  return h("div", { class: "end" }, h("span", {}, end === "from" ? "First" : "Second"), input, h("datalist", { id: list }, submaps.map((s) => h("option", { value: s.name }))), button("Pick", () => view.use(new Pick(app, view, end)), { key: `pick ${end}`, title: "Point at it in the map" }));
+  const input = h("input", {
+    type: "text",
+    list,
+    placeholder: "Robot/number",
+    value: id ? app.submap_name(id) : "",
+    "aria-label": end === "from" ? "First submap" : "Second submap",
+    on: {
+      change: ((e: Event) => {
+        const name = (e.target as HTMLInputElement).value.trim();
+        (e.target as HTMLInputElement).blur();
+        const found = submaps.find((s) => s.name === name);
+        if (found) set_end(app, end, found.id);
+        else if (name) notice(`There is no submap ${name}.`, "error");
+      }) as () => void,
+    },
+  });
+  return h(
+    "div",
+    { class: "end" },
+    h("span", {}, end === "from" ? "First" : "Second"),
+    input,
+    h(
+      "datalist",
+      { id: list },
+      submaps.map((s) => h("option", { value: s.name })),
+    ),
+    button("Pick", () => view.use(new Pick(app, view, end)), { key: `pick ${end}`, title: "Point at it in the map" }),
+  );
 }
 
 /** Lays the second cloud by hand before it is registered. */
@@ -101,8 +129,19 @@ function nudges(app: App): Child {
     const guess: Pose = [turned[0] + x, turned[1] + y, turned[2], turned[3], turned[4], turned[5], turned[6]];
     begin(app, { guess });
   };
-  const nudge = (text: string, title: string, x: number, y: number, degrees: number) => button(text, () => move(x, y, degrees), { key: `nudge ${title}`, title, "aria-label": title, class: "square" });
-  return h("div", { class: "row" }, h("span", { class: "soft" }, "Lay the second"), nudge("←", "1 m left", -1, 0, 0), nudge("→", "1 m right", 1, 0, 0), nudge("↑", "1 m forward", 0, 1, 0), nudge("↓", "1 m back", 0, -1, 0), nudge("⟲", "10° to the left", 0, 0, 10), nudge("⟳", "10° to the right", 0, 0, -10));
+  const nudge = (text: string, title: string, x: number, y: number, degrees: number) =>
+    button(text, () => move(x, y, degrees), { key: `nudge ${title}`, title, "aria-label": title, class: "square" });
+  return h(
+    "div",
+    { class: "row" },
+    h("span", { class: "soft" }, "Lay the second"),
+    nudge("←", "1 m left", -1, 0, 0),
+    nudge("→", "1 m right", 1, 0, 0),
+    nudge("↑", "1 m forward", 0, 1, 0),
+    nudge("↓", "1 m back", 0, -1, 0),
+    nudge("⟲", "10° to the left", 0, 0, 10),
+    nudge("⟳", "10° to the right", 0, 0, -10),
+  );
 }
 
 /** As the map has them, or both at one place. */
@@ -114,8 +153,16 @@ function start_of(app: App): Pose {
 function ask_row(app: App): Child {
   if (draft.kept) return null;
   const label = draft.busy ? "Registering …" : draft.guess ? "Register from here" : "Register";
-  return h("div", { class: "row" }, button(label, () => void register(app), { key: "register", class: draft.answer ? "" : "primary", disabled: draft.busy || !app.may("register") }),
-    draft.guess ? button("Let Tutti search", () => begin(app, {}), { class: "plain" }) : null);
+  return h(
+    "div",
+    { class: "row" },
+    button(label, () => void register(app), {
+      key: "register",
+      class: draft.answer ? "" : "primary",
+      disabled: draft.busy || !app.may("register"),
+    }),
+    draft.guess ? button("Let Tutti search", () => begin(app, {}), { class: "plain" }) : null,
+  );
 }
 
 async function register(app: App): Promise<void> {
@@ -157,7 +204,15 @@ function change_words(app: App): Child {
   return [
     change.joined > 0 ? h("p", {}, `It would join ${many(change.joined + 1, "part")} of the map.`) : null,
     change.largest_m > TIMES.ghost_m
-      ? h("p", {}, "The map would move by up to ", h("b", {}, metres(change.largest_m)), ` (${app.submap_name(change.largest)}); `, [...per_robot].map(([robot, m]) => `${app.robot_name(robot)} ${metres(m)}`).join(", "), ". Dashed lines show where to.")
+      ? h(
+          "p",
+          {},
+          "The map would move by up to ",
+          h("b", {}, metres(change.largest_m)),
+          ` (${app.submap_name(change.largest)}); `,
+          [...per_robot].map(([robot, m]) => `${app.robot_name(robot)} ${metres(m)}`).join(", "),
+          ". Dashed lines show where to.",
+        )
       : h("p", {}, `What is joined already would move by less than ${metres(TIMES.ghost_m)}.`),
   ];
 }
@@ -166,10 +221,24 @@ function answer(app: App, found: Registration): Child {
   const fits = found.found && found.evidence.every((gate) => gate.ok);
   const may_keep = found.T_from_to && app.may("closure") && !draft.kept;
   return [
-    h("p", { class: `state ${fits ? "" : "warn"}` }, h("b", {}, fits ? "They fit." : found.found ? "Tutti would refuse this:" : "They do not fit."), ` ${found.why}`),
+    h(
+      "p",
+      { class: `state ${fits ? "" : "warn"}` },
+      h("b", {}, fits ? "They fit." : found.found ? "Tutti would refuse this:" : "They do not fit."),
+      ` ${found.why}`,
+    ),
     found.look === null || draft.kept ? null : change_words(app),
     gates(found.evidence),
-    may_keep ? h("div", { class: "row decide" }, button(fits ? "Keep it in the map" : "Keep it all the same", () => void keep(app), { key: "keep", class: fits ? "primary" : "danger" })) : null,
+    may_keep
+      ? h(
+          "div",
+          { class: "row decide" },
+          button(fits ? "Keep it in the map" : "Keep it all the same", () => void keep(app), {
+            key: "keep",
+            class: fits ? "primary" : "danger",
+          }),
+        )
+      : null,
   ];
 }
 
@@ -186,7 +255,12 @@ async function keep(app: App): Promise<void> {
 }
 
 function kept(app: App, name: string): Child {
-  return h("div", { class: "row decide" }, h("span", {}, "Kept."), button("Undo", () => void undo(app, name), { key: "undo", class: "danger" }));
+  return h(
+    "div",
+    { class: "row decide" },
+    h("span", {}, "Kept."),
+    button("Undo", () => void undo(app, name), { key: "undo", class: "danger" }),
+  );
 }
 
 async function undo(app: App, name: string): Promise<void> {

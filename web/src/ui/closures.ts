@@ -9,11 +9,19 @@ import type { View } from "../scene/view";
 import { button, h, held, panel, swatch } from "./dom";
 import type { Child } from "./dom";
 
-export const STATE_WORDS: Record<ClosureState, string> = { accepted: "in the map", candidate: "waiting", rejected: "refused" };
+export const STATE_WORDS: Record<ClosureState, string> = {
+  accepted: "in the map",
+  candidate: "waiting",
+  rejected: "refused",
+};
 const filter = { state: "all" as ClosureState | "all" | "hand", words: "", between: false };
 
 export function closures_panel(app: App, view: View): HTMLElement {
-  const search = h("input", { type: "search", placeholder: "Filter: alpha/12, overlap, …", "aria-label": "Filter closures" });
+  const search = h("input", {
+    type: "search",
+    placeholder: "Filter: alpha/12, overlap, …",
+    "aria-label": "Filter closures",
+  });
   const list = panel(app, ["data", "time", "selection", "options"], {}, () => content(app, view));
   search.addEventListener("input", () => {
     filter.words = search.value.toLowerCase().trim();
@@ -26,22 +34,38 @@ function content(app: App, view: View): Child[] {
   const all = [...app.store.all("closure", app.at())];
   const count = (state: ClosureState) => all.filter(([, c]) => c.state === state).length;
   const choose = (state: typeof filter.state, text: string) =>
-    button(text, () => {
-      filter.state = state;
-      app.say("options");
-    }, { key: `filter ${state}`, "aria-pressed": String(filter.state === state) });
+    button(
+      text,
+      () => {
+        filter.state = state;
+        app.say("options");
+      },
+      { key: `filter ${state}`, "aria-pressed": String(filter.state === state) },
+    );
   const rows = all.filter(([, c]) => shown(app, c)).reverse();
   return [
-    h("div", { class: "row chips" }, choose("all", `All ${all.length}`), choose("accepted", `In the map ${count("accepted")}`), choose("candidate", `Waiting ${count("candidate")}`), choose("rejected", `Refused ${count("rejected")}`),
-      all.some(([, c]) => c.by_hand || c.word) ? choose("hand", "By a person") : null),
+    h(
+      "div",
+      { class: "row chips" },
+      choose("all", `All ${all.length}`),
+      choose("accepted", `In the map ${count("accepted")}`),
+      choose("candidate", `Waiting ${count("candidate")}`),
+      choose("rejected", `Refused ${count("rejected")}`),
+      all.some(([, c]) => c.by_hand || c.word) ? choose("hand", "By a person") : null,
+    ),
     rows.slice(0, LIMITS.rows).map(([name, closure]) => row(app, view, name, closure)),
-    rows.length === 0 ? h("p", { class: "empty" }, all.length === 0 ? "No closure was found yet." : "None fits the filter.") : null,
-    rows.length > LIMITS.rows ? h("p", { class: "empty" }, `and ${rows.length - LIMITS.rows} more: filter to see them`) : null,
+    rows.length === 0
+      ? h("p", { class: "empty" }, all.length === 0 ? "No closure was found yet." : "None fits the filter.")
+      : null,
+    rows.length > LIMITS.rows
+      ? h("p", { class: "empty" }, `and ${rows.length - LIMITS.rows} more: filter to see them`)
+      : null,
   ];
 }
 
 function shown(app: App, c: Closure): boolean {
-  if (filter.state === "hand" ? !c.by_hand && !c.word : filter.state !== "all" && c.state !== filter.state) return false;
+  if (filter.state === "hand" ? !c.by_hand && !c.word : filter.state !== "all" && c.state !== filter.state)
+    return false;
   if (filter.words === "") return true;
   return `${pair_name(app, c)} ${c.reason} ${c.word?.by ?? ""}`.toLowerCase().includes(filter.words);
 }
@@ -52,15 +76,39 @@ function row(app: App, view: View, name: string, closure: Closure): HTMLElement 
   const chosen = app.selection?.kind === "closure" && app.selection.name === name;
   const palette = palette_of(app.dark);
   const misfit = closure.links[0]?.misfit_m;
-  return h("button", { type: "button", class: `closure${chosen ? " chosen" : ""}`, key: `closure ${name}`, on: { click: () => {
-    app.select({ kind: "closure", name });
-    const ends = ends_of(app, closure);
-    if (ends) view.look_at(ends[0].map((x, k) => (x + ends[1][k]) / 2), 45);
-  } } },
-    h("span", { class: "line" }, swatch(state_colour(palette, closure.state)), h("b", {}, pair_name(app, closure)), h("span", { class: "seen" }, closure.by_hand ? "by hand" : misfit == null ? STATE_WORDS[closure.state] : `off ${figure(misfit, "m")}`)),
+  return h(
+    "button",
+    {
+      type: "button",
+      class: `closure${chosen ? " chosen" : ""}`,
+      key: `closure ${name}`,
+      on: {
+        click: () => {
+          app.select({ kind: "closure", name });
+          const ends = ends_of(app, closure);
+          if (ends)
+            view.look_at(
+              ends[0].map((x, k) => (x + ends[1][k]) / 2),
+              45,
+            );
+        },
+      },
+    },
+    h(
+      "span",
+      { class: "line" },
+      swatch(state_colour(palette, closure.state)),
+      h("b", {}, pair_name(app, closure)),
+      h(
+        "span",
+        { class: "seen" },
+        closure.by_hand ? "by hand" : misfit == null ? STATE_WORDS[closure.state] : `off ${figure(misfit, "m")}`,
+      ),
+    ),
     closure.state !== "accepted" && closure.reason ? h("span", { class: "detail" }, closure.reason) : null,
     held(app, `closure/${name}`),
-    closure.word ? h("span", { class: "detail" }, `${closure.word.by || "somebody"}: ${closure.word.wish}`) : null);
+    closure.word ? h("span", { class: "detail" }, `${closure.word.by || "somebody"}: ${closure.word.wish}`) : null,
+  );
 }
 
 function refusals(app: App): HTMLElement {
@@ -68,7 +116,19 @@ function refusals(app: App): HTMLElement {
     const all = app.store.get("refusals", app.at()) ?? [];
     if (all.length === 0) return [];
     const most = Math.max(...all.map((r) => r.count));
-    return [h("h3", {}, "Pairs refused, by reason"), [...all].sort((a, b) => b.count - a.count).map((r) =>
-      h("div", { class: "bar-row" }, h("span", {}, r.reason), h("span", { class: "track" }, h("span", { class: "bar", style: { width: `${(100 * r.count) / most}%` } })), h("span", { class: "right" }, r.count)))];
+    return [
+      h("h3", {}, "Pairs refused, by reason"),
+      [...all]
+        .sort((a, b) => b.count - a.count)
+        .map((r) =>
+          h(
+            "div",
+            { class: "bar-row" },
+            h("span", {}, r.reason),
+            h("span", { class: "track" }, h("span", { class: "bar", style: { width: `${(100 * r.count) / most}%` } })),
+            h("span", { class: "right" }, r.count),
+          ),
+        ),
+    ];
   });
 }

@@ -11,7 +11,11 @@ type Props = {
   on?: Partial<Record<keyof HTMLElementEventMap, (event: never) => void>>;
 } & Record<string, unknown>;
 
-export function h<K extends keyof HTMLElementTagNameMap>(tag: K, props: Props = {}, ...children: Child[]): HTMLElementTagNameMap[K] {
+export function h<K extends keyof HTMLElementTagNameMap>(
+  tag: K,
+  props: Props = {},
+  ...children: Child[]
+): HTMLElementTagNameMap[K] {
   const element = document.createElement(tag);
   const { class: name, on, key, style, ...rest } = props;
   if (name) element.className = name;
@@ -36,7 +40,11 @@ export function append(element: Element, children: Child[]): void {
 
 /** `key`: finds the button again after its panel was drawn anew. */
 export function button(text: Child, run: () => void, props: Props = {}): HTMLButtonElement {
-  return h("button", { type: "button", key: typeof text === "string" ? text : undefined, ...props, on: { click: run as () => void } }, text);
+  return h(
+    "button",
+    { type: "button", key: typeof text === "string" ? text : undefined, ...props, on: { click: run as () => void } },
+    text,
+  );
 }
 
 export function swatch(colour: string): HTMLElement {
@@ -46,7 +54,9 @@ export function swatch(colour: string): HTMLElement {
 /** Who else inspects something now. */
 export function held(app: App, what: string): Child {
   const names = app.holders(what);
-  return names.length === 0 ? null : h("span", { class: "detail held" }, `${names.join(", ")} ${names.length === 1 ? "looks" : "look"} at this`);
+  return names.length === 0
+    ? null
+    : h("span", { class: "detail held" }, `${names.join(", ")} ${names.length === 1 ? "looks" : "look"} at this`);
 }
 
 const kIcons = {
@@ -100,7 +110,12 @@ export function panel(app: App, topics: readonly Topic[], props: Props, render: 
     stale = !element.isConnected || element.closest("[hidden]") !== null;
     if (stale) return;
     const active = document.activeElement;
-    if (active && element.contains(active) && /^(INPUT|TEXTAREA|SELECT)$/.test(active.tagName) && !/^(checkbox|file)$/.test(active.getAttribute("type") ?? "")) {
+    if (
+      active &&
+      element.contains(active) &&
+      /^(INPUT|TEXTAREA|SELECT)$/.test(active.tagName) &&
+      !/^(checkbox|file)$/.test(active.getAttribute("type") ?? "")
+    ) {
       stale = true; // somebody is typing
       return;
     }
@@ -108,7 +123,8 @@ export function panel(app: App, topics: readonly Topic[], props: Props, render: 
     const content: Child[] = render();
     element.replaceChildren();
     append(element, content);
-    if (focused) element.querySelector<HTMLElement>(`[data-key="${CSS.escape(focused)}"]`)?.focus({ preventScroll: true });
+    if (focused)
+      element.querySelector<HTMLElement>(`[data-key="${CSS.escape(focused)}"]`)?.focus({ preventScroll: true });
   };
   app.on((topic) => {
     if (!topics.includes(topic) && !(stale && (topic === "tick" || topic === "options"))) return;

@@ -20,40 +20,80 @@ export function inspector_panel(app: App): HTMLElement {
     if (s?.kind !== "closure") return [];
     if (!closure) return [h("p", { class: "empty" }, "This closure is not there at this time.")];
     clouds.show({ from: closure.from, to: closure.to, measured: closure.links[0]?.T_from_to ?? null });
-    return [heading(app, s.name, closure), clouds.element, legend(app, closure, clouds), decisions(app, s.name, closure), numbers(app, closure), gates(closure.evidence), origin(closure)];
+    return [
+      heading(app, s.name, closure),
+      clouds.element,
+      legend(app, closure, clouds),
+      decisions(app, s.name, closure),
+      numbers(app, closure),
+      gates(closure.evidence),
+      origin(closure),
+    ];
   });
 }
 
 function heading(app: App, name: string, closure: Closure): Child {
   const colour = state_colour(palette_of(app.dark), closure.state);
   return [
-    h("div", { class: "line" }, h("h2", {}, pair_name(app, closure)), button("×", () => app.select(null), { class: "plain", "aria-label": "Close", key: `close ${name}` })),
-    h("p", { class: "state" }, swatch(colour), h("b", {}, `${closure.by_hand ? "By hand, " : ""}${STATE_WORDS[closure.state]}`), closure.reason ? `: ${closure.reason}` : ""),
+    h(
+      "div",
+      { class: "line" },
+      h("h2", {}, pair_name(app, closure)),
+      button("×", () => app.select(null), { class: "plain", "aria-label": "Close", key: `close ${name}` }),
+    ),
+    h(
+      "p",
+      { class: "state" },
+      swatch(colour),
+      h("b", {}, `${closure.by_hand ? "By hand, " : ""}${STATE_WORDS[closure.state]}`),
+      closure.reason ? `: ${closure.reason}` : "",
+    ),
     held(app, `closure/${name}`),
-    closure.word ? h("p", { class: "word" }, `${closure.word.by || "Somebody"} said ${closure.word.wish}${closure.word.wall_ns ? ` at ${wall(closure.word.wall_ns)}` : ""}.`) : null,
+    closure.word
+      ? h(
+          "p",
+          { class: "word" },
+          `${closure.word.by || "Somebody"} said ${closure.word.wish}${closure.word.wall_ns ? ` at ${wall(closure.word.wall_ns)}` : ""}.`,
+        )
+      : null,
   ];
 }
 
 function legend(app: App, closure: Closure, clouds: PairView): Child {
   const colours = kPairColours[app.dark ? "dark" : "light"];
   const toggle = (by_map: boolean, text: string) =>
-    button(text, () => {
-      clouds.by_map = by_map;
-      app.say("options");
-    }, { "aria-pressed": String(clouds.by_map === by_map) });
-  return h("div", { class: "row legend" }, swatch(`rgb(${colours[0].join()})`), app.submap_name(closure.from), swatch(`rgb(${colours[1].join()})`), app.submap_name(closure.to),
-    h("span", { class: "segmented" }, toggle(false, "As measured"), toggle(true, "As in the map")));
+    button(
+      text,
+      () => {
+        clouds.by_map = by_map;
+        app.say("options");
+      },
+      { "aria-pressed": String(clouds.by_map === by_map) },
+    );
+  return h(
+    "div",
+    { class: "row legend" },
+    swatch(`rgb(${colours[0].join()})`),
+    app.submap_name(closure.from),
+    swatch(`rgb(${colours[1].join()})`),
+    app.submap_name(closure.to),
+    h("span", { class: "segmented" }, toggle(false, "As measured"), toggle(true, "As in the map")),
+  );
 }
 
 /** What a person may decide on a closure now. */
 function decisions(app: App, name: string, closure: Closure): Child {
   if (!app.may("decide")) return null;
-  const say = (wish: Wish, text: string, props = {}) => button(text, () => void decide(app, name, wish), { ...props, key: `decide ${wish}` });
+  const say = (wish: Wish, text: string, props = {}) =>
+    button(text, () => void decide(app, name, wish), { ...props, key: `decide ${wish}` });
   const said = closure.word && closure.word.wish !== "withdraw" ? closure.word.wish : null;
-  return h("div", { class: "row decide" },
+  return h(
+    "div",
+    { class: "row decide" },
     closure.state !== "accepted" && said !== "accept" ? say("accept", "Accept", { class: "primary" }) : null,
     closure.state !== "rejected" && said !== "reject" ? say("reject", "Reject", { class: "danger" }) : null,
-    said ? say("withdraw", `Take back “${said}”`) : null);
+    said ? say("withdraw", `Take back “${said}”`) : null,
+  );
 }
 
 async function decide(app: App, name: string, wish: Wish): Promise<void> {
@@ -64,9 +104,37 @@ async function decide(app: App, name: string, wish: Wish): Promise<void> {
 
 function numbers(app: App, closure: Closure): Child {
   if (closure.links.length === 0) return null;
-  return [h("h3", {}, "Numbers"), h("div", { class: "scroll" }, h("table", {},
-    h("thead", {}, h("tr", {}, ["link", "measured", "turn", "map differs", "by", "χ²"].map((t) => h("th", {}, t)))),
-    h("tbody", {}, closure.links.map((link, i) => h("tr", { title: link.reason }, row(app, closure, link, i).map((t) => h("td", {}, t)))))))];
+  return [
+    h("h3", {}, "Numbers"),
+    h(
+      "div",
+      { class: "scroll" },
+      h(
+        "table",
+        {},
+        h(
+          "thead",
+          {},
+          h(
+            "tr",
+            {},
+            ["link", "measured", "turn", "map differs", "by", "χ²"].map((t) => h("th", {}, t)),
+          ),
+        ),
+        h(
+          "tbody",
+          {},
+          closure.links.map((link, i) =>
+            h(
+              "tr",
+              { title: link.reason },
+              row(app, closure, link, i).map((t) => h("td", {}, t)),
+            ),
+          ),
+        ),
+      ),
+    ),
+  ];
 }
 
 function row(app: App, closure: Closure, link: Link, i: number): string[] {
@@ -76,18 +144,50 @@ function row(app: App, closure: Closure, link: Link, i: number): string[] {
     const off = compose(inverse(link.T_from_to), compose(inverse(a.target), b.target));
     [metres_off, degrees_off] = [distance(off, [0, 0, 0]), turn_deg(off)];
   }
-  return [String(i + 1), metres(Math.hypot(...link.T_from_to.slice(0, 3))), degrees(turn_deg(link.T_from_to)), metres(metres_off), degrees(degrees_off), figure(link.chi2)];
+  return [
+    String(i + 1),
+    metres(Math.hypot(...link.T_from_to.slice(0, 3))),
+    degrees(turn_deg(link.T_from_to)),
+    metres(metres_off),
+    degrees(degrees_off),
+    figure(link.chi2),
+  ];
 }
 
 /** Measured values against their limits; those that fail first. */
 export function gates(evidence: Gate[]): Child {
   if (evidence.length === 0) return null;
   const sorted = [...evidence].sort((a, b) => Number(a.ok) - Number(b.ok));
-  return [h("h3", {}, "What was checked"), h("ul", { class: "gates" }, sorted.map((gate) => h("li", { class: gate.ok ? "ok" : "failed" },
-    h("span", { class: "mark" }, gate.ok ? "✓" : "✗"), h("span", {}, gate.reason), h("span", { class: "right" }, gate.value === null ? "" : figure(gate.value, gate.unit), gate.limit === null ? "" : h("small", {}, ` at ${gate.at_least ? "least" : "most"} ${figure(gate.limit, gate.unit)}`)))))];
+  return [
+    h("h3", {}, "What was checked"),
+    h(
+      "ul",
+      { class: "gates" },
+      sorted.map((gate) =>
+        h(
+          "li",
+          { class: gate.ok ? "ok" : "failed" },
+          h("span", { class: "mark" }, gate.ok ? "✓" : "✗"),
+          h("span", {}, gate.reason),
+          h(
+            "span",
+            { class: "right" },
+            gate.value === null ? "" : figure(gate.value, gate.unit),
+            gate.limit === null
+              ? ""
+              : h("small", {}, ` at ${gate.at_least ? "least" : "most"} ${figure(gate.limit, gate.unit)}`),
+          ),
+        ),
+      ),
+    ),
+  ];
 }
 
 function origin(closure: Closure): Child {
-  const words = [closure.verifier && `found by ${closure.verifier}`, closure.worker && `verified by ${/^\d+$/.test(closure.worker) ? "worker " : ""}${closure.worker}`, closure.verified_ns && `at ${wall(closure.verified_ns)}`].filter((w) => w);
+  const words = [
+    closure.verifier && `found by ${closure.verifier}`,
+    closure.worker && `verified by ${/^\d+$/.test(closure.worker) ? "worker " : ""}${closure.worker}`,
+    closure.verified_ns && `at ${wall(closure.verified_ns)}`,
+  ].filter((w) => w);
   return words.length ? h("p", { class: "detail" }, words.join(", ")) : null;
 }

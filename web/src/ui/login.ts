@@ -10,17 +10,40 @@ import type { Child } from "./dom";
 
 export function person(app: App): Child {
   const { me } = app;
-  if (app.is_locked()) return h("label", { class: "button primary", title: "Choose the credential file that `tutti pki` has made for you" }, "Log in", credential_input(app));
-  if (me.login) return h("span", { class: "person" }, h("b", {}, me.name), ` ${me.role}`, button("Log out", () => void attempt(() => log_out(app)), { class: "plain" }));
+  if (app.is_locked())
+    return h(
+      "label",
+      { class: "button primary", title: "Choose the credential file that `tutti pki` has made for you" },
+      "Log in",
+      credential_input(app),
+    );
+  if (me.login)
+    return h(
+      "span",
+      { class: "person" },
+      h("b", {}, me.name),
+      ` ${me.role}`,
+      button("Log out", () => void attempt(() => log_out(app)), { class: "plain" }),
+    );
   if (!me.may_decide) return null;
-  return button(app.by ? `You: ${app.by}` : "Your name?", () => void name_of(app), { class: "plain", title: "Decisions carry this name" });
+  return button(app.by ? `You: ${app.by}` : "Your name?", () => void name_of(app), {
+    class: "plain",
+    title: "Decisions carry this name",
+  });
 }
 
 function credential_input(app: App): HTMLElement {
-  return h("input", { type: "file", class: "hidden", "aria-label": "Credential file", on: { change: ((e: Event) => {
-    const file = (e.target as HTMLInputElement).files?.[0];
-    if (file) void attempt(() => log_in(app, file));
-  }) as () => void } });
+  return h("input", {
+    type: "file",
+    class: "hidden",
+    "aria-label": "Credential file",
+    on: {
+      change: ((e: Event) => {
+        const file = (e.target as HTMLInputElement).files?.[0];
+        if (file) void attempt(() => log_in(app, file));
+      }) as () => void,
+    },
+  });
 }
 
 async function log_in(app: App, file: Blob): Promise<void> {
@@ -43,7 +66,23 @@ async function log_out(app: App): Promise<void> {
 export function name_of(app: App): Promise<string> {
   return new Promise((resolve) => {
     const input = h("input", { type: "text", maxlength: "64", placeholder: "Name", value: app.by });
-    const dialog = h("dialog", { class: "ask" }, h("form", { method: "dialog" }, h("h2", {}, "Your name"), h("p", {}, "Every decision carries it."), input, h("div", { class: "row" }, h("button", { value: "ok", class: "primary" }, "Use it"), h("button", { value: "no", formnovalidate: true }, "Cancel"))));
+    const dialog = h(
+      "dialog",
+      { class: "ask" },
+      h(
+        "form",
+        { method: "dialog" },
+        h("h2", {}, "Your name"),
+        h("p", {}, "Every decision carries it."),
+        input,
+        h(
+          "div",
+          { class: "row" },
+          h("button", { value: "ok", class: "primary" }, "Use it"),
+          h("button", { value: "no", formnovalidate: true }, "Cancel"),
+        ),
+      ),
+    );
     dialog.addEventListener("close", () => {
       if (dialog.returnValue === "ok" && input.value.trim()) {
         app.by = input.value.trim();

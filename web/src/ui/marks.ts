@@ -20,7 +20,10 @@ const draft: { spot: Spot | null; photo: string | null } = { spot: null, photo: 
 
 class PlaceMark implements Tool {
   readonly name = "Point at the place";
-  constructor(private readonly app: App, private readonly view: View) {}
+  constructor(
+    private readonly app: App,
+    private readonly view: View,
+  ) {}
   point(spot: Spot): void {
     draft.spot = spot;
     this.view.use(null);
@@ -30,32 +33,63 @@ class PlaceMark implements Tool {
 }
 
 export function marks_panel(app: App, view: View): HTMLElement {
-  const text = h("textarea", { rows: 2, maxlength: "400", placeholder: "What is here?", "aria-label": "Words of the mark" });
-  return h("div", { class: "marks" },
+  const text = h("textarea", {
+    rows: 2,
+    maxlength: "400",
+    placeholder: "What is here?",
+    "aria-label": "Words of the mark",
+  });
+  return h(
+    "div",
+    { class: "marks" },
     panel(app, ["tool", "me", "time"], {}, () => (app.may("mark") ? [form(app, view, text)] : [])),
     panel(app, ["data", "time", "selection", "me"], {}, () => {
       const all = [...app.store.all("mark", app.at())];
-      return [all.length === 0 ? h("p", { class: "empty" }, "No marks yet.") : null, all.slice(0, LIMITS.rows).map(([id, mark]) => line(app, view, id, mark))];
-    }));
+      return [
+        all.length === 0 ? h("p", { class: "empty" }, "No marks yet.") : null,
+        all.slice(0, LIMITS.rows).map(([id, mark]) => line(app, view, id, mark)),
+      ];
+    }),
+  );
 }
 
 function form(app: App, view: View, text: HTMLTextAreaElement): Child {
-  if (!draft.spot) return h("div", { class: "row" }, button("New mark", () => view.use(new PlaceMark(app, view)), { class: "primary", key: "new mark" }));
-  const photo = h("input", { type: "file", accept: "image/*", class: "hidden", "aria-label": "Photo", on: { change: ((e: Event) => {
-    const file = (e.target as HTMLInputElement).files?.[0];
-    if (file) void attempt(async () => {
-      draft.photo = await shrink(file);
-      app.say("tool");
-    });
-  }) as () => void } });
-  return h("div", { class: "sheet" },
+  if (!draft.spot)
+    return h(
+      "div",
+      { class: "row" },
+      button("New mark", () => view.use(new PlaceMark(app, view)), { class: "primary", key: "new mark" }),
+    );
+  const photo = h("input", {
+    type: "file",
+    accept: "image/*",
+    class: "hidden",
+    "aria-label": "Photo",
+    on: {
+      change: ((e: Event) => {
+        const file = (e.target as HTMLInputElement).files?.[0];
+        if (file)
+          void attempt(async () => {
+            draft.photo = await shrink(file);
+            app.say("tool");
+          });
+      }) as () => void,
+    },
+  });
+  return h(
+    "div",
+    { class: "sheet" },
     h("p", {}, `In ${app.submap_name(draft.spot.submap)}`),
     text,
     draft.photo ? h("img", { src: draft.photo, alt: "Photo of the mark" }) : null,
-    h("div", { class: "row" },
+    h(
+      "div",
+      { class: "row" },
       button("Save", () => void save(app, text), { class: "primary", key: "save mark" }),
       h("label", { class: "button" }, draft.photo ? "Another photo" : "Photo", photo),
-      button("Cancel", () => clear(app, text), { key: "cancel mark" })));
+      button("Cancel", () => clear(app, text), { key: "cancel mark" }),
+    ),
+  );
 }
 
 function clear(app: App, text: HTMLTextAreaElement): void {
@@ -85,14 +119,44 @@ async function shrink(file: Blob): Promise<string> {
 
 function line(app: App, view: View, id: string, mark: Mark): HTMLElement {
   const chosen = app.selection?.kind === "mark" && app.selection.id === id;
-  return h("article", { class: `mark${chosen ? " chosen" : ""}` },
-    h("button", { type: "button", class: "closure", key: `mark ${id}`, "aria-pressed": String(chosen), on: { click: () => {
-      app.select(chosen ? null : { kind: "mark", id });
-      const at = app.world.point(mark.submap, mark.at);
-      if (at && !chosen) view.look_at(at);
-    } } },
-      h("span", { class: "line" }, h("b", {}, mark.text.split("\n")[0] || "Mark"), h("span", { class: "seen" }, wall(mark.wall_ns))),
-      h("span", { class: "detail" }, `${mark.by || "somebody"}, ${app.submap_name(mark.submap)}`)),
-    chosen ? [mark.text.includes("\n") ? h("p", { class: "words" }, mark.text) : null, mark.photo && is_photo(mark.photo) ? h("img", { src: mark.photo, alt: "Photo of the mark" }) : null,
-      app.may("mark") ? h("div", { class: "row" }, button("Remove", () => void attempt(() => api.unmark(id)), { class: "danger", key: `remove ${id}` })) : null] : null);
+  return h(
+    "article",
+    { class: `mark${chosen ? " chosen" : ""}` },
+    h(
+      "button",
+      {
+        type: "button",
+        class: "closure",
+        key: `mark ${id}`,
+        "aria-pressed": String(chosen),
+        on: {
+          click: () => {
+            app.select(chosen ? null : { kind: "mark", id });
+            const at = app.world.point(mark.submap, mark.at);
+            if (at && !chosen) view.look_at(at);
+          },
+        },
+      },
+      h(
+        "span",
+        { class: "line" },
+        h("b", {}, mark.text.split("\n")[0] || "Mark"),
+        h("span", { class: "seen" }, wall(mark.wall_ns)),
+      ),
+      h("span", { class: "detail" }, `${mark.by || "somebody"}, ${app.submap_name(mark.submap)}`),
+    ),
+    chosen
+      ? [
+          mark.text.includes("\n") ? h("p", { class: "words" }, mark.text) : null,
+          mark.photo && is_photo(mark.photo) ? h("img", { src: mark.photo, alt: "Photo of the mark" }) : null,
+          app.may("mark")
+            ? h(
+                "div",
+                { class: "row" },
+                button("Remove", () => void attempt(() => api.unmark(id)), { class: "danger", key: `remove ${id}` }),
+              )
+            : null,
+        ]
+      : null,
+  );
 }

@@ -42,7 +42,10 @@ export class Plot {
   private plot: uPlot | null = null;
   private observer: ResizeObserver;
 
-  constructor(private readonly app: App, private readonly spec: PlotSpec) {
+  constructor(
+    private readonly app: App,
+    private readonly spec: PlotSpec,
+  ) {
     this.element.className = "plot";
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(this.element);
@@ -57,7 +60,12 @@ export class Plot {
     const width = this.element.clientWidth;
     if (width < 50) return;
     if (this.plot) this.plot.setSize({ width, height: this.spec.height });
-    else this.plot = new uPlot(this.options(width), [Array.from(this.spec.times), ...this.spec.curves.map((c) => c.values)] as uPlot.AlignedData, this.element);
+    else
+      this.plot = new uPlot(
+        this.options(width),
+        [Array.from(this.spec.times), ...this.spec.curves.map((c) => c.values)] as uPlot.AlignedData,
+        this.element,
+      );
   }
 
   private options(width: number): uPlot.Options {
@@ -65,27 +73,55 @@ export class Plot {
     const style = getComputedStyle(document.documentElement);
     const soft = style.getPropertyValue("--soft");
     const line = style.getPropertyValue("--line");
-    const axis = { stroke: soft, grid: { stroke: line, width: 1 }, ticks: { stroke: line, width: 1 }, font: '11px system-ui, "DejaVu Sans", sans-serif' };
+    const axis = {
+      stroke: soft,
+      grid: { stroke: line, width: 1 },
+      ticks: { stroke: line, width: 1 },
+      font: '11px system-ui, "DejaVu Sans", sans-serif',
+    };
     return {
       width,
       height: spec.height,
       legend: { show: false },
       cursor: { sync: { key: kSync, setSeries: false }, drag: { x: false, y: false }, points: { size: 6 } },
-      scales: { x: { time: false }, y: spec.log ? { distr: 3, log: 10 } : { range: (_u, low, high) => [Math.min(0, low), high * 1.08 || 1] } },
+      scales: {
+        x: { time: false },
+        y: spec.log ? { distr: 3, log: 10 } : { range: (_u, low, high) => [Math.min(0, low), high * 1.08 || 1] },
+      },
       axes: [
         { ...axis, space: 70, size: 30, values: (_u, ticks) => ticks.map((t) => moment(t)) },
-        { ...axis, size: 58, values: (_u, ticks) => ticks.map((v) => (v === null ? "" : `${Number(v.toPrecision(6))} ${spec.unit}`)) },
+        {
+          ...axis,
+          size: 58,
+          values: (_u, ticks) => ticks.map((v) => (v === null ? "" : `${Number(v.toPrecision(6))} ${spec.unit}`)),
+        },
       ],
-      series: [{}, ...spec.curves.map((c) => ({ label: c.label, stroke: c.colour, width: c.width ?? 1.4, dash: c.dash, fill: c.fill ? `color-mix(in srgb, ${c.colour} 35%, transparent)` : undefined, points: { show: false }, spanGaps: false }))],
+      series: [
+        {},
+        ...spec.curves.map((c) => ({
+          label: c.label,
+          stroke: c.colour,
+          width: c.width ?? 1.4,
+          dash: c.dash,
+          fill: c.fill ? `color-mix(in srgb, ${c.colour} 35%, transparent)` : undefined,
+          points: { show: false },
+          spanGaps: false,
+        })),
+      ],
       hooks: {
         drawClear: [(u) => this.background(u)],
-        setCursor: [(u) => {
-          const at = u.cursor.left ?? -1;
-          if (u.cursor.event || at < 0) app.set_cursor(at < 0 ? null : u.posToVal(at, "x"));
-        }],
-        ready: [(u) => u.over.addEventListener("click", () => {
-          if ((u.cursor.left ?? -1) >= 0) spec.on_click?.(u.posToVal(u.cursor.left!, "x"));
-        })],
+        setCursor: [
+          (u) => {
+            const at = u.cursor.left ?? -1;
+            if (u.cursor.event || at < 0) app.set_cursor(at < 0 ? null : u.posToVal(at, "x"));
+          },
+        ],
+        ready: [
+          (u) =>
+            u.over.addEventListener("click", () => {
+              if ((u.cursor.left ?? -1) >= 0) spec.on_click?.(u.posToVal(u.cursor.left!, "x"));
+            }),
+        ],
       },
     };
   }
@@ -97,7 +133,12 @@ export class Plot {
       const from = u.valToPos(band.from_s, "x", true);
       const until = Math.max(u.valToPos(band.until_s, "x", true), from + 2);
       ctx.fillStyle = band.colour;
-      ctx.fillRect(Math.max(from, bbox.left), bbox.top, Math.min(until, bbox.left + bbox.width) - Math.max(from, bbox.left), bbox.height);
+      ctx.fillRect(
+        Math.max(from, bbox.left),
+        bbox.top,
+        Math.min(until, bbox.left + bbox.width) - Math.max(from, bbox.left),
+        bbox.height,
+      );
     }
     if (this.spec.level !== undefined) {
       const y = u.valToPos(this.spec.level, "y", true);

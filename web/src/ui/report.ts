@@ -35,17 +35,40 @@ export const robot_cell = (app: App, name: string): Child => {
 function headline(app: App, report: Node): HTMLElement {
   const robots = report.list("robots");
   const way = robots.reduce((sum, r) => sum + (r.n("distance_m") ?? 0), 0);
-  const facts = [report.s("input"), `${many(robots.length, "robot")}, ${many(report.n("server.components") ?? 0, "map")}`, `${metres(way)} in ${span(report.n("duration_s"))}`, report.s("default_policy") && `policy ${report.s("default_policy")}`, report.has("seed") && `seed ${report.s("seed")}`];
+  const facts = [
+    report.s("input"),
+    `${many(robots.length, "robot")}, ${many(report.n("server.components") ?? 0, "map")}`,
+    `${metres(way)} in ${span(report.n("duration_s"))}`,
+    report.s("default_policy") && `policy ${report.s("default_policy")}`,
+    report.has("seed") && `seed ${report.s("seed")}`,
+  ];
   const measured = robots.some((r) => r.has("onboard_rmse_m"));
-  return h("section", {},
+  return h(
+    "section",
+    {},
     h("h2", { class: "title" }, report.s("mission")),
     h("p", { class: "lead" }, report.s("description")),
-    h("p", { class: "chips-line" }, facts.filter((f) => f).map((f) => h("span", { class: "chip" }, f as string))),
+    h(
+      "p",
+      { class: "chips-line" },
+      facts.filter((f) => f).map((f) => h("span", { class: "chip" }, f as string)),
+    ),
     report.texts("warnings").map((w) => h("p", { class: "alert warning" }, h("b", {}, "Warning: "), w)),
     failures(report),
-    h("h3", {}, measured ? "Error of every robot, RMSE: by its own odometry → corrected" : "Error of every robot: not measured, because there is no reference"),
-    h("div", { class: "cards wide" }, robots.map((r) => robot_card(app, report, r))),
-    h("div", { class: "cards" }, map_cards(report)));
+    h(
+      "h3",
+      {},
+      measured
+        ? "Error of every robot, RMSE: by its own odometry → corrected"
+        : "Error of every robot: not measured, because there is no reference",
+    ),
+    h(
+      "div",
+      { class: "cards wide" },
+      robots.map((r) => robot_card(app, report, r)),
+    ),
+    h("div", { class: "cards" }, map_cards(report)),
+  );
 }
 
 /** Where robots or the server report that localisation failed. */
@@ -54,46 +77,124 @@ function failures(report: Node): Child {
   for (const robot of report.list("robots"))
     for (const alert of robot.list("alerts")) {
       const gone = alert.n("withdrawn_s");
-      lines.push(h("p", { class: `alert ${gone === null ? "error" : "info seen"}` }, h("b", {}, robot.s("name")), `: localisation left the map by ${metres(alert.n("translation_m"))} between ${moment(alert.n("from_s"))} and ${moment(alert.n("until_s"))}; noticed at ${moment(alert.n("known_since_s"))}`, gone === null ? "" : `, withdrawn at ${moment(gone)}`));
+      lines.push(
+        h(
+          "p",
+          { class: `alert ${gone === null ? "error" : "info seen"}` },
+          h("b", {}, robot.s("name")),
+          `: localisation left the map by ${metres(alert.n("translation_m"))} between ${moment(alert.n("from_s"))} and ${moment(alert.n("until_s"))}; noticed at ${moment(alert.n("known_since_s"))}`,
+          gone === null ? "" : `, withdrawn at ${moment(gone)}`,
+        ),
+      );
     }
   for (const failed of report.list("server.failed_odometry"))
-    lines.push(h("p", { class: "alert error" }, h("b", {}, failed.s("robot")), `: closures contradict its odometry by ${metres(failed.n("error_m"))} between ${moment(failed.n("from_s"))} and ${moment(failed.n("until_s"))}`));
+    lines.push(
+      h(
+        "p",
+        { class: "alert error" },
+        h("b", {}, failed.s("robot")),
+        `: closures contradict its odometry by ${metres(failed.n("error_m"))} between ${moment(failed.n("from_s"))} and ${moment(failed.n("until_s"))}`,
+      ),
+    );
   return lines;
 }
 
 function card(what: Child, value: Child, detail: Child): HTMLElement {
-  return h("div", { class: "card" }, h("p", { class: "what" }, what), h("p", { class: "value" }, value), h("p", { class: "detail" }, detail));
+  return h(
+    "div",
+    { class: "card" },
+    h("p", { class: "what" }, what),
+    h("p", { class: "value" }, value),
+    h("p", { class: "detail" }, detail),
+  );
 }
 
 /** A figure for headlines: none when it was scored on too little of the distance. */
-const headline_m = (node: Node, key: string, partial: string): string => (node.yes(partial) ? "-" : metres(node.n(key)));
+const headline_m = (node: Node, key: string, partial: string): string =>
+  node.yes(partial) ? "-" : metres(node.n(key));
 
 function robot_card(app: App, report: Node, robot: Node): HTMLElement {
   const policy = followed(report, robot);
   const value: Child = robot.has("onboard_rmse_m")
-    ? [h("span", { class: "up" }, headline_m(robot, "onboard_rmse_m", "onboard_partial")), " → ", h("span", { class: "down" }, headline_m(policy, "rmse_m", "partial")), h("small", {}, ` server ${headline_m(robot, "server_rmse_m", "server_partial")}`)]
+    ? [
+        h("span", { class: "up" }, headline_m(robot, "onboard_rmse_m", "onboard_partial")),
+        " → ",
+        h("span", { class: "down" }, headline_m(policy, "rmse_m", "partial")),
+        h("small", {}, ` server ${headline_m(robot, "server_rmse_m", "server_partial")}`),
+      ]
     : ["not measured", h("small", {}, " no reference")];
   const constraints = policy.n("constraints") ?? 0;
   const factors = robot.n("odometry_factors") ?? 0;
   const duration = robot.n("duration_s") ?? 0;
-  const rate = (key: string) => `${bytes(robot.n(key))} (${duration > 0 ? `${bytes((robot.n(key) ?? 0) / duration)}/s` : "-"})`;
-  const detail: Child[] = [h("b", {}, constraints), ` constraints beside ${factors} odometry factors (${share(factors ? constraints / factors : null)}); `, h("b", {}, rate("bytes_down")), " received, ", rate("bytes_up"), " sent"];
-  if (!robot.has("onboard_rmse_m") && policy.has("agreement_rmse_m")) detail.push(h("br"), `corrected and server agree within ${metres(policy.n("agreement_rmse_m"))} RMSE, however true both are`);
-  if (robot.has("map_error.corrected")) detail.push(h("br"), "its map, mean distance to the survey: ", h("b", {}, `${metres(robot.n("map_error.onboard.mean_m"))} → ${metres(robot.n("map_error.corrected.mean_m"))}`));
-  for (const [what, node, key, scored, flag] of [["onboard", robot, "onboard_rmse_m", "onboard_scored_share", "onboard_partial"], ["corrected", policy, "rmse_m", "scored_share", "partial"], ["server", robot, "server_rmse_m", "server_scored_share", "server_partial"]] as const)
-    if (node.yes(flag)) detail.push(h("br"), `partial, scored on ${share(node.n(scored), 0)} of its trajectory only: ${what} (${metres(node.n(key))})`);
-  return card([robot_cell(app, robot.s("name")), h("small", {}, ` ${metres(robot.n("distance_m"))} in ${span(duration)}`)], value, detail);
+  const rate = (key: string) =>
+    `${bytes(robot.n(key))} (${duration > 0 ? `${bytes((robot.n(key) ?? 0) / duration)}/s` : "-"})`;
+  const detail: Child[] = [
+    h("b", {}, constraints),
+    ` constraints beside ${factors} odometry factors (${share(factors ? constraints / factors : null)}); `,
+    h("b", {}, rate("bytes_down")),
+    " received, ",
+    rate("bytes_up"),
+    " sent",
+  ];
+  if (!robot.has("onboard_rmse_m") && policy.has("agreement_rmse_m"))
+    detail.push(
+      h("br"),
+      `corrected and server agree within ${metres(policy.n("agreement_rmse_m"))} RMSE, however true both are`,
+    );
+  if (robot.has("map_error.corrected"))
+    detail.push(
+      h("br"),
+      "its map, mean distance to the survey: ",
+      h("b", {}, `${metres(robot.n("map_error.onboard.mean_m"))} → ${metres(robot.n("map_error.corrected.mean_m"))}`),
+    );
+  for (const [what, node, key, scored, flag] of [
+    ["onboard", robot, "onboard_rmse_m", "onboard_scored_share", "onboard_partial"],
+    ["corrected", policy, "rmse_m", "scored_share", "partial"],
+    ["server", robot, "server_rmse_m", "server_scored_share", "server_partial"],
+  ] as const)
+    if (node.yes(flag))
+      detail.push(
+        h("br"),
+        `partial, scored on ${share(node.n(scored), 0)} of its trajectory only: ${what} (${metres(node.n(key))})`,
+      );
+  return card(
+    [robot_cell(app, robot.s("name")), h("small", {}, ` ${metres(robot.n("distance_m"))} in ${span(duration)}`)],
+    value,
+    detail,
+  );
 }
 
 function map_cards(report: Node): HTMLElement[] {
   const server = report.at("server");
   const partial = server.yes("partial");
   const out: HTMLElement[] = [];
-  if (server.has("rmse_m")) out.push(card("Error of the server's map, RMSE", partial ? "-" : metres(server.n("rmse_m")), partial ? `partial, scored on ${share(server.n("scored_share"), 0)}: (${metres(server.n("rmse_m"))})` : `all robots in one alignment; largest ${metres(server.n("max_error_m"))}`));
-  if (server.has("map_error.mean_m")) out.push(card("Joint map off the survey, mean", metres(server.n("map_error.mean_m")), `95 % of ${many(server.n("map_error.points") ?? 0, "point")} within ${metres(server.n("map_error.p95_m"))}`));
-  out.push(card("Loop closures in the map", server.s("closures_accepted") || "-", `${server.n("closures_accepted_inter") ?? 0} between robots; ${server.n("closures_rejected") ?? 0} refused`));
+  if (server.has("rmse_m"))
+    out.push(
+      card(
+        "Error of the server's map, RMSE",
+        partial ? "-" : metres(server.n("rmse_m")),
+        partial
+          ? `partial, scored on ${share(server.n("scored_share"), 0)}: (${metres(server.n("rmse_m"))})`
+          : `all robots in one alignment; largest ${metres(server.n("max_error_m"))}`,
+      ),
+    );
+  if (server.has("map_error.mean_m"))
+    out.push(
+      card(
+        "Joint map off the survey, mean",
+        metres(server.n("map_error.mean_m")),
+        `95 % of ${many(server.n("map_error.points") ?? 0, "point")} within ${metres(server.n("map_error.p95_m"))}`,
+      ),
+    );
+  out.push(
+    card(
+      "Loop closures in the map",
+      server.s("closures_accepted") || "-",
+      `${server.n("closures_accepted_inter") ?? 0} between robots; ${server.n("closures_rejected") ?? 0} refused`,
+    ),
+  );
   const updates = report.list("robots").reduce((sum, r) => sum + (r.n("updates") ?? 0), 0);
-  if (updates > 0) out.push(card("Broadcasts answered", String(updates), `by ${many(report.list("robots").length, "robot")}`));
+  if (updates > 0)
+    out.push(card("Broadcasts answered", String(updates), `by ${many(report.list("robots").length, "robot")}`));
   return out;
 }
-

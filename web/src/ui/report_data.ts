@@ -27,7 +27,9 @@ export class Node {
     return Array.isArray(v) ? v.map((x) => new Node(x)) : [];
   }
   texts(path: string): string[] {
-    return this.list(path).map((x) => x.s("")).filter((x) => x !== "");
+    return this.list(path)
+      .map((x) => x.s(""))
+      .filter((x) => x !== "");
   }
   keys(path: string): string[] {
     const v = this.to(path).value;

@@ -17,7 +17,12 @@ export function robots_panel(app: App, view: View): HTMLElement {
     search.hidden = app.robots.length <= LIMITS.dense_robots;
     return [h("h2", {}, "Robots", h("small", {}, summary(app.robots)))];
   });
-  const search = h("input", { type: "search", placeholder: "Search: a name, silent, trouble, …", "aria-label": "Search robots", hidden: true });
+  const search = h("input", {
+    type: "search",
+    placeholder: "Search: a name, silent, trouble, …",
+    "aria-label": "Search robots",
+    hidden: true,
+  });
   search.addEventListener("input", () => {
     filter.words = search.value.toLowerCase().trim();
     app.say("options");
@@ -26,9 +31,15 @@ export function robots_panel(app: App, view: View): HTMLElement {
     const dense = app.robots.length > LIMITS.dense_robots;
     const found = ordered(app).filter((robot) => !dense || words_of(robot).includes(filter.words));
     return [
-      app.robots.length === 0 ? h("p", { class: "empty" }, "No robot was heard yet.") : found.length === 0 ? h("p", { class: "empty" }, "None fits the search.") : null,
+      app.robots.length === 0
+        ? h("p", { class: "empty" }, "No robot was heard yet.")
+        : found.length === 0
+          ? h("p", { class: "empty" }, "None fits the search.")
+          : null,
       found.slice(0, LIMITS.rows).map((robot) => card(app, view, robot, dense)),
-      found.length > LIMITS.rows ? h("p", { class: "empty" }, `and ${found.length - LIMITS.rows} more: search to see them`) : null,
+      found.length > LIMITS.rows
+        ? h("p", { class: "empty" }, `and ${found.length - LIMITS.rows} more: search to see them`)
+        : null,
       workers(app),
     ];
   });
@@ -37,24 +48,40 @@ export function robots_panel(app: App, view: View): HTMLElement {
 
 const is_away = (robot: RobotView): boolean => robot.presence === "silent" || robot.presence === "lost";
 const is_troubled = ({ status }: RobotView): boolean =>
-  status !== null && (status.trouble !== "" || status.conflict !== "" || (status.battery_percent !== null && status.battery_percent < 15));
+  status !== null &&
+  (status.trouble !== "" || status.conflict !== "" || (status.battery_percent !== null && status.battery_percent < 15));
 
 /** What the search looks at. */
 function words_of(robot: RobotView): string {
   const { status } = robot;
-  return [robot.name, is_away(robot) ? "silent" : robot.presence, is_troubled(robot) ? "trouble" : "", status?.trouble, status?.conflict].join(" ").toLowerCase();
+  return [
+    robot.name,
+    is_away(robot) ? "silent" : robot.presence,
+    is_troubled(robot) ? "trouble" : "",
+    status?.trouble,
+    status?.conflict,
+  ]
+    .join(" ")
+    .toLowerCase();
 }
 
 /** The silent stand first, the longest silent before all, then the troubled; in the phase of recovery, those with nothing to send last. */
 function ordered(app: App): RobotView[] {
-  const rank = (r: RobotView): number => (is_away(r) ? -(r.silent_s ?? 0) : is_troubled(r) ? 1 : app.phase === "recover" && r.drain.state === "empty" ? 3 : 2);
+  const rank = (r: RobotView): number =>
+    is_away(r) ? -(r.silent_s ?? 0) : is_troubled(r) ? 1 : app.phase === "recover" && r.drain.state === "empty" ? 3 : 2;
   return [...app.robots].sort((a, b) => rank(a) - rank(b));
 }
 
 function summary(robots: RobotView[]): string {
   const n = (presence: RobotView["presence"][]) => robots.filter((r) => presence.includes(r.presence)).length;
-  return [[n(["here"]), "here"], [n(["silent", "lost"]), "silent"], [n(["finished"]), "finished"]]
-    .filter(([count]) => count !== 0).map(([count, word]) => `${count} ${word}`).join(", ");
+  return [
+    [n(["here"]), "here"],
+    [n(["silent", "lost"]), "silent"],
+    [n(["finished"]), "finished"],
+  ]
+    .filter(([count]) => count !== 0)
+    .map(([count, word]) => `${count} ${word}`)
+    .join(", ");
 }
 
 function card(app: App, view: View, robot: RobotView, dense: boolean): HTMLElement {
@@ -62,20 +89,59 @@ function card(app: App, view: View, robot: RobotView, dense: boolean): HTMLEleme
   const away = is_away(robot);
   if (dense && !chosen) return row(app, view, robot);
   const colour = css(robot_rgb(robot.index, app.dark));
-  const body = h("button", { type: "button", class: "who", key: `robot ${robot.number}`, "aria-pressed": String(chosen), on: { click: () => choose(app, view, robot, chosen) } },
-    h("span", { class: "line" }, swatch(away ? "var(--soft)" : colour), h("b", {}, robot.name), h("span", { class: "seen" }, seen(app, robot))),
+  const body = h(
+    "button",
+    {
+      type: "button",
+      class: "who",
+      key: `robot ${robot.number}`,
+      "aria-pressed": String(chosen),
+      on: { click: () => choose(app, view, robot, chosen) },
+    },
+    h(
+      "span",
+      { class: "line" },
+      swatch(away ? "var(--soft)" : colour),
+      h("b", {}, robot.name),
+      h("span", { class: "seen" }, seen(app, robot)),
+    ),
     h("span", { class: "icons" }, icons(app, robot), h("span", { class: "right" }, many(robot.submaps, "submap"))),
-    details(app, robot), held(app, `robot/${robot.number}`), chosen ? radio(app, robot) : null);
-  return h("article", { class: `robot ${robot.presence}${chosen ? " chosen" : ""}` }, body, chosen ? actions(app, view, robot) : null);
+    details(app, robot),
+    held(app, `robot/${robot.number}`),
+    chosen ? radio(app, robot) : null,
+  );
+  return h(
+    "article",
+    { class: `robot ${robot.presence}${chosen ? " chosen" : ""}` },
+    body,
+    chosen ? actions(app, view, robot) : null,
+  );
 }
 
 /** One of many: a line, with what is wrong in it. */
 function row(app: App, view: View, robot: RobotView): HTMLElement {
   const wrong = robot.status?.conflict || robot.status?.trouble;
   const colour = is_away(robot) ? "var(--soft)" : css(robot_rgb(robot.index, app.dark));
-  const body = h("button", { type: "button", class: "who", key: `robot ${robot.number}`, "aria-pressed": "false", on: { click: () => choose(app, view, robot, false) } },
-    h("span", { class: "line" }, swatch(colour), h("b", {}, robot.name), h("span", { class: "icons" }, icons(app, robot)), h("span", { class: "seen" }, seen(app, robot))),
-    wrong ? h("span", { class: "detail bad" }, wrong) : null, held(app, `robot/${robot.number}`));
+  const body = h(
+    "button",
+    {
+      type: "button",
+      class: "who",
+      key: `robot ${robot.number}`,
+      "aria-pressed": "false",
+      on: { click: () => choose(app, view, robot, false) },
+    },
+    h(
+      "span",
+      { class: "line" },
+      swatch(colour),
+      h("b", {}, robot.name),
+      h("span", { class: "icons" }, icons(app, robot)),
+      h("span", { class: "seen" }, seen(app, robot)),
+    ),
+    wrong ? h("span", { class: "detail bad" }, wrong) : null,
+    held(app, `robot/${robot.number}`),
+  );
   return h("article", { class: `robot brief ${robot.presence}` }, body);
 }
 
@@ -87,10 +153,18 @@ function choose(app: App, view: View, robot: RobotView, chosen: boolean): void {
 
 function actions(app: App, view: View, robot: RobotView): Child {
   const follows = view.followed === robot.number;
-  return h("div", { class: "row" }, button(follows ? "Stop following" : "Follow", () => {
-    view.followed = follows ? null : robot.number;
-    app.say("tool");
-  }, { "aria-pressed": String(follows) }));
+  return h(
+    "div",
+    { class: "row" },
+    button(
+      follows ? "Stop following" : "Follow",
+      () => {
+        view.followed = follows ? null : robot.number;
+        app.say("tool");
+      },
+      { "aria-pressed": String(follows) },
+    ),
+  );
 }
 
 function seen(app: App, robot: RobotView): Child {
@@ -115,35 +189,77 @@ function icons(app: App, robot: RobotView): Child[] {
   const part = robot.newest ? app.world.parts.get(app.world.placed.get(robot.newest.id)?.component ?? -1) : undefined;
   const main = joined && (part?.submaps ?? 0) === largest;
   const out: Child[] = [
-    icon("link", away ? "Cannot be heard now" : status ? "Is heard" : "Never heard", away ? "bad" : status ? "on" : "off"),
-    icon("joined", main ? "Joined to the map" : joined ? "Its part is not joined to the largest part" : "Not in the map yet", main ? "on" : joined ? "warn" : "off"),
+    icon(
+      "link",
+      away ? "Cannot be heard now" : status ? "Is heard" : "Never heard",
+      away ? "bad" : status ? "on" : "off",
+    ),
+    icon(
+      "joined",
+      main ? "Joined to the map" : joined ? "Its part is not joined to the largest part" : "Not in the map yet",
+      main ? "on" : joined ? "warn" : "off",
+    ),
     icon("corrects", corrects(status), status?.update_age_s == null ? "off" : "on"),
   ];
   if (!status) return out;
-  if (status.backlog_submaps > 0) out.push(icon("upload", `Holds ${many(status.backlog_submaps, "submap")} that the server has not stored`, robot.drain.state === "grows" || away ? "warn" : "on"));
-  if (status.battery_percent !== null) out.push(icon("battery", `Battery ${status.battery_percent.toFixed(0)} %`, status.battery_percent < 15 ? "bad" : status.battery_percent < 30 ? "warn" : "on"));
+  if (status.backlog_submaps > 0)
+    out.push(
+      icon(
+        "upload",
+        `Holds ${many(status.backlog_submaps, "submap")} that the server has not stored`,
+        robot.drain.state === "grows" || away ? "warn" : "on",
+      ),
+    );
+  if (status.battery_percent !== null)
+    out.push(
+      icon(
+        "battery",
+        `Battery ${status.battery_percent.toFixed(0)} %`,
+        status.battery_percent < 15 ? "bad" : status.battery_percent < 30 ? "warn" : "on",
+      ),
+    );
   if (status.finished) out.push(icon("flag", "Its recording has ended"));
-  if (status.trouble || status.conflict || status.alerts > 0) out.push(icon("alert", status.trouble || status.conflict || many(status.alerts, "alert"), "bad"));
+  if (status.trouble || status.conflict || status.alerts > 0)
+    out.push(icon("alert", status.trouble || status.conflict || many(status.alerts, "alert"), "bad"));
   return out;
 }
 
 const corrects = (status: RobotView["status"]): string =>
-  status?.update_age_s == null ? "Has not used the map yet: drives by its own odometry" : `Corrects itself: used the map of revision ${status.heard_revision}, ${span(status.update_age_s)} ago`;
+  status?.update_age_s == null
+    ? "Has not used the map yet: drives by its own odometry"
+    : `Corrects itself: used the map of revision ${status.heard_revision}, ${span(status.update_age_s)} ago`;
 
 function details(app: App, robot: RobotView): Child[] {
   const { status, drain } = robot;
   const out: Child[] = [];
   const line = (text: Child, severity = "") => out.push(h("span", { class: `detail ${severity}` }, text));
   const away = is_away(robot);
-  if (away) line(`May be within ${metres(robot.reach_m)} of where it was seen (drove ${robot.speed_mps.toFixed(1)} m/s)`, "warn");
-  if (status && status.backlog_submaps > 0) line(`Backlog ${many(status.backlog_submaps, "submap")}, ${bytes(status.backlog_bytes)} · ${drains(robot, drain)}`, drain.state === "grows" ? "warn" : "");
+  if (away)
+    line(
+      `May be within ${metres(robot.reach_m)} of where it was seen (drove ${robot.speed_mps.toFixed(1)} m/s)`,
+      "warn",
+    );
+  if (status && status.backlog_submaps > 0)
+    line(
+      `Backlog ${many(status.backlog_submaps, "submap")}, ${bytes(status.backlog_bytes)} · ${drains(robot, drain)}`,
+      drain.state === "grows" ? "warn" : "",
+    );
   if (status?.conflict) line(status.conflict, "bad");
   if (status?.trouble) line(status.trouble, "bad");
   const loud = app.phase === "deploy" || (app.selection?.kind === "robot" && app.selection.number === robot.number);
   if (loud && status) {
-    line([status.version ? `Version ${status.version}` : null, status.battery_percent === null ? null : `battery ${status.battery_percent.toFixed(0)} %`, status.battery_v === null ? null : `${status.battery_v.toFixed(1)} V`].filter((x) => x).join(" · ") || "No version reported");
+    line(
+      [
+        status.version ? `Version ${status.version}` : null,
+        status.battery_percent === null ? null : `battery ${status.battery_percent.toFixed(0)} %`,
+        status.battery_v === null ? null : `${status.battery_v.toFixed(1)} V`,
+      ]
+        .filter((x) => x)
+        .join(" · ") || "No version reported",
+    );
     line(corrects(status));
-    if (status.refused_submaps + status.unread_submaps > 0) line(`${many(status.refused_submaps + status.unread_submaps, "submap")} not taken by the map`, "warn");
+    if (status.refused_submaps + status.unread_submaps > 0)
+      line(`${many(status.refused_submaps + status.unread_submaps, "submap")} not taken by the map`, "warn");
   }
   return out;
 }
@@ -160,8 +276,12 @@ function radio(app: App, robot: RobotView): Child[] {
   const seconds = track!.times[last] - track!.times[first];
   const total = (of: Record<string, number> = {}) => Object.values(of).reduce((sum, n) => sum + n, 0);
   const line = (way: "up" | "down", words: string) => {
-    const rate = before && seconds > 0 ? ` · ${bytes(Math.max(0, total(now[way]) - total(before[way])) / seconds)}/s` : "";
-    const kinds = Object.entries(now[way]).sort((a, b) => b[1] - a[1]).map(([kind, n]) => `${kind} ${bytes(n)}`).join(", ");
+    const rate =
+      before && seconds > 0 ? ` · ${bytes(Math.max(0, total(now[way]) - total(before[way])) / seconds)}/s` : "";
+    const kinds = Object.entries(now[way])
+      .sort((a, b) => b[1] - a[1])
+      .map(([kind, n]) => `${kind} ${bytes(n)}`)
+      .join(", ");
     return h("span", { class: "detail" }, `${words} ${bytes(total(now[way]))}${rate}${kinds ? `: ${kinds}` : ""}`);
   };
   return [line("up", "Sent"), line("down", "Was sent")];
@@ -177,5 +297,10 @@ function workers(app: App): Child {
   if (!status || status.workers.length === 0) return null;
   const silent_s = silent_after(app.store);
   const late = status.workers.filter((w) => (w.last_seen_s_ago ?? 0) > silent_s).length;
-  return h("p", { class: "workers" }, `${many(status.workers.length, "worker")} look${status.workers.length === 1 ? "s" : ""} for closures`, late ? h("em", {}, ` · ${late} silent`) : null);
+  return h(
+    "p",
+    { class: "workers" },
+    `${many(status.workers.length, "worker")} look${status.workers.length === 1 ? "s" : ""} for closures`,
+    late ? h("em", {}, ` · ${late} silent`) : null,
+  );
 }

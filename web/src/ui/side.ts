@@ -26,14 +26,44 @@ interface Tab {
 /** To add a tab, add a row. */
 const TABS: Tab[] = [
   { name: "report", title: () => "Report", offered: (app) => app.store.get("report") !== null, make: report_panel },
-  { name: "compare", title: () => "Comparison", offered: (app) => app.store.get("compare") !== null, make: compare_panel },
-  { name: "robots", title: () => "Robots", offered: (app) => !app.live && app.world.placed.size > 0, make: robots_panel },
-  { name: "alerts", title: (app) => `Alerts${open_alerts(app).length ? ` ${open_alerts(app).length}` : ""}`, offered: (app) => app.live || app.store.track("alerts") !== null, make: alerts_panel },
-  { name: "closures", title: () => "Closures", offered: (app) => app.live || !app.store.all("closure").next().done, make: closures_panel },
+  {
+    name: "compare",
+    title: () => "Comparison",
+    offered: (app) => app.store.get("compare") !== null,
+    make: compare_panel,
+  },
+  {
+    name: "robots",
+    title: () => "Robots",
+    offered: (app) => !app.live && app.world.placed.size > 0,
+    make: robots_panel,
+  },
+  {
+    name: "alerts",
+    title: (app) => `Alerts${open_alerts(app).length ? ` ${open_alerts(app).length}` : ""}`,
+    offered: (app) => app.live || app.store.track("alerts") !== null,
+    make: alerts_panel,
+  },
+  {
+    name: "closures",
+    title: () => "Closures",
+    offered: (app) => app.live || !app.store.all("closure").next().done,
+    make: closures_panel,
+  },
   { name: "by hand", title: () => "By hand", offered: (app) => app.may("register"), make: by_hand_panel },
   { name: "why", title: () => "Why not?", offered: (app) => app.may("why"), make: why_panel },
-  { name: "disagreement", title: () => "Odometry", offered: (app) => [...app.store.all("disagreement", app.at())].length > 0, make: disagreement_panel },
-  { name: "marks", title: () => "Marks", offered: (app) => app.may("mark") || [...app.store.all("mark", app.at())].length > 0, make: marks_panel },
+  {
+    name: "disagreement",
+    title: () => "Odometry",
+    offered: (app) => [...app.store.all("disagreement", app.at())].length > 0,
+    make: disagreement_panel,
+  },
+  {
+    name: "marks",
+    title: () => "Marks",
+    offered: (app) => app.may("mark") || [...app.store.all("mark", app.at())].length > 0,
+    make: marks_panel,
+  },
 ];
 
 /** Tabs that leave room for an inspected closure. */
@@ -58,11 +88,19 @@ export function side_panel(app: App, view: View): HTMLElement {
   const bar = panel(app, ["data", "options", "me", "time"], { class: "tabs", role: "tablist" }, () => {
     const offered = TABS.filter((t) => t.offered(app));
     if (phase !== app.phase || (app.ready && !offered.some((t) => t.name === tab))) {
-      const wanted = [phase === app.phase ? "" : PHASES[app.phase].tab, ...offered.map((t) => t.name)].find((name) => offered.some((t) => t.name === name))!;
+      const wanted = [phase === app.phase ? "" : PHASES[app.phase].tab, ...offered.map((t) => t.name)].find((name) =>
+        offered.some((t) => t.name === name),
+      )!;
       phase = app.phase;
       queueMicrotask(() => show(wanted));
     }
-    return offered.map((t) => button(t.title(app), () => show(t.name), { key: `tab ${t.name}`, role: "tab", "aria-selected": String(t.name === tab) }));
+    return offered.map((t) =>
+      button(t.title(app), () => show(t.name), {
+        key: `tab ${t.name}`,
+        role: "tab",
+        "aria-selected": String(t.name === tab),
+      }),
+    );
   });
   queueMicrotask(() => show(tab));
   return h("aside", { class: "side" }, inspector_panel(app), bar, body);
@@ -81,7 +119,13 @@ export function splitter(app: App): HTMLElement {
   const held = memory.read<number | null>(name, null);
   if (held !== null) set(held);
   else if (!app.live) document.documentElement.style.setProperty("--side", "48vw");
-  const element = h("div", { class: "splitter", role: "separator", tabindex: 0, "aria-orientation": "vertical", "aria-label": "Width of the panel" });
+  const element = h("div", {
+    class: "splitter",
+    role: "separator",
+    tabindex: 0,
+    "aria-orientation": "vertical",
+    "aria-label": "Width of the panel",
+  });
   element.addEventListener("pointerdown", (e) => element.setPointerCapture(e.pointerId));
   element.addEventListener("pointermove", (e) => element.hasPointerCapture(e.pointerId) && set(innerWidth - e.clientX));
   element.addEventListener("keydown", (e) => {

@@ -26,21 +26,40 @@ export class Timeline {
 
   constructor(private readonly app: App) {
     this.slider.addEventListener("input", () => this.go(Number(this.slider.value)));
-    this.element = h("footer", { class: "timeline" }, this.controls(), h("div", { class: "line-of-time" }, this.canvas, this.slider), this.clock());
+    this.element = h(
+      "footer",
+      { class: "timeline" },
+      this.controls(),
+      h("div", { class: "line-of-time" }, this.canvas, this.slider),
+      this.clock(),
+    );
     new ResizeObserver(() => this.draw()).observe(this.element);
     app.on((topic) => {
-      if (topic === "data" || topic === "time" || topic === "tick" || topic === "options") requestAnimationFrame(() => this.draw());
+      if (topic === "data" || topic === "time" || topic === "tick" || topic === "options")
+        requestAnimationFrame(() => this.draw());
     });
   }
 
   private controls(): HTMLElement {
     return panel(this.app, ["time", "options"], { class: "row" }, () => {
-      const play = button(icon(this.playing ? "pause" : "play", this.playing ? "Pause" : "Play"), () => this.toggle(), { key: "play", class: "square", "aria-label": this.playing ? "Pause" : "Play" });
-      const speed = button(`× ${this.speed}`, () => {
-        this.speed = kSpeeds[(kSpeeds.indexOf(this.speed) + 1) % kSpeeds.length];
-        this.app.say("options");
-      }, { key: "speed", title: "Speed of playing" });
-      const star = button(icon("star", "Remember this moment"), () => this.remember(), { key: "star", class: "square", "aria-label": "Remember this moment" });
+      const play = button(icon(this.playing ? "pause" : "play", this.playing ? "Pause" : "Play"), () => this.toggle(), {
+        key: "play",
+        class: "square",
+        "aria-label": this.playing ? "Pause" : "Play",
+      });
+      const speed = button(
+        `× ${this.speed}`,
+        () => {
+          this.speed = kSpeeds[(kSpeeds.indexOf(this.speed) + 1) % kSpeeds.length];
+          this.app.say("options");
+        },
+        { key: "speed", title: "Speed of playing" },
+      );
+      const star = button(icon("star", "Remember this moment"), () => this.remember(), {
+        key: "star",
+        class: "square",
+        "aria-label": "Remember this moment",
+      });
       return [play, speed, star];
     });
   }
@@ -49,7 +68,11 @@ export class Timeline {
     return panel(this.app, ["time", "tick", "data"], { class: "clock" }, () => [
       h("b", {}, moment(this.app.shown())),
       this.app.live
-        ? button("Live", () => this.stop(null), { class: this.app.time === null ? "live" : "primary", "aria-pressed": String(this.app.time === null), title: "Back to now" })
+        ? button("Live", () => this.stop(null), {
+            class: this.app.time === null ? "live" : "primary",
+            "aria-pressed": String(this.app.time === null),
+            title: "Back to now",
+          })
         : h("span", {}, `of ${moment(this.range().last)}`),
     ]);
   }
@@ -133,10 +156,19 @@ export class Timeline {
     const mission = this.app.store.get("mission")?.name ?? "";
     c.fillStyle = palette.mark;
     for (const b of this.bookmarks) if (b.mission === mission) c.fillRect(x(b.t) - 1.5, 0, 3, 15);
-    this.slider.title = this.moves().length ? `Strokes: corrections of the map, the largest ${metres(Math.max(...this.moves().map((m) => m.moved_m)))}; green where parts were joined` : "";
+    this.slider.title = this.moves().length
+      ? `Strokes: corrections of the map, the largest ${metres(Math.max(...this.moves().map((m) => m.moved_m)))}; green where parts were joined`
+      : "";
   }
 
-  private draw_axis(c: CanvasRenderingContext2D, x: (t: number) => number, first: number, last: number, width: number, height: number): void {
+  private draw_axis(
+    c: CanvasRenderingContext2D,
+    x: (t: number) => number,
+    first: number,
+    last: number,
+    width: number,
+    height: number,
+  ): void {
     const palette = palette_of(this.app.dark);
     const steps = [10, 30, 60, 120, 300, 600, 1800, 3600, 7200, 14400, 43200];
     const step = steps.find((s) => ((last - first) / s) * 70 < width) ?? 86400;

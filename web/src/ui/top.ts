@@ -19,11 +19,33 @@ export function top_bar(app: App, theme: ThemeChoice): HTMLElement {
     h("h1", { title: app.store.get("mission")?.description ?? "" }, app.store.get("mission")?.name ?? ""),
     badge(app),
     facts(app),
-    app.store.get("mission")?.mode === "compare" ? null : h("nav", { class: "phases", "aria-label": "Phase of the mission" }, (Object.keys(PHASES) as Phase[]).map((phase) =>
-      button(PHASES[phase].name, () => app.set_phase(phase), { title: PHASES[phase].help, "aria-pressed": String(app.phase === phase) }),
-    )),
-    button(icon(theme.theme === "light" ? "sun" : theme.theme === "dark" ? "moon" : "system", `Colours: ${THEMES[theme.theme]}`), () => theme.next(), { class: "plain square", key: "theme", "aria-label": `Colours: ${THEMES[theme.theme]}` }),
-    app.live ? button(icon("save", "Save the mission so far as one file that opens offline"), () => void attempt(() => save_file(app)), { class: "plain square", key: "save", "aria-label": "Save as a file" }) : null,
+    app.store.get("mission")?.mode === "compare"
+      ? null
+      : h(
+          "nav",
+          { class: "phases", "aria-label": "Phase of the mission" },
+          (Object.keys(PHASES) as Phase[]).map((phase) =>
+            button(PHASES[phase].name, () => app.set_phase(phase), {
+              title: PHASES[phase].help,
+              "aria-pressed": String(app.phase === phase),
+            }),
+          ),
+        ),
+    button(
+      icon(
+        theme.theme === "light" ? "sun" : theme.theme === "dark" ? "moon" : "system",
+        `Colours: ${THEMES[theme.theme]}`,
+      ),
+      () => theme.next(),
+      { class: "plain square", key: "theme", "aria-label": `Colours: ${THEMES[theme.theme]}` },
+    ),
+    app.live
+      ? button(
+          icon("save", "Save the mission so far as one file that opens offline"),
+          () => void attempt(() => save_file(app)),
+          { class: "plain square", key: "save", "aria-label": "Save as a file" },
+        )
+      : null,
     app.live ? person(app) : null,
   ]);
 }
@@ -35,13 +57,24 @@ export function status_age(app: App): number | null {
 }
 
 function badge(app: App): Child {
-  if (!app.live) return h("span", { class: "badge report", title: "A recorded mission; nothing here changes any more" }, app.store.get("mission")?.mode === "compare" ? "Comparison" : "Report");
+  if (!app.live)
+    return h(
+      "span",
+      { class: "badge report", title: "A recorded mission; nothing here changes any more" },
+      app.store.get("mission")?.mode === "compare" ? "Comparison" : "Report",
+    );
   const { state, heard_ms, why } = app.link;
   if (state === "locked") return h("span", { class: "badge old" }, "Not logged in");
   if (state === "connecting") return h("span", { class: "badge old" }, why ? `No server (${why})` : "Connecting …");
-  if (state === "silent") return h("span", { class: "badge bad", role: "alert" }, `The server is silent since ${span((performance.now() - heard_ms) / 1000)}`);
+  if (state === "silent")
+    return h(
+      "span",
+      { class: "badge bad", role: "alert" },
+      `The server is silent since ${span((performance.now() - heard_ms) / 1000)}`,
+    );
   const age = status_age(app);
-  if (age !== null && age > OLD_STATUS * silent_after(app.store)) return h("span", { class: "badge old", role: "alert" }, `Status is ${span(age)} old`);
+  if (age !== null && age > OLD_STATUS * silent_after(app.store))
+    return h("span", { class: "badge old", role: "alert" }, `Status is ${span(age)} old`);
   if (app.time !== null) return h("span", { class: "badge old" }, `Past: ${moment(app.time)}`);
   return h("span", { class: "badge live", title: "The server is heard" }, "Live");
 }
@@ -59,5 +92,10 @@ function facts(app: App): Child {
     status && status.pending_jobs > 0 ? `${many(status.pending_jobs, "job")} waiting` : null,
   ].filter((w) => w !== null);
   const trouble = status?.trouble || (status && status.waiting > 0 ? status.why_waiting : "");
-  return h("span", { class: "facts" }, words.join(" · "), trouble ? h("b", { class: "bad", title: trouble }, ` · ${trouble}`) : null);
+  return h(
+    "span",
+    { class: "facts" },
+    words.join(" · "),
+    trouble ? h("b", { class: "bad", title: trouble }, ` · ${trouble}`) : null,
+  );
 }
