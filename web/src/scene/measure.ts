@@ -2,7 +2,8 @@
 import { metres } from "../format";
 import { distance } from "../pose";
 import type { Ink } from "./ink";
-import type { Spot, Tool } from "./view";
+import type { Spot } from "./pick";
+import type { Tool } from "./view";
 
 /** Distances between two places that somebody points at. */
 export class Measure implements Tool {

@@ -2,10 +2,17 @@
 /** Finds the place that somebody points at: the nearest point of a cloud, or of a track, under the cursor. */
 import type { App } from "../app";
 import { inverse, rows_of, transform } from "../pose";
-import type { Vec3 } from "../schema";
+import type { SubmapId, Vec3 } from "../schema";
 import type { Eye } from "./eye";
-import type { Spot } from "./view";
 import { window_of } from "./dress";
+
+/** A place that somebody pointed at. */
+export interface Spot {
+  submap: SubmapId;
+  /** In the submap's frame. */
+  at: Vec3;
+  world: Vec3;
+}
 
 const kReach_px = 9;
 

@@ -4,7 +4,6 @@ import type { App } from "../app";
 import { worst_disagreement } from "../derive";
 import { LIMITS, TIMES } from "../limits";
 import type { Painted } from "../raster";
-import type { SubmapId, Vec3 } from "../schema";
 import { SurveyDistance } from "../survey";
 import { Dresser, window_of } from "./dress";
 import type { Dressing } from "./dress";
@@ -15,15 +14,8 @@ import { CpuPainter, GpuPainter, gpu_name } from "./painters";
 import type { Painter } from "./painters";
 import { draw_picture } from "./picture";
 import { nearest_point } from "./pick";
+import type { Spot } from "./pick";
 import { position_of } from "./where";
-
-/** A place that somebody pointed at. */
-export interface Spot {
-  submap: SubmapId;
-  /** In the submap's frame. */
-  at: Vec3;
-  world: Vec3;
-}
 
 export interface Tool {
   readonly name: string;

@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /** The story of a mission afterwards: what was corrected with how little, the map beside the survey, who drifted where and when, tables. */
 import type { App } from "../app";
-import { css, robot_rgb } from "../colours";
 import { bytes, many, metres, moment, share, span } from "../format";
 import type { View } from "../scene/view";
 import { beside } from "./beside";
-import { h, swatch } from "./dom";
+import { h } from "./dom";
 import type { Child } from "./dom";
 import { curves } from "./report_curves";
 import { followed, reading } from "./report_data";
 import type { Node } from "./report_data";
-import { tables } from "./report_tables";
+import { robot_cell, tables } from "./report_tables";
 
 export function report_panel(app: App, view: View): HTMLElement {
   const element = h("div", { class: "report" });
@@ -26,11 +25,6 @@ export function report_panel(app: App, view: View): HTMLElement {
   queueMicrotask(draw);
   return element;
 }
-
-export const robot_cell = (app: App, name: string): Child => {
-  const index = app.robots.find((r) => r.name === name)?.index ?? 0;
-  return [swatch(css(robot_rgb(index, app.dark))), " ", name];
-};
 
 function headline(app: App, report: Node): HTMLElement {
   const robots = report.list("robots");

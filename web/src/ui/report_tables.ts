@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /** A report's figures as tables. */
 import type { App } from "../app";
+import { css, robot_rgb } from "../colours";
 import { bytes, degrees, figure, metres, milliseconds, share, span } from "../format";
-import { h } from "./dom";
+import { h, swatch } from "./dom";
 import type { Child } from "./dom";
-import { robot_cell } from "./report";
 import { reading } from "./report_data";
 import type { Node } from "./report_data";
+
+export const robot_cell = (app: App, name: string): Child => {
+  const index = app.robots.find((r) => r.name === name)?.index ?? 0;
+  return [swatch(css(robot_rgb(index, app.dark))), " ", name];
+};
 
 export function table(head: string[], rows: Child[][], left = 1): HTMLElement {
   const cells = (tag: "th" | "td", row: Child[]) =>
