@@ -17,6 +17,8 @@ export interface RobotView {
   presence: Presence;
   /** Since the robot was heard, at the time that is shown; null: never. */
   silent_s: number | null;
+  /** One who has finished may be heard all the same. */
+  is_heard: boolean;
   /** Its newest submap in the map. */
   newest: Submap | null;
   submaps: number;
@@ -82,6 +84,7 @@ function view_of(
     status,
     presence,
     silent_s,
+    is_heard: silent_s !== null && silent_s < silent_after(store),
     newest,
     submaps: submaps.length,
     speed_mps,

@@ -35,6 +35,8 @@ export const LIMITS = {
   folds: 3,
   /** Robots beyond which the list is dense and has a search. */
   dense_robots: 12,
+  /** A picture narrower than this has its legend folded. */
+  narrow_px: 520,
   /** Alerts that were acknowledged, remembered by this browser. */
   acknowledged: 500,
   /** A picture that moves has fewer points when it takes longer, but never fewer than these. */

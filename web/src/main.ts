@@ -8,10 +8,11 @@ import "./styles.css";
 import { ThemeChoice } from "./theme";
 import { open_alerts } from "./ui/alerts";
 import { h } from "./ui/dom";
+import { legend } from "./ui/legend";
 import { robots_panel } from "./ui/robots";
 import { side_panel, splitter } from "./ui/side";
 import { Timeline } from "./ui/timeline";
-import { legend, tool_bar } from "./ui/tools";
+import { tool_bar } from "./ui/tools";
 import { top_bar } from "./ui/top";
 
 const app = new App(InlinedSource.of_page(document) ?? new LiveSource());

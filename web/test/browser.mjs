@@ -2,36 +2,14 @@
 // Drives the built page in a headless Chromium, against the fake server and as a file. Ends with 1 if anything is not as it should be.
 import assert from "node:assert/strict";
 import { generateKeyPairSync, verify } from "node:crypto";
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
-import { tmpdir } from "node:os";
+import { writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { Browser, WEBGL } from "./chromium.mjs";
 import { FakeMission } from "./fake_mission.mjs";
 import { fill, recorded_mission } from "./fake_report.mjs";
 import { FakeServer } from "./fake_server.mjs";
-
-const page_text = readFileSync(new URL("../dist/index.html", import.meta.url), "utf8");
-const work = mkdtempSync(join(tmpdir(), "tutti-web-"));
-let browser = await Browser.launch();
-const kPoints = 1200; // of a submap: enough to see a picture
-const small = (options = {}) => new FakeMission({ points: kPoints, ...options });
-const tests = [];
-const test = (name, run) => tests.push({ name, run });
-
-/** A fake server that lives as long as `run`. */
-async function served(mission, run, options) {
-  const server = await new FakeServer(mission, options).start();
-  const page = await browser.open(`http://127.0.0.1:${server.port}/`);
-  try {
-    if (server.me.role !== null || !server.me.login)
-      await page.until("all submaps are placed", (n) => tutti.app.world.placed.size >= n, mission.submaps.length);
-    await run(page, server, mission);
-    assert.deepEqual(page.errors, [], "errors on the page");
-  } finally {
-    await page.close();
-    await server.stop();
-  }
-}
+import { browser, fleet, kPoints, page_text, run_all, served, small, test, work } from "./served.mjs";
+import "./operator_tests.mjs";
 
 test("three robots live: all in one frame, parts apart, clouds come", () =>
   served(small(), async (page) => {
@@ -118,7 +96,7 @@ test("an alert is acknowledged once, and stays so over a reload", () =>
   }));
 
 test("of a hundred robots one cause is one line, who is missed stands first, and a search finds the others", () => {
-  const robots = Array.from({ length: 100 }, (_, i) => `r${String(i).padStart(2, "0")}`);
+  const robots = fleet(100);
   const apart = robots.map((_, i) => i).filter((i) => i % 10 === 3);
   return served(small({ robots, submaps: 2, points: 50, apart }), async (page, server, mission) => {
     for (const number of [17, 42, 63, 88]) mission.silent.set(number, mission.time);
@@ -655,7 +633,7 @@ test("a distance is measured between two places", () =>
   }));
 
 test("a hundred robots and a million points: the first picture, frames a second, memory", async () => {
-  const robots = Array.from({ length: 100 }, (_, i) => `r${String(i).padStart(2, "0")}`);
+  const robots = fleet(100);
   const mission = new FakeMission({ robots, submaps: 2, points: 5000, apart: [] });
   mission.closures.clear();
   for (const s of mission.submaps) mission.cloud(s.robot, s.index); // not the page's time
@@ -687,25 +665,4 @@ test("a hundred robots and a million points: the first picture, frames a second,
   });
 });
 
-let failed = 0;
-const only = process.argv[2];
-for (const { name, run } of tests) {
-  if (only && !name.includes(only)) continue;
-  const start = Date.now();
-  try {
-    await run().catch(async (error) => {
-      // A busy machine draws late: what fails twice is wrong.
-      console.log(`     ${browser.lives ? (error.stack ?? error) : "Chromium itself ended"} in: ${name}; once more`);
-      if (!browser.lives) browser = await Browser.launch();
-      await run();
-    });
-    console.log(`ok   ${name} (${Date.now() - start} ms)`);
-  } catch (error) {
-    ++failed;
-    console.log(`FAIL ${name}: ${error.stack ?? error}`);
-  }
-}
-await browser.close();
-rmSync(work, { recursive: true });
-console.log(failed ? `${failed} of ${tests.length} failed` : "all is as it should be");
-process.exit(failed ? 1 : 0);
+await run_all(process.argv[2]);

@@ -98,6 +98,8 @@ export class FakeMission {
     this.marks = new Map();
     this.silent = new Map(); // robot -> since
     this.troubled = new Map(); // robot -> why
+    this.unheard = new Set(); // robots, since the server's start
+    this.finished = new Set();
     this.clouds = new Map();
     this.backlog = robots.map(() => 0);
     this.revision = 0;
@@ -230,7 +232,7 @@ export class FakeMission {
       const backlog = this.backlog[number];
       return {
         number,
-        last_seen_s_ago: 0.4 + silent,
+        last_seen_s_ago: this.unheard.has(number) ? null : 0.4 + silent,
         last_update_s_ago: 4 + silent,
         submaps: own,
         refused_submaps: 0,
@@ -247,7 +249,7 @@ export class FakeMission {
         keyframes: own * 10,
         T_odom_body: { translation_m: pose_along(number, this.time * 0.9).p, quaternion_xyzw: [0, 0, 0, 1] },
         alerts: 0,
-        finished: false,
+        finished: this.finished.has(number),
         jobs_done: 0,
         trouble: this.troubled.get(number) ?? "",
         can: [],

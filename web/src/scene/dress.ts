@@ -3,7 +3,7 @@
 import type { Cloud, Clouds } from "../cloud";
 import { abgr, bad, css, even, height_ramp, mix, ramp_of, robot_rgb } from "../colours";
 import type { Rgb } from "../colours";
-import { metres, span } from "../format";
+import { figure, metres, span } from "../format";
 import type { Options } from "../options";
 import { rows_of, transform } from "../pose";
 import type { Painted, Window3 } from "../raster";
@@ -32,7 +32,7 @@ export interface Legend {
   title: string;
   entries: { colour: string; label: string }[];
   /** Instead of entries: a scale from left to right. */
-  scale: { colours: string[]; low: string; high: string } | null;
+  scale: { colours: string[]; low: string; high: string; middle?: string } | null;
 }
 
 const kHolding: { most: number; colour: Rgb; label: string }[] = [
@@ -42,24 +42,26 @@ const kHolding: { most: number; colour: Rgb; label: string }[] = [
   { most: Infinity, colour: [70, 200, 150], label: "3 or more" },
 ];
 
-/** In units of the threshold: the end of its scale. */
-const kMostDisagreement = 2;
-
-/** Largest sigma of a submap and oldest age: the ends of scales. */
+/** Largest sigma of a submap, oldest age, worst disagreement in units of its threshold: the ends of scales. */
 interface Scales {
   sigma_m: number;
   age_s: number;
+  disagreement: number;
 }
 
-function scales_of(world: World, t: number): Scales {
-  let sigma_m = 0.01;
-  let age_s = 10;
+function scales_of(world: World, d: Dressing): Scales {
+  const out = { sigma_m: 0.01, age_s: 10, disagreement: 2 };
   for (const p of world.placed.values()) {
-    if (p.sigma_m > sigma_m) sigma_m = p.sigma_m;
-    age_s = Math.max(age_s, t - p.submap.until_s);
+    if (p.sigma_m > out.sigma_m) out.sigma_m = p.sigma_m;
+    out.age_s = Math.max(out.age_s, d.t - p.submap.until_s);
+    out.disagreement = Math.max(out.disagreement, d.disagreement(p.id) ?? 0);
   }
-  return { sigma_m, age_s };
+  return out;
 }
+
+/** The threshold lies in the middle of the scale; beyond it, factors are as wide as each other. */
+const share_of_disagreement = (x: number, most: number): number =>
+  x <= 1 ? x / 2 : 0.5 + (0.5 * Math.log(x)) / Math.log(most);
 
 function colour_of(p: Placed, d: Dressing, s: Scales): Rgb {
   switch (d.options.colour) {
@@ -71,7 +73,7 @@ function colour_of(p: Placed, d: Dressing, s: Scales): Rgb {
       return Number.isFinite(p.holding) ? kHolding.find((h) => p.holding <= h.most)!.colour : [130, 138, 150];
     case "disagreement": {
       const x = d.disagreement(p.id);
-      return x === null ? [130, 138, 150] : bad(x / kMostDisagreement);
+      return x === null ? [130, 138, 150] : bad(share_of_disagreement(x, s.disagreement));
     }
     case "part":
       return robot_rgb(p.component, d.dark);
@@ -89,7 +91,7 @@ export class Dresser {
   dress(world: World, clouds: Clouds, eye: Eye, d: Dressing, most: number, all = false): Map<string, Painted> {
     const out = new Map<string, Painted>();
     if (!d.options.layers.clouds) return out;
-    const scales = scales_of(world, d.t);
+    const scales = scales_of(world, d);
     let points = 0;
     for (const [id, placed] of world.placed) {
       const cloud = clouds.get(id);
@@ -145,11 +147,11 @@ export function window_of(world: World, options: Options): Window3 {
 }
 
 export function legend_of(world: World, d: Dressing): Legend {
-  const s = scales_of(world, d.t);
-  const scale = (title: string, colour: (x: number) => Rgb, low: string, high: string): Legend => ({
+  const s = scales_of(world, d);
+  const scale = (title: string, colour: (x: number) => Rgb, low: string, high: string, middle = ""): Legend => ({
     title,
     entries: [],
-    scale: { colours: [0, 0.25, 0.5, 0.75, 1].map((x) => css(colour(x))), low, high },
+    scale: { colours: [0, 0.25, 0.5, 0.75, 1].map((x) => css(colour(x))), low, high, middle },
   });
   const w = window_of(world, d.options);
   switch (d.options.colour) {
@@ -164,7 +166,7 @@ export function legend_of(world: World, d: Dressing): Legend {
     case "survey":
       return scale("distance to the survey's nearest point", bad, "0", `${100 * SurveyDistance.most_m} cm or more`);
     case "disagreement":
-      return scale("disagreement, times the threshold", bad, "0", `${kMostDisagreement} or more`);
+      return scale("disagreement, times the threshold", bad, "0", figure(s.disagreement), "1");
     case "held":
       return {
         title: "closures that hold it",

@@ -254,15 +254,18 @@ function draw_marks(app: App, ink: Ink, palette: Palette): void {
   }
 }
 
+/** More have their names alone. */
+const kFewParts = 4;
+
 /** Where there is more than one part, each has its name. */
 function draw_part_names(app: App, ink: Ink, palette: Palette): void {
   const { parts } = app.world;
   if (parts.size < 2) return;
   const largest = Math.max(...[...parts.values()].map((p) => p.submaps));
+  const beside = parts.size > kFewParts ? "" : ": not joined, placed beside";
   for (const part of parts.values()) {
     const at = [0, 1, 2].map((k) => (k === 1 ? part.low[1] : (part.low[k] + part.high[k]) / 2) + part.offset[k]);
-    const text =
-      part.submaps === largest ? `part ${part.component + 1}` : `part ${part.component + 1}: not joined, placed beside`;
+    const text = part.submaps === largest ? `part ${part.component + 1}` : `part ${part.component + 1}${beside}`;
     const spot = ink.eye.project(at);
     if (spot) ink.text(spot[0] - 20, spot[1] + 24, text, palette.soft, palette.halo);
   }

@@ -136,10 +136,10 @@ function row(app: App, view: View, robot: RobotView): HTMLElement {
       { class: "line" },
       swatch(colour),
       h("b", {}, robot.name),
+      wrong ? h("span", { class: "wrong bad", title: wrong }, wrong) : null,
       h("span", { class: "icons" }, icons(app, robot)),
       h("span", { class: "seen" }, seen(app, robot)),
     ),
-    wrong ? h("span", { class: "detail bad" }, wrong) : null,
     held(app, `robot/${robot.number}`),
   );
   return h("article", { class: `robot brief ${robot.presence}` }, body);
@@ -180,6 +180,15 @@ function seen(app: App, robot: RobotView): Child {
   }
 }
 
+const kHeard: Record<RobotView["presence"], [string, "on" | "off" | "bad"]> = {
+  here: ["Is heard", "on"],
+  silent: ["Cannot be heard now", "bad"],
+  lost: ["Cannot be heard now", "bad"],
+  finished: ["Has finished and is not heard any more", "off"],
+  unknown: ["Not heard since the server started", "off"],
+};
+const heard = (robot: RobotView): (typeof kHeard)["here"] => (robot.is_heard ? kHeard.here : kHeard[robot.presence]);
+
 /** What a robot can do now. */
 function icons(app: App, robot: RobotView): Child[] {
   const { status } = robot;
@@ -189,11 +198,7 @@ function icons(app: App, robot: RobotView): Child[] {
   const part = robot.newest ? app.world.parts.get(app.world.placed.get(robot.newest.id)?.component ?? -1) : undefined;
   const main = joined && (part?.submaps ?? 0) === largest;
   const out: Child[] = [
-    icon(
-      "link",
-      away ? "Cannot be heard now" : status ? "Is heard" : "Never heard",
-      away ? "bad" : status ? "on" : "off",
-    ),
+    icon("link", ...heard(robot)),
     icon(
       "joined",
       main ? "Joined to the map" : joined ? "Its part is not joined to the largest part" : "Not in the map yet",

@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-/** What lies over the 3-D picture: colours, heights, section, layers, measuring, legend. */
+/** What lies over the 3-D picture: colours, heights, section, layers, measuring. */
 import type { App } from "../app";
-import { css, robot_rgb } from "../colours";
 import { metres } from "../format";
 import { COLOUR_MODES, LAYERS } from "../options";
 import type { ColourMode, Layer } from "../options";
-import { legend_of } from "../scene/dress";
 import { Measure } from "../scene/measure";
-import { palette_of } from "../scene/picture";
 import type { View } from "../scene/view";
-import { button, h, panel, swatch } from "./dom";
+import { button, h, panel } from "./dom";
 import type { Child } from "./dom";
 
 const open = { layers: false, heights: false, section: false };
@@ -184,68 +181,4 @@ function section(app: App, view: View): Child {
       app.say("time");
     }),
   );
-}
-
-/** What the lines mean that are drawn now. */
-function lines(app: App): Child {
-  const palette = palette_of(app.dark);
-  const { layers } = app.options;
-  const states = new Set([...app.store.all("closure", app.at())].map(([, c]) => c.state));
-  const line = (colour: string, label: string, style = "solid") =>
-    h(
-      "span",
-      { class: "entry" },
-      h("i", { class: "stroke", style: { "border-top-color": colour, "border-top-style": style } }),
-      label,
-    );
-  const kinds = layers.estimates
-    ? new Set([...app.store.all("trajectory")].map(([name]) => name.split("/")[1]))
-    : new Set<string>();
-  return [
-    layers.accepted && states.has("accepted")
-      ? [line(palette.accepted, "closure between robots"), line(palette.within, "closure within a robot")]
-      : null,
-    layers.candidate && states.has("candidate") ? line(palette.candidate, "closure waiting", "dashed") : null,
-    layers.rejected && states.has("rejected") ? line(palette.rejected, "closure refused", "dotted") : null,
-    app.shows_ghost() ? line(palette.ghost, "before the correction", "dashed") : null,
-    [...kinds]
-      .filter((k) => k !== "server" || app.world.placed.size === 0)
-      .map((k) => line(palette.soft, k, k === "onboard" ? "dashed" : k === "reference" ? "dotted" : "solid")),
-  ];
-}
-
-export function legend(app: App, view: View): HTMLElement {
-  return panel(app, ["options", "data", "time", "cloud", "me"], { class: "legend-box" }, () => {
-    if (app.world.placed.size === 0 && app.robots.length > 0 && !app.live)
-      return [
-        h("b", {}, "robot"),
-        app.robots
-          .slice(0, 12)
-          .map((r) => h("span", { class: "entry" }, swatch(css(robot_rgb(r.index, app.dark))), r.name)),
-        lines(app),
-      ];
-    if (app.world.placed.size === 0 && app.is_locked())
-      return [
-        h("p", { class: "empty" }, "Log in (above) with an operator's or a viewer's credential to see the mission."),
-      ];
-    if (app.world.placed.size === 0)
-      return [h("p", { class: "empty" }, app.ready ? "No submap is in the map yet." : "Waiting for the map …")];
-    const { title, entries, scale } = legend_of(app.world, view.dressing());
-    return [
-      h("b", {}, title),
-      scale
-        ? h(
-            "span",
-            { class: "scale" },
-            h("span", {}, scale.low),
-            h("span", { class: "gradient", style: { background: `linear-gradient(90deg,${scale.colours.join()})` } }),
-            h("span", {}, scale.high),
-          )
-        : null,
-      entries.slice(0, 12).map((e) => h("span", { class: "entry" }, swatch(e.colour), e.label)),
-      entries.length > 12 ? h("span", { class: "entry" }, `and ${entries.length - 12} more`) : null,
-      lines(app),
-      app.clouds.waiting > 0 ? h("span", { class: "entry soft" }, `${app.clouds.waiting} clouds to come`) : null,
-    ];
-  });
 }
