@@ -58,6 +58,8 @@ export const TIMES = {
   animation_ms: 1200,
   /** Between pictures while clouds arrive. */
   clouds_ms: 250,
+  /** Until a panel has drawn what was just chosen. */
+  seen_ms: 80,
   /** What a picture that moves may take. */
   moving_ms: 24,
   answer_ms: 20_000,

@@ -93,3 +93,139 @@ test("the scale of disagreement ends where the largest value is, and its middle 
     await page.until("the legend", () => /^▾ disagreement/.test(document.querySelector(".legend-box").textContent));
     assert.deepEqual(await page.texts(".legend-box .scale > span"), ["0", "1", "75"]);
   }));
+
+test("All fits what is drawn: parts, clouds, circles of silent robots", () =>
+  served(small({ robots: fleet(6), submaps: 6, apart: [3, 4, 5] }), async (page, server, mission) => {
+    mission.silent.set(4, mission.time - 60);
+    server.tick(30);
+    await page.until("one is silent", () => tutti.app.robots.some((r) => r.reach_m > 50));
+    await page.until("clouds are there", () => tutti.app.clouds.waiting === 0);
+    for (const [width, height] of [
+      [1280, 800],
+      [700, 900],
+      [1366, 640],
+    ]) {
+      await page.page.setViewport({ width, height });
+      await page.evaluate(() => tutti.view.eye.look_at([500, 0, 0], 15));
+      await page.press("All");
+      await page.pause(400);
+      const { out, wide, high } = await page.evaluate(() => {
+        const { eye } = tutti.view;
+        const [xs, ys] = [[], []];
+        for (const { submap, target, id } of tutti.app.world.placed.values()) {
+          const cloud = tutti.app.clouds.get(id);
+          const corners = submap.path.concat(
+            [-1, 1].flatMap((a) => [-1, 1].map((b) => cloud.centre.map((x, k) => x + [a, b, 1][k] * cloud.half_m[k]))),
+          );
+          for (const p of corners) {
+            const yaw = 2 * Math.atan2(target[5], target[6]);
+            const [c, s] = [Math.cos(yaw), Math.sin(yaw)];
+            const at = eye.project([
+              target[0] + c * p[0] - s * p[1],
+              target[1] + s * p[0] + c * p[1],
+              target[2] + p[2],
+            ]);
+            xs.push(at[0]);
+            ys.push(at[1]);
+          }
+        }
+        const out = xs.filter((x, i) => x < 0 || x > eye.width || ys[i] < 0 || ys[i] > eye.height).length;
+        const share = (all, of) => (Math.max(...all) - Math.min(...all)) / of;
+        return { out, wide: share(xs, eye.width), high: share(ys, eye.height) };
+      });
+      assert.equal(out, 0, `points outside at ${width} x ${height}`);
+      assert.ok(Math.max(wide, high) > 0.5, `and not far away: ${wide} of the width, ${high} of the height`);
+      assert.ok(await page.evaluate(() => tutti.view.eye.holds([{ at: [0, 0, 0], radius_m: 1 }])));
+    }
+  }));
+
+/** Presses what a finger or a mouse reaches: it scrolls as a person does, and fails where something lies over the button. */
+async function tap(page, selector, text) {
+  const found = await page.page.evaluateHandle(
+    (s, words) => [...document.querySelectorAll(s)].find((e) => new RegExp(words).test(e.textContent)),
+    selector,
+    text,
+  );
+  await found.asElement().scrollIntoView();
+  await page.pause(150);
+  const over = await found.evaluate((e) => {
+    const box = e.getBoundingClientRect();
+    const top = document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2);
+    return e.contains(top) ? "" : (top?.outerHTML.slice(0, 80) ?? "nothing");
+  });
+  assert.equal(over, "", `over ${text}`);
+  await found.asElement().click();
+}
+
+for (const [width, height, scrolls] of [
+  [1366, 640, false],
+  [390, 844, true],
+])
+  test(`a closure is rejected at ${width} x ${height}`, () =>
+    served(
+      small(),
+      async (page, server) => {
+        await page.evaluate(() => localStorage.setItem("tutti.by", JSON.stringify("eva")));
+        await page.reload();
+        await page.until("loaded", () => tutti.app.may("decide") && tutti.app.world.placed.size === 72);
+        await tap(page, ".tabs button", "^Closures");
+        await page.until("the list", () => document.querySelector(".closures .closure"));
+        await tap(page, ".chips button", "^In the map");
+        await page.pause(300);
+        await tap(page, ".closures .closure", "alpha");
+        await page.until("both clouds", () => document.querySelector(".inspector .pair canvas"));
+        await page.pause(300);
+        const seen = await page.evaluate(() => {
+          const inside = (s) => {
+            const box = document.querySelector(s).getBoundingClientRect();
+            const panel = document.querySelector(".inspector").getBoundingClientRect();
+            return box.top >= 0 && box.bottom <= Math.min(innerHeight, panel.bottom + 1) && box.right <= innerWidth;
+          };
+          return { decision: inside(".decide .danger"), clouds: inside(".pair canvas") };
+        });
+        if (!scrolls) assert.deepEqual(seen, { decision: true, clouds: true }, "without scrolling");
+        assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), "nothing is wider");
+        await tap(page, ".decide button", "^Reject");
+        await page.until("it is refused", () =>
+          /refused/.test(document.querySelector(".inspector .state").textContent),
+        );
+        assert.equal(server.asked.find((a) => a.path === "/api/decide").body.wish, "reject");
+      },
+      {},
+      { width, height },
+    ));
+
+for (const [width, height, what] of [
+  [640, 400, "1280 x 800 at 200 %"],
+  [683, 320, "1366 x 640 at 200 %"],
+  [390, 844, "a phone"],
+  [1366, 640, "a laptop"],
+])
+  test(`nothing lies over a button: ${what}`, () =>
+    served(
+      small(),
+      async (page) => {
+        for (const tab of ["Closures", /^Alerts/]) {
+          await page.press(tab);
+          if (tab === "Closures") await page.click(".closure");
+          await page.pause(500);
+          const covered = await page.evaluate(async () => {
+            const out = [];
+            for (const e of document.querySelectorAll("button, input:not(.hidden), select")) {
+              if (e.offsetParent === null) continue;
+              e.scrollIntoView({ block: "center" });
+              const box = e.getBoundingClientRect();
+              const top = document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2);
+              if (!e.contains(top) && !top?.contains(e))
+                out.push(`${e.textContent || e.ariaLabel} under ${top?.className}`);
+              if (box.right > innerWidth + 1) out.push(`${e.textContent || e.ariaLabel} is cut`);
+            }
+            return out;
+          });
+          assert.deepEqual(covered, []);
+          assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), "nothing is wider");
+        }
+      },
+      {},
+      { width, height },
+    ));

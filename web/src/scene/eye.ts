@@ -5,6 +5,14 @@ import { MapControls } from "three/examples/jsm/controls/MapControls.js";
 import type { Vec3 } from "../schema";
 
 const kField_deg = 45;
+const kTilt_rad = 0.62;
+/** Between what is drawn and the picture's edges, where tools, scale and names are. */
+const kMargin_px = { top: 60, bottom: 44, side: 24 };
+
+export interface Ball {
+  at: Vec3;
+  radius_m: number;
+}
 
 export class Eye {
   readonly camera = new PerspectiveCamera(kField_deg, 1, 0.05, 20_000);
@@ -89,11 +97,14 @@ export class Eye {
     return true;
   }
 
-  /** Whether a box is in the picture, with all its corners. */
-  holds(low: Vec3, high: Vec3): boolean {
-    for (let corner = 0; corner < 8; ++corner) {
-      const at = this.project(low.map((x, k) => (corner & (1 << k) ? high[k] : x)));
-      if (!at || at[0] < 0 || at[0] > this.width || at[1] < 0 || at[1] > this.height) return false;
+  /** Whether all of these are in the picture. */
+  holds(balls: Iterable<Ball>): boolean {
+    for (const { at, radius_m } of balls) {
+      const spot = this.project(at);
+      if (!spot) return false;
+      const reach = radius_m * this.pixels_per_m(spot[2]);
+      if (spot[0] < reach || spot[0] + reach > this.width) return false;
+      if (spot[1] < reach || spot[1] + reach > this.height) return false;
     }
     return true;
   }
@@ -113,13 +124,37 @@ export class Eye {
     return Math.atan2(m[1], m[0]);
   }
 
-  /** Looks at a box from above, a little from the south. */
-  fit(low: Vec3, high: Vec3, from_above = false): void {
-    const size = Math.max(high[1] - low[1], (high[0] - low[0]) / this.camera.aspect, 4);
-    const away = (0.56 * size) / Math.tan((kField_deg * Math.PI) / 360) + (high[2] - low[2]) / 2;
-    this.controls.target.set((low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2);
-    const tilt = from_above ? 0.0001 : 0.62;
-    this.camera.position.copy(this.controls.target).add(new Vector3(0, -away * Math.sin(tilt), away * Math.cos(tilt)));
+  /** Looks at all of these from above, turned to the south by an angle, from as near as they are all in the picture. */
+  fit(balls: Ball[], tilt_rad = kTilt_rad, margin_px = kMargin_px): void {
+    if (balls.length === 0) return;
+    const [sin, cos] = [Math.sin(tilt_rad), Math.cos(tilt_rad)];
+    const half = Math.tan((kField_deg * Math.PI) / 360);
+    const free = (px: number, of: number): number => half * Math.max(0.3, 1 - (2 * px) / of);
+    /** For one direction of the picture: from how far away, and how far off the origin the middle is. */
+    const along = (of: (p: Vec3) => number, low: number, high: number): { away: number; middle: number } => {
+      let [most, least] = [-Infinity, -Infinity];
+      for (const { at, radius_m } of balls) {
+        const nearer = cos * at[2] - sin * at[1]; // to the camera than the origin
+        most = Math.max(most, nearer + (of(at) + radius_m * Math.hypot(1, high)) / high);
+        least = Math.max(least, nearer + (-of(at) + radius_m * Math.hypot(1, low)) / low);
+      }
+      const middle = (most - least) / (1 / high + 1 / low);
+      return { away: most - middle / high, middle };
+    };
+    const { aspect } = this.camera;
+    const side = free(margin_px.side, this.width) * aspect;
+    const right = along((p) => p[0], side, side);
+    const up = along(
+      (p) => cos * p[1] + sin * p[2],
+      free(margin_px.bottom, this.height),
+      free(margin_px.top, this.height),
+    );
+    const away = Math.max(right.away, up.away, 4);
+    const place = new Vector3(right.middle, cos * up.middle - sin * away, sin * up.middle + cos * away);
+    const ground = balls.reduce((sum, { at }) => sum + at[2], 0) / balls.length;
+    const ahead = (place.z - ground) / cos; // what it turns around is on the ground
+    this.controls.target.set(place.x, place.y + sin * ahead, ground);
+    this.camera.position.copy(place);
     this.controls.update();
     this.aimed = false;
   }

@@ -6,6 +6,7 @@ import type { Rgb } from "../colours";
 import { compose, inverse, kIdentity, rows_of, transform } from "../pose";
 import type { Painted } from "../raster";
 import type { Pose, SubmapId, Vec3 } from "../schema";
+import { corners_of } from "./extent";
 import { Eye } from "./eye";
 import { Ink } from "./ink";
 import { CpuPainter } from "./painters";
@@ -28,6 +29,11 @@ export interface Pair {
   /** T_from_to as measured; null: only as the map has it. */
   measured: Pose | null;
 }
+
+/** Where no cloud is there: a tunnel's piece around the submap's place. */
+const kNoCloud = { centre: [0, 0, 0] as Vec3, half_m: [5, 5, 1] as Vec3 };
+const kFromAbove_rad = 1e-4;
+const kMargin_px = { top: 6, bottom: 6, side: 6 };
 
 export class PairView {
   readonly element = document.createElement("div");
@@ -122,21 +128,10 @@ export class PairView {
     const name = `${pair.from} ${pair.to} ${clouds.map((c) => c !== null).join()}`;
     if (this.fitted === name) return;
     this.fitted = name;
-    const low: Vec3 = [Infinity, Infinity, Infinity];
-    const high: Vec3 = [-Infinity, -Infinity, -Infinity];
-    clouds.forEach((cloud, i) => {
+    const balls = clouds.flatMap((cloud, i) => {
       const T = poses[i];
-      if (!T) return;
-      const centre = transform(T, cloud?.centre ?? [0, 0, 0]);
-      const m = rows_of(T);
-      const half = cloud?.half_m ?? [5, 5, 1];
-      for (let k = 0; k < 3; ++k) {
-        const reach =
-          Math.abs(m[4 * k] * half[0]) + Math.abs(m[4 * k + 1] * half[1]) + Math.abs(m[4 * k + 2] * half[2]);
-        low[k] = Math.min(low[k], centre[k] - reach);
-        high[k] = Math.max(high[k], centre[k] + reach);
-      }
+      return T ? corners_of(cloud ?? kNoCloud).map((corner) => ({ at: transform(T, corner), radius_m: 0 })) : [];
     });
-    if (Number.isFinite(low[0])) this.eye.fit(low, high, true);
+    this.eye.fit(balls, kFromAbove_rad, kMargin_px);
   }
 }

@@ -7,6 +7,7 @@ import type { Painted } from "../raster";
 import { SurveyDistance } from "../survey";
 import { Dresser, window_of } from "./dress";
 import type { Dressing } from "./dress";
+import { drawn } from "./extent";
 import { Eye } from "./eye";
 import { Ink } from "./ink";
 import type { Target } from "./ink";
@@ -73,9 +74,9 @@ export class View {
   redraw(): void {
     this.dirty = true;
   }
-  fit(from_above = false): void {
+  fit(): void {
     this.followed = null;
-    this.eye.fit(this.app.world.low, this.app.world.high, from_above);
+    this.eye.fit(drawn(this.app));
   }
   use(tool: Tool | null): void {
     this.tool = tool;
@@ -133,7 +134,7 @@ export class View {
     if (!app.ready || this.tool || !app.robots.some((r) => r.newest || !app.live)) return;
     eye.update();
     const sees = [...app.world.placed.values()].some((p) => eye.sees(p.target, 0));
-    if (eye.aimed ? this.saw && !sees : !eye.holds(app.world.low, app.world.high)) this.fit();
+    if (eye.aimed ? this.saw && !sees : !eye.holds(drawn(app))) this.fit();
     else this.saw = sees;
   }
 
@@ -149,6 +150,7 @@ export class View {
     this.eye.resize(width, height);
     this.painter.resize(width, height, ratio);
     this.ink.resize(width, height, ratio);
+    this.keep_in_sight();
     this.draw();
   }
 

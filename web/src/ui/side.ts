@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /** The panel on the right: what is inspected, and below it the tabs. */
 import type { App } from "../app";
+import { TIMES } from "../limits";
 import { memory, PHASES } from "../options";
 import type { View } from "../scene/view";
 import { alerts_panel, open_alerts } from "./alerts";
@@ -103,7 +104,13 @@ export function side_panel(app: App, view: View): HTMLElement {
     );
   });
   queueMicrotask(() => show(tab));
-  return h("aside", { class: "side" }, inspector_panel(app), bar, body);
+  const inspector = inspector_panel(app);
+  app.on((topic) => {
+    if (topic === "selection" && app.selection?.kind === "closure")
+      // on a phone the list is below it
+      setTimeout(() => inspector.scrollIntoView({ block: "nearest" }), TIMES.seen_ms);
+  });
+  return h("aside", { class: "side" }, inspector, bar, body);
 }
 
 const kLeast_px = 280;
