@@ -148,6 +148,11 @@ export class App {
     this.say("options");
   }
 
+  /** The server is gone, and nobody misses it: everybody had finished and sent everything. */
+  has_ended(): boolean {
+    const all_finished = this.robots.length > 0 && this.robots.every((robot) => robot.presence === "finished");
+    return this.link.state === "silent" && all_finished;
+  }
   /** Whether the server shows nothing until this person logs in. */
   is_locked(): boolean {
     return this.me.login && !this.me.role;

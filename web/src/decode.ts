@@ -106,6 +106,7 @@ function status(value: unknown): s.Status {
       };
     }),
     trouble: words(f.trouble, "trouble"),
+    wall_ms: (maybe(f.wall_ns, "wall_ns") ?? 0) / 1e6 || null,
     verifier: words(f.verifier, "verifier"),
     waiting: count(f.waiting, "waiting"),
     why_waiting: words(f.why_waiting, "why_waiting"),
@@ -214,11 +215,6 @@ function closure(value: unknown): s.Closure {
   };
 }
 
-function refused(value: unknown, what: string): s.Refused {
-  const f = fields(value, what);
-  return { reason: text(f.reason, "reason"), count: number(f.count, "count") };
-}
-
 function disagreement(value: unknown): s.Disagreement {
   const f = fields(value, "disagreement");
   return {
@@ -319,7 +315,6 @@ export const DECODERS: { [K in s.Kind]: (value: unknown, ids: IdTable) => s.Valu
   submap,
   poses,
   closure,
-  refusals: (value) => list(value, "refusals", refused),
   disagreement,
   trajectory,
   errors,
@@ -353,6 +348,7 @@ export function decode_registration(value: unknown): s.Registration {
   return {
     found: f.found === true,
     why: words(f.why, "why"),
+    hint: words(f.hint, "hint"),
     T_from_to: f.T_from_to ? pose(f.T_from_to, "T_from_to") : null,
     evidence: maybe_list(f.evidence, "evidence", gate),
     look: maybe(f.look, "look"),

@@ -202,6 +202,20 @@ export function correction_between(store: Store, t: number, was: Poses, after: P
   return { t, before, after, moved_m, largest_m, largest, joined, keeper };
 }
 
+/** The server's wall clock at mission time t, ms since 1970; null: not known. */
+export function wall_ms_at(store: Store, t: number): number | null {
+  const track = store.track("status");
+  const wall = (i: number): number | null => track?.values[i]?.wall_ms ?? null;
+  const i = track ? track.index(t) : -1;
+  const here = wall(i);
+  if (!track || here === null) return null;
+  // Played at another speed, mission time and the wall's do not go alike: as between the two statuses around it.
+  const other = wall(i + 1) !== null ? i + 1 : i - 1;
+  const there = wall(other);
+  const rate = there === null ? 1000 : (there - here) / (track.times[other] - track.times[i]);
+  return here + (t - track.times[i]) * (Number.isFinite(rate) ? rate : 1000);
+}
+
 /** The range between the mission's first and last message, for the time line. */
 export function time_range(store: Store, now: number): { first: number; last: number } {
   const mission = store.get("mission");

@@ -56,8 +56,14 @@ export function figure(x: Figure, unit = ""): string {
 
 export const many = (n: number, one: string, several = `${one}s`): string => `${n} ${n === 1 ? one : several}`;
 
-/** When, by the watch on the wall; from ns since 1970. */
-export const wall = (ns: number | null): string =>
-  ns ? new Date(ns / 1e6).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" }) : "";
+/** A time of the day that is the same for everybody, "04:12:09 UTC"; from ms since 1970. */
+export const utc = (ms: number | null): string =>
+  ms !== null && Math.abs(ms) < kMostDate_ms ? `${new Date(ms).toISOString().slice(11, 19)} UTC` : "";
+/** The same with its day: "2026-11-28 04:12:09 UTC". */
+export const utc_date = (ms: number | null): string =>
+  ms !== null && Math.abs(ms) < kMostDate_ms ? `${new Date(ms).toISOString().slice(0, 10)} ${utc(ms)}` : "";
+const kMostDate_ms = 8.64e15;
+/** From ns since 1970, to the minute: "04:12 UTC". */
+export const wall = (ns: number | null): string => (ns ? utc(ns / 1e6).replace(/:\d\d UTC$/, " UTC") : "");
 
 const two = (n: number): string => String(n).padStart(2, "0");

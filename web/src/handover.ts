@@ -17,6 +17,7 @@ const ENCODERS: { [K in Kind]?: (value: never, store: Store) => unknown } = {
   }),
   status: (s: Status) => ({
     ...s,
+    wall_ns: s.wall_ms && s.wall_ms * 1e6,
     robots: s.robots.map((r) => ({ ...r, T_odom_body: r.position && { translation_m: r.position } })),
     refusals: s.refused.map((r) => ({ ...r, last_why: r.why })),
   }),

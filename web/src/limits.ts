@@ -9,7 +9,6 @@ export const LIMITS = {
     submap: 2,
     poses: 240,
     closure: 8,
-    refusals: 60,
     disagreement: 12,
     trajectory: 1,
     errors: 1,

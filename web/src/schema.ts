@@ -72,6 +72,8 @@ export interface Status {
   workers: WorkerStatus[];
   refused: { from: string; kind: string; count: number; why: string }[];
   trouble: string;
+  /** The server's wall clock, ms since 1970; null: not known. */
+  wall_ms: number | null;
   verifier: string;
   waiting: number;
   why_waiting: string;
@@ -150,11 +152,6 @@ export interface Closure {
   evidence: Gate[];
 }
 
-export interface Refused {
-  reason: string;
-  count: number;
-}
-
 export interface Disagreement {
   robot: number | null;
   scale_length_m: number[];
@@ -223,7 +220,6 @@ export interface Values {
   submap: Submap;
   poses: Poses;
   closure: Closure;
-  refusals: Refused[];
   disagreement: Disagreement;
   trajectory: Trajectory;
   errors: Errors;
@@ -258,6 +254,8 @@ export interface Me {
 export interface Registration {
   found: boolean;
   why: string;
+  /** What would help; "": every gate is passed. */
+  hint: string;
   T_from_to: Pose | null;
   evidence: Gate[];
   /** What to ask for the map with it by; null: nothing was found. */

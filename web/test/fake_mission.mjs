@@ -6,6 +6,8 @@ export function random(seed) {
   return () => ((s = (Math.imul(s, 1664525) + 1013904223) >>> 0), s / 4294967296);
 }
 
+/** When mission time was 0, by the server's clock: 03:58 UTC. */
+const kBegin_ms = Date.UTC(2026, 10, 28, 3, 58);
 const kSubmap_s = 10;
 const kKeyframes = 11;
 
@@ -261,7 +263,7 @@ export class FakeMission {
     });
     return {
       time_ns: this.time * 1e9,
-      wall_ns: Date.now() * 1e6,
+      wall_ns: (kBegin_ms + 1000 * this.time) * 1e6,
       version: "0.3.0",
       epoch: 1,
       revision: this.revision,
@@ -368,13 +370,6 @@ export class FakeMission {
     for (const c of this.closures.values()) out.push(this.message(`closure/${c.name}`, c));
     for (const m of this.marks.values()) out.push(this.message(`mark/${m.id}`, m));
     this.robots.forEach((name, r) => out.push(this.message(`disagreement/${name}`, this.disagreement(r))));
-    out.push(
-      this.message("refusals", [
-        { reason: "overlap", count: 812 },
-        { reason: "no alignment comes near", count: 640 },
-        { reason: "free to slide", count: 77 },
-      ]),
-    );
     return out;
   }
 

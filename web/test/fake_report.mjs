@@ -13,7 +13,13 @@ export function fill(page, recorded) {
 }
 
 /** Messages of a whole mission: submaps arrive every ten seconds, each revision is nearer to the truth. */
-export function recorded_mission({ robots = ["alpha", "bravo"], submaps = 36, points = 4000, name = "demo" } = {}) {
+export function recorded_mission({
+  robots = ["alpha", "bravo"],
+  submaps = 36,
+  points = 4000,
+  name = "demo",
+  reference = true,
+} = {}) {
   const mission = new FakeMission({ robots, submaps: 0, points, apart: [], name });
   const messages = [];
   const clouds = {};
@@ -60,19 +66,25 @@ export function recorded_mission({ robots = ["alpha", "bravo"], submaps = 36, po
         : [],
     );
   }
-  robots.forEach((robot, r) => add_estimates(mission, say, robot, r));
-  say("refusals", [
-    { reason: "overlap", count: 812 },
-    { reason: "no alignment comes near", count: 640 },
-  ]);
-  say("report", JSON.parse(read("./data/report.json")));
+  robots.forEach((robot, r) => add_estimates(mission, say, robot, r, reference));
+  const report = JSON.parse(read("./data/report.json"));
+  say("report", reference ? report : without_reference(report));
   say("timing", JSON.parse(read("./data/timing.json")));
   say("settings", "mission: demo\nseed: 1\nrobots:\n  - name: alpha\n");
   add_survey(mission, say, clouds);
   return { messages, clouds };
 }
 
-function add_estimates(mission, say, robot, r) {
+/** As the program writes it when nobody knows where the robots were. */
+function without_reference(report) {
+  for (const robot of report.robots)
+    for (const of of [robot, ...Object.values(robot.policies)])
+      for (const key of Object.keys(of)) if (/rmse|max_error|rpe/.test(key) && !/agreement/.test(key)) of[key] = null;
+  report.server.rmse_m = report.server.max_error_m = null;
+  return report;
+}
+
+function add_estimates(mission, say, robot, r, reference) {
   const points = { onboard: [], corrected: [], server: [], reference: [] };
   const errors = [];
   for (const s of mission.submaps.filter((s) => s.robot === r)) {
@@ -97,13 +109,14 @@ function add_estimates(mission, say, robot, r) {
       ]);
     }
   }
+  if (!reference) delete points.reference;
   for (const [kind, list] of Object.entries(points))
     say(`trajectory/${robot}/${kind}`, { robot: r, component: 0, name: robot, points: list });
   say(`errors/${robot}`, {
     robot: r,
     names: ["onboard", "corrected", "server", "born", "distance"],
-    against: "reference",
-    points: errors,
+    against: reference ? "reference" : "server",
+    points: reference ? errors : errors.map((row) => [row[0], row[1], row[2], null, null, row[5]]),
   });
   say(`disagreement/${robot}`, mission.disagreement(r));
 }

@@ -162,7 +162,16 @@ export class FakeServer {
       const found = Math.hypot(T[0], T[1]) < 15;
       return ok({
         found,
-        why: found ? "Both clouds fit." : "no alignment comes near",
+        why: this.ambiguous
+          ? "ambiguous: 0.91, at most 0.75"
+          : found
+            ? "every gate is passed"
+            : "no alignment comes near",
+        hint: this.ambiguous
+          ? "a place that looks the same all along"
+          : found
+            ? ""
+            : "most likely these are different places",
         T_from_to: T,
         evidence: [
           { reason: "overlap", value: found ? 0.55 : 0.04, limit: 0.3, unit: "", at_least: true, ok: found },

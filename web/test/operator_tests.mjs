@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What an operator needs at four in the morning: a hundred robots, small screens, numbers that do not contradict each other.
 import assert from "node:assert/strict";
-import { fleet, served, small, test } from "./served.mjs";
+import { writeFileSync } from "node:fs";
+import { join } from "node:path";
+import { fill, recorded_mission } from "./fake_report.mjs";
+import { browser, fleet, page_text, served, small, test, work } from "./served.mjs";
 
 const a_hundred = () => small({ robots: fleet(100), submaps: 2, points: 50, apart: [] });
 
@@ -141,6 +144,7 @@ test("All fits what is drawn: parts, clouds, circles of silent robots", () =>
 
 /** Presses what a finger or a mouse reaches: it scrolls as a person does, and fails where something lies over the button. */
 async function tap(page, selector, text) {
+  await page.pause(300); // panels that are being drawn anew
   const found = await page.page.evaluateHandle(
     (s, words) => [...document.querySelectorAll(s)].find((e) => new RegExp(words).test(e.textContent)),
     selector,
@@ -229,3 +233,79 @@ for (const [width, height, what] of [
       {},
       { width, height },
     ));
+
+test("mission time stands beside the day's, in UTC and 24 h, also in the past", () =>
+  served(small(), async (page) => {
+    await page.until("now", () => /^0:04:0\d04:02:0\d UTC$/.test(document.querySelector(".clock .now").textContent));
+    await page.evaluate(() => tutti.app.set_time(241));
+    await page.until("then", () => document.querySelector(".clock .now").textContent === "0:04:0104:02:01 UTC");
+    assert.match(await page.evaluate(() => document.querySelector(".clock .now").title), /2026-11-28 04:02:01 UTC/);
+  }));
+
+test("a finished mission whose server has ended is over, and says where the report is", () =>
+  served(small(), async (page, server, mission) => {
+    mission.finished = new Set([0, 1, 2]);
+    server.tick(5);
+    await page.until("all have finished", () => document.querySelectorAll(".robot.finished").length === 3);
+    await server.stop();
+    await page.until("it is over", () => document.querySelector(".badge").textContent === "The mission is over");
+    assert.match((await page.texts(".hint")).join(), /report\.html in the mission's folder/);
+    assert.doesNotMatch(await page.evaluate(() => document.body.innerText), /server is silent/);
+    await server.start(server.port);
+  }));
+
+test("what Tutti would refuse does not fit, whatever the gates say", () =>
+  served(small(), async (page, server) => {
+    server.ambiguous = true;
+    await page.press("By hand");
+    await page.fill('[aria-label="First submap"]', "alpha/0");
+    await page.fill('[aria-label="Second submap"]', "charlie/10");
+    await page.press("Register");
+    await page.until("it is refused", () =>
+      /Tutti would refuse this: ambiguous: 0\.91, at most 0\.75/.test(document.querySelector(".by-hand").textContent),
+    );
+    assert.doesNotMatch((await page.texts(".by-hand")).join(), /They fit/);
+  }));
+
+test("the uncertainty of a mark says from where, and names the other number", () => {
+  const mission = small();
+  const mark = {
+    id: "m1",
+    submap: "0:1/9",
+    at: [1, 0, 0],
+    text: "door, locked",
+    by: "eva",
+    wall_ns: 1e18,
+    photo: null,
+  };
+  mission.marks.set("m1", mark);
+  return served(mission, async (page) => {
+    await page.press("Marks");
+    await page.click(".mark .closure");
+    await page.until("the uncertainty", () =>
+      /known to 0\.110.m \(one sigma\) beside the rest of its robot's way.*marks\.csv/.test(
+        document.querySelector(".mark").textContent,
+      ),
+    );
+    assert.equal((await page.texts(".mark .seen"))[0], "01:46 UTC");
+  });
+});
+
+test("a report without a reference shows distances to the server's map, and no error", async () => {
+  const file = join(work, "unreferenced.html");
+  writeFileSync(file, fill(page_text, recorded_mission({ reference: false })));
+  const page = await browser.open(`file://${file}`);
+  await page.until("the report", () => document.querySelectorAll(".report .cards.wide .card").length > 0);
+  const text = (await page.texts(".report"))[0];
+  assert.match(text, /Every robot's distance to the server's map, RMSE: by its own odometry → corrected/);
+  assert.match((await page.texts(".report .cards.wide .value"))[0], /^\d\.\d+\sm → \d\.\d+\sm$/);
+  assert.doesNotMatch(text, /not measured|error, m|error in m/);
+  assert.match(text, /distance to the server's map, m/);
+  assert.match(text, /2216 pairs of submaps refused/);
+  await page.press("Closures");
+  await page.until("the same number", () =>
+    /2216 pairs of submaps refused, by reason/.test(document.querySelector(".closures").textContent),
+  );
+  assert.deepEqual(page.errors, []);
+  await page.close();
+});

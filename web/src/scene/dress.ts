@@ -162,7 +162,12 @@ export function legend_of(world: World, d: Dressing): Legend {
     case "sigma":
       if (![...world.placed.values()].some((p) => Number.isFinite(p.sigma_m)))
         return { title: "uncertainty: not computed", entries: [], scale: null };
-      return scale("uncertainty of position, one sigma", bad, "0 m", metres(s.sigma_m));
+      return scale(
+        "uncertainty of position beside the rest of its robot's way, one sigma",
+        bad,
+        "0 m",
+        metres(s.sigma_m),
+      );
     case "survey":
       return scale("distance to the survey's nearest point", bad, "0", `${100 * SurveyDistance.most_m} cm or more`);
     case "disagreement":

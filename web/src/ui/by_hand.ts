@@ -219,7 +219,7 @@ function change_words(app: App): Child {
 }
 
 function answer(app: App, found: Registration): Child {
-  const fits = found.found && found.evidence.every((gate) => gate.ok);
+  const fits = found.found && found.hint === "" && found.evidence.every((gate) => gate.ok);
   const may_keep = found.T_from_to && app.may("closure") && !draft.kept;
   return [
     h(
@@ -227,6 +227,7 @@ function answer(app: App, found: Registration): Child {
       { class: `state ${fits ? "" : "warn"}` },
       h("b", {}, fits ? "They fit." : found.found ? "Tutti would refuse this:" : "They do not fit."),
       ` ${found.why}`,
+      found.hint ? h("span", { class: "detail" }, found.hint) : null,
     ),
     found.look === null || draft.kept ? null : change_words(app),
     gates(found.evidence),

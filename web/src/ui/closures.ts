@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /** All closures, newest decisions first; filtered by state and by text. */
 import type { App } from "../app";
-import { figure } from "../format";
+import { figure, many } from "../format";
 import { LIMITS } from "../limits";
 import type { Closure, ClosureState } from "../schema";
 import { ends_of, palette_of, state_colour } from "../scene/picture";
 import type { View } from "../scene/view";
 import { button, h, held, panel, swatch } from "./dom";
 import type { Child } from "./dom";
+import { reading } from "./report_data";
 
 export const STATE_WORDS: Record<ClosureState, string> = {
   accepted: "in the map",
@@ -44,6 +45,11 @@ function content(app: App, view: View): Child[] {
     );
   const rows = all.filter(([, c]) => shown(app, c)).reverse();
   return [
+    h(
+      "p",
+      { class: "lead" },
+      "Closures: pairs of submaps whose relative pose was found. Pairs that were refused before that are not in this list.",
+    ),
     h(
       "div",
       { class: "row chips" },
@@ -111,24 +117,30 @@ function row(app: App, view: View, name: string, closure: Closure): HTMLElement 
   );
 }
 
+/** A report counts them; a running server does not. */
 function refusals(app: App): HTMLElement {
   return panel(app, ["data", "time"], {}, () => {
-    const all = app.store.get("refusals", app.at()) ?? [];
+    const server = reading(app.store.get("report")).at("server");
+    const all = server
+      .list("rejections")
+      .map((r) => ({ reason: r.s("reason"), count: (r.n("intra") ?? 0) + (r.n("inter") ?? 0) }))
+      .sort((a, b) => b.count - a.count);
     if (all.length === 0) return [];
-    const most = Math.max(...all.map((r) => r.count));
     return [
-      h("h3", {}, "Pairs refused, by reason"),
-      [...all]
-        .sort((a, b) => b.count - a.count)
-        .map((r) =>
+      h("h3", {}, `${many(server.n("closures_rejected") ?? 0, "pair")} of submaps refused, by reason`),
+      all.map((r) =>
+        h(
+          "div",
+          { class: "bar-row" },
+          h("span", {}, r.reason),
           h(
-            "div",
-            { class: "bar-row" },
-            h("span", {}, r.reason),
-            h("span", { class: "track" }, h("span", { class: "bar", style: { width: `${(100 * r.count) / most}%` } })),
-            h("span", { class: "right" }, r.count),
+            "span",
+            { class: "track" },
+            h("span", { class: "bar", style: { width: `${(100 * r.count) / all[0].count}%` } }),
           ),
+          h("span", { class: "right" }, r.count),
         ),
+      ),
     ];
   });
 }

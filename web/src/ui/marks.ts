@@ -3,7 +3,7 @@
 import { api } from "../api";
 import type { App } from "../app";
 import { is_photo } from "../decode";
-import { wall } from "../format";
+import { metres, wall } from "../format";
 import { LIMITS } from "../limits";
 import type { Mark } from "../schema";
 import type { Ink } from "../scene/ink";
@@ -120,6 +120,7 @@ async function shrink(file: Blob): Promise<string> {
 
 function line(app: App, view: View, id: string, mark: Mark): HTMLElement {
   const chosen = app.selection?.kind === "mark" && app.selection.id === id;
+  const sigma_m = app.world.placed.get(mark.submap)?.sigma_m ?? NaN;
   return h(
     "article",
     { class: `mark${chosen ? " chosen" : ""}` },
@@ -149,6 +150,13 @@ function line(app: App, view: View, id: string, mark: Mark): HTMLElement {
     chosen
       ? [
           mark.text.includes("\n") ? h("p", { class: "words" }, mark.text) : null,
+          Number.isFinite(sigma_m)
+            ? h(
+                "p",
+                { class: "detail" },
+                `Its submap is known to ${metres(sigma_m)} (one sigma) beside the rest of its robot's way. How well its place is known from the first keyframe of its part, which is another number, is in the table of marks (tutti export STATE/map.tutti --live -o marks.csv).`,
+              )
+            : null,
           mark.photo && is_photo(mark.photo) ? h("img", { src: mark.photo, alt: "Photo of the mark" }) : null,
           app.may("mark")
             ? h(

@@ -54,7 +54,7 @@ function headline(app: App, report: Node): HTMLElement {
       {},
       measured
         ? "Error of every robot, RMSE: by its own odometry → corrected"
-        : "Error of every robot: not measured, because there is no reference",
+        : "Every robot's distance to the server's map, RMSE: by its own odometry → corrected. Without a reference nobody knows the error",
     ),
     h(
       "div",
@@ -107,6 +107,14 @@ function card(what: Child, value: Child, detail: Child): HTMLElement {
 const headline_m = (node: Node, key: string, partial: string): string =>
   node.yes(partial) ? "-" : metres(node.n(key));
 
+/** Without a reference, an estimate's curve is its distance to the server's. */
+function off_server_m(app: App, robot: Node, estimate: string): number | null {
+  const errors = app.store.get("errors", Infinity, robot.s("name"));
+  const column = errors?.columns[errors.names.indexOf(estimate) + 1].filter(Number.isFinite);
+  if (errors?.against !== "server" || !column?.length) return null;
+  return Math.sqrt(column.reduce((sum, x) => sum + x * x, 0) / column.length);
+}
+
 function robot_card(app: App, report: Node, robot: Node): HTMLElement {
   const policy = followed(report, robot);
   const value: Child = robot.has("onboard_rmse_m")
@@ -116,7 +124,11 @@ function robot_card(app: App, report: Node, robot: Node): HTMLElement {
         h("span", { class: "down" }, headline_m(policy, "rmse_m", "partial")),
         h("small", {}, ` server ${headline_m(robot, "server_rmse_m", "server_partial")}`),
       ]
-    : ["not measured", h("small", {}, " no reference")];
+    : [
+        h("span", { class: "up" }, metres(off_server_m(app, robot, "onboard"))),
+        " → ",
+        h("span", { class: "down" }, metres(policy.n("agreement_rmse_m") ?? off_server_m(app, robot, "corrected"))),
+      ];
   const constraints = policy.n("constraints") ?? 0;
   const factors = robot.n("odometry_factors") ?? 0;
   const duration = robot.n("duration_s") ?? 0;
@@ -130,11 +142,6 @@ function robot_card(app: App, report: Node, robot: Node): HTMLElement {
     rate("bytes_up"),
     " sent",
   ];
-  if (!robot.has("onboard_rmse_m") && policy.has("agreement_rmse_m"))
-    detail.push(
-      h("br"),
-      `corrected and server agree within ${metres(policy.n("agreement_rmse_m"))} RMSE, however true both are`,
-    );
   if (robot.has("map_error.corrected"))
     detail.push(
       h("br"),
@@ -184,7 +191,7 @@ function map_cards(report: Node): HTMLElement[] {
     card(
       "Loop closures in the map",
       server.s("closures_accepted") || "-",
-      `${server.n("closures_accepted_inter") ?? 0} between robots; ${server.n("closures_rejected") ?? 0} refused`,
+      `${server.n("closures_accepted_inter") ?? 0} between robots; ${many(server.n("closures_rejected") ?? 0, "pair")} of submaps refused`,
     ),
   );
   const updates = report.list("robots").reduce((sum, r) => sum + (r.n("updates") ?? 0), 0);

@@ -28,16 +28,15 @@ export function curves(app: App, view: View, report: Node): HTMLElement {
   const colours = (name: string): string =>
     style.getPropertyValue(`--${name}`).trim() || style.getPropertyValue("--soft");
   const names = [...new Set(all.flatMap(([, e]) => e.names))].filter((n) => !kAside.includes(n));
-  const against = all[0][1].against === "server" ? "the server's estimate" : "the reference";
+  const known = all[0][1].against !== "server";
+  const lead = known
+    ? "Distance of every keyframe to the reference after one rigid alignment. New drift: the error of the odometry's motion over the last 20 s, which shows where drift was born."
+    : "Distance of every keyframe to the server's map after one rigid alignment; without a reference nobody knows the error.";
   return h(
     "section",
     {},
     h("h2", {}, "Who drifted where and when"),
-    h(
-      "p",
-      { class: "lead" },
-      `Distance of every keyframe to ${against} after one rigid alignment. New drift: the error of the odometry's motion over the last 20 s, which shows where drift was born. Point at a curve to see the place in the map; click to look there.`,
-    ),
+    h("p", { class: "lead" }, `${lead} Point at a curve to see the place in the map; click to look there.`),
     h(
       "p",
       { class: "row key" },
@@ -98,7 +97,11 @@ function one(
       { class: "line" },
       swatch(css(robot_rgb(robot?.index ?? 0, app.dark))),
       h("b", {}, robot?.name ?? name),
-      h("span", { class: "seen" }, `error in m${log ? ", logarithmic" : ""}`),
+      h(
+        "span",
+        { class: "seen" },
+        `${errors.against === "server" ? "distance to the server's map" : "error"}, m${log ? ", logarithmic" : ""}`,
+      ),
     ),
     plot.element,
     ...born(app, errors, thin, colours),

@@ -147,7 +147,7 @@ function closures(report: Node): HTMLElement {
       r.n("nearest") === null
         ? ""
         : ` (nearest ${figure(r.n("nearest"), r.s("unit"))}, limit ${figure(r.n("limit"), r.s("unit"))})`;
-    rows.push(line([`refused: ${r.s("reason")}`, h("small", {}, nearest)], r.n("intra") ?? 0, r.n("inter") ?? 0));
+    rows.push(line([`pairs refused: ${r.s("reason")}`, h("small", {}, nearest)], r.n("intra") ?? 0, r.n("inter") ?? 0));
   }
   const check = server.at("closure_check");
   const lead = check.has("checked")
@@ -155,8 +155,8 @@ function closures(report: Node): HTMLElement {
     : "";
   return section(
     "Loop closures",
-    `What the server took into the map, and why it refused the rest.${lead}`,
-    table(["loop closures", "within a robot", "between robots", "together"], rows),
+    `What the server took into the map, and why it refused other pairs of submaps.${lead}`,
+    table(["pairs of submaps", "within a robot", "between robots", "together"], rows),
   );
 }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /** Time at the bottom: what happened when, and the time that is shown. */
 import type { App } from "../app";
-import { correction_between, time_range } from "../derive";
-import { metres, moment } from "../format";
+import { correction_between, time_range, wall_ms_at } from "../derive";
+import { metres, moment, utc, utc_date } from "../format";
 import { TIMES } from "../limits";
 import { memory } from "../options";
 import { palette_of } from "../scene/picture";
@@ -66,7 +66,12 @@ export class Timeline {
 
   private clock(): HTMLElement {
     return panel(this.app, ["time", "tick", "data"], { class: "clock" }, () => [
-      h("b", {}, moment(this.app.shown())),
+      h(
+        "span",
+        { class: "now", title: `Mission time, and by the server's clock: ${utc_date(this.wall_ms()) || "not known"}` },
+        h("b", {}, moment(this.app.shown())),
+        h("small", {}, utc(this.wall_ms())),
+      ),
       this.app.live
         ? button("Live", () => this.stop(null), {
             class: this.app.time === null ? "live" : "primary",
@@ -75,6 +80,10 @@ export class Timeline {
           })
         : h("span", {}, `of ${moment(this.range().last)}`),
     ]);
+  }
+
+  private wall_ms(): number | null {
+    return wall_ms_at(this.app.store, this.app.shown());
   }
 
   private range(): { first: number; last: number } {

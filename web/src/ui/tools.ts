@@ -12,7 +12,7 @@ import type { Child } from "./dom";
 const open = { layers: false, heights: false, section: false };
 
 export function tool_bar(app: App, view: View): HTMLElement {
-  const bar = panel(app, ["options", "tool", "data"], { class: "tools" }, () => {
+  const bar = panel(app, ["options", "tool", "data", "link"], { class: "tools" }, () => {
     const toggle = (name: keyof typeof open, text: string, lit = false) =>
       button(
         text,
@@ -43,6 +43,7 @@ export function tool_bar(app: App, view: View): HTMLElement {
       open.layers ? layers(app) : null,
       open.heights ? heights(app) : null,
       open.section ? section(app, view) : null,
+      app.has_ended() ? h("p", { class: "hint" }, kEnded) : null,
       view.tool
         ? h(
             "p",
@@ -55,6 +56,10 @@ export function tool_bar(app: App, view: View): HTMLElement {
   });
   return bar;
 }
+
+const kEnded =
+  "All robots have finished and have sent everything, and the server has ended: this is how it came out. " +
+  "The report is report.html in the mission's folder (--out), which the console of tutti demo --live or tutti mission up names.";
 
 const hint = (view: View): string =>
   view.tool?.name === "measure" ? "Point at two places. Esc ends it. " : `${view.tool?.name ?? ""}. Esc ends it. `;

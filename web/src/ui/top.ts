@@ -65,6 +65,7 @@ function badge(app: App): Child {
     );
   const { state, heard_ms, why } = app.link;
   if (state === "locked") return h("span", { class: "badge old" }, "Not logged in");
+  if (app.has_ended()) return h("span", { class: "badge report", role: "status" }, "The mission is over");
   if (state === "connecting") return h("span", { class: "badge old" }, why ? `No server (${why})` : "Connecting …");
   if (state === "silent")
     return h(
