@@ -1,6 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /** From JSON to the values of schema.ts; one function per kind of key, one table of all of them. */
-import { count, DecodeError, fields, list, maybe, maybe_list, number, numbers, one_of, text, words } from "./reading";
+import {
+  count,
+  DecodeError,
+  fields,
+  list,
+  maybe,
+  maybe_list,
+  named_numbers,
+  number,
+  numbers,
+  one_of,
+  text,
+  words,
+} from "./reading";
 import type { Fields } from "./reading";
 import type { Rgb, RobotColours } from "./colours";
 import { POSE_ROW } from "./schema";
@@ -110,6 +123,7 @@ function status(value: unknown): s.Status {
     verifier: words(f.verifier, "verifier"),
     waiting: count(f.waiting, "waiting"),
     why_waiting: words(f.why_waiting, "why_waiting"),
+    numbers: named_numbers(f),
   };
 }
 

@@ -16,9 +16,16 @@ const ENCODERS: { [K in Kind]?: (value: never, store: Store) => unknown } = {
     submaps: Object.fromEntries(rows_of_submaps(p, store)),
   }),
   status: (s: Status) => ({
+    ...s.numbers.get(""),
     ...s,
+    numbers: undefined,
     wall_ns: s.wall_ms && s.wall_ms * 1e6,
-    robots: s.robots.map((r) => ({ ...r, T_odom_body: r.position && { translation_m: r.position } })),
+    workers: s.workers.map((w) => ({ ...s.numbers.get(`workers: ${w.name}`), ...w })),
+    robots: s.robots.map((r) => ({
+      ...s.numbers.get(r.name),
+      ...r,
+      T_odom_body: r.position && { translation_m: r.position },
+    })),
     refusals: s.refused.map((r) => ({ ...r, last_why: r.why })),
   }),
   disagreement: (d: Disagreement) => ({ ...d, nodes: d.nodes.map((n) => ({ ...n, d: n.d_m })) }),

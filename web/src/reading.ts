@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /** Reads values that came from outside; what does not fit throws a DecodeError that names where. */
+import type { Numbers } from "./schema";
 
 export class DecodeError extends Error {}
 
@@ -61,4 +62,21 @@ export function numbers<T extends number[]>(value: unknown, what: string, n: num
 export function one_of<T extends string>(value: unknown, what: string, all: readonly T[]): T {
   if (!all.includes(value as T)) wrong(what, value, `one of ${all.join(", ")}`);
   return value as T;
+}
+
+/** All numbers of a status, its truths as 0 and 1, and of everything in its lists that has a name. */
+export function named_numbers(status: Fields): Numbers {
+  const flat = (of: Fields): Record<string, number> =>
+    Object.fromEntries(
+      Object.entries(of).flatMap(([key, x]) =>
+        typeof x === "number" && Number.isFinite(x) ? [[key, x]] : typeof x === "boolean" ? [[key, Number(x)]] : [],
+      ),
+    );
+  const out = new Map([["", flat(status)]]);
+  for (const [kind, all] of Object.entries(status))
+    if (Array.isArray(all))
+      for (const one of all as Fields[])
+        if (typeof one?.name === "string" && one.name !== "")
+          out.set(kind === "robots" ? one.name : `${kind}: ${one.name}`, flat(one));
+  return out;
 }

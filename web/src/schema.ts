@@ -60,6 +60,9 @@ export interface WorkerStatus {
   trouble: string;
 }
 
+/** By whose they are ("": the server's): numbers by name. */
+export type Numbers = ReadonlyMap<string, Readonly<Record<string, number>>>;
+
 export interface Status {
   version: string;
   revision: number;
@@ -77,6 +80,8 @@ export interface Status {
   verifier: string;
   waiting: number;
   why_waiting: string;
+  /** Every number that came, also those that the page has no other use for. */
+  numbers: Numbers;
 }
 
 export type Severity = "info" | "warning" | "error";

@@ -309,3 +309,26 @@ test("a report without a reference shows distances to the server's map, and no e
   assert.deepEqual(page.errors, []);
   await page.close();
 });
+
+test("any number of any robot is a curve, chosen from a list of what the server sends", () =>
+  served(small(), async (page, server, mission) => {
+    for (let i = 0; i < 5; ++i) {
+      mission.backlog[0] = 3 * i;
+      server.tick(2);
+      await page.pause(150);
+    }
+    await page.press("Curves");
+    await page.until("the battery of all", () =>
+      /alpha 90 %.*bravo 59 %.*charlie 28 %/.test(document.querySelector(".curves").textContent),
+    );
+    const offered = await page.texts('[aria-label="Number"] option');
+    for (const name of ["backlog bytes", "last seen s ago", "sigma m", "pending jobs", "keyframes"])
+      assert.ok(offered.includes(name), `${name} of ${offered.join()}`);
+    await page.page.select('[aria-label="Number"]', "backlog_submaps");
+    await page.page.select('[aria-label="Of whom"]', "alpha");
+    await page.until("alpha's backlog", () => document.querySelector(".curves .key").textContent === "alpha 12");
+    await page.until("its curve", () => document.querySelector(".curves .uplot canvas") !== null);
+    await page.evaluate(() => tutti.app.set_time(241));
+    const text = await page.evaluate(() => tutti.saved_page(tutti.app));
+    assert.match(text, /"jobs_done":120/, "all numbers are handed over");
+  }));

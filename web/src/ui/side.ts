@@ -8,6 +8,7 @@ import { alerts_panel, open_alerts } from "./alerts";
 import { by_hand_panel } from "./by_hand";
 import { closures_panel } from "./closures";
 import { compare_panel } from "./compare";
+import { curves_panel } from "./curves";
 import { disagreement_panel } from "./disagreement";
 import { button, h, panel } from "./dom";
 import { inspector_panel } from "./inspector";
@@ -58,6 +59,12 @@ const TABS: Tab[] = [
     title: () => "Odometry",
     offered: (app) => [...app.store.all("disagreement", app.at())].length > 0,
     make: disagreement_panel,
+  },
+  {
+    name: "curves",
+    title: () => "Curves",
+    offered: (app) => app.store.track("status") !== null,
+    make: curves_panel,
   },
   {
     name: "marks",
