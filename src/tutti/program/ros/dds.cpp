@@ -20,8 +20,8 @@ namespace {
 constexpr std::int32_t kMostWaiting = 200;  // messages, where a reader keeps all
 constexpr std::string_view kTopicPrefix = "rt/";
 constexpr std::string_view kTypeMiddle = "::msg::dds_::";
-constexpr std::uint32_t kDiscovered = 256;  // publications that are read at a time
-constexpr std::uint32_t kTaken = 64;        // messages
+constexpr std::size_t kDiscovered = 256;  // publications to begin with; a ROS 2 with a navigation stack has more
+constexpr std::uint32_t kTaken = 64;      // messages
 // Interfaces that CycloneDDS may be on: loopback and, of networks, the first ones.
 constexpr std::size_t kMostInterfaces = 4;
 
@@ -256,12 +256,19 @@ Result<std::unique_ptr<Reader>> Participant::reader(const std::string& topic_nam
 void Participant::wait(double wall_s) { dds_waitset_wait(wait_set_, nullptr, 0, duration(wall_s)); }
 
 std::vector<Publication> Participant::publications() const {
-  std::array<void*, kDiscovered> samples{};
-  std::array<dds_sample_info_t, kDiscovered> info{};
+  std::vector<void*> samples;
+  std::vector<dds_sample_info_t> info;
   dds_guid_t own{};
   dds_get_guid(entity_, &own);
-  const dds_return_t count = dds_read_mask(discovered_, samples.data(), info.data(), kDiscovered, kDiscovered,
-                                           DDS_ANY_SAMPLE_STATE | DDS_ANY_VIEW_STATE | DDS_ALIVE_INSTANCE_STATE);
+  dds_return_t count = 0;
+  for (std::size_t room = kDiscovered;; room *= 2) {  // what is read stays, and is read again from the first one on
+    samples.assign(room, nullptr);
+    info.resize(room);
+    count = dds_read_mask(discovered_, samples.data(), info.data(), room, static_cast<std::uint32_t>(room),
+                          DDS_ANY_SAMPLE_STATE | DDS_ANY_VIEW_STATE | DDS_ALIVE_INSTANCE_STATE);
+    if (count < static_cast<dds_return_t>(room)) break;
+    dds_return_loan(discovered_, samples.data(), count);
+  }
   std::vector<Publication> out;
   for (dds_return_t i = 0; i < count; ++i) {
     const auto at = static_cast<std::size_t>(i);

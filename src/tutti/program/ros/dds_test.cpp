@@ -56,6 +56,15 @@ TEST(Dds, EveryTopicIsSeenWithTypeQosAndHash) {
   EXPECT_TRUE(seen["/tf_static"].latched);
 }
 
+TEST(Dds, TheTopicsOfANavigationStackAreAllSeen) {
+  const auto a = join_loopback(), b = join_loopback();
+  constexpr std::size_t kEndpoints = 600;  // each node of ROS has some ten
+  std::vector<std::unique_ptr<Writer>> writers;
+  for (std::size_t i = 0; i < kEndpoints; ++i)
+    writers.push_back(a->writer("/node" + std::to_string(i), kOdometry, kSensorQos, "").value());
+  EXPECT_TRUE(within(kPatience_s, [&] { return b->publications().size() == kEndpoints; })) << b->publications().size();
+}
+
 TEST(Dds, WhoComesLateIsGivenWhatIsLatched) {
   const auto a = join_loopback(), b = join_loopback();
   const auto writer = a->writer("/map", kOdometry, kLatchedQos, "").value();
