@@ -20,8 +20,8 @@ namespace {
 constexpr std::int32_t kMostWaiting = 200;  // messages, where a reader keeps all
 constexpr std::string_view kTopicPrefix = "rt/";
 constexpr std::string_view kTypeMiddle = "::msg::dds_::";
-constexpr std::size_t kDiscovered = 256;  // publications to begin with; a ROS 2 with a navigation stack has more
-constexpr std::uint32_t kTaken = 64;      // messages
+constexpr std::uint32_t kDiscovered = 256;  // changes of publications that are taken at a time
+constexpr std::uint32_t kTaken = 64;        // messages
 // Interfaces that CycloneDDS may be on: loopback and, of networks, the first ones.
 constexpr std::size_t kMostInterfaces = 4;
 
@@ -256,28 +256,29 @@ Result<std::unique_ptr<Reader>> Participant::reader(const std::string& topic_nam
 void Participant::wait(double wall_s) { dds_waitset_wait(wait_set_, nullptr, 0, duration(wall_s)); }
 
 std::vector<Publication> Participant::publications() const {
-  std::vector<void*> samples;
-  std::vector<dds_sample_info_t> info;
+  std::array<void*, kDiscovered> samples{};
+  std::array<dds_sample_info_t, kDiscovered> info{};
   dds_guid_t own{};
   dds_get_guid(entity_, &own);
+  const std::lock_guard lock(publications_mutex_);
   dds_return_t count = 0;
-  for (std::size_t room = kDiscovered;; room *= 2) {  // what is read stays, and is read again from the first one on
-    samples.assign(room, nullptr);
-    info.resize(room);
-    count = dds_read_mask(discovered_, samples.data(), info.data(), room, static_cast<std::uint32_t>(room),
-                          DDS_ANY_SAMPLE_STATE | DDS_ANY_VIEW_STATE | DDS_ALIVE_INSTANCE_STATE);
-    if (count < static_cast<dds_return_t>(room)) break;
-    dds_return_loan(discovered_, samples.data(), count);
-  }
+  do {
+    count = dds_take(discovered_, samples.data(), info.data(), kDiscovered, kDiscovered);
+    for (dds_return_t i = 0; i < count; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      const auto& endpoint = *static_cast<const dds_builtintopic_endpoint_t*>(samples[at]);
+      const Guid key = std::to_array(endpoint.key.v);
+      if (info[at].instance_state != DDS_IST_ALIVE)
+        publications_.erase(key);
+      else if (info[at].valid_data && !std::ranges::equal(endpoint.participant_key.v, own.v) &&
+               std::string_view(endpoint.topic_name).starts_with(kTopicPrefix))
+        publications_[key] = to_publication(endpoint);
+    }
+    if (count > 0) dds_return_loan(discovered_, samples.data(), count);
+  } while (count > 0);
   std::vector<Publication> out;
-  for (dds_return_t i = 0; i < count; ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    const auto& endpoint = *static_cast<const dds_builtintopic_endpoint_t*>(samples[at]);
-    const bool is_own = std::ranges::equal(endpoint.participant_key.v, own.v);
-    if (info[at].valid_data && !is_own && std::string_view(endpoint.topic_name).starts_with(kTopicPrefix))
-      out.push_back(to_publication(endpoint));
-  }
-  if (count > 0) dds_return_loan(discovered_, samples.data(), count);
+  out.reserve(publications_.size());
+  for (const auto& [key, publication] : publications_) out.push_back(publication);
   return out;
 }
 

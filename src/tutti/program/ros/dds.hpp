@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -121,6 +124,7 @@ class Participant : public std::enable_shared_from_this<Participant> {
   /// Returns when any reader has something to take, or after `wall_s` of wall time.
   void wait(double wall_s);
   /// The topics of ROS that other participants publish; topics of DDS programs other than ROS's are left out.
+  /// Asked often it costs little: what was discovered before is kept.
   [[nodiscard]] std::vector<Publication> publications() const;
   /// Which of ROS's settings let it be heard here, for a message when nothing is.
   [[nodiscard]] std::string discovery_hint() const;
@@ -134,6 +138,9 @@ class Participant : public std::enable_shared_from_this<Participant> {
   std::uint32_t domain_;
   Reach reach_;
   std::int32_t wait_set_ = 0, discovered_ = 0;
+  using Guid = std::array<std::uint8_t, 16>;
+  mutable std::mutex publications_mutex_;
+  mutable std::map<Guid, Publication> publications_;  ///< By endpoint; of others than this participant.
 };
 
 /// Explains why `reader` gets no usable messages, and names topics of its type that others publish: "nobody publishes

@@ -63,6 +63,9 @@ TEST(Dds, TheTopicsOfANavigationStackAreAllSeen) {
   for (std::size_t i = 0; i < kEndpoints; ++i)
     writers.push_back(a->writer("/node" + std::to_string(i), kOdometry, kSensorQos, "").value());
   EXPECT_TRUE(within(kPatience_s, [&] { return b->publications().size() == kEndpoints; })) << b->publications().size();
+  writers.resize(1);
+  ASSERT_TRUE(within(kPatience_s, [&] { return b->publications().size() == 1; })) << b->publications().size();
+  EXPECT_EQ(b->publications().front().topic, "/node0");
 }
 
 TEST(Dds, WhoComesLateIsGivenWhatIsLatched) {
