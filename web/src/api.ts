@@ -39,6 +39,7 @@ export const api = {
   mark: (submap: SubmapId, at: Vec3, text: string, photo: string | null, by: string) =>
     ask("/api/mark", { submap, at, text, photo, by }),
   unmark: (id: string) => ask("/api/unmark", { id }),
+  acknowledge: (alerts: string[], undo: boolean, by: string) => ask("/api/acknowledge", { alerts, undo, by }),
   hold: (what: string, by: string) => ask("/api/hold", { what, by }),
   why: async (from: string, to: string): Promise<Why> =>
     decode_why(await ask(`/api/why?from=${encodeURIComponent(from)}&to=${encodeURIComponent(to)}`)),

@@ -5,6 +5,7 @@ import { Clouds } from "./cloud";
 import { set_robot_colours } from "./colours";
 import { correction_at, robots_at, time_range } from "./derive";
 import type { Correction, RobotView } from "./derive";
+import { recall } from "./history";
 import { TIMES } from "./limits";
 import { default_options, memory, PHASES } from "./options";
 import type { Options, Phase } from "./options";
@@ -87,6 +88,7 @@ export class App {
       ready: (keys) => {
         this.ready = true;
         if (keys) this.store.retain(keys);
+        if (keys && this.live) void recall(this.store);
         if (this.live) void this.ask_me();
         this.refresh("data");
       },

@@ -321,6 +321,20 @@ function radio(value: unknown): Map<number, s.RadioBytes> {
   );
 }
 
+function acknowledged(value: unknown): s.Acknowledged {
+  const f = fields(value, "acknowledged");
+  return { alert: text(f.alert, "alert"), by: words(f.by, "by") };
+}
+
+function history(value: unknown): s.Known {
+  const f = fields(value, "history");
+  return {
+    first_s: maybe(f.first_s, "first_s"),
+    gaps: maybe_list(f.gaps, "gaps", (gap, what) => numbers<[number, number]>(gap, what, 2)),
+    trouble: words(f.trouble, "trouble"),
+  };
+}
+
 /** Every kind of key and what reads its values. */
 export const DECODERS: { [K in s.Kind]: (value: unknown, ids: IdTable) => s.Values[K] } = {
   mission,
@@ -342,6 +356,8 @@ export const DECODERS: { [K in s.Kind]: (value: unknown, ids: IdTable) => s.Valu
   mark,
   held: (value) => list(value, "held", held),
   radio,
+  acknowledged,
+  history,
 };
 
 export function decode_me(value: unknown): s.Me {

@@ -220,7 +220,10 @@ export function wall_ms_at(store: Store, t: number): number | null {
 export function time_range(store: Store, now: number): { first: number; last: number } {
   const mission = store.get("mission");
   const last = Math.max(now, store.newest, mission && mission.mode !== "live" ? (mission.duration_s ?? 0) : 0);
-  return { first: mission && mission.mode !== "live" ? 0 : Math.min(store.oldest, last), last };
+  return {
+    first: mission && mission.mode !== "live" ? 0 : Math.min(store.get("history")?.first_s ?? store.oldest, last),
+    last,
+  };
 }
 
 /** The worst disagreement of every submap with its robot's odometry, over all scales. */

@@ -21,6 +21,8 @@ export const LIMITS = {
     mark: 8,
     held: 1,
     radio: 40,
+    acknowledged: 8,
+    history: 1,
   },
   /** Most keys of one kind; beyond, the oldest goes. */
   keys: 20_000,
@@ -36,8 +38,8 @@ export const LIMITS = {
   dense_robots: 12,
   /** A picture narrower than this has its legend folded. */
   narrow_px: 520,
-  /** Alerts that were acknowledged, remembered by this browser. */
-  acknowledged: 500,
+  /** A mission of which nothing is known for so long at its beginning, s, says so. */
+  unknown_s: 30,
   /** A picture that moves has fewer points when it takes longer, but never fewer than these. */
   moving_points: 100_000,
 } as const;
@@ -62,6 +64,8 @@ export const TIMES = {
   /** What a picture that moves may take. */
   moving_ms: 24,
   answer_ms: 20_000,
+  /** The past of a long mission has some megabytes. */
+  history_ms: 120_000,
   /** The map is made once more to show what a closure by hand would change. */
   change_ms: 300_000,
   /** The server forgets who inspects what after three times this. */

@@ -217,6 +217,21 @@ export interface RadioBytes {
   down: Record<string, number>;
 }
 
+/** That somebody has seen an alert, for all who watch. */
+export interface Acknowledged {
+  alert: string;
+  by: string;
+}
+
+/** Of which times the program knows something. */
+export interface Known {
+  /** Null: of none yet. */
+  first_s: number | null;
+  gaps: [number, number][];
+  /** Why it does not remember what is now; "": it does. */
+  trouble: string;
+}
+
 /** The types of values by kind of key. */
 export interface Values {
   mission: Mission;
@@ -239,13 +254,16 @@ export interface Values {
   mark: Mark;
   held: Held[];
   radio: Map<number, RadioBytes>;
+  /** By ID@SINCE of the alert. */
+  acknowledged: Acknowledged;
+  history: Known;
 }
 export type Kind = keyof Values;
 
 /** report.json and timing.json of docs/report.md; read where they are shown. */
 export type Report = Record<string, unknown>;
 
-export type Offer = "decide" | "register" | "closure" | "mark" | "hold" | "why" | "disagreement";
+export type Offer = "decide" | "register" | "closure" | "mark" | "hold" | "acknowledge" | "why" | "disagreement";
 export interface Me {
   login: boolean;
   name: string;

@@ -15,6 +15,7 @@ export class Store {
   private changed = new Set<Kind>();
   private listeners: Listener[] = [];
   private scheduled = false;
+  private recalls = false;
   /** Messages that could not be read, and what the last one lacked. */
   unread = { count: 0, last: "" };
   /** Times of the newest and the oldest message, s. */
@@ -39,6 +40,13 @@ export class Store {
       ++this.unread.count;
       this.unread.last = `${message.key}: ${error.message}`;
     }
+  }
+
+  /** Takes messages of before, among those that are here. */
+  recall(messages: readonly Message[]): void {
+    this.recalls = true;
+    for (const message of messages) this.apply(message);
+    this.recalls = false;
   }
 
   /** Forgets everything: another mission, or another life of the server. */
@@ -133,11 +141,13 @@ export class Store {
     this.tracks.set(kind, named);
     let track = named.get(name);
     if (track === undefined) {
-      if (value === null) return;
+      if (value === null && !this.recalls) return;
       if (named.size >= LIMITS.keys) named.delete(named.keys().next().value!);
       named.set(name, (track = new Track()));
     }
-    track.push(message.t, value, this.keep_all ? Infinity : LIMITS.history[kind]);
+    const keep = this.keep_all ? Infinity : LIMITS.history[kind];
+    if (this.recalls) track.insert(message.t, value, keep);
+    else track.push(message.t, value, keep);
     this.newest = Math.max(this.newest, message.t);
     if (kind !== "mission") this.oldest = Math.min(this.oldest, message.t);
     this.changed.add(kind);

@@ -16,6 +16,15 @@ export class Track<V> {
     if (this.times.length > keep) this.thin(keep);
   }
 
+  /** A value of before the last one; a time that is known keeps its value. */
+  insert(t: number, value: V | null, keep: number): void {
+    const i = this.index(t);
+    if (i >= 0 && this.times[i] === t) return;
+    this.times.splice(i + 1, 0, t);
+    this.values.splice(i + 1, 0, value);
+    if (this.times.length > keep) this.thin(keep);
+  }
+
   /** Index of the value that was valid at `t`, -1 before the first one. */
   index(t: number): number {
     let low = 0;

@@ -81,9 +81,17 @@ test("a robot goes silent: grey, a circle, an alert; comes back and drains", () 
     );
   }));
 
-test("an alert is acknowledged once, and stays so over a reload", () =>
-  served(small(), async (page) => {
+test("an alert is acknowledged by one for all, and stays so over a reload", () =>
+  served(small(), async (page, server) => {
+    const other = await browser.open(`http://127.0.0.1:${server.port}/`);
+    await other.until("the alert is there", () => document.querySelector(".alert") !== null);
     await page.press("Acknowledge");
+    await page.fill("dialog input", "eva");
+    await page.press("Use it");
+    await other.until("the other one sees who has", () =>
+      /eva has seen it/.test(document.querySelector(".alert.seen")?.textContent),
+    );
+    await other.close();
     await page.until("the inbox is empty", () =>
       /Everything is acknowledged/.test(document.querySelector(".alerts").textContent),
     );
@@ -94,6 +102,56 @@ test("an alert is acknowledged once, and stays so over a reload", () =>
     );
     assert.match((await page.texts(".alert.seen"))[0], /^its part of the map is joined to no other.*charlie/);
   }));
+
+test("who comes late sees what was before, and where nothing is known", () => {
+  const mission = small();
+  const closure = [...mission.closures.values()].find((c) => c.state === "accepted");
+  return served(mission, async (page, server) => {
+    const at = (t, key, value) => ({ key, t, value });
+    const early = { ...mission.status(), revision: 0 };
+    server.past = [
+      at(100, "status", early),
+      at(110, "poses", { ...mission.poses(), revision: 0, accepted: 0 }),
+      at(110, `closure/${closure.name}`, { ...closure, state: "candidate" }),
+      at(120, "alerts", [
+        { id: "robot/1/silent", severity: "warning", what: "silent", where: "bravo", since_s: 115, todo: "", robot: 1 },
+      ]),
+      at(130, "status", early),
+      at(200, "alerts", []),
+    ];
+    mission.known = { first_s: 100, gaps: [[130, 190]], trouble: "" };
+    await page.reload();
+    await page.until("the past is here", () => tutti.app.store.track("status").times[0] === 100);
+    assert.match((await page.texts(".clock .unknown"))[0], /^nothing before 0:01:40$/);
+    await page.evaluate(() => tutti.app.set_time(125));
+    await page.until("bravo was silent then", () =>
+      /silent.*bravo/.test(document.querySelector(".alert")?.textContent),
+    );
+    assert.equal(
+      await page.evaluate((name) => tutti.app.store.get("closure", 125, name).state, closure.name),
+      "candidate",
+    );
+    assert.equal(
+      await page.evaluate((name) => tutti.app.store.get("closure", Infinity, name).state, closure.name),
+      "accepted",
+    );
+    await page.evaluate(() => tutti.app.set_time(150));
+    await page.until(
+      "nothing is known of that",
+      () => document.querySelector(".clock .unknown").textContent === "nothing from 0:02:10 to 0:03:10",
+    );
+    const file = join(work, "night.html");
+    writeFileSync(file, await page.evaluate(() => tutti.saved_page(tutti.app)));
+    const handed_over = await browser.open(`file://${file}`);
+    await handed_over.until(
+      "the file has the past, too",
+      () =>
+        tutti.app.store.track("status")?.times[0] === 100 && tutti.app.store.get("alerts", 125)[0].where === "bravo",
+    );
+    assert.deepEqual(handed_over.errors, []);
+    await handed_over.close();
+  });
+});
 
 test("of a hundred robots one cause is one line, who is missed stands first, and a search finds the others", () => {
   const robots = fleet(100);
@@ -114,6 +172,7 @@ test("of a hundred robots one cause is one line, who is missed stands first, and
     await page.until("each of the four", () => document.querySelectorAll(".alert").length === 6);
     await page.press("Fold");
     await page.until("one line", () => document.querySelectorAll(".alert").length === 2);
+    await page.evaluate(() => (tutti.app.by = "eva"));
     await page.press("Acknowledge 4");
     await page.until("they are acknowledged", () =>
       /^4 robots: silent/.test(document.querySelector(".alert.seen")?.textContent),

@@ -98,6 +98,8 @@ export class FakeMission {
     this.submaps = [];
     this.closures = new Map();
     this.marks = new Map();
+    this.acknowledged = new Map();
+    this.known = null; // of which times the program knows something
     this.silent = new Map(); // robot -> since
     this.troubled = new Map(); // robot -> why
     this.unheard = new Set(); // robots, since the server's start
@@ -368,6 +370,8 @@ export class FakeMission {
       this.message("alerts", this.alerts()),
     );
     for (const c of this.closures.values()) out.push(this.message(`closure/${c.name}`, c));
+    if (this.known) out.push(this.message("history", this.known));
+    for (const [key, value] of this.acknowledged) out.push(this.message(key, value));
     for (const m of this.marks.values()) out.push(this.message(`mark/${m.id}`, m));
     this.robots.forEach((name, r) => out.push(this.message(`disagreement/${name}`, this.disagreement(r))));
     return out;

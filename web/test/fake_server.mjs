@@ -18,13 +18,14 @@ export class FakeServer {
       mission: mission.name,
       may_decide: true,
       nonce: "n",
-      offers: ["decide", "register", "closure", "mark", "hold", "why", "disagreement"],
+      offers: ["decide", "register", "closure", "mark", "hold", "acknowledge", "why", "disagreement"],
       ...options.me,
     };
     this.incarnation = 1;
     this.listeners = new Set();
     this.held = new Map();
     this.photos = new Map();
+    this.past = []; // messages, as the program remembers them
     this.asked = []; // POST requests, for tests
     this.sent = []; // messages, in order: an event's id is this start's number and a place here
   }
@@ -97,6 +98,7 @@ export class FakeServer {
       return response
         .writeHead(200, { "Content-Type": "image/jpeg" })
         .end(this.photos.get(url.pathname.split("/").at(-1)));
+    if (url.pathname === "/api/history") return this.say(response, 200, { messages: this.past });
     if (url.pathname === "/api/why") return this.say(response, 200, this.why(url.searchParams));
     if (request.method !== "POST" || request.headers["x-tutti"] !== "1")
       return this.say(response, 404, { error: "Not offered." });
@@ -186,6 +188,15 @@ export class FakeServer {
       const poses = mission.poses();
       Object.assign(mission, { apart, wobble });
       return ok({ poses });
+    }
+    if (path === "/api/acknowledge") {
+      for (const alert of mission.alerts().filter((a) => body.alerts.includes(a.id))) {
+        const key = `acknowledged/${alert.id}@${Math.round(alert.since_s)}`;
+        const value = body.undo ? null : { alert: alert.id, since_s: alert.since_s, by: body.by };
+        mission.acknowledged.set(key, value);
+        this.send(mission.message(key, value));
+      }
+      return ok();
     }
     if (path === "/api/hold") {
       if (body.what) this.held.set(body.by, body.what);

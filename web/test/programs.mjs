@@ -206,10 +206,22 @@ async function play(browser) {
     submaps,
     kPatience_ms,
   );
+  const first = await page.evaluate(() => tutti.app.store.track("poses").times[1]);
+  await late.until(
+    "what was before it came, too",
+    (t) =>
+      tutti.app.store.track("poses").times[0] <= t &&
+      tutti.app.store.track("status").times[0] <= t &&
+      tutti.app.store.track("alerts").times.length > 2,
+    first,
+    kPatience_ms,
+  );
+  const gap = await late.evaluate(() => tutti.app.store.get("history").gaps.length);
+  assert.equal(gap, 0, "the page has heard the server all the time");
   assert.equal(await late.evaluate(() => tutti.app.store.unread.count), 0);
   assert.deepEqual(late.errors, []);
   await late.close();
-  step("who comes late sees all");
+  step("who comes late sees all, and what was before");
 
   assert.deepEqual(page.errors, [], "errors on the page");
   await page.close();

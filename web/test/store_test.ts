@@ -2,6 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { correction_at, drain_of, robots_at } from "../src/derive";
+import { unknown_at } from "../src/history";
 import { LIMITS, REACH_M } from "../src/limits";
 import { POSE_ROW } from "../src/schema";
 import type { Message } from "../src/schema";
@@ -20,6 +21,37 @@ test("everything that a server says first is read", () => {
   assert.equal([...store.all("submap")].length, 72);
   assert.equal(store.get("mission")?.name, "adit north");
   assert.equal(store.get("poses")?.components, 2);
+});
+
+test("what was before is put among what is here, and changes nothing of that", () => {
+  const mission = new FakeMission();
+  const store = filled(mission);
+  const alerts = store.get("alerts")!.length;
+  store.recall([
+    { key: "alerts", t: 10, value: [] },
+    { key: "alerts", t: mission.time, value: [] },
+    { key: "mark/old", t: 20, value: { id: "old", submap: "0:1/3", at: [0, 0, 0], text: "gone", by: "eva" } },
+    { key: "mark/old", t: 30, value: null },
+    { key: "alerts", t: 15, value: [{ id: "a", severity: "info", what: "x" }] },
+  ]);
+  assert.deepEqual(store.unread, { count: 0, last: "" });
+  assert.deepEqual(store.track("alerts")!.times, [10, 15, mission.time]);
+  assert.equal(store.get("alerts", 12)!.length, 0);
+  assert.equal(store.get("alerts", 16)!.length, 1);
+  assert.equal(store.get("alerts")!.length, alerts, "a time that is known keeps its value");
+  assert.equal(store.get("mark", 25, "old")?.text, "gone");
+  assert.equal(store.get("mark", Infinity, "old"), null);
+});
+
+test("of which times nothing is known", () => {
+  const store = filled();
+  assert.equal(unknown_at(store, 5), "");
+  store.apply({ key: "history", t: 240, value: { first_s: 100, gaps: [[130, 190]], trouble: "" } });
+  assert.equal(unknown_at(store, null), "nothing before 0:01:40");
+  assert.equal(unknown_at(store, 160), "nothing from 0:02:10 to 0:03:10");
+  assert.equal(unknown_at(store, 200), "nothing before 0:01:40");
+  store.apply({ key: "history", t: 241, value: { first_s: 2, gaps: [], trouble: "" } });
+  assert.equal(unknown_at(store, null), "");
 });
 
 test("the same messages again change nothing", () => {

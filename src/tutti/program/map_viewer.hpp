@@ -35,6 +35,8 @@ struct ViewedMission {
   std::shared_ptr<const server::ClosureVerifier> verifier;
   double rate = 1.0;          ///< Mission time per wall time.
   std::filesystem::path pki;  ///< Of `tutti pki`; empty: whoever reaches the server may do all.
+  /// Where a viewer keeps what it has shown, for those who come late; empty: nowhere.
+  std::filesystem::path history;
   std::function<void(Level, const std::string&)> say;
 };
 

@@ -18,6 +18,7 @@
 #include "tutti/base/utc_text.hpp"
 #include "tutti/bus/mission_lease.hpp"
 #include "tutti/bus/nats_child.hpp"
+#include "tutti/history/history_file.hpp"
 #include "tutti/node/map_meta.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/program/bus_guard.hpp"
@@ -298,6 +299,7 @@ Status ServerProgram::start() {
                              .verifier = verifier_,
                              .rate = options_.rate,
                              .pki = options_.pki,
+                             .history = folder_->path() / "page" / history::kHistoryFile,
                              .say = [this](Level level, const std::string& sentence) { log_->say(level, sentence); }};
   for (const auto& view : options_.views) {
     auto viewer = view(viewed);

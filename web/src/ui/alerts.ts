@@ -1,30 +1,37 @@
 // SPDX-License-Identifier: BSD-3-Clause
-/** The inbox: what, where, since when, what to do. Many of one kind are one line that unfolds. Acknowledged once; this browser remembers it. */
+/** The inbox: what, where, since when, what to do. Many of one kind are one line that unfolds. Acknowledged by one, acknowledged for all. */
+import { api } from "../api";
 import type { App } from "../app";
 import { moment, span } from "../format";
 import { LIMITS } from "../limits";
-import { memory } from "../options";
 import type { Alert } from "../schema";
 import type { View } from "../scene/view";
-import { button, h, panel } from "./dom";
+import { attempt, button, h, panel } from "./dom";
 import type { Child } from "./dom";
+import { who } from "./login";
 
-const acknowledged = new Set<string>(memory.read<string[]>("acknowledged", []));
-
-/** An alert of another mission, or one that came again later, is another one. */
-const mark_of = (app: App, alert: Alert): string =>
-  `${app.store.get("mission")?.name ?? ""} ${alert.id} ${Math.round(alert.since_s ?? 0)}`;
+/** Who has acknowledged it; null: nobody. An alert that came again later is another one. */
+const seen_by = (app: App, alert: Alert): string | null =>
+  app.store.get("acknowledged", app.at(), `${alert.id}@${Math.round(alert.since_s ?? 0)}`)?.by ?? null;
 
 export const open_alerts = (app: App): Alert[] =>
-  (app.store.get("alerts", app.at()) ?? []).filter((a) => !acknowledged.has(mark_of(app, a)));
+  (app.store.get("alerts", app.at()) ?? []).filter((a) => seen_by(app, a) === null);
 
 function acknowledge(app: App, alerts: Alert[], yes: boolean): void {
-  for (const alert of alerts)
-    if (yes) acknowledged.add(mark_of(app, alert));
-    else acknowledged.delete(mark_of(app, alert));
-  while (acknowledged.size > LIMITS.acknowledged) acknowledged.delete(acknowledged.values().next().value!);
-  memory.write("acknowledged", [...acknowledged]);
-  app.say("options");
+  void attempt(async () =>
+    api.acknowledge(
+      alerts.map((a) => a.id),
+      !yes,
+      await who(app),
+    ),
+  );
+}
+
+/** Offered to who may: it holds for everybody. */
+function seen_button(app: App, label: string, alerts: Alert[], seen: boolean, key: string): Child {
+  return app.may("acknowledge")
+    ? button(seen ? "Show as new again" : label, () => acknowledge(app, alerts, !seen), { key })
+    : null;
 }
 
 /** Alerts of one cause differ in the robots, sessions and places that their ids have. */
@@ -82,9 +89,7 @@ function group(app: App, view: View, cause: string, alerts: Alert[], seen: boole
       h(
         "div",
         { class: "row" },
-        button(seen ? "Show as new again" : `Acknowledge ${alerts.length}`, () => acknowledge(app, alerts, !seen), {
-          key: `ack ${key}`,
-        }),
+        seen_button(app, `Acknowledge ${alerts.length}`, alerts, seen, `ack ${key}`),
         button(open ? "Fold" : "Unfold", fold, { key: `fold ${key}`, "aria-expanded": String(open) }),
       ),
     ),
@@ -98,7 +103,7 @@ export function alerts_panel(app: App, view: View): HTMLElement {
     const open = open_alerts(app);
     const seen = all.filter((a) => !open.includes(a));
     return [
-      open.length > 1
+      open.length > 1 && app.may("acknowledge")
         ? h(
             "div",
             { class: "row end" },
@@ -131,13 +136,12 @@ function line(app: App, view: View, alert: Alert, seen: boolean): Child {
       ),
     ),
     alert.where ? h("p", {}, alert.where) : null,
+    seen && seen_by(app, alert) ? h("p", { class: "names" }, `${seen_by(app, alert)} has seen it`) : null,
     alert.todo ? h("p", { class: "todo" }, alert.todo) : null,
     h(
       "div",
       { class: "row" },
-      button(seen ? "Show as new again" : "Acknowledge", () => acknowledge(app, [alert], !seen), {
-        key: `ack ${alert.id}`,
-      }),
+      seen_button(app, "Acknowledge", [alert], seen, `ack ${alert.id}`),
       goes ? button("Show", () => show(app, view, alert), { key: `show ${alert.id}` }) : null,
     ),
   );

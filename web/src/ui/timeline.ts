@@ -3,6 +3,7 @@
 import type { App } from "../app";
 import { correction_between, time_range, wall_ms_at } from "../derive";
 import { metres, moment, utc, utc_date } from "../format";
+import { gaps_of, unknown_at } from "../history";
 import { TIMES } from "../limits";
 import { memory } from "../options";
 import { palette_of } from "../scene/picture";
@@ -72,6 +73,7 @@ export class Timeline {
         h("b", {}, moment(this.app.shown())),
         h("small", {}, utc(this.wall_ms())),
       ),
+      h("span", { class: "unknown" }, unknown_at(this.app.store, this.app.time)),
       this.app.live
         ? button("Live", () => this.stop(null), {
             class: this.app.time === null ? "live" : "primary",
@@ -162,12 +164,32 @@ export class Timeline {
       c.fillStyle = joined > 0 ? palette.accepted : palette.accent;
       c.fillRect(x(t) - 1, 15 - tall, 2, tall);
     }
+    this.draw_gaps(c, x, height);
     const mission = this.app.store.get("mission")?.name ?? "";
     c.fillStyle = palette.mark;
     for (const b of this.bookmarks) if (b.mission === mission) c.fillRect(x(b.t) - 1.5, 0, 3, 15);
     this.slider.title = this.moves().length
       ? `Strokes: corrections of the map, the largest ${metres(Math.max(...this.moves().map((m) => m.moved_m)))}; green where parts were joined`
       : "";
+  }
+
+  /** Hatched: nothing is known of these times. */
+  private draw_gaps(c: CanvasRenderingContext2D, x: (t: number) => number, height: number): void {
+    c.strokeStyle = palette_of(this.app.dark).soft;
+    c.lineWidth = 1;
+    for (const [from, until] of gaps_of(this.app.store)) {
+      c.save();
+      c.beginPath();
+      c.rect(x(from), 0, Math.max(2, x(until) - x(from)), height - 14);
+      c.clip();
+      c.beginPath();
+      for (let at = x(from) - height; at < x(until) + 2; at += 5) {
+        c.moveTo(at, height);
+        c.lineTo(at + height, 0);
+      }
+      c.stroke();
+      c.restore();
+    }
   }
 
   private draw_axis(

@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "tutti/program/field_json.hpp"
 #include "tutti/program/page/view.hpp"
 #include "tutti/server/map_components.hpp"
 
@@ -174,6 +175,14 @@ std::vector<Alert> Alerts::of_map(const mapfile::ShownMap& map, const std::map<S
                      .todo = "Look at that closure; another meeting would settle it.",
                      .robot = submap.chain.robot});
   return dated(std::move(out), map_since_, map.time - Timestamp{});
+}
+
+void Alerts::resume(std::string_view alerts) {
+  const FieldJson all = FieldJson::parse(alerts, nullptr, false);
+  if (!all.is_array()) return;
+  for (const FieldJson& one : all)
+    if (one.contains("id") && one["id"].is_string() && one.contains("since_s") && one["since_s"].is_number())
+      status_since_[one["id"]] = map_since_[one["id"]] = one["since_s"].get<double>();
 }
 
 }  // namespace tutti::page

@@ -11,16 +11,11 @@
 #include <string_view>
 #include <vector>
 
+#include "tutti/history/message.hpp"
+
 namespace tutti::page {
 
-/// What the page is sent: a key, and its value as JSON; "null": there is no such thing any more. A later message of a
-/// key replaces the earlier one, so a page that comes late needs the last of each. docs/page.md lists the keys.
-struct Message {
-  std::string key;
-  double time_s = 0.0;  ///< Mission time.
-  std::string value;
-  friend bool operator==(const Message&, const Message&) = default;
-};
+using history::Message;
 
 /// {"key":..,"t":..,"value":..}
 std::string to_json(const Message& message);

@@ -74,6 +74,24 @@ void ByHand::change(const Json& body, Response& response) {
   say(response, Json{{"poses", Json::parse(poses_text(*with))}});
 }
 
+void ByHand::why(const std::string& from, const std::string& to, Response& response) const {
+  const auto map = site_.last_map.get();
+  if (map == nullptr) return say(response, 409, "there is no map yet");
+  const auto why = mapfile::why_not_joined(site_.store, map->content, map->map, from, to);
+  if (!why) return say(response, 404, why.error().message);
+  Json out{{"sentence", why->sentence}, {"joined", why->is_joined}, {"compared", why->compared}};
+  out["stopped_by"] = Json::object();
+  for (const auto& [reason, count] : why->stopped_by) out["stopped_by"][reason] = count;
+  out["candidates"] = Json::array();
+  for (const mapfile::NearMiss& miss : why->nearest)
+    out["candidates"].push_back({{"pair", miss.name},
+                                 {"from", to_string(miss.pair.first)},
+                                 {"to", to_string(miss.pair.second)},
+                                 {"reason", miss.reason},
+                                 {"hint", miss.hint}});
+  say(response, out);
+}
+
 std::optional<ByHand::Seen> ByHand::look_at(const Json& body, Response& response) {
   const auto refuse = [&](int status, const std::string& why) {
     say(response, status, why);

@@ -31,7 +31,16 @@ class LiveBoard {
     sequence = board_.sequence();
     return out;
   }
-  /// The same without waiting.
+  /// The same, but for what was put before close(), which it still gives.
+  std::vector<std::shared_ptr<const Posted>> recorded_after(std::uint64_t& sequence,
+                                                            std::chrono::milliseconds at_most) {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, at_most, [&] { return closed_ || board_.sequence() > sequence; });
+    auto out = board_.after(sequence);
+    sequence = board_.sequence();
+    return out;
+  }
+  /// wait_after() without waiting.
   std::vector<std::shared_ptr<const Posted>> after(std::uint64_t& sequence) {
     return wait_after(sequence, std::chrono::milliseconds(0));
   }

@@ -9,16 +9,19 @@
 #include <condition_variable>
 #include <cstdlib>
 #include <mutex>
+#include <optional>
 #include <thread>
 #include <utility>
 
 #include "tutti/bus/bus_address.hpp"
 #include "tutti/bus/bus_credentials.hpp"
+#include "tutti/history/history_file.hpp"
 #include "tutti/pki/pki.hpp"
 #include "tutti/program/clock.hpp"
 #include "tutti/program/incarnation.hpp"
 #include "tutti/program/page/internal/guarded_server.hpp"
 #include "tutti/program/page/internal/mark_routes.hpp"
+#include "tutti/program/page/internal/recorder.hpp"
 #include "tutti/program/page/internal/routes.hpp"
 #include "tutti/program/page/view.hpp"
 
@@ -42,13 +45,18 @@ std::string host_to_open(const std::string& host, const std::vector<std::string>
 class PageViewer final : public program::MapViewer {
  public:
   PageViewer(const PageOptions& options, const program::ViewedMission& mission)
-      : site_(mission), say_(mission.say), announce_(options.announce), alerts_(silent_after_s(mission.rate)) {
+      : site_(mission),
+        say_(mission.say),
+        announce_(options.announce),
+        rate_(mission.rate),
+        alerts_(silent_after_s(mission.rate)) {
     site_.board.put([&](Board& board) {
       board.put(mission_message({.name = mission.name,
                                  .description = options.description,
                                  .version = mission.version,
                                  .robot_silent_s = silent_after_s(mission.rate)}));
     });
+    remember(mission.history);
   }
   ~PageViewer() override {
     site_.board.close();
@@ -57,6 +65,7 @@ class PageViewer final : public program::MapViewer {
     if (listens_.joinable()) listens_.join();
     makes_.request_stop();
     if (makes_.joinable()) makes_.join();
+    recorder_.reset();
   }
   PageViewer(const PageViewer&) = delete;
   PageViewer& operator=(const PageViewer&) = delete;
@@ -105,6 +114,7 @@ class PageViewer final : public program::MapViewer {
     site_.time_s = time_s;
     const auto alerts = joined(alerts_.of_status(status), map_alerts());
     site_.metrics.update(status, radio);
+    site_.acknowledged.with([&](Acknowledged& all) { all.show(alerts); });
     const auto held = site_.held.with([&](Holders& holders) { return holders.message(Clock::steady_s(), time_s); });
     site_.board.put([&](Board& board) {
       board.put(held);
@@ -116,12 +126,29 @@ class PageViewer final : public program::MapViewer {
   std::vector<program::AskedDecision> take_decisions() override { return site_.decisions.take(); }
 
  private:
+  /// What an earlier program has shown goes on: the past, since when problems are there, who has acknowledged them.
+  void remember(const std::filesystem::path& file) {
+    const double gap_s = 3.0 * silent_after_s(rate_);
+    auto opened = history::open_history(file, {.gap_s = gap_s});
+    if (!opened.said.empty()) say_(Level::warning, "the page: " + opened.said);
+    site_.history = std::move(opened.history);
+    for (const Message& message : site_.history->last()) {
+      site_.time_s = std::max<double>(site_.time_s, message.time_s);
+      site_.acknowledged.with([&](Acknowledged& all) { all.resume(message); });
+      if (message.key != "alerts") continue;
+      alerts_.resume(message.value);
+      maps_alerts_.resume(message.value);
+    }
+    recorder_.emplace(site_.board, *site_.history, say_);
+  }
   Status open_marks() {
     const auto marks = site_.marks.open();
     if (!marks) return tl::unexpected(marks.error());
     site_.board.put([&](Board& board) {
+      std::vector<Message> messages;
       for (const auto& [number, mark] : *marks)
-        board.put(mark_message(number, mark, mark.photo_type.empty() ? "" : photo_path(number), 0.0));
+        messages.push_back(mark_message(number, mark, mark.photo_type.empty() ? "" : photo_path(number), site_.time_s));
+      board.put_all("mark/", messages, site_.time_s);
     });
     return {};
   }
@@ -162,6 +189,7 @@ class PageViewer final : public program::MapViewer {
   std::function<void(Level, const std::string&)> say_;
   std::function<void(const std::string&)> announce_;
   std::unique_ptr<GuardedServer> server_;
+  double rate_;
   Alerts alerts_;       // the server's thread's
   Alerts maps_alerts_;  // of the thread that makes messages
   std::atomic<std::uint64_t> shown_ = 0;
@@ -170,6 +198,7 @@ class PageViewer final : public program::MapViewer {
   std::condition_variable_any changed_;
   std::shared_ptr<const ShownMap> next_;
   std::vector<Alert> map_alerts_;
+  std::optional<Recorder> recorder_;
   std::thread listens_;
   std::jthread makes_;
 };

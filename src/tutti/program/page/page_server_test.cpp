@@ -218,7 +218,7 @@ TEST_F(PageServer, WithCredentialsShowsNothingToStrangersAndLetsOperatorsDecide)
   start(folder_ / "pki");
   ASSERT_TRUE(url_.starts_with("https://")) << url_;
   auto http = client();
-  for (const char* path : {"/api/events", "/api/cloud/0/5/0", "/metrics"})
+  for (const char* path : {"/api/events", "/api/history", "/api/cloud/0/5/0", "/metrics"})
     EXPECT_EQ(http.Get(path)->status, 401) << path;
   EXPECT_EQ(decide("alpha/0-bravo/1", "reject", ours()), "401");
   const std::string vera = sign_in(pki, "vera"), anna = sign_in(pki, "anna");

@@ -12,13 +12,13 @@
 
 #include "tutti/base/plain_text.hpp"
 #include "tutti/bus/bus_address.hpp"
-#include "tutti/mapfile/why.hpp"
 #include "tutti/pki/certificates.hpp"
 #include "tutti/program/clock.hpp"
 #include "tutti/program/page/base64.hpp"
 #include "tutti/program/page/cloud_bytes.hpp"
 #include "tutti/program/page/internal/answers.hpp"
 #include "tutti/program/page/internal/by_hand.hpp"
+#include "tutti/program/page/internal/history_routes.hpp"
 #include "tutti/program/page/internal/mark_routes.hpp"
 #include "tutti/program/page/internal/page_data.hpp"
 #include "tutti/program/page/internal/request_head.hpp"
@@ -66,8 +66,9 @@ std::string cookie(const std::string& token, bool is_secure) {
 
 class Routes {
  public:
-  explicit Routes(Site& site) : by_hand(site), site_(site) {}
+  explicit Routes(Site& site) : by_hand(site), history(site), site_(site) {}
   ByHand by_hand;
+  HistoryRoutes history;
 
   void me(const Request& request, Response& response) {
     const Visitor visitor = who(request);
@@ -78,7 +79,7 @@ class Routes {
                                          : Json(nullptr)},
              {"mission", site_.mission_name},
              {"may_decide", visitor.may_decide},
-             {"offers", {"decide", "register", "closure", "mark", "hold", "why", "disagreement"}}};
+             {"offers", {"decide", "register", "closure", "mark", "hold", "acknowledge", "why", "disagreement"}}};
     if (!site_.sign_in.is_open()) out["nonce"] = site_.sign_in.nonce(program::Clock::steady_s());
     say(response, out);
   }
@@ -200,25 +201,6 @@ class Routes {
     if (!held) return say(response, 400, held.error().message);
     site_.board.put([&](Board& board) { board.put(*held); });
     say(response, Json::object());
-  }
-
-  void why(const Request& request, Response& response) {
-    const auto map = site_.last_map.get();
-    if (map == nullptr) return say(response, 409, "there is no map yet");
-    const auto why = mapfile::why_not_joined(site_.store, map->content, map->map, request.get_param_value("from"),
-                                             request.get_param_value("to"));
-    if (!why) return say(response, 404, why.error().message);
-    Json out{{"sentence", why->sentence}, {"joined", why->is_joined}, {"compared", why->compared}};
-    out["stopped_by"] = Json::object();
-    for (const auto& [reason, count] : why->stopped_by) out["stopped_by"][reason] = count;
-    out["candidates"] = Json::array();
-    for (const mapfile::NearMiss& miss : why->nearest)
-      out["candidates"].push_back({{"pair", miss.name},
-                                   {"from", to_string(miss.pair.first)},
-                                   {"to", to_string(miss.pair.second)},
-                                   {"reason", miss.reason},
-                                   {"hint", miss.hint}});
-    say(response, out);
   }
 
   /// Hands the operator's decision to the server; false: the answer states why it is not stored.
@@ -387,6 +369,10 @@ void add_routes(httplib::Server& server, Site& site) {
   server.Post("/api/hold", routes->decided([routes](const Visitor& visitor, const Json& body, Response& r) {
     routes->hold(visitor, body, r);
   }));
+  server.Get("/api/history", routes->seen([routes](const Request& q, Response& r) { routes->history.past(q, r); }));
+  server.Post("/api/acknowledge", routes->decided([routes](const Visitor& visitor, const Json& body, Response& r) {
+    routes->history.acknowledge(visitor, body, r);
+  }));
   server.Post("/api/mark", routes->decided([&site](const Visitor& visitor, const Json& body, Response& r) {
     put_mark(site, visitor, body, r);
   }));
@@ -394,7 +380,9 @@ void add_routes(httplib::Server& server, Site& site) {
               routes->decided([&site](const Visitor&, const Json& body, Response& r) { remove_mark(site, body, r); }));
   server.Get(R"(/api/photo/(\d{1,20}))",
              routes->seen([&site](const Request& q, Response& r) { show_photo(site, q, r); }));
-  server.Get("/api/why", routes->seen([routes](const Request& q, Response& r) { routes->why(q, r); }));
+  server.Get("/api/why", routes->seen([routes](const Request& q, Response& r) {
+    routes->by_hand.why(q.get_param_value("from"), q.get_param_value("to"), r);
+  }));
   server.Get("/metrics", [routes](const Request& q, Response& r) { routes->metrics(q, r); });
   server.Get("/healthz", [routes](const Request&, Response& r) { routes->health(r); });
 }

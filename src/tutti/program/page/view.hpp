@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tutti/consistency/explanation.hpp"
@@ -75,6 +76,8 @@ class Alerts {
   /// Errors first, the oldest of each first.
   std::vector<Alert> of_status(const MissionStatus& status);
   std::vector<Alert> of_map(const mapfile::ShownMap& map, const std::map<SubmapId, std::size_t>& holding);
+  /// Problems of a value of alerts_message() are there since it says, if they still are when these are asked next.
+  void resume(std::string_view alerts);
 
  private:
   std::vector<Alert> dated(std::vector<Alert> found, std::map<std::string, double>& since, double now_s);

@@ -18,6 +18,7 @@
 
 #include "support/mapfile/small_map.hpp"
 #include "support/pki/sign.hpp"
+#include "tutti/history/history_file.hpp"
 #include "tutti/pki/pki.hpp"
 #include "tutti/program/page/base64.hpp"
 #include "tutti/program/page/page_server.hpp"
@@ -61,6 +62,7 @@ class ServedPage : public ::testing::Test {
                                      .map = store_,
                                      .verifier = std::make_shared<mapfile::test::ExplainingVerifier>(),
                                      .pki = pki,
+                                     .history = history_,
                                      .say = [](program::Level, const std::string&) {}});
     ASSERT_TRUE(made.has_value()) << made.error().message;
     viewer_ = std::move(*made);
@@ -161,6 +163,7 @@ class ServedPage : public ::testing::Test {
   }
 
   fs::path folder_ = fs::path(::testing::TempDir()) / ("page_" + std::to_string(getpid()));
+  fs::path history_ = folder_ / "page" / history::kHistoryFile;
   storage::MemoryStore store_{storage::map_schema()};
   std::shared_ptr<const mapfile::ShownMap> map_;
   std::unique_ptr<program::MapViewer> viewer_;

@@ -33,6 +33,8 @@ class ByHand {
   void inspect(const Json& body, Response& response);
   /// The map as it would be with a closure that was looked at.
   void change(const Json& body, Response& response);
+  /// Why two robots' maps are not joined, which one may then want to join by hand.
+  void why(const std::string& from, const std::string& to, Response& response) const;
 
  private:
   struct Found {

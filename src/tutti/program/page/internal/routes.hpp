@@ -9,9 +9,11 @@
 #include <utility>
 #include <vector>
 
+#include "tutti/history/history.hpp"
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/program/incarnation.hpp"
 #include "tutti/program/map_viewer.hpp"
+#include "tutti/program/page/acknowledged.hpp"
 #include "tutti/program/page/holders.hpp"
 #include "tutti/program/page/internal/mark_book.hpp"
 #include "tutti/program/page/live_board.hpp"
@@ -70,18 +72,19 @@ class LastMap {
   std::shared_ptr<const mapfile::ShownMap> map_;
 };
 
-/// Who inspects what, for several threads.
-class HeldThings {
+/// A value for several threads.
+template <class Value>
+class Guarded {
  public:
   template <class Call>
   auto with(Call&& call) {
     const std::scoped_lock lock(mutex_);
-    return std::forward<Call>(call)(holders_);
+    return std::forward<Call>(call)(value_);
   }
 
  private:
   std::mutex mutex_;
-  Holders holders_;
+  Value value_;
 };
 
 /// What the page's threads share.
@@ -107,8 +110,10 @@ struct Site {
   std::shared_ptr<const node::SubmapFrames> clouds;
   LastMap last_map;
   MarkBook marks;
-  HeldThings held;
-  std::atomic<double> time_s = 0.0;  ///< Mission time of the last status.
+  Guarded<Holders> held;
+  Guarded<Acknowledged> acknowledged;
+  std::unique_ptr<history::History> history;  ///< Set before the server starts.
+  std::atomic<double> time_s = 0.0;           ///< Mission time of the last status.
 };
 
 /// Everything that the page asks for (docs/page.md). `site` outlives the server.

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "tutti/program/page/internal/answers.hpp"
+#include "tutti/program/page/internal/routes.hpp"
+
+namespace tutti::page {
+
+/// What the page asks of the past (docs/page.md).
+class HistoryRoutes {
+ public:
+  explicit HistoryRoutes(Site& site) : site_(site) {}
+  /// All of it, or what was between `from` and `until`. One answer is made at a time; all of it is the same text for
+  /// everybody who asks within ten seconds.
+  void past(const Request& request, Response& response);
+  void acknowledge(const Visitor& visitor, const Json& body, Response& response);
+
+ private:
+  [[nodiscard]] std::string text(double from_s, double until_s) const;
+  Site& site_;
+  std::mutex mutex_;  // of what follows
+  std::string all_;
+  double all_until_s_ = 0.0;  // of a steady clock
+};
+
+}  // namespace tutti::page
