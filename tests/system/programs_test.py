@@ -193,7 +193,10 @@ class Programs(ProgramsTest):
         return out
 
     def test_mission_up_is_tutti_run(self):
-        out = self.mission_up()
+        out = self.mission_up("--view", "0")
+        shown = (out / "report.html").read_text()
+        for key in ("status", "alerts", "radio"):  # as the page was sent them meanwhile
+            self.assertTrue(f'{{"key":"{key}","t":' in shown, key)
         for name in ("alpha", "bravo"):  # whom the lab has fed, and told nothing of their recordings
             told = (out / "state/robots" / name / "events.jsonl").read_text()
             self.assertIn('"update_timed"', told)

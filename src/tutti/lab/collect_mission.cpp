@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/lab/collect_mission.hpp"
 
+#include <algorithm>
 #include <exception>
 #include <map>
 #include <memory>
@@ -9,6 +10,7 @@
 #include <vector>
 
 #include "tutti/consistency/proxy_graph_builder.hpp"
+#include "tutti/history/history_file.hpp"
 #include "tutti/lab/mission_input.hpp"
 #include "tutti/lab/update_json.hpp"
 #include "tutti/mission/make_record.hpp"
@@ -205,6 +207,22 @@ Result<mission::MissionEvents> read_course(const fs::path& folder, std::uint64_t
   return course;
 }
 
+/// What the page of the mission was sent, in the order of time, if there was one: its maps until `end_s`, when the last
+/// one is made, and what robots and operators said.
+std::vector<page::Message> shown_by_page(const fs::path& server, double end_s) {
+  const fs::path file = server / "page" / history::kHistoryFile;
+  if (std::error_code none; !fs::exists(file, none)) return {};
+  const auto opened = history::open_history(file);
+  std::vector<page::Message> out = opened.history->past();
+  for (page::Message& message : opened.history->last()) out.push_back(std::move(message));
+  std::erase_if(out, [&](const page::Message& message) {
+    const std::string_view kind = history::kind_of(message.key);
+    const bool is_said = kind == "status" || kind == "alerts" || kind == "acknowledged" || kind == "radio";
+    return kind == "mark" || (!is_said && message.time_s >= end_s);
+  });
+  return out;
+}
+
 }  // namespace
 
 Result<mission::MissionRecord> collect_mission(const MissionConfig& config, const MissionSource& source,
@@ -256,6 +274,9 @@ Result<mission::MissionRecord> collect_mission(const MissionConfig& config, cons
   const auto marks = page::marks_with_photos(**store, 0.0);
   if (!marks) return in_context(map.string(), marks.error());
   view.messages.insert(view.messages.begin(), marks->begin(), marks->end());
+  for (page::Message& message : shown_by_page(state / "server", record.duration_s))
+    view.messages.push_back(std::move(message));
+  std::ranges::stable_sort(view.messages, {}, &page::Message::time_s);
   record.view = std::make_shared<const mission::ViewRecord>(std::move(view));
   return record;
 }
