@@ -213,7 +213,8 @@ TEST_P(RosFleet, EveryPoseOfARobotIsOnAFreeCellOfItsGridAndInOneTree) {
     bool are_all_free = true;
     for (auto& [name, stack] : stacks) {
       stack.look();
-      are_all_free = are_all_free && stack.poses > 50 && stack.free == stack.poses;
+      are_all_free = are_all_free && stack.poses > 50 && stack.free == stack.poses &&
+                     buffers[is_nav2 ? "/" + name + "/tf" : "/tf"].find("world", stack.prefix + "base_link");
     }
     return are_all_free && output_of("play").find("messages of") != std::string::npos;
   };

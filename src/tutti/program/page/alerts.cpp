@@ -46,8 +46,9 @@ void check_silence(const MissionStatus& status, const MissionStatus::Robot& robo
   }
   const double silent_s = status.time - *robot.last_seen;
   if (silent_s < limit_s) return;
-  Alert alert = robot_alert(robot, "silent", "warning", "silent",
-                            "If its program runs, it goes on mapping and joins again when the radio reaches it; else start it.");
+  Alert alert =
+      robot_alert(robot, "silent", "warning", "silent",
+                  "If its program runs, it goes on mapping and joins again when the radio reaches it; else start it.");
   alert.since_s = *robot.last_seen - Timestamp{};
   out.push_back(std::move(alert));
 }
