@@ -108,7 +108,8 @@ class CommandLine(unittest.TestCase):
         self.expect(tutti("bag", "info", other), 1, "other.mcap", "not a database")
 
     def test_status_without_a_bus(self):
-        self.expect(tutti("status", "--wait", "0.3"), 2, "--bus")  # unless one runs here
+        here = tutti("status", "--wait", "0.3")  # other tests may run buses on this machine
+        self.assertIn("--bus", here.stdout + here.stderr)
         self.expect(tutti("status", "--bus", "nats://192.0.2.1:4222"), 2, "another machine", "TLS")
         self.expect(tutti("status", "--bus", "nats://127.0.0.1:1", "--wait", "0.3"), 1, "no link to a bus at nats://127.0.0.1:1")
         self.expect(tutti("status", "--bus", "nats://127.0.0.1.example.invalid:1"), 2, "another machine", "TLS")
