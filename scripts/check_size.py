@@ -12,6 +12,7 @@ today's figures become today's figures; a higher cap is written by hand, with it
 import json
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 
@@ -50,6 +51,8 @@ def room_of(order, relative):
 
 def tags_of(headers):
     """What headers declare, by Universal Ctags."""
+    if shutil.which("ctags") is None:
+        raise ValueError("ctags is not installed: apt install universal-ctags")
     made = subprocess.run(["ctags", "--output-format=json", "--languages=C++", "--langmap=C++:.hpp", "--kinds-C++=+p", "--fields=+sKa",
                            "-L", "-", "-o", "-"], input="\n".join(map(str, headers)), capture_output=True, text=True, check=True)
     return [json.loads(line) for line in made.stdout.splitlines()]
