@@ -24,9 +24,10 @@ FollowedMaps::Decision FollowedMaps::take(RobotId robot, Map map, bool at_once, 
       out.send = true;
     } else {
       const consistency::MapChange change = consistency::map_change(known.followed.own, map.own, chain);
-      const server::ChangeReason reason = server::reason_of_change(*known.followed.beliefs, *map.beliefs, chain);
-      if (change.significance > kNoticed || concerns(reason)) out.send = true;
-      if (change.is_change_of_mind()) out.changed = {robot, change, reason};
+      const auto reason = [&] { return server::reason_of_change(*known.followed.beliefs, *map.beliefs, chain); };
+      if (change.is_change_of_mind()) out.changed = {robot, change, reason()};
+      // The reason goes over all closures, so it is asked where nothing else decides.
+      out.send = out.send || change.significance > kNoticed || concerns(reason());
     }
   }
   if (out.send)
