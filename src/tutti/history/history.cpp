@@ -174,7 +174,7 @@ std::vector<History::Drop> History::surplus_of(const Kept& kept, std::uint32_t c
   return out;
 }
 
-/// What the kind has beyond `bytes`, the oldest values first, whatever they are.
+/// The values that the kind has beyond `bytes`, the oldest first, whatever they are.
 std::vector<History::Drop> History::oldest_of(const Kept& kept, std::uint64_t bytes) const {
   std::vector<std::pair<std::int64_t, const std::string*>> all;
   const auto [begin, end] = tracks_of(kept);

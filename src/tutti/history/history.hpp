@@ -18,7 +18,7 @@
 #include "tutti/history/message.hpp"
 #include "tutti/storage/table_store.hpp"
 
-/// What a mission's page was sent, over time: in bounded size, so that who comes late sees the night, too.
+/// The messages that a mission's page was sent, over time: in bounded size, so that who comes late sees the night, too.
 namespace tutti::history {
 
 /// Schema of the store of a mission's history.

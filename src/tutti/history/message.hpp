@@ -6,8 +6,9 @@
 
 namespace tutti::history {
 
-/// What the page is sent: a key, and its value as JSON; "null": there is no such thing any more. A later message of a
-/// key replaces the earlier one, so a page that comes late needs the last of each. docs/page.md lists the keys.
+/// The page is sent such messages: a key, and its value as JSON; "null": there is no such thing any more. A later
+/// message of a key replaces the earlier one, so a page that comes late needs the last of each. docs/page.md lists the
+/// keys.
 struct Message {
   std::string key;
   double time_s = 0.0;  ///< Mission time.
@@ -15,7 +16,7 @@ struct Message {
   friend bool operator==(const Message&, const Message&) = default;
 };
 
-/// What a key is of: "closure" of "closure/alpha/1-bravo/2".
+/// The part of a key that says of what it is: "closure" in "closure/alpha/1-bravo/2".
 inline std::string_view kind_of(std::string_view key) { return key.substr(0, key.find('/')); }
 
 }  // namespace tutti::history

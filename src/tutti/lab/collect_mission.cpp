@@ -207,8 +207,8 @@ Result<mission::MissionEvents> read_course(const fs::path& folder, std::uint64_t
   return course;
 }
 
-/// What the page of the mission was sent, in the order of time, if there was one: its maps until `end_s`, when the last
-/// one is made, and what robots and operators said.
+/// The messages that the page of the mission was sent, in the order of time, if there was one: its maps until `end_s`,
+/// when the last one is made, and what robots and operators said.
 std::vector<page::Message> shown_by_page(const fs::path& server, double end_s) {
   const fs::path file = server / "page" / history::kHistoryFile;
   if (std::error_code none; !fs::exists(file, none)) return {};

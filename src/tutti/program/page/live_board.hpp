@@ -25,20 +25,12 @@ class LiveBoard {
   }
   /// What was put after `sequence`, which then counts it; waits for it at most so long. Empty after close().
   std::vector<std::shared_ptr<const Posted>> wait_after(std::uint64_t& sequence, std::chrono::milliseconds at_most) {
-    std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, at_most, [&] { return closed_ || board_.sequence() > sequence; });
-    auto out = closed_ ? std::vector<std::shared_ptr<const Posted>>() : board_.after(sequence);
-    sequence = board_.sequence();
-    return out;
+    return posted_after(sequence, at_most, false);
   }
   /// The same, but for what was put before close(), which it still gives.
   std::vector<std::shared_ptr<const Posted>> recorded_after(std::uint64_t& sequence,
                                                             std::chrono::milliseconds at_most) {
-    std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, at_most, [&] { return closed_ || board_.sequence() > sequence; });
-    auto out = board_.after(sequence);
-    sequence = board_.sequence();
-    return out;
+    return posted_after(sequence, at_most, true);
   }
   /// wait_after() without waiting.
   std::vector<std::shared_ptr<const Posted>> after(std::uint64_t& sequence) {
@@ -57,6 +49,15 @@ class LiveBoard {
   }
 
  private:
+  std::vector<std::shared_ptr<const Posted>> posted_after(std::uint64_t& sequence, std::chrono::milliseconds at_most,
+                                                          bool also_closed) {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, at_most, [&] { return closed_ || board_.sequence() > sequence; });
+    auto out = closed_ && !also_closed ? std::vector<std::shared_ptr<const Posted>>() : board_.after(sequence);
+    sequence = board_.sequence();
+    return out;
+  }
+
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   Board board_;

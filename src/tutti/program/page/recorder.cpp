@@ -47,7 +47,7 @@ void Recorder::store(const std::vector<Message>& messages) {
   const std::string trouble = stored ? "" : stored.error().message;
   if (trouble != trouble_)
     say_(stored ? program::Level::info : program::Level::warning,
-         stored ? "the page\'s past is stored again" : "the page\'s past is not stored: " + trouble);
+         stored ? "the page's past is stored again" : "the page's past is not stored: " + trouble);
   trouble_ = trouble;
   double time_s = 0.0;
   for (const Message& message : messages) time_s = std::max(time_s, message.time_s);
