@@ -101,9 +101,13 @@ int GuardedServer::bind(const std::string& host, int port) {
   return port;
 }
 
+/// httplib's stop() does nothing until the thread that listens has begun; that thread would then listen for ever.
 void GuardedServer::end() {
   connections_.close();
-  stop();
+  const socket_t listener = svr_sock_.exchange(INVALID_SOCKET);
+  if (listener == INVALID_SOCKET) return;
+  static_cast<void>(shutdown(listener, SHUT_RDWR));
+  close(listener);
 }
 
 bool GuardedServer::process_and_close_socket(socket_t socket) {

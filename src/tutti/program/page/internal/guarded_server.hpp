@@ -32,7 +32,7 @@ class GuardedServer final : public httplib::Server {
   bool use_tls(const TlsFiles& files);
   /// Listens at an address, at port 0 at any free one. The port; below 0: it cannot.
   int bind(const std::string& host, int port);
-  /// Ends every connection, also what is being sent, and listen_after_bind().
+  /// Ends every connection, also what is being sent, and listen_after_bind(), also one that has not begun.
   void end();
 
  private:
