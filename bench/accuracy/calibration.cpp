@@ -25,6 +25,8 @@ namespace {
 
 using namespace tutti;
 
+constexpr double kUpdate_s = 10.0;  // of mission time, between two maps
+
 /// The test that a robot makes of a broadcast, all of whose nodes of this chain it has.
 consistency::DisagreementTest robots_test(const ProxyGraph& graph, const ChainId& chain, double alpha) {
   std::vector<consistency::NodePair> pairs;

@@ -175,13 +175,22 @@ void record_failure(const judge::FailedSegment& failed, MapEstimate& map) {
   judge::weaken(map.graph, map.odometry_edges, failed.from, failed.to, jump_m, jump_rad);
 }
 
+/// Per node the number of its connected component, and how many there are.
+auto components_of(const PoseGraph& graph) {
+  DisjointSets sets(graph.poses.size());
+  for (const PoseGraphEdge& edge : graph.edges) sets.join(edge.from, edge.to);
+  return sets.labels();
+}
+
+std::size_t degrees_of_freedom(const PoseGraph& graph, std::size_t components) {
+  return 6 * (graph.edges.size() + components - graph.poses.size());
+}
+
 void label_components(MapEstimate& map) {
-  DisjointSets sets(map.nodes.size());
-  for (const PoseGraphEdge& edge : map.graph.edges) sets.join(edge.from, edge.to);
-  const auto [label, count] = sets.labels();
+  const auto [label, count] = components_of(map.graph);
   for (std::size_t i = 0; i < map.nodes.size(); ++i) map.nodes[i].component = static_cast<std::uint32_t>(label[i]);
   map.components = static_cast<std::uint32_t>(count);
-  map.degrees_of_freedom = 6 * (map.graph.edges.size() + map.components - map.nodes.size());
+  map.degrees_of_freedom = degrees_of_freedom(map.graph, map.components);
 }
 
 void adopt(const judge::Optimum& optimum, MapEstimate& map) {
@@ -232,6 +241,17 @@ std::map<ChainId, judge::OdometryHonesty> honesty_after(const MapEstimate& map, 
   return judge::odometry_honesty(odometry_segments(map.nodes, step_to), fitting);
 }
 
+/// Probability with which the poses miss by no more than this what honest measurements say.
+constexpr double kHonestMiss = 0.999;
+
+/// Whether the map misses its measurements by more than they allow for. Odometry that fails once makes all loops over
+/// that segment miss and may look far worse than it says everywhere; the map then fits all the same.
+bool is_contradicted(const judge::Optimum& optimum) {
+  const std::size_t degrees = degrees_of_freedom(optimum.graph, components_of(optimum.graph).second);
+  return degrees > 0 &&
+         optimum.solution.summary.final_cost > chi_square_quantile(kHonestMiss, static_cast<double>(degrees));
+}
+
 /// True if the odometry of any chain was far worse than it said; it now says so.
 bool raise_understated(const std::map<ChainId, judge::OdometryHonesty>& honesty, MapEstimate& map,
                        PoseGraph& searched) {
@@ -269,7 +289,7 @@ MapEstimate estimate_together(const SubmapSet& submaps, const VerdictSet& verdic
   };
   judge::Optimum optimum = decide();
   auto honesty = honesty_after(map, optimum, closures.judged);
-  if (config.judge_odometry && raise_understated(honesty, map, searched)) {
+  if (config.judge_odometry && is_contradicted(optimum) && raise_understated(honesty, map, searched)) {
     const judge::SearchWork before = optimum.work;
     optimum = decide();
     optimum.work += before;
