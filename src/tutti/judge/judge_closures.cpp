@@ -11,7 +11,6 @@
 #include <optional>
 #include <utility>
 
-#include "tutti/base/disjoint_sets.hpp"
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/judge/internal/optimiser.hpp"
 
@@ -132,9 +131,7 @@ void Optimiser::leave_unjoined(std::vector<Objection>& objections) const {
 }
 
 void Optimiser::place_by_odometry(PoseGraph& graph) const {
-  DisjointSets parts(graph.poses.size());
-  for (const PoseGraphEdge& edge : graph.edges) parts.join(edge.from, edge.to);
-  const auto [part, count] = parts.labels();
+  const auto [part, count] = components(graph);
   std::vector<std::optional<Pose3>> T_odometry_solved(static_cast<std::size_t>(count));
   for (std::size_t k = 0; k < graph.poses.size(); ++k) {
     auto& T = T_odometry_solved[static_cast<std::size_t>(part[k])];

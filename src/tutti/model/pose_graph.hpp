@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 #include "tutti/geometry/pose3.hpp"
@@ -22,5 +23,12 @@ struct PoseGraph {
   std::vector<Pose3> poses;
   std::vector<PoseGraphEdge> edges;
 };
+
+/// Per node the number of its connected component, in the order of their first nodes, and how many there are.
+std::pair<std::vector<int>, int> components(const PoseGraph& graph);
+
+/// By how many numbers the edges measure more than the poses need: 6 (edges + components - nodes). The sum of
+/// r^T Omega r of solved poses is about as large where everything errs by what it states.
+std::size_t degrees_of_freedom(const PoseGraph& graph);
 
 }  // namespace tutti

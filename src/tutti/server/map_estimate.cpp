@@ -6,9 +6,9 @@
 #include <set>
 #include <span>
 #include <tuple>
+#include <utility>
 
 #include "tutti/base/chi_square.hpp"
-#include "tutti/base/disjoint_sets.hpp"
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/judge/closure_honesty.hpp"
 #include "tutti/judge/judge_closures.hpp"
@@ -175,22 +175,11 @@ void record_failure(const judge::FailedSegment& failed, MapEstimate& map) {
   judge::weaken(map.graph, map.odometry_edges, failed.from, failed.to, jump_m, jump_rad);
 }
 
-/// Per node the number of its connected component, and how many there are.
-auto components_of(const PoseGraph& graph) {
-  DisjointSets sets(graph.poses.size());
-  for (const PoseGraphEdge& edge : graph.edges) sets.join(edge.from, edge.to);
-  return sets.labels();
-}
-
-std::size_t degrees_of_freedom(const PoseGraph& graph, std::size_t components) {
-  return 6 * (graph.edges.size() + components - graph.poses.size());
-}
-
 void label_components(MapEstimate& map) {
-  const auto [label, count] = components_of(map.graph);
+  const auto [label, count] = components(map.graph);
   for (std::size_t i = 0; i < map.nodes.size(); ++i) map.nodes[i].component = static_cast<std::uint32_t>(label[i]);
   map.components = static_cast<std::uint32_t>(count);
-  map.degrees_of_freedom = degrees_of_freedom(map.graph, map.components);
+  map.degrees_of_freedom = degrees_of_freedom(map.graph);
 }
 
 void adopt(const judge::Optimum& optimum, MapEstimate& map) {
@@ -247,22 +236,25 @@ constexpr double kHonestMiss = 0.999;
 /// Whether the map misses its measurements by more than they allow for. Odometry that fails once makes all loops over
 /// that segment miss and may look far worse than it says everywhere; the map then fits all the same.
 bool is_contradicted(const judge::Optimum& optimum) {
-  const std::size_t degrees = degrees_of_freedom(optimum.graph, components_of(optimum.graph).second);
+  const std::size_t degrees = degrees_of_freedom(optimum.graph);
   return degrees > 0 &&
          optimum.solution.summary.final_cost > chi_square_quantile(kHonestMiss, static_cast<double>(degrees));
 }
 
 /// True if the odometry of any chain was far worse than it said; it now says so.
-bool raise_understated(const std::map<ChainId, judge::OdometryHonesty>& honesty, MapEstimate& map,
-                       PoseGraph& searched) {
+bool raise_understated(const std::map<ChainId, judge::OdometryHonesty>& honesty, const judge::Optimum& optimum,
+                       MapEstimate& map, PoseGraph& searched) {
+  std::map<ChainId, double> factors;
   for (const auto& [chain, worth] : honesty)
-    if (worth.whole > kUnderstated) map.understated[chain] = worth.whole;
+    if (worth.whole > kUnderstated) factors[chain] = worth.whole;
+  if (factors.empty() || !is_contradicted(optimum)) return false;
+  map.understated = std::move(factors);
   for (std::size_t e = 0; e < map.odometry_edges; ++e) {
     const auto found = map.understated.find(map.nodes[map.graph.edges[e].from].id.chain);
     if (found == map.understated.end()) continue;
     for (PoseGraph* graph : {&map.graph, &searched}) graph->edges[e].information /= found->second;
   }
-  return !map.understated.empty();
+  return true;
 }
 
 /// The map of submaps that do not contradict each other.
@@ -289,7 +281,7 @@ MapEstimate estimate_together(const SubmapSet& submaps, const VerdictSet& verdic
   };
   judge::Optimum optimum = decide();
   auto honesty = honesty_after(map, optimum, closures.judged);
-  if (config.judge_odometry && is_contradicted(optimum) && raise_understated(honesty, map, searched)) {
+  if (config.judge_odometry && raise_understated(honesty, optimum, map, searched)) {
     const judge::SearchWork before = optimum.work;
     optimum = decide();
     optimum.work += before;

@@ -11,7 +11,6 @@
 #include <tuple>
 
 #include "tutti/base/check.hpp"
-#include "tutti/base/disjoint_sets.hpp"
 
 namespace tutti::estimation::internal {
 namespace {
@@ -101,9 +100,7 @@ BlockStructure analyse_blocks(const PoseGraph& graph, std::span<const std::pair<
   for (const auto& edge : graph.edges)
     TUTTI_CHECK(edge.from < nodes && edge.to < nodes, "edge {} -> {} of {} nodes", edge.from, edge.to, nodes);
   BlockStructure s;
-  DisjointSets sets(graph.poses.size());
-  for (const auto& edge : graph.edges) sets.join(edge.from, edge.to);
-  std::tie(s.component, s.components) = sets.labels();
+  std::tie(s.component, s.components) = components(graph);
   const std::vector<bool> anchored = anchors(s, fixed);
   s.variable.assign(nodes, -1);
   for (std::size_t i = 0; i < nodes; ++i)

@@ -6,7 +6,6 @@
 #include <functional>
 #include <utility>
 
-#include "tutti/base/disjoint_sets.hpp"
 #include "tutti/estimation/chain_reduction.hpp"
 #include "tutti/estimation/edge_roles.hpp"
 #include "tutti/estimation/influence.hpp"
@@ -60,11 +59,8 @@ double Optimiser::score(const Optimum& map) const {
 }
 
 bool Optimiser::is_plausible(const Optimum& map) const {
-  DisjointSets parts(map.graph.poses.size());
-  for (const PoseGraphEdge& edge : map.graph.edges) parts.join(edge.from, edge.to);
-  const auto nodes = static_cast<double>(map.graph.poses.size()) - static_cast<double>(parts.labels().second);
-  const double freedom = 6.0 * (static_cast<double>(map.graph.edges.size()) - nodes);
-  return freedom <= 0.0 || estimation::chi2(map.graph) <= kPlausible * freedom;
+  const auto freedom = static_cast<double>(degrees_of_freedom(map.graph));
+  return freedom == 0.0 || estimation::chi2(map.graph) <= kPlausible * freedom;
 }
 
 std::ptrdiff_t Optimiser::Groups::contradicting() const {
