@@ -40,6 +40,7 @@ class SqliteStore final : public TableStore {
   SqliteStore(std::filesystem::path file, const SqliteOptions& options)
       : file_(std::filesystem::absolute(file)), options_(options) {}
   Status open(const Schema& schema);
+  Status open_to_read(const Schema& schema);
 
   Status commit(std::span<const Write> writes) override;
   [[nodiscard]] Result<std::optional<std::string>> read(std::string_view table, std::string_view key) const override;
@@ -57,7 +58,9 @@ class SqliteStore final : public TableStore {
   Status create(const Schema& schema);
   Status check_kind(const Schema& schema) const;
   Status add_tables(const Schema& schema) const;
-  Status check(const Schema& schema) const;
+  Status check_tables(const Schema& schema) const;
+  Status check_pages() const;
+  Status prepare_statements(const Schema& schema);
   [[nodiscard]] Status room_for(std::span<const Write> writes) const;
   [[nodiscard]] Status write_all(std::span<const Write> writes) const;
   [[nodiscard]] Status check_row(std::string_view table, std::string_view key, std::int64_t hash,
@@ -68,6 +71,7 @@ class SqliteStore final : public TableStore {
   SqliteOptions options_;
   mutable std::recursive_mutex mutex_;  ///< Recursive, so that a visitor that calls the store gets an error.
   mutable bool scanning_ = false;
+  bool is_reader_ = false;
   Database database_;
   std::map<std::string, TableStatements, std::less<>> tables_;
 };
@@ -124,14 +128,18 @@ Result<std::int64_t> SqliteStore::number_of(const std::string& sql) const {
   return use.number(0);
 }
 
-/// Alone with the file from here on: in exclusive mode what is locked once is kept.
+constexpr int kOthersDone_ms = 5000;  // a reader that finds a log of a killed program puts it in order first
+
+/// Alone with the file from here on, unless there are to be readers: in exclusive mode what is locked once is kept.
 Status SqliteStore::configure() {
   if (const Status opened = open_file(SQLITE_OPEN_READWRITE); !opened) return opened;
   if (sqlite3_db_readonly(database_.get(), "main") != 0)
     return fail(ErrorCode::io, "{}: cannot be written", file_.string());
   // A map comes from anywhere: nothing in it is run.
-  for (const char* sql : {"PRAGMA locking_mode = EXCLUSIVE", "PRAGMA trusted_schema = OFF",
-                          "PRAGMA secure_delete = OFF", "PRAGMA synchronous = FULL", "BEGIN EXCLUSIVE", "COMMIT"})
+  if (options_.has_readers) sqlite3_busy_timeout(database_.get(), kOthersDone_ms);
+  const char* const locks = options_.has_readers ? "PRAGMA locking_mode = NORMAL" : "PRAGMA locking_mode = EXCLUSIVE";
+  for (const char* sql : {locks, "PRAGMA trusted_schema = OFF", "PRAGMA secure_delete = OFF",
+                          "PRAGMA synchronous = FULL", "BEGIN EXCLUSIVE", "COMMIT"})
     if (const Status done = run(sql); !done) return done;
   return {};
 }
@@ -201,21 +209,24 @@ Status SqliteStore::add_tables(const Schema& schema) const {
   return run(sql + fmt::format("PRAGMA user_version={};COMMIT", schema.version));
 }
 
-Status SqliteStore::check(const Schema& schema) const {
-  const std::string file = file_.string();
+Status SqliteStore::check_tables(const Schema& schema) const {
   std::vector<std::string> expected{sql_of_kind()};
   for (const std::string& table : schema.tables) expected.push_back(sql_of_table(table));
   std::ranges::sort(expected);
   const Result<std::string> found = value_of("SELECT sql FROM sqlite_schema WHERE sql IS NOT NULL ORDER BY sql");
   if (!found) return tl::unexpected(found.error());
   if (*found != fmt::format("{}", fmt::join(expected, "\n")))
-    return fail(ErrorCode::parse, "{}: has other tables than a {} of version {}:\n{}", file, schema.kind,
+    return fail(ErrorCode::parse, "{}: has other tables than a {} of version {}:\n{}", file_.string(), schema.kind,
                 schema.version, *found);
+  return {};
+}
+
+Status SqliteStore::check_pages() const {
   const Result<std::string> damage = value_of("PRAGMA integrity_check(1)");
   if (!damage) return tl::unexpected(damage.error());
   if (*damage != "ok")  // "*** in database main ***", and in the last line what it is
-    return fail(ErrorCode::parse, "{}: the file is damaged: {}{}", file, damage->substr(damage->rfind('\n') + 1),
-                kSalvage);
+    return fail(ErrorCode::parse, "{}: the file is damaged: {}{}", file_.string(),
+                damage->substr(damage->rfind('\n') + 1), kSalvage);
   return {};
 }
 
@@ -231,7 +242,8 @@ Status SqliteStore::open(const Schema& schema) {
   if (const Status done = configure(); !done) return done;
   if (const Status done = check_kind(schema); !done) return done;
   if (const Status done = add_tables(schema); !done) return done;
-  if (const Status done = check(schema); !done) return done;
+  if (const Status done = check_tables(schema); !done) return done;
+  if (const Status done = check_pages(); !done) return done;
   if (const Result<std::string> mode = value_of("PRAGMA journal_mode = WAL"); !mode)
     return tl::unexpected(mode.error());
   else if (*mode != "wal")
@@ -242,16 +254,36 @@ Status SqliteStore::open(const Schema& schema) {
     const std::uint64_t pages = std::max<std::uint64_t>(1, options_.max_bytes / static_cast<std::uint64_t>(*page));
     if (const Status done = run(fmt::format("PRAGMA max_page_count = {}", pages)); !done) return done;
   }
+  return prepare_statements(schema);
+}
+
+Status SqliteStore::open_to_read(const Schema& schema) {
+  is_reader_ = true;
+  if (const Status opened = open_file(SQLITE_OPEN_READONLY); !opened) return opened;
+  sqlite3_busy_timeout(database_.get(), kOthersDone_ms);
+  if (const Status done = run("PRAGMA trusted_schema = OFF"); !done) return done;
+  if (const Status done = check_kind(schema); !done) return done;
+  if (const Status done = check_tables(schema); !done) return done;
+  return prepare_statements(schema);
+}
+
+Status SqliteStore::prepare_statements(const Schema& schema) {
   for (const std::string& table : schema.tables) {
-    auto put = prepare("INSERT INTO " + table + " (key, hash, bytes) VALUES (?1, ?2, ?3) " +
-                       "ON CONFLICT (key) DO UPDATE SET hash = excluded.hash, bytes = excluded.bytes");
-    auto remove = prepare("DELETE FROM " + table + " WHERE key = ?1");
-    auto read = prepare("SELECT hash, bytes FROM " + table + " WHERE key = ?1");
-    auto scan = prepare("SELECT key, hash, bytes FROM " + table + " WHERE key >= ?1 ORDER BY key");
-    auto sizes = prepare("SELECT key, length(bytes) FROM " + table + " ORDER BY key");
-    for (const auto* made : {&put, &remove, &read, &scan, &sizes})
-      if (!*made) return tl::unexpected(made->error());
-    tables_[table] = {std::move(*put), std::move(*remove), std::move(*read), std::move(*scan), std::move(*sizes)};
+    TableStatements& made = tables_[table];
+    std::vector<std::pair<Statement*, std::string>> all{
+        {&made.read, "SELECT hash, bytes FROM " + table + " WHERE key = ?1"},
+        {&made.scan, "SELECT key, hash, bytes FROM " + table + " WHERE key >= ?1 ORDER BY key"},
+        {&made.sizes, "SELECT key, length(bytes) FROM " + table + " ORDER BY key"}};
+    if (!is_reader_) {
+      all.emplace_back(&made.put, "INSERT INTO " + table + " (key, hash, bytes) VALUES (?1, ?2, ?3) " +
+                                      "ON CONFLICT (key) DO UPDATE SET hash = excluded.hash, bytes = excluded.bytes");
+      all.emplace_back(&made.remove, "DELETE FROM " + table + " WHERE key = ?1");
+    }
+    for (const auto& [statement, sql] : all) {
+      auto prepared = prepare(sql);
+      if (!prepared) return tl::unexpected(prepared.error());
+      *statement = std::move(*prepared);
+    }
   }
   return {};
 }
@@ -296,6 +328,7 @@ Status SqliteStore::write_all(std::span<const Write> writes) const {
 }
 
 Status SqliteStore::commit(std::span<const Write> writes) {
+  if (is_reader_) return fail(ErrorCode::io, "{}: is open to be read alone", file_.string());
   const std::scoped_lock lock(mutex_);
   for (const Write& write : writes) {
     static_cast<void>(statements(write.table));
@@ -365,6 +398,15 @@ Result<std::unique_ptr<TableStore>> open_sqlite_store(const std::filesystem::pat
                                                       const SqliteOptions& options) {
   auto store = std::make_unique<SqliteStore>(file, options);
   if (const Status opened = store->open(schema); !opened) return tl::unexpected(opened.error());
+  return store;
+}
+
+Result<std::unique_ptr<TableStore>> open_sqlite_reader(const std::filesystem::path& file, const Schema& schema) {
+  std::error_code failed;
+  if (!std::filesystem::is_regular_file(file, failed))
+    return fail(ErrorCode::io, "{}: no such file, expected a {}", file.string(), schema.kind);
+  auto store = std::make_unique<SqliteStore>(file, SqliteOptions());
+  if (const Status opened = store->open_to_read(schema); !opened) return tl::unexpected(opened.error());
   return store;
 }
 

@@ -14,6 +14,9 @@ namespace tutti::storage {
 struct SqliteOptions {
   std::uint64_t min_free_bytes = std::uint64_t{256} << 20U;
   std::uint64_t max_bytes = 0;
+  /// Others may read the file meanwhile (open_sqlite_reader()). Two that open it so do not see each other: who does has
+  /// another lock, as of a state folder.
+  bool has_readers = false;
   template <class V>
   void describe(V& v) {
     v.field("min_free_bytes", min_free_bytes, any(),
@@ -31,5 +34,11 @@ struct SqliteOptions {
 /// process has open. Damage within a row is found by its hash when the row is read.
 Result<std::unique_ptr<TableStore>> open_sqlite_store(const std::filesystem::path& file, const Schema& schema,
                                                       const SqliteOptions& options = {});
+
+/// Opens a store that another process may have open with SqliteOptions::has_readers, to read what that has committed;
+/// commit() is an error. Each call sees the newest commit. The other process waits for no reader, but its log grows
+/// while a scan goes on. Errors as above, and that there is no such file; damage elsewhere than in the rows that are
+/// read is not looked for.
+Result<std::unique_ptr<TableStore>> open_sqlite_reader(const std::filesystem::path& file, const Schema& schema);
 
 }  // namespace tutti::storage

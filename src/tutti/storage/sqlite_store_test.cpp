@@ -165,6 +165,33 @@ TEST_F(SqliteStoreTest, IsOpenOnce) {
   EXPECT_TRUE(store->commit(one("a", "1")));
 }
 
+TEST_F(SqliteStoreTest, AReaderSeesTheNewestCommitAndHoldsUpNobody) {
+  const auto store = open({.min_free_bytes = 0, .has_readers = true});
+  ASSERT_TRUE(store->commit(one("a", "1")));
+  const auto reader = open_sqlite_reader(file(), kSchema);
+  ASSERT_TRUE(reader) << reader.error().message;
+  EXPECT_EQ((*reader)->read("apples", "a").value(), "1");
+  ASSERT_TRUE(store->commit(one("b", "2")));
+  int seen = 0;
+  ASSERT_TRUE((*reader)->scan("apples", "", [&](std::string_view, std::string_view) {
+    EXPECT_TRUE(store->commit(one("c" + std::to_string(++seen), "3")));  // while the reader is at it
+    return true;
+  }));
+  EXPECT_EQ(seen, 2);  // what was committed when it began
+  EXPECT_EQ((*reader)->read("apples", "c2").value(), "3");
+  expect_says((*reader)->commit(one("a", "4")).error().message, {"some.tutti", "read alone"});
+  expect_says(refusal(), {"open in another program"});  // for who would have it alone
+}
+
+TEST_F(SqliteStoreTest, AStoreIsOpenedAgainWhileAReaderStays) {
+  ASSERT_TRUE(open({.min_free_bytes = 0, .has_readers = true})->commit(one("a", "1")));
+  const auto reader = open_sqlite_reader(file(), kSchema).value();
+  ASSERT_TRUE(open({.min_free_bytes = 0, .has_readers = true})->commit(one("a", "2")));
+  EXPECT_EQ(reader->read("apples", "a").value(), "2");
+  EXPECT_EQ(open_sqlite_reader(folder_ / "none", kSchema).error().message,
+            (folder_ / "none").string() + ": no such file, expected a test");
+}
+
 TEST_F(SqliteStoreTest, ADamagedRowIsNamedAndTheOthersAreRead) {
   const std::string bytes = "twelve score of apples";
   ASSERT_TRUE(open()->commit(std::vector<Write>{{"apples", "a", "1"}, {"apples", "\x01k", bytes}}));
