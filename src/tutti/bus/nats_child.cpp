@@ -4,21 +4,17 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
-#include <sys/prctl.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
-#include <condition_variable>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
-#include <mutex>
 #include <string_view>
 #include <thread>
 #include <utility>
@@ -37,18 +33,11 @@ using Clock = std::chrono::steady_clock;
 
 constexpr auto kWaitForPort = std::chrono::seconds(2);
 constexpr auto kPollEvery = std::chrono::milliseconds(3);
-constexpr auto kPolitely = std::chrono::seconds(3);      // then it is killed
 constexpr auto kOthersMayEnd = std::chrono::seconds(2);  // the nats-server of a killed process ends a little later
 constexpr std::uintmax_t kMostLog = 8U << 20U;           // then it begins again: strangers make it grow
 constexpr const char* kConfiguration = "configuration";  // in its folder
+constexpr std::string_view kProgram = "nats-server";
 constexpr const char* kElsewhere = "/usr/sbin/nats-server";
-
-struct ToBeClosed {
-  int file = -1;
-  ~ToBeClosed() {
-    if (file >= 0) close(file);
-  }
-};
 
 /// Messages of up to 8 MB pass, which copies of submaps need. The default write_deadline of 10 s cuts off a receiver of
 /// 2 MB over 1 Mbit/s.
@@ -97,102 +86,6 @@ bool is_ready(const std::string& url, const NatsChildOptions& child) {
 }
 
 }  // namespace
-
-/// The process and the thread that forked it, which waits for its end: the kernel ends the child with that thread.
-class NatsChild::Process {
- public:
-  Process(const std::string& program, const fs::path& configuration, int log, int lock) : log_{log} {
-    std::vector<std::string> command{program, "-c", configuration.string()};
-    thread_ = std::thread([this, command = std::move(command), lock]() mutable { run(command, lock); });
-    std::unique_lock guard(mutex_);
-    changed_.wait(guard, [&] { return pid_ >= 0 || failure_ != 0; });
-  }
-  ~Process() {
-    {
-      std::unique_lock guard(mutex_);
-      for (const int signal : {SIGINT, SIGKILL}) {
-        if (!ended_ && pid_ > 0) kill(pid_, signal);
-        if (signal == SIGINT) changed_.wait_for(guard, kPolitely, [&] { return ended_; });
-      }
-    }
-    thread_.join();
-  }
-  Process(const Process&) = delete;
-  Process& operator=(const Process&) = delete;
-
-  /// errno of what did not let it start.
-  [[nodiscard]] int failure() const {
-    const std::scoped_lock guard(mutex_);
-    return failure_;
-  }
-  [[nodiscard]] bool ended() const {
-    const std::scoped_lock guard(mutex_);
-    return ended_;
-  }
-  [[nodiscard]] int pid() const {
-    const std::scoped_lock guard(mutex_);
-    return pid_;
-  }
-
- private:
-  void run(std::vector<std::string>& command, int lock) {
-    std::vector<char*> environment;  // whoever reads that of nats-server gets no credential
-    for (char** one = environ; *one != nullptr; ++one)
-      if (!std::string_view(*one).starts_with("TUTTI_")) environment.push_back(*one);
-    environment.push_back(nullptr);
-    std::vector<char*> arguments;
-    for (std::string& argument : command) arguments.push_back(argument.data());
-    arguments.push_back(nullptr);
-    int errors[2] = {-1, -1};
-    if (pipe2(errors, O_CLOEXEC) != 0) return report(-1, errno);
-    const pid_t parent = getpid();
-    const pid_t child = fork();
-    if (child == 0) {  // only what is allowed between fork and exec
-      prctl(PR_SET_PDEATHSIG, SIGKILL);
-      if (getppid() != parent) _exit(1);
-      sigset_t none;
-      sigemptyset(&none);
-      sigprocmask(SIG_SETMASK, &none, nullptr);
-      setpgid(0, 0);  // Ctrl-C is for us; it is stopped by us
-      dup2(log_.file, STDOUT_FILENO);
-      dup2(log_.file, STDERR_FILENO);
-      fcntl(lock, F_SETFD, 0);
-      execvpe(arguments[0], arguments.data(), environment.data());
-      if (errno == ENOENT && std::strcmp(arguments[0], "nats-server") == 0)
-        execve(kElsewhere, arguments.data(), environment.data());
-      const int error = errno;
-      static_cast<void>(!write(errors[1], &error, sizeof error));
-      _exit(1);
-    }
-    int error = child < 0 ? errno : 0;
-    close(errors[1]);
-    static_cast<void>(!read(errors[0], &error, sizeof error));
-    close(errors[0]);
-    report(child, error);
-    if (child < 0) return;
-    siginfo_t ended{};
-    while (waitid(P_PID, static_cast<id_t>(child), &ended, WEXITED | WNOWAIT) != 0 && errno == EINTR) continue;
-    const std::scoped_lock guard(mutex_);  // nobody signals it from here on: its number is free after waitpid
-    waitpid(child, nullptr, 0);
-    ended_ = true;
-    changed_.notify_all();
-  }
-  void report(pid_t child, int failure) {
-    const std::scoped_lock guard(mutex_);
-    pid_ = child;
-    failure_ = failure;
-    if (child < 0) ended_ = true;
-    changed_.notify_all();
-  }
-
-  mutable std::mutex mutex_;
-  std::condition_variable changed_;
-  ToBeClosed log_;
-  pid_t pid_ = -1;
-  int failure_ = 0;
-  bool ended_ = false;
-  std::thread thread_;
-};
 
 NatsChild::NatsChild(fs::path folder, NatsChildOptions options)
     : folder_(std::move(folder)), options_(std::move(options)) {}
@@ -268,7 +161,11 @@ Status NatsChild::launch(int port) {
   const auto log = open_own_file(folder_ / "log", O_CREAT | O_WRONLY | O_TRUNC | O_APPEND, 0600);
   if (!log) return tl::unexpected(log.error());
   log_read_ = 0;
-  process_ = std::make_unique<Process>(options_.program, file, *log, lock_);
+  process_ = std::make_unique<ChildProcess>(ChildCommand{.words = {options_.program, "-c", file.string()},
+                                                         .elsewhere = options_.program == kProgram ? kElsewhere : "",
+                                                         .output = *log,
+                                                         .inherits = lock_});
+  close(*log);
   pid_ = process_->pid();
   if (const int error = process_->failure(); error == ENOENT)
     return fail(ErrorCode::io, "{}: not installed (Debian: apt install nats-server)", options_.program);

@@ -11,6 +11,7 @@
 #include "tutti/base/config.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/bus/bus_credentials.hpp"
+#include "tutti/bus/child_process.hpp"
 #include "tutti/bus/nats_log.hpp"
 
 namespace tutti::bus {
@@ -71,7 +72,6 @@ class NatsChild {
   [[nodiscard]] Refusals take_refusals();
 
  private:
-  class Process;
   NatsChild(std::filesystem::path folder, NatsChildOptions options);
   Status lock_folder();
   Status launch(int port);
@@ -84,7 +84,7 @@ class NatsChild {
   std::filesystem::path folder_;
   NatsChildOptions options_;
   int lock_ = -1;  ///< The lock file, open and locked; the child inherits it and holds the lock until it ends.
-  std::unique_ptr<Process> process_;
+  std::unique_ptr<ChildProcess> process_;
   std::string configured_;       ///< Its configuration.
   std::uintmax_t log_read_ = 0;  ///< So much of its log.
   std::string url_;
