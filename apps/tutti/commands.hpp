@@ -25,6 +25,7 @@ void add_simulate_command(CLI::App& app, int& exit_code);
 void add_server_command(CLI::App& app, int& exit_code);
 void add_robot_command(CLI::App& app, int& exit_code);
 void add_worker_command(CLI::App& app, int& exit_code);
+void add_page_command(CLI::App& app, int& exit_code);
 void add_mission_command(CLI::App& app, int& exit_code);
 void add_pki_command(CLI::App& app, int& exit_code);
 void add_manual_command(CLI::App& app, int& exit_code);

@@ -39,6 +39,7 @@ int main(int argc, char** argv) {
   tutti::app::add_server_command(app, exit_code);
   tutti::app::add_robot_command(app, exit_code);
   tutti::app::add_worker_command(app, exit_code);
+  tutti::app::add_page_command(app, exit_code);
   tutti::app::add_mission_command(app, exit_code);
   tutti::app::add_pki_command(app, exit_code);
   tutti::app::add_manual_command(app, exit_code);

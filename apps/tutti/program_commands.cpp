@@ -12,7 +12,7 @@
 #include "options.hpp"
 #include "program_options.hpp"
 #include "ros_commands.hpp"
-#include "tutti/program/page/page_server.hpp"
+#include "tutti/program/page/page_program.hpp"
 #include "tutti/program/robot_program.hpp"
 #include "tutti/program/server_program.hpp"
 #include "tutti/program/stop.hpp"
@@ -27,11 +27,16 @@ void add_state_option(CLI::App& command, std::filesystem::path& state, const std
   command.add_option("--state", state, what)->type_name("DIR")->required();
 }
 
-void show_on_page(page::PageOptions& page, program::ServerOptions& options) {
-  page.allow_insecure = options.bus.allow_insecure;
-  page.announce = [](const std::string& url) { fmt::print(stderr, "tutti server: the page is at {}\n", url); };
-  options.views.emplace_back(
-      [&page](const program::ViewedMission& mission) { return page::serve_page(page, mission); });
+/// With the mission of the server.
+program::PageChildOptions page_of(const std::string& listen, const ProgramArguments& common) {
+  const lab::MissionSource& mission = common.mission;
+  program::PageChildOptions out{.listen = listen,
+                                .arguments = {"--log-level", common.log_level, "--seed", std::to_string(mission.seed)}};
+  if (!mission.data.empty()) out.arguments.insert(out.arguments.end(), {"--data", mission.data});
+  for (const std::string& assignment : mission.assignments)
+    out.arguments.insert(out.arguments.end(), {"--set", assignment});
+  if (!mission.file.empty()) out.arguments.push_back(mission.file);
+  return out;
 }
 
 }  // namespace
@@ -71,11 +76,12 @@ void add_server_command(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   add_rate_option(*command, options->rate,
                   "How fast mission time passes, for robots that replay faster than real time");
-  const auto page = std::make_shared<page::PageOptions>();
+  const auto view = std::make_shared<std::string>();
   command
-      ->add_option("--view", page->listen,
+      ->add_option("--view", *view,
                    "Serve the page of the mission (map, robots, closures, alerts, decisions) at this port of this "
-                   "machine; with a HOST to others, too, which needs --pki (docs/operating.md)")
+                   "machine, by a program of its own (tutti page); with a HOST to others, too, which needs --pki "
+                   "(docs/operating.md)")
       ->type_name("[HOST:]PORT");
   const auto ros = add_ros_server_options(*command);
   add_program_options(*command, *common);
@@ -83,7 +89,7 @@ void add_server_command(CLI::App& app, int& exit_code) {
     fmt::print("{}\n", line);
     std::fflush(stdout);
   };
-  command->callback([options, common, page, ros, &exit_code] {
+  command->callback([options, common, view, ros, &exit_code] {
     exit_code = run_program("server", *common, options->console, [&]() -> Status {
       auto settings = lab::server_settings(common->mission);
       if (!settings) return tl::unexpected(settings.error());
@@ -91,7 +97,7 @@ void add_server_command(CLI::App& app, int& exit_code) {
       if (wants_ros(*ros))
         if (Status shown = show_on_ros(*ros, *options); !shown) return shown;
       options->settings = std::move(*settings);
-      if (!page->listen.empty()) show_on_page(*page, *options);
+      if (!view->empty()) options->page = page_of(*view, *common);
       return program::run_server(*options, program::stop_asked());
     });
   });
@@ -175,6 +181,55 @@ void add_robot_command(CLI::App& app, int& exit_code) {
       if (wants_ros(*ros))
         if (Status ok = feed_from_ros(*ros, *options); !ok) return ok;
       return program::run_robot(*options, program::stop_asked());
+    });
+  });
+}
+
+void add_page_command(CLI::App& app, int& exit_code) {
+  const auto options = std::make_shared<page::PageProgramOptions>();
+  const auto common = std::make_shared<ProgramArguments>();
+  options->page.version = TUTTI_VERSION;
+  CLI::App* command = app.add_subcommand("page",
+                                         "Serves the page of a running mission (docs/page.md), beside its server, "
+                                         "whose map it reads. `tutti server --view` "
+                                         "starts\n"
+                                         "it. It remembers what it has shown: killed at any moment and started again "
+                                         "with the same --state it goes on, and\n"
+                                         "the mission does not notice. SIGTERM or Ctrl-C stop it.");
+  add_bus_options(*command, options->bus)->required();
+  command->add_option("--server", options->server, "The state folder of the server, on this machine")
+      ->type_name("DIR")
+      ->required();
+  command
+      ->add_option("--listen", options->page.listen,
+                   "Where browsers reach it: a port of this machine; with a HOST others do, too, which needs --pki")
+      ->type_name("[HOST:]PORT")
+      ->required();
+  command->add_option("--state", options->state, "Folder of this page: what it has shown, log; default: SERVER/page")
+      ->type_name("DIR");
+  command
+      ->add_option(
+          "--pki", options->page.pki,
+          "The folder of `tutti pki`: TLS, and who may see the page and decide there. --credentials is then that "
+          "of an operator called 'page', for whom those who decide are named")
+      ->type_name("DIR");
+  add_mission_argument(*command, *common, "Needed only where closures come from its reference");
+  add_mission_name(*command, common->mission.name, kServedMission);
+  add_rate_option(*command, options->page.rate, "How fast mission time passes, as the server has it");
+  add_program_options(*command, *common);
+  command->callback([options, common, &exit_code] {
+    exit_code = run_program("page", *common, options->console, [&]() -> Status {
+      auto settings = lab::worker_settings(common->mission);
+      if (!settings) return tl::unexpected(settings.error());
+      if (common->print_config) return print_settings(*settings);
+      options->verifiers = std::move(settings->verifiers);
+      options->bus.mission = settings->mission;
+      options->page.allow_insecure = options->bus.allow_insecure;
+      options->page.announce = [](const std::string& url) {
+        fmt::print(stderr, "tutti page: the page is at {}\n", url);
+      };
+      if (options->state.empty()) options->state = options->server / "page";
+      return page::run_page(*options, program::stop_asked());
     });
   });
 }

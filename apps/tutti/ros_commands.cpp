@@ -272,8 +272,8 @@ Status show_on_ros(const RosArguments& arguments, program::ServerOptions& option
   if (!participant) return tl::unexpected(participant.error());
   ros::RosServerOptions ros = arguments.server;
   ros.say = log_of("server ros", options.console);
-  options.views.emplace_back([ros, participant = *participant](const program::ViewedMission& mission) {
-    return ros::view_on_ros(ros, participant, mission.map);
+  options.views.emplace_back([ros, participant = *participant](const storage::TableStore& map) {
+    return ros::view_on_ros(ros, participant, map);
   });
   return {};
 }

@@ -7,6 +7,7 @@ usage: page_intruders_test.py TUTTI_PROGRAM SOURCE_DIR [Plain.TEST | WithCredent
 """
 import contextlib
 import gzip
+import json
 import pathlib
 import re
 import shutil
@@ -54,11 +55,12 @@ class Plain(unittest.TestCase):
             self.fail("the server ended")
         threading.Thread(target=self.server.stderr.read, daemon=True).start()
         self.assertEqual(self.ask("GET / HTTP/1.1")[0], 200)
-        pathlib.Path(f"/proc/{self.server.pid}/clear_refs").write_text("5")  # the peak begins anew
+        self.page = json.loads((self.folder / "server/page/status.json").read_text())["pid"]
+        pathlib.Path(f"/proc/{self.page}/clear_refs").write_text("5")  # the peak begins anew
         self.before = self.peak()
 
     def peak(self):
-        status = pathlib.Path(f"/proc/{self.server.pid}/status").read_text()
+        status = pathlib.Path(f"/proc/{self.page}/status").read_text()
         return 1024 * int(re.search(r"VmHWM:\s+(\d+) kB", status)[1])
 
     @contextlib.contextmanager

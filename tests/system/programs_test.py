@@ -16,6 +16,7 @@ import sqlite3
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import unittest
 
@@ -205,6 +206,30 @@ class Programs(ProgramsTest):
         again = run("mission", "up", MISSION, "--out", out)
         self.assertEqual(again.returncode, 1)
         self.assertIn("earlier mission", again.stderr)
+
+    def test_a_page_that_is_killed_over_and_over_changes_nothing(self):
+        status = self.path / "up/state/server/page/status.json"
+        over, killed = threading.Event(), []
+
+        def kill_pages():
+            while not over.wait(0.05):
+                try:
+                    page = json.loads(status.read_text())["pid"]
+                except (OSError, ValueError):
+                    continue
+                if page not in killed and "page" in pathlib.Path(f"/proc/{page}/cmdline").read_text():
+                    killed.append(page)
+                    time.sleep(0.3)
+                    os.kill(page, signal.SIGKILL)
+
+        killer = threading.Thread(target=kill_pages)
+        killer.start()
+        try:
+            self.mission_up("--view", "0")
+        finally:
+            over.set()
+            killer.join()
+        self.assertGreaterEqual(len(killed), 2)
 
     def test_fixes_are_fed_like_the_rest_also_with_rights(self):
         mission = [SOURCE / "missions/apart_fixes.yaml", "--set", "simulation.robots.0.walk.duration_s=240",

@@ -68,6 +68,10 @@ std::string credentials_text(const BusCredentials& credentials);
 /// other bus.
 inline constexpr const char* kBusName = "bus.tutti";
 
+/// The operator that `tutti page` is on a bus with rights. It has asked those who decide there who they are, so what it
+/// states of them counts (docs/security.md).
+inline constexpr const char* kPageUser = "page";
+
 /// "_INBOX.robot.3": where the user is answered, and nobody else listens. Without a user `otherwise` is in it.
 std::string inbox_of(const BusCredentials& credentials, const std::string& otherwise);
 

@@ -31,10 +31,12 @@ constexpr Delivery delivery_of(wire::MessageKind kind) {
     case wire::MessageKind::verdicts:    // worker -> server
     case wire::MessageKind::refinement:  // worker -> server
     case wire::MessageKind::decision:    // viewer -> server
-    case wire::MessageKind::verdict:     // these four are stored, not sent
+    case wire::MessageKind::mark:        // as a decision
+    case wire::MessageKind::verdict:     // these five are stored, not sent
     case wire::MessageKind::cloud:
     case wire::MessageKind::agent_state:
     case wire::MessageKind::tracked_images:
+    case wire::MessageKind::estimate:
       return Delivery::durable;
   }
   return Delivery::durable;

@@ -4,42 +4,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <utility>
 
 #include "tutti/base/file.hpp"
 #include "tutti/base/utc_text.hpp"
 #include "tutti/geometry/so3.hpp"
-#include "tutti/mapfile/picture.hpp"
+#include "tutti/node/marks.hpp"
 #include "tutti/server/georeference.hpp"
 #include "tutti/server/map_posterior.hpp"
-#include "tutti/wire/field_bytes.hpp"
 
 namespace tutti::mapfile {
 namespace {
-
-constexpr std::string_view kMark = "mark/", kPhoto = "photo/";
-
-std::string key(std::string_view prefix, std::uint64_t number) { return fmt::format("{}{:020}", prefix, number); }
-
-std::optional<std::uint64_t> number_of(std::string_view key, std::string_view prefix) {
-  key.remove_prefix(prefix.size());
-  std::uint64_t out = 0;
-  const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), out);
-  return error == std::errc() && end == key.data() + key.size() ? std::optional(out) : std::nullopt;
-}
-
-Status check(const MapMark& mark, const std::string& photo, std::size_t known) {
-  if (known >= kMostMarks) return fail(ErrorCode::invalid, "the map has {} marks already: remove one first", known);
-  if (photo.size() > MapMark::kMostPhotoBytes)
-    return fail(ErrorCode::invalid, "the photo has {} bytes, expected at most {}", photo.size(),
-                MapMark::kMostPhotoBytes);
-  if (!photo.empty())
-    if (Status ok = check_picture(photo); !ok) return ok;
-  if (mark.words.empty() && photo.empty()) return fail(ErrorCode::invalid, "a mark has words or a photo");
-  if (auto ok = wire::check_fields(mark); !ok) return in_context("mark", ok.error());
-  return {};
-}
 
 /// The pose that a mark hangs on, and where it is from there.
 struct Attached {
@@ -100,41 +75,6 @@ constexpr const char* kHeading =
 
 }  // namespace
 
-Result<MarkSet> read_marks(const storage::TableStore& map) {
-  MarkSet out;
-  const auto scanned = map.scan(map_tables::kMeta, kMark, [&](std::string_view key, std::string_view bytes) {
-    if (!key.starts_with(kMark)) return false;
-    const auto number = number_of(key, kMark);
-    auto mark = wire::read_fields<MapMark>(bytes);
-    if (number && mark && wire::check_fields(*mark)) out.emplace(*number, std::move(*mark));
-    return true;
-  });
-  if (!scanned) return tl::unexpected(scanned.error());
-  return out;
-}
-
-Result<std::optional<std::string>> read_photo(const storage::TableStore& map, std::uint64_t number) {
-  return map.read(map_tables::kMeta, key(kPhoto, number));
-}
-
-Result<std::uint64_t> put_mark(storage::TableStore& map, const MarkSet& known, MapMark& mark,
-                               const std::string& photo) {
-  mark.photo_type = picture_type(photo);
-  if (auto ok = check(mark, photo, known.size()); !ok) return tl::unexpected(ok.error());
-  auto number = static_cast<std::uint64_t>(std::max<std::int64_t>(mark.given_ns, 0));
-  while (known.contains(number)) ++number;
-  std::vector<storage::Write> rows{{map_tables::kMeta, key(kMark, number), wire::field_bytes(mark)}};
-  if (!photo.empty()) rows.push_back({map_tables::kMeta, key(kPhoto, number), photo});
-  if (auto ok = map.commit(rows); !ok) return tl::unexpected(ok.error());
-  return number;
-}
-
-Status remove_mark(storage::TableStore& map, std::uint64_t number) {
-  const std::vector<storage::Write> rows{{map_tables::kMeta, key(kMark, number), std::nullopt},
-                                         {map_tables::kMeta, key(kPhoto, number), std::nullopt}};
-  return map.commit(rows);
-}
-
 std::vector<PlacedMark> place_marks(const MarkSet& marks, const Content& content, const server::MapEstimate& map) {
   const std::vector<Attached> all = attached(marks, content, map);
   if (all.empty()) return {};
@@ -161,7 +101,7 @@ std::vector<PlacedMark> place_marks(const MarkSet& marks, const Content& content
 
 Result<ExportedMarks> export_marks(const storage::TableStore& store, const Content& content,
                                    const server::MapEstimate& map, const std::filesystem::path& file) {
-  const auto marks = read_marks(store);
+  const auto marks = node::read_marks(store);
   if (!marks) return tl::unexpected(marks.error());
   const server::ClosureNames names = content.closure_names();
   ExportedMarks out;
@@ -169,7 +109,7 @@ Result<ExportedMarks> export_marks(const storage::TableStore& store, const Conte
   for (const PlacedMark& placed : place_marks(*marks, content, map)) {
     const MapMark& mark = marks->at(placed.number);
     std::string photo;
-    const auto bytes = read_photo(store, placed.number);
+    const auto bytes = node::read_photo(store, placed.number);
     if (!bytes) return tl::unexpected(bytes.error());
     if (*bytes) {
       photo =

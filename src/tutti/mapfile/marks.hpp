@@ -10,23 +10,8 @@
 #include "tutti/mapfile/content.hpp"
 #include "tutti/model/map_mark.hpp"
 
-/// Marks in a map's store: rows `mark/NUMBER` and `photo/NUMBER` of its table `meta` (docs/storage.md). Nothing of the
-/// map follows from them, so whoever has the store open may change them.
+/// Where the marks of a map (node/marks.hpp) are.
 namespace tutti::mapfile {
-
-inline constexpr std::size_t kMostMarks = 500;  ///< In one map.
-
-/// All marks. Rows that a newer program has written otherwise are left out. Fails when the table cannot be read.
-Result<MarkSet> read_marks(const storage::TableStore& map);
-/// A mark's photo; nothing when it has none.
-Result<std::optional<std::string>> read_photo(const storage::TableStore& map, std::uint64_t number);
-
-/// Stores a mark under a number that no other one has, the time at which it was given in ns or the next free one, and
-/// returns that. `known` are the marks that the store has. Its photo_type follows from `photo`, which may be empty.
-/// Errors of code `invalid`, which name what is wrong: a picture of another kind or size, words that are too long, a
-/// place that is none, too many marks.
-Result<std::uint64_t> put_mark(storage::TableStore& map, const MarkSet& known, MapMark& mark, const std::string& photo);
-Status remove_mark(storage::TableStore& map, std::uint64_t number);
 
 /// Where a mark is in the map, and how sure that is.
 struct PlacedMark {

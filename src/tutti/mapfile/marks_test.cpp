@@ -12,6 +12,7 @@
 #include "tutti/base/file.hpp"
 #include "tutti/mapfile/merge.hpp"
 #include "tutti/mapfile/placement.hpp"
+#include "tutti/node/marks.hpp"
 #include "tutti/server/map_posterior.hpp"
 #include "tutti/storage/sqlite_store.hpp"
 
@@ -21,6 +22,16 @@ namespace marks_test {
 namespace fs = std::filesystem;
 
 const std::string kJpeg = "\xff\xd8\xff\xe0 a photo";
+
+Status put_mark(storage::TableStore& store, std::uint64_t number, const std::optional<MapMark>& mark,
+                const std::string& photo = "") {
+  MarkSet known = node::read_marks(store).value();
+  const auto rows = node::follow({.number = number, .mark = mark, .photo = photo}, known);
+  if (!rows) return tl::unexpected(rows.error());
+  EXPECT_TRUE(store.commit(*rows));
+  EXPECT_EQ(node::read_marks(store).value(), known);
+  return {};
+}
 
 class Marks : public testing::Test {
  protected:
@@ -32,9 +43,8 @@ class Marks : public testing::Test {
   }
   ~Marks() override { fs::remove_all(folder_); }
 
-  /// One mark more.
-  std::uint64_t put(MapMark mark, const std::string& photo = "") {
-    return put_mark(store_, read_marks(store_).value(), mark, photo).value();
+  void put(const MapMark& mark, const std::string& photo = "") {
+    EXPECT_TRUE(put_mark(store_, static_cast<std::uint64_t>(mark.given_ns), mark, photo));
   }
   storage::MemoryStore store_{storage::map_schema()};
   fs::path folder_ = fs::path(testing::TempDir()) / ("marks_" + std::to_string(getpid()));
@@ -44,28 +54,33 @@ const MapMark kDoor{
     .submap = {{RobotId{0}, 5}, 2}, .at = {3.0, 4.0, 1.0}, .words = "door", .by = "anna", .given_ns = 7};
 
 TEST_F(Marks, AreWhatWasStored) {
-  EXPECT_TRUE(read_marks(store_)->empty()) << "a map of before has none";
+  EXPECT_TRUE(node::read_marks(store_)->empty()) << "a map of before has none";
   MapMark door = kDoor;
-  EXPECT_EQ(put(door), 7U);
-  EXPECT_EQ(put(door, kJpeg), 8U) << "given at the same time";
-  const MarkSet marks = read_marks(store_).value();
+  put(door);
+  EXPECT_TRUE(put_mark(store_, 8, door, kJpeg));
+  EXPECT_TRUE(put_mark(store_, 8, door, kJpeg)) << "the same again";
+  const MarkSet marks = node::read_marks(store_).value();
   ASSERT_EQ(marks.size(), 2U);
   EXPECT_EQ(marks.at(7), kDoor);
   door.photo_type = "image/jpeg";
   EXPECT_EQ(marks.at(8), door);
-  EXPECT_EQ(read_photo(store_, 7).value(), std::nullopt);
-  EXPECT_EQ(read_photo(store_, 8).value(), kJpeg);
+  EXPECT_EQ(node::read_photo(store_, 7).value(), std::nullopt);
+  EXPECT_EQ(node::read_photo(store_, 8).value(), kJpeg);
   EXPECT_EQ(read(store_)->decisions, DecisionSet()) << "the map is read as before";
-  ASSERT_TRUE(remove_mark(store_, 8));
-  EXPECT_EQ(read_marks(store_)->size(), 1U);
-  EXPECT_EQ(read_photo(store_, 8).value(), std::nullopt);
+  MapMark other = kDoor;
+  other.words = "window";
+  EXPECT_EQ(put_mark(store_, 7, other).error().message, "mark 7: there is another one of this number");
+  ASSERT_TRUE(put_mark(store_, 8, std::nullopt));
+  EXPECT_EQ(put_mark(store_, 8, std::nullopt).error().message, "there is no such mark");
+  EXPECT_EQ(node::read_marks(store_)->size(), 1U);
+  EXPECT_EQ(node::read_photo(store_, 8).value(), std::nullopt);
 }
 
 TEST_F(Marks, RowsOfANewerProgramAreLeftOut) {
   put(kDoor);
   ASSERT_TRUE(store_.commit(std::vector<storage::Write>{
       {"meta", "mark/1", "\xff garbage"}, {"meta", "mark/x", ""}, {"meta", "mark/99999999999999999999", ""}}));
-  EXPECT_EQ(read_marks(store_)->size(), 1U);
+  EXPECT_EQ(node::read_marks(store_)->size(), 1U);
 }
 
 TEST_F(Marks, SurviveAProgramThatIsKilled) {
@@ -74,8 +89,7 @@ TEST_F(Marks, SurviveAProgramThatIsKilled) {
   const pid_t child = fork();
   if (child == 0) {
     auto store = storage::open_sqlite_store(file, storage::map_schema(), {.min_free_bytes = 0});
-    MapMark door = kDoor;
-    if (put_mark(**store, {}, door, kJpeg)) kill(getpid(), SIGKILL);
+    if (put_mark(**store, 7, kDoor, kJpeg)) kill(getpid(), SIGKILL);
     _exit(1);
   }
   int ended = 0;
@@ -83,8 +97,8 @@ TEST_F(Marks, SurviveAProgramThatIsKilled) {
   ASSERT_TRUE(WIFSIGNALED(ended));
   const auto store = storage::open_sqlite_store(file, storage::map_schema(), {.min_free_bytes = 0});
   ASSERT_TRUE(store);
-  EXPECT_EQ(read_marks(**store)->at(7).words, "door");
-  EXPECT_EQ(read_photo(**store, 7).value(), kJpeg);
+  EXPECT_EQ(node::read_marks(**store)->at(7).words, "door");
+  EXPECT_EQ(node::read_photo(**store, 7).value(), kJpeg);
 }
 
 TEST_F(Marks, AreOfBothMapsThatAreMerged) {
@@ -95,12 +109,12 @@ TEST_F(Marks, AreOfBothMapsThatAreMerged) {
     mapper.walk({RobotId{2}, 5});
   }
   MapMark there{.submap = {{RobotId{2}, 5}, 1}, .words = "stairs", .given_ns = 9};
-  ASSERT_TRUE(put_mark(other, {}, there, ""));
+  ASSERT_TRUE(put_mark(other, 9, there));
   ASSERT_TRUE(merge(store_, other, joint));
-  const MarkSet marks = read_marks(joint).value();
+  const MarkSet marks = node::read_marks(joint).value();
   ASSERT_EQ(marks.size(), 2U);
   EXPECT_EQ(marks.at(9).words, "stairs");
-  EXPECT_EQ(read_photo(joint, 7).value(), kJpeg);
+  EXPECT_EQ(node::read_photo(joint, 7).value(), kJpeg);
 }
 
 /// A mark's place as a function of a small motion of the pose that it hangs on.
@@ -143,6 +157,7 @@ TEST_F(Marks, AreExportedWithTheirPhotosAndNoFormulas) {
   put(hostile);
   MapMark elsewhere = kDoor;
   elsewhere.submap.index = 99;
+  elsewhere.given_ns = 8;
   put(elsewhere);
   const Content content = read(store_).value();
   const auto written = export_marks(store_, content, estimate(content), folder_ / "marks.csv");

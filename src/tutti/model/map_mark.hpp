@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -37,6 +38,24 @@ struct MapMark {
     v.field(8, "photo_type", photo_type, {.at_most = 16});
   }
   friend bool operator==(const MapMark&, const MapMark&) = default;
+};
+
+/// What an operator asks of the server: a mark to be stored under a number, or, without a mark, to be removed.
+struct MarkOrder {
+  std::uint64_t number = 0;
+  std::optional<MapMark> mark;
+  std::string photo = {};     ///< The mark's, a JPEG or PNG file; may be empty.
+  std::int64_t given_ns = 0;  ///< When, by the operator's clock.
+  std::string by = {};        ///< Who, for people.
+  template <class V>
+  void describe(V& v) {
+    v.field(1, "number", number);
+    v.field(2, "mark", mark);
+    v.field(3, "photo", photo, {.text = FieldRule::Text::any, .at_most = MapMark::kMostPhotoBytes});
+    v.field(4, "given_ns", given_ns);
+    v.field(5, "by", by, {.at_most = 200});
+  }
+  friend bool operator==(const MarkOrder&, const MarkOrder&) = default;
 };
 
 /// By number, which never names another mark.

@@ -140,6 +140,25 @@ struct MissionStatus {
     friend bool operator==(const Decision&, const Decision&) = default;
   };
 
+  /// What the server has exchanged with a robot since it was started, of one kind and direction: messages as the bus is
+  /// given them and gives them, without what the bus adds. One that comes or goes again counts again.
+  struct Radio {
+    RobotId robot;
+    bool is_down = false;  ///< To the robot.
+    std::string kind;      ///< wire::name()
+    std::uint64_t messages = 0;
+    std::uint64_t bytes = 0;
+    template <class V>
+    void describe(V& v) {
+      v.field(1, "robot", robot);
+      v.field(2, "down", is_down);
+      v.field(3, "kind", kind);
+      v.field(4, "messages", messages);
+      v.field(5, "bytes", bytes);
+    }
+    friend bool operator==(const Radio&, const Radio&) = default;
+  };
+
   static constexpr std::size_t kMostRobots = 10'000;  ///< Likewise workers.
 
   Timestamp time;
@@ -163,6 +182,7 @@ struct MissionStatus {
   std::uint64_t waiting = 0;        ///< Pairs and refinements that no present worker can compute,
   std::string why_waiting;          ///< and what the last worker that tried reported.
   std::vector<Decision> decisions;  ///< The latest decisions.
+  std::vector<Radio> radio;         ///< Sorted by robot, direction and kind.
   template <class V>
   void describe(V& v) {
     v.field(1, "time", time);
@@ -185,6 +205,7 @@ struct MissionStatus {
     v.field(22, "waiting", waiting);
     v.field(23, "why_waiting", why_waiting);
     v.field(24, "words", decisions);
+    v.field(25, "radio", radio, {.at_most = 20 * kMostRobots});
   }
   [[nodiscard]] Status check() const;  ///< Lists have the order that is promised above.
   friend bool operator==(const MissionStatus&, const MissionStatus&) = default;

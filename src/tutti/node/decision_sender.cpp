@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "tutti/base/content_hash.hpp"
 #include "tutti/wire/codec.hpp"
@@ -11,9 +12,17 @@
 namespace tutti::node {
 
 DecisionSender::DecisionSender(bus::Endpoint self, const ClosureDecision& decision)
+    : DecisionSender(self, fmt::format("{}/{}/{}", to_string(decision.wish), decision.given_ns, self.number),
+                     wire::encode(decision)) {}
+
+DecisionSender::DecisionSender(bus::Endpoint self, const MarkOrder& order)
+    : DecisionSender(self, fmt::format("mark/{}/{}/{}", order.number, order.given_ns, self.number),
+                     wire::encode(order)) {}
+
+DecisionSender::DecisionSender(bus::Endpoint self, std::string id, std::string frame)
     : self_(self),
-      id_(fmt::format("{}/{}/{}", to_string(decision.wish), decision.given_ns, self.number)),
-      bytes_(std::make_shared<const std::string>(wire::encode(decision))),
+      id_(std::move(id)),
+      bytes_(std::make_shared<const std::string>(std::move(frame))),
       content_(content_hash(*bytes_)) {}
 
 std::optional<bus::Envelope> DecisionSender::due(double now_s) {

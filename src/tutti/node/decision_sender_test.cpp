@@ -8,6 +8,8 @@
 #include <string>
 
 #include "support/node/submaps.hpp"
+#include "tutti/bus/bus_credentials.hpp"
+#include "tutti/node/marks.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/worker_node.hpp"
 #include "tutti/storage/memory_store.hpp"
@@ -85,6 +87,41 @@ TEST_F(Decisions, WhatIsNotTakenIsAnsweredWithTheReason) {
   EXPECT_EQ(answer({"0/0-0/2", Wish::accept, "eve", 4}), "a later decision on it holds");
   EXPECT_EQ(answer({"0/0-0/2", Wish::accept, "eve", 6}), "");
   EXPECT_EQ(decisions(), 1U);
+}
+
+TEST_F(Decisions, AMarkIsStoredOnceHoweverOftenItComes) {
+  const MapMark door{.submap = {{RobotId{0}, 7}, 1}, .words = "door", .by = "ada", .given_ns = 9};
+  DecisionSender sender(kSelf, MarkOrder{.number = 9, .mark = door, .given_ns = 9});
+  const auto message = sender.due(0.0).value();
+  for (int i = 0; i < 2; ++i) {
+    does(server_->receive(message, {}));
+    EXPECT_EQ(sender.answer(status()), "");
+    if (i == 0) start();
+  }
+  EXPECT_EQ(read_marks(store_).value(), (MarkSet{{9, door}}));
+  DecisionSender removes(kSelf, MarkOrder{.number = 9, .given_ns = 10});
+  const auto removal = removes.due(0.0).value();
+  for (int i = 0; i < 2; ++i) does(server_->receive(removal, {}));
+  EXPECT_EQ(removes.answer(status()), "");
+  EXPECT_TRUE(read_marks(store_)->empty());
+  DecisionSender none(kSelf, MarkOrder{.number = 8, .given_ns = 11});
+  does(server_->receive(none.due(0.0).value(), {}));
+  EXPECT_EQ(none.answer(status()), "there is no such mark");
+}
+
+/// The page has asked who decides there; nobody else speaks for others.
+TEST_F(Decisions, OnlyThePageSpeaksForOthers) {
+  std::int64_t given_ns = 5;
+  const auto author = [&](const std::string& user, const std::string& by) {
+    auto message = DecisionSender(kSelf, {"0/0-0/2", Wish::reject, by, ++given_ns}).due(0.0).value();
+    message.user = user;
+    does(server_->receive(message, {}));
+    return server_->map_server().state().decisions.begin()->second.by;
+  };
+  EXPECT_EQ(author("", "ada"), "ada") << "nobody has proved anything";
+  EXPECT_EQ(author("eve", "ada"), "eve");
+  EXPECT_EQ(author(bus::kPageUser, "ada"), "ada");
+  EXPECT_EQ(author(bus::kPageUser, ""), bus::kPageUser);
 }
 
 TEST_F(Decisions, OnlyTheLastAreReported) {

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The operators' decisions on closures that come to the server.
+// What operators send to the server: decisions on closures, and marks.
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <set>
@@ -10,28 +11,52 @@
 #include <vector>
 
 #include "tutti/base/plain_text.hpp"
+#include "tutti/bus/bus_credentials.hpp"
 #include "tutti/node/decisions.hpp"
+#include "tutti/node/marks.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/storage/map_tables.hpp"
 #include "tutti/wire/codec.hpp"
+#include "tutti/wire/frame.hpp"
 
 namespace tutti::node {
 namespace {
 
 constexpr std::size_t kLongestName = 64;  // of `tutti pki`
 
+/// Whose word it is, whatever it claims. The page has asked who decides there.
+std::string author_of(const bus::Envelope& envelope, const std::string& claimed) {
+  const bool may_claim = envelope.user.empty() || (envelope.user == bus::kPageUser && !claimed.empty());
+  return may_claim ? claimed : plain_text(envelope.user, kLongestName);
+}
+
 }  // namespace
 
-/// An operator's decision is not a robot's or a worker's to give.
-void ServerNode::receive_decision(const bus::Envelope& envelope, Timestamp now, Step& step) {
+/// It is not a robot's or a worker's to give.
+void ServerNode::receive_word(const bus::Envelope& envelope, Timestamp now, Step& step) {
   if (envelope.from.role != bus::Endpoint::Role::viewer)
     return refuse(
         envelope,
         fmt::format("a decision on closures from a {}, which only operators may make", name(envelope.from.role)), now,
         step);
+  if (wire::kind_of(*envelope.bytes) == bus::MessageKind::mark) return receive_mark(envelope, now, step);
+  receive_decision(envelope, now, step);
+}
+
+void ServerNode::receive_mark(const bus::Envelope& envelope, Timestamp now, Step& step) {
+  auto order = wire::decode_mark_order(*envelope.bytes);
+  if (!order) return refuse(envelope, order.error().message, now, step);
+  if (decisions_.is_stored(*envelope.bytes)) return note_decision(*envelope.bytes, {});  // once more
+  if (order->mark) order->mark->by = author_of(envelope, order->mark->by);
+  auto rows = follow(*order, marks_);
+  if (rows) std::ranges::move(*rows, std::back_inserter(step.writes));
+  note_decision(*envelope.bytes, rows ? "" : rows.error().message);
+}
+
+void ServerNode::receive_decision(const bus::Envelope& envelope, Timestamp now, Step& step) {
   auto decision = wire::decode_decision(*envelope.bytes);
   if (!decision) return refuse(envelope, decision.error().message, now, step);
-  if (!envelope.user.empty()) decision->by = plain_text(envelope.user, kLongestName);  // whatever it claims
+  decision->by = author_of(envelope, decision->by);
   const std::int64_t now_ns = config_.wall_ns ? config_.wall_ns() : 0;
   decision->taken_ns = now_ns;
   if (decision->counts_from_ns() < decision->given_ns && decisions_.is_stored(*envelope.bytes))

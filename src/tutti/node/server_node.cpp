@@ -9,6 +9,7 @@
 #include "tutti/base/check.hpp"
 #include "tutti/node/internal/opened_map.hpp"
 #include "tutti/node/map_meta.hpp"
+#include "tutti/node/marks.hpp"
 #include "tutti/node/meta_keys.hpp"
 #include "tutti/node/worker_node.hpp"
 #include "tutti/storage/map_tables.hpp"
@@ -51,8 +52,12 @@ Result<std::unique_ptr<ServerNode>> ServerNode::open(std::set<RobotId> robots,
     for (const auto& [robot, receipt] : opened->receipts) robots.insert(robot);
     for (const auto& [robot, entry] : opened->registry.robots()) robots.insert(robot);
   }
-  return std::unique_ptr<ServerNode>(new ServerNode(std::move(robots), std::move(verifier), config, epoch,
-                                                    SubmapFrames::of(store), std::move(*opened)));
+  auto marks = read_marks(store);
+  if (!marks) return tl::unexpected(marks.error());
+  std::unique_ptr<ServerNode> node(new ServerNode(std::move(robots), std::move(verifier), config, epoch,
+                                                  SubmapFrames::of(store), std::move(*opened)));
+  node->marks_ = std::move(*marks);
+  return node;
 }
 
 ServerNode::ServerNode(std::set<RobotId> robots, std::shared_ptr<const server::ClosureVerifier> verifier,
@@ -116,7 +121,7 @@ Step ServerNode::receive(const bus::Envelope& envelope, Timestamp now) {
   else if (envelope.kind == bus::MessageKind::status)
     receive_status(envelope, now, step);
   else if (envelope.kind == bus::MessageKind::decision)
-    receive_decision(envelope, now, step);
+    receive_word(envelope, now, step);
   else if (envelope.kind == bus::MessageKind::job && envelope.from == bus::Endpoint::any_worker())
     receive_returned_job(envelope, now, step);
   else if (envelope.kind == bus::MessageKind::refinement_job && envelope.from == bus::Endpoint::any_worker())

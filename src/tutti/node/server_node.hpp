@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "tutti/model/map_mark.hpp"
 #include "tutti/node/answered_decisions.hpp"
 #include "tutti/node/broadcast.hpp"
 #include "tutti/node/job_book.hpp"
@@ -144,7 +145,9 @@ class ServerNode {
   void receive_returned_job(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_refinement(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_returned_refinement(const bus::Envelope& envelope, Timestamp now, Step& step);
+  void receive_word(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_decision(const bus::Envelope& envelope, Timestamp now, Step& step);
+  void receive_mark(const bus::Envelope& envelope, Timestamp now, Step& step);
   /// True when a decision on this pair that was given later counts instead.
   Result<bool> take_decision(const ClosureDecision& decision, Timestamp now, Step& step);
   void note_decision(const std::string& frame, const std::string& why);
@@ -192,6 +195,7 @@ class ServerNode {
   server::MapServer server_;
   Receipts receipts_;
   AnsweredDecisions decisions_;
+  MarkSet marks_;
   RobotRegistry registry_;
   std::map<std::string, UnreadRows> unread_rows_;  // by table, until they are reported
   WorkerRoster workers_;

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "tutti/base/plain_text.hpp"
@@ -25,6 +26,25 @@ Result<BusGuard> BusGuard::open(const std::filesystem::path& folder, const std::
   if (!rights) return tl::unexpected(rights.error());
   guard.rights_ = std::move(*rights);
   return guard;
+}
+
+Result<std::string> BusGuard::credential_of_page() {
+  auto there = pki::Pki::open(folder_);
+  if (!there) return in_context("--pki", there.error());
+  const auto& members = there->members();
+  const auto found = std::ranges::find(members, std::string(bus::kPageUser),
+                                       [](const pki::Member& member) { return member.user.name; });
+  const std::string file = there->credential(bus::kPageUser).string();
+  if (found == members.end()) {
+    const auto made = there->add(bus::BusRole::operates, bus::kPageUser, std::nullopt);
+    return made ? Result<std::string>(made->string()) : tl::unexpected(made.error());
+  }
+  if (found->is_revoked || found->user.role != bus::BusRole::operates)
+    return fail(ErrorCode::configuration,
+                "--pki {}: member '{}' is {}, and the page of --view is an operator of that name", folder_.string(),
+                bus::kPageUser, found->is_revoked ? "revoked" : "no operator");
+  if (Status renewed = there->renew(bus::kPageUser); !renewed) return tl::unexpected(renewed.error());
+  return file;
 }
 
 /// While it is being changed, the state before counts.

@@ -21,6 +21,8 @@ class BusGuard {
   /// Fails when the folder is that of another mission. `now` as of utc_text(), here and below.
   static Result<BusGuard> open(const std::filesystem::path& folder, const std::string& mission, const std::string& now);
 
+  /// The file with the credential of bus::kPageUser, which is made, or renewed, when there is none that is valid.
+  Result<std::string> credential_of_page();
   /// For bus::NatsChild: those of everybody whose certificate had not expired when the folder was last read.
   [[nodiscard]] const std::string& rights() const { return rights_; }
   /// The server's own.

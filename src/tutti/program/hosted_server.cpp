@@ -7,7 +7,6 @@
 
 #include "tutti/base/freed_memory.hpp"
 #include "tutti/node/status_envelope.hpp"
-#include "tutti/wire/codec.hpp"
 
 namespace tutti::program {
 
@@ -27,13 +26,10 @@ bool HostedServer::is_made() const {
   return making_.valid() && making_.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
 }
 
-std::optional<Timestamp> HostedServer::next_work() const {
-  return asked_.empty() && !is_made() ? node_->next_timer() : kFirstTimestamp;
-}
+std::optional<Timestamp> HostedServer::next_work() const { return is_made() ? kFirstTimestamp : node_->next_timer(); }
 
 Answer HostedServer::work(Timestamp now) {
   Answer answer;
-  for (AskedDecision& decision : std::exchange(asked_, {})) take(decision, now, answer.step);
   answer.step.add(node_->tend(now));
   if (is_made()) {
     answer.step.add(node_->end_map(making_.get(), now));
@@ -58,7 +54,6 @@ Answer HostedServer::end() {
 
 void HostedServer::wait(double wall_s) {
   tend_viewers(clock_.now());
-  if (!asked_.empty()) return;
   if (making_.valid())
     making_.wait_for(std::chrono::duration<double>(wall_s));
   else
@@ -71,34 +66,17 @@ bus::Envelope HostedServer::mission_status(Timestamp now) {
   status.version = version_;
   status.wall_ns = static_cast<std::int64_t>(wall_clock_ns());
   status.trouble = trouble_(status);
-  for (const auto& viewer : viewers_) viewer->show_status(status, radio_.sums());
+  status.radio = radio_.sums();
   return node::to_viewers(std::move(status));
 }
 
 void HostedServer::tend_viewers(Timestamp now) {
-  for (auto& [promise, why] : std::exchange(answers_, {})) promise.set_value(why);
   std::shared_ptr<const mapfile::ShownMap> shown;
   for (const auto& viewer : viewers_) {
-    for (AskedDecision& decision : viewer->take_decisions()) asked_.push_back(std::move(decision));
     if (!node_->has_map() || !viewer->wants(node_->map_server().state().revision)) continue;
     if (!shown) shown = std::make_shared<const mapfile::ShownMap>(shown_maps_.of(*node_, now));
     viewer->show(shown);
   }
-}
-
-void HostedServer::take(AskedDecision& asked, Timestamp now, node::Step& step) {
-  const bus::Envelope envelope{bus::Endpoint::viewer(0),
-                               bus::Endpoint::server(),
-                               bus::MessageKind::decision,
-                               fmt::format("page/{}/{}", asked.decision.given_ns, ++asked_decisions_),
-                               std::make_shared<const std::string>(wire::encode(asked.decision)),
-                               asked.proved_name};
-  node::Step taken = node_->receive(envelope, now);
-  std::string why;
-  for (const node::Event& event : taken.events)
-    if (const auto* refused = std::get_if<node::MessageRefused>(&event.what)) why = refused->why;
-  answers_.emplace_back(std::move(asked.answer), std::move(why));
-  step.add(std::move(taken));
 }
 
 Json HostedServer::status(Timestamp now) const {

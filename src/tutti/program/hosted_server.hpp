@@ -14,6 +14,7 @@
 #include "tutti/program/clock.hpp"
 #include "tutti/program/host.hpp"
 #include "tutti/program/map_viewer.hpp"
+#include "tutti/program/radio_count.hpp"
 
 namespace tutti::program {
 
@@ -43,7 +44,7 @@ class HostedServer final : public Hosted {
   Answer report(Timestamp now) override { return {{.messages = {mission_status(now)}}, {}}; }
   [[nodiscard]] Json status(Timestamp now) const override;
   [[nodiscard]] bool finished() const override { return is_over_; }
-  /// Viewers that have time for a new map get it, and what operators decided there is work for the next turn.
+  /// Viewers that have time for a new map get it.
   void wait(double wall_s) override;
   /// The map that is being made is still sent.
   Answer end() override;
@@ -55,8 +56,6 @@ class HostedServer final : public Hosted {
     return answer;
   }
   void tend_viewers(Timestamp now);
-  /// As if it had come by the bus.
-  void take(AskedDecision& asked, Timestamp now, node::Step& step);
   [[nodiscard]] bool is_made() const;
 
   std::unique_ptr<node::ServerNode> node_;
@@ -68,11 +67,7 @@ class HostedServer final : public Hosted {
   const Clock& clock_;
   MakeMap make_map_;
   RadioCount radio_;
-  std::vector<AskedDecision> asked_;
-  /// Answers to decisions whose step is being carried out.
-  std::vector<std::pair<std::promise<std::string>, std::string>> answers_;
   std::uint64_t reported_changes_ = 0;
-  std::uint64_t asked_decisions_ = 0;    // so many so far
   std::future<node::MapOfTask> making_;  // valid while a map is made; its destructor waits
 };
 

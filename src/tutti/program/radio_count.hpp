@@ -1,49 +1,49 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <map>
 #include <set>
+#include <tuple>
+#include <vector>
 
 #include "tutti/bus/envelope.hpp"
+#include "tutti/model/status.hpp"
 
 namespace tutti::program {
 
-/// What the server has exchanged with robots since it was started, by kind: bytes of messages as the bus is given them
-/// and gives them, without what the bus adds. A message that comes or goes again counts again.
+/// Counts what the server exchanges with robots (MissionStatus::radio).
 class RadioCount {
  public:
   static constexpr std::size_t kMostRobots = 1'000;  ///< A stranger may call himself anything.
-  struct Key {
-    RobotId robot;
-    bool is_down = false;  ///< To the robot.
-    bus::MessageKind kind{};
-    friend auto operator<=>(const Key&, const Key&) = default;
-  };
-  struct Sum {
-    std::uint64_t messages = 0;
-    std::uint64_t bytes = 0;
-    friend bool operator==(const Sum&, const Sum&) = default;
-  };
-  using Sums = std::map<Key, Sum>;
 
   void count(const bus::Envelope& message) {
     const auto to = message.to.robot(), from = message.from.robot();
     if (!to && !from) return;
-    const Key key{to ? *to : *from, to.has_value(), message.kind};
-    if (robots_.size() >= kMostRobots && !robots_.contains(key.robot)) return;
-    robots_.insert(key.robot);
-    Sum& sum = sums_[key];
+    const RobotId robot = to ? *to : *from;
+    if (robots_.size() >= kMostRobots && !robots_.contains(robot)) return;
+    robots_.insert(robot);
+    Sum& sum = sums_[{robot, to.has_value(), message.kind}];
     ++sum.messages;
     sum.bytes += message.bytes->size();
   }
-  [[nodiscard]] const Sums& sums() const { return sums_; }
+  [[nodiscard]] std::vector<MissionStatus::Radio> sums() const {
+    std::vector<MissionStatus::Radio> out;
+    for (const auto& [key, sum] : sums_) {
+      const auto& [robot, is_down, kind] = key;
+      out.push_back({robot, is_down, wire::name(kind), sum.messages, sum.bytes});
+    }
+    return out;
+  }
 
  private:
+  struct Sum {
+    std::uint64_t messages = 0;
+    std::uint64_t bytes = 0;
+  };
   std::set<RobotId> robots_;
-  Sums sums_;
+  std::map<std::tuple<RobotId, bool, bus::MessageKind>, Sum> sums_;
 };
 
 }  // namespace tutti::program

@@ -15,10 +15,11 @@
 
 #include "tutti/base/file.hpp"
 #include "tutti/base/freed_memory.hpp"
+#include "tutti/base/own_file.hpp"
 #include "tutti/base/utc_text.hpp"
 #include "tutti/bus/mission_lease.hpp"
 #include "tutti/bus/nats_child.hpp"
-#include "tutti/history/history_file.hpp"
+#include "tutti/mapfile/estimate_file.hpp"
 #include "tutti/node/map_meta.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/program/bus_guard.hpp"
@@ -149,11 +150,14 @@ class ServerProgram {
 
  private:
   Result<std::unique_ptr<Hosted>> open_node();
+  node::MapOfTask make_map(node::MapTask task) const;
   Status take_lease();
   /// Whether another server has the mission.
   Status check_lease(const bus::MissionLease::State& seen) const;
   void tend();
   void tend_bus();
+  Status admit_page();
+  Status start_page();
   [[nodiscard]] std::string robot_command() const;
   [[nodiscard]] std::string trouble(const MissionStatus& status) const;
 
@@ -172,6 +176,8 @@ class ServerProgram {
   std::optional<Host> host_;
   std::optional<OwnWorker> worker_;
   std::vector<std::unique_ptr<MapViewer>> viewers_;
+  std::string page_credential_;  // the file
+  std::unique_ptr<PageChild> page_;
   std::string trouble_;  // of the bus
 };
 
@@ -189,7 +195,21 @@ Result<std::unique_ptr<Hosted>> ServerProgram::open_node() {
   if (!node) return in_context((folder_->path() / kMapFile).string(), node.error());
   return std::make_unique<HostedServer>(
       std::move(*node), *store_, options_.version, [this](const MissionStatus& status) { return trouble(status); },
-      is_over_, viewers_, *clock_);
+      is_over_, viewers_, *clock_, [this](node::MapTask task) { return make_map(std::move(task)); });
+}
+
+/// Writes what it has computed, for the page, on the thread that has computed it.
+node::MapOfTask ServerProgram::make_map(node::MapTask task) const {
+  node::MapOfTask out = node::make_map(std::move(task));
+  const server::MadeMap& made = out.made;
+  const std::string bytes = mapfile::encode_estimate({.epoch = made.job.epoch,
+                                                      .revision = made.job.revision,
+                                                      .time = out.pace.begun,
+                                                      .map = made.map,
+                                                      .broadcast = *out.broadcast.last()});
+  if (const Status written = replace_file(folder_->path() / kEstimateFile, bytes, false); !written)
+    log_->say(Level::warning, written.error().message);
+  return out;
 }
 
 std::string ServerProgram::trouble(const MissionStatus& status) const {
@@ -224,6 +244,8 @@ Status ServerProgram::take_lease() {
 /// Once a second.
 void ServerProgram::tend() {
   tend_bus();
+  if (page_)
+    if (const std::string said = page_->tend(clock_->wall_s()); !said.empty()) log_->say(Level::warning, said);
   is_over_ = !check_lease(lease_->state());
   if (const auto link = host_->link(); worker_) worker_->note_given_in_vain(link && link->given_in_vain > 0);
 }
@@ -260,6 +282,7 @@ Status ServerProgram::start() {
     if (!guard) return tl::unexpected(guard.error());
     guard_.emplace(std::move(*guard));
   }
+  if (Status ok = admit_page(); !ok) return ok;
   bus_ = options_.bus;
   bus_.mission = settings_.mission;
   auto folder = StateFolder::open(options_.state, "server", kMapFile);
@@ -269,7 +292,7 @@ Status ServerProgram::start() {
   if (!log) return tl::unexpected(log.error());
   log_ = std::move(*log);
   verifier_ = settings_.verifiers.verifier();
-  auto store = storage::open_sqlite_store(folder_->path() / kMapFile, storage::map_schema());
+  auto store = storage::open_sqlite_store(folder_->path() / kMapFile, storage::map_schema(), {.has_readers = true});
   if (!store) return tl::unexpected(store.error());
   store_ = std::move(*store);
   if (options_.bus.url.empty()) {
@@ -293,23 +316,48 @@ Status ServerProgram::start() {
                             .trouble = [this] { return trouble_.empty() && guard_ ? guard_->trouble() : trouble_; }},
                 *clock_, *log_);
   if (Status opened = host_->open(); !opened) return opened;
-  const ViewedMission viewed{.name = settings_.mission,
-                             .version = options_.version,
-                             .map = *store_,
-                             .verifier = verifier_,
-                             .rate = options_.rate,
-                             .pki = options_.pki,
-                             .history = folder_->path() / "page" / history::kHistoryFile,
-                             .say = [this](Level level, const std::string& sentence) { log_->say(level, sentence); }};
   for (const auto& view : options_.views) {
-    auto viewer = view(viewed);
+    auto viewer = view(*store_);
     if (!viewer) return tl::unexpected(viewer.error());
     viewers_.push_back(std::move(*viewer));
   }
+  if (Status shown = start_page(); !shown) return shown;
   if (options_.threads == 0) return {};
   worker_.emplace(bus_, verifier_, settings_.verifiers.refiner(), *store_, options_.version,
                   static_cast<std::size_t>(options_.threads), *clock_, *log_);
   return worker_->start();
+}
+
+/// The page is a member of the bus as others are, with a credential of its own.
+Status ServerProgram::admit_page() {
+  if (!options_.page) return {};
+  if (options_.bus.credentials.known)
+    return fail(ErrorCode::configuration,
+                "--view: on a bus with rights that runs already the page needs a credential of its own: `tutti page "
+                "--bus {} --credentials FILE --server {}` (tutti pki add-operator page)",
+                bus::without_credentials(options_.bus.url), options_.state.string());
+  if (!guard_) return {};
+  auto credential = guard_->credential_of_page();
+  if (!credential) return tl::unexpected(credential.error());
+  page_credential_ = std::move(*credential);
+  guard_->check(utc_text(static_cast<std::int64_t>(wall_clock_ns())));  // it is let in
+  return {};
+}
+
+Status ServerProgram::start_page() {
+  if (!options_.page) return {};
+  std::vector<std::string> more{"--bus",     bus_.url,
+                                "--mission", bus_.mission,
+                                "--server",  folder_->path().string(),
+                                "--state",   (folder_->path() / "page").string(),
+                                "--rate",    fmt::format("{}", options_.rate)};
+  if (guard_) more.insert(more.end(), {"--pki", options_.pki.string(), "--credentials", page_credential_});
+  if (!guard_ && !bus_.credentials.file.empty()) more.insert(more.end(), {"--credentials", bus_.credentials.file});
+  if (bus_.allow_insecure) more.emplace_back("--insecure");
+  auto page = PageChild::start(folder_->path() / "page", *options_.page, std::move(more));
+  if (!page) return tl::unexpected(page.error());
+  page_ = std::move(*page);
+  return {};
 }
 
 Status ServerProgram::run(const std::atomic<bool>& stop) {

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,12 +14,15 @@
 #include "tutti/bus/transport.hpp"
 #include "tutti/program/event_log.hpp"
 #include "tutti/program/map_viewer.hpp"
+#include "tutti/program/page_child.hpp"
 #include "tutti/program/verifier_settings.hpp"
 #include "tutti/server/map_server.hpp"
 
 namespace tutti::program {
 
 inline constexpr const char* kMapFile = "map.tutti";  ///< In a server's state folder.
+/// In a server's: what it has computed of its map last (mapfile/estimate_file.hpp).
+inline constexpr const char* kEstimateFile = "estimate";
 /// In a server's and in a robot's: Hosted::status(), at most half a second old.
 inline constexpr const char* kStatusFile = "status.json";
 
@@ -49,8 +53,9 @@ struct ServerOptions {
   double rate = 1.0;  ///< Mission time per wall time.
   Level console = Level::warning;
   std::string version;
-  /// Each makes a viewer of the mission.
-  std::vector<std::function<Result<std::unique_ptr<MapViewer>>(const ViewedMission& mission)>> views;
+  /// Each makes a viewer of the map, whose store outlives it.
+  std::vector<std::function<Result<std::unique_ptr<MapViewer>>(const storage::TableStore& map)>> views;
+  std::optional<PageChildOptions> page;  ///< The page of the mission, as a program of its own.
   /// Called once with the command that starts a robot of this server.
   std::function<void(const std::string&)> announce;
 };

@@ -10,6 +10,7 @@
 #include "tutti/base/result.hpp"
 #include "tutti/model/closure_decision.hpp"
 #include "tutti/model/loop_closure.hpp"
+#include "tutti/model/map_mark.hpp"
 #include "tutti/model/messages.hpp"
 #include "tutti/model/point_cloud.hpp"
 #include "tutti/model/status.hpp"
@@ -77,6 +78,9 @@ Result<MissionStatus> decode_mission_status(std::string_view bytes);
 /// Exact. The closure's name has 1 to 200 bytes.
 std::string encode(const ClosureDecision& decision);
 Result<ClosureDecision> decode_decision(std::string_view bytes);
+/// Exact.
+std::string encode(const MarkOrder& order);
+Result<MarkOrder> decode_mark_order(std::string_view bytes);
 
 /// A cloud alone, with points within kMaxCloudRange_m along each axis; an empty one stays empty.
 std::string encode(const PointCloud& cloud, const CloudCodec& codec = {});
@@ -97,5 +101,6 @@ Status validate(const Verdicts& verdicts);
 Status validate(const NodeStatus& status);
 Status validate(const MissionStatus& status);
 Status validate(const ClosureDecision& decision);
+Status validate(const MarkOrder& order);
 
 }  // namespace tutti::wire

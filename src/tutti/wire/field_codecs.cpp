@@ -23,6 +23,12 @@ Result<ClosureDecision> decode_decision(std::string_view bytes) {
   return decode_fields<ClosureDecision>(MessageKind::decision, bytes);
 }
 
+Status validate(const MarkOrder& order) { return check_message(MessageKind::mark, order); }
+std::string encode(const MarkOrder& order) { return encode_fields(MessageKind::mark, order); }
+Result<MarkOrder> decode_mark_order(std::string_view bytes) {
+  return decode_fields<MarkOrder>(MessageKind::mark, bytes);
+}
+
 Status validate(const ClosureVerdict& verdict) { return check_message(MessageKind::verdict, verdict); }
 std::string encode(const ClosureVerdict& verdict) { return encode_fields(MessageKind::verdict, verdict); }
 Result<ClosureVerdict> decode_verdict(std::string_view bytes) {

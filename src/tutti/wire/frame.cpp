@@ -15,13 +15,12 @@ namespace {
 
 constexpr std::string_view kMagic = "TU";
 constexpr std::size_t kHeaderBytes = 5;
-/// A state is large and written often.
-constexpr int level_of(MessageKind kind) { return kind == MessageKind::agent_state ? 1 : 9; }
-constexpr std::size_t most_bytes(MessageKind kind) {
-  return kind == MessageKind::agent_state ? kMaxStateBytes : kMaxMessageBytes;
-}
+/// What is large and written often.
+constexpr bool is_state(MessageKind kind) { return kind == MessageKind::agent_state || kind == MessageKind::estimate; }
+constexpr int level_of(MessageKind kind) { return is_state(kind) ? 1 : 9; }
+constexpr std::size_t most_bytes(MessageKind kind) { return is_state(kind) ? kMaxStateBytes : kMaxMessageBytes; }
 constexpr std::string_view kUnknown = "unknown";
-constexpr auto kLastKind = static_cast<unsigned>(MessageKind::refinement);
+constexpr auto kLastKind = static_cast<unsigned>(MessageKind::estimate);
 
 }  // namespace
 
@@ -61,6 +60,10 @@ const char* name(MessageKind kind) {
       return "refinement job";
     case MessageKind::refinement:
       return "refinement";
+    case MessageKind::mark:
+      return "mark";
+    case MessageKind::estimate:
+      return "estimate";
   }
   return kUnknown.data();
 }
@@ -99,6 +102,8 @@ Versions versions(MessageKind kind) {
     case MessageKind::tracked_images:
     case MessageKind::refinement_job:
     case MessageKind::refinement:
+    case MessageKind::mark:
+    case MessageKind::estimate:
       return {.oldest = 1, .current = 1};
     case MessageKind::agent_state:
       return {.oldest = 3, .current = 6};
@@ -129,6 +134,11 @@ Result<Header> read_header(std::string_view bytes) {
 }
 
 }  // namespace
+
+std::optional<MessageKind> kind_of(std::string_view frame) {
+  const Result<Header> header = read_header(frame);
+  return header ? std::optional(header->kind) : std::nullopt;
+}
 
 std::uint16_t version_of(std::string_view frame) {
   const Result<Header> header = read_header(frame);

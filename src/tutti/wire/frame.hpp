@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -25,6 +26,8 @@ struct Unpacked {
 /// same bytes.
 Result<Unpacked> unpack_frame(MessageKind kind, std::string_view frame);
 
+/// The kind of a frame; nothing: no frame that this program reads.
+std::optional<MessageKind> kind_of(std::string_view frame);
 /// The version of a frame that unpack_frame() accepts; of other bytes std::logic_error.
 std::uint16_t version_of(std::string_view frame);
 

@@ -21,11 +21,14 @@
 namespace tutti::wire {
 namespace hostile_test {
 
-constexpr std::array kKinds = {MessageKind::submap,         MessageKind::proxy_graph,       MessageKind::verdict,
-                               MessageKind::cloud,          MessageKind::receipt,           MessageKind::job,
-                               MessageKind::verdicts,       MessageKind::proxy_graph_delta, MessageKind::status,
-                               MessageKind::mission_status, MessageKind::decision,          MessageKind::submap_request,
-                               MessageKind::submap_copy,    MessageKind::refinement_job,    MessageKind::refinement};
+constexpr std::array kKinds = {MessageKind::submap,      MessageKind::proxy_graph,
+                               MessageKind::verdict,     MessageKind::cloud,
+                               MessageKind::receipt,     MessageKind::job,
+                               MessageKind::verdicts,    MessageKind::proxy_graph_delta,
+                               MessageKind::status,      MessageKind::mission_status,
+                               MessageKind::decision,    MessageKind::submap_request,
+                               MessageKind::submap_copy, MessageKind::refinement_job,
+                               MessageKind::refinement,  MessageKind::mark};
 
 /// What deltas are against.
 const ProxyGraph& base() {
@@ -60,6 +63,7 @@ std::string sample(MessageKind kind, Rng rng) {
   if (kind == MessageKind::status) return encode(test::any_status(rng));
   if (kind == MessageKind::mission_status) return encode(test::any_mission_status(rng));
   if (kind == MessageKind::decision) return encode(test::any_decision(rng));
+  if (kind == MessageKind::mark) return encode(test::any_mark_order(rng));
   return encode(test::any_verdict(rng, 2));
 }
 
@@ -94,6 +98,7 @@ std::optional<Error> decode(MessageKind kind, std::string_view bytes) {
   if (kind == MessageKind::status) return outcome(decode_status(bytes));
   if (kind == MessageKind::mission_status) return outcome(decode_mission_status(bytes));
   if (kind == MessageKind::decision) return outcome(decode_decision(bytes));
+  if (kind == MessageKind::mark) return outcome(decode_mark_order(bytes));
   const auto cloud = decode_cloud(bytes);
   return outcome(cloud ? Result<PointCloud>(**cloud) : tl::unexpected(cloud.error()));
 }

@@ -5,8 +5,8 @@
 
 namespace tutti::wire {
 
-/// What a frame carries. The numbers are on the wire and in stores: never reuse one. verdict, cloud, agent_state and
-/// tracked_images are stored, never sent.
+/// What a frame carries. The numbers are on the wire and in stores: never reuse one. verdict, cloud, agent_state,
+/// tracked_images and estimate are stored, never sent.
 enum class MessageKind : std::uint8_t {
   submap = 1,
   proxy_graph = 2,
@@ -25,6 +25,8 @@ enum class MessageKind : std::uint8_t {
   tracked_images = 18,     ///< What a robot's cameras saw, in its journal.
   refinement_job = 19,     ///< Submaps to be refined together.
   refinement = 20,         ///< The answer to a refinement job.
+  mark = 21,               ///< What an operator writes on the map; travels as a `decision` does.
+  estimate = 22,           ///< A server's map, for who reads its file meanwhile.
 };
 
 /// The kind in words: "submap", "proxy graph", ...

@@ -11,6 +11,7 @@
 #include "tutti/geometry/so3.hpp"
 #include "tutti/model/closure_decision.hpp"
 #include "tutti/model/loop_closure.hpp"
+#include "tutti/model/map_mark.hpp"
 #include "tutti/model/messages.hpp"
 #include "tutti/model/refinement.hpp"
 #include "tutti/model/status.hpp"
@@ -243,6 +244,7 @@ inline MissionStatus any_mission_status(Rng& rng) {
 }
 
 inline ClosureDecision any_decision(Rng& rng) { return any_fields<ClosureDecision>(rng); }
+inline MarkOrder any_mark_order(Rng& rng) { return any_fields<MarkOrder>(rng); }
 inline Receipt any_receipt(Rng& rng) { return any_fields<Receipt>(rng); }
 inline SubmapRequest any_submap_request(Rng& rng) { return any_fields<SubmapRequest>(rng); }
 inline SubmapCopy any_submap_copy(Rng& rng) { return any_fields<SubmapCopy>(rng); }

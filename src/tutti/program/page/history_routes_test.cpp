@@ -29,8 +29,7 @@ class PageHistory : public served::ServedPage {
       viewer_->show_status(
           {.time = Timestamp{} + time_s,
            .revision = 3,
-           .robots = {{.robot = RobotId{0}, .last_seen = Timestamp{} + 4.0, .status = {.name = "alpha"}}}},
-          {});
+           .robots = {{.robot = RobotId{0}, .last_seen = Timestamp{} + 4.0, .status = {.name = "alpha"}}}});
     for (int i = 0; i < 1000 && known().at("first_s").is_null(); ++i)
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }

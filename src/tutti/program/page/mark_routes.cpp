@@ -7,10 +7,12 @@
 #include <algorithm>
 #include <charconv>
 
-#include "tutti/mapfile/picture.hpp"
+#include "tutti/node/marks.hpp"
+#include "tutti/node/picture.hpp"
 #include "tutti/program/clock.hpp"
 #include "tutti/program/page/base64.hpp"
 #include "tutti/program/page/view.hpp"
+#include "tutti/wire/codec.hpp"
 
 namespace tutti::page {
 namespace {
@@ -64,27 +66,35 @@ void put_mark(Site& site, const Visitor& visitor, const Json& body, Response& re
     if (!bytes || bytes->empty()) return say(response, 400, "photo: expected data:image/jpeg;base64,.. or PNG");
     photo = *bytes;
   }
-  const auto stored = site.marks.add(std::move(*mark), photo);
-  if (!stored) return say(response, stored.error().code == ErrorCode::invalid ? 400 : 503, stored.error().message);
+  mark->photo_type = picture_type(photo);
+  const std::uint64_t number = site.marks.with(
+      [&](const MarkBook& book) { return book.free_number(static_cast<std::uint64_t>(mark->given_ns)); });
+  MarkOrder order{.number = number, .mark = mark, .photo = std::move(photo), .given_ns = mark->given_ns};
+  if (const Status ok = wire::validate(order); !ok) return say(response, 400, ok.error().message);
+  if (!ask_server(site, std::move(order), 400, response)) return;
+  site.marks.with([&](MarkBook& book) { book.note(number, mark); });
   site.board.put([&](Board& board) {
-    board.put(mark_message(stored->first, stored->second, photo.empty() ? "" : photo_path(stored->first), site.time_s));
+    board.put(mark_message(number, *mark, mark->photo_type.empty() ? "" : photo_path(number), site.time_s));
   });
-  say(response, Json{{"id", std::to_string(stored->first)}});
+  say(response, Json{{"id", std::to_string(number)}});
 }
 
 void remove_mark(Site& site, const Json& body, Response& response) {
   const auto number = number_of(body.value("id", ""));
   if (!number) return say(response, 404, "there is no such mark");
-  const Status removed = site.marks.remove(*number);
-  if (!removed) return say(response, removed.error().code == ErrorCode::invalid ? 404 : 503, removed.error().message);
+  if (!site.marks.with([&](const MarkBook& book) { return book.contains(*number); }))
+    return say(response, 404, "there is no such mark");
+  MarkOrder order{.number = *number, .given_ns = static_cast<std::int64_t>(program::wall_clock_ns())};
+  if (!ask_server(site, std::move(order), 404, response)) return;
+  site.marks.with([&](MarkBook& book) { book.note(*number, std::nullopt); });
   site.board.put([&](Board& board) { board.put({fmt::format("mark/{}", *number), site.time_s, "null"}); });
   say(response, Json::object());
 }
 
 void show_photo(const Site& site, const Request& request, Response& response) {
   const auto number = number_of(request.matches[1]);
-  const auto photo = number ? mapfile::read_photo(site.store, *number) : Result<std::optional<std::string>>();
-  if (!photo || !*photo || !mapfile::check_picture(**photo)) return say(response, 404, "there is no such photo");
+  const auto photo = number ? node::read_photo(site.store, *number) : Result<std::optional<std::string>>();
+  if (!photo || !*photo || !node::check_picture(**photo)) return say(response, 404, "there is no such photo");
   response.set_header("Cache-Control", "private, max-age=31536000, immutable");
   response.set_content(**photo, std::string(picture_type(**photo)));
 }

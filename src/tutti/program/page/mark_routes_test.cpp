@@ -101,10 +101,10 @@ TEST_F(Marks, WhatIsNoneIsRefusedWithASentence) {
 }
 
 TEST_F(Marks, AreAsManyAsAMapMayHave) {
-  for (std::uint64_t number = 0; number < mapfile::kMostMarks; ++number) {
-    MarkSet known;
-    MapMark mark{.words = "here", .given_ns = static_cast<std::int64_t>(number)};
-    ASSERT_TRUE(mapfile::put_mark(store_, known, mark, ""));
+  MarkSet known;
+  for (std::uint64_t number = 0; number < node::kMostMarks; ++number) {
+    const MapMark mark{.words = "here", .given_ns = static_cast<std::int64_t>(number)};
+    ASSERT_TRUE(store_.commit(node::follow({.number = number, .mark = mark}, known).value()));
   }
   start();
   events_with_map();

@@ -63,35 +63,34 @@ void add_members(const Members& members, const std::string& role, Timestamp now,
 }
 
 /// A robot that has no status yet has its number for a name.
-std::string radio_text(const program::RadioCount::Sums& radio, const MissionStatus& status) {
+std::string radio_text(const MissionStatus& status) {
   std::map<RobotId, std::string> names;
   for (const MissionStatus::Robot& robot : status.robots) names[robot.robot] = label_value(robot.status.name);
   std::string bytes, messages;
-  for (const auto& [key, sum] : radio) {
-    const auto name = names.find(key.robot);
+  for (const MissionStatus::Radio& sum : status.radio) {
+    const auto name = names.find(sum.robot);
     const std::string labels = fmt::format("{{name=\"{}\",direction=\"{}\",kind=\"{}\"}}",
-                                           name == names.end() ? std::to_string(key.robot.value) : name->second,
-                                           key.is_down ? "down" : "up", wire::name(key.kind));
+                                           name == names.end() ? std::to_string(sum.robot.value) : name->second,
+                                           sum.is_down ? "down" : "up", label_value(sum.kind));
     bytes += fmt::format("tutti_radio_bytes_total{} {}\n", labels, sum.bytes);
     messages += fmt::format("tutti_radio_messages_total{} {}\n", labels, sum.messages);
   }
-  if (radio.empty()) return {};
+  if (status.radio.empty()) return {};
   return "# TYPE tutti_radio_bytes_total counter\n" + bytes + "# TYPE tutti_radio_messages_total counter\n" + messages;
 }
 
 }  // namespace
 
-Message radio_message(const program::RadioCount::Sums& radio, double time_s) {
+Message radio_message(const MissionStatus& status) {
   FieldJson out = FieldJson::object();
-  for (const auto& [key, sum] : radio)
-    out[std::to_string(key.robot.value)][key.is_down ? "down" : "up"][wire::name(key.kind)] = sum.bytes;
-  return {"radio", time_s, text_of(out)};
+  for (const MissionStatus::Radio& sum : status.radio)
+    out[std::to_string(sum.robot.value)][sum.is_down ? "down" : "up"][sum.kind] = sum.bytes;
+  return {"radio", status.time - Timestamp{}, text_of(out)};
 }
 
-void Metrics::update(const MissionStatus& status, const program::RadioCount::Sums& radio) {
+void Metrics::update(const MissionStatus& status) {
   const std::scoped_lock lock(mutex_);
   last_ = status;
-  radio_ = radio;
 }
 
 std::optional<std::string> Metrics::trouble() const {
@@ -116,7 +115,7 @@ std::string Metrics::text() const {
     out += fmt::format("# TYPE {} gauge\n", name);
     for (const std::string& sample : samples) out += sample;
   }
-  return out + radio_text(radio_, *last_);
+  return out + radio_text(*last_);
 }
 
 }  // namespace tutti::page

@@ -7,7 +7,6 @@
 
 #include "tutti/model/status.hpp"
 #include "tutti/program/page/board.hpp"
-#include "tutti/program/radio_count.hpp"
 
 namespace tutti::page {
 
@@ -17,7 +16,7 @@ namespace tutti::page {
 /// tutti_radio_bytes_total and tutti_radio_messages_total. May be called from several threads.
 class Metrics {
  public:
-  void update(const MissionStatus& status, const program::RadioCount::Sums& radio = {});
+  void update(const MissionStatus& status);
   /// The text format of Prometheus, version 0.0.4.
   [[nodiscard]] std::string text() const;
   /// The server's trouble; empty: it is well; nothing: nothing is known yet.
@@ -26,10 +25,9 @@ class Metrics {
  private:
   mutable std::mutex mutex_;
   std::optional<MissionStatus> last_;
-  program::RadioCount::Sums radio_;
 };
 
 /// "radio": the bytes that robots have sent ("up") and were sent ("down"), by robot and kind.
-Message radio_message(const program::RadioCount::Sums& radio, double time_s);
+Message radio_message(const MissionStatus& status);
 
 }  // namespace tutti::page

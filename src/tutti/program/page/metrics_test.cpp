@@ -11,6 +11,7 @@
 #include "support/paths.hpp"
 #include "support/wire/messages.hpp"
 #include "tutti/base/file.hpp"
+#include "tutti/program/radio_count.hpp"
 
 namespace tutti::page {
 namespace metrics_test {
@@ -47,7 +48,7 @@ bus::Envelope message(bus::Endpoint from, bus::Endpoint to, bus::MessageKind kin
   return {from, to, kind, "id", std::make_shared<const std::string>(bytes, 'x')};
 }
 
-program::RadioCount some_radio() {
+MissionStatus with_radio(MissionStatus status) {
   using bus::Endpoint, bus::MessageKind;
   program::RadioCount radio;
   const auto alpha = Endpoint::of(RobotId{0}), stranger = Endpoint::of(RobotId{7});
@@ -56,13 +57,13 @@ program::RadioCount some_radio() {
   radio.count(message(Endpoint::server(), alpha, MessageKind::proxy_graph, 30));
   radio.count(message(stranger, Endpoint::server(), MessageKind::status, 5));
   radio.count(message(Endpoint::worker(1), Endpoint::server(), MessageKind::verdicts, 1000));
-  return radio;
+  status.radio = radio.sums();
+  return status;
 }
 
 TEST(Metrics, CountsTheRadioByRobotAndKind) {
   Metrics metrics;
-  const auto radio = some_radio();
-  metrics.update(status(), radio.sums());
+  metrics.update(with_radio(status()));
   const std::string text = metrics.text();
   for (const char* line : {"tutti_radio_bytes_total{name=\"al\\\"pha \",direction=\"up\",kind=\"submap\"} 150\n",
                            "tutti_radio_messages_total{name=\"al\\\"pha \",direction=\"up\",kind=\"submap\"} 2\n",
@@ -70,7 +71,7 @@ TEST(Metrics, CountsTheRadioByRobotAndKind) {
                            "tutti_radio_bytes_total{name=\"7\",direction=\"up\",kind=\"status\"} 5\n"})
     EXPECT_NE(text.find(line), std::string::npos) << line << text;
   EXPECT_EQ(text.find("1000"), std::string::npos) << "workers are not on the radio";
-  EXPECT_EQ(radio_message(radio.sums(), 3.0).value,
+  EXPECT_EQ(radio_message(with_radio({})).value,
             R"({"0":{"up":{"submap":150},"down":{"proxy graph":30}},"7":{"up":{"status":5}}})");
 }
 
@@ -81,7 +82,7 @@ std::set<std::string> all_metrics() {
   Rng rng(3);
   for (int i = 0; i < 40; ++i) {
     Metrics metrics;
-    metrics.update(wire::test::any_mission_status(rng), some_radio().sums());
+    metrics.update(with_radio(wire::test::any_mission_status(rng)));
     const std::string text = metrics.text();
     for (auto at = std::sregex_iterator(text.begin(), text.end(), type); at != std::sregex_iterator(); ++at)
       out.insert((*at)[1]);
@@ -115,7 +116,7 @@ TEST(RadioCount, IsBounded) {
 /// https://prometheus.io/docs/instrumenting/exposition_formats/
 TEST(Metrics, IsWhatPrometheusReads) {
   Metrics metrics;
-  metrics.update(status(), some_radio().sums());
+  metrics.update(with_radio(status()));
   std::istringstream lines(metrics.text());
   const std::regex sample(R"re(([a-z_]+)(\{[a-z_]+="([^"\\]|\\.)*"(,[a-z_]+="([^"\\]|\\.)*")*\})? [-+0-9.e]+)re");
   const std::regex type("# TYPE ([a-z_]+) (gauge|counter)");

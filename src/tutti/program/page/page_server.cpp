@@ -42,49 +42,48 @@ std::string host_to_open(const std::string& host, const std::vector<std::string>
   return own.empty() ? "localhost" : own;
 }
 
-class PageViewer final : public program::MapViewer {
+class ServedPage final : public Page {
  public:
-  PageViewer(const PageOptions& options, const program::ViewedMission& mission)
-      : site_(mission),
-        say_(mission.say),
+  ServedPage(const PageOptions& options, const storage::TableStore& map)
+      : site_(options, map),
+        say_(options.say),
         announce_(options.announce),
-        rate_(mission.rate),
-        alerts_(silent_after_s(mission.rate)) {
+        rate_(options.rate),
+        alerts_(silent_after_s(options.rate)) {
     site_.board.put([&](Board& board) {
-      board.put(mission_message({.name = mission.name,
+      board.put(mission_message({.name = options.mission,
                                  .description = options.description,
-                                 .version = mission.version,
-                                 .robot_silent_s = silent_after_s(mission.rate)}));
+                                 .version = options.version,
+                                 .robot_silent_s = silent_after_s(options.rate)}));
     });
-    remember(mission.history);
+    remember(options.history);
   }
-  ~PageViewer() override {
+  ~ServedPage() override {
     site_.board.close();
-    site_.decisions.close();
+    site_.words.close();
     if (server_) server_->end();
     if (listens_.joinable()) listens_.join();
     makes_.request_stop();
     if (makes_.joinable()) makes_.join();
     recorder_.reset();
   }
-  PageViewer(const PageViewer&) = delete;
-  PageViewer& operator=(const PageViewer&) = delete;
+  ServedPage(const ServedPage&) = delete;
+  ServedPage& operator=(const ServedPage&) = delete;
 
   Status open(const bus::HostPort& address, const std::filesystem::path& pki) {
-    if (Status ok = open_marks(); !ok) return in_context("--view", ok.error());
     server_ = std::make_unique<GuardedServer>();
     if (!pki.empty() && !server_->use_tls({pki / pki::kBusCertificate, pki / pki::kBusKey, pki / pki::kAuthority}))
-      return fail(ErrorCode::io, "--view: the certificate of {} cannot be used", pki.string());
+      return fail(ErrorCode::io, "the page: the certificate of {} cannot be used", pki.string());
     if (!pki.empty()) {
       const auto there = pki::Pki::open(pki);
       auto names = there ? there->bus_names() : tl::unexpected(there.error());
-      if (!names) return in_context("--view", names.error());
+      if (!names) return in_context("the page", names.error());
       site_.names = std::move(*names);
     }
     add_routes(*server_, site_);
     const int port = server_->bind(address.host, address.port);
     if (port < 0)
-      return fail(ErrorCode::io, "--view {}: this address cannot be listened at; is another program there?",
+      return fail(ErrorCode::io, "the page at {}: this address cannot be listened at; is another program there?",
                   to_string(address));
     site_.is_secure = !pki.empty();
     listens_ = std::thread([this] { server_->listen_after_bind(); });
@@ -109,21 +108,30 @@ class PageViewer final : public program::MapViewer {
     }
     changed_.notify_one();
   }
-  void show_status(const MissionStatus& status, const program::RadioCount::Sums& radio) override {
+  void show_status(const MissionStatus& status) override {
     const double time_s = status.time - Timestamp{};
     site_.time_s = time_s;
     const auto alerts = joined(alerts_.of_status(status), map_alerts());
-    site_.metrics.update(status, radio);
+    site_.metrics.update(status);
     site_.acknowledged.with([&](Acknowledged& all) { all.show(alerts); });
     const auto held = site_.held.with([&](Holders& holders) { return holders.message(Clock::steady_s(), time_s); });
     site_.board.put([&](Board& board) {
       board.put(held);
-      board.put(radio_message(radio, time_s));
+      board.put(radio_message(status));
       board.put(status_message(status));
       board.put(alerts_message(alerts, time_s));
     });
   }
-  std::vector<program::AskedDecision> take_decisions() override { return site_.decisions.take(); }
+  void show_marks(const MarkSet& marks) override {
+    const MarkSet all = site_.marks.with([&](MarkBook& book) { return book.replace(marks); });
+    site_.board.put([&](Board& board) {
+      std::vector<Message> messages;
+      for (const auto& [number, mark] : all)
+        messages.push_back(mark_message(number, mark, mark.photo_type.empty() ? "" : photo_path(number), site_.time_s));
+      board.put_all("mark/", messages, site_.time_s);
+    });
+  }
+  std::vector<AskedWord> take_words() override { return site_.words.take(); }
 
  private:
   /// What an earlier program has shown goes on: the past, since when problems are there, who has acknowledged them.
@@ -140,17 +148,6 @@ class PageViewer final : public program::MapViewer {
       maps_alerts_.resume(message.value);
     }
     recorder_.emplace(site_.board, *site_.history, say_);
-  }
-  Status open_marks() {
-    const auto marks = site_.marks.open();
-    if (!marks) return tl::unexpected(marks.error());
-    site_.board.put([&](Board& board) {
-      std::vector<Message> messages;
-      for (const auto& [number, mark] : *marks)
-        messages.push_back(mark_message(number, mark, mark.photo_type.empty() ? "" : photo_path(number), site_.time_s));
-      board.put_all("mark/", messages, site_.time_s);
-    });
-    return {};
   }
   std::vector<Alert> map_alerts() {
     const std::scoped_lock lock(mutex_);
@@ -207,24 +204,23 @@ Result<bus::HostPort> address_of(const std::string& listen) {
   const bool is_port = !listen.empty() && listen.find_first_not_of("0123456789") == std::string::npos;
   const bool is_any = is_port && std::stoul("0" + listen.substr(0, 9)) == 0;
   auto address = bus::parse_host_port(is_any ? "127.0.0.1" : is_port ? "127.0.0.1:" + listen : listen);
-  if (!address) return in_context("--view", address.error());
+  if (!address) return in_context("the page's address", address.error());
   return address;
 }
 
 }  // namespace
 
-Result<std::unique_ptr<program::MapViewer>> serve_page(const PageOptions& options,
-                                                       const program::ViewedMission& mission) {
+Result<std::unique_ptr<Page>> serve_page(const PageOptions& options, const storage::TableStore& map) {
   const auto address = address_of(options.listen);
   if (!address) return tl::unexpected(address.error());
-  if (mission.pki.empty() && !options.allow_insecure && !bus::is_loopback(address->host))
+  if (options.pki.empty() && !options.allow_insecure && !bus::is_loopback(address->host))
     return fail(ErrorCode::configuration,
-                "--view {}: anybody who reaches this address could decide: needs --pki DIR (tutti pki init); "
+                "the page at {}: anybody who reaches this address could decide: needs --pki DIR (tutti pki init); "
                 "--insecure forces it",
                 options.listen);
-  auto viewer = std::make_unique<PageViewer>(options, mission);
-  if (Status ok = viewer->open(*address, mission.pki); !ok) return tl::unexpected(ok.error());
-  return viewer;
+  auto page = std::make_unique<ServedPage>(options, map);
+  if (Status ok = page->open(*address, options.pki); !ok) return tl::unexpected(ok.error());
+  return page;
 }
 
 }  // namespace tutti::page

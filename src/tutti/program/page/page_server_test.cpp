@@ -62,7 +62,7 @@ TEST_F(PageServer, WhoWasCutOffIsSentWhatIsNew) {
   std::string since = event_text({{"Last-Event-ID", id}});
   EXPECT_NE(since.find(R"("resumed":true)"), std::string::npos) << since;
   EXPECT_EQ(since.find("\"key\""), std::string::npos) << since;
-  viewer_->show_status({.time = Timestamp{} + 7.0, .revision = 4}, {});
+  viewer_->show_status({.time = Timestamp{} + 7.0, .revision = 4});
   since = event_text({{"Last-Event-ID", id}});
   EXPECT_NE(since.find(R"("key":"status")"), std::string::npos) << since;
   EXPECT_EQ(since.find("\"key\":\"submap/"), std::string::npos) << since;
@@ -98,10 +98,9 @@ TEST_F(PageServer, ADecisionIsTheServersToTakeOrNot) {
   EXPECT_EQ(refused->status, 413);
   const std::scoped_lock lock(mutex_);
   ASSERT_EQ(decisions_.size(), 1U);
-  EXPECT_EQ(decisions_.front().first.closure, "alpha/0-bravo/1");
-  EXPECT_EQ(decisions_.front().first.wish, Wish::reject);
-  EXPECT_EQ(decisions_.front().first.by, "mallory") << "nobody has proved anything";
-  EXPECT_EQ(decisions_.front().second, "");
+  EXPECT_EQ(decisions_.front().closure, "alpha/0-bravo/1");
+  EXPECT_EQ(decisions_.front().wish, Wish::reject);
+  EXPECT_EQ(decisions_.front().by, "mallory") << "nobody has proved anything";
 }
 
 TEST_F(PageServer, TwoSubmapsAreComparedAndAClosureIsAddedByHand) {
@@ -125,10 +124,10 @@ TEST_F(PageServer, TwoSubmapsAreComparedAndAClosureIsAddedByHand) {
   EXPECT_EQ(kept, 200) << name;
   const std::scoped_lock lock(mutex_);
   ASSERT_EQ(decisions_.size(), 1U);
-  EXPECT_EQ(decisions_.front().first.closure, closure.at("name"));
-  EXPECT_EQ(decisions_.front().first.wish, Wish::accept);
-  EXPECT_EQ(decisions_.front().first.by, "anna");
-  ASSERT_EQ(decisions_.front().first.by_hand.size(), 1U);
+  EXPECT_EQ(decisions_.front().closure, closure.at("name"));
+  EXPECT_EQ(decisions_.front().wish, Wish::accept);
+  EXPECT_EQ(decisions_.front().by, "anna");
+  ASSERT_EQ(decisions_.front().by_hand.size(), 1U);
 }
 
 TEST_F(PageServer, TheMapWithAClosureIsShownAndNothingIsStored) {
@@ -154,8 +153,8 @@ TEST_F(PageServer, TheMapWithAClosureIsShownAndNothingIsStored) {
   {
     const std::scoped_lock lock(mutex_);
     ASSERT_EQ(decisions_.size(), 1U);
-    const SubmapPair pair = kept.closure_names().find(decisions_.front().first.closure).value();
-    kept.decisions[pair] = with_sessions(decisions_.front().first, pair);
+    const SubmapPair pair = kept.closure_names().find(decisions_.front().closure).value();
+    kept.decisions[pair] = with_sessions(decisions_.front(), pair);
   }
   mapfile::ShownMap with{
       .revision = map_->revision, .time = {}, .content = kept, .map = mapfile::estimate(kept), .broadcast = {}};
@@ -228,7 +227,7 @@ TEST_F(PageServer, WithCredentialsShowsNothingToStrangersAndLetsOperatorsDecide)
   {
     const std::scoped_lock lock(mutex_);
     ASSERT_EQ(decisions_.size(), 1U);
-    EXPECT_EQ(decisions_.front().second, "anna") << "whatever the page says";
+    EXPECT_EQ(decisions_.front().by, "anna") << "whatever the page says";
   }
   EXPECT_EQ(http.Post("/api/logout", ours(anna), "{}", "application/json")->status, 200);
   EXPECT_EQ(decide("alpha/0-bravo/1", "accept", ours(anna)), "401");
@@ -381,25 +380,20 @@ TEST_F(PageServer, ConnectionsThatSendNothingTakeNothingFromTheMission) {
   }
   std::this_thread::sleep_for(std::chrono::milliseconds(200));
   EXPECT_LE(open_files() - before, 400 + 70) << "the page itself holds as many as it serves";
-  viewer_->show_status({.time = Timestamp{} + 6.0, .revision = 4}, {});
-  EXPECT_TRUE(viewer_->take_decisions().empty());
+  viewer_->show_status({.time = Timestamp{} + 6.0, .revision = 4});
+  EXPECT_TRUE(viewer_->take_words().empty());
   for (const int one : sockets) close(one);
   EXPECT_EQ(events_with_map().at("status").at("revision"), 4) << "and it is there again when they have gone";
 }
 
 TEST(PageOptions, ALoopbackAddressOrCredentialsAreNeeded) {
   storage::MemoryStore store{storage::map_schema()};
-  const program::ViewedMission mission{.name = "cave",
-                                       .version = "1",
-                                       .map = store,
-                                       .verifier = nullptr,
-                                       .pki = {},
-                                       .say = [](program::Level, const std::string&) {}};
-  const auto open = serve_page({.listen = "0.0.0.0"}, mission);
+  const auto say = [](program::Level, const std::string&) {};
+  const auto open = serve_page({.listen = "0.0.0.0", .say = say}, store);
   ASSERT_FALSE(open.has_value());
   EXPECT_NE(open.error().message.find("--pki"), std::string::npos) << open.error().message;
-  EXPECT_FALSE(serve_page({.listen = "nonsense:abc"}, mission).has_value());
-  EXPECT_FALSE(serve_page({.listen = ""}, mission).has_value());
+  EXPECT_FALSE(serve_page({.listen = "nonsense:abc", .say = say}, store).has_value());
+  EXPECT_FALSE(serve_page({.listen = "", .say = say}, store).has_value());
 }
 
 }  // namespace page_server_test

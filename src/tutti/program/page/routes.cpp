@@ -205,22 +205,9 @@ class Routes {
 
   /// Hands the operator's decision to the server; false: the answer states why it is not stored.
   bool give(const Visitor& visitor, const Json& body, ClosureDecision decision, Response& response) {
-    decision.by = plain_text(body.value("by", ""));
+    decision.by = name_of(visitor, body);
     decision.given_ns = static_cast<std::int64_t>(program::wall_clock_ns());
-    auto answer = site_.decisions.ask(std::move(decision), visitor.name);
-    const auto refuse = [&](int status, const std::string& why) {
-      say(response, status, why);
-      return false;
-    };
-    if (!answer) return refuse(503, "too many decisions wait for the server");
-    if (answer->wait_for(kAnswer) != std::future_status::ready)
-      return refuse(504, "the server has not answered yet; the decision may still be taken");
-    try {
-      const std::string why = answer->get();
-      return why.empty() || refuse(409, why);
-    } catch (const std::future_error&) {
-      return refuse(503, "the server could not store it: try again");
-    }
+    return ask_server(site_, std::move(decision), 409, response);
   }
 
   void health(Response& response) {
@@ -314,6 +301,23 @@ std::string own_host_name() {
 void say(Response& response, int status, const std::string& error) {
   response.status = status;
   response.set_content(text_of(Json{{"error", error}}), kJson);
+}
+
+bool ask_server(Site& site, std::variant<ClosureDecision, MarkOrder> word, int refused, Response& response) {
+  auto answer = site.words.ask(std::move(word));
+  const auto refuse = [&](int status, const std::string& why) {
+    say(response, status, why);
+    return false;
+  };
+  if (!answer) return refuse(503, "too many decisions wait for the server");
+  if (answer->wait_for(kAnswer) != std::future_status::ready)
+    return refuse(504, "the server has not answered yet; the decision may still be taken");
+  try {
+    const std::string why = answer->get();
+    return why.empty() || refuse(refused, why);
+  } catch (const std::future_error&) {
+    return refuse(503, "the server could not store it: try again");
+  }
 }
 
 void say(Response& response, const Json& json) { response.set_content(text_of(json), kJson); }

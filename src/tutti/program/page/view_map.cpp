@@ -199,7 +199,9 @@ Message mission_message(const Mission& mission) {
 }
 
 Message status_message(const MissionStatus& status) {
-  return {"status", status.time - Timestamp{}, text_of(json_of_fields(status, status.time))};
+  FieldJson out = json_of_fields(status, status.time);
+  out.erase("radio");  // radio_message()
+  return {"status", status.time - Timestamp{}, text_of(out)};
 }
 
 Message alerts_message(const std::vector<Alert>& alerts, double time_s) {

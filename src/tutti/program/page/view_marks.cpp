@@ -2,7 +2,7 @@
 // What operators have written on the map, as messages.
 #include <fmt/format.h>
 
-#include "tutti/mapfile/marks.hpp"
+#include "tutti/node/marks.hpp"
 #include "tutti/program/field_json.hpp"
 #include "tutti/program/page/base64.hpp"
 #include "tutti/program/page/view.hpp"
@@ -22,11 +22,11 @@ Message mark_message(std::uint64_t number, const MapMark& mark, const std::strin
 }
 
 Result<std::vector<Message>> marks_with_photos(const storage::TableStore& map, double time_s) {
-  const auto marks = mapfile::read_marks(map);
+  const auto marks = node::read_marks(map);
   if (!marks) return tl::unexpected(marks.error());
   std::vector<Message> out;
   for (const auto& [number, mark] : *marks) {
-    const auto photo = mapfile::read_photo(map, number);
+    const auto photo = node::read_photo(map, number);
     if (!photo) return tl::unexpected(photo.error());
     const std::string_view type = *photo ? picture_type(**photo) : std::string_view();
     out.push_back(mark_message(number, mark,

@@ -19,6 +19,7 @@
 #include "support/mapfile/small_map.hpp"
 #include "support/pki/sign.hpp"
 #include "tutti/history/history_file.hpp"
+#include "tutti/node/marks.hpp"
 #include "tutti/pki/pki.hpp"
 #include "tutti/program/page/base64.hpp"
 #include "tutti/program/page/page_server.hpp"
@@ -56,31 +57,41 @@ class ServedPage : public ::testing::Test {
     fs::remove_all(folder_);
   }
   void start(const fs::path& pki = {}, const std::string& listen = "0") {
-    PageOptions options{.listen = listen, .announce = [this](const std::string& url) { url_ = url; }};
-    auto made = serve_page(options, {.name = "cave",
-                                     .version = "1",
-                                     .map = store_,
-                                     .verifier = std::make_shared<mapfile::test::ExplainingVerifier>(),
-                                     .pki = pki,
-                                     .history = history_,
-                                     .say = [](program::Level, const std::string&) {}});
+    const PageOptions options{.listen = listen,
+                              .mission = "cave",
+                              .version = "1",
+                              .verifier = std::make_shared<mapfile::test::ExplainingVerifier>(),
+                              .pki = pki,
+                              .history = history_,
+                              .say = [](program::Level, const std::string&) {},
+                              .announce = [this](const std::string& url) { url_ = url; }};
+    auto made = serve_page(options, store_);
     ASSERT_TRUE(made.has_value()) << made.error().message;
     viewer_ = std::move(*made);
     viewer_->show(map_);
-    viewer_->show_status({.time = Timestamp{} + 5.0, .revision = 3}, {});
+    viewer_->show_marks(node::read_marks(store_).value());
+    viewer_->show_status({.time = Timestamp{} + 5.0, .revision = 3});
     takes_ = std::thread([this] {
       while (!stop_) {
-        for (program::AskedDecision& asked : viewer_->take_decisions()) {
-          const bool is_known = asked.decision.closure != "alpha/0-bravo/999";
-          if (is_known) {
-            const std::scoped_lock lock(mutex_);
-            decisions_.emplace_back(asked.decision, asked.proved_name);
-          }
-          asked.answer.set_value(is_known ? "" : "no such closure");
-        }
+        for (AskedWord& asked : viewer_->take_words()) asked.answer.set_value(answer(asked));
         std::this_thread::sleep_for(std::chrono::milliseconds(5));
       }
     });
+  }
+  /// As the server would: why the word is not stored.
+  std::string answer(const AskedWord& asked) {
+    if (const auto* order = std::get_if<MarkOrder>(&asked.word)) {
+      MarkSet known = node::read_marks(store_).value();
+      const auto rows = node::follow(*order, known);
+      if (!rows) return rows.error().message;
+      EXPECT_TRUE(store_.commit(*rows));
+      return {};
+    }
+    const auto& decision = std::get<ClosureDecision>(asked.word);
+    if (decision.closure == "alpha/0-bravo/999") return "no such closure";
+    const std::scoped_lock lock(mutex_);
+    decisions_.push_back(decision);
+    return {};
   }
   /// As a program that is started again with what its store has.
   void restart() {
@@ -166,11 +177,11 @@ class ServedPage : public ::testing::Test {
   fs::path history_ = folder_ / "page" / history::kHistoryFile;
   storage::MemoryStore store_{storage::map_schema()};
   std::shared_ptr<const mapfile::ShownMap> map_;
-  std::unique_ptr<program::MapViewer> viewer_;
+  std::unique_ptr<Page> viewer_;
   std::string url_;
   std::atomic<bool> stop_ = false;
   std::mutex mutex_;
-  std::vector<std::pair<ClosureDecision, std::string>> decisions_;
+  std::vector<ClosureDecision> decisions_;
   std::thread takes_;
 };
 

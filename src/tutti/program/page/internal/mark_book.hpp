@@ -1,45 +1,46 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <mutex>
-#include <string>
+#include <map>
+#include <optional>
 #include <utility>
 
-#include "tutti/mapfile/marks.hpp"
+#include "tutti/model/map_mark.hpp"
 
 namespace tutti::page {
 
-/// The marks of a running mission's map. May be called from several threads.
+/// The marks of a running mission's map: those in its file, and what the server has just stored or removed there.
 class MarkBook {
  public:
-  explicit MarkBook(storage::TableStore& map) : map_(map) {}
-
-  /// All marks that the map's store has; must be called first.
-  Result<MarkSet> open() {
-    const std::scoped_lock lock(mutex_);
-    auto stored = mapfile::read_marks(map_);
-    if (stored) marks_ = *stored;
-    return stored;
+  /// `stored` are those in the file, which may have been read before the server's last answer. All that there are.
+  MarkSet replace(const MarkSet& stored) {
+    marks_ = stored;
+    for (auto change = changes_.begin(); change != changes_.end();) {
+      const auto& [number, mark] = *change;
+      const auto found = stored.find(number);
+      const bool is_read = mark ? found != stored.end() : found == stored.end();
+      if (mark && !is_read) marks_.insert_or_assign(number, *mark);
+      if (!mark && !is_read) marks_.erase(number);
+      change = is_read ? changes_.erase(change) : std::next(change);
+    }
+    return marks_;
   }
-  /// The mark as it is stored, when this returns.
-  Result<MarkSet::value_type> add(MapMark mark, const std::string& photo) {
-    const std::scoped_lock lock(mutex_);
-    const auto number = mapfile::put_mark(map_, marks_, mark, photo);
-    if (!number) return tl::unexpected(number.error());
-    return *marks_.emplace(*number, std::move(mark)).first;
+  /// The server has stored it, or removed it.
+  void note(std::uint64_t number, const std::optional<MapMark>& mark) {
+    changes_.insert_or_assign(number, mark);
+    if (mark) marks_.insert_or_assign(number, *mark);
+    if (!mark) marks_.erase(number);
   }
-  Status remove(std::uint64_t number) {
-    const std::scoped_lock lock(mutex_);
-    if (!marks_.contains(number)) return fail(ErrorCode::invalid, "there is no such mark");
-    if (Status ok = mapfile::remove_mark(map_, number); !ok) return ok;
-    marks_.erase(number);
-    return {};
+  /// One that no mark has, from `wanted` on.
+  [[nodiscard]] std::uint64_t free_number(std::uint64_t wanted) const {
+    while (marks_.contains(wanted)) ++wanted;
+    return wanted;
   }
+  [[nodiscard]] bool contains(std::uint64_t number) const { return marks_.contains(number); }
 
  private:
-  std::mutex mutex_;
-  storage::TableStore& map_;
   MarkSet marks_;
+  std::map<std::uint64_t, std::optional<MapMark>> changes_;  // that were not read yet
 };
 
 }  // namespace tutti::page

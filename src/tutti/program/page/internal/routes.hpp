@@ -7,36 +7,38 @@
 #include <mutex>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "tutti/history/history.hpp"
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/program/incarnation.hpp"
-#include "tutti/program/map_viewer.hpp"
 #include "tutti/program/page/acknowledged.hpp"
 #include "tutti/program/page/holders.hpp"
 #include "tutti/program/page/internal/mark_book.hpp"
 #include "tutti/program/page/live_board.hpp"
 #include "tutti/program/page/metrics.hpp"
+#include "tutti/program/page/page_server.hpp"
 #include "tutti/program/page/sign_in.hpp"
 
 namespace httplib {
 class Server;
-}
+struct Response;
+}  // namespace httplib
 
 namespace tutti::page {
 
-/// Decisions on their way from the page's threads to the server's.
-class DecisionInbox {
+/// Operators' words on their way to the server.
+class WordInbox {
  public:
-  /// The server's answer will be in the future: why the decision is not stored, or empty. Nothing when too many wait.
-  std::optional<std::future<std::string>> ask(ClosureDecision decision, std::string proved_name) {
+  /// The server's answer will be in the future: why it is not stored, or empty. Nothing when too many wait.
+  std::optional<std::future<std::string>> ask(std::variant<ClosureDecision, MarkOrder> word) {
     const std::scoped_lock lock(mutex_);
     if (is_closed_ || asked_.size() >= kMost) return std::nullopt;
-    asked_.push_back({std::move(decision), std::move(proved_name), {}});
+    asked_.push_back({std::move(word), {}});
     return asked_.back().answer.get_future();
   }
-  std::vector<program::AskedDecision> take() {
+  std::vector<AskedWord> take() {
     const std::scoped_lock lock(mutex_);
     return std::exchange(asked_, {});
   }
@@ -51,7 +53,7 @@ class DecisionInbox {
   static constexpr std::size_t kMost = 100;
   bool is_closed_ = false;
   std::mutex mutex_;
-  std::vector<program::AskedDecision> asked_;
+  std::vector<AskedWord> asked_;
 };
 
 /// The last map that the server has shown.
@@ -89,13 +91,12 @@ class Guarded {
 
 /// What the page's threads share.
 struct Site {
-  explicit Site(const program::ViewedMission& mission)
-      : mission_name(mission.name),
-        store(mission.map),
-        verifier(mission.verifier),
-        sign_in(mission.pki),
-        clouds(node::SubmapFrames::of(mission.map)),
-        marks(mission.map) {}
+  Site(const PageOptions& options, const storage::TableStore& map)
+      : mission_name(options.mission),
+        store(map),
+        verifier(options.verifier),
+        sign_in(options.pki),
+        clouds(node::SubmapFrames::of(map)) {}
 
   bool is_secure = false;
   std::vector<std::string> names;  ///< Those of the certificate, under which it is served, too.
@@ -105,11 +106,11 @@ struct Site {
   const std::uint32_t incarnation = program::any_incarnation();
   SignIn sign_in;
   LiveBoard board;
-  DecisionInbox decisions;
+  WordInbox words;
   Metrics metrics;
   std::shared_ptr<const node::SubmapFrames> clouds;
   LastMap last_map;
-  MarkBook marks;
+  Guarded<MarkBook> marks;
   Guarded<Holders> held;
   Guarded<Acknowledged> acknowledged;
   std::unique_ptr<history::History> history;  ///< Set before the server starts.
@@ -118,6 +119,9 @@ struct Site {
 
 /// Everything that the page asks for (docs/page.md). `site` outlives the server.
 void add_routes(httplib::Server& server, Site& site);
+/// Asks the server to store an operator's word, and waits. False: the answer states why it is not stored, with the
+/// status `refused` where the server refuses it.
+bool ask_server(Site& site, std::variant<ClosureDecision, MarkOrder> word, int refused, httplib::Response& response);
 /// This machine's name; empty: it has none.
 std::string own_host_name();
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/mapfile/picture.hpp"
+#include "tutti/node/picture.hpp"
 
 #include <cstddef>
 
 #include "tutti/model/map_mark.hpp"
 
-namespace tutti::mapfile {
+namespace tutti::node {
 namespace {
 
 struct Size {
@@ -53,4 +53,4 @@ Status check_picture(std::string_view bytes) {
               size.width, size.height, kMostPixels);
 }
 
-}  // namespace tutti::mapfile
+}  // namespace tutti::node
