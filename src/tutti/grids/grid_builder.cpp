@@ -44,6 +44,7 @@ Result<GridBuilder> GridBuilder::create(const GridConfig& config, const std::vec
   out.passes_.assign(count, 0);
   out.hit_by_.assign(count, 0);
   out.passed_by_.assign(count, 0);
+  out.driven_.assign(count, false);
   out.spread_ground(ground);
   return out;
 }
@@ -120,7 +121,7 @@ void GridBuilder::mark_trajectory(const Trajectory& trajectory) {
       for (int dy = -reach; dy <= reach; ++dy)
         for (int dx = -reach; dx <= reach; ++dx)
           if (const Index at{middle.x + dx, middle.y + dy}; is_inside(at) && dx * dx + dy * dy <= reach * reach)
-            mark(passed_by_, passes_, at);
+            driven_[flat(at)] = true;
     }
   }
 }
@@ -191,7 +192,9 @@ OccupancyGrid GridBuilder::grid() const {
                     .height = static_cast<std::size_t>(height_),
                     .cells = std::vector(hits_.size(), OccupancyGrid::unknown)};
   for (std::size_t i = 0; i < hits_.size(); ++i) {
-    if (hits_[i] > 0 && kPassesAHit * hits_[i] >= passes_[i])
+    if (driven_[i])
+      out.cells[i] = OccupancyGrid::free;
+    else if (hits_[i] > 0 && kPassesAHit * hits_[i] >= passes_[i])
       out.cells[i] = OccupancyGrid::occupied;
     else if (passes_[i] > 0)
       out.cells[i] = OccupancyGrid::free;

@@ -18,7 +18,7 @@ struct GridConfig {
   double range_m = 10.0;  ///< Points farther, seen from above, from the nearest pose of their submap are not used.
   /// Edge of the voxels to which submaps' clouds were thinned: a point stands for this much wall.
   double point_m = 0.3;
-  double robot_m = 0.25;  ///< Free radius around a robot's trajectory, because the robot was there.
+  double robot_m = 0.25;  ///< Radius around a robot's trajectory that is free, because the robot was there.
   double mate_m = 0.7;    ///< Points this near to where another robot was at the time are taken for that robot's body.
 };
 
@@ -45,8 +45,9 @@ class GridBuilder {
   /// `ground`: points below all robots' trajectories, at least one. A grid of more than 4e8 cells is an error.
   static Result<GridBuilder> create(const GridConfig& config, const std::vector<Ground>& ground);
   void add(const LevelSubmap& submap);
-  /// The grid of all submaps so far: a cell is occupied where at least one in three votes is for that, free where there
-  /// are other votes, and unknown elsewhere.
+  /// The grid of all submaps so far: a cell is free where a robot was, whatever was seen there, since its stack plans
+  /// from where it is; occupied where at least one in three votes is for that, free where there are other votes, and
+  /// unknown elsewhere.
   [[nodiscard]] OccupancyGrid grid() const;
 
  private:
@@ -73,6 +74,7 @@ class GridBuilder {
   std::vector<float> ground_;  ///< Height of each cell's ground, level frame; NaN where no trajectory is near.
   std::vector<std::uint16_t> hits_, passes_;       ///< Votes of submaps, per cell.
   std::vector<std::uint32_t> hit_by_, passed_by_;  ///< The last submap that voted, per cell.
+  std::vector<bool> driven_;                       ///< A robot was there, per cell.
   std::uint32_t submap_ = 0;
 };
 

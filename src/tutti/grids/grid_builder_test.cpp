@@ -104,6 +104,22 @@ TEST(GridBuilder, OtherRobotsAreNoObstacles) {
   expect_the_room(grid_of(submap));
 }
 
+/// A sensor that a person carries sees that person, and goes up and down, so that the ground is an obstacle (HKU, real:
+/// 9 % of its poses were on occupied cells).
+TEST(GridBuilder, WhereARobotWasIsFreeWhateverWasSeenThere) {
+  LevelSubmap submap = room([](double) { return 0.0; });
+  const std::vector<Ground> ground = ground_below(submap);
+  for (const StampedPose& keyframe : submap.keyframes)
+    for (double z = 0.1; z < 0.8; z += 0.1)
+      submap.points.emplace_back(
+          Vector3d(keyframe.pose.translation.x(), keyframe.pose.translation.y(), z).cast<float>());
+  GridBuilder builder = GridBuilder::create({}, ground).value();
+  for (int i = 0; i < 5; ++i) builder.add(submap);
+  for (const StampedPose& keyframe : submap.keyframes)
+    EXPECT_EQ(cell_at(builder.grid(), keyframe.pose.translation.x(), keyframe.pose.translation.y()),
+              OccupancyGrid::free);
+}
+
 TEST(GridBuilder, WhatOthersPassThroughIsFreeAgain) {
   LevelSubmap with = room([](double) { return 0.0; });
   const LevelSubmap without = with;
