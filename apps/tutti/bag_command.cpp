@@ -66,7 +66,10 @@ int show_bag(const std::string& path) {
   for (const std::string& line : bags::uses(info)) fmt::print("{}\n", printable(line));
   for (const std::string& line : bags::near_types(info)) fmt::print("{}\n", printable(line));
   for (const std::string& note : info.notes) fmt::print("note: {}\n", printable(note));
-  fmt::print("\n{}\n", printable(mission::judge_bag(path, info.robots).text));
+  const mission::BagVerdict verdict = mission::judge_bag(path, info.robots);
+  fmt::print("\n");
+  for (const std::string& warning : verdict.warnings) fmt::print("warning: {}\n", printable(warning));
+  fmt::print("{}\n", printable(verdict.text));
   std::fflush(stdout);
   for (const std::string& error : info.said) fmt::print(stderr, "{}\n", printable(error));
   if (info.errors == 0) return 0;
@@ -84,7 +87,8 @@ void add_bag_command(CLI::App& app, int& exit_code) {
       "info", "Topics with type, count, rate, times and frames; what Tutti would use of them, and what is missing.");
   info->footer(
       "All of the bag is read, one chunk at a time. One that is cut off is read up to the cut.\n"
-      "The last line is the verdict: \"ready\" with the line to type, or \"not ready\" with what is missing.\n"
+      "The last line is the verdict: \"ready\" with the line to type, or \"not ready\" with what is missing;\n"
+      "before it are warnings, where much of the recording would be left out.\n"
       "Example: tutti bag info recording/\n");
   info->add_option("bag", *path, "A folder that rosbag2 wrote, or an .mcap, .db3 or (ROS 1) .bag file; packed or not.")
       ->required()

@@ -136,6 +136,7 @@ int run_and_report(const Result<lab::MissionConfig>& config, MissionArguments& a
   }
   ProgressLine progress;
   arguments.run.progress = std::ref(progress);
+  arguments.run.warn = [](const std::string& warning) { std::cerr << "tutti: warning: " << warning << '\n'; };
   program::stop_on_signals();
   arguments.run.stop = [is_announced = false]() mutable {
     if (program::stop_asked() && !std::exchange(is_announced, true))

@@ -10,6 +10,7 @@
 
 #include "tutti/bags/robot_namespace.hpp"
 #include "tutti/bags/sensor_clock.hpp"
+#include "tutti/mission/bag_left_out.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -241,6 +242,7 @@ Status take_scans(const OdometryTrack& odometry, const std::string& topic, ScanT
       seen.refused.add(place.message, ok.error().message);
   }
   out.scan_topic = topic;
+  out.refused_scans = seen.refused;
   if (seen.refused.count > 0) out.notes.push_back(note_of(topic, seen.refused, seen.messages));
   if (const std::string doubt = clock.take_doubt(); !doubt.empty())
     out.notes.push_back(fmt::format("{}: {}", topic, doubt));
@@ -306,6 +308,7 @@ Result<BagRecording> read_bag(const fs::path& data, const RobotConfig& robot, bo
       what += ", no scans (sensor_msgs/PointCloud2, or CustomMsg of a Livox)";
     if (!index.scans.empty()) what += fmt::format(", no scans: {}", list_of(index.scans));
     out.notes.insert(out.notes.begin(), what);
+    out.warnings = much_left_out(index, {source, track}, out, robot);
     return out;
   }
   const auto& [topic, seen] = **scans;
@@ -317,6 +320,7 @@ Result<BagRecording> read_bag(const fs::path& data, const RobotConfig& robot, bo
   doubt_place(topic, out.T_body_lidar, out.notes);
   if (robot.scan_time_offset_s != 0.0) where += fmt::format("; {:g} s added to their stamps", robot.scan_time_offset_s);
   out.notes.insert(out.notes.begin(), fmt::format("{}, scans of {} ({}); {}", what, topic, in_words(seen), where));
+  out.warnings = much_left_out(index, {source, track}, out, robot);
   return out;
 }
 

@@ -36,6 +36,7 @@ struct BagRecording {
   Trajectory odometry;           ///< T_odom_body
   std::string scan_topic;        ///< Empty: the bag has no scans.
   std::vector<ScanPlace> scans;  ///< Stamps increase.
+  Refusals refused_scans;
   Pose3 T_body_lidar;
   std::vector<BagCamera> cameras;   ///< None, one or two.
   std::optional<BagDepth> depth;    ///< Registered to the only camera.
@@ -43,7 +44,8 @@ struct BagRecording {
   std::vector<ImuSample> imu;       ///< In the body frame.
   std::string fix_topic, fix_note;  ///< Empty: the bag has no fixes; and remarks on them.
   std::vector<PositionFix> fixes;
-  std::vector<std::string> notes;  ///< What was used, what was refused and why, for the report.
+  std::vector<std::string> notes;     ///< What was used, what was refused and why, for the report.
+  std::vector<std::string> warnings;  ///< much_left_out()
 };
 
 /// Reads `robot.bag` once. Topics are found by type. Odometry is nav_msgs/Odometry, else a pair of frames of /tf called

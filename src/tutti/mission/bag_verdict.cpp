@@ -5,9 +5,12 @@
 
 #include <algorithm>
 #include <cctype>
+#include <iterator>
+#include <utility>
 
 #include "tutti/mission/bag_mission.hpp"
 #include "tutti/mission/bag_recording.hpp"
+#include "tutti/mission/recordings.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -31,25 +34,54 @@ std::string without_sensors(const BagRecording& bag) {
       bag.file, bag.no_images.empty() ? "none are there" : bag.no_images);
 }
 
+/// Which verifier finds closures with what the robots have seen; or why there is none.
+Result<std::string> verifier_for(const std::vector<RobotConfig>& robots) {
+  bool has_scans = true, has_images = true;
+  for (const RobotConfig& robot : robots) {
+    const auto read = read_bag({}, robot, true);
+    if (!read) return tl::unexpected(read.error());
+    if (read->scans.empty() && read->cameras.empty()) return fail(ErrorCode::invalid, "{}", without_sensors(*read));
+    has_scans = has_scans && !read->scans.empty();
+    has_images = has_images && !read->cameras.empty();
+  }
+  return has_scans ? "lidar" : has_images ? "visual" : "sensors";
+}
+
+/// What `tutti run` of these bags begins with.
+Result<MissionInput> begin(const std::vector<RobotConfig>& robots, const std::string& verifier) {
+  MissionConfig config;
+  config.robots = robots;
+  config.closures.verifier = verifier;
+  return load_input(config, {}, 1);
+}
+
 }  // namespace
 
 BagVerdict judge_bag(const std::filesystem::path& bag, const std::set<std::string>& robots) {
-  const std::set<std::string> names = robots.empty() ? std::set{robot_of_bag(bag)} : robots;
+  const std::string plain = MissionConfig{}.closures.verifier;
+  std::vector<RobotConfig> configs;
   std::string line = "tutti run";
-  bool has_scans = true;
-  for (const std::string& name : names) {
+  for (const std::string& name : robots.empty() ? std::set{robot_of_bag(bag)} : robots) {
     RobotConfig robot;
     robot.name = name;
     robot.bag = bag.string();
-    const auto read = read_bag({}, robot, true);
-    if (!read) return {false, "not ready: " + read.error().message};
-    if (read->scans.empty() && read->cameras.empty()) return {false, "not ready: " + without_sensors(*read)};
-    has_scans = has_scans && !read->scans.empty();
+    configs.push_back(std::move(robot));
     line += fmt::format(" --bag {}", word(name + "=" + bag.string()));
   }
   line += fmt::format(" --out out/{}", robot_of_bag(bag));
-  if (!has_scans) line += " --set closures.verifier=visual";
-  return {true, "ready: " + line};
+  auto input = begin(configs, plain);
+  if (!input) {
+    const auto verifier = verifier_for(configs);
+    if (!verifier) return {false, "not ready: " + verifier.error().message, {}};
+    if (*verifier != plain) {
+      input = begin(configs, *verifier);
+      line += " --set closures.verifier=" + *verifier;
+    }
+  }
+  if (!input) return {false, "not ready: " + input.error().message, {}};
+  BagVerdict out{true, "ready: " + line, {}};
+  for (MissionRecording& robot : input->robots) std::ranges::move(robot.warnings, std::back_inserter(out.warnings));
+  return out;
 }
 
 }  // namespace tutti::mission

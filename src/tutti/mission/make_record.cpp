@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 
 #include "tutti/base/config_io.hpp"
 #include "tutti/mission/perfect_judge.hpp"
@@ -102,7 +103,9 @@ MissionRecord make_record(const FinishedMission& mission) {
           finished.refused_images.empty() ? "the notes below say what is known" : finished.refused_images;
     for (const auto& [id, submap] : server.state().submaps) robot.submaps += id.chain.robot == robot.id ? 1 : 0;
   }
-  record.warnings = warnings_of(record);
+  for (const RobotOutcome& robot : outcomes)
+    record.warnings.insert(record.warnings.end(), robot.recording->warnings.begin(), robot.recording->warnings.end());
+  std::ranges::move(warnings_of(record), std::back_inserter(record.warnings));
   return record;
 }
 

@@ -89,6 +89,7 @@ Status take_bag(const BagRecording& bag, const Trajectory& odometry, const Robot
                 const visual::TrackingConfig& tracking, MissionRecording& out) {
   const auto note = [&](const std::string& text) { out.notes.push_back(fmt::format("{}: {}", robot.name, text)); };
   for (const std::string& text : bag.notes) note(text);
+  for (const std::string& text : bag.warnings) out.warnings.push_back(fmt::format("{}: {}", robot.name, text));
   if (!bag.scans.empty()) {
     std::string how;
     auto scans = open_scans(bag, odometry, robot, how);

@@ -39,6 +39,7 @@ struct MissionRecording {
   std::string graph, graph_robot;         ///< File and letter of the graph that it is from; empty: from none.
   std::vector<RecordedClosure> closures;  ///< Those of the graph that end at this robot.
   std::vector<std::string> notes;         ///< Assumptions made about the recording, for the report.
+  std::vector<std::string> warnings;      ///< Where much of it is left out, with what to type (much_left_out()).
 };
 
 /// The recordings of a mission.

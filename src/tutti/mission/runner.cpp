@@ -390,6 +390,8 @@ Result<MissionRecord> run_mission(const MissionConfig& config, MissionParts part
   if (const auto ok = check_links(config, parts.input.robots); !ok) return tl::unexpected(ok.error());
   if (options.stop && options.stop())
     return fail(ErrorCode::invalid, "stopped before the mission began: nothing to report");
+  if (options.warn)
+    for (const MissionRecording& robot : parts.input.robots) std::ranges::for_each(robot.warnings, options.warn);
   MissionRun mission(config, options, std::move(parts));
   mission.run();
   if (const auto ok = mission.check_scans(); !ok) return tl::unexpected(ok.error());

@@ -46,6 +46,8 @@ struct RunOptions {
   std::string version;         ///< Version of the program, for the report.
   std::string settings_yaml;   ///< Settings to show in the report; empty: those of the configuration.
   std::function<void(const Progress&)> progress;
+  /// Called before the mission begins with each of its recordings' warnings, which its record has, too.
+  std::function<void(const std::string&)> warn;
   /// Called after every update of the map.
   std::function<void(const server::MapServer&)> updated;
   /// Asked between steps. Once it is true the mission ends as if recordings ended there, with a note on that. Not set:
