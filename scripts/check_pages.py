@@ -5,11 +5,15 @@
 Everywhere: the options and settings of `tutti` commands, and the arguments of tutti_ros's launch files. In docs/extending.md, which
 says where to change what, also every file, function, type and table.
 
-usage: check_pages.py [project root]
+With --run, README.md's commands for one's own data are run as they stand there, the live ones against a running server (run_readme.py).
+
+usage: check_pages.py [--run TUTTI_PROGRAM] [project root]
 """
 import pathlib
 import re
 import sys
+
+import run_readme
 
 SOURCES = {"src", "apps", "proto", "python", "ros2", "cmake", "tests", "scripts", "bench", "web/src", "web/test"}
 SUFFIXES = {".cpp", ".hpp", ".py", ".proto", ".txt", ".cmake", ".sh", ".yaml", ".ts", ".mjs"}
@@ -81,9 +85,12 @@ def breaches(root):
 
 
 def main():
-    root = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else pathlib.Path(__file__).parents[1]).resolve()
-    found = list(breaches(root))
-    print("\n".join(found) or f"check_pages: {root.name}: every command and name is there")
+    arguments = sys.argv[1:]
+    program = arguments[1] if arguments[:1] == ["--run"] else None
+    rest = arguments[2:] if program else arguments
+    root = pathlib.Path(rest[0] if rest else pathlib.Path(__file__).parents[1]).resolve()
+    found = run_readme.run(read(root / "README.md"), program) if program else list(breaches(root))
+    print("\n".join(found) or f"check_pages: {root.name}: every command {'of README.md runs' if program else 'and name is there'}")
     return 1 if found else 0
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """scripts/check_pages.py finds each kind of name that is not there, at its line, and nothing in true pages."""
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -43,6 +44,20 @@ class CheckPages(unittest.TestCase):
             code, out = check(page, text)
             self.assertEqual(code, 1, text)
             self.assertIn(said, out)
+
+    @unittest.skipUnless(shutil.which("nats-server"), "no nats-server")
+    def test_commands_of_the_readme_that_fail_are_found(self):
+        block = "From recordings:\n\n```sh\ntutti bag info a\ntutti run a\ntutti run b\n```\n"
+        with tempfile.TemporaryDirectory() as folder:
+            root = pathlib.Path(folder)
+            program = root / "stub"
+            program.write_text('#!/bin/sh\n[ "$1" = bag ] && echo "not ready" && exit 3\nexit 0\n')
+            program.chmod(0o755)
+            for page, said in ((block, "tutti bag info a\nexit code 3: not ready"), ("", "0 commands behind 'From recordings:'")):
+                (root / "README.md").write_text(page)
+                done = subprocess.run([sys.executable, SCRIPT, "--run", program, root], capture_output=True, text=True, check=False)
+                self.assertEqual(done.returncode, 1, done.stdout + done.stderr)
+                self.assertIn(said, done.stdout)
 
 
 if __name__ == "__main__":
