@@ -93,8 +93,12 @@ void ChildProcess::kill() {
 
 void ChildProcess::run(ChildCommand& command) {
   std::vector<char*> environment;
-  for (char** one = environ; *one != nullptr; ++one)
-    if (command.has_our_variables || !std::string_view(*one).starts_with("TUTTI_")) environment.push_back(*one);
+  for (char** one = environ; *one != nullptr; ++one) {
+    const std::string_view variable = *one;
+    const bool is_ours = variable.starts_with("TUTTI_") && !command.has_our_variables;
+    if (!is_ours && !variable.starts_with("NOTIFY_SOCKET="))
+      environment.push_back(*one);  // that is this program's to use
+  }
   environment.push_back(nullptr);
   std::vector<char*> arguments;
   for (std::string& word : command.words) arguments.push_back(word.data());
