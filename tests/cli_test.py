@@ -266,6 +266,29 @@ class CommandLine(unittest.TestCase):
         self.assertTrue((out / "report.json").exists())
         self.expect(tutti("map", "info", kept), 0, "alpha")
 
+    def stopped(self, *arguments, after):
+        """stdout and stderr of a program that gets SIGTERM after a line with this in it"""
+        with subprocess.Popen([TUTTI, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
+            while after not in program.stderr.readline():
+                self.assertIsNone(program.poll(), "ended before it could be stopped")
+            program.send_signal(signal.SIGTERM)
+            printed, said = program.communicate(timeout=60)
+        self.assertEqual(program.returncode, 0, said)
+        return printed, said
+
+    def test_a_stopped_simulation_leaves_bags_that_can_be_read(self):
+        printed, said = self.stopped("simulate", "demo", "-o", self.path / "bags", after="%")
+        self.assertIn("stopping: the bags are closed with what is there; once more ends at once", said)
+        self.assertRegex(printed, r"bags/alpha: [0-9]+ messages, stopped at [0-9]+ of [0-9]+ s\nstopped: 1 bags are there")
+        self.assertFalse((self.path / "bags/bravo").exists())
+        self.assertTrue((self.path / "bags/alpha/metadata.yaml").exists())
+        self.expect(tutti("bag", "info", self.path / "bags/alpha"), 0, "/alpha/points", "ready: tutti run --bag alpha=")
+
+    def test_a_simulation_says_how_long_yet(self):
+        with subprocess.Popen([TUTTI, "simulate", "demo", "-o", str(self.path / "bags")], stderr=subprocess.PIPE, text=True) as program:
+            self.assertRegex(program.stderr.readline(), r"^ +1[0-9] %   alpha(, about [0-9]+ (s|min) yet)?$")
+            program.kill()
+
     def test_a_mission_removes_nothing_of_the_users(self):
         data = self.path / "data"
         (data / "clouds").mkdir(parents=True)
@@ -549,6 +572,21 @@ class CommandLine(unittest.TestCase):
         (self.path / "better_stamps.csv").unlink()
         (self.path / "better_stamps.csv").mkdir()
         self.expect(tutti("optimise", graph, "-o", self.path / "better.g2o"), 1, "better_stamps.csv")
+
+    def test_a_stopped_optimisation_writes_what_is_there(self):
+        graph, out = self.write_graph("graph.g2o", 0.5, steps=20000), self.path / "better.g2o"
+        for loss in ("none", "gnc"):
+            with subprocess.Popen([TUTTI, "optimise", graph, "-o", out, "--loss", loss], stdout=subprocess.PIPE,
+                                  stderr=subprocess.PIPE, text=True) as program:
+                status = pathlib.Path(f"/proc/{program.pid}/status")
+                while not int(status.read_text().split("SigCgt:")[1].split()[0], 16) >> (signal.SIGTERM - 1) & 1:
+                    time.sleep(0.001)
+                program.send_signal(signal.SIGTERM)  # while it reads the graph
+                printed, said = program.communicate(timeout=60)
+            self.assertEqual(program.returncode, 0, said)
+            self.assertIn("stopping: the poses so far are written; once more ends at once", said)
+            self.assertRegex(printed, "iterations +0\n(.*\n)*termination +interrupted")
+            self.assertEqual(len(out.read_text().splitlines()), len(graph.read_text().splitlines()))
 
     def test_optimise_takes_graphs_as_published(self):
         """Information that is not semidefinite, a vertex that hangs on such an edge alone, and fixed vertices."""

@@ -17,6 +17,7 @@
 #include "tutti/formats/pyfg.hpp"
 #include "tutti/formats/symbol_keys.hpp"
 #include "tutti/geometry/covariance.hpp"
+#include "tutti/judge/patience.hpp"
 
 namespace tutti::app {
 namespace {
@@ -287,7 +288,8 @@ Result<NamedGraph> name_graph(const GraphSource& source, const formats::G2oFile&
   return out;
 }
 
-Result<server::JudgedGraph> judge(const NamedGraph& graph, const std::string& path) {
+Result<server::JudgedGraph> judge(const NamedGraph& graph, const std::string& path, const std::function<bool()>& stop) {
+  const judge::Patience patience(stop);
   server::JudgedGraph judged = server::judge_graph(graph.robots, {});
   if (!judged.map.left_out.empty())
     return fail(ErrorCode::invalid, "{}: the edges of robot {} cannot be solved", path,

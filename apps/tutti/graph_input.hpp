@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <span>
@@ -59,8 +60,9 @@ Result<NamedGraph> name_graph(const GraphSource& source, const formats::G2oFile&
                               std::span<const formats::VertexStamp> stamps);
 /// The server's map of the graph (server::judge_graph). Each component is placed so that its first fixed vertex, or
 /// else its first vertex, is where the file has it. Fails when the graph cannot be solved, or a component has several
-/// vertices with FIX lines.
-Result<server::JudgedGraph> judge(const NamedGraph& graph, const std::string& path);
+/// vertices with FIX lines. Once `stop` is true, no further decision is tried.
+Result<server::JudgedGraph> judge(const NamedGraph& graph, const std::string& path,
+                                  const std::function<bool()>& stop = {});
 /// Reads the truth that `source` names; empty when there is none. Fails when a file cannot be read or does not fit the
 /// graph.
 Result<GraphTruth> read_truth(const GraphSource& source, const NamedGraph& graph);

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What takes a mission: run, demo and world.
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <chrono>
 #include <filesystem>
 #include <iostream>
 #include <map>
@@ -17,6 +15,7 @@
 #include "commands.hpp"
 #include "live_mission.hpp"
 #include "options.hpp"
+#include "progress_line.hpp"
 #include "tutti/base/folder.hpp"
 #include "tutti/formats/ply.hpp"
 #include "tutti/lab/run_mission.hpp"
@@ -33,49 +32,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// One line on stderr that is rewritten on a terminal, and elsewhere a line every ten per cent or half a minute.
-class ProgressLine {
- public:
-  void operator()(const mission::Progress& progress) {
-    const double share = progress.duration_s > 0.0 ? std::min(1.0, progress.time_s / progress.duration_s) : 1.0;
-    const std::string maps = progress.components == 0   ? "no map yet"
-                             : progress.components == 1 ? "1 map"
-                                                        : fmt::format("{} maps (not joined yet)", progress.components);
-    const std::string line = fmt::format("{:4.0f} % of {:.0f} s   {} submaps, {} closures, {}{}", 100.0 * share,
-                                         progress.duration_s, progress.submaps, progress.closures, maps, rest(share));
-    if (terminal_) {
-      std::cerr << "\r\033[K" << line << std::flush;
-      open_ = true;
-    } else if (share >= next_ || Clock::now() - printed_ > kSilence) {
-      std::cerr << line << '\n';
-      printed_ = Clock::now();
-      while (next_ <= share) next_ += 0.1;
-    }
-  }
-  void close() {
-    if (open_) std::cerr << '\n';
-    open_ = false;
-  }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  static constexpr std::chrono::seconds kSilence{30};
-
-  /// ", about 3 min yet"; empty until it can be estimated.
-  [[nodiscard]] std::string rest(double share) const {
-    constexpr double kLeastShare = 0.02, kMinute_s = 60.0;
-    const double spent_s = std::chrono::duration<double>(Clock::now() - begun_).count();
-    if (share < kLeastShare || share >= 1.0 || spent_s < 1.0) return "";
-    const double rest_s = spent_s * (1.0 - share) / share;
-    return rest_s < 2.0 * kMinute_s ? fmt::format(", about {:.0f} s yet", rest_s)
-                                    : fmt::format(", about {:.0f} min yet", rest_s / kMinute_s);
-  }
-
-  bool terminal_ = isatty(STDERR_FILENO) != 0;
-  bool open_ = false;
-  double next_ = 0.1;
-  Clock::time_point begun_ = Clock::now(), printed_ = begun_;
-};
+void show(const mission::Progress& progress, ProgressLine& line) {
+  const double share = progress.duration_s > 0.0 ? std::min(1.0, progress.time_s / progress.duration_s) : 1.0;
+  const std::string maps = progress.components == 0   ? "no map yet"
+                           : progress.components == 1 ? "1 map"
+                                                      : fmt::format("{} maps (not joined yet)", progress.components);
+  line.show(share, fmt::format("{:4.0f} % of {:.0f} s   {} submaps, {} closures, {}", 100.0 * share,
+                               progress.duration_s, progress.submaps, progress.closures, maps));
+}
 
 /// What `run` and `demo` share.
 struct MissionArguments {
@@ -135,14 +99,9 @@ int run_and_report(const Result<lab::MissionConfig>& config, MissionArguments& a
     };
   }
   ProgressLine progress;
-  arguments.run.progress = std::ref(progress);
+  arguments.run.progress = [&progress](const mission::Progress& now) { show(now, progress); };
   arguments.run.warn = [](const std::string& warning) { std::cerr << "tutti: warning: " << warning << '\n'; };
-  program::stop_on_signals();
-  arguments.run.stop = [is_announced = false]() mutable {
-    if (program::stop_asked() && !std::exchange(is_announced, true))
-      std::cerr << "\ntutti: stopping: report and map of what is there are made; once more ends at once\n";
-    return program::stop_asked().load();
-  };
+  arguments.run.stop = announced_stop("report and map of what is there are made");
   const auto record = lab::run_mission(*config, arguments.run);
   progress.close();
   if (!record) {

@@ -13,10 +13,12 @@
 #include "commands.hpp"
 #include "optimise_robust.hpp"
 #include "options.hpp"
+#include "progress_line.hpp"
 #include "tutti/base/folder.hpp"
 #include "tutti/estimation/fixed_nodes.hpp"
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/graph_stamps.hpp"
+#include "tutti/program/stop.hpp"
 
 namespace tutti::app {
 namespace {
@@ -40,6 +42,10 @@ struct Outcome {
   double chi2_after = 0.0;
   int rejected = 0;  ///< Edges with weight below 0.5.
   double time_s = 0.0;
+  bool is_stopped = false;  ///< By a signal, before it had converged.
+  [[nodiscard]] std::string_view ending() const {
+    return is_stopped ? "interrupted" : to_string(solution.summary.termination);
+  }
 };
 
 Outcome optimise(const formats::G2oFile& file, const OptimiseOptions& options) {
@@ -48,13 +54,15 @@ Outcome optimise(const formats::G2oFile& file, const OptimiseOptions& options) {
   PoseGraph graph = file.graph;
   out.chi2_before = chi2(graph);
   const auto roles = roles_from_numbering(graph);
+  const auto stop = counted_stop("step", "the poses so far are written");
   SolverConfig config{.max_iterations = options.max_iterations, .initialisation = options.initialisation};
   if (options.loss == "gnc") {
-    out.solution = solve_pose_graph_gnc(graph, {.solver = config}, roles, file.fixed).solution;
+    out.solution = solve_pose_graph_gnc(graph, {.solver = config}, roles, file.fixed, stop).solution;
   } else {
     config.loss = {loss_kind(options.loss), 3.0};  // standard deviations
-    out.solution = solve_pose_graph(graph, config, roles, file.fixed);
+    out.solution = solve_pose_graph(graph, config, roles, file.fixed, stop);
   }
+  out.is_stopped = program::stop_asked() && out.solution.summary.termination == Termination::max_iterations;
   graph.poses = out.solution.poses;
   out.chi2_after = chi2(graph);
   for (const double weight : out.solution.weights) out.rejected += weight < 0.5 ? 1 : 0;
@@ -79,7 +87,7 @@ void print(const formats::G2oFile& file, const Outcome& outcome, const OptimiseO
                                       {"downweighted_edges", outcome.rejected},
                                       {"iterations", summary.iterations},
                                       {"time_s", outcome.time_s},
-                                      {"termination", std::string(to_string(summary.termination))}};
+                                      {"termination", std::string(outcome.ending())}};
     fmt::print("{}\n", json.dump(2));
     return;
   }
@@ -97,7 +105,7 @@ void print(const formats::G2oFile& file, const Outcome& outcome, const OptimiseO
   fmt::print("chi2         {:.6g} -> {:.6g}\n", outcome.chi2_before, outcome.chi2_after);
   if (options.loss != "none") fmt::print("down-weighted edges {}\n", outcome.rejected);
   fmt::print("iterations   {}\ntime         {:.1f} ms\ntermination  {}\n", summary.iterations, 1e3 * outcome.time_s,
-             to_string(summary.termination));
+             outcome.ending());
 }
 
 /// The same vertices at the same times: the stamps beside the input, if any, go beside the output.
@@ -112,6 +120,7 @@ Status copy_stamps(const OptimiseOptions& options) {
 }
 
 int run(OptimiseOptions options) {
+  program::stop_on_signals();  // a graph that is large takes long to read, too
   if (options.robust) {
     options.robustly.source.path = options.inputs.front();
     options.robustly.source.more.assign(options.inputs.begin() + 1, options.inputs.end());
@@ -165,6 +174,7 @@ void add_optimise_command(CLI::App& app, int& exit_code) {
       "summary counts them; numbers that are not finite, or no positive eigenvalue, are an error.\n"
       "SE(2) graphs are optimised lifted to SE(3). With a robust loss or gnc, edges between vertices that follow each\n"
       "other in the file count as odometry and are trusted; gnc decides for each other edge whether it is wrong.\n"
+      "Ctrl-C or SIGTERM ends it: what is optimised, or decided, until then is written (termination: interrupted).\n"
       "IN_stamps.csv, if it is there, is copied beside the output. Several files are one graph, as where each robot "
       "has its own.\nAn edge that is there twice to the digit counts once; lines of other kinds (priors, landmarks) "
       "are left out\nand counted.\n\n"

@@ -9,6 +9,7 @@
 #include <iterator>
 
 #include "options.hpp"
+#include "progress_line.hpp"
 #include "robust_score.hpp"
 #include "robust_summary.hpp"
 #include "tutti/base/file.hpp"
@@ -17,11 +18,14 @@
 #include "tutti/formats/graph_stamps.hpp"
 #include "tutti/formats/pyfg.hpp"
 #include "tutti/formats/trajectory_file.hpp"
+#include "tutti/program/stop.hpp"
 
 namespace tutti::app {
 namespace {
 
 using server::JudgedEdge;
+
+constexpr const char* kWhatIsThere = "the graph is written as it is decided so far";
 
 std::size_t robot_of(const MapNode& node) { return node.id.chain.robot.value; }
 
@@ -107,12 +111,12 @@ int optimise_robust(const RobustOptions& options) {
   if (!truth) return complain("optimise", truth.error().message);
   const auto start = std::chrono::steady_clock::now();
   const std::clock_t cpu_start = std::clock();
-  const auto judged = judge(*graph, options.source.path);
+  const auto judged = judge(*graph, options.source.path, counted_stop("decision", kWhatIsThere));
   const double cpu_s = static_cast<double>(std::clock() - cpu_start) / CLOCKS_PER_SEC;
   const double time_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (!judged) return complain("optimise", judged.error().message + "; nothing written");
   const Score scored = score(*graph, *judged, *truth);
-  const RobustResult result{*graph, *judged, scored, time_s, cpu_s};
+  const RobustResult result{*graph, *judged, scored, time_s, cpu_s, program::stop_asked()};
   options.json ? print_json(result) : print_text(result);
   const auto written = write_all(options, *graph, *judged, *truth);
   return written ? 0 : complain("optimise", written.error().message);

@@ -79,7 +79,7 @@ void print_score(const NamedGraph& graph, const Score& score) {
 }  // namespace
 
 void print_json(const RobustResult& result) {
-  const auto& [graph, judged, score, time_s, cpu_s] = result;
+  const auto& [graph, judged, score, time_s, cpu_s, is_stopped] = result;
   ordered_json out{{"robots", graph.robot_names},
                    {"robots_from", graph.robots_from},
                    {"stamps_from", graph.stamps_from},
@@ -106,6 +106,7 @@ void print_json(const RobustResult& result) {
   out["factorisations"] = judged.map.work.factorisations;
   out["time_s"] = time_s;
   out["cpu_s"] = cpu_s;
+  if (is_stopped) out["stopped"] = true;
   fmt::print("{}\n", out.dump(2));
 }
 
@@ -128,7 +129,8 @@ void print_text(const RobustResult& result) {
                graph.robot_names[failed.chain.robot.value], name_at(graph, failed, failed.from),
                name_at(graph, failed, failed.to), failed.jump_m, failed.jump_rad / kRadPerDeg);
   print_score(graph, result.score);
-  fmt::print("time         {:.1f} s\n", result.time_s);
+  fmt::print("time         {:.1f} s{}\n", result.time_s,
+             result.is_stopped ? ", then stopped: not all was tried that may be wrong" : "");
 }
 
 }  // namespace tutti::app

@@ -14,6 +14,7 @@ struct RobustResult {
   const Score& score;
   double time_s = 0.0;  ///< By the clock, of judging alone.
   double cpu_s = 0.0;
+  bool is_stopped = false;  ///< By a signal, before all decisions were tried.
 };
 
 /// Prints the summary as JSON, or for people.

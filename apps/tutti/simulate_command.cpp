@@ -10,7 +10,9 @@
 
 #include "commands.hpp"
 #include "options.hpp"
+#include "progress_line.hpp"
 #include "tutti/lab/write_bags.hpp"
+#include "tutti/program/stop.hpp"
 
 namespace tutti::app {
 namespace {
@@ -21,13 +23,25 @@ struct SimulateOptions {
   std::vector<std::string> assignments;
 };
 
+bool is_cut(const lab::WrittenBag& bag) { return program::stop_asked() && bag.duration_s < bag.planned_s; }
+
 int simulate(const SimulateOptions& options) {
   const auto config = lab::load_mission(options.mission, options.assignments);
   if (!config) return complain("simulate", config.error().message, 2);
-  const auto bags = lab::write_bags(*config, options.seed, options.folder,
-                                    [](const std::string& robot) { fmt::print(stderr, "{} ..\n", robot); });
+  ProgressLine line;
+  const lab::Watch watch{
+      .progress = [&](const std::string& robot,
+                      double share) { line.show(share, fmt::format("{:4.0f} %   {}", 100.0 * share, robot)); },
+      .stop = announced_stop("the bags are closed with what is there")};
+  const auto bags = lab::write_bags(*config, options.seed, options.folder, watch);
+  line.close();
   if (!bags) return complain("simulate", bags.error().message, bags.error().code == ErrorCode::configuration ? 2 : 1);
-  for (const lab::WrittenBag& bag : *bags) fmt::print("{}: {} messages\n", bag.folder, bag.messages);
+  for (const lab::WrittenBag& bag : *bags)
+    fmt::print("{}: {} messages{}\n", bag.folder, bag.messages,
+               is_cut(bag) ? fmt::format(", stopped at {:.0f} of {:.0f} s", bag.duration_s, bag.planned_s) : "");
+  if (program::stop_asked())
+    fmt::print("stopped: {} bags are there, each readable; robots that are not among them were not begun\n",
+               bags->size());
   return 0;
 }
 
@@ -42,6 +56,7 @@ void add_simulate_command(CLI::App& app, int& exit_code) {
       "with\n"
       "covariances, LiDAR scans with the times of their points, IMU, images, /tf, /tf_static, and the true poses\n"
       "(/ROBOT/truth, in one frame `world` for all). Stamps count from 1 January 2026, as robots' clocks agree.\n"
+      "Ctrl-C or SIGTERM ends it: the bag is closed, and can be read up to there.\n"
       "Example: tutti simulate missions/demo.yaml -o bags && tutti bag info bags/alpha\n");
   command->add_option("mission", options->mission, "Mission file with source: simulation or hall, or 'demo'.")
       ->required()

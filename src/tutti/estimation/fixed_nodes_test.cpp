@@ -23,6 +23,27 @@ class FixedNodes : public ::testing::TestWithParam<bool> {
   }
 };
 
+TEST_P(FixedNodes, AStoppedSolutionIsWhatIsThere) {
+  Rng rng(3);
+  PoseGraph graph = random_graph(rng, 60, 60, 1.0).graph;
+  const auto roles = roles_from_numbering(graph);
+  const auto stopped_after = [&](int steps) {
+    const auto stop = [&] { return steps-- <= 0; };
+    const SolverConfig given{.relative_cost_tolerance = 1e-14, .initialisation = "given"};
+    return GetParam() ? solve_pose_graph_gnc(graph, {.solver = given}, roles, {}, stop).solution
+                      : solve_pose_graph(graph, given, roles, {}, stop);
+  };
+  const auto none = stopped_after(0), whole = stopped_after(1'000'000);
+  EXPECT_EQ(whole.summary.termination, Termination::converged);
+  EXPECT_EQ(none.summary.iterations, 0);
+  for (const auto& solution : {none, stopped_after(1)}) {
+    EXPECT_EQ(solution.summary.termination, Termination::max_iterations);
+    EXPECT_TRUE(is_usable(solution.summary.termination));
+    EXPECT_GE(solution.summary.final_cost, whole.summary.final_cost);
+    EXPECT_EQ(solution.poses.size(), graph.poses.size());
+  }
+}
+
 TEST_P(FixedNodes, StayAndTheOthersAreOptimal) {
   const std::vector<std::size_t> fixed = {7, 20, 21};  // not the first; 20 and 21 share an edge
   for (std::uint64_t seed = 0; seed < 5; ++seed) {

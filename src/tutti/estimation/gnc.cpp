@@ -49,14 +49,16 @@ bool is_binary(double weight) { return weight == 0.0 || weight == 1.0; }
 
 }  // namespace
 
-PoseGraphSolution least_squares(const PoseGraph& graph, const GncConfig& config, std::span<const std::size_t> fixed) {
+PoseGraphSolution least_squares(const PoseGraph& graph, const GncConfig& config, std::span<const std::size_t> fixed,
+                                const std::function<bool()>& stop) {
   SolverConfig plain = config.solver;
   plain.loss = {};
-  return solve_pose_graph(graph, plain, {}, fixed);
+  return solve_pose_graph(graph, plain, {}, fixed, stop);
 }
 
 GncResult truncated_least_squares(const PoseGraph& graph, const GncConfig& config, std::span<const double> truncation,
-                                  const PoseGraphSolution& start, std::span<const std::size_t> fixed) {
+                                  const PoseGraphSolution& start, std::span<const std::size_t> fixed,
+                                  const std::function<bool()>& stop) {
   const std::size_t edges = graph.edges.size();
   GncResult out{.solution = start, .inlier_weight = std::vector<double>(edges, 1.0)};
   if (!is_usable(out.solution.summary.termination)) return out;
@@ -83,7 +85,8 @@ GncResult truncated_least_squares(const PoseGraph& graph, const GncConfig& confi
   inner.relative_cost_tolerance = std::max(kInnerTolerance, config.solver.relative_cost_tolerance);
   inner.max_iterations = kInnerIterations;
   double mu = convex_until(worst);
-  for (bool binary = false; !binary && out.outer_iterations < kMaxOuterIterations; ++out.outer_iterations) {
+  for (bool binary = false; !binary && out.outer_iterations < kMaxOuterIterations && !(stop && stop());
+       ++out.outer_iterations) {
     binary = true;
     std::size_t changed = 0;
     for (std::size_t e = 0; e < edges; ++e) {
@@ -97,7 +100,7 @@ GncResult truncated_least_squares(const PoseGraph& graph, const GncConfig& confi
     const int before = out.solution.summary.factorisations;
     out.solution.summary =
         internal::minimise(equations, out.solution.poses, costs, inner,
-                           {.is_factorised = out.outer_iterations > 0 && kFewChange * changed < edges});
+                           {.is_factorised = out.outer_iterations > 0 && kFewChange * changed < edges, .stop = stop});
     out.solution.summary.factorisations += before;
     if (!is_usable(out.solution.summary.termination)) return out;
     // What is far off may be long gone, and all else fit.
@@ -110,11 +113,11 @@ GncResult truncated_least_squares(const PoseGraph& graph, const GncConfig& confi
 namespace {
 
 GncResult reweight(const PoseGraph& graph, const GncConfig& config, std::span<const EdgeRole> roles,
-                   std::span<const std::size_t> fixed) {
+                   std::span<const std::size_t> fixed, const std::function<bool()>& stop) {
   std::vector<double> truncation(graph.edges.size(), chi_square_quantile(config.confidence, 6.0));
   for (std::size_t e = 0; e < roles.size(); ++e)
     if (roles[e] == EdgeRole::trusted) truncation[e] = std::numeric_limits<double>::infinity();
-  return truncated_least_squares(graph, config, truncation, least_squares(graph, config, fixed), fixed);
+  return truncated_least_squares(graph, config, truncation, least_squares(graph, config, fixed, stop), fixed, stop);
 }
 
 }  // namespace
@@ -124,12 +127,12 @@ GncResult solve_pose_graph_gnc(const PoseGraph& graph, const GncConfig& config, 
 }
 
 GncResult solve_pose_graph_gnc(const PoseGraph& graph, const GncConfig& config, std::span<const EdgeRole> roles,
-                               std::span<const std::size_t> fixed) {
+                               std::span<const std::size_t> fixed, const std::function<bool()>& stop) {
   TUTTI_CHECK(roles.empty() || roles.size() == graph.edges.size(), "{} roles, {} edges", roles.size(),
               graph.edges.size());
-  if (!internal::is_finite(graph)) return reweight(graph, config, roles, fixed);  // reports it
+  if (!internal::is_finite(graph)) return reweight(graph, config, roles, fixed, stop);  // reports it
   const ReducedGraph reduced = reduce_chains(graph, roles, fixed);
-  if (reduced.runs.empty()) return reweight(graph, config, roles, fixed);
+  if (reduced.runs.empty()) return reweight(graph, config, roles, fixed, stop);
 
   // The runs bend little, so the reduced graph decides the same, at a fraction of the cost; then the full one is solved
   // with the decided weights from where the reduced one ended.
@@ -137,7 +140,7 @@ GncResult solve_pose_graph_gnc(const PoseGraph& graph, const GncConfig& config, 
   for (const std::size_t i : fixed)
     reduced_fixed.push_back(
         static_cast<std::size_t>(std::ranges::lower_bound(reduced.nodes, i) - reduced.nodes.begin()));
-  GncResult out = reweight(reduced.graph, config, reduced.roles, reduced_fixed);
+  GncResult out = reweight(reduced.graph, config, reduced.roles, reduced_fixed, stop);
   const std::vector<double> reduced_weight =
       std::exchange(out.inlier_weight, std::vector<double>(graph.edges.size(), 1.0));
   const std::vector<Pose3> reduced_poses = std::exchange(out.solution.poses, graph.poses);
@@ -154,8 +157,8 @@ GncResult solve_pose_graph_gnc(const PoseGraph& graph, const GncConfig& config, 
   const auto structure = internal::analyse_blocks(graph, {}, fixed);
   internal::GraphEquations equations(graph, structure);
   const int before = out.solution.summary.factorisations;
-  out.solution.summary =
-      internal::minimise(equations, out.solution.poses, {.loss = {}, .roles = roles, .scale = scale}, config.solver);
+  out.solution.summary = internal::minimise(equations, out.solution.poses, {.loss = {}, .roles = roles, .scale = scale},
+                                            config.solver, {.stop = stop});
   out.solution.summary.factorisations += before;
   return out;
 }

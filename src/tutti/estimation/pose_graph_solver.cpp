@@ -40,7 +40,7 @@ PoseGraphSolution solve_pose_graph(const PoseGraph& graph, const SolverConfig& c
 }
 
 PoseGraphSolution solve_pose_graph(const PoseGraph& graph, const SolverConfig& config, std::span<const EdgeRole> roles,
-                                   std::span<const std::size_t> fixed) {
+                                   std::span<const std::size_t> fixed, const std::function<bool()>& stop) {
   TUTTI_CHECK(roles.empty() || roles.size() == graph.edges.size(), "{} roles, {} edges", roles.size(),
               graph.edges.size());
   PoseGraphSolution solution{.poses = graph.poses, .weights = std::vector<double>(graph.edges.size(), 1.0)};
@@ -56,7 +56,7 @@ PoseGraphSolution solve_pose_graph(const PoseGraph& graph, const SolverConfig& c
   }
   const internal::EdgeCosts costs{.loss = config.loss, .roles = roles, .scale = {}};
   internal::GraphEquations equations(graph, structure);
-  solution.summary = internal::minimise(equations, solution.poses, costs, config);
+  solution.summary = internal::minimise(equations, solution.poses, costs, config, {.stop = stop});
   if (costs.loss.kind != LossKind::none) {
     for (std::size_t e = 0; e < graph.edges.size(); ++e) {
       const auto& edge = graph.edges[e];

@@ -10,6 +10,7 @@
 #include "tutti/base/check.hpp"
 #include "tutti/judge/closure_support.hpp"
 #include "tutti/judge/hypothesis.hpp"
+#include "tutti/judge/patience.hpp"
 
 namespace tutti::judge {
 namespace {
@@ -29,6 +30,7 @@ class Search {
     Solution best = solver_.solve({});
     // Whatever failed pays for its places and at least one run.
     if (!best.solved || !config_.let_odometry_fail || best.unexplained < config_.least_votes + 1.0) return best;
+    if (is_out_of_patience()) return best;
     if (Solution proposal = without_impossible(proposed()); proposal.solved && !proposal.failed.empty())
       keep_better(best, without_idle(std::move(proposal)));
     return refuse_groups(std::move(groups), best) ? without_idle(std::move(best)) : best;
@@ -76,6 +78,7 @@ class Search {
   [[nodiscard]] Solution without_idle(Solution best) const {
     std::set<std::size_t> needed;  // windows, by their first run
     for (std::size_t batch = best.hypothesis.windows.size(); best.solved && solver_.work().hypotheses < most_;) {
+      if (is_out_of_patience()) break;
       std::vector<std::size_t> open;
       for (std::size_t k = 0; k < best.hypothesis.windows.size(); ++k)
         if (!needed.contains(best.hypothesis.windows[k].first)) open.push_back(k);
@@ -112,7 +115,7 @@ class Search {
       for (const auto& group : groups) {
         double price = 0.0;  // votes of what would be lost
         for (const std::size_t c : group) price += best.accepted[c] ? solver_.votes(c) : 0.0;
-        if (changed || tried >= config_.candidate_groups || price >= best.unexplained) continue;
+        if (changed || is_out_of_patience() || tried >= config_.candidate_groups || price >= best.unexplained) continue;
         ++tried;
         Hypothesis more = best.hypothesis;
         more.wrong.push_back(group);

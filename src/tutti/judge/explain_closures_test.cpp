@@ -11,6 +11,7 @@
 #include "tutti/geometry/so3.hpp"
 #include "tutti/judge/closure_support.hpp"
 #include "tutti/judge/hypothesis.hpp"
+#include "tutti/judge/patience.hpp"
 
 namespace tutti::judge {
 namespace outlier_rejection_test {
@@ -167,6 +168,13 @@ TEST(OutlierRejection, SeveralFailuresAreFoundByASearchAndByOneCutShort) {
   laps.close_laps(2);
   const OutlierRejectionConfig short_search{.least_hypotheses = 3, .tried_nodes = 0};
   const Judgement whole = laps.explain(), cut = laps.explain({}, short_search);
+  {
+    const Patience none([] { return true; });
+    const Judgement stopped = laps.explain();
+    EXPECT_TRUE(stopped.solved);
+    EXPECT_EQ(stopped.work.hypotheses, 1U);
+  }
+  EXPECT_EQ(laps.explain().work.hypotheses, whole.work.hypotheses);
   EXPECT_GT(whole.work.hypotheses, 4U);
   EXPECT_LE(cut.work.hypotheses, 4U);
   for (const Judgement& found : {whole, cut}) {

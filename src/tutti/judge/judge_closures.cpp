@@ -13,6 +13,7 @@
 
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/judge/internal/optimiser.hpp"
+#include "tutti/judge/patience.hpp"
 
 namespace tutti::judge {
 namespace {
@@ -47,7 +48,7 @@ Optimiser::Optimiser(const OdometryGraph& map, const NodeIndex& index, const Clo
 /// closures do. So the other search is made where the first one's map is not plausible.
 Optimum Optimiser::decide() const {
   Optimum best = searched(config_.least_support);
-  if (is_usable(best) && !is_plausible(best)) {
+  if (is_usable(best) && !is_out_of_patience() && !is_plausible(best)) {
     Optimum other = searched(0);
     SearchWork work = best.work;
     work += other.work;
@@ -60,12 +61,13 @@ Optimum Optimiser::decide() const {
 
 Optimum Optimiser::searched(int least_support) const {
   Optimum best = settle(map_.searched, explain(least_support));
-  for (int round = 0; round < kDecisions && lay_joint_anew(best);) ++round;
+  for (int round = 0; round < kDecisions && !is_out_of_patience() && lay_joint_anew(best);) ++round;
   bool blames_odometry = true;
   int refusals = 0;
-  while (refusals < kDecisions && refuse_lone_witness(best, blames_odometry)) ++refusals;
+  while (refusals < kDecisions && !is_out_of_patience() && refuse_lone_witness(best, blames_odometry)) ++refusals;
+  if (is_out_of_patience()) return best;
   ask_again(best);
-  for (int round = 0; refusals > 0 && round < kDecisions && lay_joint_anew(best);) ++round;
+  for (int round = 0; refusals > 0 && round < kDecisions && !is_out_of_patience() && lay_joint_anew(best);) ++round;
   return best;
 }
 

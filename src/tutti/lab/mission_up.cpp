@@ -90,6 +90,8 @@ class MissionUp {
   std::optional<pki::Pki> pki_;  // of a bus with rights
   SteadyClock::time_point begin_ = SteadyClock::now();
   double wall_s_ = 0.0;
+  Timestamp newest_;                     // of the server's statuses
+  std::optional<Timestamp> stopped_at_;  // by a signal, before the mission was over
 };
 
 /// The command line that all programs get.
@@ -197,12 +199,16 @@ Status MissionUp::watch(const std::atomic<bool>& stop) {
     for (const bus::Received& message : (*port)->receive()) {
       const auto status = wire::decode_mission_status(*message.envelope.bytes);
       if (!status) return tl::unexpected(status.error());
+      newest_ = status->time;
       report(*status);
       if (is_over(*status, names_)) return {};
     }
     if (Status runs = children_.check(); !runs) return runs;
-    if (stop)
-      return fail(ErrorCode::io, "stopped before the mission was over; what is there lies in {}", state_.string());
+    if (stop) {
+      stopped_at_ = newest_;
+      if (options_.progress) options_.progress("stopping: the report of what is there is made; once more ends at once");
+      return {};
+    }
     std::this_thread::sleep_for(kPollEvery);
   }
 }
@@ -239,6 +245,10 @@ Result<mission::MissionRecord> MissionUp::collect() const {
       fmt::format("Run as {} programs on one machine, which talked over NATS{}, at {:g} times real time.",
                   1 + names_.size() + static_cast<std::size_t>(options_.workers),
                   options_.has_rights ? " with TLS and rights" : "", options_.rate));
+  if (stopped_at_)
+    record->notes.push_back(
+        fmt::format("stopped at {:.0f} s, before the mission was over: the report is of what is there",
+                    *stopped_at_ - Timestamp{}));
   record->timing.machine = mission::machine_description();
   record->timing.wall_s = wall_s_;
   record->timing.rate = options_.rate;

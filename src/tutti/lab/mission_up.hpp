@@ -28,7 +28,8 @@ struct MissionUpOptions {
 
 /// Runs a whole mission as programs on this machine: a server with its own bus, a program for each robot, and workers.
 /// Returns when all robots have replayed their recordings, the server has mapped everything, and every robot has
-/// received the last map. Fails when a program ends earlier (with its output), or at `stop`.
+/// received the last map. Fails when a program ends earlier (with its output). At `stop`
+/// the record is of what is there, with a note.
 Result<mission::MissionRecord> mission_up(const MissionUpOptions& options, const std::atomic<bool>& stop);
 
 }  // namespace tutti::lab

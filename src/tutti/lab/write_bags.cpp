@@ -47,8 +47,11 @@ class RobotWriter {
   RobotWriter(const RobotToWrite& robot, bags::BagWriter& bag, std::int64_t offset_ns)
       : robot_(robot), recording_(robot.recording), bag_(bag), offset_ns_(offset_ns) {}
 
-  Status write_all() {
-    if (auto ok = write_static(); !ok) return ok;
+  /// Returns the stamp of the last message.
+  Result<Timestamp> write_all(const Watch& watch) {
+    if (auto ok = write_static(); !ok) return tl::unexpected(ok.error());
+    Timestamp last = begin();
+    double told = 0.0;
     // In the order of which comes first at one stamp: who has a scan has the odometry up to it.
     std::array<Stream, 6> streams{{
         {[&](std::size_t i) { return stamp_of(recording_.odometry, i); }, [&](std::size_t i) { return odometry(i); }},
@@ -66,12 +69,21 @@ class RobotWriter {
           next = &stream;
           first = stamp;
         }
-      if (next == nullptr) return {};
-      if (auto ok = next->write(next->at++); !ok) return ok;
+      if (next == nullptr || (watch.stop && watch.stop())) return last;
+      if (auto ok = next->write(next->at++); !ok) return tl::unexpected(ok.error());
+      last = *first;
+      const double share = planned_s() > 0.0 ? (last - begin()) / planned_s() : 1.0;
+      if (!watch.progress || share < told) continue;
+      watch.progress(recording_.name, share);
+      told = share + kTellEvery;
     }
   }
 
+  [[nodiscard]] Timestamp begin() const { return recording_.odometry.front().stamp; }
+  [[nodiscard]] double planned_s() const { return recording_.odometry.back().stamp - begin(); }
+
  private:
+  static constexpr double kTellEvery = 0.002;  // share of the bag
   struct Stream {
     std::function<std::optional<Timestamp>(std::size_t)> stamp;  ///< Nothing behind the last.
     std::function<Status(std::size_t)> write;
@@ -266,27 +278,35 @@ Result<std::vector<RobotToWrite>> simulated_robots(const MissionConfig& config, 
 
 }  // namespace
 
-Result<WrittenBag> write_bag(const RobotToWrite& robot, const std::string& folder, std::int64_t offset_ns) {
+Result<WrittenBag> write_bag(const RobotToWrite& robot, const std::string& folder, std::int64_t offset_ns,
+                             const Watch& watch) {
   auto bag = bags::BagWriter::create(folder);
   if (!bag) return tl::unexpected(bag.error());
-  if (auto ok = RobotWriter(robot, *bag, offset_ns).write_all(); !ok) return tl::unexpected(ok.error());
+  RobotWriter writer(robot, *bag, offset_ns);
+  const auto last = writer.write_all(watch);
+  if (!last) return tl::unexpected(last.error());
   if (auto ok = bag->close(); !ok) return tl::unexpected(ok.error());
-  WrittenBag out{.folder = folder};
+  WrittenBag out{.folder = folder, .duration_s = *last - writer.begin(), .planned_s = writer.planned_s()};
   for (const auto& [name, topic] : bag->written().topics()) out.messages += topic.count;
   return out;
 }
 
 Result<std::vector<WrittenBag>> write_bags(const MissionConfig& config, std::uint64_t seed, const std::string& folder,
-                                           const std::function<void(const std::string&)>& progress) {
+                                           const Watch& watch) {
   if (config.source != "simulation" && config.source != "hall")
     return fail(ErrorCode::configuration, "{}: source is '{}', expected 'simulation' or 'hall'", config.mission,
                 config.source);
   const auto robots = simulated_robots(config, seed);
   if (!robots) return tl::unexpected(robots.error());
   std::vector<WrittenBag> out;
+  Watch each{.progress = {}, .stop = watch.stop};
   for (const RobotToWrite& robot : *robots) {
-    if (progress) progress(robot.recording.name);
-    auto written = write_bag(robot, (fs::path(folder) / robot.recording.name).string(), kBagsBegin_ns);
+    if (watch.stop && watch.stop()) break;
+    if (watch.progress)
+      each.progress = [&](const std::string& name, double share) {
+        watch.progress(name, (static_cast<double>(out.size()) + share) / static_cast<double>(robots->size()));
+      };
+    auto written = write_bag(robot, (fs::path(folder) / robot.recording.name).string(), kBagsBegin_ns, each);
     if (!written) return tl::unexpected(written.error());
     out.push_back(std::move(*written));
   }

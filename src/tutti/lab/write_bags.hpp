@@ -25,6 +25,16 @@ struct RobotToWrite {
 struct WrittenBag {
   std::string folder;
   std::uint64_t messages = 0;
+  double duration_s = 0.0;  ///< From the robot's first sample to its last message.
+  double planned_s = 0.0;   ///< The same of all that there was to write: more, if it was stopped.
+};
+
+/// Who watches while bags are written.
+struct Watch {
+  /// Called from time to time with the robot's name and how much of all bags is written, of 1.
+  std::function<void(const std::string& robot, double share)> progress;
+  /// Asked between messages. Once it is true, the bag is closed as it is, and no other is begun. Not set: never.
+  std::function<bool()> stop;
 };
 
 /// Time zero of simulated missions: midnight of 1 January 2026, UTC. A stamp of zero means "no stamp" in ROS.
@@ -38,12 +48,13 @@ inline constexpr std::int64_t kBagsBegin_ns = 1'767'225'600'000'000'000;
 /// Odometry's twist is the motion since the previous sample, divided by the time; its covariance is the increment's
 /// (right tangent, in the twist's frame), divided by the time squared. The pose's covariance is what has added up since
 /// the start, about the fixed axes of its frame. `offset_ns` is added to every stamp. Fails when a file cannot be
-/// written.
-Result<WrittenBag> write_bag(const RobotToWrite& robot, const std::string& folder, std::int64_t offset_ns);
+/// written. `watch.progress` has the share of this bag.
+Result<WrittenBag> write_bag(const RobotToWrite& robot, const std::string& folder, std::int64_t offset_ns,
+                             const Watch& watch = {});
 
-/// Writes a mission with source simulation or hall to DIR/alpha, DIR/bravo, .. `progress` is called with the name of
-/// each robot that is begun.
+/// Writes a mission with source simulation or hall to DIR/alpha, DIR/bravo, .. Robots that were not begun when it was
+/// stopped are not among the bags.
 Result<std::vector<WrittenBag>> write_bags(const MissionConfig& config, std::uint64_t seed, const std::string& folder,
-                                           const std::function<void(const std::string&)>& progress = {});
+                                           const Watch& watch = {});
 
 }  // namespace tutti::lab

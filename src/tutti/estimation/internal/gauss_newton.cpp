@@ -68,7 +68,7 @@ SolveSummary minimise(GraphEquations& equations, std::vector<Pose3>& poses, cons
   double previous_size = 0.0;
   bool reuse_factor = how.is_factorised;
   bool is_unknown = reuse_factor;  // no step has shown yet what this factor is worth
-  while (summary.iterations < config.max_iterations) {
+  while (summary.iterations < config.max_iterations && !(how.stop && how.stop())) {
     equations.linearise(poses, costs, !reuse_factor);
     if (!reuse_factor) ++summary.factorisations;
     if (!reuse_factor && !equations.factorise()) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <limits>
 #include <vector>
 
@@ -16,6 +17,7 @@ struct Minimising {
   /// The equations are factorised, with other costs or at other poses: that factor is tried first, and kept as long as
   /// it makes steps shrink.
   bool is_factorised = false;
+  std::function<bool()> stop;  ///< Asked before every step; once it is true none follows. Not set: never.
 };
 
 /// Moves `poses` to a minimum. Uses of config: iterations, tolerance, halvings.
