@@ -111,6 +111,26 @@ Result<ImuNoise> read_euroc_imu_noise(const std::string& path) {
   return noise;
 }
 
+// --- lists ---
+
+/// As TUM RGB-D has it: `stamp[s] file` instead of `stamp[ns],file,file`.
+bool is_tum_list(std::string_view text) {
+  internal::LineReader line(text, "");
+  return line.next() && line.columns()[0].find(',') == std::string_view::npos &&
+         line.columns()[0].find('.') != std::string_view::npos;
+}
+
+Result<Timestamp> next_seconds(const internal::LineReader& line, Timestamp last) {
+  const std::string_view column = line.columns()[0];
+  const auto stamp = internal::parse_seconds(column);
+  if (!stamp || !internal::is_in_range(*stamp))
+    return line.fail(ErrorCode::parse, "stamp in column 1 is {}, expected decimal seconds", internal::shown(column));
+  if (*stamp <= last)
+    return line.fail(ErrorCode::invalid, "stamp {} s does not come after the previous {} s, expected increasing stamps",
+                     column, internal::to_seconds(last));
+  return *stamp;
+}
+
 }  // namespace
 
 Result<std::vector<CameraCalibration>> parse_cameras(const std::string& text, const std::string& name) {
@@ -137,12 +157,15 @@ Result<std::vector<CameraImages>> parse_image_list(std::string_view text, const 
                                                    const std::vector<CameraCalibration>& cameras) {
   std::vector<CameraImages> out;
   for (const CameraCalibration& camera : cameras) out.push_back({camera.camera, {}});
-  internal::LineReader line(text, name, internal::Separator::comma);
+  const bool is_tum = is_tum_list(text);
+  internal::LineReader line(text, name, is_tum ? internal::Separator::whitespace : internal::Separator::comma);
   Timestamp last = kFirstTimestamp;
   while (line.next()) {
-    if (auto ok = line.expect_columns(1 + cameras.size(), "stamp[ns],file of each camera"); !ok)
+    if (auto ok = line.expect_columns(1 + cameras.size(),
+                                      is_tum ? "stamp[s] file, of one camera" : "stamp[ns],file of each camera");
+        !ok)
       return tl::unexpected(ok.error());
-    const auto stamp = line.next_stamp(last);
+    const auto stamp = is_tum ? next_seconds(line, last) : line.next_stamp(last);
     if (!stamp) return tl::unexpected(stamp.error());
     last = *stamp;
     for (std::size_t i = 0; i < cameras.size(); ++i) {

@@ -37,7 +37,8 @@ Result<std::vector<CameraCalibration>> parse_cameras(const std::string& text, co
 Result<std::vector<CameraCalibration>> read_cameras(const std::string& path);
 
 /// Reads a list of images, a csv `stamp[ns],file of camera 0,file of camera 1,...` with files relative to `folder` and
-/// increasing stamps; an empty cell means that this camera took no image then. Returns one entry per camera.
+/// increasing stamps; an empty cell means that this camera took no image then. Without a comma it is as TUM RGB-D's
+/// rgb.txt and depth.txt, of one camera: `stamp[s] file`. Returns one entry per camera.
 Result<std::vector<CameraImages>> parse_image_list(std::string_view text, const std::string& name,
                                                    const std::string& folder,
                                                    const std::vector<CameraCalibration>& cameras);

@@ -193,6 +193,30 @@ TEST_F(ImageFolder, ReadsOurCamerasAndAListOfImages) {
   EXPECT_FALSE(read_image_list(path("nowhere.csv"), path("data"), *cameras));
 }
 
+TEST_F(ImageFolder, ReadsTumsLists) {
+  write("cameras.yaml", kTwoCameras);
+  const CameraCalibration camera{read_cameras(path("cameras.yaml"))->at(1).camera, 0.0};
+  write("rgb.txt",
+        "# color images\n# file: 'rgbd_dataset_freiburg1_xyz.bag'\n# timestamp filename\n"
+        "1305031102.175304 rgb/1305031102.175304.png\n1305031102.211214 rgb/1305031102.211214.png\n");
+  const auto images = read_image_list(path("rgb.txt"), path("."), {camera});
+  ASSERT_TRUE(images) << images.error().message;
+  ASSERT_EQ((*images)[0].images.size(), 2U);
+  EXPECT_EQ((*images)[0].images[1].stamp.ns, 1305031102211214000);
+  EXPECT_EQ((*images)[0].images[1].path, path("./rgb/1305031102.211214.png"));
+  write("rgb.txt", "2.5 a.png\n2.5 b.png\n");
+  const auto twice = read_image_list(path("rgb.txt"), path("."), {camera});
+  ASSERT_FALSE(twice);
+  EXPECT_NE(twice.error().message.find("rgb.txt:2: stamp 2.5 s does not come after the previous 2.500000000 s"),
+            std::string::npos)
+      << twice.error().message;
+  write("rgb.txt", "2.5 a.png\nx.5 b.png\n");
+  EXPECT_NE(read_image_list(path("rgb.txt"), path("."), {camera}).error().message.find("expected decimal seconds"),
+            std::string::npos);
+  EXPECT_NE(read_image_list(path("rgb.txt"), path("."), {camera, camera}).error().message.find("of one camera"),
+            std::string::npos);
+}
+
 TEST_F(ImageFolder, ErrorsInOurCamerasSayWhereAndWhat) {
   const auto error = [&](const std::string& text) {
     write("cameras.yaml", text);
