@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 
 namespace tutti::mission {
 namespace {
@@ -120,6 +121,19 @@ std::string format_mapped_robots(const MissionRecord& record) {
   std::string out;
   for (std::size_t i = 0; i < names.size(); ++i)
     out += (i == 0 ? "" : i + 1 < names.size() ? ", " : " and ") + names[i];
+  return out;
+}
+
+std::string format_maps(const MissionRecord& record) {
+  std::map<std::uint32_t, std::string> robots;  // by component
+  for (const RobotRecord& robot : record.robots)
+    if (!robot.server_estimate.empty()) {
+      std::string& names = robots[robot.component];
+      names += (names.empty() ? "" : " + ") + robot.name;
+    }
+  if (robots.size() < 2) return "";
+  std::string out;
+  for (const auto& [component, names] : robots) out += (out.empty() ? "" : "; ") + names;
   return out;
 }
 

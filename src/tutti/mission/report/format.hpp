@@ -58,6 +58,8 @@ ClosureCounts count_closures(const ServerRecord& server);
 /// The robots that the figures of the joint map are about: "all robots", or when there are several maps those in the
 /// largest: "alpha and bravo".
 std::string format_mapped_robots(const MissionRecord& record);
+/// Which robots share a map, as "alpha + bravo; charlie"; empty where all do.
+std::string format_maps(const MissionRecord& record);
 /// A sentence on the robots whose odometry turns better than it states, in standard deviations; empty when there are
 /// none.
 std::string format_surer_turns(std::span<const RobotRecord> robots);

@@ -105,9 +105,11 @@ std::string radio_table(const MissionRecord& record) {
 std::string server_lines(const MissionRecord& record) {
   const ServerRecord& server = record.server;
   const ClosureCounts closures = count_closures(server);
-  std::string text = fmt::format("{} of {}, {} ({} between robots), {} refused", plural(server.components, "map"),
-                                 plural(record.robots.size(), "robot"), plural(closures.accepted(), "loop closure"),
-                                 closures.accepted_inter, closures.rejected());
+  const std::string maps = format_maps(record);
+  std::string text =
+      fmt::format("{}{} of {}, {} ({} between robots), {} refused", plural(server.components, "map"),
+                  maps.empty() ? "" : fmt::format(" ({})", maps), plural(record.robots.size(), "robot"),
+                  plural(closures.accepted(), "loop closure"), closures.accepted_inter, closures.rejected());
   if (is_partial(server.joint.scored_share))
     text += fmt::format("; partial: RMSE ({}) over {} at once is scored on {} of all robots' trajectories",
                         format_metres(server.joint.rmse_m), format_mapped_robots(record),

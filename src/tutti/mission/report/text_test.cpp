@@ -109,8 +109,10 @@ TEST(ReportText, FiguresOfOneOfSeveralMapsNameItsRobots) {
   const std::string apart = unwrapped(report_text(record, "x"));
   EXPECT_EQ(apart.find("all robots"), std::string::npos) << apart;
   EXPECT_NE(apart.find("over alpha and charlie at once"), std::string::npos) << apart;
+  EXPECT_NE(apart.find("2 maps (alpha + charlie; bravo) of 3 robots"), std::string::npos) << apart;
   record.server.largest_component = 1;
   EXPECT_EQ(format_mapped_robots(record), "bravo");
+  EXPECT_EQ(format_maps(record), "alpha + charlie; bravo");
 }
 
 TEST(ReportText, APartialFigureIsMarkedAndNoHeadline) {
