@@ -13,7 +13,7 @@
 #include "options.hpp"
 #include "tutti/base/file.hpp"
 #include "tutti/evaluation/cloud_distance.hpp"
-#include "tutti/formats/ply.hpp"
+#include "tutti/formats/cloud_file.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/perception/lidar/registration.hpp"
 #include "tutti/perception/lidar/voxel_filter.hpp"
@@ -97,7 +97,7 @@ Result<Pose3> initial_transform(const EvalMapOptions& options) {
 }
 
 Result<formats::PlacedCloud> load(const std::string& path) {
-  auto cloud = formats::read_placed_ply(path);
+  auto cloud = formats::read_placed_cloud(path);
   if (cloud && cloud->cloud.points.empty())
     return fail(ErrorCode::invalid, "{}: holds no point, expected at least one", path);
   return cloud;

@@ -11,6 +11,8 @@
 #include "tutti/exports/map_scene.hpp"
 #include "tutti/exports/run_scene.hpp"
 #include "tutti/formats/graph_stamps.hpp"
+#include "tutti/formats/pcd.hpp"
+#include "tutti/formats/ply.hpp"
 #include "tutti/mapfile/export.hpp"
 #include "tutti/mapfile/marks.hpp"
 
@@ -82,8 +84,9 @@ Result<std::string> tum_of_run(const fs::path& folder, const FormatSettings&, co
   return fmt::format("{}: {}", out.string(), fmt::join(files, ", "));
 }
 
-Result<std::string> ply_of_map(const MapSource& map, const FormatSettings&, const fs::path& out) {
-  const auto cloud = mapfile::export_ply(*map.store, map.content, map.estimate, out);
+template <formats::CloudFormat format>
+Result<std::string> cloud_of_map(const MapSource& map, const FormatSettings&, const fs::path& out) {
+  const auto cloud = mapfile::export_cloud(*map.store, map.content, map.estimate, out, format);
   if (!cloud) return tl::unexpected(cloud.error());
   if (cloud->points == 0) return fail(ErrorCode::invalid, "{}: no submap has a cloud", map.file.string());
   return fmt::format("{}: {} points of {} submaps{}{}", out.string(), cloud->points, cloud->submaps,
@@ -93,6 +96,15 @@ Result<std::string> ply_of_map(const MapSource& map, const FormatSettings&, cons
 
 Result<std::string> ply_of_run(const fs::path& folder, const FormatSettings&, const fs::path& out) {
   return copy_of(folder / "map.ply", out).map([&] { return out.string() + ": the server's map"; });
+}
+
+Result<std::string> pcd_of_run(const fs::path& folder, const FormatSettings&, const fs::path& out) {
+  const auto cloud = formats::read_ply((folder / "map.ply").string());
+  if (!cloud) return tl::unexpected(cloud.error());
+  return formats::write_pcd(out.string(), cloud->points).map([&] {
+    return fmt::format("{}: the server's map, {} points without the robots' colours", out.string(),
+                       cloud->points.size());
+  });
 }
 
 Result<std::string> marks_of_map(const MapSource& map, const FormatSettings&, const fs::path& out) {
@@ -114,7 +126,9 @@ constexpr std::array kFormats{
     Format{"tum", "/", "Every session's trajectory in the joint map, as NAME.tum.", tum_of_map, tum_of_run},
     Format{"voxels", ".voxels.ply", "The centre of every cube of space in which anything was seen.", write_voxels,
            nullptr},
-    Format{"ply", ".ply", "What all robots saw, thinned to voxels of 0.1 m.", ply_of_map, ply_of_run},
+    Format{"ply", ".ply", "What all robots saw, thinned to voxels of 0.1 m.", cloud_of_map<formats::CloudFormat::ply>,
+           ply_of_run},
+    Format{"pcd", ".pcd", "The same for PCL's programs.", cloud_of_map<formats::CloudFormat::pcd>, pcd_of_run},
     Format{"grid", ".yaml",
            "A map to drive on, as nav2's map server reads it, with the image beside it: where something stands\n"
            "between --low and --high above the ground, where nothing does, and what nobody knows.",
@@ -148,8 +162,10 @@ Result<const Format*> format_of(std::string_view path) {
   if (format != kFormats.end()) return format;
   std::vector<std::string> known;
   for (const Format& one : kFormats) known.push_back(fmt::format("{} ({})", one.ending, one.name));
-  return fail(ErrorCode::configuration, "'{}' has no ending of a format, expected one of {}", path,
-              fmt::join(known, ", "));
+  const bool is_las = path.ends_with(".las") || path.ends_with(".laz");
+  return fail(ErrorCode::configuration, "'{}' has no ending of a format, expected one of {}{}", path,
+              fmt::join(known, ", "),
+              is_las ? fmt::format("; pdal translate map.ply {} makes LAS of a .ply", path) : "");
 }
 
 }  // namespace tutti::exports

@@ -10,6 +10,7 @@
 
 #include "support/mapfile/small_map.hpp"
 #include "tutti/base/file.hpp"
+#include "tutti/formats/cloud_file.hpp"
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/graph_stamps.hpp"
 #include "tutti/storage/sqlite_store.hpp"
@@ -90,6 +91,8 @@ TEST_F(Formats, AnUnknownEndingListsAllThatAreKnown) {
     EXPECT_NE(format.error().message.find("'" + std::string(path) + "'"), std::string::npos);
     for (const Format& one : all_formats())
       EXPECT_NE(format.error().message.find(one.ending), std::string::npos) << format.error().message;
+    EXPECT_EQ(format.error().message.find("pdal translate map.ply map.laz") != std::string::npos,
+              path == std::string_view("map.laz"));
   }
 }
 
@@ -121,6 +124,8 @@ TEST_F(Formats, WhatAMissionsFolderHasIsTheSameFile) {
   EXPECT_EQ(read_file(file("again.g2o")).value(), read_file((run / "graph.g2o").string()).value());
   EXPECT_EQ(read_file(file("again_stamps.csv")).value(), read_file((run / "graph_stamps.csv").string()).value());
   EXPECT_EQ(read_file(file("again.ply")).value(), read_file((run / "map.ply").string()).value());
+  EXPECT_EQ(formats::read_placed_cloud(file("again.pcd"))->cloud.points,
+            formats::read_placed_cloud((run / "map.ply").string())->cloud.points);
   EXPECT_EQ(read_file(file("again/1.tum")).value(), read_file((run / "1_server.tum").string()).value());
 }
 

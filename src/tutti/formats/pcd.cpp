@@ -5,9 +5,11 @@
 #include <array>
 #include <cstring>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "tutti/formats/internal/lzf.hpp"
+#include "tutti/formats/internal/placed_pcd.hpp"
 #include "tutti/formats/internal/points.hpp"
 
 namespace tutti::formats {
@@ -166,29 +168,42 @@ Result<internal::Records> read_records(LineReader& line, std::size_t count, cons
   return binary_points(*records, count, layout);
 }
 
-}  // namespace
-
-bool is_time_field(std::string_view name) { return std::ranges::find(kTimeNames, name) != kTimeNames.end(); }
-
-Result<TimedCloud> parse_timed_pcd(std::string_view bytes, const std::string& name) {
+Result<std::pair<internal::Records, std::string>> parse_records(std::string_view bytes, const std::string& name,
+                                                                bool moves) {
   LineReader line(bytes, name);
   const auto header = read_header(line);
   if (!header) return tl::unexpected(header.error());
   if (header->data != "ascii" && header->data != "binary" && header->data != "binary_compressed")
     return line.fail(ErrorCode::unsupported, "DATA is {}, expected ascii, binary or binary_compressed",
                      shown(header->data));
-  const auto layout = layout_of(*header, name);
+  auto layout = layout_of(*header, name);
   if (!layout) return tl::unexpected(layout.error());
+  layout->moves = moves;
   const std::int64_t size = header->width < 0 ? header->points : header->width * header->height;
   if (size < 0) return fail(ErrorCode::parse, "{}: no POINTS or WIDTH in the header", name);
   if (header->points >= 0 && header->points != size)
     return fail(ErrorCode::parse, "{}: POINTS is {}, expected WIDTH x HEIGHT = {}", name, header->points, size);
-
   auto records = read_records(line, static_cast<std::size_t>(size), *header, *layout);
   if (!records) return tl::unexpected(records.error());
-  return TimedCloud{.cloud = {std::move(records->points)},
-                    .time_field = std::string(layout->time_name),
-                    .times = std::move(records->times)};
+  return std::pair(std::move(*records), std::string(layout->time_name));
+}
+
+}  // namespace
+
+Result<PlacedCloud> internal::parse_placed_pcd(std::string_view bytes, const std::string& name) {
+  return parse_records(bytes, name, true).map([](auto&& read) {
+    return PlacedCloud{{std::move(read.first.points)}, read.first.origin};
+  });
+}
+
+bool is_time_field(std::string_view name) { return std::ranges::find(kTimeNames, name) != kTimeNames.end(); }
+
+Result<TimedCloud> parse_timed_pcd(std::string_view bytes, const std::string& name) {
+  return parse_records(bytes, name, false).map([](auto&& read) {
+    return TimedCloud{.cloud = {std::move(read.first.points)},
+                      .time_field = std::move(read.second),
+                      .times = std::move(read.first.times)};
+  });
 }
 
 Result<TimedCloud> read_timed_pcd(const std::string& path) {

@@ -149,10 +149,6 @@ Result<PlacedCloud> parse_placed_ply(std::string_view bytes, const std::string& 
   return parse_vertices(bytes, name, true);
 }
 
-Result<PlacedCloud> read_placed_ply(const std::string& path) {
-  return read_file(path).and_then([&](const std::string& bytes) { return parse_placed_ply(bytes, path); });
-}
-
 Result<PointCloud> read_ply(const std::string& path) {
   return read_file(path).and_then([&](const std::string& bytes) { return parse_ply(bytes, path); });
 }

@@ -42,6 +42,5 @@ struct PlacedCloud {
 };
 /// As parse_ply(), subtracting the origin before coordinates are rounded to float.
 Result<PlacedCloud> parse_placed_ply(std::string_view bytes, const std::string& name);
-Result<PlacedCloud> read_placed_ply(const std::string& path);
 
 }  // namespace tutti::formats

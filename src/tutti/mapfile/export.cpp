@@ -10,7 +10,6 @@
 #include "tutti/base/folder.hpp"
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/graph_stamps.hpp"
-#include "tutti/formats/ply.hpp"
 #include "tutti/formats/trajectory_file.hpp"
 #include "tutti/mapfile/placement.hpp"
 #include "tutti/node/submap_frames.hpp"
@@ -78,8 +77,9 @@ std::vector<std::string> world_comments(const Pose3& T_level_world) {
   return {"frame: the map's world", in_words(T_level_world) + " takes it to the frame of the map's grids"};
 }
 
-Result<ExportedCloud> export_ply(const storage::TableStore& store, const Content& content,
-                                 const server::MapEstimate& map, const std::filesystem::path& file) {
+Result<ExportedCloud> export_cloud(const storage::TableStore& store, const Content& content,
+                                   const server::MapEstimate& map, const std::filesystem::path& file,
+                                   formats::CloudFormat format) {
   const auto joint = joint_cloud(store, content, map);
   if (!joint) return tl::unexpected(joint.error());
   const std::vector<Eigen::Vector3f>& points = joint->cloud.points;
@@ -87,7 +87,7 @@ Result<ExportedCloud> export_ply(const storage::TableStore& store, const Content
                           joint->component == server::choose_components(map).largest};
   if (points.empty()) return out;
   const auto frame = world_comments(level_frame(map, joint->component));
-  if (auto status = formats::write_ply(file.string(), points, {}, {}, frame); !status)
+  if (auto status = formats::write_cloud(file.string(), format, points, frame); !status)
     return tl::unexpected(status.error());
   return out;
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "tutti/formats/cloud_file.hpp"
 #include "tutti/mapfile/content.hpp"
 #include "tutti/model/point_cloud.hpp"
 
@@ -41,8 +42,9 @@ struct ExportedCloud {
   std::size_t left_out = 0;    ///< Submaps with a cloud that are not in the component.
   bool of_the_largest = true;  ///< False: the largest component has no clouds, and this is the one with most points.
 };
-/// Writes joint_cloud() as a PLY file; without points no file is written.
-Result<ExportedCloud> export_ply(const storage::TableStore& store, const Content& content,
-                                 const server::MapEstimate& map, const std::filesystem::path& file);
+/// Writes joint_cloud() to a file; without points no file is written.
+Result<ExportedCloud> export_cloud(const storage::TableStore& store, const Content& content,
+                                   const server::MapEstimate& map, const std::filesystem::path& file,
+                                   formats::CloudFormat format);
 
 }  // namespace tutti::mapfile

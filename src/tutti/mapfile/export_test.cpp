@@ -60,7 +60,7 @@ TEST_F(Export, GraphTrajectoriesAndCloudAreThoseOfTheServersMap) {
   }
   EXPECT_EQ(poses, poses_.size());
 
-  const auto cloud = export_ply(store_, content, map, folder_ / "map.ply");
+  const auto cloud = export_cloud(store_, content, map, folder_ / "map.ply", formats::CloudFormat::ply);
   ASSERT_TRUE(cloud.has_value()) << cloud.error().message;
   EXPECT_EQ(cloud->submaps, content.submaps.size());
   EXPECT_EQ(cloud->left_out, 0U);
@@ -155,7 +155,7 @@ TEST_F(Export, WhereTheLargestPartHasNoCloudsTheCloudIsOfAnother) {
                                chain.robot.value});
       content.submaps[id] = std::make_shared<const Submap>(without_payloads(std::move(message.submap)));
     }
-  const auto cloud = export_ply(store, content, map, folder_ / "map.ply");
+  const auto cloud = export_cloud(store, content, map, folder_ / "map.ply", formats::CloudFormat::ply);
   ASSERT_TRUE(cloud.has_value()) << cloud.error().message;
   EXPECT_EQ(cloud->submaps, 2U);
   EXPECT_EQ(cloud->points, 2U);
@@ -168,7 +168,8 @@ TEST_F(Export, AFolderThatCannotBeMadeIsAnError) {
   const server::MapEstimate map = estimate(content);
   EXPECT_FALSE(export_g2o(map, folder_ / "nowhere" / "graph.g2o").has_value());
   EXPECT_FALSE(export_tum(content, map, "/dev/null/x").has_value());
-  EXPECT_FALSE(export_ply(store_, content, map, folder_ / "nowhere" / "map.ply").has_value());
+  EXPECT_FALSE(
+      export_cloud(store_, content, map, folder_ / "nowhere" / "map.ply", formats::CloudFormat::ply).has_value());
 }
 
 }  // namespace export_test
