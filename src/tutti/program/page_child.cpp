@@ -17,6 +17,7 @@ namespace tutti::program {
 namespace {
 
 constexpr auto kPollEvery = std::chrono::milliseconds(10);
+constexpr int kInARow = 3;
 constexpr int kWrongUsage = 2;      // the exit code
 constexpr std::size_t kListen = 3;  // of the command's words, where it listens
 
@@ -93,11 +94,14 @@ std::string PageChild::listens_at() const {
   return status.value("url", "");
 }
 
-bool PageChild::is_silent() const {
+/// Several times in a row: a clock that was set makes every file old for a moment.
+bool PageChild::is_silent() {
   std::error_code none;
   const auto written = std::filesystem::last_write_time(folder_ / kPageStatusFile, none);
   const auto since = std::filesystem::file_time_type::clock::now() - written;
-  return Clock::steady_s() - begun_s_ > kSilent_s && (none || std::chrono::duration<double>(since).count() > kSilent_s);
+  const bool is_old = none || std::chrono::duration<double>(since).count() > kSilent_s;
+  silent_ = is_old && Clock::steady_s() - begun_s_ > kSilent_s ? silent_ + 1 : 0;
+  return silent_ >= kInARow;
 }
 
 std::string PageChild::tend(double wall_s) {

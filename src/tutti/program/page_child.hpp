@@ -37,7 +37,7 @@ class PageChild {
   std::string tend(double wall_s);
   [[nodiscard]] const std::string& url() const { return url_; }
 
-  static constexpr double kStart_s = 20.0;                    ///< By then it listens.
+  static constexpr double kStart_s = 60.0;                    ///< By then it listens.
   static constexpr double kSilent_s = 30.0;                   ///< One that has written no status for so long is ended.
   static constexpr double kFirst_s = 1.0, kLongest_s = 60.0;  ///< Pauses before it is started again.
 
@@ -46,7 +46,7 @@ class PageChild {
   void launch();
   /// The address of the child that runs now; empty: it does not listen yet.
   [[nodiscard]] std::string listens_at() const;
-  [[nodiscard]] bool is_silent() const;
+  [[nodiscard]] bool is_silent();
 
   std::filesystem::path folder_;
   PageChildOptions options_;
@@ -54,6 +54,7 @@ class PageChild {
   std::unique_ptr<bus::ChildProcess> process_;
   std::string url_;
   double pause_s_ = kFirst_s, again_s_ = 0.0, begun_s_ = 0.0;
+  int silent_ = 0;  // how often in a row
 };
 
 }  // namespace tutti::program
