@@ -23,7 +23,7 @@ Result<Sizes> sizes_of(const storage::TableStore& store, const char* table) {
   return ok ? Result<Sizes>(std::move(out)) : tl::unexpected(ok.error());
 }
 
-/// What the submaps state of a map's nodes.
+/// Fills in what the submaps state of a map's nodes.
 void complete(std::vector<MapNode>& nodes, const server::SubmapSet& submaps) {
   std::unordered_map<KeyframeId, const Keyframe*> keyframes;
   for (const auto& [id, submap] : submaps)
@@ -91,13 +91,16 @@ Result<std::shared_ptr<const ShownMap>> MapBeside::newest() {
   const Written now = written();
   const auto bytes = read_file(estimate_.string());
   if (!bytes) return tl::unexpected(bytes.error());
+  read_ = now;  // also one that is of no use: it is not decoded again and again
   auto computed = decode_estimate(*bytes);
   if (!computed) return in_context(estimate_.string(), computed.error());
   const auto meta = node::read_map_meta(store_);
   if (!meta) return tl::unexpected(meta.error());
   if (!*meta || (*meta)->epoch != computed->epoch) return nullptr;  // left of a map that was here before
-  if (Status ok = read_rows(); !ok) return tl::unexpected(ok.error());
-  read_ = now;
+  if (Status ok = read_rows(); !ok) {
+    read_ = {};  // the store may give them later
+    return tl::unexpected(ok.error());
+  }
   complete(computed->map.nodes, content_.submaps);
   return std::make_shared<const ShownMap>(ShownMap{.revision = computed->revision,
                                                    .time = computed->time,

@@ -27,7 +27,7 @@ class MapBeside {
   Result<std::shared_ptr<const ShownMap>> newest();
 
  private:
-  /// What tells one written file from another.
+  /// Differs from one written file to the next.
   using Written = std::pair<std::filesystem::file_time_type, std::uintmax_t>;
   [[nodiscard]] Written written() const;
   Status read_rows();

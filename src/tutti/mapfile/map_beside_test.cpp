@@ -98,6 +98,11 @@ TEST_F(Beside, AnEstimateOfAnotherMapIsNone) {
   write(other);
   MapBeside beside(*reader_, folder_ / "estimate");
   EXPECT_EQ(beside.newest().value(), nullptr);
+  EXPECT_FALSE(beside.has_news()) << "it would be decoded at every turn";
+  ASSERT_TRUE(replace_file(folder_ / "estimate", "garbage", false));
+  ASSERT_TRUE(beside.has_news());
+  EXPECT_FALSE(beside.newest());
+  EXPECT_FALSE(beside.has_news());
 }
 
 TEST_F(Beside, WhateverBytesAreThereAreAMapOrAnError) {
