@@ -55,7 +55,8 @@ Result<std::unique_ptr<PageChild>> PageChild::start(std::filesystem::path folder
   std::unique_ptr<PageChild> out(new PageChild(std::move(folder), std::move(options), std::move(more)));
   const double end_s = Clock::steady_s() + kStart_s;
   out->launch();
-  while (out->url_.empty()) {
+  std::string url;
+  while (url.empty()) {
     if (const int error = out->process_->failure(); error != 0)
       return fail(ErrorCode::io, "--view: the page cannot be started: {}", std::strerror(error));
     if (out->process_->exit_code() == kWrongUsage)
@@ -65,14 +66,12 @@ Result<std::unique_ptr<PageChild>> PageChild::start(std::filesystem::path folder
                   (out->folder_ / "log.txt").string());
     if (out->process_->ended()) out->launch();  // a killed one may still be ending
     std::this_thread::sleep_for(kPollEvery);
-    out->url_ = out->listens_at();
+    url = out->listens_at();
   }
   std::string& listen = out->command_[kListen];
   const std::size_t before_port = listen.find_last_of(':') + 1;  // 0 when there is no host
-  const std::string& url = out->url_;
   listen =
       listen.substr(0, before_port) + url.substr(url.find_last_of(':') + 1, url.size() - url.find_last_of(':') - 2);
-  if (out->options_.announce) out->options_.announce(url);
   return out;
 }
 

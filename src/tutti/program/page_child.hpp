@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -18,8 +17,6 @@ struct PageChildOptions {
   std::string listen;                                  ///< "[HOST:]PORT"; port 0: any, and then always that one.
   std::vector<std::string> arguments;                  ///< The mission; the server adds bus and folders.
   std::uint64_t most_bytes = std::uint64_t{4} << 30U;  ///< Memory that it may take.
-  /// Called with the page's address whenever it has started; may be empty.
-  std::function<void(const std::string& url)> announce = {};
 };
 
 /// In a page's state folder: its address, and the number of its process.
@@ -35,7 +32,6 @@ class PageChild {
                                                   std::vector<std::string> more);
   /// To be called about once a second: starts it again. Returns what the operator should know; empty: nothing.
   std::string tend(double wall_s);
-  [[nodiscard]] const std::string& url() const { return url_; }
 
   static constexpr double kStart_s = 60.0;                    ///< By then it listens.
   static constexpr double kSilent_s = 30.0;                   ///< One that has written no status for so long is ended.
@@ -52,7 +48,6 @@ class PageChild {
   PageChildOptions options_;
   std::vector<std::string> command_;
   std::unique_ptr<bus::ChildProcess> process_;
-  std::string url_;
   double pause_s_ = kFirst_s, again_s_ = 0.0, begun_s_ = 0.0;
   int silent_ = 0;  // how often in a row
 };

@@ -2,19 +2,17 @@
 #include "tutti/program/worker_program.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
 #include <future>
-#include <limits>
 #include <thread>
 #include <utility>
 
-#include "tutti/base/random.hpp"
 #include "tutti/bus/delivery.hpp"
 #include "tutti/bus/mission_lease.hpp"
 #include "tutti/node/status_envelope.hpp"
+#include "tutti/program/incarnation.hpp"
 #include "tutti/program/stop.hpp"
 #include "tutti/verifiers/parallel.hpp"
 
@@ -26,12 +24,6 @@ constexpr std::size_t kCacheBytes = std::size_t{512} << 20U;
 
 /// Thrown through the verification of a job when the program is to end.
 struct Stopped {};
-
-/// No other start has it, nor the server's own worker, which is 0.
-std::uint32_t any_number() {
-  const Rng rng = Rng(wall_clock_ns()).fork(static_cast<std::uint64_t>(getpid()));
-  return static_cast<std::uint32_t>(1 + Rng(rng).index(std::numeric_limits<std::uint32_t>::max() - 1));
-}
 
 }  // namespace
 
@@ -97,7 +89,7 @@ Status run_worker(const WorkerOptions& options, const std::atomic<bool>& stop) {
   const auto verifier = settings.verifier();
   const auto log = EventLog::on_console("worker", options.console);
   const auto& known = options.bus.credentials.known;
-  const bus::Endpoint self = bus::Endpoint::worker(known ? known->number : any_number());
+  const bus::Endpoint self = bus::Endpoint::worker(known ? known->number : any_incarnation());
   bus::BusOptions where = options.bus;
   where.mission = options.settings.mission;
   auto mission = bus::served_mission(where, bus::kLookForServer_s);

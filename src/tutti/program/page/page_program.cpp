@@ -4,12 +4,10 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <limits>
 #include <list>
 #include <optional>
 #include <utility>
 
-#include "tutti/base/random.hpp"
 #include "tutti/bus/mission_lease.hpp"
 #include "tutti/history/history_file.hpp"
 #include "tutti/mapfile/map_beside.hpp"
@@ -17,6 +15,7 @@
 #include "tutti/node/marks.hpp"
 #include "tutti/program/clock.hpp"
 #include "tutti/program/host.hpp"
+#include "tutti/program/incarnation.hpp"
 #include "tutti/program/page_child.hpp"
 #include "tutti/program/server_program.hpp"
 #include "tutti/program/state_folder.hpp"
@@ -32,11 +31,6 @@ using program::Answer, program::Clock, program::Json, program::Level;
 constexpr double kWaitForServer_s = 10.0;
 constexpr double kNobodyWaits_s = 30.0;  // a word that the server has not answered is sent no more
 
-std::uint32_t any_number() {
-  const Rng rng = Rng(program::wall_clock_ns()).fork(static_cast<std::uint64_t>(getpid()));
-  return static_cast<std::uint32_t>(1 + Rng(rng).index(std::numeric_limits<std::uint32_t>::max() - 2));
-}
-
 /// The page as its host sees it: a viewer of the bus, which passes on what operators say.
 class HostedPage final : public program::Hosted {
  public:
@@ -48,7 +42,7 @@ class HostedPage final : public program::Hosted {
   Answer receive(const bus::Received& message, Timestamp /*now*/) override {
     auto status = wire::decode_mission_status(*message.envelope.bytes);
     if (!status) {
-      say_once(status.error().message);
+      say(status.error().message);
       return {{}, {message.ticket}};
     }
     revision_ = status->revision;
@@ -99,16 +93,16 @@ class HostedPage final : public program::Hosted {
 
   void show_map() {
     const auto map = beside_.newest();
-    if (!map) return say_once(map.error().message);
+    if (!map) return say(map.error().message);
     if (*map) page_.show(*map);
   }
   void show_marks() {
     const auto marks = node::read_marks(map_);
-    if (!marks) return say_once(marks.error().message);
-    if (!std::exchange(has_marks_, true) || *marks != marks_) page_.show_marks(*marks);
+    if (!marks) return say(marks.error().message);
+    if (marks_ != *marks) page_.show_marks(*marks);
     marks_ = *marks;
   }
-  void say_once(const std::string& what) { log_.say(Level::warning, what); }
+  void say(const std::string& what) { log_.say(Level::warning, what); }
 
   bus::Endpoint self_;
   Page& page_;
@@ -117,8 +111,7 @@ class HostedPage final : public program::Hosted {
   std::string url_;
   program::EventLog& log_;
   std::uint64_t revision_ = 0;
-  bool has_marks_ = false;
-  MarkSet marks_;
+  std::optional<MarkSet> marks_;  // that the page has
   std::list<Sent> sent_;
 };
 
@@ -152,7 +145,7 @@ Status run_page(PageProgramOptions options, const std::atomic<bool>& stop) {
   auto page = serve_page(served, **map);
   if (!page) return tl::unexpected(page.error());
   const Clock clock;
-  const bus::Endpoint self = bus::Endpoint::viewer(any_number());
+  const bus::Endpoint self = bus::Endpoint::viewer(program::any_incarnation());
   program::Host host({.store = nullptr,
                       .open_port = [&] { return bus::open_port(self, options.bus); },
                       .open_node = [&](bus::Port&) -> Result<std::unique_ptr<program::Hosted>> {
