@@ -64,8 +64,6 @@ Status write_files(const mission::CompareReport& report, const std::filesystem::
 }
 
 int run(const CompareOptions& options) {
-  if (options.a != options.b)  // until 0.3
-    fmt::print(stderr, "tutti compare: EST is judged by REF, in the order of tutti eval; before 0.2 REF came first\n");
   const auto report = compare(options);
   const Status written = !report               ? tl::unexpected(report.error())
                          : options.out.empty() ? Status()

@@ -130,10 +130,7 @@ class Comparisons(InFolder):
         truth, trajectory = walk(), walk(200, error_rad=2e-3)
         named = tutti.compare(estimate=trajectory, reference=truth).json()
         self.assertNotEqual(named, tutti.compare(estimate=truth, reference=trajectory).json())
-        with self.assertWarnsRegex(FutureWarning, "order of tutti.ate"):
-            self.assertEqual(tutti.compare(trajectory, truth).json(), named)
-        with self.assertWarnsRegex(DeprecationWarning, "reference and estimate"):
-            self.assertEqual(tutti.compare(a=truth, b=trajectory).json(), named)  # as it was
+        self.assertEqual(tutti.compare(trajectory, truth).json(), named)
         self.assertAlmostEqual(tutti.ate(trajectory, truth).rmse_m, tutti.compare(estimate=trajectory, reference=truth).before.rmse_m, 3)
 
     def test_wrong_numbers_are_refused(self):

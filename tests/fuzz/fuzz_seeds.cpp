@@ -37,7 +37,7 @@ std::string joined(std::initializer_list<std::string_view> parts) {
 
 /// As a frame, and what is in it (fuzz_targets.cpp, frame()).
 std::vector<std::string> both(MessageKind kind, const std::string& frame) {
-  return {joined({std::string_view("\0", 1), frame}), joined({"\1", wire::unpack_frame(kind, frame)->payload})};
+  return {joined({std::string_view("\0", 1), frame}), joined({"\1", *wire::unpack_frame(kind, frame)})};
 }
 
 std::string agent_state(bool corrected) {

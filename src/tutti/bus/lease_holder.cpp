@@ -19,7 +19,7 @@ namespace tutti::bus {
 namespace {
 
 constexpr std::size_t kLongestLease = 8192;  // bytes; the bus takes no larger value
-constexpr std::size_t kFieldsBefore = 5;     // of versions whose processes had no marks
+constexpr std::size_t kFields = 6;
 
 template <class Number>
 bool read_whole(std::string_view text, Number& number) {
@@ -67,7 +67,7 @@ std::string lease_text(const LeaseHolder& holder) {
 
 std::optional<LeaseHolder> lease_of(std::string_view text) {
   if (text.size() > kLongestLease || !text.ends_with('\n')) return std::nullopt;
-  std::array<std::string_view, kFieldsBefore + 1> fields;
+  std::array<std::string_view, kFields> fields;
   std::size_t count = 0;
   for (; !text.empty(); ++count) {
     if (count == fields.size()) return std::nullopt;
@@ -76,7 +76,7 @@ std::optional<LeaseHolder> lease_of(std::string_view text) {
     text.remove_prefix(end + 1);
   }
   LeaseHolder holder;
-  const bool is_lease = count >= kFieldsBefore && read_whole(fields[1], holder.process) &&
+  const bool is_lease = count == kFields && read_whole(fields[1], holder.process) &&
                         read_whole(fields[3], holder.since_ns) && !fields[4].empty();
   if (!is_lease) return std::nullopt;
   holder.host = plain_text(std::string(fields[0]));

@@ -100,9 +100,8 @@ inline constexpr double kLookForServer_s = 10.0;
 
 /// where.mission, or when that is empty that of its credential, if it has one of `tutti pki`, or the mission that is
 /// served on the bus. Waits at most `wall_s` for a lease;
-/// then, and when kDefaultMission is among several served ones, it is that, because servers of older versions have no
-/// lease. An error when several other missions are served. `say`, if given, gets once what is waited for, when that
-/// takes long.
+/// then, and when kDefaultMission is among several served ones, it is that. An error when several other missions are
+/// served. `say`, if given, gets once what is waited for, when that takes long.
 Result<std::string> served_mission(const BusOptions& where, double wall_s,
                                    const std::function<void(const std::string&)>& say = {});
 

@@ -175,7 +175,7 @@ std::string encode_estimate(const ComputedMap& computed) {
 Result<ComputedMap> decode_estimate(std::string_view bytes) {
   const auto frame = wire::unpack_frame(wire::MessageKind::estimate, bytes);
   if (!frame) return tl::unexpected(frame.error());
-  const auto rows = wire::read_fields<Rows>(frame->payload);
+  const auto rows = wire::read_fields<Rows>(*frame);
   if (!rows) return in_context("estimate", rows.error());
   if (Status ok = check(*rows); !ok) return tl::unexpected(ok.error());
   ComputedMap out{

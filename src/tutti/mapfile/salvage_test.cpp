@@ -120,19 +120,19 @@ TEST_F(SalvagedMap, WithADamagedPageIsReportedInOneLine) {
 
 TEST_F(SalvagedMap, ARobotsStoreGivesItsSubmapsAndBeginsASession) {
   const fs::path file = folder_ / "robot.tutti";
-  fs::copy_file(tutti::test::source_path("tests/stored/robot_1.tutti"), file);  // four submaps wait
+  fs::copy_file(tutti::test::source_path("tests/stored/robot_state_1.tutti"), file);  // seven submaps wait
   std::string bytes = read_file(file.string()).value();
   bytes.replace(0, 4096, 4096, '\x55');
   ASSERT_TRUE(write_file(file.string(), bytes));
   const auto salvaged = salvage(file, out_, kNow_ns);
   ASSERT_TRUE(salvaged.has_value()) << salvaged.error().message;
   EXPECT_EQ(salvaged->kind, "robot");
-  EXPECT_EQ(salvaged->rows.at("outbox"), 4U);
+  EXPECT_EQ(salvaged->rows.at("outbox"), 7U);
   EXPECT_FALSE(salvaged->rows.contains("checkpoint"));
   const auto store = storage::open_sqlite_store(out_, storage::robot_schema(), {.min_free_bytes = 0}).value();
   const auto robot = node::RobotNode::open(RobotId{1}, 7, {}, *store);
   ASSERT_TRUE(robot.has_value()) << robot.error().message;
-  EXPECT_EQ((*robot)->backlog().size(), 4U);
+  EXPECT_EQ((*robot)->backlog().size(), 7U);
   EXPECT_EQ((*robot)->agent().chain().session, kNow_ns + 1);
   const node::Step step = (*robot)->resume({});
   ASSERT_EQ(step.events.size(), 1U);

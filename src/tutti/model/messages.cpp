@@ -14,8 +14,7 @@ bool Receipt::has_refusal_of(std::uint64_t session, std::uint32_t index) const {
 
 bool Receipt::refuses(SubmapId id, std::uint64_t content) const {
   const Refusal refusal{id.chain.session, id.index, content};
-  return std::ranges::find(refusals, refusal) != refusals.end() ||
-         (refuses(id) && !has_refusal_of(id.chain.session, id.index));
+  return std::ranges::find(refusals, refusal) != refusals.end();
 }
 
 bool Receipt::refuse(SubmapId id, std::uint64_t content, std::size_t most) {

@@ -77,7 +77,7 @@ struct Receipt {
   /// The session that owns this robot's name and number, as far as the server knows.
   std::optional<std::uint64_t> owner_session;
   std::optional<Conflict> conflict;
-  std::vector<Refusal> refusals;  ///< The latest refusals by content; older servers do not send them.
+  std::vector<Refusal> refusals;  ///< The latest refusals by content.
   template <class V>
   void describe(V& v) {
     v.field(1, "robot", robot);
@@ -94,8 +94,7 @@ struct Receipt {
   [[nodiscard]] bool contains(SubmapId id) const { return has(stored, id); }
   [[nodiscard]] bool refuses(SubmapId id) const { return has(refused, id); }
   [[nodiscard]] bool leaves_unread(SubmapId id) const { return has(unread, id); }
-  /// True if this content was refused under this id. Older servers send no contents: then whatever has the id is
-  /// refused.
+  /// True if this content was refused under this id.
   [[nodiscard]] bool refuses(SubmapId id, std::uint64_t content) const;
   /// Adds a refusal; false if it is known already. Keeps at most `most` contents: the oldest go first, and an id stops
   /// being refused when its last content goes.
@@ -117,7 +116,7 @@ struct Receipt {
 struct Job {
   std::string id;
   std::vector<SubmapPair> pairs;
-  MethodId verifier{};  ///< Only this verifier may verify them. Without a name (from an older server) any verifier may.
+  MethodId verifier{};     ///< Only this verifier may verify them.
   std::string settings{};  ///< Settings to make the verifier with (server::ClosureVerifier::settings()); empty: only a
                            ///< worker that has the verifier can.
   template <class V>

@@ -53,8 +53,6 @@ class Bytes {
     take_all(list.data(), list.size());
     return list;
   }
-  void refuse() { is_right_ = false; }
-  std::string take_rest() { return std::string(std::exchange(left_, {})); }
   [[nodiscard]] bool is_done() const { return is_right_ && left_.empty(); }
 
  private:
@@ -62,12 +60,12 @@ class Bytes {
   bool is_right_ = true;
 };
 
-/// The first byte of an entry; of another kind than odometry it is the entry's index. Odometry comes hundreds of times
-/// a second, and of its covariance what follows from the rest is left out.
-constexpr char kOdometry = 0;           // all 36 numbers: what robots wrote once, and of any matrix
-constexpr char kDiagonalOdometry = 4;   // the 6 of a diagonal matrix
-constexpr char kSymmetricOdometry = 5;  // the 21 of a symmetric one
-constexpr char kFix = 6;                // the index is diagonal odometry's
+/// The first byte of an entry. Odometry comes hundreds of times a second, and of its covariance what follows from the
+/// rest is left out.
+constexpr char kOdometry = 1;           // all 36 numbers of any matrix
+constexpr char kDiagonalOdometry = 2;   // the 6 of a diagonal one
+constexpr char kSymmetricOdometry = 3;  // the 21 of a symmetric one
+constexpr char kScan = 4, kGraph = 5, kImages = 6, kFix = 7;
 
 bool is_same(double a, double b) { return std::memcmp(&a, &b, sizeof a) == 0; }  // to the bit
 
@@ -89,7 +87,7 @@ char kind_of(const OdometrySample& sample) {
 
 void write(const OdometrySample& sample, std::string& out) {
   const char kind = kind_of(sample);
-  out.back() = kind;
+  out += kind;
   put(out, sample.stamp.ns);
   put_all(out, sample.T_odom_body.rotation.coeffs().data(), 4);
   put_all(out, sample.T_odom_body.translation.data(), 3);
@@ -111,12 +109,13 @@ Result<JournalEntry> read_odometry(Bytes in, char kind) {
     });
   if (!in.is_done())
     return fail(ErrorCode::parse, "journal: an entry is not as long as it says, or of another version");
-  if (kind != kOdometry && kind_of(sample) != kind)
+  if (kind_of(sample) != kind)
     return fail(ErrorCode::parse, "journal: odometry of kind {}, expected {}", int{kind}, int{kind_of(sample)});
   return JournalEntry(sample);
 }
 
 void write(const Scan& scan, std::string& out) {
+  out += kScan;
   put(out, scan.stamp.ns);
   put(out, std::uint64_t{scan.cloud->points.size()});
   for (const Eigen::Vector3f& point : scan.cloud->points) put_all(out, point.data(), 3);
@@ -135,19 +134,12 @@ void read(Bytes& in, Scan& scan) {
     scan.age_s = std::make_shared<const std::vector<float>>(in.take_list<float>(ages));
 }
 
-void write(const HeardGraph& graph, std::string& out) {
-  put(out, kNone);  // a limit that nothing has set
-  out += graph.frame;
-}
-void read(Bytes& in, HeardGraph& graph) {
-  if (in.take<std::uint64_t>() != kNone) in.refuse();
-  graph.frame = in.take_rest();
-}
+void write(const HeardGraph& graph, std::string& out) { (out += kGraph) += graph.frame; }
 
-void write(const TrackedImages& images, std::string& out) { out += wire::encode(images); }
+void write(const TrackedImages& images, std::string& out) { (out += kImages) += wire::encode(images); }
 
 void write(const PositionFix& fix, std::string& out) {
-  out.back() = kFix;
+  out += kFix;
   put(out, fix.stamp.ns);
   for (const double x : {fix.antenna.latitude_deg, fix.antenna.longitude_deg, fix.antenna.height_m}) put(out, x);
   put_all(out, fix.covariance.data(), 9);
@@ -173,7 +165,7 @@ Result<JournalEntry> read_entry(Bytes in) {
 }  // namespace
 
 std::string encode(const JournalEntry& entry) {
-  std::string out(1, static_cast<char>(entry.index()));
+  std::string out;
   std::visit([&](const auto& what) { write(what, out); }, entry);
   return out;
 }
@@ -186,13 +178,13 @@ Result<JournalEntry> decode_entry(std::string_view bytes) {
     case kDiagonalOdometry:
     case kSymmetricOdometry:
       return read_odometry(rest, bytes.front());
-    case 1:
+    case kScan:
       return read_entry<Scan>(rest);
-    case 2:
-      return read_entry<HeardGraph>(rest);
+    case kGraph:
+      return JournalEntry(HeardGraph{std::string(bytes.substr(1))});
     case kFix:
       return read_entry<PositionFix>(rest);
-    case 3: {
+    case kImages: {
       auto images = wire::decode_tracked_images(bytes.substr(1));
       if (!images) return tl::unexpected(images.error());
       return JournalEntry(std::move(*images));

@@ -14,7 +14,7 @@ namespace {
 
 using Robots = std::pair<RobotId, RobotId>;
 
-constexpr std::string_view kBetween = "between/", kAside = "aside/";
+constexpr std::string_view kBetween = "between/";
 
 Robots robots_of(const SubmapPair& pair) { return std::minmax(pair.first.chain.robot, pair.second.chain.robot); }
 
@@ -29,7 +29,7 @@ std::string behind(std::string prefix) {
   return prefix;
 }
 
-/// The rows of keys from `from` on and below `to` ("": to the end), in batches.
+/// The rows of keys from `from` on and below `to`, in batches.
 class Batches {
  public:
   Batches(const storage::TableStore& store, std::string from, std::string to)
@@ -38,7 +38,7 @@ class Batches {
   Result<std::vector<std::string>> next() {
     std::vector<std::string> rows;
     const auto scanned = store_.scan(map_tables::kAnswers, from_, [&](std::string_view key, std::string_view bytes) {
-      if (!to_.empty() && key >= to_) return false;
+      if (key >= to_) return false;
       rows.emplace_back(bytes);
       from_ = std::string(key) + '\0';
       return rows.size() < kRowsAtOnce;
@@ -72,24 +72,19 @@ Result<std::size_t> read_refusals(const storage::TableStore& store, RobotId robo
   const Robots robots = std::minmax(robot, other);
   const std::string own = prefix_of(robots);
   std::size_t looked_at = 0;
-  for (const auto& [from, to] : {std::pair(own, behind(own)), std::pair(std::string(), std::string(kAside)),
-                                 std::pair(behind(std::string(kAside)), std::string(kBetween)),
-                                 std::pair(behind(std::string(kBetween)), std::string())}) {
-    Batches batches(store, from, to);
-    for (auto rows = batches.next();; rows = batches.next()) {
-      if (!rows) return tl::unexpected(rows.error());
-      if (rows->empty()) break;
-      looked_at += rows->size();
-      for (const std::string& bytes : *rows) {
-        const auto answer = wire::decode_verdicts(bytes);
-        if (!answer && answer.error().code == ErrorCode::unsupported) continue;
-        if (!answer) return in_context("the map's table 'answers'", answer.error());
-        for (const ClosureVerdict& verdict : answer->verdicts)
-          if (verdict.refusal && robots_of(verdict.pair) == robots) take(verdict.pair, *verdict.refusal);
-      }
+  Batches batches(store, own, behind(own));
+  for (auto rows = batches.next();; rows = batches.next()) {
+    if (!rows) return tl::unexpected(rows.error());
+    if (rows->empty()) return looked_at;
+    looked_at += rows->size();
+    for (const std::string& bytes : *rows) {
+      const auto answer = wire::decode_verdicts(bytes);
+      if (!answer && answer.error().code == ErrorCode::unsupported) continue;
+      if (!answer) return in_context("the map's table 'answers'", answer.error());
+      for (const ClosureVerdict& verdict : answer->verdicts)
+        if (verdict.refusal && robots_of(verdict.pair) == robots) take(verdict.pair, *verdict.refusal);
     }
   }
-  return looked_at;
 }
 
 }  // namespace tutti::node

@@ -15,10 +15,9 @@ namespace tutti::node {
 std::vector<storage::Write> rows_of_refusals(const Verdicts& refused);
 
 using TakeRefusal = std::function<void(const SubmapPair&, const Refusal&)>;
-/// Gives every refusal between two robots to `take`, and returns how many rows it looked at: those of the two robots,
-/// and those that programs before 28 November 2026 wrote under the job's name alone. It takes kRowsAtOnce rows at a
-/// time from the store, so that a commit waits for no more. Errors: a row that cannot be read; rows of newer programs
-/// are left out.
+/// Gives every refusal between two robots to `take`, and returns how many rows it looked at: those of the two robots.
+/// It takes kRowsAtOnce rows at a time from the store, so that a commit waits for no more. Errors: a row that cannot be
+/// read; rows of newer programs are left out.
 Result<std::size_t> read_refusals(const storage::TableStore& store, RobotId robot, RobotId other,
                                   const TakeRefusal& take);
 inline constexpr std::size_t kRowsAtOnce = 64;

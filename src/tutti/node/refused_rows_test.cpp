@@ -46,18 +46,6 @@ TEST(RefusedRows, LooksOnlyAtRowsOfTheTwoRobots) {
   EXPECT_EQ(found, 0U);
 }
 
-TEST(RefusedRows, FindsWhatFormerProgramsWroteUnderAJobsName) {
-  storage::MemoryStore store(storage::map_schema());
-  const Verdicts job = job_of(3, "7/1");
-  const std::vector<storage::Write> rows{{map_tables::kAnswers, job.job, wire::encode(job)},
-                                         {map_tables::kAnswers, "aside/1-2", "of another verifier"}};
-  ASSERT_TRUE(store.commit(rows).has_value());
-  ASSERT_TRUE(store.commit(rows_of_refusals(job_of(3, "7/2"))).has_value());
-  std::size_t found = 0;
-  EXPECT_EQ(looked_at(store, 1, 2, found), 2U);
-  EXPECT_EQ(found, 2U);
-}
-
 /// The reader is at its first refusal, with most rows before it, when a commit is asked for.
 TEST(RefusedRows, ACommitGoesOnWhileTheyAreRead) {
   const auto file = std::filesystem::path(testing::TempDir()) / "refused_rows_commit.tutti";

@@ -197,7 +197,7 @@ bool RobotNode::is_refused_as_it_is(SubmapId id, const Receipt& receipt) const {
   const auto is_of_id = [&](const Receipt::Refusal& of) {
     return of.session == id.chain.session && of.index == id.index;
   };
-  if (!receipt.refuses(id) && std::ranges::none_of(receipt.refusals, is_of_id)) return false;
+  if (std::ranges::none_of(receipt.refusals, is_of_id)) return false;
   const auto row = store_.read(kOutbox, key_of(id));
   return row && *row && receipt.refuses(id, content_hash(**row));
 }

@@ -27,14 +27,12 @@ Result<std::unique_ptr<RobotNode>> RobotNode::open(RobotId robot, std::uint64_t 
   };
   std::unique_ptr<RobotNode> node;
   Status readable = stored->lost ? Status(fail(ErrorCode::parse, "{}", *stored->lost)) : Status();
-  const bool is_whole = rows.contains(kWhole);
   if (rows.empty()) {
     node = make({{.session = next}});
-  } else if (auto state = is_whole ? wire::decode_agent_state(rows.at(kWhole)) : wire::decode_state_rows(rows)) {
-    wire::StoredState written = is_whole ? wire::StoredState{} : wire::stored_state(*state);
+  } else if (auto state = wire::decode_state_rows(rows)) {
+    wire::StoredState written = wire::stored_state(*state);
     node = make(std::move(*state));
     node->stored_ = std::move(written);
-    if (is_whole) node->obsolete_ = {kWhole};
   } else {
     readable = in_context("checkpoint", state.error());
   }

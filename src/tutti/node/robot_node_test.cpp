@@ -128,7 +128,7 @@ TEST_F(RobotNodeTest, WhatTheServerRefusesForGoodLeavesTheOutboxAndIsReported) {
   walk(0, 100);
   const SubmapId bad = node_->backlog().begin()->first;
   Receipt receipt{.robot = kRobot, .why_refused = "no good"};
-  receipt.refused[bad.chain.session].insert(bad.index);
+  receipt.refuse(bad, content_hash(store_->tables().at("outbox").at(key_of(bad))), 1);
   const bus::Envelope envelope = from_server(MessageKind::receipt, wire::encode(receipt));
   const Step step = done(node_->receive(envelope, now_));
   EXPECT_FALSE(node_->backlog().contains(bad));
@@ -189,11 +189,11 @@ TEST_F(RobotNodeTest, WhatAServerRefusedLongAgoIsNotSentAgainAndAgain) {
   walk(0, 100);
   const SubmapId bad = node_->backlog().begin()->first;
   Receipt receipt{.robot = kRobot, .incarnation = 1, .why_refused = "no good"};
-  receipt.refused[bad.chain.session].insert(bad.index);
+  receipt.refuse(bad, content_hash(store_->tables().at("outbox").at(key_of(bad))), 1);
   done(node_->receive(from_server(MessageKind::receipt, wire::encode(receipt)), now_));
   ASSERT_TRUE(node_->archive().contains(bad));
   restart();
-  receipt.refused.clear();  // its list is bounded
+  receipt.forget_refusals(bad);  // its list is bounded
   done(node_->receive(from_server(MessageKind::receipt, wire::encode(receipt)), now_));
   EXPECT_TRUE(node_->archive().contains(bad));
   receipt.incarnation = 2;  // another server may take it

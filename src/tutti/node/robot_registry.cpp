@@ -55,10 +55,6 @@ bool RobotRegistry::is_mapped(RobotId robot, std::uint64_t session) const {
   return found != mapped_.end() && found->second.contains(session);
 }
 
-void RobotRegistry::forget_strangers() {
-  std::erase_if(robots_, [&](const auto& entry) { return !is_mapped(entry.first); });
-}
-
 void RobotRegistry::make_room() {
   std::size_t strangers = 0;
   auto oldest = robots_.end();

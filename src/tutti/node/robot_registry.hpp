@@ -54,8 +54,6 @@ class RobotRegistry {
   bool note_session(const ChainId& chain);
   /// True if the robot has submaps in the map.
   [[nodiscard]] bool is_mapped(RobotId robot) const { return mapped_.contains(robot); }
-  /// Forgets robots without submaps. Needed after reading the rows of an older program, which stored every claim.
-  void forget_strangers();
   /// Takes the status of a program that claims to be this robot.
   Heard hear(RobotId robot, const NodeStatus& status, Timestamp now);
 

@@ -162,8 +162,6 @@ TEST_F(Registry, StrangersAreBoundedNotStoredAndBlockNobody) {
   EXPECT_TRUE(hear(kTwo, "bravo", 11, 2));
   EXPECT_EQ(registry_.robots().size(), RobotRegistry::kMostStrangers + 1);
   EXPECT_TRUE(registry_.robots().contains(kTwo));
-  registry_.forget_strangers();
-  EXPECT_EQ(registry_.robots().size(), 1U);
 }
 
 TEST_F(Registry, WhatLiesInTheMapIsOlderThanWhoeverComesFirst) {

@@ -7,7 +7,6 @@
 namespace tutti::node::robot_tables {
 
 inline constexpr const char* kCheckpoint = "checkpoint";
-inline constexpr const char* kWhole = "agent";  // the single row that checkpoints of older programs had
 /// Begins the keys of what this or another program could not read: then the session, '/', the table, '/' and the key.
 inline constexpr const char* kAside = "aside/";
 inline constexpr const char* kJournal = "journal";

@@ -44,10 +44,6 @@ Result<std::unique_ptr<ServerNode>> ServerNode::open(std::set<RobotId> robots,
   auto opened = OpenedMap::from(store, verifier->id());
   if (!opened) return tl::unexpected(opened.error());
   if (opened->epoch > 0) epoch = opened->epoch;
-  opened->registry.forget_strangers();
-  if (config.wall_ns)  // those of programs before, which did not store when they came
-    for (auto& [pair, decision] : opened->state.decisions)
-      if (decision.taken_ns == 0) decision.taken_ns = config.wall_ns();
   if (config.accepts_others) {
     for (const auto& [robot, receipt] : opened->receipts) robots.insert(robot);
     for (const auto& [robot, entry] : opened->registry.robots()) robots.insert(robot);

@@ -343,17 +343,6 @@ TEST_F(ServerNodeTest, ADecisionCountsFromWhenItCameAndNotFromAClockThatIsAhead)
   EXPECT_EQ(holds().wish, Wish::accept);
 }
 
-TEST_F(ServerNodeTest, WhatProgramsBeforeStoredOfAClockThatWasAheadIsOverruled) {
-  fill();
-  const SubmapPair pair{{kAlpha, 0}, {kBravo, 2}};
-  receive(test::envelope(ClosureDecision{"0/0-1/2", Wish::reject, "ada", 1'000'000}));  // a server without a clock
-  std::int64_t wall_ns = 100;
-  start({RobotId{0}, RobotId{1}}, {.wall_ns = [&] { return wall_ns; }});
-  wall_ns = 102;
-  receive(test::envelope(ClosureDecision{"0/0-1/2", Wish::accept, "eve", 101}));
-  EXPECT_EQ(node_->map_server().state().decisions.at(pair).by, "eve");
-}
-
 TEST_F(ServerNodeTest, NobodyElseDecidesAndNotOnWhatIsNotThere) {
   fill();
   const auto before = store_->tables();

@@ -2,7 +2,6 @@
 // What a ServerNode knows of the others, and reports of the whole.
 #include <algorithm>
 #include <functional>
-#include <limits>
 
 #include "tutti/base/plain_text.hpp"
 #include "tutti/node/server_node.hpp"
@@ -30,8 +29,7 @@ std::uint64_t count_refused(const Receipt& receipt, const NodeStatus& status) {
     std::uint64_t used = 0;
     if (const auto stored = receipt.stored.find(session); stored != receipt.stored.end())
       for (const NumberSet::Interval& interval : stored->second.intervals()) used = interval.end;
-    if (session == status.session && !status.name.empty())  // older robots do not send it
-      used = std::max(used, status.submaps.value_or(std::numeric_limits<std::uint64_t>::max()));
+    if (session == status.session) used = std::max(used, status.submaps.value_or(0));
     for (const NumberSet::Interval& interval : numbers.intervals())
       all += std::min(interval.end, used) - std::min(interval.begin, used);
   }

@@ -252,7 +252,7 @@ TEST_F(ServerStatus, WhatItNeverTakesIsInTheReceiptAndSurvivesARestart) {
   check();
   EXPECT_EQ(store_->tables().at("submaps").size(), 1U);
   EXPECT_EQ(node_->mission_status(now_).robots[0].refused, 0U);  // they may be anybody's
-  hear(kAlpha, "alpha", 7);                                      // an older robot, which does not send how many it made
+  receive(to_server(Endpoint::of(kAlpha), {.name = "alpha", .session = 7, .start = 1, .submaps = 5}));
   EXPECT_EQ(node_->mission_status(now_).robots[0].refused, 3U);
   receipts_.clear();
   restart();

@@ -101,7 +101,7 @@ std::vector<MethodId> WorkerNode::can() const {
 }
 
 Status WorkerNode::prepare(const Job& job) {
-  if (job.verifier.name.empty() || job.verifier == verifier_->id()) {
+  if (job.verifier == verifier_->id()) {
     asked_verifier_ = verifier_;
     return {};
   }

@@ -40,7 +40,7 @@ class WorkerNodeTest : public testing::Test {
 };
 
 TEST_F(WorkerNodeTest, AnswersEveryPairOfAJobTheSameOnAnyNumberOfThreads) {
-  Job job{.id = "1/0", .pairs = {}};
+  Job job{.id = "1/0", .pairs = {}, .verifier = test::EvenVerifier().id()};
   for (std::uint32_t i = 0; i < 5; ++i) job.pairs.push_back({{kAlpha, i}, {kBravo, 2}});
   WorkerNode alone(kWorker, verifier_, frames());
   const Verdicts verdicts = answer(alone.receive(envelope(job), Timestamp{}));
@@ -79,7 +79,7 @@ TEST_F(WorkerNodeTest, AVerifierThatThrowsCostsThePairAndNothingElse) {
     test::EvenVerifier there_;
   };
   WorkerNode worker(kWorker, std::make_shared<Throwing>(), frames());
-  Job job{.id = "1/0", .pairs = {}};
+  Job job{.id = "1/0", .pairs = {}, .verifier = test::EvenVerifier().id()};
   for (std::uint32_t i = 0; i < 3; ++i) job.pairs.push_back({{kAlpha, i}, {kBravo, 2}});
   const Verdicts verdicts = answer(worker.receive(envelope(job), Timestamp{}));
   EXPECT_EQ(verdicts.verdicts.size(), 2U);
@@ -113,7 +113,7 @@ class LaterVerifier final : public server::ClosureVerifier {
 
 TEST_F(WorkerNodeTest, AnswersWithEachClosureWhenItIsKnownAndTheJobWithTheLast) {
   WorkerNode worker(kWorker, std::make_shared<LaterVerifier>(), frames());
-  Job job{.id = "1/0", .pairs = {}};
+  Job job{.id = "1/0", .pairs = {}, .verifier = test::EvenVerifier().id()};
   for (std::uint32_t i = 0; i < 3; ++i) job.pairs.push_back({{kAlpha, i}, {kBravo, 2}});
   const Timestamp newest = test::submap(kBravo, 2).submap.keyframes.back().stamp;
   const Timestamp now = newest + 5000.0;  // the clock here is 5000 s ahead
@@ -144,7 +144,7 @@ TEST_F(WorkerNodeTest, AnswersWithEachClosureWhenItIsKnownAndTheJobWithTheLast) 
 class DistantWorkerTest : public WorkerNodeTest {
  protected:
   static Job job_of(std::uint32_t count) {
-    Job job{.id = "1/0", .pairs = {}};
+    Job job{.id = "1/0", .pairs = {}, .verifier = test::EvenVerifier().id()};
     for (std::uint32_t i = 0; i < count; ++i) job.pairs.push_back({{kAlpha, i}, {kBravo, 2}});
     return job;
   }
@@ -215,7 +215,7 @@ TEST_F(DistantWorkerTest, AsksAgainForWhatDoesNotComeAndAtLastAnswersWithout) {
 }
 
 TEST_F(DistantWorkerTest, AsksForFewAtATime) {
-  Job job{.id = "1/0", .pairs = {}};
+  Job job{.id = "1/0", .pairs = {}, .verifier = test::EvenVerifier().id()};
   for (std::uint32_t i = 0; i < 40; ++i) job.pairs.push_back({{kAlpha, i}, {kBravo, 2}});
   std::vector<SubmapId> open = asked(worker_.receive(envelope(job), Timestamp{}));
   std::size_t most = open.size(), came = 0;

@@ -19,16 +19,15 @@ namespace fs = std::filesystem;
 
 constexpr RobotId kRobot{1};
 constexpr std::uint64_t kNow_ns = 1'700'000'000'000'000'000;
-constexpr std::size_t kWaiting = 4, kPage = 4096;
+constexpr std::size_t kWaiting = 7, kPage = 4096;
 
-/// A robot's state folder, with four submaps that wait.
+/// A robot's state folder, with seven submaps that wait.
 class RobotStoreTest : public testing::Test {
  protected:
   RobotStoreTest() {
     fs::remove_all(folder_);
     fs::create_directories(folder_);
-    fs::copy_file(tutti::test::source_path("tests/stored/robot_1.tutti"), file_);
-    open().store.reset();  // of today's version
+    fs::copy_file(tutti::test::source_path("tests/stored/robot_state_1.tutti"), file_);
     whole_ = read_file(file_.string()).value();
   }
   ~RobotStoreTest() override { fs::remove_all(folder_); }

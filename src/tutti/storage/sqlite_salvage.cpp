@@ -122,10 +122,10 @@ Status DamagedStore::File::choose_schema(std::span<const Schema> schemas) {
   if (found == schemas.end())
     return fail(ErrorCode::invalid, "{}: holds a {}, expected a {}", file_.string(), kind, schemas.front().kind);
   schema_ = *found;
-  const bool is_newer = version.size() > 9 || std::stoul("0" + version) > schema_.version;
-  if (is_newer && first_value(internal::sql_of_strange_tables(schema_)).value_or("0") != "0")
-    return fail(ErrorCode::unsupported, "{}: a {} of version {}, this program reads versions 1 to {}", file_.string(),
-                schema_.kind, version, schema_.version);
+  const bool is_other = version != std::to_string(schema_.version);
+  if (is_other && first_value(internal::sql_of_strange_tables(schema_)).value_or("0") != "0")
+    return fail(ErrorCode::unsupported, "{}: a {} of version {}, this program reads version {}{}", file_.string(),
+                schema_.kind, version, schema_.version, internal::kUpgrade);
   return {};
 }
 

@@ -57,7 +57,7 @@ class SqliteStore final : public TableStore {
   Status configure();
   Status create(const Schema& schema);
   Status check_kind(const Schema& schema) const;
-  Status add_tables(const Schema& schema) const;
+  Status write_version(const Schema& schema) const;
   Status check_tables(const Schema& schema) const;
   Status check_pages() const;
   Status prepare_statements(const Schema& schema);
@@ -185,28 +185,19 @@ Status SqliteStore::check_kind(const Schema& schema) const {
   if (*kind != schema.kind) return fail(ErrorCode::invalid, "{}: holds a {}, expected a {}", file, *kind, schema.kind);
   const Result<std::int64_t> version = number_of("PRAGMA user_version");
   if (!version) return tl::unexpected(version.error());
-  if (*version >= 1 && *version <= schema.version) return {};
+  if (*version == schema.version) return {};
   const Result<std::int64_t> strange = number_of(internal::sql_of_strange_tables(schema));
   if (!strange) return tl::unexpected(strange.error());
-  if (*strange == 0) return {};  // a bit of the version is wrong: add_tables() writes it anew
-  return fail(ErrorCode::unsupported, "{}: a {} of version {}, this program reads versions 1 to {}{}", file,
-              schema.kind, *version, schema.version,
-              *version > schema.version ? "; it was written by a newer one" : "");
+  if (*strange == 0) return {};  // a bit of the version is wrong: write_version() writes it anew
+  return fail(ErrorCode::unsupported, "{}: a {} of version {}, this program reads version {}{}", file, schema.kind,
+              *version, schema.version, internal::kUpgrade);
 }
 
-/// Those that an older version did not have.
-Status SqliteStore::add_tables(const Schema& schema) const {
+/// The file has the tables of this version.
+Status SqliteStore::write_version(const Schema& schema) const {
   const Result<std::int64_t> version = number_of("PRAGMA user_version");
   if (!version) return tl::unexpected(version.error());
-  if (*version == schema.version) return {};
-  std::string sql = "BEGIN;";
-  for (const std::string& table : schema.tables) {
-    const Result<std::int64_t> known =
-        number_of("SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND name = '" + table + "'");
-    if (!known) return tl::unexpected(known.error());
-    if (*known == 0) sql += sql_of_table(table) + ";";
-  }
-  return run(sql + fmt::format("PRAGMA user_version={};COMMIT", schema.version));
+  return *version == schema.version ? Status() : run(fmt::format("PRAGMA user_version={}", schema.version));
 }
 
 Status SqliteStore::check_tables(const Schema& schema) const {
@@ -241,8 +232,8 @@ Status SqliteStore::open(const Schema& schema) {
   }
   if (const Status done = configure(); !done) return done;
   if (const Status done = check_kind(schema); !done) return done;
-  if (const Status done = add_tables(schema); !done) return done;
   if (const Status done = check_tables(schema); !done) return done;
+  if (const Status done = write_version(schema); !done) return done;
   if (const Status done = check_pages(); !done) return done;
   if (const Result<std::string> mode = value_of("PRAGMA journal_mode = WAL"); !mode)
     return tl::unexpected(mode.error());

@@ -13,8 +13,7 @@ const Schema& map_schema() {
 }
 
 const Schema& robot_schema() {
-  static const Schema schema{
-      .kind = "robot", .version = 2, .tables = {"checkpoint", "journal", "outbox", "archive", "meta"}};
+  static const Schema schema{.kind = "robot", .tables = {"checkpoint", "journal", "outbox", "archive", "meta"}};
   return schema;
 }
 

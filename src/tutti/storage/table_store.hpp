@@ -14,11 +14,10 @@
 
 namespace tutti::storage {
 
-/// What a store is for and which tables it has. A store is never opened as one of another kind, nor one of a newer
-/// version than the schema's. A newer version has all tables of the older ones; an older store gets the tables that it
-/// lacks, empty, when it is opened. The version is in one place of the file, where a flipped bit makes another of it,
-/// so the tables are its witness: every newer version has a table that the older ones do not have, and a file without
-/// one is not newer, whatever it says.
+/// What a store is for and which tables it has. A store is never opened as one of another kind or version. The version
+/// is in one place of the file, where a flipped bit makes another of it, so the tables are its witness: every version
+/// has a table that no earlier one has, and a file without a table that is not the schema's is not newer, whatever it
+/// says.
 struct Schema {
   std::string kind;                 ///< "map" or "robot", in the file and in messages.
   std::uint32_t version = 1;        ///< Raised when a table is added; one that means something else gets another name.

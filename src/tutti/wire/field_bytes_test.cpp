@@ -187,7 +187,7 @@ TEST(FieldBytes, AreWhatProtobufWrites) {
     expect_protobufs<v1::Receipt>(test::any_receipt(rng));
     expect_protobufs<v1::SubmapIds>(test::any_submap_request(rng));
     expect_protobufs<v1::SubmapCopy>(test::any_submap_copy(rng));
-    const auto payload = [](MessageKind kind, const std::string& frame) { return unpack_frame(kind, frame)->payload; };
+    const auto payload = [](MessageKind kind, const std::string& frame) { return *unpack_frame(kind, frame); };
     const std::string job = payload(MessageKind::refinement_job, encode(test::any_refinement_job(rng)));
     EXPECT_EQ(job, again<v1::RefinementJob>(job));
     const std::string refinement = payload(MessageKind::refinement, encode(test::any_refinement(rng)));

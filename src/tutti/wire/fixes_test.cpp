@@ -63,7 +63,7 @@ TEST(SubmapFixesCodec, EdgesOfTheEarthComeThrough) {
 TEST(SubmapFixesCodec, AnOlderPeerMissesNothingElse) {
   Rng rng(1);
   SubmapMessage message = with_fixes(rng, 5);
-  v1::Submap raw = parse_frame<v1::Submap>(MessageKind::submap, encode(message))->message;
+  v1::Submap raw = *parse_frame<v1::Submap>(MessageKind::submap, encode(message));
   raw.clear_fixes();
   message.submap.fixes.clear();
   EXPECT_EQ(pack_frame(MessageKind::submap, raw.SerializeAsString()), encode(message));
@@ -71,7 +71,7 @@ TEST(SubmapFixesCodec, AnOlderPeerMissesNothingElse) {
 
 TEST(SubmapFixesCodec, RefusesWhatAHostileSenderPutsThere) {
   Rng rng(1);
-  const v1::Submap good = parse_frame<v1::Submap>(MessageKind::submap, encode(with_fixes(rng, 3)))->message;
+  const v1::Submap good = *parse_frame<v1::Submap>(MessageKind::submap, encode(with_fixes(rng, 3)));
   const auto refused = [&](const std::string& why, const std::function<void(v1::Fixes&)>& spoil) {
     v1::Submap bad = good;
     spoil(*bad.mutable_fixes());

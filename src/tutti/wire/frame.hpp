@@ -16,15 +16,10 @@ namespace tutti::wire {
 /// A frame of the kind's current version. `payload` has at most kMaxMessageBytes, of an agent's state kMaxStateBytes.
 std::string pack_frame(MessageKind kind, std::string_view payload);
 
-struct Unpacked {
-  std::uint16_t version = 0;  ///< One of versions(kind).
-  std::string payload;
-};
-
 /// The payload of a frame of this kind. Errors: wrong magic, kind, size or checksum, bytes left over, a version that
 /// this program does not read. Only the last is ErrorCode::unsupported: another version of the program may read the
 /// same bytes.
-Result<Unpacked> unpack_frame(MessageKind kind, std::string_view frame);
+Result<std::string> unpack_frame(MessageKind kind, std::string_view frame);
 
 /// The kind of a frame; nothing: no frame that this program reads.
 std::optional<MessageKind> kind_of(std::string_view frame);

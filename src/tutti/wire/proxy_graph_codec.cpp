@@ -255,16 +255,16 @@ std::string encode_delta(const ProxyGraphMessage& message, const ProxyGraph& bas
 Result<ProxyGraphMessage> decode_proxy_graph(std::string_view bytes) {
   const auto parsed = parse_frame<v1::ProxyGraph>(MessageKind::proxy_graph, bytes);
   if (!parsed) return tl::unexpected(parsed.error());
-  return decode(parsed->message, {});
+  return decode(*parsed, {});
 }
 
 Result<std::optional<ProxyGraphMessage>> decode_delta(std::string_view bytes, const ProxyGraph& base) {
   const auto parsed = parse_frame<v1::ProxyGraph>(MessageKind::proxy_graph_delta, bytes);
   if (!parsed) return tl::unexpected(parsed.error());
-  const bool is_of_base = std::pair(parsed->message.base_epoch(), parsed->message.base_revision()) == base.age() &&
-                          parsed->message.incarnation() == base.incarnation;
+  const bool is_of_base = std::pair(parsed->base_epoch(), parsed->base_revision()) == base.age() &&
+                          parsed->incarnation() == base.incarnation;
   if (!is_of_base) return std::nullopt;
-  return decode(parsed->message, base);
+  return decode(*parsed, base);
 }
 
 }  // namespace tutti::wire

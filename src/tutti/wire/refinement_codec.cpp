@@ -149,7 +149,7 @@ template <class Columns>
 Result<Columns> decode_columns(MessageKind kind, std::string_view bytes) {
   const auto frame = unpack_frame(kind, bytes);
   if (!frame) return tl::unexpected(frame.error());
-  auto columns = read_fields<Columns>(frame->payload);
+  auto columns = read_fields<Columns>(*frame);
   if (!columns) return in_context(name(kind), columns.error());
   return columns;
 }

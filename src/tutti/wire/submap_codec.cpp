@@ -133,10 +133,9 @@ Status read_fixes(const v1::Fixes& in, Submap& submap) {
 
 /// All but the payloads.
 template <class In>
-Result<SubmapMessage> read_trajectory_message(const In& in, std::uint16_t version) {
+Result<SubmapMessage> read_trajectory_message(const In& in) {
   SubmapMessage message;
-  // Up to version 4 the session had nothing on the chain: each robot had one.
-  const ChainId chain{RobotId{in.header().robot()}, version < 5 ? 0 : in.header().session()};
+  const ChainId chain{RobotId{in.header().robot()}, in.header().session()};
   message.header = {chain.robot, chain.session, in.header().sequence()};
   message.submap.id = {chain, in.index()};
   const std::string where = "submap " + to_string(message.submap.id);
@@ -176,8 +175,8 @@ std::string encode(const SubmapMessage& message, const CloudCodec& cloud) {
 Result<SubmapMessage> decode_submap(std::string_view bytes) {
   const auto parsed = parse_frame<v1::Submap>(MessageKind::submap, bytes);
   if (!parsed) return tl::unexpected(parsed.error());
-  const v1::Submap& in = parsed->message;
-  auto trajectory = read_trajectory_message(in, parsed->version);
+  const v1::Submap& in = *parsed;
+  auto trajectory = read_trajectory_message(in);
   if (!trajectory) return trajectory;
   SubmapMessage message = std::move(*trajectory);
   const std::string where = "submap " + to_string(message.submap.id);
@@ -198,8 +197,8 @@ Result<SubmapMessage> decode_submap(std::string_view bytes) {
 Result<SubmapOutline> decode_outline(std::string_view bytes) {
   const auto parsed = parse_frame<v1::SubmapOutline>(MessageKind::submap, bytes);
   if (!parsed) return tl::unexpected(parsed.error());
-  const v1::SubmapOutline& in = parsed->message;
-  auto trajectory = read_trajectory_message(in, parsed->version);
+  const v1::SubmapOutline& in = *parsed;
+  auto trajectory = read_trajectory_message(in);
   if (!trajectory) return tl::unexpected(trajectory.error());
   if (auto ok = validate(*trajectory); !ok) return tl::unexpected(ok.error());
   SubmapOutline outline{std::move(trajectory->submap), {}};

@@ -38,7 +38,7 @@ bool Inbox::add_part(Endpoint from, const Part& part, std::string_view bytes, st
   }
   forget_half(found);
   auto whole = std::make_shared<const std::string>(message.assembly.take_bytes());
-  if (part.content && content_hash(*whole) != *part.content) {
+  if (content_hash(*whole) != part.content) {
     for (const auto& [index, other] : message.assembly.replies())
       if (index != part.index) strays_.push_back(other);
     messages_.erase(found);

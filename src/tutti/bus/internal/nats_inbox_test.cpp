@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -17,7 +18,10 @@ const Endpoint kAlpha = Endpoint::of(RobotId{0});
 const Endpoint kBravo = Endpoint::of(RobotId{1});
 
 Part part(const std::string& id, std::uint32_t index = 0, std::uint32_t count = 1) {
-  return {MessageKind::submap, id, index, count, {}};
+  static const std::map<std::string, std::string> whole{
+      {"a", "abcdef"}, {"half", "ABCdef"}, {"whole", "abc"}, {"real", "abc"}, {"slow", "xy"}};
+  const auto found = whole.find(id);
+  return {MessageKind::submap, id, index, count, found == whole.end() ? 0 : content_hash(found->second)};
 }
 
 TEST(NatsInbox, AMessageIsGivenOnceWhenItIsWholeAndAcknowledgedInAllItsParts) {
@@ -53,7 +57,7 @@ TEST(NatsInbox, OfAStreamThatTheBusHasLostNothingIsAcknowledgedAndHalvesAreForgo
   Inbox inbox(Endpoint::server());
   EXPECT_TRUE(inbox.add_part(kAlpha, part("half", 0, 2), "abc", "1"));
   EXPECT_TRUE(inbox.add_part(kAlpha, part("whole", 0, 1), "abc", "2"));
-  EXPECT_TRUE(inbox.add_part(kAlpha, {MessageKind::verdicts, "other", 0, 1, {}}, "abc", "3"));
+  EXPECT_TRUE(inbox.add_part(kAlpha, {MessageKind::verdicts, "other", 0, 1, content_hash("abc")}, "abc", "3"));
   const auto taken = inbox.take();
   ASSERT_EQ(taken.size(), 2U);
   for (const Received& received : taken) inbox.acknowledge(received.ticket);
@@ -69,13 +73,13 @@ TEST(NatsInbox, OfAStreamThatTheBusHasLostNothingIsAcknowledgedAndHalvesAreForgo
 
 TEST(NatsInbox, MessagesOfOneIdButOtherSendersAreOthers) {
   Inbox inbox(Endpoint::server());
-  EXPECT_TRUE(inbox.add_part(kAlpha, part("a", 0, 2), "abc", "1"));
+  EXPECT_TRUE(inbox.add_part(kAlpha, part("a", 0, 2), "ABC", "1"));
   EXPECT_TRUE(inbox.add_part(kBravo, part("a", 1, 2), "def", "2"));
   EXPECT_TRUE(inbox.take().empty());
-  EXPECT_TRUE(inbox.add_part(kBravo, part("a", 0, 2), "ABC", "3"));
+  EXPECT_TRUE(inbox.add_part(kBravo, part("a", 0, 2), "abc", "3"));
   const auto taken = inbox.take();
   ASSERT_EQ(taken.size(), 1U);
-  EXPECT_EQ(*taken[0].envelope.bytes, "ABCdef");
+  EXPECT_EQ(*taken[0].envelope.bytes, "abcdef");
   EXPECT_FALSE(inbox.add_part(kAlpha, part("a", 1, 3), "of another", "4"));
 }
 

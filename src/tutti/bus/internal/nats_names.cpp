@@ -110,25 +110,24 @@ std::optional<Address> address_of(std::string_view subject) {
 }
 
 std::string to_string(const Part& part) {
-  const std::string content = part.content ? fmt::format("/h{:016x}", *part.content) : "";
-  return fmt::format("{}/{}{}/{}.{}", word_of(part.kind), part.id, content, part.index, part.count);
+  return fmt::format("{}/{}/h{:016x}/{}.{}", word_of(part.kind), part.id, part.content, part.index, part.count);
 }
 
 std::optional<Part> part_of(std::string_view text) {
   const std::size_t first = text.find('/');
   const std::size_t last = text.rfind('/');
-  if (first == last) return std::nullopt;  // none, or one
+  if (first == last || last == 0) return std::nullopt;  // none, or one
   const auto kind = kind_of(text.substr(0, first));
   const auto numbers = split(text.substr(last + 1), '.');
   if (!kind || numbers.size() != 2) return std::nullopt;
   const auto index = number_of(numbers[0]);
   const auto count = number_of(numbers[1]);
   if (!index || !count || *count > kMostParts || *index >= *count) return std::nullopt;
-  std::string_view id = text.substr(first + 1, last - first - 1);
-  const std::size_t before = id.rfind('/');
-  const auto content = content_of(before == std::string_view::npos ? "" : id.substr(before + 1));
-  if (content) id = id.substr(0, before);
-  return Part{*kind, std::string(id), *index, *count, content};
+  const std::size_t before = text.rfind('/', last - 1);
+  if (before == first) return std::nullopt;
+  const auto content = content_of(text.substr(before + 1, last - before - 1));
+  if (!content) return std::nullopt;
+  return Part{*kind, std::string(text.substr(first + 1, before - first - 1)), *index, *count, *content};
 }
 
 Part whole_part(const Envelope& envelope) { return {envelope.kind, envelope.id, 0, 1, content_hash(*envelope.bytes)}; }

@@ -43,7 +43,7 @@ struct Part {
   std::string id;
   std::uint32_t index = 0;
   std::uint32_t count = 1;
-  std::optional<std::uint64_t> content;  ///< content_hash() of the whole; older programs do not send it.
+  std::uint64_t content = 0;  ///< content_hash() of the whole.
   friend bool operator==(const Part&, const Part&) = default;
 };
 std::string to_string(const Part& part);

@@ -11,7 +11,6 @@ namespace {
 constexpr std::array kAlways = {"report.json", "timing.json", "report.html",
                                 "config.yaml", "graph.g2o",   "graph_stamps.csv"};
 constexpr const char* kMap = "map.ply";
-constexpr std::array kOfEarlier = {"map_top.png", "map_section.png"};  // reports of version 0.2.0 and before
 constexpr const char* kSurvey = "survey.ply";
 constexpr std::array kEstimates = {"onboard", "corrected", "server", "reference"};
 
@@ -45,7 +44,7 @@ std::vector<std::string> report_file_names(const MissionRecord& record) {
 
 bool is_report_file_name(const std::string& name) {
   const auto is = [&](const char* known) { return name == known; };
-  if (std::ranges::any_of(kAlways, is) || std::ranges::any_of(kOfEarlier, is) || is(kMap) || is(kSurvey)) return true;
+  if (std::ranges::any_of(kAlways, is) || is(kMap) || is(kSurvey)) return true;
   return std::ranges::any_of(kEstimates, [&](const std::string& estimate) {
     const std::string ending = trajectory_file_name("", estimate);
     return name.size() > ending.size() && name.ends_with(ending) &&

@@ -56,8 +56,11 @@ std::string sql_of_table(const std::string& table);
 /// Makes all of an empty store, in one transaction.
 std::string sql_of_store(const Schema& schema);
 
-/// How many tables a file has that are not the schema's: SQL for one number.
+/// How many tables a file has that are not the schema's: SQL for one number. A file of another version has some.
 std::string sql_of_strange_tables(const Schema& schema);
+
+/// Ends the message of whoever refuses a file of another version.
+inline constexpr std::string_view kUpgrade = ": upgrade the older of the two programs (tutti --version)";
 
 /// FNV-1a over the key, then over the bytes. Any change within eight neighbouring bits changes it.
 std::int64_t hash_of(std::string_view key, std::string_view bytes);

@@ -13,8 +13,8 @@
 namespace tutti::wire {
 
 /// A robot's whole state as one frame (frame.hpp). An agent that goes on from the decoded state does the same as the
-/// one that was encoded. Robots of version 3 stored their state like this; today's store rows (below), and tests
-/// compare states by these bytes. A state above kMaxStateBytes is std::logic_error.
+/// one that was encoded. Robots store rows (below); tests compare states by these bytes. A state above kMaxStateBytes
+/// is std::logic_error.
 std::string encode(const robot::AgentState& state);
 /// Accepts any bytes and returns an error or a state that an agent can go on from.
 Result<robot::AgentState> decode_agent_state(std::string_view bytes);

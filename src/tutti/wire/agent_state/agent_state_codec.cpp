@@ -28,7 +28,7 @@ template <class T>
 Status decode_part(std::string_view bytes, T& value) {
   const auto parsed = parse_frame<v1::AgentState>(MessageKind::agent_state, bytes);
   if (!parsed) return tl::unexpected(parsed.error());
-  Reader reader(parsed->message, parsed->version);
+  Reader reader(*parsed);
   pass(reader, value);
   if (!reader.is_complete()) return fail(ErrorCode::parse, "agent state: not as many numbers as its lengths say");
   return {};
@@ -221,7 +221,7 @@ Result<TrackedImages> decode_tracked_images(std::string_view bytes) {
   const auto parsed = parse_frame<v1::AgentState>(MessageKind::tracked_images, bytes);
   if (!parsed) return tl::unexpected(parsed.error());
   TrackedImages images;
-  Reader reader(parsed->message, versions(MessageKind::agent_state).current);
+  Reader reader(*parsed);
   pass(reader, images);
   if (!reader.is_complete()) return fail(ErrorCode::parse, "tracked images: not as many numbers as their lengths say");
   return images;

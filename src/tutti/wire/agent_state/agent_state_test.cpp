@@ -205,7 +205,7 @@ TEST(AgentState, AnyChangeOfTheNumbersIsRefusedOrMakesAStateToGoOnFrom) {
   RobotAgent agent = mission.start();
   mission.live(agent, 0, 60);
   v1::AgentState good;
-  ASSERT_TRUE(good.ParseFromString(unpack_frame(MessageKind::agent_state, encode(agent.state()))->payload));
+  ASSERT_TRUE(good.ParseFromString(*unpack_frame(MessageKind::agent_state, encode(agent.state()))));
   Rng rng(1);
   int accepted = 0;
   for (int round = 0; round < 600; ++round) {

@@ -148,7 +148,7 @@ std::string encode(const PointCloud& cloud, const CloudCodec& codec) {
 Result<std::shared_ptr<const PointCloud>> decode_cloud(std::string_view bytes) {
   const auto parsed = parse_frame<v1::Cloud>(MessageKind::cloud, bytes);
   if (!parsed) return tl::unexpected(parsed.error());
-  return decode_cloud(parsed->message);
+  return decode_cloud(*parsed);
 }
 
 }  // namespace tutti::wire

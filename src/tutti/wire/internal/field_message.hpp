@@ -28,7 +28,7 @@ template <HasFields T>
 Result<T> decode_fields(MessageKind kind, std::string_view bytes) {
   const auto frame = unpack_frame(kind, bytes);
   if (!frame) return tl::unexpected(frame.error());
-  auto message = read_fields<T>(frame->payload);
+  auto message = read_fields<T>(*frame);
   if (!message) return in_context(name(kind), message.error());
   if (auto ok = check_message(kind, *message); !ok) return tl::unexpected(ok.error());
   return message;

@@ -22,8 +22,6 @@ class Writer {
   void integer(const std::uint64_t& x) { out_.add_integer(x); }
   void number(const double& x) { out_.add_number(x); }
   void coordinate(const float& x) { out_.add_coordinate(x); }
-  [[nodiscard]] bool has_more() const { return true; }
-  [[nodiscard]] bool has_names() const { return true; }
   /// A list's length; returns how many elements follow.
   template <class T>
   std::size_t length(const std::vector<T>& list) {
@@ -38,9 +36,7 @@ class Writer {
 /// Gives zeros where there is nothing more; is_complete() shows it at the end.
 class Reader {
  public:
-  /// `version`: of the frame. States of before kComplete may end early, at places where has_more() asks.
-  Reader(const v1::AgentState& in, std::uint16_t version)
-      : in_(in), may_end_(version < kComplete), has_names_(version >= kNames) {}
+  explicit Reader(const v1::AgentState& in) : in_(in) {}
   void integer(std::uint64_t& x) { x = next(in_.integer(), integers_); }
   void number(double& x) { x = next(in_.number(), numbers_); }
   void coordinate(float& x) { x = next(in_.coordinate(), coordinates_); }
@@ -54,8 +50,6 @@ class Reader {
     list.resize(short_ ? 0 : static_cast<std::size_t>(count));
     return list.size();
   }
-  [[nodiscard]] bool has_more() const { return !may_end_ || integers_ < in_.integer_size(); }
-  [[nodiscard]] bool has_names() const { return has_names_; }
   [[nodiscard]] bool is_complete() const {
     return !short_ && integers_ == in_.integer_size() && numbers_ == in_.number_size() &&
            coordinates_ == in_.coordinate_size();
@@ -68,9 +62,7 @@ class Reader {
     short_ = true;
     return 0;
   }
-  static constexpr std::uint16_t kComplete = 5, kNames = 6;
   const v1::AgentState& in_;
-  bool may_end_, has_names_;
   int integers_ = 0, numbers_ = 0, coordinates_ = 0;
   bool short_ = false;
 };
@@ -273,10 +265,9 @@ void pass(A& a, robot::SensorSample& sample) {
   pass_optional(sample.scan);
   pass_optional(sample.images);
 }
-/// What keyframes wait for: the last of a state, and not in one of before there was such a thing.
+/// What keyframes wait for.
 template <class A>
 void pass_waiting(A& a, robot::SubmapBuilderState& builder) {
-  if (!a.has_more()) return;
   std::vector<robot::OdometryStep> odometry(builder.waiting.odometry.begin(), builder.waiting.odometry.end());
   pass(a, odometry);
   builder.waiting.odometry.assign(odometry.begin(), odometry.end());
@@ -293,10 +284,9 @@ void pass(A& a, robot::OdometryWatch::State::Anchor& anchor) {
   pass(a, anchor.T_odom_body);
   pass(a, anchor.T_fed_body);
 }
-/// What odometry was before it was made one that does not jump: after pass_waiting(), and as that not in older states.
+/// What odometry was before it was made one that does not jump: after pass_waiting(), whose samples it marks.
 template <class A>
 void pass_watch(A& a, AgentState& state) {
-  if (!a.has_more()) return;
   robot::OdometryWatch::State& watch = state.watch;
   pass(a, watch.newest);
   pass(a, watch.speed_mps);
@@ -337,19 +327,16 @@ void pass(A& a, SubmapFix& fix) {
   pass(a, fix.antenna);
   pass(a, fix.covariance);
 }
-/// Fixes stand behind what pass_watch() writes. Like that, older states do not have them.
 template <class A>
 void pass_fixes(A& a, robot::SubmapBuilderState& builder) {
-  if (!a.has_more()) return;
   pass(a, builder.waiting_fixes);
   pass(a, builder.fixes);
   pass(a, builder.heard_fix);
   for (robot::FinishedSubmap& finished : builder.finished) pass(a, finished.submap.fixes);
 }
-/// Team-mates' names; states of before kNames do not have them.
+/// Team-mates' names.
 template <class A>
 void pass_names(A& a, AgentState& state) {
-  if (!a.has_names()) return;
   for (robot::Whereabouts& other : state.whereabouts) {
     std::vector<std::uint8_t> letters(other.name.begin(), other.name.end());
     pass(a, letters);
