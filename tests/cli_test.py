@@ -353,7 +353,7 @@ class CommandLine(unittest.TestCase):
         with contextlib.closing(sqlite3.connect(file)) as database:
             database.execute("CREATE TABLE store (kind TEXT NOT NULL)")
             database.execute("INSERT INTO store VALUES('map')")
-            for table in ("submaps", "verdicts", "answers", "words", "meta"):
+            for table in ("submaps", "verdicts", "answers", "decisions", "meta"):
                 database.execute(f"CREATE TABLE {table} "
                                  "(key BLOB PRIMARY KEY NOT NULL, hash INTEGER NOT NULL, bytes BLOB NOT NULL)")
             database.execute(f"PRAGMA application_id={0x54757474}")

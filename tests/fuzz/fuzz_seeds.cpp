@@ -169,7 +169,7 @@ std::map<std::string, std::vector<std::string>> seeds() {
                   "base\n17\n/a\n5\nseat\n"};
   out["job"] = both(MessageKind::job, wire::encode(Job{"1/7", any_pairs(rng, 5)}));
   out["cloud"] = both(MessageKind::cloud, wire::encode(*any_submap(rng, 1, 40).submap.cloud));
-  out["word"] = both(MessageKind::decision, wire::encode(any_decision(rng)));
+  out["decision"] = both(MessageKind::decision, wire::encode(any_decision(rng)));
   for (const bool corrected : {false, true})
     for (std::string& seed : both(MessageKind::agent_state, agent_state(corrected)))
       out["agent_state"].push_back(std::move(seed));

@@ -76,7 +76,7 @@ void submap(std::string_view bytes) { frame(MessageKind::submap, bytes, wire::de
 void proxy_graph(std::string_view bytes) { frame(MessageKind::proxy_graph, bytes, wire::decode_proxy_graph); }
 void verdict(std::string_view bytes) { frame(MessageKind::verdict, bytes, wire::decode_verdict); }
 void verdicts(std::string_view bytes) { frame(MessageKind::verdicts, bytes, wire::decode_verdicts); }
-void word(std::string_view bytes) { frame(MessageKind::decision, bytes, wire::decode_decision); }
+void decision(std::string_view bytes) { frame(MessageKind::decision, bytes, wire::decode_decision); }
 void receipt(std::string_view bytes) { frame(MessageKind::receipt, bytes, wire::decode_receipt); }
 void job(std::string_view bytes) { frame(MessageKind::job, bytes, wire::decode_job); }
 void status(std::string_view bytes) { frame(MessageKind::status, bytes, wire::decode_status); }
@@ -304,6 +304,7 @@ const std::map<std::string, Target>& targets() {
       {"cdr", cdr},
       {"cloud", cloud},
       {"db3", db3},
+      {"decision", decision},
       {"euroc_csv", file<formats::parse_euroc_csv>},
       {"feed", feed},
       {"feed_message", feed_message},
@@ -345,7 +346,6 @@ const std::map<std::string, Target>& targets() {
       {"tum", tum},
       {"verdict", verdict},
       {"verdicts", verdicts},
-      {"word", word},
       {"yaml", yaml},
   };
   return all;

@@ -205,9 +205,9 @@ function link(value: unknown, what: string): s.Link {
   };
 }
 
-function operator_word(value: unknown): s.Closure["word"] {
+function operator_decision(value: unknown): s.Closure["decision"] {
   if (value === null || value === undefined) return null;
-  const f = fields(value, "word");
+  const f = fields(value, "decision");
   return { wish: one_of(f.wish, "wish", kWishes), by: words(f.by, "by"), wall_ns: maybe(f.wall_ns, "wall_ns") };
 }
 
@@ -220,7 +220,7 @@ function closure(value: unknown): s.Closure {
     state: one_of(f.state, "state", kStates),
     reason: words(f.reason, "reason"),
     by_hand: f.by_hand === true,
-    word: operator_word(f.word),
+    decision: operator_decision(f.decision),
     verifier: words(f.verifier, "verifier"),
     worker: words(f.worker, "worker"),
     verified_ns: maybe(f.verified_ns, "verified_ns"),

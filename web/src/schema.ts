@@ -149,7 +149,7 @@ export interface Closure {
   state: ClosureState;
   reason: string;
   by_hand: boolean;
-  word: { wish: Wish; by: string; wall_ns: number | null } | null;
+  decision: { wish: Wish; by: string; wall_ns: number | null } | null;
   verifier: string;
   worker: string;
   verified_ns: number | null;

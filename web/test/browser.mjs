@@ -501,7 +501,7 @@ const kHostile = '<img src=x onerror="window.hacked=1"><script>window.hacked=1</
 test("scripts in names, words, reasons and photos do nothing", async () => {
   const mission = small({ robots: [kHostile, "bravo", "charlie"], name: kHostile });
   for (const c of mission.closures.values())
-    Object.assign(c, { reason: kHostile, verifier: kHostile, word: { wish: "reject", by: kHostile, wall_ns: 1 } });
+    Object.assign(c, { reason: kHostile, verifier: kHostile, decision: { wish: "reject", by: kHostile, wall_ns: 1 } });
   mission.marks.set("m1", {
     id: "m1",
     submap: "0:1/2",

@@ -170,7 +170,7 @@ export class FakeMission {
       state,
       by_hand,
       reason: refused ? "overlap: 0.16, at least 0.30 needed" : "",
-      word: by ? { wish: "accept", by, wall_ns: Date.now() * 1e6 } : null,
+      decision: by ? { wish: "accept", by, wall_ns: Date.now() * 1e6 } : null,
       verifier: "cloud 7",
       worker: "worker-1",
       verified_ns: Date.now() * 1e6,

@@ -151,7 +151,7 @@ export class FakeServer {
     if (path === "/api/decide") {
       const closure = mission.closures.get(body.closure);
       if (!closure) return this.say(response, 404, { error: `There is no closure ${body.closure}.` });
-      closure.word = body.wish === "withdraw" ? null : { wish: body.wish, by: body.by, wall_ns: Date.now() * 1e6 };
+      closure.decision = body.wish === "withdraw" ? null : { wish: body.wish, by: body.by, wall_ns: Date.now() * 1e6 };
       closure.state = body.wish === "reject" ? "rejected" : "accepted";
       closure.reason = body.wish === "reject" ? `rejected by ${body.by}` : "";
       if (body.wish === "withdraw" && closure.by_hand) [closure.state, closure.reason] = ["rejected", "withdrawn"];

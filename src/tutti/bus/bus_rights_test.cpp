@@ -40,7 +40,7 @@ TEST(BusRightsTest, AnOperatorDecidesUnderOneName) {
   EXPECT_TRUE(may(kAnna, BusRight::To::publish, subject_of("cave", decision)));
   EXPECT_EQ(address_of(subject_of("cave", decision))->user, "anna");
   for (const BusRight& right : bus_rights()) {
-    const bool is_decision = std::string(right.subject).ends_with(".word");
+    const bool is_decision = std::string(right.subject).ends_with(".decision");
     EXPECT_EQ(is_decision, std::string(right.subject).find("{name}") != std::string::npos) << right.subject;
     EXPECT_TRUE(!is_decision || right.role == BusRole::operates) << right.subject;
   }
@@ -63,7 +63,7 @@ TEST(BusRightsTest, OnlyTheServerChangesStreams) {
 TEST(BusRightsTest, TheConfigurationNamesEveryUserAndSubject) {
   const std::string text = authorization("cave", {{kAlpha, "UALPHA"}, {kAnna, "UANNA"}});
   for (const char* part : {"nkey: UALPHA", "nkey: UANNA", "\"mission.cave.robot.7.submap\"", "\"_INBOX.operator.1.>\"",
-                           "\"mission.cave.operator.anna.word\"", "# robot alpha"})
+                           "\"mission.cave.operator.anna.decision\"", "# robot alpha"})
     EXPECT_NE(text.find(part), std::string::npos) << part << " in: " << text;
   EXPECT_EQ(std::ranges::count(text, '{'), std::ranges::count(text, '}'));
 }

@@ -131,7 +131,7 @@ Status NatsConnection::prepare(const BusOptions& options) const {
   const std::array<std::vector<std::string>, 3> subjects{
       {{fmt::format("mission.{}.robot.*.submap", mission)},
        {fmt::format("mission.{}.worker.*.verdicts", mission), fmt::format("mission.{}.worker.*.refinement", mission),
-        fmt::format("mission.{}.viewer.*.word", mission), fmt::format("mission.{}.operator.*.word", mission)},
+        fmt::format("mission.{}.viewer.*.decision", mission), fmt::format("mission.{}.operator.*.decision", mission)},
        {fmt::format("mission.{}.jobs.loop", mission)}}};
   const std::array names{submap_stream(mission), verdict_stream(mission), job_stream(mission)};
   for (std::size_t i = 0; i < names.size(); ++i) {

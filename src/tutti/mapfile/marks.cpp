@@ -66,12 +66,12 @@ std::string row(const PlacedMark& placed, const MapMark& mark, const std::string
   else
     out += ",,,";
   return out + fmt::format(",{},{},{},{},{}\n", quoted(submap), quoted(mark.by), utc_text(mark.given_ns),
-                           quoted(mark.words), quoted(photo));
+                           quoted(mark.text), quoted(photo));
 }
 
 constexpr const char* kHeading =
     "number,component,x_m,y_m,z_m,cov_xx_m2,cov_xy_m2,cov_xz_m2,cov_yy_m2,cov_yz_m2,cov_zz_m2,latitude_deg,"
-    "longitude_deg,height_m,submap,by,when,words,photo\n";
+    "longitude_deg,height_m,submap,by,when,text,photo\n";
 
 }  // namespace
 

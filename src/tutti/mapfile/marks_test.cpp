@@ -51,7 +51,7 @@ class Marks : public testing::Test {
 };
 
 const MapMark kDoor{
-    .submap = {{RobotId{0}, 5}, 2}, .at = {3.0, 4.0, 1.0}, .words = "door", .by = "anna", .given_ns = 7};
+    .submap = {{RobotId{0}, 5}, 2}, .at = {3.0, 4.0, 1.0}, .text = "door", .by = "anna", .given_ns = 7};
 
 TEST_F(Marks, AreWhatWasStored) {
   EXPECT_TRUE(node::read_marks(store_)->empty()) << "a map of before has none";
@@ -68,7 +68,7 @@ TEST_F(Marks, AreWhatWasStored) {
   EXPECT_EQ(node::read_photo(store_, 8).value(), kJpeg);
   EXPECT_EQ(read(store_)->decisions, DecisionSet()) << "the map is read as before";
   MapMark other = kDoor;
-  other.words = "window";
+  other.text = "window";
   EXPECT_EQ(put_mark(store_, 7, other).error().message, "mark 7: there is another one of this number");
   ASSERT_TRUE(put_mark(store_, 8, std::nullopt));
   EXPECT_EQ(put_mark(store_, 8, std::nullopt).error().message, "there is no such mark");
@@ -97,7 +97,7 @@ TEST_F(Marks, SurviveAProgramThatIsKilled) {
   ASSERT_TRUE(WIFSIGNALED(ended));
   const auto store = storage::open_sqlite_store(file, storage::map_schema(), {.min_free_bytes = 0});
   ASSERT_TRUE(store);
-  EXPECT_EQ(node::read_marks(**store)->at(7).words, "door");
+  EXPECT_EQ(node::read_marks(**store)->at(7).text, "door");
   EXPECT_EQ(node::read_photo(**store, 7).value(), kJpeg);
 }
 
@@ -108,12 +108,12 @@ TEST_F(Marks, AreOfBothMapsThatAreMerged) {
     test::Mapper mapper({RobotId{2}}, other);
     mapper.walk({RobotId{2}, 5});
   }
-  MapMark there{.submap = {{RobotId{2}, 5}, 1}, .words = "stairs", .given_ns = 9};
+  MapMark there{.submap = {{RobotId{2}, 5}, 1}, .text = "stairs", .given_ns = 9};
   ASSERT_TRUE(put_mark(other, 9, there));
   ASSERT_TRUE(merge(store_, other, joint));
   const MarkSet marks = node::read_marks(joint).value();
   ASSERT_EQ(marks.size(), 2U);
-  EXPECT_EQ(marks.at(9).words, "stairs");
+  EXPECT_EQ(marks.at(9).text, "stairs");
   EXPECT_EQ(node::read_photo(joint, 7).value(), kJpeg);
 }
 
@@ -122,7 +122,7 @@ TEST_F(Marks, CovarianceIsThatOfThePoseWithTheLeverArm) {
   const Content content = read(store_).value();
   const server::MapEstimate map = estimate(content);
   for (const Eigen::Vector3d& at : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(30, -10, 5)}) {
-    const MarkSet marks{{1, {.submap = {{RobotId{0}, 5}, 3}, .at = at, .words = "here"}}};
+    const MarkSet marks{{1, {.submap = {{RobotId{0}, 5}, 3}, .at = at, .text = "here"}}};
     const Submap& submap = *content.submaps.at(marks.at(1).submap);
     const auto placed = place_marks(marks, content, map);
     ASSERT_EQ(placed.size(), 1U);
@@ -151,7 +151,7 @@ TEST_F(Marks, CovarianceIsThatOfThePoseWithTheLeverArm) {
 TEST_F(Marks, AreExportedWithTheirPhotosAndNoFormulas) {
   put(kDoor, kJpeg);
   MapMark hostile = kDoor;
-  hostile.words = "=cmd|'/c calc'!A1,\"x\"\nsecond line";
+  hostile.text = "=cmd|'/c calc'!A1,\"x\"\nsecond line";
   hostile.by = "-2+3";
   hostile.given_ns = 1'700'000'000'000'000'000;
   put(hostile);

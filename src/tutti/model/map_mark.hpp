@@ -21,7 +21,7 @@ struct MapMark {
 
   SubmapId submap;
   Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< In the submap's frame, m.
-  std::string words;                             ///< UTF-8, any; may be empty.
+  std::string text;                              ///< UTF-8, any; may be empty.
   std::string by;                                ///< Who wrote it, for people; may be empty.
   std::int64_t given_ns = 0;                     ///< When, since the Unix epoch.
   std::string photo_type;                        ///< "image/jpeg" or "image/png"; empty: there is no photo.
@@ -32,7 +32,7 @@ struct MapMark {
     v.field(2, "x", at.x(), {.low = -kFarthest_m, .high = kFarthest_m});
     v.field(3, "y", at.y(), {.low = -kFarthest_m, .high = kFarthest_m});
     v.field(4, "z", at.z(), {.low = -kFarthest_m, .high = kFarthest_m});
-    v.field(5, "words", words, {.text = FieldRule::Text::any, .at_most = kMostBytes});
+    v.field(5, "text", text, {.text = FieldRule::Text::any, .at_most = kMostBytes});
     v.field(6, "by", by, {.at_most = kLongestName});
     v.field(7, "given_ns", given_ns);
     v.field(8, "photo_type", photo_type, {.at_most = 16});

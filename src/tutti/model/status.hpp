@@ -204,7 +204,7 @@ struct MissionStatus {
     v.field(21, "former_pairs", former_pairs);
     v.field(22, "waiting", waiting);
     v.field(23, "why_waiting", why_waiting);
-    v.field(24, "words", decisions);
+    v.field(24, "decisions", decisions);
     v.field(25, "radio", radio, {.at_most = 20 * kMostRobots});
   }
   [[nodiscard]] Status check() const;  ///< Lists have the order that is promised above.

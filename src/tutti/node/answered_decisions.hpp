@@ -8,7 +8,7 @@
 
 namespace tutti::node {
 
-/// The operators' decisions that the server answered last, as in MissionStatus::words.
+/// The operators' decisions that the server answered last, as in MissionStatus::decisions.
 class AnsweredDecisions {
  public:
   /// Notes the answer to a decision: `frame` is the message as it came, `why` is why the decision is not stored

@@ -90,7 +90,7 @@ TEST_F(Decisions, WhatIsNotTakenIsAnsweredWithTheReason) {
 }
 
 TEST_F(Decisions, AMarkIsStoredOnceHoweverOftenItComes) {
-  const MapMark door{.submap = {{RobotId{0}, 7}, 1}, .words = "door", .by = "ada", .given_ns = 9};
+  const MapMark door{.submap = {{RobotId{0}, 7}, 1}, .text = "door", .by = "ada", .given_ns = 9};
   DecisionSender sender(kSelf, MarkOrder{.number = 9, .mark = door, .given_ns = 9});
   const auto message = sender.due(0.0).value();
   for (int i = 0; i < 2; ++i) {

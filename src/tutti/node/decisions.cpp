@@ -28,11 +28,11 @@ Result<DecisionSet> read_decisions(const storage::TableStore& map,
     const auto pair = pair_of(key);
     auto decision = wire::decode_decision(bytes);
     if (!pair)
-      ok = fail(ErrorCode::parse, "the map's table 'words': a key that is no pair of submaps");
+      ok = fail(ErrorCode::parse, "the map's table 'decisions': a key that is no pair of submaps");
     else if (!decision && decision.error().code == ErrorCode::unsupported)
       leave(decision.error().message);
     else if (!decision)
-      ok = in_context("the map's table 'words'", decision.error());
+      ok = in_context("the map's table 'decisions'", decision.error());
     else
       decisions.insert_or_assign(*pair, with_sessions(std::move(*decision), *pair));
     return ok.has_value();

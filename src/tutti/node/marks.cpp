@@ -32,7 +32,7 @@ Status check(const MapMark& mark, const std::string& photo, std::size_t known) {
                 MapMark::kMostPhotoBytes);
   if (!photo.empty())
     if (Status ok = check_picture(photo); !ok) return ok;
-  if (mark.words.empty() && photo.empty()) return fail(ErrorCode::invalid, "a mark has words or a photo");
+  if (mark.text.empty() && photo.empty()) return fail(ErrorCode::invalid, "a mark has a text or a photo");
   if (auto ok = wire::check_fields(mark); !ok) return in_context("mark", ok.error());
   return {};
 }

@@ -33,7 +33,7 @@ std::string author_of(const bus::Envelope& envelope, const std::string& claimed)
 }  // namespace
 
 /// It is not a robot's or a worker's to give.
-void ServerNode::receive_word(const bus::Envelope& envelope, Timestamp now, Step& step) {
+void ServerNode::receive_order(const bus::Envelope& envelope, Timestamp now, Step& step) {
   if (envelope.from.role != bus::Endpoint::Role::viewer)
     return refuse(
         envelope,

@@ -117,7 +117,7 @@ Step ServerNode::receive(const bus::Envelope& envelope, Timestamp now) {
   else if (envelope.kind == bus::MessageKind::status)
     receive_status(envelope, now, step);
   else if (envelope.kind == bus::MessageKind::decision)
-    receive_word(envelope, now, step);
+    receive_order(envelope, now, step);
   else if (envelope.kind == bus::MessageKind::job && envelope.from == bus::Endpoint::any_worker())
     receive_returned_job(envelope, now, step);
   else if (envelope.kind == bus::MessageKind::refinement_job && envelope.from == bus::Endpoint::any_worker())

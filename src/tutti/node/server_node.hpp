@@ -145,7 +145,7 @@ class ServerNode {
   void receive_returned_job(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_refinement(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_returned_refinement(const bus::Envelope& envelope, Timestamp now, Step& step);
-  void receive_word(const bus::Envelope& envelope, Timestamp now, Step& step);
+  void receive_order(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_decision(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_mark(const bus::Envelope& envelope, Timestamp now, Step& step);
   /// True when a decision on this pair that was given later counts instead.

@@ -134,7 +134,7 @@ TEST(Upgrade, RowsOfANewerVersionAreLeftAloneAndReported) {
   }
   const SubmapPair pair{{chain, 0}, {chain, 2}};
   ASSERT_TRUE(store.commit(std::vector<storage::Write>{
-      {"words", key_of(pair), raised(wire::encode(ClosureDecision{.closure = "robot_0/0-robot_0/2"}))},
+      {"decisions", key_of(pair), raised(wire::encode(ClosureDecision{.closure = "robot_0/0-robot_0/2"}))},
       {"meta", "refused/0", raised(wire::encode(Receipt{.robot = chain.robot}))}}));
   std::vector<storage::Write> newer;
   for (const char* table : {"submaps", "verdicts", "answers"}) {

@@ -157,7 +157,7 @@ const std::vector<std::string> kOfTheServerAlone{"$JS.API.STREAM.DELETE.SUBMAPS_
                                                  "_INBOX.server.0.anything"};
 const std::vector<std::string> kOfOthers{"mission.cave.robot.4.submap",   "mission.cave.robot.4.status",
                                          "mission.cave.worker.2.status",  "mission.cave.worker.2.verdicts",
-                                         "mission.cave.viewer.0.word",    "mission.cave.operator.berta.word",
+                                         "mission.cave.viewer.0.decision",    "mission.cave.operator.berta.decision",
                                          "mission.tunnel.robot.3.submap", "mission.tunnel.worker.1.verdicts"};
 
 TEST_F(Intruders, NobodyButTheServerTouchesStreamsReceiptsAndTheLease) {
@@ -178,7 +178,7 @@ TEST_F(Intruders, NobodyReadsWhatIsOthers) {
 }
 
 TEST_F(Intruders, AViewerDoesNotDecideAndAnOperatorOnlyUnderOneName) {
-  expect_refused(vera_, "publish", {"mission.cave.operator.vera.word", "mission.cave.operator.anna.word"});
+  expect_refused(vera_, "publish", {"mission.cave.operator.vera.decision", "mission.cave.operator.anna.decision"});
   const auto desk = open(Endpoint::viewer(1), anna_);
   ASSERT_TRUE(
       desk->send({Endpoint::viewer(1), Endpoint::server(), MessageKind::decision, "w", bytes("by berta"), "berta"}));

@@ -86,7 +86,7 @@ EventReport report_of(const node::VerdictsTaken& taken) {
           Level::debug};
 }
 EventReport report_of(const node::DecisionTaken& taken) {
-  return {{{"event", "word_taken"},
+  return {{{"event", "decision_taken"},
            {"first", to_string(taken.pair.first)},
            {"second", to_string(taken.pair.second)},
            {"wish", to_string(taken.wish)}},

@@ -109,9 +109,9 @@ TEST(FieldBytes, TheFilesForOtherLanguagesHaveTheSameFields) {
   expect_in_proto<MissionStatus::Robot>("status.proto", "RobotInMission");
   expect_in_proto<MissionStatus::Worker>("status.proto", "WorkerInMission");
   expect_in_proto<MissionStatus::Refusals>("status.proto", "RefusedMessages");
-  expect_in_proto<MissionStatus::Decision>("status.proto", "AnsweredWord");
+  expect_in_proto<MissionStatus::Decision>("status.proto", "AnsweredDecision");
   expect_in_proto<MissionStatus::Radio>("status.proto", "RobotsRadio");
-  expect_in_proto<ClosureDecision>("status.proto", "Word");
+  expect_in_proto<ClosureDecision>("status.proto", "Decision");
   expect_in_proto<MarkOrder>("status.proto", "MarkOrder");
   expect_in_proto<MapMark>("status.proto", "Mark");
   expect_in_proto<SubmapId>("status.proto", "SubmapId");

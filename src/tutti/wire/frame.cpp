@@ -51,7 +51,7 @@ const char* name(MessageKind kind) {
     case MessageKind::mission_status:
       return "mission status";
     case MessageKind::decision:
-      return "word";
+      return "decision";
     case MessageKind::proxy_graph_delta:
       return "proxy graph delta";
     case MessageKind::tracked_images:

@@ -57,7 +57,7 @@ function content(app: App, view: View): Child[] {
       choose("accepted", `In the map ${count("accepted")}`),
       choose("candidate", `Waiting ${count("candidate")}`),
       choose("rejected", `Refused ${count("rejected")}`),
-      all.some(([, c]) => c.by_hand || c.word) ? choose("hand", "By a person") : null,
+      all.some(([, c]) => c.by_hand || c.decision) ? choose("hand", "By a person") : null,
     ),
     rows.slice(0, LIMITS.rows).map(([name, closure]) => row(app, view, name, closure)),
     rows.length === 0
@@ -70,10 +70,10 @@ function content(app: App, view: View): Child[] {
 }
 
 function shown(app: App, c: Closure): boolean {
-  if (filter.state === "hand" ? !c.by_hand && !c.word : filter.state !== "all" && c.state !== filter.state)
+  if (filter.state === "hand" ? !c.by_hand && !c.decision : filter.state !== "all" && c.state !== filter.state)
     return false;
   if (filter.words === "") return true;
-  return `${pair_name(app, c)} ${c.reason} ${c.word?.by ?? ""}`.toLowerCase().includes(filter.words);
+  return `${pair_name(app, c)} ${c.reason} ${c.decision?.by ?? ""}`.toLowerCase().includes(filter.words);
 }
 
 export const pair_name = (app: App, c: Closure): string => `${app.submap_name(c.from)} – ${app.submap_name(c.to)}`;
@@ -92,11 +92,8 @@ function row(app: App, view: View, name: string, closure: Closure): HTMLElement 
         click: () => {
           app.select({ kind: "closure", name });
           const ends = ends_of(app, closure);
-          if (ends)
-            view.look_at(
-              ends[0].map((x, k) => (x + ends[1][k]) / 2),
-              45,
-            );
+          const middle = ends?.[0].map((x, k) => (x + ends[1][k]) / 2);
+          if (middle) view.look_at(middle, 45);
         },
       },
     },
@@ -113,7 +110,9 @@ function row(app: App, view: View, name: string, closure: Closure): HTMLElement 
     ),
     closure.state !== "accepted" && closure.reason ? h("span", { class: "detail" }, closure.reason) : null,
     held(app, `closure/${name}`),
-    closure.word ? h("span", { class: "detail" }, `${closure.word.by || "somebody"}: ${closure.word.wish}`) : null,
+    closure.decision
+      ? h("span", { class: "detail" }, `${closure.decision.by || "somebody"}: ${closure.decision.wish}`)
+      : null,
   );
 }
 

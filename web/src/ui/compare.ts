@@ -56,7 +56,7 @@ function robot_section(robot: Node): HTMLElement {
       ? `${metres(node.n("rmse_m"))} RMSE, ${metres(node.n("max_m"))} at most, ${degrees(node.n("rmse_deg"))}`
       : "-";
   const facts: Child[] = [
-    `${robot.s("paired")} of ${robot.s("poses")} poses of B have one of A; ${robot.s("nodes")} nodes along ${metres(robot.n("way_m"))} and ${span(robot.n("duration_s"))}. After one rigid alignment B is off A by `,
+    `${robot.s("paired")} of ${robot.s("poses")} poses of B have one of A; ${robot.s("nodes")} nodes along ${metres(robot.n("distance_m"))} and ${span(robot.n("duration_s"))}. After one rigid alignment B is off A by `,
     h("b", {}, aligned(robot.at("aligned"))),
     ".",
   ];
@@ -64,7 +64,7 @@ function robot_section(robot: Node): HTMLElement {
     facts.push(
       " With the relative poses below: ",
       h("b", {}, aligned(robot.at("fixed"))),
-      `; no motion changes by more than ${metres(robot.n("kink_m"))}.`,
+      `; no motion changes by more than ${metres(robot.n("discontinuity_m"))}.`,
     );
   return section(
     robot.s("name") || "The trajectory",

@@ -49,11 +49,11 @@ function heading(app: App, name: string, closure: Closure): Child {
       closure.reason ? `: ${closure.reason}` : "",
     ),
     held(app, `closure/${name}`),
-    closure.word
+    closure.decision
       ? h(
           "p",
-          { class: "word" },
-          `${closure.word.by || "Somebody"} said ${closure.word.wish}${closure.word.wall_ns ? ` at ${wall(closure.word.wall_ns)}` : ""}.`,
+          { class: "decision" },
+          `${closure.decision.by || "Somebody"} said ${closure.decision.wish}${closure.decision.wall_ns ? ` at ${wall(closure.decision.wall_ns)}` : ""}.`,
         )
       : null,
   ];
@@ -86,7 +86,7 @@ function decisions(app: App, name: string, closure: Closure): Child {
   if (!app.may("decide")) return null;
   const say = (wish: Wish, text: string, props = {}) =>
     button(text, () => void decide(app, name, wish), { ...props, key: `decide ${wish}` });
-  const said = closure.word && closure.word.wish !== "withdraw" ? closure.word.wish : null;
+  const said = closure.decision && closure.decision.wish !== "withdraw" ? closure.decision.wish : null;
   return h(
     "div",
     { class: "row decide" },

@@ -89,7 +89,7 @@ function policies(app: App, report: Node): HTMLElement | null {
       const policy = robot.at("policies").at(name);
       const chosen = name === report.s("default_policy");
       line(chosen ? h("b", {}, name) : name, (key) => policy.n(key), policy.yes("partial"), [
-        metres(policy.n("kink_m")),
+        metres(policy.n("discontinuity_m")),
         metres(policy.n("agreement_rmse_m")),
         policy.s("constraints"),
       ]);

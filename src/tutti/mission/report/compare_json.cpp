@@ -83,7 +83,7 @@ Json robot_json(const TrajectoryComparison& c) {
           {"paired", c.paired},
           {"nodes", c.judged.size()},
           {"spacing_m", number(c.spacing_m)},
-          {"way_m", number(c.length_m)},
+          {"distance_m", number(c.length_m)},
           {"duration_s", number(c.judged.back().stamp - c.judged.front().stamp)},
           {"disagrees", c.explanation.disagrees()},
           {"aligned", ate_json(c.before)},
@@ -92,8 +92,8 @@ Json robot_json(const TrajectoryComparison& c) {
           {"origins", origins_json(c)},
           {"constraints", constraints_json(c)},
           {"fixed", mended ? ate_json(c.after) : Json(nullptr)},
-          {"kink_m", mended ? number(c.discontinuity.translation_m) : Json(nullptr)},
-          {"kink_deg", mended ? number(c.discontinuity.rotation_deg) : Json(nullptr)},
+          {"discontinuity_m", mended ? number(c.discontinuity.translation_m) : Json(nullptr)},
+          {"discontinuity_deg", mended ? number(c.discontinuity.rotation_deg) : Json(nullptr)},
           {"map", map_json(c)}};
 }
 

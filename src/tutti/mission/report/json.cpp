@@ -71,8 +71,8 @@ void add_accuracy(Json& out, const std::string& prefix, const Accuracy& accuracy
 Json policy_json(const RobotRecord& robot, const PolicyRecord& policy) {
   Json out = Json::object();
   add_accuracy(out, "", policy.accuracy);
-  out["kink_m"] = policy.discontinuity ? number(policy.discontinuity->translation_m) : Json(nullptr);
-  out["kink_deg"] = policy.discontinuity ? number(policy.discontinuity->rotation_deg) : Json(nullptr);
+  out["discontinuity_m"] = policy.discontinuity ? number(policy.discontinuity->translation_m) : Json(nullptr);
+  out["discontinuity_deg"] = policy.discontinuity ? number(policy.discontinuity->rotation_deg) : Json(nullptr);
   out["agreement_rmse_m"] = number(policy.agreement_rmse_m);
   add_scored(out, "agreement_", policy.agreement_rmse_m ? std::optional(robot.mapped_share) : std::nullopt);
   out["constraints"] = policy.constraints_added;

@@ -42,7 +42,7 @@ TEST(ReportJson, HasTheDocumentedKeys) {
     for (const auto& policy : robot["policies"])
       EXPECT_EQ(keys(policy),
                 (std::set<std::string>{"rmse_m", "max_error_m", "rpe_m", "rpe_deg", "rpe_10m_m", "rpe_10m_deg",
-                                       "kink_m", "kink_deg", "agreement_rmse_m", "constraints", "scored_share",
+                                       "discontinuity_m", "discontinuity_deg", "agreement_rmse_m", "constraints", "scored_share",
                                        "partial", "agreement_scored_share", "agreement_partial"}));
   }
   expect_keys(report["server"], {"components", "closures_accepted", "closures_rejected", "rmse_m"});
@@ -165,7 +165,7 @@ TEST(ReportJson, ExplainsTheLastUpdateInMissionTime) {
   EXPECT_EQ(alert["known_since_broadcast"], record.robots[1].alerts[0].known_since_revision);
   EXPECT_TRUE(alert["withdrawn_s"].is_null());
   EXPECT_DOUBLE_EQ(report["robots"][1]["onboard_rpe_10m_m"], 0.095);
-  EXPECT_DOUBLE_EQ(report["robots"][1]["policies"]["spectral"]["kink_m"], 0.01);
+  EXPECT_DOUBLE_EQ(report["robots"][1]["policies"]["spectral"]["discontinuity_m"], 0.01);
 }
 
 TEST(ReportJson, MapErrorWhereThereIsASurvey) {

@@ -49,10 +49,10 @@ struct CandidateConfig {
 /// Settings of LiDAR closures, from two submap clouds to a loop closure or a refusal. Every gate is a physical
 /// quantity.
 struct LidarClosureConfig {
-  /// Submaps shorter than this and than min_way_m are not used: they saw too little and gave wrong closures.
+  /// Submaps shorter than this and than min_distance_m are not used: they saw too little and gave wrong closures.
   double min_duration_s = 5.0;
-  double min_way_m = 10.0;  ///< Travel from which a submap may be shorter than min_duration_s, as by car.
-  int min_keyframes = 6;    ///< Submaps with fewer keyframes are not used.
+  double min_distance_m = 10.0;  ///< Travel from which a submap may be shorter than min_duration_s, as by car.
+  int min_keyframes = 6;         ///< Submaps with fewer keyframes are not used.
   int min_points = 500;
   double voxel_m = 0.3;  ///< Voxels that clouds are thinned to; denser clouds cost time and gain nothing.
   NormalConfig normals;
@@ -74,8 +74,8 @@ struct LidarClosureConfig {
   template <class V>
   void describe(V& v) {
     v.field("min_duration_s", min_duration_s, at_least(0.0),
-            "Submaps shorter than this and than min_way_m are not used.");
-    v.field("min_way_m", min_way_m, at_least(0.0), "Travel from which a submap may take less than min_duration_s.");
+            "Submaps shorter than this and than min_distance_m are not used.");
+    v.field("min_distance_m", min_distance_m, at_least(0.0), "Longer ones may take less than min_duration_s.");
     v.field("min_points", min_points, at_least(10), "Submaps with fewer points are not used.");
     v.field("voxel_m", voxel_m, greater_than(0.0), "Clouds are thinned to voxels of this edge.");
     v.field("normals", normals, any(), "Surface normals.");

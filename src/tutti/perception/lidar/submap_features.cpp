@@ -23,7 +23,7 @@ std::optional<Refusal> why_unusable(const Submap& submap, std::size_t points, co
     return Refusal{RefusalReason::too_few_keyframes, static_cast<double>(submap.keyframes.size()),
                    static_cast<double>(config.min_keyframes)};
   const double duration_s = submap.keyframes.back().stamp - submap.keyframes.front().stamp;
-  if (duration_s < config.min_duration_s && path_length_m(submap.odometry) < config.min_way_m)
+  if (duration_s < config.min_duration_s && path_length_m(submap.odometry) < config.min_distance_m)
     return Refusal{RefusalReason::too_short, duration_s, config.min_duration_s};
   return std::nullopt;
 }

@@ -98,7 +98,7 @@ TEST(ExtractFeatures, AFewSecondsAreEnoughWhereTheyLeadFar) {
   for (auto& keyframe : fast.keyframes) keyframe.stamp.ns /= 4;
   EXPECT_FALSE(extract_features(fast, {}).usable);
   LidarClosureConfig config;
-  config.min_way_m = path_length_m(fast.odometry);
+  config.min_distance_m = path_length_m(fast.odometry);
   EXPECT_TRUE(extract_features(fast, config).usable);
 }
 

@@ -139,7 +139,7 @@ FromClient read(v1::Feed::Hello& in) {
   FeedHello out{.version = in.protocol_version(),
                 .client = plain_text(in.client_name()),
                 .listens_only = in.listens_only(),
-                .wants_trajectory = in.wants_way()};
+                .wants_trajectory = in.wants_trajectory()};
   if (in.has_sensors()) out.sensors = read(in.sensors());
   if (in.has_ros()) out.ros = read(in.ros());
   if (in.has_clock_offset_ns()) out.clock_offset_ns = in.clock_offset_ns();

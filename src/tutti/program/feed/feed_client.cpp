@@ -28,7 +28,7 @@ Result<std::unique_ptr<FeedClient>> FeedClient::connect(const std::string& socke
   v1::Feed hello;
   hello.mutable_hello()->set_protocol_version(kFeedVersion);
   hello.mutable_hello()->set_client_name(name);
-  hello.mutable_hello()->set_wants_way(wants_trajectory);
+  hello.mutable_hello()->set_wants_trajectory(wants_trajectory);
   internal::write(sensors, *hello.mutable_hello()->mutable_sensors());
   if (auto ok = out->send(hello); !ok) return tl::unexpected(ok.error());
   return out;

@@ -140,7 +140,7 @@ std::optional<std::string> trajectory_frame(const FeedTrajectory& trajectory, st
   if ((trajectory.corrected.size() + trajectory.map.size() + 1) * kMostBytesPerPose > kMaxFeedBytes)
     return std::nullopt;
   v1::Feed message;
-  auto& out = *message.mutable_way();
+  auto& out = *message.mutable_trajectory();
   out.set_map_epoch(trajectory.map_age.first);
   out.set_map_revision(trajectory.map_age.second);
   out.set_constraints(trajectory.constraints);

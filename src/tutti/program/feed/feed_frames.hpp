@@ -70,7 +70,7 @@ struct FeedHello {
   /// Nanoseconds, to be added to the client's stamps; or the client's time now.
   std::optional<std::int64_t> clock_offset_ns = {}, clock_now_ns = {};
   Result<std::optional<FeedRos>> ros = std::nullopt;  ///< An error states why these cannot be.
-  bool wants_trajectory = false;                      ///< Asks for a FeedWay after every update of the map.
+  bool wants_trajectory = false;                      ///< Asks for a FeedTrajectory after every update of the map.
 };
 struct FeedEnd {};
 struct FeedTime {

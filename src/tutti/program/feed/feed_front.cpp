@@ -225,7 +225,7 @@ bool FeedFront::wants_trajectory() const {
 void FeedFront::say(FeedTrajectory trajectory) {
   const std::scoped_lock lock(mutex_);
   trajectories_.push_back(std::move(trajectory));
-  if (trajectories_.size() > kWays) trajectories_.pop_front();
+  if (trajectories_.size() > kTrajectories) trajectories_.pop_front();
 }
 
 std::vector<FeedTrajectory> FeedFront::take_trajectories() {

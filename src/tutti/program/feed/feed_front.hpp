@@ -90,9 +90,9 @@ class FeedFront final : public FeedTarget {
   /// Sets what the robot knows now; ignored while a robot made again has not caught up with what it knew before.
   void publish(FeedState robot);
   [[nodiscard]] bool wants_trajectory() const;
-  /// Queues a trajectory for the client; only the newest kWays wait.
+  /// Queues a trajectory for the client; only the newest kTrajectories wait.
   void say(FeedTrajectory trajectory);
-  static constexpr std::size_t kWays = 4;
+  static constexpr std::size_t kTrajectories = 4;
   /// What the robot's body reported last, unless that is older than kHealthLasts.
   [[nodiscard]] Health health() const;
   static constexpr std::chrono::seconds kHealthLasts{60};

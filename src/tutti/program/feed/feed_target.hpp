@@ -100,7 +100,7 @@ class FeedTarget {
   virtual void set_health(const Health& /*health*/) {}
   /// Ends the recording; FeedState::ended shows when that is done.
   virtual Status finish() = 0;
-  /// From now on take_ways() has something to return.
+  /// From now on take_trajectories() has something to return.
   virtual void want_trajectory() {}
   /// The trajectories since the last call, as far as they were kept.
   virtual std::vector<FeedTrajectory> take_trajectories() { return {}; }

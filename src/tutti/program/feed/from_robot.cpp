@@ -62,8 +62,8 @@ FromRobot read(const v1::Feed& message) {
     }
     case v1::Feed::kRefused:
       return FeedRefusal{{message.refused().stamp_ns()}, message.refused().why()};
-    case v1::Feed::kWay: {
-      const auto& in = message.way();
+    case v1::Feed::kTrajectory: {
+      const auto& in = message.trajectory();
       return FeedTrajectory{{in.map_epoch(), in.map_revision()},
                             in.constraints(),
                             trajectory(in.stamp_ns(), in.t_map_body()),

@@ -48,7 +48,7 @@ std::optional<MapMark> mark_of(const Site& site, const Visitor& visitor, const J
     return refuse(400, "at: expected [x, y, z] in the submap's frame");
   return MapMark{.submap = submap->first,
                  .at = {at[0].get<double>(), at[1].get<double>(), at[2].get<double>()},
-                 .words = body.value("text", ""),
+                 .text = body.value("text", ""),
                  .by = name_of(visitor, body),
                  .given_ns = static_cast<std::int64_t>(program::wall_clock_ns())};
 }

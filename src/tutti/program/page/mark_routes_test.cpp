@@ -83,8 +83,8 @@ TEST_F(Marks, WhatIsNoneIsRefusedWithASentence) {
   refused("at", {1.0, 2.0}, "at");
   refused("at", {1.0, 2.0, "3"}, "at");
   refused("at", {1.0, 2.0, 1e300}, "mark");
-  refused("text", std::string(MapMark::kMostBytes + 1, 'a'), "words");
-  refused("text", "", "words or a photo");
+  refused("text", std::string(MapMark::kMostBytes + 1, 'a'), "text");
+  refused("text", "", "a text or a photo");
   refused("photo", "https://elsewhere.example/photo.jpg", "photo");
   refused("photo", "data:image/jpeg;base64,~~~", "photo");
   refused("photo", data_url("<svg onload='alert(1)'/>"), "neither");
@@ -103,7 +103,7 @@ TEST_F(Marks, WhatIsNoneIsRefusedWithASentence) {
 TEST_F(Marks, AreAsManyAsAMapMayHave) {
   MarkSet known;
   for (std::uint64_t number = 0; number < node::kMostMarks; ++number) {
-    const MapMark mark{.words = "here", .given_ns = static_cast<std::int64_t>(number)};
+    const MapMark mark{.text = "here", .given_ns = static_cast<std::int64_t>(number)};
     ASSERT_TRUE(store_.commit(node::follow({.number = number, .mark = mark}, known).value()));
   }
   start();

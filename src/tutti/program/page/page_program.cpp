@@ -29,7 +29,7 @@ namespace {
 using program::Answer, program::Clock, program::Json, program::Level;
 
 constexpr double kWaitForServer_s = 10.0;
-constexpr double kNobodyWaits_s = 30.0;  // a word that the server has not answered is sent no more
+constexpr double kNobodyWaits_s = 30.0;  // an order that the server has not answered is sent no more
 
 /// The page as its host sees it: a viewer of the bus, which passes on what operators say.
 class HostedPage final : public program::Hosted {
@@ -66,12 +66,12 @@ class HostedPage final : public program::Hosted {
     return out;
   }
   void wait(double wall_s) override {
-    for (AskedWord& asked : page_.take_words())
+    for (AskedOrder& asked : page_.take_orders())
       std::visit(
-          [&](const auto& word) {
-            sent_.push_back({node::DecisionSender(self_, word), std::move(asked.answer), Clock::steady_s()});
+          [&](const auto& order) {
+            sent_.push_back({node::DecisionSender(self_, order), std::move(asked.answer), Clock::steady_s()});
           },
-          asked.word);
+          asked.order);
     if (beside_.has_news() && page_.wants(revision_)) show_map();
     Hosted::wait(sent_.empty() ? wall_s : std::min(wall_s, kSoon_s));
   }

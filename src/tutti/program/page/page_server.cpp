@@ -60,7 +60,7 @@ class ServedPage final : public Page {
   }
   ~ServedPage() override {
     site_.board.close();
-    site_.words.close();
+    site_.orders.close();
     if (server_) server_->end();
     if (listens_.joinable()) listens_.join();
     makes_.request_stop();
@@ -131,7 +131,7 @@ class ServedPage final : public Page {
       board.put_all("mark/", messages, site_.time_s);
     });
   }
-  std::vector<AskedWord> take_words() override { return site_.words.take(); }
+  std::vector<AskedOrder> take_orders() override { return site_.orders.take(); }
 
  private:
   /// What an earlier program has shown goes on: the past, since when problems are there, who has acknowledged them.

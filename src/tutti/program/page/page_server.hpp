@@ -21,10 +21,10 @@
 
 namespace tutti::page {
 
-/// An operator's word on its way to the server, and the promise of an answer: why it is not stored, or empty when it
+/// An operator's order on its way to the server, and the promise of an answer: why it is not stored, or empty when it
 /// is. The promise is broken when nobody will answer.
-struct AskedWord {
-  std::variant<ClosureDecision, MarkOrder> word;
+struct AskedOrder {
+  std::variant<ClosureDecision, MarkOrder> order;
   std::promise<std::string> answer;
 };
 
@@ -57,7 +57,7 @@ class Page {
   /// All marks of the map; those that it has, too.
   virtual void show_marks(const MarkSet& marks) = 0;
   /// What operators have decided and written since the last call.
-  [[nodiscard]] virtual std::vector<AskedWord> take_words() = 0;
+  [[nodiscard]] virtual std::vector<AskedOrder> take_orders() = 0;
 
  protected:
   Page() = default;

@@ -303,8 +303,8 @@ void say(Response& response, int status, const std::string& error) {
   response.set_content(text_of(Json{{"error", error}}), kJson);
 }
 
-bool ask_server(Site& site, std::variant<ClosureDecision, MarkOrder> word, int refused, Response& response) {
-  auto answer = site.words.ask(std::move(word));
+bool ask_server(Site& site, std::variant<ClosureDecision, MarkOrder> order, int refused, Response& response) {
+  auto answer = site.orders.ask(std::move(order));
   const auto refuse = [&](int status, const std::string& why) {
     say(response, status, why);
     return false;

@@ -107,7 +107,7 @@ std::string closure_json(const ShownMap& map, const mapfile::ClosureInfo& info) 
                 {"to", to_string(info.pair.second)},
                 {"state", to_string(info.state)},
                 {"reason", info.reason}};
-  out["word"] = info.decision ? FieldJson{{"wish", to_string(info.decision->wish)},
+  out["decision"] = info.decision ? FieldJson{{"wish", to_string(info.decision->wish)},
                                           {"by", info.decision->by},
                                           {"wall_ns", info.decision->counts_from_ns()}}
                               : FieldJson(nullptr);

@@ -15,7 +15,7 @@ Message mark_message(std::uint64_t number, const MapMark& mark, const std::strin
           text_of({{"id", id},
                    {"submap", to_string(mark.submap)},
                    {"at", {mark.at.x(), mark.at.y(), mark.at.z()}},
-                   {"text", mark.words},
+                   {"text", mark.text},
                    {"by", mark.by},
                    {"wall_ns", mark.given_ns},
                    {"photo", photo.empty() ? FieldJson(nullptr) : FieldJson(photo)}})};

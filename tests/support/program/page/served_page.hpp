@@ -73,21 +73,21 @@ class ServedPage : public ::testing::Test {
     viewer_->show_status({.time = Timestamp{} + 5.0, .revision = 3});
     takes_ = std::thread([this] {
       while (!stop_) {
-        for (AskedWord& asked : viewer_->take_words()) asked.answer.set_value(answer(asked));
+        for (AskedOrder& asked : viewer_->take_orders()) asked.answer.set_value(answer(asked));
         std::this_thread::sleep_for(std::chrono::milliseconds(5));
       }
     });
   }
   /// As the server would: why the word is not stored.
-  std::string answer(const AskedWord& asked) {
-    if (const auto* order = std::get_if<MarkOrder>(&asked.word)) {
+  std::string answer(const AskedOrder& asked) {
+    if (const auto* order = std::get_if<MarkOrder>(&asked.order)) {
       MarkSet known = node::read_marks(store_).value();
       const auto rows = node::follow(*order, known);
       if (!rows) return rows.error().message;
       EXPECT_TRUE(store_.commit(*rows));
       return {};
     }
-    const auto& decision = std::get<ClosureDecision>(asked.word);
+    const auto& decision = std::get<ClosureDecision>(asked.order);
     if (decision.closure == "alpha/0-bravo/999") return "no such closure";
     const std::scoped_lock lock(mutex_);
     decisions_.push_back(decision);

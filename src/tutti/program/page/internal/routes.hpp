@@ -28,17 +28,17 @@ struct Response;
 
 namespace tutti::page {
 
-/// Operators' words on their way to the server.
-class WordInbox {
+/// Operators' orders on their way to the server.
+class OrderInbox {
  public:
   /// The server's answer will be in the future: why it is not stored, or empty. Nothing when too many wait.
-  std::optional<std::future<std::string>> ask(std::variant<ClosureDecision, MarkOrder> word) {
+  std::optional<std::future<std::string>> ask(std::variant<ClosureDecision, MarkOrder> order) {
     const std::scoped_lock lock(mutex_);
     if (is_closed_ || asked_.size() >= kMost) return std::nullopt;
-    asked_.push_back({std::move(word), {}});
+    asked_.push_back({std::move(order), {}});
     return asked_.back().answer.get_future();
   }
-  std::vector<AskedWord> take() {
+  std::vector<AskedOrder> take() {
     const std::scoped_lock lock(mutex_);
     return std::exchange(asked_, {});
   }
@@ -53,7 +53,7 @@ class WordInbox {
   static constexpr std::size_t kMost = 100;
   bool is_closed_ = false;
   std::mutex mutex_;
-  std::vector<AskedWord> asked_;
+  std::vector<AskedOrder> asked_;
 };
 
 /// The last map that the server has shown.
@@ -106,7 +106,7 @@ struct Site {
   const std::uint32_t incarnation = program::any_incarnation();
   SignIn sign_in;
   LiveBoard board;
-  WordInbox words;
+  OrderInbox orders;
   Metrics metrics;
   std::shared_ptr<const node::SubmapFrames> clouds;
   LastMap last_map;
@@ -119,9 +119,9 @@ struct Site {
 
 /// Everything that the page asks for (docs/page.md). `site` outlives the server.
 void add_routes(httplib::Server& server, Site& site);
-/// Asks the server to store an operator's word, and waits. False: the answer states why it is not stored, with the
+/// Asks the server to store an operator's order, and waits. False: the answer states why it is not stored, with the
 /// status `refused` where the server refuses it.
-bool ask_server(Site& site, std::variant<ClosureDecision, MarkOrder> word, int refused, httplib::Response& response);
+bool ask_server(Site& site, std::variant<ClosureDecision, MarkOrder> order, int refused, httplib::Response& response);
 /// This machine's name; empty: it has none.
 std::string own_host_name();
 
