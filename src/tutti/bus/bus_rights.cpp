@@ -52,7 +52,8 @@ constexpr std::array kRights{
     listens(kViewerUser, "$KV.GRAPH_{mission}.viewer.0.*", "the mission's status"),
     listens(kViewerUser, "_INBOX.viewer.{number}.>", kOwnInbox),
 
-    publishes(kOperatorUser, "mission.{mission}.operator.{name}.decision", "decisions, under the name that the key proves"),
+    publishes(kOperatorUser, "mission.{mission}.operator.{name}.decision",
+              "decisions, under the name that the key proves"),
     publishes(kOperatorUser, kAskStatus, "asks for the mission's last status"),
     publishes(kOperatorUser, kAskLease, kLease),
     listens(kOperatorUser, "$KV.GRAPH_{mission}.viewer.0.*", "the mission's status"),

@@ -50,8 +50,7 @@ class Marks : public testing::Test {
   fs::path folder_ = fs::path(testing::TempDir()) / ("marks_" + std::to_string(getpid()));
 };
 
-const MapMark kDoor{
-    .submap = {{RobotId{0}, 5}, 2}, .at = {3.0, 4.0, 1.0}, .text = "door", .by = "anna", .given_ns = 7};
+const MapMark kDoor{.submap = {{RobotId{0}, 5}, 2}, .at = {3.0, 4.0, 1.0}, .text = "door", .by = "anna", .given_ns = 7};
 
 TEST_F(Marks, AreWhatWasStored) {
   EXPECT_TRUE(node::read_marks(store_)->empty()) << "a map of before has none";

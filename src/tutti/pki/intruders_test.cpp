@@ -155,10 +155,10 @@ const std::vector<std::string> kOfTheServerAlone{"$JS.API.STREAM.DELETE.SUBMAPS_
                                                  "mission.cave.jobs.loop",
                                                  "mission.cave.worker.1.submap_copy",
                                                  "_INBOX.server.0.anything"};
-const std::vector<std::string> kOfOthers{"mission.cave.robot.4.submap",   "mission.cave.robot.4.status",
-                                         "mission.cave.worker.2.status",  "mission.cave.worker.2.verdicts",
-                                         "mission.cave.viewer.0.decision",    "mission.cave.operator.berta.decision",
-                                         "mission.tunnel.robot.3.submap", "mission.tunnel.worker.1.verdicts"};
+const std::vector<std::string> kOfOthers{"mission.cave.robot.4.submap",    "mission.cave.robot.4.status",
+                                         "mission.cave.worker.2.status",   "mission.cave.worker.2.verdicts",
+                                         "mission.cave.viewer.0.decision", "mission.cave.operator.berta.decision",
+                                         "mission.tunnel.robot.3.submap",  "mission.tunnel.worker.1.verdicts"};
 
 TEST_F(Intruders, NobodyButTheServerTouchesStreamsReceiptsAndTheLease) {
   for (const auto* who : {&alpha_, &worker_, &anna_, &vera_}) {

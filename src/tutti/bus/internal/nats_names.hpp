@@ -22,8 +22,8 @@ inline constexpr std::size_t kLargestWhole = (8U << 20U) - (8U << 10U);  ///< Wh
 bool is_mission_name(std::string_view mission);
 
 /// "mission.M.robot.3.submap", "mission.M.worker.7.verdicts", "mission.M.jobs.loop", "$KV.GRAPH_M.robot.3.proxy_graph",
-/// "$KV.GRAPH_M.viewer.0.mission_status" for all viewers; "mission.M.operator.NAME.decision" of an operator whom the bus
-/// knows, else "mission.M.viewer.0.decision".
+/// "$KV.GRAPH_M.viewer.0.mission_status" for all viewers; "mission.M.operator.NAME.decision" of an operator whom the
+/// bus knows, else "mission.M.viewer.0.decision".
 std::string subject_of(const std::string& mission, const Envelope& envelope);
 /// "proxy_graph"
 std::string word_of(MessageKind kind);

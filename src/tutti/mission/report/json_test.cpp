@@ -42,8 +42,8 @@ TEST(ReportJson, HasTheDocumentedKeys) {
     for (const auto& policy : robot["policies"])
       EXPECT_EQ(keys(policy),
                 (std::set<std::string>{"rmse_m", "max_error_m", "rpe_m", "rpe_deg", "rpe_10m_m", "rpe_10m_deg",
-                                       "discontinuity_m", "discontinuity_deg", "agreement_rmse_m", "constraints", "scored_share",
-                                       "partial", "agreement_scored_share", "agreement_partial"}));
+                                       "discontinuity_m", "discontinuity_deg", "agreement_rmse_m", "constraints",
+                                       "scored_share", "partial", "agreement_scored_share", "agreement_partial"}));
   }
   expect_keys(report["server"], {"components", "closures_accepted", "closures_rejected", "rmse_m"});
   for (const auto& transform : report["transforms"])

@@ -108,9 +108,9 @@ std::string closure_json(const ShownMap& map, const mapfile::ClosureInfo& info) 
                 {"state", to_string(info.state)},
                 {"reason", info.reason}};
   out["decision"] = info.decision ? FieldJson{{"wish", to_string(info.decision->wish)},
-                                          {"by", info.decision->by},
-                                          {"wall_ns", info.decision->counts_from_ns()}}
-                              : FieldJson(nullptr);
+                                              {"by", info.decision->by},
+                                              {"wall_ns", info.decision->counts_from_ns()}}
+                                  : FieldJson(nullptr);
   out["links"] = FieldJson::array();
   for (const mapfile::ClosureFit& fit : info.closures) out["links"].push_back(link_json(map, info, fit));
   out["by_hand"] = info.decision && !info.decision->by_hand.empty();
