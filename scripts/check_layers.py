@@ -25,7 +25,7 @@ CONFINED = [
     (r"dds/", r"program/ros/(dds|internal/raw_type)\.cpp$", "program/ros/dds.cpp and internal/raw_type.cpp"),
     (r"openssl/", r"(bags/internal/sha256|bus/nats_trust|pki/.*)\.cpp$",
      "bags/internal/sha256.cpp, bus/nats_trust.cpp and pki/*.cpp"),
-    (r"httplib", r"(tests/support/)?program/page/(internal/)?(guarded_server|guarded_stream|routes|history_routes|mark_routes|page_server_test|served_page)\.[ch]pp$", "the page's server and its tests"),
+    (r"httplib", r"(tests/support/)?program/page/(internal/)?(guarded_server|guarded_stream|routes|history_routes|mark_routes|shared_answer|page_server_test|served_page)\.[ch]pp$", "the page's server and its tests"),
     (r"turbojpeg", r"formats/.*\.cpp$", "formats/*.cpp"),
     (r"CLI/", r"(?!)", "apps/"),
     (r"pybind11/", r"(?!)", "python/"),

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/program/page/internal/guarded_server.hpp"
 
-#include <fcntl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
-#include <condition_variable>
-#include <functional>
-#include <mutex>
+#include <thread>
 #include <utility>
 
 #include "tutti/program/clock.hpp"
@@ -16,42 +14,10 @@
 namespace tutti::page {
 namespace {
 
-constexpr int kMostRequests = 100;       // on one connection
-constexpr int kBacklog = 128;            // connections that wait with the kernel
+constexpr int kMostRequests = 100;  // on one connection
+constexpr int kBacklog = 128;       // connections that wait with the kernel
+constexpr auto kWithoutFiles = std::chrono::milliseconds(10);
 constexpr int kReceiveBuffer = 1 << 17;  // bytes a connection: the kernel, left alone, gives up to 32 MB
-constexpr auto kLookForRoom = std::chrono::milliseconds(50);
-
-/// As many threads as connections are served at a time. Who comes then waits in the kernel's queue, and takes no file
-/// of the program's.
-class BoundedPool final : public httplib::TaskQueue {
- public:
-  BoundedPool(std::size_t threads, Connections& connections)
-      : pool_(threads), connections_(connections), free_(threads) {}
-  void enqueue(std::function<void()> task) override {
-    {
-      std::unique_lock lock(mutex_);
-      while (!changed_.wait_for(lock, kLookForRoom, [this] { return free_ > 0; }))
-        connections_.make_room(program::Clock::steady_s());
-      --free_;
-    }
-    pool_.enqueue([this, task = std::move(task)] {
-      task();
-      {
-        const std::scoped_lock lock(mutex_);
-        ++free_;
-      }
-      changed_.notify_one();
-    });
-  }
-  void shutdown() override { pool_.shutdown(); }
-
- private:
-  httplib::ThreadPool pool_;
-  Connections& connections_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::size_t free_;
-};
 
 /// Between the two files of a renewal a connection may be refused; the next one is not.
 int use_files(SSL* connection, void* files) {
@@ -65,13 +31,14 @@ int use_files(SSL* connection, void* files) {
 }  // namespace
 
 GuardedServer::GuardedServer(const Patience& patience) : patience_(patience) {
-  new_task_queue = [this] { return new BoundedPool(kConnections, connections_); };
   set_keep_alive_timeout(static_cast<time_t>(patience.keep_alive_s));
   set_keep_alive_max_count(kMostRequests);
   set_payload_max_length(kMostBody);
 }
 
-GuardedServer::~GuardedServer() = default;
+GuardedServer::~GuardedServer() {
+  if (listener_ != INVALID_SOCKET) close(listener_);
+}
 
 bool GuardedServer::use_tls(const TlsFiles& files) {
   files_ = files;
@@ -95,36 +62,48 @@ int GuardedServer::bind(const std::string& host, int port) {
   else if (!bind_to_port(host, port))
     port = -1;
   if (port > 0) {
-    static_cast<void>(setsockopt(svr_sock_, SOL_SOCKET, SO_RCVBUF, &kReceiveBuffer, sizeof(kReceiveBuffer)));
-    static_cast<void>(::listen(svr_sock_, kBacklog));  // cpp-httplib asks for five
+    listener_ = svr_sock_;
+    static_cast<void>(setsockopt(listener_, SOL_SOCKET, SO_RCVBUF, &kReceiveBuffer, sizeof(kReceiveBuffer)));
+    static_cast<void>(::listen(listener_, kBacklog));  // cpp-httplib asks for five
   }
   return port;
 }
 
-/// httplib's stop() does nothing until the thread that listens has begun; that thread would then listen for ever.
+/// The listener is closed only where no thread may still accept from it: its number may be another file's by then.
 void GuardedServer::end() {
   connections_.close();
-  const socket_t listener = svr_sock_.exchange(INVALID_SOCKET);
-  if (listener == INVALID_SOCKET) return;
-  static_cast<void>(shutdown(listener, SHUT_RDWR));
-  close(listener);
+  svr_sock_ = INVALID_SOCKET;  // what httplib is sending ends
+  if (listener_ != INVALID_SOCKET) static_cast<void>(shutdown(listener_, SHUT_RDWR));
 }
 
-bool GuardedServer::process_and_close_socket(socket_t socket) {
-  std::string address;
-  int port = 0;
-  GuardedStream(socket, nullptr, connections_, patience_).get_remote_ip_and_port(address, port);
-  if (connections_.enter(socket, address)) {
-    serve(socket);
-    connections_.leave(socket);
+/// Takes whoever comes at once: nobody waits with the kernel behind others.
+void GuardedServer::listen() {
+  httplib::ThreadPool pool(Connections::kThreads);
+  for (;;) {
+    const int socket = accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+    if (socket < 0) {
+      if (svr_sock_ == INVALID_SOCKET) break;  // end() has shut it down, or it was never bound
+      if (errno != ECONNABORTED && errno != EINTR) std::this_thread::sleep_for(kWithoutFiles);
+      continue;
+    }
+    std::string address;
+    int port = 0;
+    GuardedStream(socket, nullptr, connections_, patience_).get_remote_ip_and_port(address, port);
+    if (!connections_.enter(socket, std::move(address), program::Clock::steady_s())) {
+      close(socket);
+      continue;
+    }
+    pool.enqueue([this, socket] {
+      serve(socket);
+      connections_.leave(socket);
+      static_cast<void>(shutdown(socket, SHUT_RDWR));
+      close(socket);
+    });
   }
-  static_cast<void>(shutdown(socket, SHUT_RDWR));
-  close(socket);
-  return true;
+  pool.shutdown();
 }
 
 void GuardedServer::serve(socket_t socket) {
-  if (fcntl(socket, F_SETFL, fcntl(socket, F_GETFL) | O_NONBLOCK) != 0) return;
   std::unique_ptr<SSL, decltype(&SSL_free)> tls(nullptr, &SSL_free);
   if (tls_ != nullptr) {
     tls.reset(SSL_new(tls_.get()));

@@ -67,7 +67,9 @@ bool GuardedStream::next_request(bool is_first) {
   head_ = std::move(head->text);
   head_read_ = 0;
   body_left_ = head->body;
-  body_until_s_ = now_s() + patience_.body_s + static_cast<double>(body_left_) / kBodyRate;
+  body_since_s_ = now_s();
+  const std::size_t photo = body_left_ - std::min(body_left_, kMostOrder);
+  body_until_s_ = body_since_s_ + patience_.body_s + static_cast<double>(photo) / kBodyRate;
   return true;
 }
 
@@ -130,7 +132,7 @@ ssize_t GuardedStream::read(char* to, std::size_t most) {
     in_.copy(to, count);
     in_.erase(0, count);
   } else {
-    connections_.waits(socket_, now_s());
+    connections_.waits(socket_, body_since_s_);  // of all its bytes, and not anew with each
     count = receive(to, count, body_until_s_);
     connections_.waits(socket_, std::nullopt);
   }

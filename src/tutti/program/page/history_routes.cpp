@@ -43,11 +43,11 @@ void HistoryRoutes::past(const Request& request, Response& response) {
   const std::scoped_lock one_at_a_time(mutex_);
   if (*from_s != -kAll || *until_s != kAll) return response.set_content(text(*from_s, *until_s), "application/json");
   const double now_s = program::Clock::steady_s();
-  if (all_.empty() || now_s > all_until_s_) {
-    all_ = text(-kAll, kAll);
+  if (!all_ || now_s > all_until_s_) {
+    all_.emplace(text(-kAll, kAll), "application/json");
     all_until_s_ = now_s + kSameText_s;
   }
-  response.set_content(all_, "application/json");
+  all_->give(request, response);
 }
 
 void HistoryRoutes::acknowledge(const Visitor& visitor, const Json& body, Response& response) {

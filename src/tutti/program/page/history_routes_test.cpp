@@ -36,6 +36,23 @@ class PageHistory : public served::ServedPage {
   json known() { return events().at("history"); }
 };
 
+TEST_F(PageHistory, AndThePageAreTheSameCompressedAndPlain) {
+  start();
+  auto http = client();
+  for (const char* path : {"/", "/api/history"}) {
+    const auto plain = http.Get(path), packed = http.Get(path, httplib::Headers{{"Accept-Encoding", "gzip"}});
+    ASSERT_TRUE(plain && packed) << path;
+    EXPECT_EQ(plain->get_header_value("Content-Encoding"), "") << path;
+    EXPECT_EQ(packed->get_header_value("Content-Encoding"), "gzip") << path;
+    EXPECT_EQ(packed->body, plain->body) << path;
+    EXPECT_FALSE(plain->body.empty());
+  }
+  const auto head = http.Head("/");
+  ASSERT_TRUE(head);
+  EXPECT_GT(head->get_header_value<std::uint64_t>("Content-Length"), 100'000U);
+  EXPECT_TRUE(head->body.empty());
+}
+
 TEST_F(PageHistory, IsThereAfterARestart) {
   start();
   events_with_map();

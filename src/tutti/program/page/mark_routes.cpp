@@ -11,6 +11,7 @@
 #include "tutti/node/picture.hpp"
 #include "tutti/program/clock.hpp"
 #include "tutti/program/page/base64.hpp"
+#include "tutti/program/page/internal/request_head.hpp"
 #include "tutti/program/page/view.hpp"
 #include "tutti/wire/codec.hpp"
 
@@ -56,6 +57,25 @@ std::optional<MapMark> mark_of(const Site& site, const Visitor& visitor, const J
 }  // namespace
 
 std::string photo_path(std::uint64_t number) { return fmt::format("/api/photo/{}", number); }
+
+void MarkReader::operator()(const Request& request, Response& response, const httplib::ContentReader& read) const {
+  const bool is_large = request.get_header_value<std::uint64_t>("Content-Length") > kMostOrder;
+  const int own = is_large ? 1 : 0;
+  struct Counted {  // until the request ends, however it does
+    std::atomic<int>& all;
+    int own;
+    ~Counted() { all -= own; }
+  } const counted{*large_, own};
+  if ((counted.all += own) > kMostAtATime && is_large)
+    return say(response, 503, fmt::format("{} other photos are on their way: try again", kMostAtATime));
+  Request whole = request;
+  if (!read([&](const char* bytes, std::size_t count) {
+        whole.body.append(bytes, count);
+        return true;
+      }))
+    return say(response, 400, "the body did not come");
+  handler_(whole, response);
+}
 
 void put_mark(Site& site, const Visitor& visitor, const Json& body, Response& response) {
   auto mark = mark_of(site, visitor, body, response);

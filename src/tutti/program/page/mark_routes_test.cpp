@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/program/page/internal/mark_routes.hpp"
 
+#include <future>
+
+#include "support/bus/nats_network.hpp"
 #include "support/program/page/served_page.hpp"
 
 namespace tutti::page {
@@ -46,6 +49,33 @@ TEST_F(Marks, AreThereForWhoComesLateAndAfterARestart) {
   EXPECT_EQ(ask(client(), "/api/unmark", {{"id", id}}).first, 404) << "it has gone";
   restart();
   EXPECT_TRUE(only_marks(events()).empty());
+}
+
+TEST_F(Marks, FewLargeBodiesAreReadAtATime) {
+  start();
+  events_with_map();
+  const std::string large(100'000, ' ');
+  std::promise<void> go;
+  const std::shared_future<void> gone = go.get_future().share();
+  const auto send = [&](bool waits) {
+    const auto answer = client().Post(
+        "/api/mark", {{"X-Tutti", "1"}}, large.size(),
+        [&](std::size_t offset, std::size_t length, httplib::DataSink& sink) {
+          if (waits && offset > 0) gone.wait();
+          return sink.write(large.data() + offset, offset == 0 ? 1 : length);
+        },
+        "application/json");
+    return answer ? answer->status : 0;
+  };
+  std::vector<std::future<int>> slow;
+  for (int i = 0; i < MarkReader::kMostAtATime; ++i)
+    slow.push_back(std::async(std::launch::async, [&] { return send(true); }));
+  EXPECT_TRUE(test::within(10.0, [&] { return send(false) == 503; }));
+  EXPECT_EQ(ask(client(), "/api/mark", a_mark()).first, 200) << "small ones pass";
+  go.set_value();
+  for (auto& one : slow) EXPECT_EQ(one.get(), 400) << "spaces are no mark";
+  EXPECT_EQ(send(false), 400);
+  EXPECT_EQ(ask(client(), "/api/decide", {{"closure", large}}).first, 413) << "only a mark may be large";
 }
 
 TEST_F(Marks, APhotoIsWhatItsBytesSay) {

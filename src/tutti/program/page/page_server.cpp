@@ -86,7 +86,7 @@ class ServedPage final : public Page {
       return fail(ErrorCode::io, "the page at {}: this address cannot be listened at; is another program there?",
                   to_string(address));
     site_.is_secure = !pki.empty();
-    listens_ = std::thread([this] { server_->listen_after_bind(); });
+    listens_ = std::thread([this] { server_->listen(); });
     makes_ = std::jthread([this](const std::stop_token& stop) { make_all(stop); });
     const std::string url = fmt::format("{}://{}/", pki.empty() ? "http" : "https",
                                         to_string(bus::HostPort{host_to_open(address.host, site_.names), port}));

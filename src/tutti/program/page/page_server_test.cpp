@@ -379,7 +379,7 @@ TEST_F(PageServer, ConnectionsThatSendNothingTakeNothingFromTheMission) {
     sockets.push_back(one);
   }
   std::this_thread::sleep_for(std::chrono::milliseconds(200));
-  EXPECT_LE(open_files() - before, 400 + 70) << "the page itself holds as many as it serves";
+  EXPECT_LE(open_files() - before, 400 + 40) << "the page itself holds as many as it serves";
   viewer_->show_status({.time = Timestamp{} + 6.0, .revision = 4});
   EXPECT_TRUE(viewer_->take_orders().empty());
   for (const int one : sockets) close(one);

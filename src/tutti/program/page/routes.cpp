@@ -21,7 +21,9 @@
 #include "tutti/program/page/internal/history_routes.hpp"
 #include "tutti/program/page/internal/mark_routes.hpp"
 #include "tutti/program/page/internal/page_data.hpp"
+#include "tutti/program/page/internal/posted_json.hpp"
 #include "tutti/program/page/internal/request_head.hpp"
+#include "tutti/program/page/internal/shared_answer.hpp"
 #include "tutti/program/page/view.hpp"
 
 namespace tutti::page {
@@ -30,7 +32,7 @@ namespace {
 constexpr const char* kJson = "application/json";
 constexpr std::size_t kLongestName = 64;  // of `tutti pki`
 constexpr const char* kCookie = "tutti_session";
-constexpr const char *kLogin = "/api/login", *kLogout = "/api/logout";
+constexpr const char *kLogin = "/api/login", *kLogout = "/api/logout", *kMark = "/api/mark";
 constexpr int kMostWatchers = 32;
 constexpr std::size_t kMostPoints = 20'000;  // of one submap's cloud
 constexpr auto kSignOfLife = std::chrono::milliseconds(1000);
@@ -248,12 +250,16 @@ class Routes {
       say(response, 403, "the header X-Tutti: 1 is missing");
       return true;
     }
+    const auto length = request.get_header_value<std::uint64_t>("Content-Length");
     if (request.path == kLogin || request.path == kLogout) {
-      if (request.get_header_value<std::uint64_t>("Content-Length") <= kMostStrangersBody) return false;
+      if (length <= kMostStrangersBody) return false;
       say(response, 413, fmt::format("who is not signed in sends at most {} bytes", kMostStrangersBody));
       return true;
     }
-    return !decides(who(request), response);
+    if (!decides(who(request), response)) return true;
+    if (request.path == kMark || length <= kMostOrder) return false;
+    say(response, 413, fmt::format("only a mark has more than {} bytes", kMostOrder));
+    return true;
   }
 
   /// A handler for those who may see.
@@ -268,10 +274,10 @@ class Routes {
   template <class Call>
   static httplib::Server::Handler posted(Call call) {
     return [call](const Request& request, Response& response) {
+      const auto body = posted_json(request.body);
+      if (!body) return say(response, 400, body.error().message);
       try {
-        const Json body = Json::parse(request.body.empty() ? "{}" : request.body);
-        if (!body.is_object()) return say(response, 400, "expected a JSON object");
-        call(request, body, response);
+        call(request, *body, response);
       } catch (const Json::exception& error) {
         say(response, 400, error.what());
       }
@@ -347,10 +353,8 @@ void add_routes(httplib::Server& server, Site& site) {
   });
   server.set_exception_handler(
       [](const Request&, Response& response, std::exception_ptr) { say(response, 500, "a defect of the program"); });
-  server.Get("/", [](const Request&, Response& response) {
-    const std::string_view page = live_page();
-    response.set_content(page.data(), page.size(), "text/html; charset=utf-8");
-  });
+  server.Get("/", [page = SharedAnswer(std::string(live_page()), "text/html; charset=utf-8")](
+                      const Request& q, Response& r) { page.give(q, r); });
   server.Get("/api/me", [routes](const Request& q, Response& r) { routes->me(q, r); });
   server.Post(kLogin,
               Routes::posted([routes](const Request&, const Json& body, Response& r) { routes->login(body, r); }));
@@ -377,9 +381,9 @@ void add_routes(httplib::Server& server, Site& site) {
   server.Post("/api/acknowledge", routes->decided([routes](const Visitor& visitor, const Json& body, Response& r) {
     routes->history.acknowledge(visitor, body, r);
   }));
-  server.Post("/api/mark", routes->decided([&site](const Visitor& visitor, const Json& body, Response& r) {
-    put_mark(site, visitor, body, r);
-  }));
+  server.Post(kMark, MarkReader(routes->decided([&site](const Visitor& visitor, const Json& body, Response& r) {
+                put_mark(site, visitor, body, r);
+              })));
   server.Post("/api/unmark",
               routes->decided([&site](const Visitor&, const Json& body, Response& r) { remove_mark(site, body, r); }));
   server.Get(R"(/api/photo/(\d{1,20}))",

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -13,18 +14,18 @@ namespace tutti::page {
 /// seconds of any steady clock.
 class Connections {
  public:
-  /// False: no more are served. `address` is the peer's, without its port.
-  bool enter(int socket, std::string address);
+  /// A newcomer, who is waited for from now on. Where his address has its share, or all have theirs, he takes the place
+  /// of one whose peer is waited for: of the address that has most of them the one that has waited longest; its thread
+  /// is done soon after. False: there is none, or no more are served. `address` is the peer's, without its port.
+  bool enter(int socket, std::string address, double now_s);
   void leave(int socket);  ///< Before the socket is closed.
   /// From `since_s` on the peer is waited for, to speak or to read; nothing: it is served.
   void waits(int socket, std::optional<double> since_s);
-  /// Ends a connection whose peer has been waited for at least kPatience_s: of the address that has most of them the
-  /// one that has waited longest. Its thread is done soon after. False: there is none.
-  bool make_room(double now_s);
   /// Ends all, for good.
   void close();
 
-  static constexpr double kPatience_s = 0.5;
+  static constexpr std::size_t kMost = 256, kMostOfAddress = 16;
+  static constexpr std::size_t kThreads = kMost + 32;  ///< With those that are being ended.
 
  private:
   struct Connection {
@@ -32,6 +33,8 @@ class Connections {
     std::optional<double> waits_since_s;
     bool is_ended = false;
   };
+  /// Ends one whose peer is waited for, of this address or of any. False: there is none.
+  bool make_room(double now_s, const std::optional<std::string>& of);
   static void end(int socket, Connection& connection);
 
   std::mutex mutex_;

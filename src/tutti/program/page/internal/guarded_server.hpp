@@ -16,13 +16,10 @@ struct TlsFiles {
   std::string certificate, key, authority;
 };
 
-/// cpp-httplib's server with bounds for what a peer may send, and how long it may take (GuardedStream). It serves at
-/// most `kConnections` at a time. Who comes then takes the place of one whose peer has kept it waiting, or waits with
-/// the kernel. Its handlers are called by as many threads.
+/// cpp-httplib's server with bounds for what a peer may send, and how long he may take (GuardedStream), and for how
+/// many are served (Connections), each by a thread of its own, which calls the handlers.
 class GuardedServer final : public httplib::Server {
  public:
-  static constexpr std::size_t kConnections = 64;
-
   explicit GuardedServer(const Patience& patience = {});
   ~GuardedServer() override;
   GuardedServer(const GuardedServer&) = delete;
@@ -32,14 +29,16 @@ class GuardedServer final : public httplib::Server {
   bool use_tls(const TlsFiles& files);
   /// Listens at an address, at port 0 at any free one. The port; below 0: it cannot.
   int bind(const std::string& host, int port);
-  /// Ends every connection, also what is being sent, and listen_after_bind(), also one that has not begun.
+  /// Serves until end().
+  void listen();
+  /// Ends every connection, also what is being sent, and listen(), also one that has not begun.
   void end();
 
  private:
-  bool process_and_close_socket(socket_t socket) override;
   void serve(socket_t socket);
 
   Patience patience_;
+  socket_t listener_ = INVALID_SOCKET;
   Connections connections_;
   TlsFiles files_;
   std::unique_ptr<SSL_CTX, decltype(&SSL_CTX_free)> tls_{nullptr, &SSL_CTX_free};

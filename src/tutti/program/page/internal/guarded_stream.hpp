@@ -16,7 +16,7 @@ namespace tutti::page {
 struct Patience {
   double head_s = 10.0;       ///< For the whole head of a request, and before it for a TLS handshake.
   double keep_alive_s = 3.0;  ///< Until the next request begins.
-  double body_s = 10.0;       ///< For a body, and one more for each 16 kB of it.
+  double body_s = 10.0;       ///< For a body, and one more for each 16 kB beyond kMostOrder.
   double write_s = 10.0;      ///< To take an answer, and one more for each 4 kB of it.
 };
 
@@ -60,7 +60,7 @@ class GuardedStream final : public httplib::Stream {
   std::string in_;    // received, and not yet taken
   std::string head_;  // as cpp-httplib reads it
   std::size_t head_read_ = 0, body_left_ = 0;
-  double body_until_s_ = 0.0;
+  double body_since_s_ = 0.0, body_until_s_ = 0.0;
   bool is_broken_ = false;
 };
 

@@ -3,10 +3,12 @@
 
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 
 #include "tutti/program/page/internal/answers.hpp"
 #include "tutti/program/page/internal/routes.hpp"
+#include "tutti/program/page/internal/shared_answer.hpp"
 
 namespace tutti::page {
 
@@ -23,7 +25,7 @@ class HistoryRoutes {
   [[nodiscard]] std::string text(double from_s, double until_s) const;
   Site& site_;
   std::mutex mutex_;  // of what follows
-  std::string all_;
+  std::optional<SharedAnswer> all_;
   double all_until_s_ = 0.0;  // of a steady clock
 };
 

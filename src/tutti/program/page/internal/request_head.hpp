@@ -12,6 +12,7 @@ constexpr std::size_t kMostHead = 16U << 10U;     ///< Bytes of a request's line
 constexpr std::size_t kMostLine = 2048;           ///< Bytes of a request's line: std::regex recurses over its path.
 constexpr std::size_t kMostHeaders = 64;          ///< Lines.
 constexpr std::size_t kMostBody = 2U << 20U;      ///< Bytes: a mark's photo of 1 MiB as base64, and its text.
+constexpr std::size_t kMostOrder = 64U << 10U;    ///< Bytes: any other body.
 constexpr std::size_t kMostStrangersBody = 4096;  ///< Bytes: a log-in.
 
 /// The head of a request, as cpp-httplib is given it.
