@@ -4,7 +4,7 @@
 include_guard()
 
 set(TUTTI_LIBRARIES_core base geometry model formats evaluation spectral estimation judge consistency)
-set(TUTTI_LIBRARIES_perception lidar visual visual_frontend bundle config images)
+set(TUTTI_LIBRARIES_perception lidar fit visual visual_frontend bundle config images)
 set(TUTTI_LIBRARIES_robot robot wire agent_state)
 set(TUTTI_LIBRARIES_server server verifiers)
 set(TUTTI_LIBRARIES_net bus pki storage node mapfile)

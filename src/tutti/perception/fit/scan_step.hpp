@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "tutti/base/timestamp.hpp"
+#include "tutti/geometry/pose3.hpp"
+#include "tutti/model/point_cloud.hpp"
+#include "tutti/perception/lidar/oriented_cloud.hpp"
+
+namespace tutti::fit {
+
+/// One scan, thinned and with normals, in the body frame at its stamp.
+struct FitScan {
+  Timestamp stamp;
+  lidar::OrientedCloud cloud;
+};
+
+/// Points nearer than `min_range_m` are on the robot itself and left out. At most kMostPoints are kept.
+FitScan make_fit_scan(Timestamp stamp, const PointCloud& cloud, double min_range_m);
+
+/// How the body moved from one scan to the next, as the two scans show it.
+struct ScanStep {
+  Timestamp from, to;
+  Pose3 T_from_to;
+  /// Right tangent [m; rad]. Large along directions in which the scans slide on each other, such as a corridor's axis.
+  Matrix6d covariance = Matrix6d::Identity();
+  double overlap = 0.0;  ///< Share of the newer scan's points that lie on the older one.
+  int registrations = 0;
+};
+
+/// Registers the newer scan on the older one (lidar::register_clouds()) from what odometry says; where that does not
+/// confirm odometry, also from standing still and from `T_as_before`, the motion that a steady body would have made.
+/// Where two ends fit equally well, their difference is part of the covariance: the scans cannot tell. Nothing when the
+/// scans have too little in common.
+std::optional<ScanStep> step_between(const FitScan& from, const FitScan& to, const Pose3& T_by_odometry,
+                                     const Pose3& T_as_before = {});
+
+/// The motion of another length of time at the same speeds.
+Pose3 steady_motion(const ScanStep& step, double duration_s);
+
+}  // namespace tutti::fit
