@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
 #include "embedded.hpp"
 #include "tutti/robot/agent.hpp"
 #include "tutti/wire/codec.hpp"
@@ -66,6 +68,8 @@ std::vector<std::string> take_errors(Agent& agent) {
     std::vector<std::string> out;
     for (const Error& error : a.take_scan_errors()) out.push_back(error.message);
     for (const auto& jump : a.take_odometry_jumps()) out.push_back(to_string(jump));
+    for (const fit::Misfit& misfit : a.take_misfits())
+      out.push_back(fmt::format("{}: {}", to_string(misfit), way_on(misfit)));
     return out;
   });
 }
@@ -132,7 +136,8 @@ age_s (n,) seconds before the stamp; None: at the stamp. Points that are not fin
            "Compares what the server's optimise() sent with the own map, and corrects it. ValueError: bytes that are "
            "no such message.")
       .def("take_errors", &take_errors,
-           "What went wrong since the last call, in words: scans without odometry, odometry that jumped.")
+           "What went wrong since the last call, in words: scans without odometry, odometry that jumped, scans that "
+           "contradict it.")
       .def_property_readonly(
           "corrected", [](Agent& agent) { return agent.call([](const RobotAgent& a) { return a.corrected(); }); },
           "T_map_body at keyframes; map starts where odom does.")

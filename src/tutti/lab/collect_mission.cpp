@@ -14,6 +14,7 @@
 #include "tutti/lab/mission_input.hpp"
 #include "tutti/lab/update_json.hpp"
 #include "tutti/mission/make_record.hpp"
+#include "tutti/mission/misfit_record.hpp"
 #include "tutti/mission/robot_actor.hpp"
 #include "tutti/mission/runner.hpp"
 #include "tutti/mission/view_recorder.hpp"
@@ -106,6 +107,12 @@ Status take(const Json& event, const std::string& name, Robot& robot) try {
     for (const Json& row : event.at("traffic")) robot.finished.traffic.push_back(traffic_of(row, name));
     if (event.contains("status"))
       if (const Status ok = read_json_fields(event.at("status"), robot.finished.status); !ok) return ok;
+  }
+  if (what == "misfit_found") {
+    fit::Misfit misfit;
+    misfit.kind = fit::misfit_kind(event.value("kind", "")).value_or(misfit.kind);
+    if (const Status ok = read_json_fields(event, misfit); !ok) return ok;
+    mission::note_misfit(misfit, robot.finished.misfits);
   }
   robot.troubles.take(event);
   return {};

@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "tutti/base/config_io.hpp"
+#include "tutti/mission/misfit_record.hpp"
 #include "tutti/mission/perfect_judge.hpp"
 #include "tutti/mission/record_notes.hpp"
 #include "tutti/wire/message_kind.hpp"
@@ -92,6 +93,8 @@ MissionRecord make_record(const FinishedMission& mission) {
     robot.status = finished.status;
     robot.status.name = robot.name;
     robot.updates = finished.updates;
+    for (const fit::Misfit& misfit : finished.misfits)
+      robot.misfits.push_back(record_of(misfit, *finished.outcome.recording));
     for (UpdateRecord& update : robot.updates)
       update.perfect_rmse_m = mission.perfect.rmse_m(update.revision, robot.id);
     robot.alerts = alerts_of(robot.updates);

@@ -27,6 +27,7 @@ struct FinishedRobot {
   std::string refused_images;          ///< Why images were refused first; empty when none were.
   std::vector<TrafficRecord> traffic;  ///< bytes_per_s is not set.
   NodeStatus status;
+  std::vector<fit::Misfit> misfits;  ///< note_misfit()
 };
 
 /// A mission that is over, whichever program ran it. The references must outlive it.

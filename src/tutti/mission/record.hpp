@@ -114,6 +114,14 @@ struct WhereaboutsRecord {
   Pose3 T_map_body;  ///< In the map frame of the robot that assumes it.
 };
 
+/// In what a robot's scans contradict its odometry (fit::Misfit).
+struct MisfitRecord {
+  std::string kind;          ///< fit::to_string()
+  std::string says, way_on;  ///< Parts of a sentence about the robot.
+  double value = 0.0, sigma = 0.0;
+  double from_s = 0.0, until_s = 0.0;  ///< Mission time of the scans that say so.
+};
+
 /// The cloud that one robot saw, by one of its own estimates, against the survey, after the rigid alignment of its
 /// trajectory to the reference.
 struct MapErrorRecord {
@@ -177,7 +185,8 @@ struct RobotRecord {
   std::vector<WhereaboutsRecord> whereabouts;
   std::vector<DriftOrigin> drift_origins;  ///< Where its odometry really went wrong; empty when unknown.
   std::optional<ImagesRecord> images;      ///< Nothing when no submap has images.
-  std::string unused_images;               ///< Why a robot with a camera has no submap with images, if known.
+  std::vector<MisfitRecord> misfits;
+  std::string unused_images;  ///< Why a robot with a camera has no submap with images, if known.
   /// The cloud that the robot saw, by raw odometry, aligned rigidly to the reference (without one, to the server's
   /// estimate) and thinned. Empty without a range sensor.
   PointCloud onboard_cloud;

@@ -7,8 +7,10 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <utility>
 
+#include "tutti/geometry/so3.hpp"
 #include "tutti/server/map_components.hpp"
 #include "tutti/wire/codec.hpp"
 
@@ -95,11 +97,45 @@ void note_separate_maps(const server::MapEstimate& map, MissionRecord& record) {
   }
 }
 
+/// Up by the robot's odometry, in the world of its component, as the map lies on its keyframes; nothing without a map.
+std::optional<Eigen::Vector3d> up_of(const RobotRecord& robot) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const StampedPose& mapped : robot.server_estimate) {
+    const auto raw = std::ranges::lower_bound(robot.odometry, mapped.stamp, {}, &StampedPose::stamp);
+    if (raw == robot.odometry.end() || raw->stamp != mapped.stamp) continue;
+    sum += mapped.pose.rotation * raw->pose.rotation.conjugate() * Eigen::Vector3d::UnitZ();
+  }
+  return sum.norm() > 0.0 ? std::optional<Eigen::Vector3d>(sum.normalized()) : std::nullopt;
+}
+
+/// Robots of one map whose odometry frames are not level with each other: heights and grids of that map are wrong.
+void warn_of_up(const MissionRecord& record, std::vector<std::string>& out) {
+  constexpr double kMost_deg = 30.0;
+  for (std::size_t b = 0; b < record.robots.size(); ++b)
+    for (std::size_t a = 0; a < b; ++a) {
+      const RobotRecord &one = record.robots[a], &other = record.robots[b];
+      const auto up = up_of(one), others_up = up_of(other);
+      if (one.component != other.component || !up || !others_up) continue;
+      const double angle_deg = std::acos(std::clamp(up->dot(*others_up), -1.0, 1.0)) / kRadPerDeg;
+      if (angle_deg < kMost_deg) continue;
+      out.push_back(
+          fmt::format("{}'s up is {} by the closures between them ({:.0f} degrees apart): z of odometry's "
+                      "frame points up (docs/frames.md), which one of the two does not do, and the grid "
+                      "takes the ceiling for the ground",
+                      one.name, angle_deg > 90.0 ? other.name + "'s down" : "not " + other.name + "'s", angle_deg));
+      break;
+    }
+}
+
 }  // namespace
 
 std::vector<std::string> warnings_of(const MissionRecord& record) {
   std::vector<std::string> out;
   std::size_t submaps = 0;
+  for (const RobotRecord& robot : record.robots)
+    for (const MisfitRecord& misfit : robot.misfits)
+      out.push_back(fmt::format("{}: by {:.0f} to {:.0f} s {}: {}", robot.name, misfit.from_s, misfit.until_s,
+                                misfit.says, misfit.way_on));
   for (const RobotRecord& robot : record.robots)
     if (!robot.unused_images.empty())
       out.push_back(fmt::format("{}: none of its images are used: {}", robot.name, robot.unused_images));
@@ -108,14 +144,15 @@ std::vector<std::string> warnings_of(const MissionRecord& record) {
     if (robot.submaps == 0 && robot.keyframes > 0)
       out.push_back(fmt::format("{}: none of its submaps reached the server", robot.name));
   }
+  warn_of_up(record, out);
   const bool tied = !record.server.closures.empty();
   const bool follows_fixes = record.server.fixes && record.server.fixes->georeference;
   if (!tied && submaps > 1 && !follows_fixes)
     out.push_back(fmt::format("the server's map is odometry alone: {}", why_odometry_alone(record.server.rejections)));
   for (const RobotRecord& robot : record.robots)
     if (tied && !robot.server_estimate.empty() && robot.component != record.server.largest_component)
-      out.push_back(
-          fmt::format("{}: no closure joins it with the largest map; it lies in a frame of its own", robot.name));
+      out.push_back(fmt::format("{}: no closure joins it with the largest map; it lies in a frame of its own{}",
+                                robot.name, robot.misfits.empty() ? "" : ". It does not fit itself: mend that first"));
   return out;
 }
 

@@ -30,6 +30,29 @@ TEST(Warnings, ImagesThatNobodyUsesComeFirst) {
   EXPECT_EQ(warnings_of(record).at(0), "bravo: none of its images are used: stamps of another clock");
 }
 
+TEST(Warnings, WhatARobotsScansSayOfItsOdometryComesFirstAndExplainsTwoMaps) {
+  MissionRecord record = joined();
+  record.robots[1].component = 1;
+  record.robots[1].misfits = {
+      {"clock", "its scans are stamped 0.598 s late", "set scan_time_offset_s", -0.598, 0.003, 0, 61}};
+  const std::vector<std::string> warnings = warnings_of(record);
+  ASSERT_EQ(warnings.size(), 2U);
+  EXPECT_EQ(warnings[0], "bravo: by 0 to 61 s its scans are stamped 0.598 s late: set scan_time_offset_s");
+  EXPECT_NE(warnings[1].find("It does not fit itself: mend that first"), std::string::npos) << warnings[1];
+}
+
+TEST(Warnings, RobotsThatDisagreeWhichWayIsUp) {
+  MissionRecord record = joined();
+  for (RobotRecord& robot : record.robots) robot.odometry = robot.server_estimate;
+  EXPECT_TRUE(warnings_of(record).empty());
+  record.robots[0].odometry[0].pose.rotation = Eigen::Quaterniond(0, 1, 0, 0);
+  ASSERT_EQ(warnings_of(record).size(), 1U);
+  EXPECT_NE(warnings_of(record)[0].find("alpha's up is bravo's down"), std::string::npos) << warnings_of(record)[0];
+  record.robots[1].component = 1;  // nobody knows
+  EXPECT_EQ(warnings_of(record).size(), 1U);
+  EXPECT_EQ(warnings_of(record)[0].find("up is"), std::string::npos);
+}
+
 TEST(Warnings, EveryPairRefusedByOneGate) {
   MissionRecord record = joined();
   record.server.closures.clear();

@@ -95,6 +95,7 @@ Status take_bag(const BagRecording& bag, const Trajectory& odometry, const Robot
     auto scans = open_scans(bag, odometry, robot, how);
     if (!scans) return tl::unexpected(scans.error());
     out.recording.scans = std::move(*scans);
+    out.scan_setup = MissionRecording::ScanSetup{bag.T_body_lidar, robot.scan_time_offset_s};
     for (const ScanPlace& place : bag.scans) out.recording.scan_stamps.push_back(place.stamp);
     note(how);
   }

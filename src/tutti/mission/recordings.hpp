@@ -36,6 +36,12 @@ struct MissionRecording {
   /// T_common_odom, when the reference is the recorded odometry itself (so it is exact up to the reference's own
   /// error).
   std::optional<Pose3> T_common_odom;
+  /// How its scans were taken to be, which a misfit's setting corrects; nothing where that cannot be set.
+  struct ScanSetup {
+    Pose3 T_body_lidar;
+    double time_offset_s = 0.0;
+  };
+  std::optional<ScanSetup> scan_setup;
   std::string graph, graph_robot;         ///< File and letter of the graph that it is from; empty: from none.
   std::vector<RecordedClosure> closures;  ///< Those of the graph that end at this robot.
   std::vector<std::string> notes;         ///< Assumptions made about the recording, for the report.

@@ -11,6 +11,7 @@
 #include "tutti/base/check.hpp"
 #include "tutti/evaluation/agreement.hpp"
 #include "tutti/mission/load_meter.hpp"
+#include "tutti/mission/misfit_record.hpp"
 #include "tutti/storage/memory_store.hpp"
 #include "tutti/wire/codec.hpp"
 
@@ -102,6 +103,7 @@ void RobotActor::take(node::Step step) {
 void RobotActor::note_event(const node::Event& event) {
   if (const auto* sample = std::get_if<node::SampleRefused>(&event.what)) note(refused_odometry_, sample->why);
   if (const auto* jumped = std::get_if<node::OdometryJumped>(&event.what)) note(jumps_, to_string(jumped->jump));
+  if (const auto* found = std::get_if<node::MisfitFound>(&event.what)) note_misfit(found->misfit, misfits_);
   if (const auto* scan = std::get_if<node::ScanRefused>(&event.what)) note(refused_scans_, scan->why);
   if (const auto* images = std::get_if<node::ImagesRefused>(&event.what)) note(refused_images_, images->why);
   if (const auto* fix = std::get_if<node::FixRefused>(&event.what)) note(refused_fixes_, fix->why);

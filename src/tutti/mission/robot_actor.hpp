@@ -96,6 +96,8 @@ class RobotActor {
   /// What went wrong (samples or scans refused, updates without a correction): one line per kind, with a count and the
   /// first case.
   [[nodiscard]] std::vector<std::string> troubles() const;
+  /// In what its scans contradict its odometry (note_misfit()).
+  [[nodiscard]] const std::vector<fit::Misfit>& misfits() const { return misfits_; }
   /// Fails when scans were asked for and all of them failed.
   [[nodiscard]] Status check_scans() const;
   /// Why images were refused first; empty when none were.
@@ -148,6 +150,7 @@ class RobotActor {
   double cpu_s_ = 0.0;
   Trouble refused_odometry_;
   Trouble jumps_;
+  std::vector<fit::Misfit> misfits_;
   Trouble refused_scans_;
   std::size_t taken_scans_ = 0;
   Trouble refused_images_;

@@ -346,7 +346,8 @@ MissionRecord MissionRun::record() {
                               .troubles = actor.troubles(),
                               .refused_images = actor.refused_images(),
                               .traffic = traffic_of(network_.radio(), actor.id(), actor.recording().recording.name),
-                              .status = actor.node().status(now())});
+                              .status = actor.node().status(now()),
+                              .misfits = actor.misfits()});
   }
   MissionRecord record = make_record(mission);
   if (would_end_s_) record.notes.push_back(fmt::format("stopped at {:.0f} of {:.0f} s", duration_s_, *would_end_s_));

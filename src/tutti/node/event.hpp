@@ -13,6 +13,7 @@
 #include "tutti/model/loop_closure.hpp"
 #include "tutti/model/refinement.hpp"
 #include "tutti/node/followed_maps.hpp"
+#include "tutti/perception/fit/misfit.hpp"
 #include "tutti/robot/agent.hpp"
 
 /// What has happened at a node, for those who keep a record. Durations are not in it, because the same inputs must give
@@ -112,6 +113,11 @@ struct OdometryJumped {
   RobotId robot;
   robot::OdometryJump jump;
 };
+/// A robot's scans contradict its odometry; reported when it is found, and when its size is another.
+struct MisfitFound {
+  RobotId robot;
+  fit::Misfit misfit;
+};
 /// Reported by a robot: a scan was refused.
 struct ScanRefused {
   RobotId robot;
@@ -142,8 +148,8 @@ struct Event {
   Timestamp time;
   std::variant<SubmapStored, VerdictsTaken, DecisionTaken, VerificationFailed, RefinementTaken, RefinementFailed,
                MapUpdated, ChangeOfMind, RobotUpdated, MessageRefused, RobotJoined, RobotRefused, StateLost,
-               SessionBegun, SubmapsForgotten, SampleRefused, OdometryJumped, ScanRefused, ImagesRefused, SensorMissing,
-               FixRefused>
+               SessionBegun, SubmapsForgotten, SampleRefused, OdometryJumped, MisfitFound, ScanRefused, ImagesRefused,
+               SensorMissing, FixRefused>
       what;
 };
 

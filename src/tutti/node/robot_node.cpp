@@ -282,6 +282,7 @@ void RobotNode::take_outgoing(Timestamp now, Step& step) {
   const auto submaps = agent_.take_outgoing();
   for (Error& error : agent_.take_image_errors())
     step.emit(now, ImagesRefused{agent_.robot(), std::move(error.message), true});
+  for (fit::Misfit& misfit : agent_.take_misfits()) step.emit(now, MisfitFound{agent_.robot(), misfit});
   for (const SubmapMessage& message : submaps) {
     if (const Status ok = wire::validate(message); !ok) {
       step.emit(now, MessageRefused{bus::Endpoint::of(agent_.robot()), bus::MessageKind::submap, ok.error().message});
@@ -329,6 +330,8 @@ std::string RobotNode::odometry_trouble(Timestamp now) const {
     return fmt::format("session {} has begun: {}", agent_.chain().session, session_begun_->second);
   if (newest_jump_ && now - newest_jump_->first < config_.jump_told_s)
     return fmt::format("{} ({} so far)", to_string(newest_jump_->second), jumps_);
+  if (const auto& misfits = agent_.fit().misfits(); !misfits.empty())
+    return fmt::format("{}: {}", to_string(misfits.front()), way_on(misfits.front()));
   return {};
 }
 

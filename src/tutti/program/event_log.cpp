@@ -219,6 +219,13 @@ EventReport report_of(const node::OdometryJumped& jumped) {
                       jumped.robot.value, to_string(jump)),
           Level::warning};
 }
+EventReport report_of(const node::MisfitFound& found) {
+  Json json = json_of_fields(found.misfit);
+  json.update({{"event", "misfit_found"}, {"robot", found.robot.value}});
+  return {std::move(json),
+          fmt::format("robot {}: {}: {}", found.robot.value, to_string(found.misfit), way_on(found.misfit)),
+          Level::warning};
+}
 EventReport report_of(const node::ScanRefused& refused) {
   return {{{"event", "scan_refused"}, {"robot", refused.robot.value}, {"why", refused.why}},
           "a scan was refused: " + refused.why,
@@ -264,6 +271,7 @@ std::string throttled_kind(const node::Event& event) {
   if (std::holds_alternative<node::RobotJoined>(event.what)) return "robot joined";
   if (std::holds_alternative<node::SampleRefused>(event.what)) return "sample";
   if (std::holds_alternative<node::OdometryJumped>(event.what)) return "jump";
+  if (std::holds_alternative<node::MisfitFound>(event.what)) return "misfit";
   if (std::holds_alternative<node::SessionBegun>(event.what)) return "session";
   if (std::holds_alternative<node::ScanRefused>(event.what)) return "scan";
   if (std::holds_alternative<node::ImagesRefused>(event.what)) return "images";

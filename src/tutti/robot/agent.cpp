@@ -38,7 +38,8 @@ RobotAgent::RobotAgent(RobotId robot, const AgentConfig& config,
       policy_(std::move(policy)),
       submaps_(chain_, config.submap, std::move(state.submaps)),
       smoother_(config.smoother, std::move(state.smoother)),
-      state_(std::move(state)) {
+      state_(std::move(state)),
+      fit_(config.submap.fit) {
   // One of a program that did not watch jumps yet.
   if (const auto newest = newest_sample(); newest && !state_.watch.newest)
     state_.watch.newest = {*newest, state_.T_odom_body};
@@ -57,6 +58,7 @@ Status RobotAgent::add_odometry(Timestamp stamp, const Pose3& T_fed_body, const 
   if (auto ok = submaps_.add_odometry(stamp, T_odom_body, covariance, jump.has_value()); !ok) return ok;
   state_.watch = watch.state();
   if (jump) jumps_.push_back(*jump);
+  fit_.add_odometry({stamp, T_odom_body}, jump.has_value());
   if (!is_first) {
     const Matrix6d moved =
         compound_covariance(state_.T_odom_body.inverse() * T_odom_body, state_.covariance, covariance);
@@ -131,7 +133,10 @@ std::optional<std::uint64_t> RobotAgent::keyframes_without_images() const {
 
 std::vector<SubmapMessage> RobotAgent::take_outgoing() {
   std::vector<SubmapMessage> out;
-  while (auto submap = submaps_.take_submap())
+  const auto observe = [&](const FinishedSubmap& finished, std::span<const fit::ScanStep> steps) {
+    fit_.add_scans(finished.scans, steps);
+  };
+  while (auto submap = submaps_.take_submap(observe))
     out.push_back({.header = {.robot = chain_.robot, .session = chain_.session, .sequence = state_.sequence++},
                    .submap = std::move(*submap)});
   return out;

@@ -18,6 +18,7 @@
 #include "tutti/estimation/onboard_smoother.hpp"
 #include "tutti/model/messages.hpp"
 #include "tutti/model/trajectory.hpp"
+#include "tutti/robot/fit_watch.hpp"
 #include "tutti/robot/odometry_watch.hpp"
 #include "tutti/robot/submap_builder.hpp"
 
@@ -166,6 +167,9 @@ class RobotAgent {
   std::vector<Error> take_image_errors() { return submaps_.take_image_errors(); }
   /// The jumps since the last call.
   std::vector<OdometryJump> take_odometry_jumps() { return std::exchange(jumps_, {}); }
+  /// In what the scans contradict odometry, as far as it was not said before (FitWatch).
+  std::vector<fit::Misfit> take_misfits() { return fit_.take_news(); }
+  [[nodiscard]] const FitWatch& fit() const { return fit_; }
   /// SubmapBuilder::take_scan_errors()
   std::vector<Error> take_scan_errors() { return submaps_.take_scan_errors(); }
 
@@ -236,6 +240,7 @@ class RobotAgent {
   estimation::OnboardSmoother smoother_;
   AgentState state_;  // without the state of submaps_ and smoother_
   std::vector<OdometryJump> jumps_;
+  FitWatch fit_;  // of the state only what a start does without
   std::optional<Pose3> T_map_world_;
 };
 

@@ -13,6 +13,7 @@
 #include "tutti/model/path_length.hpp"
 #include "tutti/model/pose_at.hpp"
 #include "tutti/perception/lidar/undistort.hpp"
+#include "tutti/robot/mend_submap.hpp"
 #include "tutti/robot/odometry_sample.hpp"
 
 namespace tutti::robot {
@@ -285,8 +286,12 @@ Result<Scan> SubmapBuilder::undistorted(const Scan& scan) const {
 }
 
 void SubmapBuilder::merge(const Scan& scan, const Pose3& T_odom_body) {
-  state_.scans.push_back({state_.keyframes.front().T_odom_body.inverse() * T_odom_body, scan.cloud});
+  state_.scans.push_back({scan.stamp, state_.keyframes.front().T_odom_body.inverse() * T_odom_body, scan.cloud});
   state_.keyframes_without_scan = 0;
+  const bool is_shared = state_.keyframes.size() == 1 && scan.stamp == state_.keyframes.front().stamp;
+  if (!is_shared || state_.finished.empty() || config_.fit.scans == "off") return;
+  FinishedSubmap& before = state_.finished.back();
+  before.scan_after = {scan.stamp, before.submap.keyframes.front().T_odom_body.inverse() * T_odom_body, scan.cloud};
 }
 
 Status SubmapBuilder::add_scan(const Scan& scan) {
@@ -361,7 +366,8 @@ bool SubmapBuilder::is_full() const {
 
 void SubmapBuilder::close_submap() {
   Submap submap{{chain_, state_.next_submap++}, state_.keyframes, state_.odometry, take_fixes(), nullptr, nullptr};
-  state_.finished.push_back({std::move(submap), std::move(state_.scans), std::move(state_.images)});
+  state_.finished.push_back(
+      {.submap = std::move(submap), .scans = std::move(state_.scans), .images = std::move(state_.images)});
 }
 
 void SubmapBuilder::change_submap() {
@@ -371,10 +377,26 @@ void SubmapBuilder::change_submap() {
   start_submap(shared);
 }
 
-std::optional<Submap> SubmapBuilder::take_submap() {
+/// Compares a finished submap's scans with odometry, and mends it.
+void SubmapBuilder::fit(FinishedSubmap& finished, const ObserveScans& observe) {
+  std::vector<fit::ScanStep> steps;
+  if (config_.fit.scans != "off" && !finished.scans.empty())
+    steps = scan_steps(finished.scans, finished.scan_after, config_.min_range_m);
+  if (observe) observe(finished, steps);
+  const bool was_mended = state_.T_mended_odom != Pose3{};
+  Submap& submap = finished.submap;
+  if (was_mended)
+    for (Keyframe& keyframe : submap.keyframes) keyframe.T_odom_body = state_.T_mended_odom * keyframe.T_odom_body;
+  if (config_.fit.scans != "use") return;
+  if (const auto mended = mend_standstills(steps, finished.scan_after, finished.scans, submap))
+    state_.T_mended_odom = *mended * state_.T_mended_odom;
+}
+
+std::optional<Submap> SubmapBuilder::take_submap(const ObserveScans& observe) {
   if (state_.finished.empty() || state_.finished.front().awaits_images) return std::nullopt;
   FinishedSubmap next = std::move(state_.finished.front());
   state_.finished.erase(state_.finished.begin());
+  fit(next, observe);
   if (!next.scans.empty())
     next.submap.cloud = std::make_shared<const PointCloud>(
         lidar::merge_scans(next.scans, config_.voxel_m, {config_.min_range_m, config_.max_range_m}));

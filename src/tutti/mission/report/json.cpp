@@ -172,6 +172,19 @@ Json images_json(const std::optional<ImagesRecord>& images) {
           {"reprojection_rms_px", number(images->reprojection_rms_px)}};
 }
 
+Json misfits_json(const RobotRecord& robot) {
+  Json rows = Json::array();
+  for (const MisfitRecord& misfit : robot.misfits)
+    rows.push_back({{"kind", misfit.kind},
+                    {"says", misfit.says},
+                    {"way_on", misfit.way_on},
+                    {"value", number(misfit.value)},
+                    {"sigma", number(misfit.sigma)},
+                    {"from_s", number(misfit.from_s)},
+                    {"until_s", number(misfit.until_s)}});
+  return rows;
+}
+
 Json robot_json(const RobotRecord& robot, const std::string& default_policy, bool tied) {
   Json policies = Json::object();
   for (const auto& policy : robot.policies) policies[policy.name] = policy_json(robot, policy);
@@ -198,6 +211,7 @@ Json robot_json(const RobotRecord& robot, const std::string& default_policy, boo
               {"drift_origins", drift_json(robot)},
               {"explanation", explanation_json(robot)},
               {"alerts", alerts_json(robot)},
+              {"misfits", misfits_json(robot)},
               {"policies", std::move(policies)},
               {"bytes_up", robot.bytes_up},
               {"bytes_down", robot.bytes_down},

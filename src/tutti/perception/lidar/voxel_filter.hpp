@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 
+#include "tutti/base/timestamp.hpp"
 #include "tutti/geometry/pose3.hpp"
 #include "tutti/model/point_cloud.hpp"
 
@@ -12,6 +13,7 @@ namespace tutti::lidar {
 
 /// A cloud in the body frame and where that body stood in the submap.
 struct PosedCloud {
+  Timestamp stamp;
   Pose3 T_submap_body;
   std::shared_ptr<const PointCloud> cloud;  ///< Body frame; null counts as empty.
 };

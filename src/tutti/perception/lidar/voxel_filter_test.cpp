@@ -82,7 +82,7 @@ TEST(VoxelDownsample, refusesAVoxelWithoutSize) { EXPECT_THROW(voxel_downsample(
 TEST(MergeScans, movesEachScanAndKeepsTheRangeOfItsOwnBody) {
   const auto cloud = std::make_shared<PointCloud>(PointCloud{{{1, 0, 0}, {5, 0, 0}, {0.1F, 0, 0}}});
   const Pose3 turned{so3_exp({0, 0, 1.5707963267948966}), {10, 0, 0}};
-  const PosedCloud scans[] = {{Pose3{}, cloud}, {turned, cloud}, {turned, nullptr}};
+  const PosedCloud scans[] = {{{}, Pose3{}, cloud}, {{}, turned, cloud}, {{}, turned, nullptr}};
   const PointCloud merged = merge_scans(scans, 0.3, {.min_m = 0.5, .max_m = 2.0});
   ASSERT_EQ(merged.points.size(), 2U);  // (1, 0, 0) of both: the others are too near or too far
   EXPECT_TRUE(merged.points[0].isApprox(Eigen::Vector3f(1, 0, 0)));
@@ -93,7 +93,8 @@ RC_GTEST_PROP(MergeScans, doesNotDependOnTheOrderOfTheScans, (std::uint64_t seed
   Rng rng(seed);
   std::vector<PosedCloud> scans;
   for (int k = 0; k < 5; ++k)
-    scans.push_back({{so3_exp({0, 0, rng.uniform(-3, 3)}), {rng.uniform(-1, 1), 0, 0}},
+    scans.push_back({{},
+                     {so3_exp({0, 0, rng.uniform(-3, 3)}), {rng.uniform(-1, 1), 0, 0}},
                      std::make_shared<PointCloud>(random_cloud(rng, 50, 2.0))});
   const PointCloud forward = merge_scans(scans, 0.5);
   std::reverse(scans.begin(), scans.end());

@@ -77,6 +77,8 @@ FeedState RobotView::state(const node::RobotNode& node) const {
   if (!begun_.empty() && !agent.keyframes().empty())
     if (const Timestamp since = agent.keyframes().front().stamp; out.newest->stamp - since < kJumpAlert_s)
       out.alerts.push_back({begun_, since, since, since});
+  for (const fit::Misfit& misfit : agent.fit().misfits())
+    out.alerts.push_back({fmt::format("{}: {}", to_string(misfit), way_on(misfit)), misfit.to, misfit.from, misfit.to});
   if (jump_ && out.newest && out.newest->stamp - jump_->until < kJumpAlert_s) out.alerts.push_back(*jump_);
   for (const robot::Whereabouts& other : agent.whereabouts()) {
     const auto given = names_.find(other.robot);

@@ -170,6 +170,7 @@ void pass(A& a, PointCloud& cloud) {
 }
 template <class A>
 void pass(A& a, lidar::PosedCloud& scan) {
+  pass(a, scan.stamp);
   pass(a, scan.T_submap_body);
   pass(a, scan.cloud);
 }
@@ -221,6 +222,7 @@ void pass(A& a, robot::FinishedSubmap& finished) {
   pass(a, finished.submap.id.index);
   pass(a, finished.submap.keyframes);
   pass(a, finished.submap.odometry);
+  pass(a, finished.scan_after);
   pass(a, finished.scans);
   pass(a, finished.images);
   pass(a, finished.awaits_images);
@@ -228,6 +230,7 @@ void pass(A& a, robot::FinishedSubmap& finished) {
 template <class A>
 void pass(A& a, robot::SubmapBuilderState& builder) {
   pass(a, builder.next_submap);
+  pass(a, builder.T_mended_odom);
   pass(a, builder.keyframes);
   pass(a, builder.odometry);
   pass(a, builder.scans);

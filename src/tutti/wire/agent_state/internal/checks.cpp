@@ -70,11 +70,13 @@ bool is_in_order(const std::vector<Fix>& fixes) {
 bool is_sound(const robot::SubmapBuilderState& builder) {
   const auto is_whole = [](const robot::FinishedSubmap& finished) {
     return !finished.submap.keyframes.empty() && is_chain(finished.submap.keyframes, finished.submap.odometry) &&
-           all_sound(finished.scans) && all_sound(finished.images) && all_sound(finished.submap.fixes);
+           all_sound(finished.scans) && (!finished.scan_after || is_sound(*finished.scan_after)) &&
+           all_sound(finished.images) && all_sound(finished.submap.fixes);
   };
   const auto follows = [](const StampedPose& a, const StampedPose& b) { return a.stamp >= b.stamp; };
-  return is_chain(builder.keyframes, builder.odometry) && all_sound(builder.scans) && all_sound(builder.images) &&
-         std::ranges::all_of(builder.finished, is_whole) && is_sound(builder.since_keyframe) &&
+  return is_chain(builder.keyframes, builder.odometry) && is_sound(builder.T_mended_odom) && all_sound(builder.scans) &&
+         all_sound(builder.images) && std::ranges::all_of(builder.finished, is_whole) &&
+         is_sound(builder.since_keyframe) &&
          std::ranges::all_of(builder.recent, [](const StampedPose& at) { return is_sound(at.pose); }) &&
          std::ranges::adjacent_find(builder.recent, follows) == builder.recent.end() &&
          builder.keyframes.empty() == builder.recent.empty() && std::isfinite(builder.distance_m) &&

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/robot/fit_watch.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tutti/geometry/so3.hpp"
+#include "tutti/model/pose_at.hpp"
+#include "tutti/perception/fit/odometry_fit.hpp"
+
+namespace tutti::robot {
+namespace {
+
+constexpr double kFinest_s = 0.05;            // between odometry samples that are kept
+constexpr std::size_t kMostSamples = 20'000;  // of odometry: a robot may have no scans
+constexpr std::size_t kRanges = 20;           // scans whose ranges are remembered
+constexpr double kFarthest_m = 300.0;         // of half the points of a LiDAR
+constexpr double kOtherSize = 0.5;            // share by which a value has changed when it is said again
+
+/// Standing says nothing of odometry, and would fill the memory.
+bool stands(const fit::ScanStep& step, const Trajectory& odometry) {
+  const auto is_small = [](const Pose3& T) {
+    return T.translation.norm() < 0.05 && rotation_angle(T) < 1.0 * kRadPerDeg;
+  };
+  const auto from = pose_at(odometry, step.from), to = pose_at(odometry, step.to);
+  return is_small(step.T_from_to) && from && to && is_small(from->inverse() * *to);
+}
+
+double median_range_m(const PointCloud& cloud) {
+  std::vector<float> ranges;
+  ranges.reserve(cloud.points.size());
+  for (const Eigen::Vector3f& p : cloud.points)
+    if (p.allFinite()) ranges.push_back(p.norm());
+  if (ranges.empty()) return 0.0;
+  std::ranges::nth_element(ranges, ranges.begin() + std::ssize(ranges) / 2);
+  return double{ranges[ranges.size() / 2]};
+}
+
+bool is_same(const fit::Misfit& a, const fit::Misfit& b) {
+  if (a.kind != b.kind) return false;
+  if (a.kind == fit::MisfitKind::stood_still) return a.from <= b.to && b.from <= a.to;
+  return std::abs(a.value - b.value) <= kOtherSize * std::max(std::abs(a.value), std::abs(b.value));
+}
+
+}  // namespace
+
+void FitWatch::add_odometry(const StampedPose& T_odom_body, bool is_jump) {
+  if (!is_on_) return;
+  if (is_jump) {
+    odometry_.clear();
+    steps_.clear();
+  }
+  const bool is_close = odometry_.size() >= 2 && T_odom_body.stamp - odometry_[odometry_.size() - 2].stamp < kFinest_s;
+  if (is_close)
+    odometry_.back() = T_odom_body;
+  else
+    odometry_.push_back(T_odom_body);
+  if (odometry_.size() > kMostSamples) odometry_.erase(odometry_.begin(), odometry_.begin() + kMostSamples / 2);
+}
+
+void FitWatch::add_scans(std::span<const lidar::PosedCloud> scans, std::span<const fit::ScanStep> steps) {
+  if (!is_on_ || scans.empty()) return;
+  for (const lidar::PosedCloud& scan : scans) {
+    ranges_m_.push_back(median_range_m(*scan.cloud));
+    if (ranges_m_.size() > kRanges) ranges_m_.pop_front();
+  }
+  for (const fit::ScanStep& step : steps) {
+    registrations_ += static_cast<std::uint64_t>(step.registrations);
+    if (!stands(step, odometry_)) steps_.push_back(step);
+  }
+  forget_old(scans.back().stamp);
+  compare();
+}
+
+void FitWatch::forget_old(Timestamp newest) {
+  if (steps_.size() > kMostSteps) steps_.erase(steps_.begin(), steps_.end() - kMostSteps);
+  const Timestamp oldest = (steps_.empty() ? newest : steps_.front().from) - fit::kMostOffset_s;
+  const auto kept = std::ranges::lower_bound(odometry_, oldest, {}, &StampedPose::stamp);
+  odometry_.erase(odometry_.begin(), kept);
+}
+
+void FitWatch::compare() {
+  const std::vector<fit::Misfit> before = std::exchange(misfits_, fit::fit_odometry(steps_, odometry_).misfits);
+  std::vector<double> ranges(ranges_m_.begin(), ranges_m_.end());
+  std::ranges::nth_element(ranges, ranges.begin() + static_cast<std::ptrdiff_t>(ranges.size() / 2));
+  if (const double median = ranges[ranges.size() / 2]; ranges.size() == kRanges && median > kFarthest_m)
+    misfits_.push_back({.kind = fit::MisfitKind::far_points, .value = median});
+  const auto is_in = [](const fit::Misfit& misfit, const std::vector<fit::Misfit>& list) {
+    return std::ranges::any_of(list, [&](const fit::Misfit& other) { return is_same(other, misfit); });
+  };
+  for (const fit::Misfit& misfit : misfits_) {
+    const bool is_standstill = misfit.kind == fit::MisfitKind::stood_still;
+    if (is_in(misfit, said_) || (!is_standstill && !is_in(misfit, before))) continue;
+    if (!is_standstill) std::erase_if(said_, [&](const fit::Misfit& said) { return said.kind == misfit.kind; });
+    said_.push_back(misfit);
+    news_.push_back(misfit);
+  }
+}
+
+}  // namespace tutti::robot

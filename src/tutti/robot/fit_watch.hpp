@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "tutti/model/trajectory.hpp"
+#include "tutti/perception/fit/misfit.hpp"
+#include "tutti/perception/fit/scan_step.hpp"
+#include "tutti/perception/lidar/voxel_filter.hpp"
+#include "tutti/robot/submap_builder.hpp"
+
+namespace tutti::robot {
+
+/// Watches whether a robot fits itself: whether its scans show the motion that odometry says (fit::fit_odometry()).
+/// It remembers the newest kMostSteps steps, in memory alone: a robot that starts again begins anew.
+class FitWatch {
+ public:
+  explicit FitWatch(const FitConfig& config) : is_on_(config.scans != "off") {}
+
+  /// A sample of raw odometry; stamps increase. A jump forgets all before it.
+  void add_odometry(const StampedPose& T_odom_body, bool is_jump);
+  /// The scans of a submap that has ended, and the motions between them (scan_steps()).
+  void add_scans(std::span<const lidar::PosedCloud> scans, std::span<const fit::ScanStep> steps);
+
+  /// What contradicts since the last call, as two submaps in a row say, that was not said before or is of quite another
+  /// size than was said. Odometry that stood still is said at once.
+  std::vector<fit::Misfit> take_news() { return std::exchange(news_, {}); }
+  /// What contradicts as of the last submap.
+  [[nodiscard]] const std::vector<fit::Misfit>& misfits() const { return misfits_; }
+  /// That the steps took.
+  [[nodiscard]] std::uint64_t registrations() const { return registrations_; }
+
+  static constexpr std::size_t kMostSteps = 200;
+
+ private:
+  void forget_old(Timestamp newest);
+  void compare();
+
+  bool is_on_;
+  Trajectory odometry_;
+  std::vector<fit::ScanStep> steps_;
+  std::deque<double> ranges_m_;  // medians of the newest scans
+  std::vector<fit::Misfit> misfits_, said_, news_;
+  std::uint64_t registrations_ = 0;
+};
+
+}  // namespace tutti::robot
