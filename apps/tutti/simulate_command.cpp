@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // tutti simulate: a simulated mission as bags.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
@@ -11,6 +12,7 @@
 #include "commands.hpp"
 #include "options.hpp"
 #include "progress_line.hpp"
+#include "tutti/lab/break_recording.hpp"
 #include "tutti/lab/write_bags.hpp"
 #include "tutti/program/stop.hpp"
 
@@ -20,13 +22,29 @@ namespace {
 struct SimulateOptions {
   std::string mission, folder;
   std::uint64_t seed = 1;
-  std::vector<std::string> assignments;
+  std::vector<std::string> assignments, mistakes;
 };
+
+/// Settings for mistakes that are given as ROBOT=KIND.
+Result<std::vector<std::string>> with_mistakes(std::vector<std::string> assignments,
+                                               const std::vector<std::string>& mistakes) {
+  std::vector<std::string> rows;
+  for (const std::string& mistake : mistakes) {
+    const std::size_t at = mistake.find('=');
+    if (at == std::string::npos || at == 0)
+      return fail(ErrorCode::configuration, "--break '{}', expected ROBOT=KIND, such as bravo=scans_late", mistake);
+    rows.push_back(fmt::format("{{robot: \"{}\", kind: \"{}\"}}", mistake.substr(0, at), mistake.substr(at + 1)));
+  }
+  if (!rows.empty()) assignments.push_back(fmt::format("mistakes=[{}]", fmt::join(rows, ", ")));
+  return assignments;
+}
 
 bool is_cut(const lab::WrittenBag& bag) { return program::stop_asked() && bag.duration_s < bag.planned_s; }
 
 int simulate(const SimulateOptions& options) {
-  const auto config = lab::load_mission(options.mission, options.assignments);
+  const auto assignments = with_mistakes(options.assignments, options.mistakes);
+  if (!assignments) return complain("simulate", assignments.error().message, 2);
+  const auto config = lab::load_mission(options.mission, *assignments);
   if (!config) return complain("simulate", config.error().message, 2);
   ProgressLine line;
   const lab::Watch watch{
@@ -67,6 +85,11 @@ void add_simulate_command(CLI::App& app, int& exit_code) {
   command->add_option("--seed", options->seed, "As for tutti run.")->check(whole_number())->capture_default_str();
   command->add_option("--set", options->assignments, "Change a setting of the mission: key=value.")
       ->type_name("KEY=VALUE");
+  command
+      ->add_option("--break", options->mistakes,
+                   "Set a robot up wrongly, or let its odometry fail, to see what tutti says: " +
+                       help_of(lab::robot_mistakes()) + ". May be given several times.")
+      ->type_name("ROBOT=KIND");
   command->callback([options, &exit_code] { exit_code = simulate(*options); });
 }
 

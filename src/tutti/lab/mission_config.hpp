@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "tutti/base/config_io.hpp"
+#include "tutti/lab/break_recording.hpp"
 #include "tutti/lab/spoiled_closures.hpp"
 #include "tutti/mission/mission_config.hpp"
 #include "tutti/simulation/degrade.hpp"
@@ -86,6 +87,7 @@ struct MissionConfig : mission::MissionConfig {
   ClosureChanges closure_changes;           ///< If these are not made up, `closures` says how closures are found.
   std::vector<simulation::ReceiverConfig> receivers;
   simulation::PlaceConfig place;
+  std::vector<MistakeConfig> mistakes;
   std::vector<std::string> compare_policies;  ///< In addition to the one that the robots follow.
 
   /// Describes the fields that are not in mission::MissionConfig.
@@ -99,6 +101,8 @@ struct MissionConfig : mission::MissionConfig {
     v.field("closures", closure_changes);
     v.field("receivers", receivers, any(), "Simulated receivers of robots whose true poses are known.");
     v.field("place", place, any(), "Where on the earth these robots are.");
+    v.field("mistakes", mistakes, any(),
+            "Robots that are set up wrongly, or whose odometry fails, to see what is said.");
     v.field("compare_policies", compare_policies, any(),
             "Further policies, run beside the robots' own on the same broadcasts.");
   }

@@ -110,6 +110,7 @@ Result<mission::MissionInput> load_input(const MissionConfig& config, const std:
   std::vector<Recording*> recordings;
   for (mission::MissionRecording& robot : input->robots) recordings.push_back(&robot.recording);
   if (auto ok = add_fixes(config, seed, recordings); !ok) return tl::unexpected(ok.error());
+  if (auto ok = make_mistakes(config.mistakes, recordings); !ok) return tl::unexpected(ok.error());
   if (auto ok = check_planted(config, input->robots); !ok) return tl::unexpected(ok.error());
   return input;
 }

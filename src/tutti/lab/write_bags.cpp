@@ -267,6 +267,7 @@ Result<std::vector<RobotToWrite>> simulated_robots(const MissionConfig& config, 
   std::vector<Recording*> recordings;
   for (RobotToWrite& robot : *robots) recordings.push_back(&robot.recording);
   if (auto ok = add_fixes(config, seed, recordings); !ok) return tl::unexpected(ok.error());
+  if (auto ok = make_mistakes(config.mistakes, recordings); !ok) return tl::unexpected(ok.error());
   if (config.odometry_hz <= 0.0) return robots;
   for (auto& [recording, images, T_body_lidar] : *robots) {
     Rng rng = Rng(seed).fork("odometry/" + recording.name);
