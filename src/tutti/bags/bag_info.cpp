@@ -11,6 +11,7 @@
 #include "tutti/bags/camera.hpp"
 #include "tutti/bags/rgbd.hpp"
 #include "tutti/bags/robot_namespace.hpp"
+#include "tutti/bags/ros_fix.hpp"
 #include "tutti/bags/ros_messages.hpp"
 
 namespace tutti::bags {
@@ -46,9 +47,20 @@ void note_first(TopicInfo& topic, const BagMessage& message) {
   if (const auto* const info = std::get_if<RosCameraInfo>(&*decoded)) topic.calibration = *info;
 }
 
+/// Looks for a fix that is one.
+void note_fix(TopicInfo& topic, const BagMessage& message) {
+  const auto encoding = to_encoding(message.channel->message_encoding);
+  const auto decoded = encoding ? decode_nav_sat_fix(message.data, *encoding).and_then(&to_fix)
+                                : Result<std::optional<ReceivedFix>>(tl::unexpected(encoding.error()));
+  topic.has_fix = decoded && decoded->has_value();
+  if (!decoded && topic.refused_fix.empty())
+    topic.refused_fix = fmt::format("message {}: {}", topic.count, decoded.error().message);
+}
+
 void note_message(TopicInfo& topic, const BagMessage& message) {
   const bool is_uncalibrated = topic.use == Use::calibration && !(topic.calibration && topic.calibration->k[0] > 0.0);
   if ((topic.count++ == 0 && topic.use != Use::nothing) || is_uncalibrated) note_first(topic, message);
+  if (topic.use == Use::fixes && !topic.has_fix) note_fix(topic, message);
   topic.first = std::min(topic.first, message.log_time);
   topic.last = std::max(topic.last, message.log_time);
 }
@@ -92,10 +104,15 @@ ImageTopic image_topic(const BagInfo& info, const TopicInfo& topic) {
   return out;
 }
 
-/// Why a robot would not use the topic's images; empty where it would.
-std::string refusal_of(const ImageTopic& images) {
-  const auto camera = images.camera();
-  return camera ? "" : ", of no use: " + camera.error().message;
+/// Why a robot would not use the topic; empty where it would.
+std::string refusal_of(const TopicInfo& topic, const ImageTopic& images) {
+  if (topic.use == Use::images) {
+    const auto camera = images.camera();
+    return camera ? "" : ", of no use: " + camera.error().message;
+  }
+  if (topic.use != Use::fixes || topic.has_fix) return "";
+  return ", of no use: " + (topic.refused_fix.empty() ? "no message has a fix (status -1)"
+                                                      : "no message is a fix, the first because: " + topic.refused_fix);
 }
 
 /// Without those that show depth.
@@ -106,8 +123,7 @@ std::string list_of(const BagInfo& info, Use use) {
     const ImageTopic images = image_topic(info, topic);
     if (images.shows_depth()) continue;
     out += fmt::format("{}{}{}{}", out.empty() ? "" : "; ", topic.topic,
-                       topic.frames.empty() ? "" : " (" + topic.frames + ")",
-                       use == Use::images ? refusal_of(images) : "");
+                       topic.frames.empty() ? "" : " (" + topic.frames + ")", refusal_of(topic, images));
   }
   return out;
 }

@@ -22,6 +22,8 @@ struct TopicInfo {
   std::string frames;  ///< Frames of the first message ("odom -> base_link"); empty for types without a use.
   std::optional<ImageLayout> image;  ///< What the first message shows, of images.
   std::optional<RosCameraInfo> calibration;
+  bool has_fix = false;                  ///< A message has a position fix that a robot would use.
+  std::string refused_fix;               ///< Why the first fix that it would not is refused.
   std::string problem;                   ///< Why the first message could not be decoded; empty if it could.
   [[nodiscard]] double rate_hz() const;  ///< Mean rate; 0 for fewer than two messages.
 };

@@ -121,6 +121,25 @@ TEST(BagInfo, DepthIsNoCameraAndItsOwnIsNamed) {
       << row_of("depth");
 }
 
+/// A receiver with a fix now and then is of use; one without, or of which none is a fix, is not.
+TEST(BagInfo, FixesThatAreNoneAreOfNoUse) {
+  const auto fixes_row = [](const std::vector<RosNavSatFix>& fixes) {
+    std::string data = kMagic + schema(1, "sensor_msgs/msg/NavSatFix") + channel(1, 1, "/fix");
+    for (const RosNavSatFix& fix : fixes) data += message(1, 1, encode(fix));
+    return uses(info_of(data)).at(3);
+  };
+  const RosNavSatFix good{.header = {{1}, "gps"}, .latitude_deg = 48.0, .longitude_deg = 11.0, .altitude_m = 500.0};
+  RosNavSatFix none = good, e7 = good;
+  none.status = -1;
+  e7.latitude_deg *= 1e7;  // as some receivers' protocols have it
+  EXPECT_EQ(fixes_row({none, e7, good}), "fixes        /fix (gps)");
+  EXPECT_EQ(fixes_row({none, none}), "fixes        /fix (gps), of no use: no message has a fix (status -1)");
+  const std::string refused = fixes_row({none, e7, e7});
+  EXPECT_TRUE(
+      refused.starts_with("fixes        /fix (gps), of no use: no message is a fix, the first because: message 2: "))
+      << refused;
+}
+
 TEST(BagInfo, RobotsAreNamedAndSoAreTheContradictionsOfTheirTransforms) {
   const auto transform = [](const std::string& parent, const std::string& child, double x) {
     const RosTransform out{

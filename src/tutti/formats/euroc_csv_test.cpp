@@ -120,14 +120,10 @@ TEST_F(OthersTrajectories, BadRowsAreLeftOutAndTheRestSorted) {
 
 TEST_F(OthersTrajectories, StampsSeparatorsAndNames) {
   for (const char* text :
-       {"1700000000.5,1,2,3,0,0,0.6,0.8\n",
-        "1700000000.5, 1, 2, 3, 0, 0, 0.6, 0.8\n",
-        "1700000000.5;1;2;3;0;0;0.6;0.8\n",
-        "1700000000500000000 1 2 3 0 0 0.6 0.8\n",
-        "1.7000000005e18 1 2 3 0 0 0.6 0.8\n",
-        "1700000000500000 1 2 3 0 0 0.6 0.8\n",
-        "1700000000500 1 2 3 0 0 0.6 0.8\n",
-        "1700000000.5 1 2 3 0 0 0.6 0.8 17\n",
+       {"1700000000.5,1,2,3,0,0,0.6,0.8\n", "1700000000.5, 1, 2, 3, 0, 0, 0.6, 0.8\n",
+        "1700000000.5;1;2;3;0;0;0.6;0.8\n", "1700000000500000000 1 2 3 0 0 0.6 0.8\n",
+        "1.7000000005e18 1 2 3 0 0 0.6 0.8\n", "1700000000500000 1 2 3 0 0 0.6 0.8\n",
+        "1700000000500 1 2 3 0 0 0.6 0.8\n", "1700000000.5 1 2 3 0 0 0.6 0.8 17\n",
         "1700000000500000000,1,2,3,0.8,0,0,0.6\n",
         "timestamp,x,y,z,qw,qx,qy,qz\n1700000000500000000,1,2,3,0.8,0,0,0.6\n",
         "timestamp,x,y,z,qx,qy,qz,qw\n1700000000500000000,1,2,3,0,0,0.6,0.8\n",
@@ -149,13 +145,22 @@ TEST_F(OthersTrajectories, StampsSeparatorsAndNames) {
         "q_G_I_y, q_G_I_z\n1700000000500000000, 3, a0, 1, 2, 3, 0.8, 0, 0, 0.6\n",
         "VehicleName\tTimeStamp\tPOS_X\tPOS_Y\tPOS_Z\tQ_W\tQ_X\tQ_Y\tQ_Z\tImageFile\n"
         "Drone\t1700000000500\t1\t2\t3\t0.8\t0\t0\t0.6\timg.png\n",
-        "1700000000500000000,1,2,3,0.8,0,0,0.6,0,0,0,\n",
-        "1700000000500000000.000000 1 2 3 0 0 0.6 0.8\n",
+        "1700000000500000000,1,2,3,0.8,0,0,0.6,0,0,0,\n", "1700000000500000000.000000 1 2 3 0 0 0.6 0.8\n",
         "# timestamp(s) tx ty tz qx qy qz qw Pr11 Pr12\n# by OpenVINS\n"
         "1700000000.5 1 2 3 0 0 0.6 0.8 0.1 0.1\n",
         "Poses of a robot\ntime x y z qw qx qy qz\n1700000000.5 1 2 3 0.8 0 0 0.6\n",
         "time x y z qw qx qy qz\n1700000000.5 1 2 3 0.8 0 0 0.6\n",
         "1700000000.5 0.28 -0.96 0 1 0.96 0.28 0 2 0 0 1 3\n",
+        "1700000000.5 1 2 3 0 0 0.594 0.792\n",  // of norm 0.99
+        // spreadsheets, and countries whose numbers have commas
+        "1700000000,5;1,0;2,0;3,0;0,0;0,0;0,6;0,8\n", "1700000000,5 1 2 3,0 0,0 0,0 0,6 0,8\n",
+        "\"time\",\"x\",\"y\",\"z\",\"qx\",\"qy\",\"qz\",\"qw\"\n"
+        "\"1700000000.5\",\"1\",\"2\",\"3\",\"0\",\"0\",\"0.6\",\"0.8\"\n",
+        // ros2 topic echo --csv: Odometry, PoseStamped
+        "1700000000,500000000,odom,base_link,1.0,2.0,3.0,0.0,0.0,0.6,0.8,0.0,0.0,0.0\n",
+        "1700000000,500000000,odom,1.0,2.0,3.0,0.0,0.0,0.6,0.8\n",
+        "# timestamp(s) q p v bg ba cam_imu_dt num_cam cam0_k\n1700000000.5 0 0 0.6 0.8 1 2 3 9 9 9 0 0 0 0 0 0 0.1 1 "
+        "5\n",
         "1700000000.5 0.28 -0.96 0 1 0.96 0.28 0 2 0 0 1 3 0 0 0 1\n"})
     expect_turned(text);
   EXPECT_EQ(read("0.28 -0.96 0 1 0.96 0.28 0 2 0 0 1 3 0 0 0 1\n").value().front().pose.translation.z(), 3.0);
@@ -180,6 +185,24 @@ TEST_F(OthersTrajectories, StampsOfTooFewDigitsAreAnError) {
   const auto poses = read(many + "1.70001e+09 3 0 0 0 0 0 1\n");
   ASSERT_FALSE(poses);
   EXPECT_NE(poses.error().message.find("too few digits"), std::string::npos) << poses.error().message;
+  EXPECT_NE(read(many).error().message.find("too few digits"), std::string::npos) << read(many).error().message;
+}
+
+TEST_F(OthersTrajectories, WhatIsNoTrajectoryIsCalledSo) {
+  const auto expect = [&](const std::string& text, const std::string& part) {
+    const auto poses = read(text);
+    ASSERT_FALSE(poses) << text;
+    EXPECT_NE(poses.error().message.find(part), std::string::npos) << poses.error().message;
+    EXPECT_EQ(poses.error().message.find("state another format"), std::string::npos) << poses.error().message;
+  };
+  expect("#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n1 0.8 0 0 0.6 1 2 3 1 a.png\n10.0 20.0 -1\n",
+         "it is COLMAP's images.txt");
+  expect("header:\n  stamp:\n    sec: 17\n", "ros2 topic echo --csv");
+  expect("timestamp,x,y,z,roll,pitch,yaw\n1.5,1,2,3,0,0,1\n", "its orientations are roll, pitch, yaw");
+  expect(std::string("\xFF\xFE"
+                     "1\0 \0",
+                     6),
+         "iconv -f UTF-16 -t UTF-8 '" + path_ + "'");
 }
 
 TEST_F(OthersTrajectories, OnePoseOfSeveralRowsIsNoTrajectory) {

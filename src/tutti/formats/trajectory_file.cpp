@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "tutti/formats/internal/foreign_text.hpp"
 #include "tutti/formats/internal/text.hpp"
 #include "tutti/formats/internal/trajectory_layout.hpp"
 #include "tutti/geometry/so3.hpp"
@@ -144,12 +145,13 @@ Result<Trajectory> read_rows(std::string_view text, const std::string& name, con
   report->rows_hz = layout.stamp && !layout.is_numbered ? 0.0 : rate_hz;
   const std::size_t count = rows.size();
   auto out = in_order(std::move(rows), name, *report);
-  if (out.size() < 2 && count > 1) return tl::unexpected(report->left_out.back());
   if (2 * out.size() < count)
     return fail(
         ErrorCode::parse,
-        "{}: {} of {} rows have a stamp that another row has, too; were the stamps written with too few digits?", name,
-        count - out.size(), count);
+        "{}: {} of {} rows have a stamp that another row has, too; were the stamps written with too few digits? "
+        "(C++: << std::fixed << std::setprecision(9); Python: '%.9f')",
+        name, count - out.size(), count);
+  if (out.size() < 2 && count > 1) return tl::unexpected(report->left_out.back());
   return out;
 }
 
@@ -242,7 +244,8 @@ std::vector<std::string> RowReport::notes(const std::string& path) const {
 Result<Trajectory> read_trajectory(const std::string& path, std::string_view format, double kitti_rate_hz,
                                    RowReport* report) {
   if (auto ok = check_rate(path, kitti_rate_hz); !ok) return tl::unexpected(ok.error());
-  return read_file(path).and_then([&](const std::string& text) -> Result<Trajectory> {
+  const auto plain = [&](std::string text) { return internal::plain_text(std::move(text), path); };
+  return read_file(path).and_then(plain).and_then([&](const std::string& text) -> Result<Trajectory> {
     const TrajectoryLayout layout = internal::find_layout(text, format);
     // A matrix or a quaternion with w first may pass for TUM's columns, and be another pose.
     if (format == "tum" && !layout.is_named) {
@@ -253,6 +256,8 @@ Result<Trajectory> read_trajectory(const std::string& path, std::string_view for
     }
     auto read = read_rows(text, path, layout, kitti_rate_hz, {}, report);
     if (read) return read;
+    if (const std::string what = internal::otherwise_known(text); !what.empty())
+      return fail(read.error().code, "{}; {}", read.error().message, what);
     return fail(read.error().code, "{}; {} as {}: state another format (tum, euroc or kitti) if it is one",
                 read.error().message, format == "auto" ? "recognised" : "read", layout.format);
   });

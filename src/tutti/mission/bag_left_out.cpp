@@ -182,6 +182,14 @@ void warn_of_blind(const BagIndex& index, const Trajectory& odometry, const std:
                   blind.begin_s, blind.end_s, blind.all_s - blind.begin_s - blind.end_s, type));
 }
 
+void warn_of_fixes(const BagIndex& index, std::vector<std::string>& out) {
+  for (const auto& [topic, track] : index.fixes)
+    if (share_of(track.refused.count, track.messages) > kMuchLeftOut)
+      out.push_back(fmt::format("{} of the fixes of {} ({} of {}) are refused, the first because: {}",
+                                percent(share_of(track.refused.count, track.messages)), topic, track.refused.count,
+                                track.messages, track.refused.first));
+}
+
 }  // namespace
 
 std::vector<std::string> much_left_out(const BagIndex& index, const TakenOdometry& odometry, const BagRecording& bag,
@@ -203,6 +211,7 @@ std::vector<std::string> much_left_out(const BagIndex& index, const TakenOdometr
   }
   for (const Sensor& sensor : sensors) warn_of_sensor(index, odometry, sensor, robot, out);
   warn_of_blind(index, bag.odometry, sensors, robot, out);
+  warn_of_fixes(index, out);
   return out;
 }
 

@@ -16,7 +16,7 @@ struct TakenOdometry {
   const OdometryTrack& track;
 };
 
-/// Where more than a tenth of a bag's odometry, scans or images is left out, or no sensor saw anything for that
+/// Where more than a tenth of a bag's odometry, scans, images or fixes is left out, or no sensor saw anything for that
 /// share of the odometry's time: a sentence each, with the share, why, and what to type. `bag` has what was taken.
 std::vector<std::string> much_left_out(const BagIndex& index, const TakenOdometry& odometry, const BagRecording& bag,
                                        const RobotConfig& robot);

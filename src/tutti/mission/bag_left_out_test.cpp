@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "support/bags/robot_bag.hpp"
+#include "tutti/bags/ros_encode.hpp"
 #include "tutti/mission/bag_verdict.hpp"
 #include "tutti/mission/recordings.hpp"
 
@@ -131,6 +132,20 @@ TEST_F(LeftOut, ScansThatAreRefused) {
                            "first because: message 61: "))
       << found[0];
   EXPECT_NE(found[1].find("no closure is found in 41 % of the odometry's time"), std::string::npos) << found[1];
+}
+
+TEST_F(LeftOut, FixesThatAreNone) {
+  odometry({});
+  scans({});
+  for (int i = 0; i < kSteps; i += 10) {
+    bags::RosNavSatFix fix{.header = {at(i), "base_link"}};
+    fix.latitude_deg = 48e7;  // as some receivers' protocols have it
+    add(at(i), "/fix", "sensor_msgs/msg/NavSatFix", bags::encode(fix));
+  }
+  const auto found = warnings();
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_TRUE(found[0].starts_with("alpha: 100 % of the fixes of /fix (20 of 20) are refused, the first because: "))
+      << found[0];
 }
 
 TEST_F(LeftOut, AClockThatStartsAgain) {

@@ -84,6 +84,13 @@ Result<std::vector<fs::path>> bags_in(const fs::path& folder) {
                 folder.string(), inside.files.size(), joined(inside.files), recording_of(folder), folder.string());
   std::vector<fs::path> out = std::move(inside.bags);
   out.insert(out.end(), inside.files.begin(), inside.files.end());
+  std::error_code failure;
+  if (out.empty() && fs::exists(folder / "rgb.txt", failure))
+    return fail(ErrorCode::configuration,
+                "{0}: is a recording as TUM RGB-D's, without odometry and calibration; name both in a mission file: "
+                "robots: [{{name: {1}, odometry: {{file: ODOMETRY.tum}}, images: {{list: {0}/rgb.txt, cameras: "
+                "CAMERAS.yaml, depth: {{list: {0}/depth.txt}}}}}}] (docs/data.md, Images)",
+                folder.string(), robot_of_bag(folder));
   if (out.empty())
     return fail(ErrorCode::configuration,
                 "{}: holds no bag, expected .mcap, .db3 or .bag files, or folders of rosbag2's with them",

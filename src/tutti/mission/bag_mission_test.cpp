@@ -52,6 +52,13 @@ TEST_F(NamedBags, AFolderOfTwoRobotsBagsIsAskedAbout) {
   fs::create_directories(data_ / "none");
   EXPECT_NE(named({"none"}).find("holds no bag"), std::string::npos);
   EXPECT_NE(named({"nowhere"}).find("is not there"), std::string::npos);
+  make("desk/rgb.txt");
+  EXPECT_NE(named({"desk"}).find("images: {list: " + (data_ / "desk/rgb.txt").string() +
+                                 ", cameras: CAMERAS.yaml, "
+                                 "depth: {list: " +
+                                 (data_ / "desk/depth.txt").string() + "}}"),
+            std::string::npos)
+      << named({"desk"});
 }
 
 TEST_F(NamedBags, MissionFilesAreNoBags) {

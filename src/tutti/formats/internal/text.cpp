@@ -160,7 +160,8 @@ Result<Eigen::Quaterniond> to_unit(const LineReader& where, const Eigen::Quatern
   constexpr double kRounding = 1e-14;  // of a normalised quaternion's squared norm
   if (std::abs(q.squaredNorm() - 1.0) <= kRounding) return q;
   const double norm = q.norm();
-  if (!(std::abs(norm - 1.0) <= kUnitTolerance))
+  constexpr double kDigits = 1e-6;  // as written: 0.99 exactly is within
+  if (!(std::abs(norm - 1.0) <= kUnitTolerance + kDigits))
     return where.fail(ErrorCode::invalid, "quaternion has norm {:.6g}, expected 1 within {}", norm, kUnitTolerance);
   return Eigen::Quaterniond(q.coeffs() / norm);
 }

@@ -123,6 +123,23 @@ std::optional<Named> read_names(std::span<const std::string_view> names) {
   return is_complete ? std::optional(out) : std::nullopt;
 }
 
+/// OpenVINS' "timestamp(s) q p v bg ba ..": a column for each number. Its quaternion of the IMU is JPL's, which has the
+/// numbers of Hamilton's of the body.
+std::optional<Named> read_vectors(std::span<const std::string_view> names) {
+  if (names.size() < 3 || !is_stamp(plain(names[0])) || names[1] != "q" || names[2] != "p") return std::nullopt;
+  return Named{.stamp = 0, .fraction = kNone, .exponent = unit_in(names[0]), .at = {5, 6, 7, 1, 2, 3, 4}};
+}
+
+/// `ros2 topic echo --csv` of poses, odometry and transforms: seconds, nanoseconds, frame, perhaps the other frame.
+std::optional<Named> as_ros_prints(std::span<const std::string_view> columns) {
+  constexpr std::size_t kFrame = 2, kPose = 7;
+  if (columns.size() <= kFrame + kPose || parse_number(columns[kFrame])) return std::nullopt;
+  if (!parse_integer(columns[0]) || !parse_integer(columns[1])) return std::nullopt;
+  const std::size_t x = parse_number(columns[kFrame + 1]) ? kFrame + 1 : kFrame + 2;
+  if (columns.size() < x + kPose) return std::nullopt;
+  return Named{.stamp = 0, .fraction = 1, .exponent = 0, .at = {x, x + 1, x + 2, x + 3, x + 4, x + 5, x + 6}};
+}
+
 /// Named by one of the comments before the first row; the last one counts.
 std::optional<Named> named_in_comment(std::string_view text, Separator separator) {
   std::optional<Named> out;
@@ -134,7 +151,8 @@ std::optional<Named> named_in_comment(std::string_view text, Separator separator
       for (const Separator other : {separator, Separator::whitespace}) {
         LineReader names(line.substr(begin + 1), "", other);
         if (!names.next()) continue;
-        const auto named = read_names(names.columns());
+        auto named = read_names(names.columns());
+        if (!named) named = read_vectors(names.columns());
         if (!named) continue;
         out = named;
         break;
@@ -250,6 +268,7 @@ TrajectoryLayout find_layout(std::string_view text, std::string_view format) {
     if (auto names = read_names(line.columns())) named = names;
     if (!line.next()) return out;
   }
+  if (!named) named = as_ros_prints(line.columns());
   const std::size_t count = line.columns().size();
   if (named && std::max(named->stamp, *std::ranges::max_element(named->at)) >= count) named.reset();
   if ((format == "auto" || format == "kitti") && !named && find_matrix(line.columns(), format, out)) {
