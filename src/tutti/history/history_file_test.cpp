@@ -93,11 +93,16 @@ TEST_F(HistoryFile, OneThatIsDamagedIsSetAside) {
 }
 
 TEST_F(HistoryFile, OneOfANewerVersionIsSetAsideWhole) {
-  fill(5);
   storage::Schema newer = schema();
   newer.version = 7;
   newer.tables.emplace_back("later");
-  ASSERT_TRUE(storage::open_sqlite_store(file_, newer));
+  fs::create_directories(file_.parent_path());
+  {
+    const auto written = storage::open_sqlite_store(file_, newer);
+    ASSERT_TRUE(written) << written.error().message;
+    for (int i = 0; i < 10; ++i)
+      ASSERT_TRUE((*written)->commit(std::vector<storage::Write>{{"rows", std::to_string(i), "of a newer program"}}));
+  }
   const auto opened = open_history(file_);
   EXPECT_NE(opened.said.find("version 7"), std::string::npos) << opened.said;
   EXPECT_TRUE(opened.history->put(std::vector<Message>{{"status", 1.0, "{}"}}));
