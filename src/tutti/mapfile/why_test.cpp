@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "support/mapfile/small_map.hpp"
-#include "tutti/wire/codec.hpp"
+#include "tutti/node/refused_rows.hpp"
 
 namespace tutti::mapfile {
 namespace why_test {
@@ -25,11 +25,9 @@ class WhyNot : public testing::Test {
   }
   /// What a verifier answers instead of closures.
   void refuse(std::uint32_t a, std::uint32_t b, const Refusal& refusal) {
-    Verdicts answer{.job = "1/2"};
+    Verdicts answer{.job = fmt::format("{}/{}", a, b)};
     answer.verdicts.push_back({.pair = {{{kAlpha, 5}, a}, {{kBravo, 5}, b}}, .refusal = refusal});
-    EXPECT_TRUE(
-        store_.commit(std::vector<storage::Write>{{"answers", fmt::format("{}/{}", a, b), wire::encode(answer)}})
-            .has_value());
+    EXPECT_TRUE(store_.commit(node::rows_of_refusals(answer)).has_value());
   }
   Result<WhyNotJoined> ask(const Content& content, const std::string& a = "alpha", const std::string& b = "bravo") {
     return why_not_joined(store_, content, estimate(content), a, b);
