@@ -39,11 +39,7 @@ RobotAgent::RobotAgent(RobotId robot, const AgentConfig& config,
       submaps_(chain_, config.submap, std::move(state.submaps)),
       smoother_(config.smoother, std::move(state.smoother)),
       state_(std::move(state)),
-      fit_(config.submap.fit) {
-  // One of a program that did not watch jumps yet.
-  if (const auto newest = newest_sample(); newest && !state_.watch.newest)
-    state_.watch.newest = {*newest, state_.T_odom_body};
-}
+      fit_(config.submap.fit) {}
 RobotAgent::~RobotAgent() = default;
 RobotAgent::RobotAgent(RobotAgent&&) noexcept = default;
 RobotAgent& RobotAgent::operator=(RobotAgent&&) noexcept = default;
