@@ -21,7 +21,7 @@ constexpr double kFrozenFrom_s = 25.0, kFrozenFor_s = 5.0;
 constexpr double kDrift_deg_per_m = 0.2;
 constexpr double kScale = 1.05;
 
-/// What becomes of a scan.
+/// Changes a scan.
 using ChangeScan = std::function<void(Scan&, std::vector<Eigen::Vector3f>& points)>;
 
 /// Another source's scans, changed.

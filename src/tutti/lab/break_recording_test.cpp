@@ -14,7 +14,7 @@
 namespace tutti::lab {
 namespace break_recording_test {
 
-/// What a robot says to its own recording, which a mission of two simulated minutes makes of it.
+/// A robot says this to its own recording, a walk of 90 simulated seconds.
 std::map<std::string, fit::Misfit> said_of(const std::vector<MistakeConfig>& mistakes, std::string* error = nullptr) {
   MissionConfig config;
   config.source = "simulation";

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "tutti/geometry/so3.hpp"
-#include "tutti/model/pose_at.hpp"
 #include "tutti/perception/fit/odometry_fit.hpp"
 
 namespace tutti::robot {
@@ -22,8 +21,8 @@ bool stands(const fit::ScanStep& step, const Trajectory& odometry) {
   const auto is_small = [](const Pose3& T) {
     return T.translation.norm() < 0.05 && rotation_angle(T) < 1.0 * kRadPerDeg;
   };
-  const auto from = pose_at(odometry, step.from), to = pose_at(odometry, step.to);
-  return is_small(step.T_from_to) && from && to && is_small(from->inverse() * *to);
+  const auto by_odometry = fit::motion_over(step, odometry);
+  return is_small(step.T_from_to) && by_odometry && is_small(*by_odometry);
 }
 
 double median_range_m(const PointCloud& cloud) {

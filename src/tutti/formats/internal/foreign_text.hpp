@@ -6,7 +6,7 @@
 
 #include "tutti/base/result.hpp"
 
-/// What other programs and countries do to a text of numbers.
+/// Texts of numbers as other programs and countries write them.
 namespace tutti::formats::internal {
 
 /// Without quotes round its columns, and with decimal points where it has decimal commas: columns are then separated

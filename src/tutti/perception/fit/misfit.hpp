@@ -59,11 +59,10 @@ struct Misfit {
 /// Its name in logs and JSON, as "clock"; and back, nothing for what is none.
 std::string_view to_string(MisfitKind kind);
 std::optional<MisfitKind> misfit_kind(std::string_view name);
-/// Whether the setting or message to change is of how the robot is set up; else it is an error of odometry itself.
-bool is_setup(MisfitKind kind);
-/// What is wrong and by how much, as a sentence's end: "its scans are stamped 0.598 s late by its odometry (sigma ..)".
+/// Says what is wrong and by how much, as a sentence's end: "its scans are stamped 0.598 s late by its odometry (sigma
+/// ..)".
 std::string to_string(const Misfit& misfit);
-/// What to do about it; with the setting to paste where there is one.
+/// Says what to do about it.
 std::string way_on(const Misfit& misfit);
 
 }  // namespace tutti::fit

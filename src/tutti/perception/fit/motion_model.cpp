@@ -8,7 +8,6 @@
 #include <cmath>
 
 #include "tutti/geometry/so3.hpp"
-#include "tutti/model/pose_at.hpp"
 
 namespace tutti::fit {
 namespace {
@@ -98,11 +97,7 @@ Motions motions(const WeighedSteps& weighed, const Trajectory& odometry, double 
   constexpr double kLongestGap_s = 1.0;
   Motions out;
   out.reserve(weighed.steps.size());
-  for (const ScanStep& step : weighed.steps) {
-    const auto from = pose_at(odometry, step.from + offset_s, kLongestGap_s);
-    const auto to = pose_at(odometry, step.to + offset_s, kLongestGap_s);
-    out.push_back(from && to ? std::optional(from->inverse() * *to) : std::nullopt);
-  }
+  for (const ScanStep& step : weighed.steps) out.push_back(motion_over(step, odometry, offset_s, kLongestGap_s));
   return out;
 }
 

@@ -127,7 +127,7 @@ std::optional<Eigen::Vector3d> known_part(const Block& block, const Solution& so
   return out;
 }
 
-/// What a LiDAR that sits this far from the body's origin is displaced by in E when only its rotation is wrong.
+/// A LiDAR sits at most this far from the body's origin: so far E is displaced where only the rotation is wrong.
 constexpr double kLargestLever_m = 1.0;
 
 Misfit misfit_of(const Block& block, const Eigen::Vector3d& part, const Solution& solution) {
@@ -222,7 +222,7 @@ std::vector<Misfit> misfits_of(const WeighedSteps& weighed, const Solved& solved
   return joined(std::move(out));
 }
 
-/// What is left to say where most steps contradict and nothing above explains it.
+/// This is left to say where most steps contradict and nothing above explains it.
 std::vector<Misfit> unexplained(const WeighedSteps& weighed, const Motions& motions, double before) {
   constexpr double kMost = 30.0, kSure2 = 36.0;
   if (before < kMost) return {};
@@ -235,7 +235,7 @@ std::vector<Misfit> unexplained(const WeighedSteps& weighed, const Motions& moti
   return {{.kind = MisfitKind::unexplained, .value = sure / std::max(known, 1.0)}};
 }
 
-/// What odometry moves while scans lie on each other as they are; nothing where they do not.
+/// Says how far odometry moves while scans lie on each other as they are; nothing where they do not.
 std::optional<Misfit> stands_still(const WeighedSteps& weighed, const Motions& motions, double before, double& after) {
   double distance_m = 0.0;
   Motions still(motions.size());

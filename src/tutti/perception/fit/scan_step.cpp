@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tutti/geometry/so3.hpp"
+#include "tutti/model/pose_at.hpp"
 #include "tutti/perception/lidar/registration.hpp"
 #include "tutti/perception/lidar/voxel_filter.hpp"
 
@@ -16,7 +17,7 @@ constexpr double kVoxel_m = 0.3;
 constexpr std::size_t kMostPoints = 6000;
 constexpr double kLeastOverlap = 0.4;
 constexpr double kMostRmse_m = 0.15;
-// What registration of sparse scans errs by at least: rings of a LiDAR and edges of voxels move with the sensor.
+// Registration of sparse scans errs by this at least: rings of a LiDAR and edges of voxels move with the sensor.
 constexpr double kFloor_m = 0.02, kFloor_rad = 0.3 * kRadPerDeg;
 // Below this least eigenvalue of the normals' scatter the scans slide (as lidar::LidarClosureConfig has it), however
 // sure the residuals are: that much is then unknown along the axis.
@@ -56,6 +57,13 @@ FitScan make_fit_scan(Timestamp stamp, const PointCloud& cloud, double min_range
     points.resize(kMostPoints);
   }
   return {stamp, lidar::orient(std::move(points), {}, {})};
+}
+
+std::optional<Pose3> motion_over(const ScanStep& step, std::span<const StampedPose> odometry, double offset_s,
+                                 double max_gap_s) {
+  const auto from = pose_at(odometry, step.from + offset_s, max_gap_s);
+  const auto to = pose_at(odometry, step.to + offset_s, max_gap_s);
+  return from && to ? std::optional(from->inverse() * *to) : std::nullopt;
 }
 
 Pose3 steady_motion(const ScanStep& step, double duration_s) {

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <memory>
+#include <limits>
 #include <optional>
+#include <span>
 
 #include "tutti/base/timestamp.hpp"
 #include "tutti/geometry/pose3.hpp"
 #include "tutti/model/point_cloud.hpp"
+#include "tutti/model/trajectory.hpp"
 #include "tutti/perception/lidar/oriented_cloud.hpp"
 
 namespace tutti::fit {
@@ -29,6 +31,11 @@ struct ScanStep {
   double overlap = 0.0;  ///< Share of the newer scan's points that lie on the older one.
   int registrations = 0;
 };
+
+/// Odometry's motion over the step, whose clock `offset_s` is added to; nothing where it has no poses, or none within
+/// `max_gap_s` of each other.
+std::optional<Pose3> motion_over(const ScanStep& step, std::span<const StampedPose> odometry, double offset_s = 0.0,
+                                 double max_gap_s = std::numeric_limits<double>::infinity());
 
 /// Registers the newer scan on the older one (lidar::register_clouds()) from what odometry says; where that does not
 /// confirm odometry, also from standing still and from `T_as_before`, the motion that a steady body would have made.

@@ -12,7 +12,7 @@ namespace scan_step_test {
 
 using lidar::test::Walk;
 
-/// What a LiDAR sees from one place.
+/// A LiDAR sees this from one place.
 FitScan scan_at(const lidar::test::World& world, const Eigen::Vector3d& position, double yaw_rad, std::uint64_t seed) {
   const Walk stand{.from = position, .to = position, .yaw_rad = yaw_rad, .keyframes = 1};
   return make_fit_scan(Timestamp{static_cast<std::int64_t>(seed) * 400'000'000},

@@ -6,7 +6,6 @@
 #include <optional>
 
 #include "tutti/geometry/so3.hpp"
-#include "tutti/model/pose_at.hpp"
 
 namespace tutti::fit {
 namespace {
@@ -15,12 +14,6 @@ constexpr double kLeastDistance_m = 0.3, kLeastTurn_deg = 5.0;
 constexpr double kStill_m = 0.01, kStill_rad = 0.1 * kRadPerDeg;
 constexpr double kStillShare = 0.05;  // of what the scans show
 constexpr double kSureDistance2 = 36.0;
-
-std::optional<Pose3> motion_over(const ScanStep& step, const Trajectory& odometry) {
-  const auto from = pose_at(odometry, step.from), to = pose_at(odometry, step.to);
-  if (!from || !to) return std::nullopt;
-  return from->inverse() * *to;
-}
 
 /// The scans surely show another motion.
 bool contradicts(const ScanStep& step, const Pose3& by_odometry) {
