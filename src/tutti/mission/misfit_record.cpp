@@ -3,17 +3,10 @@
 
 #include <fmt/format.h>
 
-#include "tutti/geometry/so3.hpp"
+#include "tutti/mission/mission_config.hpp"
 
 namespace tutti::mission {
 namespace {
-
-/// Roll, pitch, yaw about fixed axes, degrees, as LidarPoseConfig has them.
-Eigen::Vector3d rpy_deg(const Eigen::Quaterniond& q) {
-  const Eigen::Matrix3d R = q.toRotationMatrix();
-  const double pitch = std::asin(std::clamp(-R(2, 0), -1.0, 1.0));
-  return Eigen::Vector3d(std::atan2(R(2, 1), R(2, 2)), pitch, std::atan2(R(1, 0), R(0, 0))) / kRadPerDeg;
-}
 
 std::string to_paste(const fit::Misfit& misfit, const MissionRecording& recording) {
   const std::string robot = "--set robots." + recording.recording.name;
@@ -24,7 +17,7 @@ std::string to_paste(const fit::Misfit& misfit, const MissionRecording& recordin
   if (!is_of_pose || !recording.scan_setup) return {};
   const Pose3 T_body_lidar = misfit.T_correction * recording.scan_setup->T_body_lidar;
   const Eigen::Vector3d& t = T_body_lidar.translation;
-  const Eigen::Vector3d rpy = rpy_deg(T_body_lidar.rotation);
+  const Eigen::Vector3d rpy = to_rpy_deg(T_body_lidar.rotation);
   return fmt::format(
       ": {0}.T_body_lidar.translation_m=[{1:.2f},{2:.2f},{3:.2f}] {0}.T_body_lidar.rpy_deg=[{4:.1f},{5:.1f},{6:.1f}]",
       robot, t.x(), t.y(), t.z(), rpy.x(), rpy.y(), rpy.z());

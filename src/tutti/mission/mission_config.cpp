@@ -168,4 +168,10 @@ Result<Pose3> to_pose(const LidarPoseConfig& config) {
   return pose;
 }
 
+Eigen::Vector3d to_rpy_deg(const Eigen::Quaterniond& rotation) {
+  const Eigen::Matrix3d R = rotation.toRotationMatrix();
+  const double pitch = std::asin(std::clamp(-R(2, 0), -1.0, 1.0));
+  return Eigen::Vector3d(std::atan2(R(2, 1), R(2, 2)), pitch, std::atan2(R(1, 0), R(0, 0))) / kRadPerDeg;
+}
+
 }  // namespace tutti::mission

@@ -56,6 +56,8 @@ inline bool is_given(const LidarPoseConfig& pose) {
 }
 /// T_body_lidar; fails with what is wrong in the configuration.
 Result<Pose3> to_pose(const LidarPoseConfig& config);
+/// The rotation as LidarPoseConfig::rpy_deg has it, pitch within 90 degrees.
+Eigen::Vector3d to_rpy_deg(const Eigen::Quaterniond& rotation);
 
 inline constexpr double kMostOffset_s = 1e10;  ///< Clocks that count from 1970, and clocks that count from their start.
 

@@ -111,20 +111,22 @@ std::optional<Eigen::Vector3d> up_of(const RobotRecord& robot) {
 /// Robots of one map whose odometry frames are not level with each other: heights and grids of that map are wrong.
 void warn_of_up(const MissionRecord& record, std::vector<std::string>& out) {
   constexpr double kMost_deg = 30.0;
-  for (std::size_t b = 0; b < record.robots.size(); ++b)
-    for (std::size_t a = 0; a < b; ++a) {
-      const RobotRecord &one = record.robots[a], &other = record.robots[b];
-      const auto up = up_of(one), others_up = up_of(other);
-      if (one.component != other.component || !up || !others_up) continue;
-      const double angle_deg = std::acos(std::clamp(up->dot(*others_up), -1.0, 1.0)) / kRadPerDeg;
+  std::vector<std::optional<Eigen::Vector3d>> ups;
+  for (const RobotRecord& robot : record.robots) {
+    const auto up = ups.emplace_back(up_of(robot));
+    for (std::size_t k = 0; up && k + 1 < ups.size(); ++k) {
+      const RobotRecord& before = record.robots[k];
+      if (before.component != robot.component || !ups[k]) continue;
+      const double angle_deg = std::acos(std::clamp(up->dot(*ups[k]), -1.0, 1.0)) / kRadPerDeg;
       if (angle_deg < kMost_deg) continue;
       out.push_back(
           fmt::format("{}'s up is {} by the closures between them ({:.0f} degrees apart): z of odometry's "
                       "frame points up (docs/frames.md), which one of the two does not do, and the grid "
                       "takes the ceiling for the ground",
-                      one.name, angle_deg > 90.0 ? other.name + "'s down" : "not " + other.name + "'s", angle_deg));
+                      before.name, angle_deg > 90.0 ? robot.name + "'s down" : "not " + robot.name + "'s", angle_deg));
       break;
     }
+  }
 }
 
 }  // namespace
