@@ -489,7 +489,7 @@ class CommandLine(unittest.TestCase):
     def test_compare_finds_where_a_trajectory_went_wrong(self):
         truth, bent = self.write_way("truth.tum"), self.write_way("bent.tum", bend_at=60)
         out = self.path / "compared"
-        self.expect(tutti("compare", bent, truth), 0, "judges:    " + str(truth), "EST is judged by REF")  # as tutti eval has them
+        self.expect(tutti("compare", bent, truth), 0, "judges:    " + str(truth))  # as tutti eval has them
         self.expect(tutti("compare", bent, truth, "--out", out), 0, "They disagree", "failure?",
                     "would fix B", "compare.html")
         report = json.loads(tutti("compare", bent, truth, "--json").stdout)

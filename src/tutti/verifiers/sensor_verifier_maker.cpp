@@ -45,8 +45,6 @@ std::string settings_of(const VerifierConfig& config) {
   std::erase_if(settings, [&](const auto& entry) {
     return entry.key != "verifier" && std::ranges::find(used, entry.key) == used.end();
   });
-  // Verdicts of all maps there are have the hash of this text, and workers of before read it.
-  std::ranges::find(settings, "verifier", &ConfigNode::Entry::key)->key = VerifierConfig::kFormerName;
   return to_yaml(node);
 }
 
