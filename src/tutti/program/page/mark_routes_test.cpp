@@ -69,7 +69,11 @@ TEST_F(Marks, FewLargeBodiesAreReadAtATime) {
   };
   std::vector<std::future<int>> slow;
   for (int i = 0; i < MarkReader::kMostAtATime; ++i)
-    slow.push_back(std::async(std::launch::async, [&] { return send(true); }));
+    slow.push_back(std::async(std::launch::async, [&] {
+      int status = 503;  // as long as what is asked below has its place
+      while (status == 503) status = send(true);
+      return status;
+    }));
   EXPECT_TRUE(test::within(10.0, [&] { return send(false) == 503; }));
   EXPECT_EQ(ask(client(), "/api/mark", a_mark()).first, 200) << "small ones pass";
   go.set_value();
