@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "tutti/exports/formats.hpp"
@@ -16,6 +17,9 @@ namespace {
 
 std::vector<std::string> notes_of(const grids::MapGrid& made, const MapSource& map) {
   std::vector<std::string> notes;
+  const std::uint32_t component = mapfile::component_to_show(map.content, map.estimate);
+  if (auto warning = mapfile::disagreement_on_up(map.content, map.estimate, component))
+    notes.push_back(std::move(*warning));
   for (const auto& [chain, height] : made.body_height_m)
     notes.push_back(fmt::format("{}: {:.2f} m above the ground", map.content.closure_names().of(chain), height));
   notes.push_back(mapfile::in_words(made.T_level_world) +

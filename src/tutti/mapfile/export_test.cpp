@@ -118,6 +118,33 @@ TEST(LevelFrame, CamerasHaveTheirYAxesDown) {
       << "a small change of the map does not turn it";
 }
 
+TEST(DisagreementOnUp, NamesTwoRobotsThatAreTheOtherWayUp) {
+  server::MapEstimate map;
+  const Eigen::Quaterniond over(0.0, 1.0, 0.0, 0.0);
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    const Eigen::Quaterniond yaw(Eigen::AngleAxisd(1.5 * i, Eigen::Vector3d::UnitZ()));
+    map.nodes.push_back({.id = {{RobotId{0}, 5}, i}, .T_world_body = {yaw, {1.0 * i, 2.0, 3.0}}});
+    map.nodes.push_back({.id = {{RobotId{1}, 5}, i}, .T_world_body = {yaw, {1.0 * i, 4.0, 3.0}}});
+    map.nodes.push_back({.id = {{RobotId{2}, 5}, i}, .T_world_body = {over * yaw, {}}, .component = i < 2 ? 0U : 1U});
+  }
+  const auto warning = disagreement_on_up(Content{}, map, 0);
+  ASSERT_TRUE(warning.has_value());
+  EXPECT_NE(warning->find("'s up is"), std::string::npos) << *warning;
+  EXPECT_FALSE(disagreement_on_up(Content{}, map, 1).has_value());
+  std::erase_if(map.nodes, [](const MapNode& node) { return node.id.chain.robot == RobotId{2}; });
+  EXPECT_FALSE(disagreement_on_up(Content{}, map, 0).has_value());
+}
+
+TEST(DisagreementOnUp, CamerasThatDriveTowardsEachOtherAgree) {
+  server::MapEstimate map;
+  for (std::uint32_t i = 0; i < 8; ++i)
+    map.nodes.push_back(
+        {.id = {{RobotId{i % 2}, 5}, i},
+         .T_world_body = {Eigen::Quaterniond(Eigen::AngleAxisd(3.14 * (i % 2), Eigen::Vector3d::UnitY())),
+                          {1.0 * i, 0, 0}}});
+  EXPECT_FALSE(disagreement_on_up(Content{}, map, 0).has_value());
+}
+
 TEST(LevelFrame, AMapThatStandsIsShownAsItIs) {
   server::MapEstimate map;
   for (std::uint32_t i = 0; i < 4; ++i)

@@ -12,21 +12,67 @@
 namespace tutti::mapfile {
 namespace {
 
-/// The mean of the bodies' axis that is up, shorter than 1 where they tilt. A body's axis that stays where it is while
-/// the body turns is the one that it turns about. That is z, or, where bodies are cameras, y, which points down; where
-/// nothing turns much, z is believed.
-Eigen::Vector3d mean_up(const server::MapEstimate& map, std::uint32_t component) {
-  constexpr double kSteady = 0.8, kClearly = 0.2;
-  Eigen::Vector3d y = Eigen::Vector3d::Zero(), z = Eigen::Vector3d::Zero();
-  double count = 0.0;
+constexpr double kSureUp = 0.8;  // of a robot's nodes, whose mean up is shorter where they tilt
+
+/// The sum of an axis of the bodies over all nodes of a component.
+Eigen::Vector3d sum_of_axes(const server::MapEstimate& map, std::uint32_t component, const Eigen::Vector3d& axis,
+                            double& nodes) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  nodes = 0.0;
   for (const MapNode& node : map.nodes) {
     if (node.component != component) continue;
-    y += node.T_world_body.rotation * Eigen::Vector3d::UnitY();
-    z += node.T_world_body.rotation * Eigen::Vector3d::UnitZ();
-    count += 1.0;
+    sum += node.T_world_body.rotation * axis;
+    nodes += 1.0;
   }
-  const bool is_camera = y.norm() > kSteady * count && y.norm() > z.norm() + kClearly * count;
-  return (is_camera ? Eigen::Vector3d(-y) : z) / std::max(count, 1.0);
+  return sum;
+}
+
+/// The bodies' axis that is up. An axis that stays where it is while the body turns is the one that it turns about.
+/// That is z, or, where bodies are cameras, y, which points down; where nothing turns much, z is believed.
+Eigen::Vector3d up_axis(const server::MapEstimate& map, std::uint32_t component) {
+  constexpr double kSteady = 0.8, kClearly = 0.2;
+  double nodes = 0.0;
+  const double y = sum_of_axes(map, component, Eigen::Vector3d::UnitY(), nodes).norm();
+  const double z = sum_of_axes(map, component, Eigen::Vector3d::UnitZ(), nodes).norm();
+  const bool is_camera = y > kSteady * nodes && y > z + kClearly * nodes;
+  return is_camera ? Eigen::Vector3d(-Eigen::Vector3d::UnitY()) : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
+}
+
+/// What a robot's nodes in a component say is up.
+struct Up {
+  ChainId chain;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double nodes = 0.0;
+  [[nodiscard]] bool is_sure() const { return sum.norm() >= kSureUp * nodes; }
+};
+std::map<RobotId, Up> ups(const server::MapEstimate& map, std::uint32_t component) {
+  const Eigen::Vector3d axis = up_axis(map, component);
+  std::map<RobotId, Up> out;
+  for (const MapNode& node : map.nodes) {
+    if (node.component != component) continue;
+    Up& up = out[node.id.chain.robot];
+    up.chain = node.id.chain;
+    up.sum += node.T_world_body.rotation * axis;
+    up.nodes += 1.0;
+  }
+  return out;
+}
+
+/// The mean of the bodies' axis that is up, shorter than 1 where they tilt; of the robots of most nodes, where others
+/// are upside down to them.
+Eigen::Vector3d mean_up(const server::MapEstimate& map, std::uint32_t component) {
+  const auto all = ups(map, component);
+  Up most;
+  for (const auto& [robot, one] : all) {
+    Up side;
+    for (const auto& [other, up] : all)
+      if (!one.is_sure() || !up.is_sure() || one.sum.dot(up.sum) >= 0.0) {
+        side.sum += up.sum;
+        side.nodes += up.nodes;
+      }
+    if (side.nodes > most.nodes) most = side;
+  }
+  return most.sum / std::max(most.nodes, 1.0);
 }
 
 }  // namespace
@@ -65,6 +111,20 @@ Pose3 upright_frame(const server::MapEstimate& map, std::uint32_t component) {
     return {nearest.z() > 0.0 ? Eigen::Quaterniond::Identity() : Eigen::Quaterniond(0.0, 1.0, 0.0, 0.0),
             Eigen::Vector3d::Zero()};
   return {Eigen::Quaterniond::FromTwoVectors(nearest, Eigen::Vector3d::UnitZ()), Eigen::Vector3d::Zero()};
+}
+
+std::optional<std::string> disagreement_on_up(const Content& content, const server::MapEstimate& map,
+                                              std::uint32_t component) {
+  auto all = ups(map, component);
+  std::erase_if(all, [](const auto& entry) { return !entry.second.is_sure(); });
+  const auto names = content.closure_names();
+  for (const auto& [robot, up] : all)
+    if (const Up& first = all.begin()->second; first.sum.dot(up.sum) < 0.0)
+      return fmt::format(
+          "warning: {}'s up is {}'s down by the closures between them, so the ground here is one's ceiling: z of the "
+          "body and of odometry's frame points up (docs/frames.md)",
+          names.of(first.chain), names.of(up.chain));
+  return std::nullopt;
 }
 
 std::string in_words(const Pose3& T_level_world) {

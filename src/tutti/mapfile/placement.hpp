@@ -28,6 +28,10 @@ Pose3 level_frame(const server::MapEstimate& map, std::uint32_t component);
 /// T_upright_world: the rotation by quarter turns that comes nearest to level_frame(), which small changes of the map
 /// do not change; the identity, unless its robots' frames are a camera's or it stands on its side.
 Pose3 upright_frame(const server::MapEstimate& map, std::uint32_t component);
+/// A warning where one robot of the component is the other way up than another by the axes of their bodies:
+/// level_frame() then is level for one of them alone. No value where all agree.
+std::optional<std::string> disagreement_on_up(const Content& content, const server::MapEstimate& map,
+                                              std::uint32_t component);
 /// How files in either frame state it, in one line.
 std::string in_words(const Pose3& T_level_world);
 

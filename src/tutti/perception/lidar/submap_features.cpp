@@ -121,6 +121,14 @@ SubmapFeatures extract_features(const Submap& submap, const LidarClosureConfig& 
   return features;
 }
 
+SubmapFeatures turned_over(SubmapFeatures features, const LidarClosureConfig& config) {
+  if (!features.usable) return features;
+  features.R_level_submap = Eigen::Quaterniond(0.0, 1.0, 0.0, 0.0) * features.R_level_submap;  // half a turn about x
+  features.view = make_view(features.cloud, features.R_level_submap, config.candidates.cell_m);
+  features.turned_views = std::make_shared<const std::vector<TurnedView>>(turn_views(features.view, config.candidates));
+  return features;
+}
+
 std::vector<TurnedView> views_from_above(const Submap& submap, const LidarClosureConfig& config) {
   const SeenFromAbove seen = see_from_above(submap, config);
   if (seen.refusal || !has_enough_walls(seen.view)) return {};

@@ -36,6 +36,9 @@ struct SubmapFeatures {
 /// false and a refusal.
 SubmapFeatures extract_features(const Submap& submap, const LidarClosureConfig& config);
 
+/// The features of the same submap with its up taken for its down.
+SubmapFeatures turned_over(SubmapFeatures features, const LidarClosureConfig& config);
+
 /// Only the turned views of these features, for half the work; none when the submap is not usable or has not enough
 /// walls.
 std::vector<TurnedView> views_from_above(const Submap& submap, const LidarClosureConfig& config);

@@ -14,7 +14,7 @@ namespace tutti::lidar {
 
 /// Version of what extract_features(), plausible_pair(), verify_pair() and to_verdict() find. A commit that changes
 /// their results, if only by a gate's default, raises it by hand: servers then ask again what another version answered.
-inline constexpr std::uint32_t kVerifierVersion = 2;
+inline constexpr std::uint32_t kVerifierVersion = 3;
 
 /// What verify_pair() found. The measured quantities are those of the best alignment, also when it is refused, as far
 /// as they were measured: where a rival refuses a pair, the finest level is left out. Without any alignment they are 0.
@@ -39,7 +39,8 @@ struct PairVerification {
   std::vector<Refusal> evidence;  ///< Every gate's value and limit, when accepted.
 };
 
-/// Decides from the two submaps alone whether they show the same place. Computed in the order of the submap ids, so
+/// Decides from the two submaps alone whether they show the same place. Those of two robots may be upside down to each
+/// other. Computed in the order of the submap ids, so
 /// verify_pair(b, a) is exactly the inverse. config.registration.levels must not be empty.
 PairVerification verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, const LidarClosureConfig& config);
 

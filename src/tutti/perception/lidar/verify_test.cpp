@@ -7,6 +7,7 @@
 #include <Eigen/LU>
 #include <array>
 #include <map>
+#include <numbers>
 
 #include "support/perception/lidar/rooms.hpp"
 
@@ -43,6 +44,28 @@ TEST(VerifyPair, acceptsTheSameRoomAndFindsThePose) {
   EXPECT_LT(error.tail<3>().norm(), 0.002);
   EXPECT_GT(v.overlap, 0.7);
   EXPECT_LT(v.contradiction, 0.1);
+}
+
+TEST(VerifyPair, findsARobotWhoseUpIsTheOthersDown) {
+  Walk over = kWalkB;
+  over.T_odom_world = {so3_exp({std::numbers::pi - 0.03, 0, 0}) * so3_exp({0, 0, -2.0}), {-40, 20, 0}};
+  const Side a = see({RobotId{0}, 0}, furnished_room(), kWalkA, 1);
+  for (const std::uint32_t index : {0U, 1U}) {
+    const Side b = see({RobotId{1}, index}, furnished_room(), over, 2);
+    const auto v = verify_pair(a.features, b.features, kConfig);
+    EXPECT_EQ(v.accepted, index == 0) << "an eighth of the pairs that are refused upright are tried";
+    if (!v.accepted) continue;
+    const Vector6d error = local(true_relative(kWalkA, over), v.T_a_b);
+    EXPECT_LT(error.head<3>().norm(), 0.02);
+    EXPECT_LT(error.tail<3>().norm(), 0.002);
+  }
+}
+
+TEST(VerifyPair, aRobotIsNeverUpsideDownToItself) {
+  Walk over = kWalkB;
+  over.T_odom_world = {so3_exp({std::numbers::pi - 0.03, 0, 0}) * so3_exp({0, 0, -2.0}), {-40, 20, 0}};
+  const Side a = see({RobotId{0}, 0}, furnished_room(), kWalkA, 1), b = see({RobotId{0}, 8}, furnished_room(), over, 2);
+  EXPECT_FALSE(verify_pair(a.features, b.features, kConfig).accepted);
 }
 
 TEST(VerifyPair, swappingTheSubmapsInvertsTheResult) {
