@@ -20,6 +20,10 @@ namespace {
 
 /// How often what the search decided is decided otherwise, of each kind.
 constexpr int kDecisions = 5;
+/// Two robots of whose closures fewer are in the map have no map together, if so many of those that each has with
+/// itself were asked: a robot's own closures are seldom wrong, and say that its odometry is.
+constexpr double kLeastShare = 0.2;
+constexpr std::size_t kEnoughOwn = 8;
 
 std::vector<double> seconds_of(const std::vector<MapNode>& nodes) {
   std::vector<double> out;
@@ -56,6 +60,7 @@ Optimum Optimiser::decide() const {
     best.work = work;
   }
   if (!is_searched_as_it_counts()) best = settle(map_.graph, std::move(best));
+  if (is_usable(best) && leave_outvoted(best.objections)) best = settle(map_.graph, std::move(best));
   return solved(std::move(best));
 }
 
@@ -130,6 +135,35 @@ void Optimiser::leave_unjoined(std::vector<Objection>& objections) const {
     for (const std::size_t c : all)
       if (never_enough || is_left(c)) objections[c] = Objection::too_few;
   }
+}
+
+bool Optimiser::leave_outvoted(std::vector<Objection>& objections) const {
+  struct Votes {
+    std::size_t in = 0, out = 0;
+    [[nodiscard]] bool is_lost() const { return static_cast<double>(in) < kLeastShare * static_cast<double>(in + out); }
+  };
+  using Pair = std::pair<std::size_t, std::size_t>;
+  std::map<Pair, Votes> votes;  // of a segment with itself, too
+  std::map<Pair, std::vector<std::size_t>> joining;
+  for (std::size_t c = 0; c < closures_.size(); ++c) {
+    const Pair ends = std::minmax({odometry_.segment(closure_edges_[c].from), odometry_.segment(closure_edges_[c].to)});
+    const bool is_in = objections[c] == Objection::none;
+    ++(is_in ? votes[ends].in : votes[ends].out);
+    if (ends.first != ends.second && is_in) joining[ends].push_back(c);
+  }
+  bool changes = false;
+  for (const auto& [ends, closures] : joining) {
+    Votes own = votes[{ends.first, ends.first}];
+    const Votes &other = votes[{ends.second, ends.second}], &between = votes[ends];
+    own.in += other.in;
+    own.out += other.out;
+    const Votes all{own.in + between.in, own.out + between.out};
+    const auto is_certain = [&](std::size_t c) { return certain_[c]; };
+    if (own.out < kEnoughOwn || !own.is_lost() || !all.is_lost() || std::ranges::any_of(closures, is_certain)) continue;
+    for (const std::size_t c : closures) objections[c] = Objection::outvoted;
+    changes = true;
+  }
+  return changes;
 }
 
 void Optimiser::place_by_odometry(PoseGraph& graph) const {
@@ -247,6 +281,8 @@ const char* to_string(Objection objection) {
       return "the map would pay more for it than a right one costs";
     case Objection::lone:
       return "with those of its place it contradicts the rest of the map";
+    case Objection::outvoted:
+      return "nearly all closures of these two contradict their odometry";
     case Objection::no_map:
       return "the map cannot be solved";
   }

@@ -26,6 +26,7 @@ enum class Objection {
   too_few,       ///< Too few closures join these two segments of odometry.
   dear,          ///< The map would pay more for it than a right one costs (settle.hpp).
   lone,          ///< With the other closures of its pair of places it contradicts all the rest of the map.
+  outvoted,      ///< Nearly all closures of these two robots contradict odometry, and no map follows from the rest.
   no_map         ///< The map could not be solved.
 };
 const char* to_string(Objection objection);  ///< The rule, for people; empty for none.

@@ -35,6 +35,10 @@ class Optimiser {
   [[nodiscard]] Optimum explain(int least_support) const;
   /// Too few closures do not join two segments of odometry, unless an operator decided so.
   void leave_unjoined(std::vector<Objection>& objections) const;
+  /// Takes out of the map what joins two segments of odometry whose closures, also those that each has with itself, are
+  /// nearly all refused: few wrong ones that agree have won over many right ones that bent odometry keeps apart.
+  /// False if there is nothing of the kind.
+  [[nodiscard]] bool leave_outvoted(std::vector<Objection>& objections) const;
   /// Whether a closure may be asked again.
   static bool is_open(Objection objection);
   [[nodiscard]] estimation::SolverConfig from_there() const;
