@@ -11,6 +11,7 @@
 #include "tutti/consistency/chain_uncertainty.hpp"
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/robot/map_covariance.hpp"
+#include "tutti/robot/mend_submap.hpp"
 #include "tutti/robot/odometry_sample.hpp"
 
 namespace tutti::robot {
@@ -129,8 +130,8 @@ std::optional<std::uint64_t> RobotAgent::keyframes_without_images() const {
 
 std::vector<SubmapMessage> RobotAgent::take_outgoing() {
   std::vector<SubmapMessage> out;
-  const auto observe = [&](const FinishedSubmap& finished, std::span<const fit::ScanStep> steps) {
-    fit_.add_scans(finished.scans, steps);
+  const auto observe = [&](const FinishedSubmap& finished, const SubmapSteps& steps) {
+    fit_.add_scans(finished.scans, steps, submaps_.state().drift);
   };
   while (auto submap = submaps_.take_submap(observe))
     out.push_back({.header = {.robot = chain_.robot, .session = chain_.session, .sequence = state_.sequence++},

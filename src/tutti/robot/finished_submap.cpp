@@ -51,16 +51,16 @@ Result<VisualPayload> see(const Submap& submap, const std::vector<TrackedImages>
 
 /// Compares a finished submap's scans with odometry, and mends it.
 void SubmapBuilder::fit(FinishedSubmap& finished, const ObserveScans& observe) {
-  std::vector<fit::ScanStep> steps;
-  if (config_.fit.scans != "off" && !finished.scans.empty())
-    steps = scan_steps(finished.scans, finished.scan_after, config_.min_range_m);
+  SubmapSteps steps;
+  if (config_.fit.scans != "off" && !finished.scans.empty()) steps = scan_steps(finished, config_.min_range_m);
+  if (steps.far) state_.drift.add(*steps.far, steps.T_far_by_odometry, steps.far_distance_m, steps.other_rad2);
   if (observe) observe(finished, steps);
   const bool was_mended = state_.T_mended_odom != Pose3{};
-  Submap& submap = finished.submap;
   if (was_mended)
-    for (Keyframe& keyframe : submap.keyframes) keyframe.T_odom_body = state_.T_mended_odom * keyframe.T_odom_body;
-  if (config_.fit.scans != "use") return;
-  if (const auto mended = mend_standstills(steps, finished.scan_after, finished.scans, submap))
+    for (Keyframe& keyframe : finished.submap.keyframes)
+      keyframe.T_odom_body = state_.T_mended_odom * keyframe.T_odom_body;
+  if (config_.fit.scans == "off" || config_.fit.scans == "say") return;
+  if (const auto mended = mend(steps, state_.drift.to_take_out(), finished))
     state_.T_mended_odom = *mended * state_.T_mended_odom;
 }
 

@@ -10,11 +10,13 @@
 namespace tutti::robot {
 namespace {
 
-constexpr double kFinest_s = 0.05;            // between odometry samples that are kept
-constexpr std::size_t kMostSamples = 20'000;  // of odometry: a robot may have no scans
-constexpr std::size_t kRanges = 20;           // scans whose ranges are remembered
-constexpr double kFarthest_m = 300.0;         // of half the points of a LiDAR
-constexpr double kOtherSize = 0.5;            // share by which a value has changed when it is said again
+constexpr double kFinest_s = 0.05;                 // between odometry samples that are kept
+constexpr std::size_t kMostSamples = 20'000;       // of odometry: a robot may have no scans
+constexpr std::size_t kRanges = 20;                // scans whose ranges are remembered
+constexpr double kFarthest_m = 300.0;              // of half the points of a LiDAR
+constexpr double kLeastDrift = 0.15 * kRadPerDeg;  // per metre, that is said
+constexpr double kSaidAfter = 2.5;                 // submaps: a late clock may look like a drift in two
+constexpr double kOtherSize = 0.5;                 // share by which a value has changed when it is said again
 
 /// Standing says nothing of odometry, and would fill the memory.
 bool stands(const fit::ScanStep& step, const Trajectory& odometry) {
@@ -57,18 +59,20 @@ void FitWatch::add_odometry(const StampedPose& T_odom_body, bool is_jump) {
   if (odometry_.size() > kMostSamples) odometry_.erase(odometry_.begin(), odometry_.begin() + kMostSamples / 2);
 }
 
-void FitWatch::add_scans(std::span<const lidar::PosedCloud> scans, std::span<const fit::ScanStep> steps) {
+void FitWatch::add_scans(std::span<const lidar::PosedCloud> scans, const SubmapSteps& steps,
+                         const fit::SteadyDrift& drift) {
   if (!is_on_ || scans.empty()) return;
   for (const lidar::PosedCloud& scan : scans) {
     ranges_m_.push_back(median_range_m(*scan.cloud));
     if (ranges_m_.size() > kRanges) ranges_m_.pop_front();
   }
-  for (const fit::ScanStep& step : steps) {
+  if (steps.far) registrations_ += static_cast<std::uint64_t>(steps.far->registrations);
+  for (const fit::ScanStep& step : steps.near) {
     registrations_ += static_cast<std::uint64_t>(step.registrations);
     if (!stands(step, odometry_)) steps_.push_back(step);
   }
   forget_old(scans.back().stamp);
-  compare();
+  compare(drift);
 }
 
 void FitWatch::forget_old(Timestamp newest) {
@@ -78,12 +82,18 @@ void FitWatch::forget_old(Timestamp newest) {
   odometry_.erase(odometry_.begin(), kept);
 }
 
-void FitWatch::compare() {
+void FitWatch::compare(const fit::SteadyDrift& drift) {
   const std::vector<fit::Misfit> before = std::exchange(misfits_, fit::fit_odometry(steps_, odometry_).misfits);
   std::vector<double> ranges(ranges_m_.begin(), ranges_m_.end());
   std::ranges::nth_element(ranges, ranges.begin() + static_cast<std::ptrdiff_t>(ranges.size() / 2));
   if (const double median = ranges[ranges.size() / 2]; ranges.size() == kRanges && median > kFarthest_m)
     misfits_.push_back({.kind = fit::MisfitKind::far_points, .value = median});
+  if (const double turn = drift.to_take_out(); std::abs(turn) >= kLeastDrift && drift.count > kSaidAfter)
+    misfits_.push_back({.kind = fit::MisfitKind::drift,
+                        .value = turn / kRadPerDeg,
+                        .sigma = drift.estimate()->sigma / kRadPerDeg,
+                        .from = steps_.empty() ? Timestamp{} : steps_.front().from,
+                        .to = steps_.empty() ? Timestamp{} : steps_.back().to});
   const auto is_in = [](const fit::Misfit& misfit, const std::vector<fit::Misfit>& list) {
     return std::ranges::any_of(list, [&](const fit::Misfit& other) { return is_same(other, misfit); });
   };

@@ -11,7 +11,9 @@
 #include "tutti/model/trajectory.hpp"
 #include "tutti/perception/fit/misfit.hpp"
 #include "tutti/perception/fit/scan_step.hpp"
+#include "tutti/perception/fit/steady_drift.hpp"
 #include "tutti/perception/lidar/voxel_filter.hpp"
+#include "tutti/robot/mend_submap.hpp"
 #include "tutti/robot/submap_builder.hpp"
 
 namespace tutti::robot {
@@ -24,8 +26,8 @@ class FitWatch {
 
   /// A sample of raw odometry; stamps increase. A jump forgets all before it.
   void add_odometry(const StampedPose& T_odom_body, bool is_jump);
-  /// The scans of a submap that has ended, and the motions between them (scan_steps()).
-  void add_scans(std::span<const lidar::PosedCloud> scans, std::span<const fit::ScanStep> steps);
+  /// The scans of a submap that has ended with the motions between them, and odometry's drift as far as it is known.
+  void add_scans(std::span<const lidar::PosedCloud> scans, const SubmapSteps& steps, const fit::SteadyDrift& drift);
 
   /// What contradicts since the last call, as two submaps in a row say, that was not said before or is of quite another
   /// size than was said. Odometry that stood still is said at once.
@@ -39,7 +41,7 @@ class FitWatch {
 
  private:
   void forget_old(Timestamp newest);
-  void compare();
+  void compare(const fit::SteadyDrift& drift);
 
   bool is_on_;
   Trajectory odometry_;

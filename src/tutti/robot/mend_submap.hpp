@@ -2,24 +2,26 @@
 #pragma once
 
 #include <optional>
-#include <span>
 #include <vector>
 
-#include "tutti/model/submap.hpp"
 #include "tutti/perception/fit/scan_step.hpp"
-#include "tutti/perception/lidar/voxel_filter.hpp"
+#include "tutti/robot/submap_builder.hpp"
 
 namespace tutti::robot {
 
-/// The motions from scan to scan of a submap, and to the scan of its last keyframe (FinishedSubmap::scan_after).
-std::vector<fit::ScanStep> scan_steps(std::span<const lidar::PosedCloud> scans,
-                                      const std::optional<lidar::PosedCloud>& after, double min_range_m);
+/// A submap's motions as its scans show them.
+struct SubmapSteps {
+  std::vector<fit::ScanStep> near;   ///< From scan to scan, and to the scan of its last keyframe.
+  std::optional<fit::ScanStep> far;  ///< From the first scan to the last.
+  Pose3 T_far_by_odometry;           ///< The same by odometry,
+  double far_distance_m = 0.0;       ///< and along its path.
+  double other_rad2 = 0.0;           ///< SteadyDrift::add(), as the near steps show it.
+};
+SubmapSteps scan_steps(const FinishedSubmap& finished, double min_range_m);
 
-/// Puts the scans' motion in the place of odometry's where odometry stood still and they moved (fit/standstill.hpp), in
-/// keyframes, odometry and the scans' poses, so that the submap is as if odometry had gone on. Returns
-/// what odometry is to be multiplied by from the submap's end on; nothing where nothing is mended.
-std::optional<Pose3> mend_standstills(std::span<const fit::ScanStep> steps,
-                                      const std::optional<lidar::PosedCloud>& after,
-                                      std::vector<lidar::PosedCloud>& scans, Submap& submap);
+/// Puts the scans' motion in the place of odometry's where odometry stood still and they moved (fit/standstill.hpp),
+/// and takes `drift` (rad/m) out of odometry's elsewhere: in keyframes, odometry and the scans' poses. Returns what
+/// odometry is to be multiplied by from the submap's end on; nothing where nothing is mended.
+std::optional<Pose3> mend(const SubmapSteps& steps, double drift, FinishedSubmap& finished);
 
 }  // namespace tutti::robot

@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <functional>
 #include <optional>
-#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,7 +12,7 @@
 #include "tutti/base/result.hpp"
 #include "tutti/model/submap.hpp"
 #include "tutti/model/trajectory.hpp"
-#include "tutti/perception/fit/scan_step.hpp"
+#include "tutti/perception/fit/steady_drift.hpp"
 #include "tutti/perception/lidar/scan_times.hpp"
 #include "tutti/perception/lidar/voxel_filter.hpp"
 #include "tutti/perception/visual/visual_payload.hpp"
@@ -27,11 +26,13 @@ struct FitConfig {
   std::string scans = "use";
   template <class V>
   void describe(V& v) {
-    v.field("scans", scans, one_of({"off", "say", "use"}),
+    v.field("scans", scans, one_of({"off", "say", "use", "correct"}),
             "say: the motion from scan to scan is compared with odometry, and what they contradict each other in is a "
             "warning with its cause and size: clocks, the LiDAR's pose, axes, drift, odometry that stood still. use: "
-            "and where odometry stood still, submaps have the scans' motion. off: nothing is registered, which saves a "
-            "robot some 5 ms a keyframe.");
+            "and submaps have the scans' motion where odometry stood still, and no steady drift of yaw. correct: and "
+            "tutti run sets clock and pose of the LiDAR of a bag to what its "
+            "scans say, and begins again; live as use. off: nothing is "
+            "registered, which saves a robot some 5 ms a keyframe.");
   }
 };
 
@@ -90,6 +91,8 @@ struct FinishedSubmap {
   bool awaits_images = false;
 };
 
+struct SubmapSteps;  // robot/mend_submap.hpp
+
 /// A position fix with the antenna's position by raw odometry.
 struct PlacedFix {
   Timestamp stamp;
@@ -101,8 +104,8 @@ struct PlacedFix {
 /// All that a builder remembers.
 struct SubmapBuilderState {
   std::uint32_t next_submap = 0;
-  /// What raw odometry is multiplied by in submaps, since it stood still and scans moved (mend_standstills()).
-  Pose3 T_mended_odom;
+  Pose3 T_mended_odom;                 ///< What raw odometry is multiplied by in submaps (mend()).
+  fit::SteadyDrift drift;              ///< How much raw odometry turns too far.
   std::vector<Keyframe> keyframes;     ///< Those of the open submap.
   std::vector<RelativePose> odometry;  ///< Between those keyframes.
   std::vector<lidar::PosedCloud> scans;
@@ -186,7 +189,7 @@ class SubmapBuilder {
   /// The oldest finished submap that was not taken yet. It is here that scans are merged and landmarks triangulated,
   /// which takes long; adding data never does. `observe` is called with the motions from scan to scan, by
   /// SubmapConfig::fit, and with the submap before its scans are merged.
-  using ObserveScans = std::function<void(const FinishedSubmap&, std::span<const fit::ScanStep>)>;
+  using ObserveScans = std::function<void(const FinishedSubmap&, const SubmapSteps&)>;
   std::optional<Submap> take_submap(const ObserveScans& observe = {});
   /// Errors since the last call, of submaps that lost what their cameras saw, because it contradicts itself or
   /// odometry.

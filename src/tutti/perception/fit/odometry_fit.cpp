@@ -33,15 +33,13 @@ struct Block {
   int first, size;  // of the parameters
   double least;     // of the norm, in the parameters' unit
 };
-constexpr double kLeastTurn = 1.0 * kRadPerDeg;    // the rings of a sparse LiDAR pitch by half of it
-constexpr double kLeastDrift = 0.18 * kRadPerDeg;  // per metre
-constexpr double kLeastOffset_s = 0.05;            // cameras that fly with honest odometry come to 0.034
-constexpr std::array<Block, 5> kBlocks{{
+constexpr double kLeastTurn = 1.0 * kRadPerDeg;  // the rings of a sparse LiDAR pitch by half of it
+constexpr double kLeastOffset_s = 0.05;          // cameras that fly with honest odometry come to 0.034
+constexpr std::array<Block, 4> kBlocks{{
     {MisfitKind::clock, 6, 1, kLeastOffset_s},
     {MisfitKind::turned, 3, 3, kLeastTurn},
     {MisfitKind::displaced, 0, 3, 0.1},
     {MisfitKind::scale, 7, 1, 0.03},
-    {MisfitKind::drift, 10, 1, kLeastDrift},  // about the body's z: gravity holds the other two
 }};
 
 Parameters as_parameters(const MotionModel& model) {
@@ -141,8 +139,7 @@ Misfit misfit_of(const Block& block, const Eigen::Vector3d& part, const Solution
     out.T_correction.rotation = so3_exp(-part);
     if (out.value > kUpsideDown_deg * kRadPerDeg && std::abs(axis.z()) < 0.5) out.kind = MisfitKind::upside_down;
   }
-  if (block.kind == MisfitKind::drift) out.value = -out.value;  // what odometry does, not what mends it
-  if (block.kind == MisfitKind::turned || block.kind == MisfitKind::drift) {
+  if (block.kind == MisfitKind::turned) {
     out.value /= kRadPerDeg;
     out.sigma /= kRadPerDeg;
   }
@@ -286,7 +283,7 @@ OdometryFit fit_odometry(std::span<const ScanStep> steps, const Trajectory& odom
       found = misfits_of(weighed, solved, before.mean);
     else if (out.after <= kMostLeft * before.mean)
       found = {misfit_of(*solved.reading)};
-    if (found.empty()) found = unexplained(weighed, now, before.mean);
+    if (found.empty() && out.after > kMostLeft * before.mean) found = unexplained(weighed, now, before.mean);
   }
   for (Misfit& misfit : found) {
     misfit.from = weighed.steps.front().from;

@@ -152,13 +152,6 @@ const std::vector<Case>& cases() {
          r.odometry = with_steps(r.truth, [](Pose T) { return Pose3{T.rotation, 1.05 * T.translation}; });
        },
        MisfitKind::scale, 1.0 / 1.05, 0.01},
-      {"turns 0.2 degrees a metre",
-       [](Robot& r) {
-         r.odometry = with_steps(r.truth, [](Pose T) {
-           return T * Pose3{so3_exp({0, 0, 0.2 * kRadPerDeg * T.translation.norm()}), Eigen::Vector3d::Zero()};
-         });
-       },
-       MisfitKind::drift, 0.2, 0.05},
   };
   return all;
 }

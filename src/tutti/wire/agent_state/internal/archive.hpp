@@ -231,6 +231,8 @@ template <class A>
 void pass(A& a, robot::SubmapBuilderState& builder) {
   pass(a, builder.next_submap);
   pass(a, builder.T_mended_odom);
+  for (double* sum : {&builder.drift.weight, &builder.drift.value, &builder.drift.square, &builder.drift.count})
+    a.number(*sum);
   pass(a, builder.keyframes);
   pass(a, builder.odometry);
   pass(a, builder.scans);

@@ -67,6 +67,11 @@ bool is_in_order(const std::vector<Fix>& fixes) {
   return all_sound(fixes) && std::ranges::is_sorted(fixes, {}, &Fix::stamp);
 }
 
+bool is_sound(const fit::SteadyDrift& drift) {
+  return std::isfinite(drift.value) && std::isfinite(drift.weight) && drift.weight >= 0.0 &&
+         std::isfinite(drift.square) && drift.square >= 0.0 && std::isfinite(drift.count) && drift.count >= 0.0;
+}
+
 bool is_sound(const robot::SubmapBuilderState& builder) {
   const auto is_whole = [](const robot::FinishedSubmap& finished) {
     return !finished.submap.keyframes.empty() && is_chain(finished.submap.keyframes, finished.submap.odometry) &&
@@ -74,8 +79,8 @@ bool is_sound(const robot::SubmapBuilderState& builder) {
            all_sound(finished.images) && all_sound(finished.submap.fixes);
   };
   const auto follows = [](const StampedPose& a, const StampedPose& b) { return a.stamp >= b.stamp; };
-  return is_chain(builder.keyframes, builder.odometry) && is_sound(builder.T_mended_odom) && all_sound(builder.scans) &&
-         all_sound(builder.images) && std::ranges::all_of(builder.finished, is_whole) &&
+  return is_chain(builder.keyframes, builder.odometry) && is_sound(builder.T_mended_odom) && is_sound(builder.drift) &&
+         all_sound(builder.scans) && all_sound(builder.images) && std::ranges::all_of(builder.finished, is_whole) &&
          is_sound(builder.since_keyframe) &&
          std::ranges::all_of(builder.recent, [](const StampedPose& at) { return is_sound(at.pose); }) &&
          std::ranges::adjacent_find(builder.recent, follows) == builder.recent.end() &&
