@@ -425,6 +425,17 @@ class CommandLine(unittest.TestCase):
         replayed = self.mission("robots: [{name: a, odometry: {file: a}, scans: s}]\n")
         self.expect(tutti("simulate", replayed, "-o", self.path / "x"), 2, "recordings", "simulation")
 
+    def test_a_bag_is_checked_against_itself_and_corrected_if_asked_for(self):
+        mission = self.mission("source: simulation\nsimulation: {sensors: lidar, world: {kind: tunnel, network: {rows: 2, columns: 2,"
+                               " block_m: 10.0}}, robots: [{name: alpha, walk: &walk {duration_s: 60}}, {name: bravo, walk: *walk}]}\n")
+        bags = self.path / "spoilt"
+        self.expect(tutti("simulate", mission, "-o", bags, "--break", "bravo=lidar_ahead"), 0, "messages")
+        self.expect(tutti("bag", "info", bags / "alpha", "--check"), 0, "ready: ", "check: alpha: scans and odometry say the same motion")
+        self.expect(tutti("bag", "info", bags / "bravo", "--check"), 1, "check: bravo: by", "LiDAR sits", "--set robots.bravo.T_body_lidar")
+        corrected = tutti("run", "--bag", f"bravo={bags}/bravo", "--set", "agent.submap.fit.scans=correct", "--out", self.path / "corrected")
+        self.expect(corrected, 0, "LiDAR sits", "corrected, as is asked for: --set robots.bravo.T_body_lidar.translation_m=[")
+        self.assertEqual(json.loads((self.path / "corrected/report.json").read_text())["robots"][0]["misfits"], [])
+
     def test_world_writes_the_walls_of_a_simulated_mission(self):
         mission = self.mission("source: simulation\nclosures: {verifier: reference}\n")
         self.expect(tutti("world", mission, "-o", self.path / "walls.ply"), 0, "triangles")

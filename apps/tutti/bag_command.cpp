@@ -12,10 +12,12 @@
 
 #include "commands.hpp"
 #include "options.hpp"
+#include "progress_line.hpp"
 #include "ros_commands.hpp"
 #include "tutti/bags/bag_info.hpp"
 #include "tutti/bags/near_types.hpp"
 #include "tutti/mission/bag_verdict.hpp"
+#include "tutti/program/stop.hpp"
 
 namespace tutti::app {
 namespace {
@@ -55,7 +57,22 @@ void print_topics(const bags::BagInfo& info) {
   }
 }
 
-int show_bag(const std::string& path) {
+/// Replays the robots of the bag, and says whether they fit themselves.
+int check(const mission::BagVerdict& verdict) {
+  if (!verdict.is_ready) return complain("bag info", "--check: the bag cannot be run");
+  ProgressLine progress;
+  const auto found =
+      mission::check_bag(verdict, [&progress, stop = announced_stop("what is known by now is said")](double share) {
+        progress.show(share, fmt::format("{:4.0f} % compared", 100.0 * share));
+        return stop();
+      });
+  progress.close();
+  if (!found) return complain("bag info", "--check: " + found.error().message);
+  for (const std::string& line : found->lines) fmt::print("check: {}\n", printable(line));
+  return found->fits ? 0 : 1;
+}
+
+int show_bag(const std::string& path, bool is_checked) {
   const auto bag = bags::open_bag(path);
   if (!bag) return complain("bag info", bag.error().message);
   const bags::BagInfo info = bags::inspect(**bag);
@@ -72,7 +89,7 @@ int show_bag(const std::string& path) {
   fmt::print("{}\n", printable(verdict.text));
   std::fflush(stdout);
   for (const std::string& error : info.said) fmt::print(stderr, "{}\n", printable(error));
-  if (info.errors == 0) return 0;
+  if (info.errors == 0) return is_checked ? check(verdict) : 0;
   return complain("bag info", fmt::format("{}: {} records or chunks could not be read", path, info.errors));
 }
 
@@ -93,7 +110,12 @@ void add_bag_command(CLI::App& app, int& exit_code) {
   info->add_option("bag", *path, "A folder that rosbag2 wrote, or an .mcap, .db3 or (ROS 1) .bag file; packed or not.")
       ->required()
       ->type_name("BAG");
-  info->callback([path, &exit_code] { exit_code = show_bag(*path); });
+  const auto is_checked = std::make_shared<bool>(false);
+  info->add_flag("--check", *is_checked,
+                 "Also compare what the scans see of the motion with odometry: late clocks, a LiDAR that is elsewhere "
+                 "than\nstated, other axes, drift, odometry that stood still. Exit code 1 where they contradict each "
+                 "other. Takes\nas long as tutti run");
+  info->callback([path, is_checked, &exit_code] { exit_code = show_bag(*path, *is_checked); });
   add_bag_play(*bag, exit_code);
 }
 

@@ -10,7 +10,9 @@
 
 #include "tutti/mission/bag_mission.hpp"
 #include "tutti/mission/bag_recording.hpp"
+#include "tutti/mission/misfit_record.hpp"
 #include "tutti/mission/recordings.hpp"
+#include "tutti/mission/robot_alone.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -47,12 +49,11 @@ Result<std::string> verifier_for(const std::vector<RobotConfig>& robots) {
   return has_scans ? "lidar" : has_images ? "visual" : "sensors";
 }
 
-/// What `tutti run` of these bags begins with.
-Result<MissionInput> begin(const std::vector<RobotConfig>& robots, const std::string& verifier) {
+MissionConfig mission_of(const std::vector<RobotConfig>& robots, const std::string& verifier) {
   MissionConfig config;
   config.robots = robots;
   config.closures.verifier = verifier;
-  return load_input(config, {}, 1);
+  return config;
 }
 
 }  // namespace
@@ -69,18 +70,41 @@ BagVerdict judge_bag(const std::filesystem::path& bag, const std::set<std::strin
     line += fmt::format(" --bag {}", word(name + "=" + bag.string()));
   }
   line += fmt::format(" --out out/{}", robot_of_bag(bag));
-  auto input = begin(configs, plain);
+  MissionConfig mission = mission_of(configs, plain);
+  auto input = load_input(mission, {}, 1);
   if (!input) {
     const auto verifier = verifier_for(configs);
-    if (!verifier) return {false, "not ready: " + verifier.error().message, {}};
+    if (!verifier) return {.text = "not ready: " + verifier.error().message};
     if (*verifier != plain) {
-      input = begin(configs, *verifier);
+      mission = mission_of(configs, *verifier);
+      input = load_input(mission, {}, 1);
       line += " --set closures.verifier=" + *verifier;
     }
   }
-  if (!input) return {false, "not ready: " + input.error().message, {}};
-  BagVerdict out{true, "ready: " + line, {}};
+  if (!input) return {.text = "not ready: " + input.error().message};
+  BagVerdict out{true, "ready: " + line, {}, std::move(mission)};
   for (MissionRecording& robot : input->robots) std::ranges::move(robot.warnings, std::back_inserter(out.warnings));
+  return out;
+}
+
+Result<BagCheck> check_bag(const BagVerdict& verdict, const std::function<bool(double share)>& stop) {
+  const auto input = load_input(verdict.mission, {}, 1);
+  if (!input) return tl::unexpected(input.error());
+  BagCheck out;
+  const double robots = static_cast<double>(input->robots.size());
+  for (std::size_t k = 0; k < input->robots.size(); ++k) {
+    const MissionRecording& robot = input->robots[k];
+    const std::string& name = robot.recording.name;
+    if (!robot.recording.scans) {
+      out.lines.push_back(fmt::format("{}: no scans to compare its odometry with", name));
+      continue;
+    }
+    const auto misfits = misfits_alone(
+        robot, verdict.mission, [&](double share) { return stop && stop((static_cast<double>(k) + share) / robots); });
+    for (const fit::Misfit& misfit : misfits) out.lines.push_back(warning_of(name, record_of(misfit, robot)));
+    if (misfits.empty()) out.lines.push_back(fmt::format("{}: scans and odometry say the same motion", name));
+    out.fits = out.fits && misfits.empty();
+  }
   return out;
 }
 

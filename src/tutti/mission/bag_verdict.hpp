@@ -2,9 +2,12 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <set>
 #include <string>
 #include <vector>
+
+#include "tutti/mission/mission_config.hpp"
 
 namespace tutti::mission {
 
@@ -14,9 +17,18 @@ struct BagVerdict {
   bool is_ready = false;
   std::string text;
   std::vector<std::string> warnings;  ///< Those that the mission would begin with.
+  MissionConfig mission;              ///< That the line runs, when ready.
 };
 
 /// `robots`: the namespaces with odometry, of which each is a robot; none: the bag is one robot's.
 BagVerdict judge_bag(const std::filesystem::path& bag, const std::set<std::string>& robots);
+
+/// Whether the robots of a bag that is ready fit themselves: what their scans say of odometry, mounting and clock
+/// (misfits_alone()). A line for each contradiction, or one for a robot that has none.
+struct BagCheck {
+  bool fits = true;
+  std::vector<std::string> lines;
+};
+Result<BagCheck> check_bag(const BagVerdict& verdict, const std::function<bool(double share)>& stop);
 
 }  // namespace tutti::mission

@@ -6,24 +6,34 @@
 #include "tutti/mission/mission_config.hpp"
 
 namespace tutti::mission {
-namespace {
 
-std::string to_paste(const fit::Misfit& misfit, const MissionRecording& recording) {
-  const std::string robot = "--set robots." + recording.recording.name;
+using ScanSetup = MissionRecording::ScanSetup;
+
+std::optional<ScanSetup> corrected_setup(const fit::Misfit& misfit, const ScanSetup& stated) {
+  ScanSetup out = stated;
   const bool is_of_pose = misfit.kind == fit::MisfitKind::turned || misfit.kind == fit::MisfitKind::displaced ||
                           misfit.kind == fit::MisfitKind::upside_down;
-  if (misfit.kind == fit::MisfitKind::clock && recording.scan_setup)
-    return fmt::format(": {}.scan_time_offset_s={:.3f}", robot, recording.scan_setup->time_offset_s + misfit.value);
-  if (!is_of_pose || !recording.scan_setup) return {};
-  const Pose3 T_body_lidar = misfit.T_correction * recording.scan_setup->T_body_lidar;
-  const Eigen::Vector3d& t = T_body_lidar.translation;
-  const Eigen::Vector3d rpy = to_rpy_deg(T_body_lidar.rotation);
+  if (misfit.kind == fit::MisfitKind::clock)
+    out.time_offset_s += misfit.value;
+  else if (is_of_pose)
+    out.T_body_lidar = misfit.T_correction * stated.T_body_lidar;
+  else
+    return std::nullopt;
+  return out;
+}
+
+std::string to_paste(const fit::Misfit& misfit, const MissionRecording& recording) {
+  const auto setup = recording.scan_setup ? corrected_setup(misfit, *recording.scan_setup) : std::nullopt;
+  if (!setup) return {};
+  const std::string robot = "--set robots." + recording.recording.name;
+  if (misfit.kind == fit::MisfitKind::clock)
+    return fmt::format(": {}.scan_time_offset_s={:.3f}", robot, setup->time_offset_s);
+  const Eigen::Vector3d& t = setup->T_body_lidar.translation;
+  const Eigen::Vector3d rpy = to_rpy_deg(setup->T_body_lidar.rotation);
   return fmt::format(
       ": {0}.T_body_lidar.translation_m=[{1:.2f},{2:.2f},{3:.2f}] {0}.T_body_lidar.rpy_deg=[{4:.1f},{5:.1f},{6:.1f}]",
       robot, t.x(), t.y(), t.z(), rpy.x(), rpy.y(), rpy.z());
 }
-
-}  // namespace
 
 MisfitRecord record_of(const fit::Misfit& misfit, const MissionRecording& recording) {
   const Timestamp begin = recording.recording.odometry.front().stamp;
@@ -34,6 +44,11 @@ MisfitRecord record_of(const fit::Misfit& misfit, const MissionRecording& record
           .sigma = misfit.sigma,
           .from_s = recording.start_s + (misfit.from - begin),
           .until_s = recording.start_s + (misfit.to - begin)};
+}
+
+std::string warning_of(const std::string& robot, const MisfitRecord& misfit) {
+  return fmt::format("{}: by {:.0f} to {:.0f} s {}: {}", robot, misfit.from_s, misfit.until_s, misfit.says,
+                     misfit.way_on);
 }
 
 void note_misfit(const fit::Misfit& misfit, std::vector<fit::Misfit>& all) {

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "tutti/geometry/so3.hpp"
+#include "tutti/mission/misfit_record.hpp"
 #include "tutti/server/map_components.hpp"
 #include "tutti/wire/codec.hpp"
 
@@ -135,9 +136,7 @@ std::vector<std::string> warnings_of(const MissionRecord& record) {
   std::vector<std::string> out;
   std::size_t submaps = 0;
   for (const RobotRecord& robot : record.robots)
-    for (const MisfitRecord& misfit : robot.misfits)
-      out.push_back(fmt::format("{}: by {:.0f} to {:.0f} s {}: {}", robot.name, misfit.from_s, misfit.until_s,
-                                misfit.says, misfit.way_on));
+    for (const MisfitRecord& misfit : robot.misfits) out.push_back(warning_of(robot.name, misfit));
   for (const RobotRecord& robot : record.robots)
     if (!robot.unused_images.empty())
       out.push_back(fmt::format("{}: none of its images are used: {}", robot.name, robot.unused_images));
