@@ -36,10 +36,29 @@ configure() {
   quietly cmake -S "$root" --preset "$1" "${@:2}"
 }
 
+# Of ninja's lines those that are no progress, and of progress one in half a minute.
+sparsely() {
+  local next=0 line
+  while IFS= read -r line; do
+    case "$line" in
+      "ninja: Entering"* | "ninja: no work"*) ;;
+      \[*/*\]*)
+        ((SECONDS < next)) && continue
+        next=$((SECONDS + 30))
+        echo "${line%%]*}] built"
+        ;;
+      *) printf '%s\n' "$line" ;;
+    esac
+  done
+}
+
 # build PRESET [ninja targets..]
 build() {
-  local preset="$1" flags=()
+  local preset="$1"
   shift
-  [ -t 1 ] || flags=(--quiet) # progress is for people
-  NINJA_STATUS='[%f/%t] ' ninja -C "$root/build/$preset" -j "$jobs" "${flags[@]}" "$@"
+  if [ -t 1 ]; then
+    NINJA_STATUS='[%f/%t] ' ninja -C "$root/build/$preset" -j "$jobs" "$@"
+  else
+    NINJA_STATUS='[%f/%t] ' ninja -C "$root/build/$preset" -j "$jobs" "$@" | sparsely
+  fi
 }
