@@ -9,7 +9,7 @@
 #include <numeric>
 #include <tuple>
 
-#include "tutti/base/file.hpp"
+#include "tutti/base/file_kind.hpp"
 #include "tutti/formats/fleet_graph.hpp"
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/graph_stamps.hpp"
@@ -37,7 +37,7 @@ bool is_a_file(const std::string& path) {
 /// Or JRL: a file whose vertices have names.
 Result<bool> is_pyfg(const std::string& path) {
   if (const auto ending = std::filesystem::path(path).extension(); ending == ".g2o") return false;
-  const auto text = read_file(path);
+  const auto text = read_file_for(FileUse::graph, path);
   if (!text) return tl::unexpected(text.error());
   return formats::looks_like_pyfg(*text) || formats::looks_like_jrl(*text);
 }

@@ -2,7 +2,6 @@
 #include "tutti/bags/bag_files.hpp"
 
 #include <algorithm>
-#include <array>
 #include <filesystem>
 #include <fstream>
 #include <string_view>
@@ -16,6 +15,7 @@
 #include "tutti/bags/rosbag2_metadata.hpp"
 #include "tutti/base/config_io.hpp"
 #include "tutti/base/file.hpp"
+#include "tutti/base/file_kind.hpp"
 
 namespace tutti::bags {
 namespace {
@@ -28,9 +28,10 @@ constexpr std::string_view kRos1Magic = "#ROSBAG V";
 Result<std::string> first_bytes(const std::string& path) {
   auto file = open_file(path);
   if (!file) return tl::unexpected(file.error());
-  std::array<char, 16> bytes{};
-  file->read(bytes.data(), bytes.size());
-  return std::string(bytes.data(), static_cast<std::size_t>(file->gcount()));
+  std::string bytes(kHeadBytes, '\0');
+  file->read(bytes.data(), kHeadBytes);
+  bytes.resize(static_cast<std::size_t>(file->gcount()));
+  return bytes;
 }
 
 template <class Reader>
@@ -39,36 +40,11 @@ Result<std::unique_ptr<BagReader>> boxed(Result<Reader> reader) {
   return std::make_unique<Reader>(std::move(*reader));
 }
 
-/// A file that something else than a recorder has packed.
-struct Packer {
-  std::string_view magic, name, unpack;
-};
-constexpr std::array<Packer, 6> kPackers{{{"\x1f\x8b", "gzip", "gunzip -k"},
-                                          {"BZh", "bzip2", "bunzip2 -k"},
-                                          {std::string_view("\xfd"
-                                                            "7zXZ\0",
-                                                            6),
-                                           "xz", "unxz -k"},
-                                          {"\x04\x22\x4d\x18", "lz4", "unlz4 -k"},
-                                          {"PK\x03\x04", "zip", "unzip"},
-                                          {"7z\xbc\xaf\x27\x1c", "7z", "7z x"}}};
-
-/// Names the packer and what to type; nothing for another file.
-Status check_packed(const std::string& path, std::string_view magic) {
-  const auto* packer = std::ranges::find_if(kPackers, [&](const Packer& one) { return magic.starts_with(one.magic); });
-  if (packer == kPackers.end()) return {};
-  const bool is_tar = path.ends_with(".tgz") || path.find(".tar.") != std::string::npos;
-  return fail(
-      ErrorCode::unsupported,
-      "{}: is packed with {}, expected a recording as it was written (zstd, as rosbag2 packs, is read): unpack it "
-      "first: {} {}",
-      path, packer->name, is_tar ? "tar xf" : packer->unpack, path);
-}
-
-/// The file's first bytes are `magic`.
+/// `magic`: its first bytes.
 Result<std::unique_ptr<BagReader>> open_plain(const std::string& path, const std::string& magic) {
   if (magic.empty()) return fail(ErrorCode::parse, "{}: is empty (0 bytes), expected a recording", path);
-  if (auto ok = check_packed(path, magic); !ok) return tl::unexpected(ok.error());
+  if (const std::string what = known_otherwise(magic, path, FileUse::recording); !what.empty())
+    return fail(ErrorCode::unsupported, "{}: {}", path, what);
   if (magic.starts_with(kSqliteMagic)) return boxed(Db3Reader::open(path));
   if (magic.starts_with(kRos1Magic)) return boxed(Ros1Reader::open(path));
   return boxed(McapReader::open(path));

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "tutti/base/file.hpp"
+#include "tutti/base/file_kind.hpp"
 #include "tutti/formats/graph_stamps.hpp"
 #include "tutti/formats/jrl.hpp"
 #include "tutti/formats/symbol_keys.hpp"
@@ -76,7 +76,7 @@ Result<PyfgFile> as_fleet(const G2oFile& graph, const std::string& name) {
 }
 
 Result<PyfgFile> read_fleet_graph(const std::string& path) {
-  const auto text = read_file(path);
+  const auto text = read_file_for(FileUse::graph, path);
   if (!text) return tl::unexpected(text.error());
   if (looks_like_jrl(*text)) return parse_jrl(*text, path);
   if (looks_like_pyfg(*text)) return parse_pyfg(*text, path);

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/base/file_kind.hpp"
 #include "tutti/formats/internal/chain.hpp"
 #include "tutti/formats/internal/g2o_lines.hpp"
 #include "tutti/formats/symbol_keys.hpp"
@@ -178,13 +179,15 @@ Result<G2oFile> parse_g2o(std::string_view text, const std::string& name) {
 }
 
 Result<G2oFile> read_g2o_edges(const std::string& path) {
-  return read_file(path).and_then([&](const std::string& text) { return parse_g2o_edges(text, path); });
+  return read_file_for(FileUse::graph, path).and_then([&](const std::string& text) {
+    return parse_g2o_edges(text, path);
+  });
 }
 
 Result<G2oFile> read_g2o(std::span<const std::string> paths) {
   G2oLines lines;
   for (const std::string& path : paths) {
-    const auto text = read_file(path);
+    const auto text = read_file_for(FileUse::graph, path);
     if (!text) return tl::unexpected(text.error());
     if (auto ok = internal::read_g2o_lines(*text, path, lines); !ok) return tl::unexpected(ok.error());
   }

@@ -71,5 +71,14 @@ TEST(OthersGraphs, ToroIsTheSameGraph) {
   EXPECT_FALSE(toro_3d->is_2d);
 }
 
+TEST(OthersGraphs, WhatIsNoGraphIsNamedWithWhatExports) {
+  const std::string path = testing::TempDir() + "tutti_others_graphs_test";
+  std::ofstream(path) << "\xdb\x01\xf5\x5b\x7b\x1f\x1d\x7b"
+                      << "and so on";
+  for (const std::string& message : {read_g2o(path).error().message, read_g2o_edges(path).error().message})
+    EXPECT_NE(message.find("is a state of Cartographer (.pbstream), expected a pose graph"), std::string::npos)
+        << message;
+}
+
 }  // namespace g2o_others_test
 }  // namespace tutti::formats

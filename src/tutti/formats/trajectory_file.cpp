@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "tutti/base/file_kind.hpp"
 #include "tutti/formats/internal/foreign_text.hpp"
 #include "tutti/formats/internal/text.hpp"
 #include "tutti/formats/internal/trajectory_layout.hpp"
@@ -245,22 +246,24 @@ Result<Trajectory> read_trajectory(const std::string& path, std::string_view for
                                    RowReport* report) {
   if (auto ok = check_rate(path, kitti_rate_hz); !ok) return tl::unexpected(ok.error());
   const auto plain = [&](std::string text) { return internal::plain_text(std::move(text), path); };
-  return read_file(path).and_then(plain).and_then([&](const std::string& text) -> Result<Trajectory> {
-    const TrajectoryLayout layout = internal::find_layout(text, format);
-    // A matrix or a quaternion with w first may pass for TUM's columns, and be another pose.
-    if (format == "tum" && !layout.is_named) {
-      const TrajectoryLayout looks = internal::find_layout(text, "auto");
-      if (looks.is_matrix || (looks.format == "euroc" && layout.stamp_exponent == -9))
-        return fail(ErrorCode::parse, "{}: it is read as tum, and looks like {}: state format: {}", path, looks.format,
-                    looks.format);
-    }
-    auto read = read_rows(text, path, layout, kitti_rate_hz, {}, report);
-    if (read) return read;
-    if (const std::string what = internal::otherwise_known(text); !what.empty())
-      return fail(read.error().code, "{}; {}", read.error().message, what);
-    return fail(read.error().code, "{}; {} as {}: state another format (tum, euroc or kitti) if it is one",
-                read.error().message, format == "auto" ? "recognised" : "read", layout.format);
-  });
+  return read_file_for(FileUse::trajectory, path)
+      .and_then(plain)
+      .and_then([&](const std::string& text) -> Result<Trajectory> {
+        const TrajectoryLayout layout = internal::find_layout(text, format);
+        // A matrix or a quaternion with w first may pass for TUM's columns, and be another pose.
+        if (format == "tum" && !layout.is_named) {
+          const TrajectoryLayout looks = internal::find_layout(text, "auto");
+          if (looks.is_matrix || (looks.format == "euroc" && layout.stamp_exponent == -9))
+            return fail(ErrorCode::parse, "{}: it is read as tum, and looks like {}: state format: {}", path,
+                        looks.format, looks.format);
+        }
+        auto read = read_rows(text, path, layout, kitti_rate_hz, {}, report);
+        if (read) return read;
+        if (const std::string what = internal::otherwise_known(text); !what.empty())
+          return fail(read.error().code, "{}; {}", read.error().message, what);
+        return fail(read.error().code, "{}; {} as {}: state another format (tum, euroc or kitti) if it is one",
+                    read.error().message, format == "auto" ? "recognised" : "read", layout.format);
+      });
 }
 
 }  // namespace tutti::formats
