@@ -152,6 +152,11 @@ TEST_F(OthersTrajectories, StampsSeparatorsAndNames) {
         "time x y z qw qx qy qz\n1700000000.5 1 2 3 0.8 0 0 0.6\n",
         "1700000000.5 0.28 -0.96 0 1 0.96 0.28 0 2 0 0 1 3\n",
         "1700000000.5 1 2 3 0 0 0.594 0.792\n",  // of norm 0.99
+        // seconds and nanoseconds, or the row's number, without names
+        "1700000000 500000000 1 2 3 0 0 0.6 0.8\n", "1700000000, 500000000, 1, 2, 3, 0, 0, 0.6, 0.8\n",
+        "4 1700000000.5 1 2 3 0 0 0.6 0.8\n",
+        "1700000000.5 1 2 3 0 0 0.6 0.8\r"
+        "# no line feeds\r",
         // spreadsheets, and countries whose numbers have commas
         "1700000000,5;1,0;2,0;3,0;0,0;0,0;0,6;0,8\n", "1700000000,5 1 2 3,0 0,0 0,0 0,6 0,8\n",
         "\"time\",\"x\",\"y\",\"z\",\"qx\",\"qy\",\"qz\",\"qw\"\n"
@@ -199,6 +204,14 @@ TEST_F(OthersTrajectories, WhatIsNoTrajectoryIsCalledSo) {
          "it is COLMAP's images.txt");
   expect("header:\n  stamp:\n    sec: 17\n", "ros2 topic echo --csv");
   expect("timestamp,x,y,z,roll,pitch,yaw\n1.5,1,2,3,0,0,1\n", "its orientations are roll, pitch, yaw");
+  expect("1.5 1 2 3\n2.5 1 2 3\n", "with 0 0 0 1 where no orientation is known");
+  expect("t,x,y,yaw_rad\n1.5,1,2,0.1\n", "its orientation is a heading");
+  expect("1.5 1 2 0.1\n", "sin(heading/2)");
+  expect("1.5 1 2 3 0 0 90\n", "three angles");
+  expect("2023-11-14T22:13:20.5 1 2 3 0 0 0.6 0.8\n", "its stamps are dates: write seconds since 1970");
+  expect("1.5, [1, 2, 3], [0, 0, 0.6, 0.8]\n", "its numbers are in brackets");
+  expect("\x89MCAP0\r\n", "is a recording, expected a trajectory: tutti bag info " + path_);
+  expect("\x1f\x8b\x08\n", "is packed with gzip");
   expect(std::string("\xFF\xFE"
                      "1\0 \0",
                      6),

@@ -110,6 +110,12 @@ Result<G2oFile> assemble(const G2oLines& lines, const std::string& name) {
   const Positions positions(file.vertex_ids);
   for (const std::int64_t id : lines.fixed) {
     const auto found = positions.of(id, name + ": FIX");
+    const bool leaves_vertices =
+        std::ranges::any_of(lines.left_out, [](const auto& entry) { return entry.first.starts_with("VERTEX"); });
+    if (!found && leaves_vertices) {  // a landmark, mostly
+      ++file.left_out["FIX"];
+      continue;
+    }
     if (!found) return tl::unexpected(found.error());
     file.fixed.push_back(*found);
   }

@@ -49,9 +49,42 @@ Result<std::string> plain_text(std::string text, const std::string& name) {
   if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF"))
     return fail(ErrorCode::parse, "{0}: is UTF-16, expected UTF-8: iconv -f UTF-16 -t UTF-8 '{0}' > utf8.txt", name);
   std::erase(text, '"');
+  if (text.find('\n') == std::string::npos) std::ranges::replace(text, '\r', '\n');  // lines as of an old Macintosh
   if (has_decimal_commas(text)) std::ranges::replace(text, ',', '.');
   return text;
 }
+
+namespace {
+
+/// What the first row of numbers is, where it is no pose.
+std::string otherwise_a_row(std::string_view text) {
+  for (const Separator separator : {Separator::comma, Separator::semicolon, Separator::whitespace}) {
+    LineReader line(text, "", separator);
+    while (line.next()) {
+      const auto columns = line.columns();
+      const std::string_view first = columns.front();
+      if (columns.size() < 3 || first.empty() || std::isdigit(static_cast<unsigned char>(first.front())) == 0) continue;
+      if (first.size() > 8 && first[4] == '-' && first[7] == '-')
+        return "its stamps are dates: write seconds since 1970 (pandas: pd.to_datetime(t).astype('int64') are "
+               "nanoseconds, which are read, too)";
+      if (std::ranges::any_of(columns, [](std::string_view c) { return c.find('[') != std::string_view::npos; }))
+        return "its numbers are in brackets: write them without, `stamp x y z qx qy qz qw`";
+      if (!std::ranges::all_of(columns, [](std::string_view c) { return parse_number(c).has_value(); })) break;
+      if (columns.size() == 4)
+        return "its rows have four numbers, as of positions without orientations, or of x, y and a heading: write "
+               "`stamp "
+               "x y z qx qy qz qw`, with 0 0 0 1 where no orientation is known (of the figures only positions are then "
+               "true), or 0 0 sin(heading/2) cos(heading/2)";
+      if (columns.size() == 7)
+        return "its rows have seven numbers, as of a stamp, a position and three angles, or of a pose without a stamp: "
+               "write `stamp x y z qx qy qz qw` (scipy's Rotation.from_euler(..).as_quat() makes quaternions)";
+      break;
+    }
+  }
+  return "";
+}
+
+}  // namespace
 
 std::string otherwise_known(std::string_view text) {
   constexpr std::size_t kHead = 4096;
@@ -67,7 +100,9 @@ std::string otherwise_known(std::string_view text) {
   if (has("roll") && has("yaw"))
     return "its orientations are roll, pitch, yaw, of which there are many kinds: write quaternions, `stamp x y z qx "
            "qy qz qw` (scipy's Rotation.from_euler(..).as_quat() makes them)";
-  return "";
+  if (has("yaw") || has("heading") || has("theta"))
+    return "its orientation is a heading: write `stamp x y z 0 0 sin(heading/2) cos(heading/2)`";
+  return otherwise_a_row(text);
 }
 
 }  // namespace tutti::formats::internal

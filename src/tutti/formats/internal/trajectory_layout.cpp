@@ -140,6 +140,30 @@ std::optional<Named> as_ros_prints(std::span<const std::string_view> columns) {
   return Named{.stamp = 0, .fraction = 1, .exponent = 0, .at = {x, x + 1, x + 2, x + 3, x + 4, x + 5, x + 6}};
 }
 
+/// One column more in front of the pose, told by which four are a unit quaternion: nanoseconds beside whole seconds, or
+/// the row's number before the stamp.
+std::optional<Named> behind_another(std::span<const std::string_view> columns) {
+  constexpr std::size_t kPose = 2;
+  constexpr double kTolerance = 1e-2, kLeastSeconds = 1e8, kSecond_ns = 1e9;
+  if (columns.size() < kPose + 7 || !parse_integer(columns[0])) return std::nullopt;
+  const auto is_unit = [&](std::size_t first) {
+    double sum = 0.0;
+    for (std::size_t i = first; i < first + 4; ++i)
+      sum += std::pow(parse_number(columns[i]).value_or(kLeastSeconds), 2);
+    return std::abs(std::sqrt(sum) - 1.0) < kTolerance;
+  };
+  if (is_unit(kPose + 2) || !is_unit(kPose + 3)) return std::nullopt;
+  Named out{.stamp = 0, .exponent = 0, .at = {2, 3, 4, 5, 6, 7, 8}};
+  const double first = *parse_number(columns[0]), second = parse_number(columns[1]).value_or(-1.0);
+  if (first >= kLeastSeconds && parse_integer(columns[1]) && second >= 0.0 && second < kSecond_ns)
+    out.fraction = 1;
+  else if (first < kLeastSeconds && second >= kLeastSeconds)
+    out.stamp = 1, out.exponent.reset();
+  else
+    return std::nullopt;
+  return out;
+}
+
 /// Named by one of the comments before the first row; the last one counts.
 std::optional<Named> named_in_comment(std::string_view text, Separator separator) {
   std::optional<Named> out;
@@ -269,6 +293,7 @@ TrajectoryLayout find_layout(std::string_view text, std::string_view format) {
     if (!line.next()) return out;
   }
   if (!named) named = as_ros_prints(line.columns());
+  if (!named && format != "kitti") named = behind_another(line.columns());
   const std::size_t count = line.columns().size();
   if (named && std::max(named->stamp, *std::ranges::max_element(named->at)) >= count) named.reset();
   if ((format == "auto" || format == "kitti") && !named && find_matrix(line.columns(), format, out)) {
