@@ -110,8 +110,8 @@ TEST(BagInfo, DepthIsNoCameraAndItsOwnIsNamed) {
   add_images("/alone", "mono8", 640, false);
   EXPECT_EQ(
       row_of("images"),
-      "images       /alone/image_raw (optical), of no use: /alone/image_raw: no sensor_msgs/CameraInfo beside it; "
-      "/color/image_raw (optical)");
+      "images       /alone/image_raw (optical), of no use: /alone/image_raw: no sensor_msgs/CameraInfo beside it, "
+      "expected on /alone/camera_info; /color/image_raw (optical)");
   add_images("/aligned", "16UC1", 640, true);
   EXPECT_TRUE(row_of("depth").ends_with("; /aligned/image_raw goes with /color/image_raw")) << row_of("depth");
   add_images("/second", "16UC1", 640, true);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cstddef>
 #include <optional>
 
@@ -40,20 +41,29 @@ std::size_t count_coefficients(const std::vector<double>& d) {
   return out;
 }
 
+/// By ROS's name what others write: Kalibr, librealsense, OpenCV, in any letters.
+std::string model_name(std::string name) {
+  std::ranges::transform(name, name.begin(),
+                         [](unsigned char c) { return c == '-' ? '_' : static_cast<char>(std::tolower(c)); });
+  if (name == "radtan" || name == "radial_tangential" || name == "brown_conrady") return "plumb_bob";
+  if (name == "fisheye" || name == "kannala_brandt4" || name == "kannala_brandt") return "equidistant";
+  return name;
+}
+
 /// Without any distortion it is a pinhole, whatever the model is called. A model that has some must have it whole.
 Result<CameraKind> kind_of(const RosCameraInfo& message) {
-  const std::string& model = message.distortion_model;
+  const std::string model = model_name(message.distortion_model);
   const std::size_t given = message.d.size(), numbers = count_coefficients(message.d);
   if (numbers == 0) return CameraKind::pinhole;
   if (model == "plumb_bob" && given >= 4 && numbers <= 4) return CameraKind::pinhole;
-  if (model == "plumb_bob" && numbers == 5) return CameraKind::rational;
-  if (model == "rational_polynomial" && given >= 8 && numbers <= 8) return CameraKind::rational;
-  if ((model == "equidistant" || model == "fisheye") && given >= 4 && numbers <= 4) return CameraKind::equidistant;
+  if ((model == "plumb_bob" || model == "rational_polynomial") && given >= 4 && numbers <= 8)
+    return CameraKind::rational;  // OpenCV's order, whichever of both it is called
+  if (model == "equidistant" && given >= 4 && numbers <= 4) return CameraKind::equidistant;
   if (model == "double_sphere" && given >= 2 && numbers <= 2) return CameraKind::double_sphere;
   return fail(ErrorCode::unsupported,
-              "distortion_model '{:.40}' with {} numbers, {} before the last zeros, expected plumb_bob (4 or 5), "
-              "rational_polynomial (8), equidistant (4) or double_sphere (2)",
-              model, given, numbers);
+              "distortion_model '{:.40}' with {} numbers, {} before the last zeros, expected plumb_bob or "
+              "rational_polynomial (4 to 8), equidistant (4) or double_sphere (2)",
+              message.distortion_model, given, numbers);
 }
 
 std::uint8_t mean_of_four(const std::uint8_t* at, std::size_t right, std::size_t below) {

@@ -21,6 +21,12 @@ TEST(BagCamera, EveryModelIsTaken) {
   EXPECT_EQ(kind(info("rational_polynomial", {0.1, 0.01, 0, 0, 0, 0.1, 0, 0})), CameraKind::rational);
   EXPECT_EQ(kind(info("fisheye", {0.01, 0, 0, 0})), CameraKind::equidistant);
   EXPECT_EQ(kind(info("", {})), CameraKind::pinhole);
+  EXPECT_EQ(kind(info("radtan", {-0.3, 0.1, 0.001, 0.002})), CameraKind::pinhole);  // Kalibr
+  EXPECT_EQ(kind(info("Brown-Conrady", {-0.3, 0.1, 0, 0, 0.01})), CameraKind::rational);
+  EXPECT_EQ(kind(info("Equidistant", {0.01, 0, 0, 0})), CameraKind::equidistant);
+  EXPECT_EQ(kind(info("kannala_brandt4", {0.01, 0, 0, 0})), CameraKind::equidistant);
+  EXPECT_EQ(kind(info("rational_polynomial", {0.1, 0.01, 0, 0, 0.02})), CameraKind::rational);
+  EXPECT_FALSE(to_camera(info("inverse_brown_conrady", {0.1, 0.01, 0, 0, 0.02})));
   EXPECT_EQ(kind(info("equidistant", {0.01, 0.02, 0, 0, 0})), CameraKind::equidistant);  // a T265
   EXPECT_EQ(kind(info("rational_polynomial", {0.1, 0.01, 0, 0, 0, 0.1, 0, 0, 0, 0, 0, 0, 0, 0})), CameraKind::rational);
   EXPECT_EQ(kind(info("rational_polynomial", {0, 0, 0, 0, 0, 0, 0, 0})), CameraKind::pinhole);

@@ -10,6 +10,7 @@
 
 #include "tutti/bags/camera.hpp"
 #include "tutti/bags/internal/cursor.hpp"
+#include "tutti/bags/internal/packed_picture.hpp"
 #include "tutti/bags/transform_tree.hpp"
 
 namespace tutti::bags {
@@ -84,6 +85,9 @@ ImageLayout layout_of(const RosCompressedImage& message) {
   const PngHeader header = header_of(png_of(message.data));
   const std::size_t end = message.format.find(';');
   ImageLayout out{message.format.substr(0, end), frame_name(message.header.frame_id), header.width, header.height};
+  if (!is_depth("", out.encoding))
+    if (std::string other = internal::other_encoding(message.format, message.data); !other.empty())
+      out.encoding = std::move(other);
   if (header.is_grey16 && end == std::string::npos && !is_depth("", out.encoding)) out.encoding = kMillimetres;
   return out;
 }

@@ -93,6 +93,9 @@ TEST(BagDepth, CompressedDepthIsUnpacked) {
   EXPECT_EQ(layout_of(message("png", formats::encode_png(Image(3, 2)))).encoding, "png");
   EXPECT_EQ(layout_of(message("rgb8; jpeg compressed bgr8", "\xFF\xD8")).encoding, "rgb8");
   EXPECT_EQ(layout_of(message("jpeg", "\xFF\xD8")).width_px, 0U);
+  EXPECT_EQ(layout_of(message("jpeg", "a broken one")).encoding, "jpeg");
+  EXPECT_EQ(layout_of(message("h264", std::string("\0\0\0\1\x67", 5))).encoding, "h264 (neither JPEG nor PNG)");
+  EXPECT_EQ(layout_of(message("webp", "RIFF")).encoding, "webp (neither JPEG nor PNG)");
   EXPECT_NE(to_depth(message("16UC1; compressedDepth rvl", header + "rvl bytes"), {})
                 .error()
                 .message.find("format '16UC1; compressedDepth rvl' with 21 bytes, expected a PNG image"),

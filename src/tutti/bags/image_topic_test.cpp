@@ -20,13 +20,17 @@ TEST(ImageTopic, ShowsWhatItsFirstMessageDoes) {
   EXPECT_TRUE(topic("/depth", "16UC1").shows_depth());
   EXPECT_EQ(topic("/depth", "16UC1").check_picture().error().message,
             "/depth: encoding '16UC1' is no picture, but depth");
-  EXPECT_EQ(topic("/flow", "32FC2").check_picture().error().message, "/flow: encoding '32FC2' is no picture");
+  EXPECT_EQ(topic("/flow", "32FC2").check_picture().error().message,
+            "/flow: encoding '32FC2' is no picture that is read, expected mono8, rgb8, bgr8, rgba8, bgra8 or bayer_..8 "
+            "(image_proc or the driver makes them)");
+  EXPECT_EQ(topic("/video", "h264 (neither JPEG nor PNG)", true).check_picture().error().message,
+            "/video: encoding 'h264 (neither JPEG nor PNG)' is no picture that is read, expected JPEG or PNG");
 }
 
 TEST(ImageTopic, ACameraIsCalibratedBesideItsPictures) {
-  EXPECT_EQ(topic("/flow", "32FC2").camera().error().message, "/flow: encoding '32FC2' is no picture");
+  EXPECT_EQ(topic("/flow", "32FC2").camera().error().message, topic("/flow", "32FC2").check_picture().error().message);
   ImageTopic seen = topic("/image", "mono8");
-  EXPECT_EQ(seen.camera().error().message, "/image: no sensor_msgs/CameraInfo beside it");
+  EXPECT_EQ(seen.camera().error().message, "/image: no sensor_msgs/CameraInfo beside it, expected on /camera_info");
   seen.info = RosCameraInfo{.height = 480, .width = 640};
   EXPECT_NE(seen.camera().error().message.find("/image: is the camera calibrated?"), std::string::npos);
   seen.info->k = {500, 0, 320, 0, 500, 240, 0, 0, 1};

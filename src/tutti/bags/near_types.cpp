@@ -27,6 +27,9 @@ constexpr std::string_view kHesai =
 constexpr std::string_view kRobosense =
     "packets of a LiDAR, not clouds: rslidar_sdk makes /rslidar_points of them (msg_source 2); record these";
 constexpr std::string_view kNebula = "packets of a LiDAR, not clouds: nebula_ros makes clouds of them; record these";
+constexpr std::string_view kLivox =
+    "packets or an older message of a Livox, not read: livox_ros_driver2 publishes its CustomMsg or PointCloud2 "
+    "(xfer_format 1 or 0); record these";
 constexpr std::string_view kPlane =
     "one plane of a laser, not a cloud: laser_geometry makes sensor_msgs/PointCloud2 of it, but closures from a single "
     "plane were never tried";
@@ -59,6 +62,8 @@ constexpr std::array kTypes{
     NearType{"rslidar_msgs/", kRobosense},
     NearType{"robosense_msgs/", kRobosense},
     NearType{"nebula_msgs/", kNebula},
+    NearType{"livox_interfaces/", kLivox},
+    NearType{"livox_sdk_vehicle_msgs/", kLivox},
     NearType{"sensor_msgs/LaserScan", kPlane},
     NearType{"sensor_msgs/MultiEchoLaserScan", kPlane},
     NearType{"sensor_msgs/PointCloud", kOldCloud},

@@ -32,6 +32,11 @@ Status check_clock(Timestamp stamp, const std::optional<Timestamp>& newest_odome
   if (!newest_odometry) return {};
   const double ahead_s = stamp - *newest_odometry;
   if (std::abs(ahead_s) <= kAnotherClock_s) return {};
+  if (stamp.ns == 0)
+    return fail(ErrorCode::invalid,
+                "stamp 0 ns, expected one near odometry's newest, {} ns: its publisher does not fill "
+                "header.stamp",
+                newest_odometry->ns);
   return fail(ErrorCode::invalid, "stamp {} ns is {:.1f} s from odometry's newest, {} ns: are they by another clock?{}",
               stamp.ns, ahead_s, newest_odometry->ns, aligned_by(ahead_s, setting));
 }

@@ -19,6 +19,7 @@ TEST(SensorClock, WhatIsFarFromOdometryIsRefusedWithTheNumberThatAligns) {
   EXPECT_TRUE(check_clock(kNow - 7200.0, kNow, "offset_s").error().message.ends_with("offset_s=7200)"));
   EXPECT_TRUE(check_clock(kNow + 12.5, kNow, "offset_s").error().message.ends_with("offset_s=-12.5)"));
   EXPECT_TRUE(check_clock(kNow + 12.5, kNow).error().message.ends_with("are they by another clock?"));
+  EXPECT_TRUE(check_clock({}, kNow, "offset_s").error().message.ends_with("does not fill header.stamp"));
 }
 
 TEST(SensorClock, ASmallerDifferenceIsDoubtedOnceByItsMedian) {

@@ -99,7 +99,8 @@ StampOrder order_by_stamp(std::span<const Arrival> arrivals) {
     if (out.used.empty() || arrivals[out.used.back()].stamp < stamp)
       out.used.push_back(i);
     else
-      out.refused.emplace_back(i, fmt::format("stamp {} ns, which another message has, too", stamp.ns));
+      out.refused.emplace_back(i, fmt::format("stamp {} ns, which another message has, too{}", stamp.ns,
+                                              stamp.ns == 0 ? ": its publisher does not fill header.stamp" : ""));
   }
   std::ranges::sort(out.refused);
   return out;

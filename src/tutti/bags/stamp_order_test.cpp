@@ -47,6 +47,13 @@ TEST(StampOrder, SingleStampsThatAreFarOffAreRefused) {
   EXPECT_EQ(behind.refused[0].second, "stamp 700000000 ns is 14.2 s behind 14900000000 ns, expected within 1 s");
 }
 
+TEST(StampOrder, HeadersWithoutStampsAreCalledSo) {
+  const StampOrder order = order_of({0, 0, 0});
+  ASSERT_EQ(order.refused.size(), 2U);
+  EXPECT_EQ(order.refused[0].second,
+            "stamp 0 ns, which another message has, too: its publisher does not fill header.stamp");
+}
+
 TEST(StampOrder, OfAClockThatStartsAgainTheLongestRunIsUsed) {
   const StampOrder order = order_of(counting(500, 530) + counting(0, 100) + counting(20, 60));
   ASSERT_EQ(order.runs.size(), 3U);

@@ -30,7 +30,8 @@ Result<Pose3> to_pose(const Eigen::Vector3d& translation, const Eigen::Quaternio
   if (!(translation.cwiseAbs().maxCoeff() <= kMaxCoordinate_m))  // also NaN
     return fail(ErrorCode::invalid, "position {} {} {}, expected at most {:g} m", translation.x(), translation.y(),
                 translation.z(), kMaxCoordinate_m);
-  if (!(std::abs(rotation.norm() - 1.0) <= kUnitTolerance))
+  constexpr double kDigits = 1e-9;  // 0.99 as a double is a little more than 0.01 from 1
+  if (!(std::abs(rotation.norm() - 1.0) <= kUnitTolerance + kDigits))
     return fail(ErrorCode::invalid, "orientation of norm {:.6g}, expected 1 within {}", rotation.norm(),
                 kUnitTolerance);
   // One that is a rotation stays as it is, bit by bit.

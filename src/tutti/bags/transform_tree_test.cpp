@@ -11,6 +11,17 @@
 namespace tutti::bags {
 namespace transform_tree_test {
 
+/// tf2's own bounds, to the rounding of a double.
+TEST(TransformTree, QuaternionsOfNorm099AreNormalised) {
+  for (const double norm : {0.99, 1.01}) {
+    const Eigen::Quaterniond turned(0.6 * norm, 0.0, 0.0, 0.8 * norm);
+    const auto pose = to_pose({0, 0, 0}, turned);
+    ASSERT_TRUE(pose) << pose.error().message;
+    EXPECT_NEAR(pose->rotation.norm(), 1.0, 1e-12);
+  }
+  EXPECT_FALSE(to_pose({0, 0, 0}, Eigen::Quaterniond(0.985, 0, 0, 0)));
+}
+
 RosTransform transform(const std::string& parent, const std::string& child, const Pose3& pose) {
   return {{Timestamp{1}, parent}, child, pose.translation, pose.rotation};
 }
