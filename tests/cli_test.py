@@ -107,6 +107,39 @@ class CommandLine(unittest.TestCase):
         other.write_bytes(b"SQLite format 3")
         self.expect(tutti("bag", "info", other), 1, "other.mcap", "not a database")
 
+    def test_a_file_of_another_kind_is_named_with_the_way_on(self):
+        def named(name, content, *words, commands=("bag info", "run", "eval", "compare", "optimise")):
+            file = self.path / name
+            file.write_bytes(content)
+            for command in commands:
+                more = {"eval": [file], "compare": [file], "optimise": ["-o", self.path / "out.g2o"]}.get(command, [])
+                self.expect(tutti(*command.split(), file, *more), 1, name + ": is ", *words)
+
+        named("velodyne.pcap", b"\xd4\xc3\xb2\xa1" + bytes(60), "network packets", "through the LiDAR's driver")
+        named("log.ulg", b"ULog\x01\x12\x35" + bytes(60), "PX4 (ULog)", "ulog2csv")
+        named("data.h5", b"\x89HDF\r\n\x1a\n" + bytes(60), "HDF5", "stamp x y z")
+        named("one.png", b"\x89PNG\r\n\x1a\n" + bytes(60), "a single image", "docs/data.md")
+        named("a.mcap.gz", b"\x1f\x8b\x08" + bytes(60), "packed with gzip", "gunzip -k ")
+        named("map.pbstream", b"\xdb\x01\xf5\x5b\x7b\x1f\x1d\x7b" + bytes(60), "Cartographer (.pbstream)")
+        named("lfs.mcap", b"version https://git-lfs.github.com/spec/v1\noid sha256:ab\n", "Git LFS", "git lfs pull")
+        named("bag.mcap", b"\x89MCAP0\r\n" + bytes(60), "a recording", "tutti bag info ", commands=("eval", "compare", "optimise"))
+        named("fleet.g2o", b"VERTEX_SE2 0 0 0 0\n", "a pose graph", "tutti run --graph ", commands=("bag info", "run"))
+        named("a.tum", b"1 0 0 0 0 0 0 1\n", "text", "mission file", commands=("bag info", "run"))
+        with contextlib.closing(sqlite3.connect(self.path / "rtabmap.db")) as database:
+            database.execute("CREATE TABLE Node (id INTEGER NOT NULL)")
+        database = (self.path / "rtabmap.db").read_bytes()
+        named("rtabmap.db", database, "RTAB-Map", "rtabmap-export --poses --poses_format 11 ", commands=("eval", "compare"))
+        named("rtabmap.db", database, "RTAB-Map", "rtabmap-export --poses --poses_format 4 ", commands=("optimise",))
+        named("rtabmap.db", database, "RTAB-Map", "give the bag", commands=("bag info", "run"))
+
+    def test_a_folder_that_is_no_bag_is_named_with_the_way_on(self):
+        (self.path / "MH_01/mav0/cam0").mkdir(parents=True)
+        (self.path / "MH_01/mav0/cam0/data.csv").write_text("#timestamp [ns],filename\n")
+        (self.path / "00/velodyne").mkdir(parents=True)
+        for command, code in ((("run",), 2), (("bag", "info"), 1)):
+            self.expect(tutti(*command, self.path / "MH_01"), code, "EuRoC's", "images: {euroc_folder: ", "verifier: visual")
+            self.expect(tutti(*command, self.path / "00"), code, "KITTI's", "/velodyne}", "verifier: lidar")
+
     def test_status_without_a_bus(self):
         here = tutti("status", "--wait", "0.3")  # other tests may run buses on this machine
         self.assertIn("--bus", here.stdout + here.stderr)

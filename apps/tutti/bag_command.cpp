@@ -7,8 +7,10 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <string>
+#include <system_error>
 
 #include "commands.hpp"
 #include "options.hpp"
@@ -16,6 +18,7 @@
 #include "ros_commands.hpp"
 #include "tutti/bags/bag_info.hpp"
 #include "tutti/bags/near_types.hpp"
+#include "tutti/mission/bag_mission.hpp"
 #include "tutti/mission/bag_verdict.hpp"
 #include "tutti/program/stop.hpp"
 
@@ -74,7 +77,11 @@ int check(const mission::BagVerdict& verdict) {
 
 int show_bag(const std::string& path, bool is_checked) {
   const auto bag = bags::open_bag(path);
-  if (!bag) return complain("bag info", bag.error().message);
+  if (!bag) {
+    std::error_code failure;
+    const std::string folder = std::filesystem::is_directory(path, failure) ? mission::known_folder(path) : "";
+    return complain("bag info", folder.empty() ? bag.error().message : path + ": " + folder);
+  }
   const bags::BagInfo info = bags::inspect(**bag);
   fmt::print("bag        {}\nmessages   {} of {} topics\nstorage    {}\n\n", path, info.messages, info.topics.size(),
              (*bag)->storage());

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <map>
 #include <string_view>
 #include <utility>
 
@@ -67,9 +68,51 @@ Inside look_into(const fs::path& folder) {
 
 std::string joined(const std::vector<fs::path>& paths) {
   std::string out;
-  for (const fs::path& path : paths) out += (out.empty() ? "" : " ") + path.string();
+  for (const fs::path& path : paths) out += fmt::format("{}{}", out.empty() ? "" : " ", path.string());
   return out;
 }
+
+/// "3 .tum, 300 .png"; for messages.
+std::string contents_of(const fs::path& folder) {
+  constexpr std::size_t kMostKinds = 5;
+  std::map<std::string, std::size_t> counts;
+  std::error_code failure;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, failure))
+    ++counts[entry.is_directory(failure)        ? "folders"
+             : entry.path().extension().empty() ? "files without an ending"
+                                                : entry.path().extension().string()];
+  std::string out;
+  std::size_t kinds = 0;
+  for (const auto& [kind, count] : counts)
+    if (++kinds <= kMostKinds) out += fmt::format("{}{} {}", out.empty() ? "" : ", ", count, kind);
+  return out.empty() ? "nothing" : out;
+}
+
+/// A recording in files of its own: told by a file in it, and what a mission file says of it.
+struct FolderKind {
+  std::string_view sign;    ///< Relative to the folder.
+  std::string_view inside;  ///< The folder of the recording itself, relative to it.
+  std::string_view name;
+  std::string_view robot;  ///< "{}" is that folder.
+  std::string_view verifier = "visual";
+};
+constexpr std::string_view kEurocRobot = "odometry: {{file: ODOMETRY.tum}}, images: {{euroc_folder: {0}}}";
+constexpr std::string_view kKittiRobot =
+    "odometry: {{file: POSES.txt, format: kitti, times: {0}/times.txt}}, scans: {0}/velodyne";
+constexpr std::array kFolderKinds{
+    FolderKind{"mav0/cam0/data.csv", "", "a recording as EuRoC's (ASL's)", kEurocRobot},
+    FolderKind{"cam0/data.csv", "", "a recording as EuRoC's (ASL's)", kEurocRobot},
+    FolderKind{"rgb.txt", "", "a recording as TUM RGB-D's",
+               "odometry: {{file: ODOMETRY.tum}}, images: {{list: {0}/rgb.txt, cameras: CAMERAS.yaml, depth: {{list: "
+               "{0}/depth.txt}}}}"},
+    FolderKind{"velodyne", "", "a sequence as KITTI's", kKittiRobot, "lidar"},
+    FolderKind{"sequences/00/velodyne", "sequences/00", "KITTI's odometry data set", kKittiRobot, "lidar"},
+    FolderKind{"Scans/000000.pcd", "", "a recording as HKU's",
+               "odometry: {{file: {0}/odom_poses.txt, format: kitti, times: {0}/times.txt}}, scans: {0}/Scans",
+               "lidar"},
+    FolderKind{"000000.pcd", "", "a folder of scans", "odometry: {{file: ODOMETRY.tum}}, scans: {0}", "lidar"},
+    FolderKind{"000000.bin", "", "a folder of scans", "odometry: {{file: ODOMETRY.tum}}, scans: {0}", "lidar"},
+};
 
 /// The bags in a folder, or the folder itself where it is one.
 Result<std::vector<fs::path>> bags_in(const fs::path& folder) {
@@ -84,21 +127,34 @@ Result<std::vector<fs::path>> bags_in(const fs::path& folder) {
                 folder.string(), inside.files.size(), joined(inside.files), recording_of(folder), folder.string());
   std::vector<fs::path> out = std::move(inside.bags);
   out.insert(out.end(), inside.files.begin(), inside.files.end());
-  std::error_code failure;
-  if (out.empty() && fs::exists(folder / "rgb.txt", failure))
-    return fail(ErrorCode::configuration,
-                "{0}: is a recording as TUM RGB-D's, without odometry and calibration; name both in a mission file: "
-                "robots: [{{name: {1}, odometry: {{file: ODOMETRY.tum}}, images: {{list: {0}/rgb.txt, cameras: "
-                "CAMERAS.yaml, depth: {{list: {0}/depth.txt}}}}}}] (docs/data.md, Images)",
-                folder.string(), robot_of_bag(folder));
-  if (out.empty())
-    return fail(ErrorCode::configuration,
-                "{}: holds no bag, expected .mcap, .db3 or .bag files, or folders of rosbag2's with them",
-                folder.string());
-  return out;
+  if (!out.empty()) return out;
+  const std::string other = known_folder(folder);
+  return fail(ErrorCode::configuration, "{}: {}", folder.string(),
+              other.empty()
+                  ? "holds no bag, expected .mcap, .db3 or .bag files, or folders of rosbag2's with them; here: " +
+                        contents_of(folder)
+                  : other);
 }
 
 }  // namespace
+
+std::string known_folder(const fs::path& folder) {
+  std::error_code failure;
+  if (const Inside inside = look_into(folder); inside.files.empty() && !inside.bags.empty())
+    return fmt::format("holds bags in folders of their own: {}", joined(inside.bags));
+  if (fs::exists(folder / "report.json", failure))
+    return fmt::format("is what tutti run has written, no bag: tutti export {} -o out.mcap shows it in Foxglove",
+                       folder.string());
+  const auto* kind =
+      std::ranges::find_if(kFolderKinds, [&](const FolderKind& k) { return fs::exists(folder / k.sign, failure); });
+  if (kind == kFolderKinds.end()) return "";
+  const std::string inside = (kind->inside.empty() ? folder : folder / kind->inside).string();
+  return fmt::format(
+      "is {}, which `tutti run` takes by a mission file, with odometry of your own: robots: [{{name: {}, {}}}], "
+      "closures: "
+      "{{verifier: {}}} (docs/data.md)",
+      kind->name, robot_of_bag(inside), fmt::format(fmt::runtime(kind->robot), inside), kind->verifier);
+}
 
 std::string robot_of_bag(const fs::path& path) {
   fs::path last = path.has_filename() ? path.filename() : path.parent_path().filename();

@@ -61,6 +61,35 @@ TEST_F(NamedBags, AFolderOfTwoRobotsBagsIsAskedAbout) {
       << named({"desk"});
 }
 
+TEST_F(NamedBags, RecordingsInFilesOfTheirOwnAreNamedWithTheRobotThatReadsThem) {
+  const auto expect = [&](const std::string& folder, const std::string& what, const std::string& robot) {
+    EXPECT_NE(named({folder}).find(what), std::string::npos) << named({folder});
+    EXPECT_NE(named({folder}).find(robot), std::string::npos) << named({folder});
+    EXPECT_EQ(named({folder}), (data_ / folder).string() + ": " + known_folder(data_ / folder));
+  };
+  make("MH_01/mav0/cam0/data.csv");
+  const std::string euroc = (data_ / "MH_01").string();
+  expect("MH_01", "is a recording as EuRoC's (ASL's), which `tutti run` takes by a mission file",
+         "robots: [{name: MH_01, odometry: {file: ODOMETRY.tum}, images: {euroc_folder: " + euroc + "}}]");
+  expect("MH_01/mav0", "is a recording as EuRoC's (ASL's)", "images: {euroc_folder: " + euroc + "/mav0}}]");
+  make("kitti/sequences/00/velodyne/000000.bin");
+  const std::string kitti = (data_ / "kitti/sequences/00").string();
+  expect("kitti", "is KITTI's odometry data set",
+         "odometry: {file: POSES.txt, format: kitti, times: " + kitti + "/times.txt}, scans: " + kitti + "/velodyne}]");
+  expect("kitti/sequences/00", "is a sequence as KITTI's", "closures: {verifier: lidar}");
+  make("hku/Scans/000000.pcd");
+  expect("hku", "is a recording as HKU's", "scans: " + (data_ / "hku/Scans").string());
+  expect("hku/Scans", "is a folder of scans", "scans: " + (data_ / "hku/Scans").string());
+  make("out/demo/report.json");
+  expect("out/demo", "is what tutti run has written", "tutti export " + (data_ / "out/demo").string());
+  make("recs/a/a_0.mcap");
+  EXPECT_EQ(known_folder(data_ / "recs"), "holds bags in folders of their own: " + (data_ / "recs/a").string());
+  make("other/a.tum");
+  make("other/b.tum");
+  EXPECT_NE(named({"other"}).find("holds no bag, expected .mcap"), std::string::npos) << named({"other"});
+  EXPECT_NE(named({"other"}).find("here: 2 .tum"), std::string::npos) << named({"other"});
+}
+
 TEST_F(NamedBags, MissionFilesAreNoBags) {
   EXPECT_TRUE(is_mission_file("demo"));
   EXPECT_TRUE(is_mission_file("missions/hku.yaml"));
