@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "tutti/bags/camera.hpp"
+#include "tutti/bags/near_types.hpp"
 #include "tutti/bags/robot_namespace.hpp"
 #include "tutti/bags/ros_fix.hpp"
 #include "tutti/bags/ros_messages.hpp"
@@ -149,6 +150,7 @@ class Indexer {
                         child = bags::frame_name(transform.child_frame_id), pair = parent + "->" + child;
       const std::string key = name_space.empty() ? pair : topic + ":" + pair;
       const bool is_odometry = bags::is_odometry_frame(parent) || pair == pair_ || key == pair_;
+      if (!is_static && !is_odometry) index.other_transforms.insert(key);
       if (is_static || !is_odometry) continue;
       OdometryTrack& track = index.transforms[key];
       track.frame = parent;
@@ -332,6 +334,11 @@ BagIndex index_bag(bags::BagReader& bag, const std::string& pair, bool with_imag
     if (use == bags::Use::odometry) index.odometry[channel->topic];
     if (use == bags::Use::poses) index.poses[channel->topic];
     if (use == bags::Use::scans) index.scans[channel->topic];
+    const std::string_view type = channel->type, way = bags::way_on(type);
+    const bool is_pose = type.starts_with("geometry_msgs/") || type.starts_with("nav_msgs/");
+    if (!way.empty())
+      (is_pose ? index.near_odometry : index.near_scans) +=
+          fmt::format("; near: {} ({}): {}", channel->topic, type, way);
   }
   for (auto* tracks : {&index.odometry, &index.poses, &index.transforms})
     for (auto& [topic, track] : *tracks) {

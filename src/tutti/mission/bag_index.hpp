@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -92,6 +93,8 @@ struct BagIndex {
   std::map<std::string, OdometryTrack> poses;     ///< geometry_msgs/PoseStamped, by topic
   /// By pair of frames, "odom->base_link"; those of a namespace's own topic as "/alpha/tf:odom->base_link".
   std::map<std::string, OdometryTrack> transforms;
+  std::set<std::string> other_transforms;  ///< Pairs of /tf that are no odometry by their names, as keys are.
+  std::string near_odometry, near_scans;   ///< "; near: .." what is nearly of use, and what makes it so.
   std::map<std::string, ScanTrack> scans;
   std::map<std::string, ImageTrack> images;
   std::map<std::string, ImuTrack> imu;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "tutti/bags/robot_namespace.hpp"
@@ -72,6 +73,29 @@ Result<const std::pair<const std::string, Track>*> choose(const std::map<std::st
   return found;
 }
 
+/// "; of /tf, camera_init->body moves, too: .." where one of the pairs may be odometry by another name; those first
+/// whose parent is nobody's child.
+std::string other_frames(const BagIndex& index, const RobotConfig& robot) {
+  constexpr std::size_t kMost = 4;
+  constexpr std::string_view kArrow = "->";
+  std::set<std::string> children;
+  std::vector<std::pair<std::string, std::string>> moving;  // the parent, the pair
+  for (const std::string& key : index.other_transforms) {
+    const std::string pair = key.substr(key.find(':') + 1);  // npos + 1 is the beginning
+    const std::size_t arrow = pair.find(kArrow);
+    const std::string parent = pair.substr(0, arrow), child = pair.substr(arrow + kArrow.size());
+    children.insert(child);
+    if (!index.tree.find(parent, child)) moving.emplace_back(parent, key);
+  }
+  if (moving.empty()) return "";
+  std::ranges::stable_partition(moving, [&](const auto& entry) { return !children.contains(entry.first); });
+  std::string out;
+  for (std::size_t i = 0; i < std::min(moving.size(), kMost); ++i)
+    out += fmt::format("{}{}", i > 0 ? ", " : "", moving[i].second);
+  return fmt::format("; of /tf, {} move{}: is it odometry? --topic '{}.odometry={}'", out,
+                     moving.size() == 1 ? "s" : "", robot.name, moving.front().second);
+}
+
 /// The track with its name, of the three kinds the first that has one.
 Result<const std::pair<const std::string, OdometryTrack>*> choose_odometry(const BagIndex& index,
                                                                            const RobotConfig& robot) {
@@ -89,8 +113,9 @@ Result<const std::pair<const std::string, OdometryTrack>*> choose_odometry(const
   if (!found || *found != nullptr) return found;
   return fail(ErrorCode::invalid,
               "no odometry: expected a topic of nav_msgs/Odometry (here: {}) or geometry_msgs/PoseStamped ({}), or a "
-              "frame in odom in /tf ({})",
-              list_of(index.odometry), list_of(index.poses), list_of(index.transforms));
+              "frame in odom in /tf ({}){}{}",
+              list_of(index.odometry), list_of(index.poses), list_of(index.transforms), other_frames(index, robot),
+              index.near_odometry);
 }
 
 /// "; refused were: transform base_link -> lidar: orientation of norm 0, .."
@@ -305,7 +330,7 @@ Result<BagRecording> read_bag(const fs::path& data, const RobotConfig& robot, bo
   if (with_images) take_cameras(index, track.body, robot, out);
   if (*scans == nullptr) {
     if (robot.topics.scans.empty() && index.scans.empty())
-      what += ", no scans (sensor_msgs/PointCloud2, or CustomMsg of a Livox)";
+      what += ", no scans (sensor_msgs/PointCloud2, or CustomMsg of a Livox)" + index.near_scans;
     if (!index.scans.empty()) what += fmt::format(", no scans: {}", list_of(index.scans));
     out.notes.insert(out.notes.begin(), what);
     out.warnings = much_left_out(index, {source, track}, out, robot);

@@ -329,5 +329,39 @@ TEST_F(StrangerBags, ALidarTensOfMetresAwayIsDoubted) {
       "/points: the sensor is 300.0 m from the body's origin, at [300.000 0.000 0.000] m: are these millimetres?");
 }
 
+TEST_F(StrangerBags, WhatIsNearlyOfUseIsNamedWhereNothingElseIs) {
+  std::vector<Sample> samples = samples_of({});
+  for (Sample& sample : samples)
+    if (sample.type == kCloud) sample = sample_of("/packets", "velodyne_msgs/msg/VelodyneScan", kStart, "packets");
+  write({samples});
+  expect_note(read("alpha"),
+              "no scans (sensor_msgs/PointCloud2, or CustomMsg of a Livox); near: /packets "
+              "(velodyne_msgs/msg/VelodyneScan): packets of a LiDAR, not clouds: play the bag beside");
+  for (Sample& sample : samples)
+    if (sample.type == kOdometry) sample = sample_of("/path", "nav_msgs/msg/Path", kStart, "poses");
+  write({samples});
+  expect_note(read("alpha"), "in /tf (none); near: /path (nav_msgs/msg/Path): a whole trajectory in each message");
+}
+
+/// As FAST-LIO's camera_init -> body: what may be odometry by another name is named with what to type.
+TEST_F(StrangerBags, OdometryOfAnotherNameInTfIsAskedFor) {
+  std::vector<Sample> samples = samples_of({});
+  std::erase_if(samples, [](const Sample& sample) { return sample.topic == "/odom"; });
+  for (int i = 0; i < kPoses; ++i) {
+    const Timestamp stamp = kStart + kPeriod_s * i;
+    samples.push_back(sample_of(
+        "/tf", kTf, stamp,
+        tf_of(stamp, {{"camera_init", "base_link", at_x(0.05 * i)}, {"base_link", "a_wheel", at_x(0.001 * i)}})));
+  }
+  write({samples});
+  const auto bag = read("alpha");
+  ASSERT_FALSE(bag);
+  EXPECT_NE(bag.error().message.find("or a frame in odom in /tf (none); of /tf, camera_init->base_link, "
+                                     "base_link->a_wheel move: is it odometry? --topic "
+                                     "'alpha.odometry=camera_init->base_link'"),
+            std::string::npos)
+      << bag.error().message;
+}
+
 }  // namespace stranger_bags_test
 }  // namespace tutti::mission
