@@ -38,7 +38,8 @@ class BagVerdicts : public testing::Test {
           all.push_back(sample_of(of + "/odom", kOdometry, stamp,
                                   odometry_of(stamp, {Eigen::Quaterniond::Identity(), {0.1 * i, 0, 0}}, odom, body)));
         if (kind != "no scans")
-          all.push_back(sample_of(of + "/points", kCloud, stamp, cloud_of(stamp, lidar, {{1, 2, 3}})));
+          all.push_back(sample_of(of + "/points", kCloud, stamp,
+                                  cloud_of(stamp + (kind == "another clock" ? -3600.0 : 0.0), lidar, {{1, 2, 3}})));
       }
     }
     std::ranges::stable_sort(all, {}, &Sample::ns);
@@ -71,7 +72,8 @@ TEST_F(BagVerdicts, WhatRunWouldRefuseIsSaid) {
   const std::pair<const char*, const char*> cases[] = {
       {"no odometry", "no odometry: expected a topic of nav_msgs/Odometry"},
       {"no scans", "odometry alone joins no maps: no scans, and no images (no sensor_msgs/Image"},
-      {"no transform", "--set robots.alpha.T_body_lidar"}};
+      {"no transform", "--set robots.alpha.T_body_lidar"},
+      {"another clock", "robots.alpha.scan_time_offset_s="}};
   for (const auto& [kind, said] : cases) {
     record({""}, kind);
     const BagVerdict verdict = judge_bag(file(), {});

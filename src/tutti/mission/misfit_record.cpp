@@ -37,13 +37,16 @@ std::string to_paste(const fit::Misfit& misfit, const MissionRecording& recordin
 
 MisfitRecord record_of(const fit::Misfit& misfit, const MissionRecording& recording) {
   const Timestamp begin = recording.recording.odometry.front().stamp;
+  const bool is_timed = misfit.to != Timestamp{};  // else it is true all the time
+  const Timestamp from = is_timed ? misfit.from : begin;
+  const Timestamp to = is_timed ? misfit.to : recording.recording.odometry.back().stamp;
   return {.kind = std::string(to_string(misfit.kind)),
           .says = to_string(misfit),
           .way_on = way_on(misfit) + to_paste(misfit, recording),
           .value = misfit.value,
           .sigma = misfit.sigma,
-          .from_s = recording.start_s + (misfit.from - begin),
-          .until_s = recording.start_s + (misfit.to - begin)};
+          .from_s = recording.start_s + (from - begin),
+          .until_s = recording.start_s + (to - begin)};
 }
 
 std::string warning_of(const std::string& robot, const MisfitRecord& misfit) {

@@ -54,6 +54,15 @@ TEST(MisfitRecord, AClockIsCorrectedOnTopOfWhatIsSet) {
   EXPECT_EQ(record_of(misfit, live).way_on.find("--set"), std::string::npos);
 }
 
+/// As of points in millimetres.
+TEST(MisfitRecord, OneWithoutTimesIsOfTheWholeRecording) {
+  MissionRecording recording = bravo();
+  recording.recording.odometry.push_back({Timestamp{} + 130.0, {}});
+  const MisfitRecord record = record_of({.kind = fit::MisfitKind::far_points, .value = 4000.0}, recording);
+  EXPECT_EQ(record.from_s, 5.0);
+  EXPECT_EQ(record.until_s, 35.0);
+}
+
 TEST(MisfitRecord, AKindIsKeptAsItWasSaidLastAndEachStandstillIs) {
   std::vector<fit::Misfit> all;
   const auto still = [](double from_s) {
