@@ -81,6 +81,23 @@ void add_transforms(std::map<std::string, TransformTree>& trees, std::set<std::s
   }
 }
 
+/// A namespace with odometry is a robot's, but not where it has no sensor, no transforms and no frames of its own and
+/// others have sensors: then it is one more odometry of a robot, as "/wheel/odom".
+void add_robots(BagInfo& out) {
+  std::set<std::string> with_more;
+  bool has_sensors = false;
+  for (const TopicInfo& topic : out.topics) {
+    const bool is_sensor = topic.use == Use::scans || topic.use == Use::images;
+    has_sensors = has_sensors || is_sensor;
+    if (is_sensor || topic.use == Use::transforms) with_more.insert(namespace_of(topic.topic));
+  }
+  for (const TopicInfo& topic : out.topics) {
+    const std::string of = namespace_of(topic.topic);
+    if (topic.use == Use::odometry && (!has_sensors || with_more.contains(of) || namespace_of(topic.frames) == of))
+      out.robots.insert(of);
+  }
+}
+
 void take_trees(const std::map<std::string, TransformTree>& trees, BagInfo& out) {
   for (const auto& [of, tree] : trees) {
     for (const auto& [problem, count] : tree.problems())
@@ -193,9 +210,9 @@ BagInfo inspect(BagReader& bag) {
   if (const auto stated = bag.stated_messages(); stated && *stated != out.messages)
     out.notes.push_back(fmt::format("its statistics say {} messages, {} could be read", *stated, out.messages));
   for (auto& [name, topic] : topics) {
-    if (topic.use == Use::odometry) out.robots.insert(namespace_of(topic.topic));
     out.topics.push_back(std::move(topic));
   }
+  add_robots(out);
   out.robots.erase("");
   take_trees(trees, out);
   return out;

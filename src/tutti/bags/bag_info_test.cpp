@@ -140,6 +140,19 @@ TEST(BagInfo, FixesThatAreNoneAreOfNoUse) {
       << refused;
 }
 
+TEST(BagInfo, OneMoreOdometryOfARobotIsNoRobot) {
+  const auto robots_of = [](const std::vector<std::pair<const char*, const char*>>& topics) {
+    std::string data = kMagic + schema(1, "nav_msgs/msg/Odometry") + schema(2, "sensor_msgs/msg/PointCloud2");
+    std::uint16_t id = 0;
+    for (const auto& [topic, kind] : topics) data += channel(++id, *kind == 'o' ? 1 : 2, topic);
+    return info_of(data).robots;
+  };
+  EXPECT_EQ(robots_of({{"/odom", "o"}, {"/wheel/odom", "o"}, {"/points", "s"}}), std::set<std::string>{});
+  EXPECT_EQ(robots_of({{"/a/odom", "o"}, {"/b/odom", "o"}, {"/a/points", "s"}, {"/b/points", "s"}}),
+            (std::set<std::string>{"a", "b"}));
+  EXPECT_EQ(robots_of({{"/a/odom", "o"}, {"/b/odom", "o"}}), (std::set<std::string>{"a", "b"}));
+}
+
 TEST(BagInfo, RobotsAreNamedAndSoAreTheContradictionsOfTheirTransforms) {
   const auto transform = [](const std::string& parent, const std::string& child, double x) {
     const RosTransform out{

@@ -41,6 +41,11 @@ constexpr std::string_view kTransform =
     "a transform that is not on /tf is not read: record /tf, or nav_msgs/Odometry of the same program";
 constexpr std::string_view kPath =
     "a whole trajectory in each message is not read: record nav_msgs/Odometry of the same program";
+constexpr std::string_view kPx4 =
+    "PX4's own message (z down) is not read: MAVROS, or a node that turns it to z up, publishes nav_msgs/Odometry; "
+    "record that";
+constexpr std::string_view kFoxglove =
+    "messages of Foxglove's schemas are not read: record ROS's (nav_msgs/Odometry, sensor_msgs/PointCloud2, ..)";
 constexpr std::string_view kFix =
     "not read: gps_tools's (gps_common's) fix_translator makes sensor_msgs/NavSatFix of it";
 constexpr std::string_view kNmea = "not read: nmea_navsat_driver (nmea_topic_driver) makes sensor_msgs/NavSatFix of it";
@@ -70,6 +75,15 @@ constexpr std::array kTypes{
     NearType{"geometry_msgs/PoseWithCovarianceStamped", kPose},
     NearType{"geometry_msgs/TransformStamped", kTransform},
     NearType{"nav_msgs/Path", kPath},
+    NearType{"px4_msgs/VehicleOdometry", kPx4},
+    NearType{"foxglove.PoseInFrame", kFoxglove},
+    NearType{"foxglove.PosesInFrame", kFoxglove},
+    NearType{"foxglove.FrameTransform", kFoxglove},
+    NearType{"foxglove.FrameTransforms", kFoxglove},
+    NearType{"foxglove.PointCloud", kFoxglove},
+    NearType{"foxglove.LaserScan", kFoxglove},
+    NearType{"foxglove.RawImage", kFoxglove},
+    NearType{"foxglove.CompressedImage", kFoxglove},
     NearType{"gps_common/GPSFix", kFix},
     NearType{"gps_msgs/GPSFix", kFix},
     NearType{"nmea_msgs/", kNmea},

@@ -11,7 +11,8 @@ namespace near_types_test {
 TEST(NearTypes, HaveAWayOnByBothNames) {
   for (const char* type : {"velodyne_msgs/msg/VelodyneScan", "velodyne_msgs/VelodyneScan", "sensor_msgs/msg/LaserScan",
                            "geometry_msgs/msg/PoseWithCovarianceStamped", "ouster_sensor_msgs/msg/PacketMsg",
-                           "sensor_msgs/msg/PointCloud", "livox_interfaces/msg/CustomMsg", "nmea_msgs/msg/Sentence"})
+                           "sensor_msgs/msg/PointCloud", "livox_interfaces/msg/CustomMsg",
+                           "px4_msgs/msg/VehicleOdometry", "foxglove.PointCloud", "nmea_msgs/msg/Sentence"})
     EXPECT_FALSE(way_on(type).empty()) << type;
   EXPECT_TRUE(way_on("std_msgs/msg/String").empty());
   EXPECT_TRUE(way_on("").empty());
