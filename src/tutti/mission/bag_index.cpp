@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "tutti/bags/camera.hpp"
@@ -335,7 +336,8 @@ BagIndex index_bag(bags::BagReader& bag, const std::string& pair, bool with_imag
     if (use == bags::Use::poses) index.poses[channel->topic];
     if (use == bags::Use::scans) index.scans[channel->topic];
     const std::string_view type = channel->type, way = bags::way_on(type);
-    const bool is_pose = type.starts_with("geometry_msgs/") || type.starts_with("nav_msgs/");
+    constexpr std::array kOfPoses{"geometry_msgs/", "nav_msgs/", "px4_msgs/", "foxglove.Pose", "foxglove.Frame"};
+    const bool is_pose = std::ranges::any_of(kOfPoses, [&](const char* begin) { return type.starts_with(begin); });
     if (!way.empty())
       (is_pose ? index.near_odometry : index.near_scans) +=
           fmt::format("; near: {} ({}): {}", channel->topic, type, way);

@@ -96,6 +96,17 @@ std::string other_frames(const BagIndex& index, const RobotConfig& robot) {
                      moving.size() == 1 ? "s" : "", robot.name, moving.front().second);
 }
 
+/// "; or are they robots of their own? .." of odometry in several namespaces.
+std::string as_robots(const BagIndex& index, const RobotConfig& robot) {
+  std::set<std::string> names;
+  for (const auto& [topic, track] : index.odometry)
+    if (has_any(track)) names.insert(bags::namespace_of(topic));
+  names.erase("");
+  std::string out;
+  for (const std::string& name : names) out += fmt::format(" --bag {}={}", name, robot.bag);
+  return names.size() < 2 ? "" : "; or are they robots of their own? tutti run" + out;
+}
+
 /// The track with its name, of the three kinds the first that has one.
 Result<const std::pair<const std::string, OdometryTrack>*> choose_odometry(const BagIndex& index,
                                                                            const RobotConfig& robot) {
@@ -106,7 +117,8 @@ Result<const std::pair<const std::string, OdometryTrack>*> choose_odometry(const
   }
   if (index.poses.contains(wanted)) return choose(index.poses, wanted, "odometry", robot);
   auto found = choose(index.odometry, wanted, "odometry", robot);
-  if (!found || *found != nullptr) return found;
+  if (!found) return fail(found.error().code, "{}{}", found.error().message, as_robots(index, robot));
+  if (*found != nullptr) return found;
   found = choose(index.transforms, "", "odometry", robot);
   if (!found || *found != nullptr) return found;
   found = choose(index.poses, "", "odometry", robot);

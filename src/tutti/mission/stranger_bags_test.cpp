@@ -97,6 +97,9 @@ TEST_F(StrangerBags, TwoRobotsInOneAreDistinguishedByTheirNamespaces) {
       expect_note(bag, fmt::format("topics of {} are used: the bag has robots alpha, bravo", robot.topics));
     }
     EXPECT_NE(read("charlie").error().message.find("--topic charlie.odometry=/alpha/odom"), std::string::npos);
+    expect_note(
+        read("charlie"),
+        fmt::format("; or are they robots of their own? tutti run --bag alpha={0} --bag bravo={0}", file_.string()));
     RobotConfig renamed;
     renamed.name = "charlie";
     renamed.topics.odometry = "/bravo/odom";  // the rest follows
