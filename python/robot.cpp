@@ -24,7 +24,7 @@ void add_odometry(Agent& agent, double stamp, const ArrayLike& T_odom_body, cons
   const Timestamp at = to_stamp(stamp, "stamp");
   const Pose3 T = to_pose(T_odom_body, "T_odom_body");
   const Matrix6d of_step = to_matrix6(covariance, "covariance");
-  check(agent.call([&](RobotAgent& a) { return a.add_odometry(at, T, of_step); }));
+  check(agent.call([&](RobotAgent& a) { return a.add(OdometrySample{at, T, of_step}); }));
 }
 
 void add_scan(Agent& agent, double stamp, const ArrayLike& points, const std::optional<ArrayLike>& age_s) {
@@ -46,7 +46,7 @@ void add_scan(Agent& agent, double stamp, const ArrayLike& points, const std::op
   } else {
     scan.cloud = std::make_shared<const PointCloud>(to_cloud(points, "points"));
   }
-  check(agent.call([&](RobotAgent& a) { return a.add_scan(scan); }));
+  check(agent.call([&](RobotAgent& a) { return a.add(scan); }));
 }
 
 std::vector<py::bytes> take_outgoing(Agent& agent) {

@@ -38,8 +38,8 @@ SmallMission make_mission() {
     robot::RobotAgent agent(recording.robot, 0, {});
     for (std::size_t i = 0; i < recording.odometry.size(); ++i)
       EXPECT_TRUE(agent
-                      .add_odometry(recording.odometry[i].stamp, recording.odometry[i].pose,
-                                    i == 0 ? Matrix6d(Matrix6d::Zero()) : recording.increment_covariance[i - 1])
+                      .add(OdometrySample{recording.odometry[i].stamp, recording.odometry[i].pose,
+                                          i == 0 ? Matrix6d(Matrix6d::Zero()) : recording.increment_covariance[i - 1]})
                       .has_value());
     agent.finish();
     for (const SubmapMessage& message : agent.take_outgoing()) out.uploads.push_back(wire::encode(message));

@@ -305,9 +305,9 @@ class Mission {
       return carry_out(robot, step.messages.empty() ? input : "end of a submap", step);
     };
     if (robot.node->agent().newest_sample() != at.stamp &&
-        !take("sample", robot.node->add_odometry({at.stamp, at.pose, covariance}, now_)))
+        !take("sample", robot.node->add(OdometrySample{at.stamp, at.pose, covariance}, now_)))
       return false;
-    if (robot.node->agent().wants_scan() && !take("scan", robot.node->add_scan(scan(r, at.stamp), now_))) return false;
+    if (robot.node->agent().wants_scan() && !take("scan", robot.node->add(scan(r, at.stamp), now_))) return false;
     return i + 1 < recording.odometry.size() || take("sample", robot.node->finish(now_));
   }
 

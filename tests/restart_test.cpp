@@ -30,11 +30,11 @@ struct Walker {
   void walk_until(double time_s) {
     const Trajectory& odometry = recording->odometry;
     for (; next < odometry.size() && odometry[next].stamp - Timestamp{} < time_s; ++next)
-      ASSERT_TRUE(
-          agent
-              .add_odometry(odometry[next].stamp, odometry[first].pose.inverse() * odometry[next].pose,
-                            next == first ? Matrix6d(Matrix6d::Zero()) : recording->increment_covariance[next - 1])
-              .has_value());
+      ASSERT_TRUE(agent
+                      .add(OdometrySample{
+                          odometry[next].stamp, odometry[first].pose.inverse() * odometry[next].pose,
+                          next == first ? Matrix6d(Matrix6d::Zero()) : recording->increment_covariance[next - 1]})
+                      .has_value());
   }
   void lose_state() {
     agent = robot::RobotAgent(recording->robot, kSecondSession, {});

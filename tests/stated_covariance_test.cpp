@@ -46,7 +46,7 @@ void drive(robot::RobotAgent& agent, double sigma_m, double sigma_rad, double ot
       T_odom_body =
           retract(T_odom_body * (on_circle(i - 1).inverse() * on_circle(i)), Vector6d(x, y, 0.0, 0.0, 0.0, yaw));
     }
-    ASSERT_TRUE(agent.add_odometry(at(i), T_odom_body, covariance));
+    ASSERT_TRUE(agent.add(OdometrySample{at(i), T_odom_body, covariance}));
   }
   agent.finish();
 }

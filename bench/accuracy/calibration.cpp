@@ -95,9 +95,9 @@ class Speaker {
     const Recording& recording = robot_.recording;
     for (; !done() && start_s() <= time_s; ++next_) {
       const Matrix6d covariance = next_ == 0 ? Matrix6d(Matrix6d::Zero()) : recording.increment_covariance[next_ - 1];
-      (void)agent_.add_odometry(recording.odometry[next_].stamp, recording.odometry[next_].pose, covariance);
+      (void)agent_.add(OdometrySample{recording.odometry[next_].stamp, recording.odometry[next_].pose, covariance});
       if (recording.scans && agent_.wants_scan())
-        if (const auto scan = recording.scans->scan(next_); scan && *scan) (void)agent_.add_scan(**scan);
+        if (const auto scan = recording.scans->scan(next_); scan && *scan) (void)agent_.add(**scan);
       if (next_ + 1 == recording.odometry.size()) agent_.finish();
     }
     return agent_.take_outgoing();

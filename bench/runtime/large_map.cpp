@@ -102,8 +102,8 @@ std::vector<Submap> write_submaps(const mission::MissionInput& input, const robo
     robot::SubmapBuilder builder({recording.robot, 1}, config);
     for (std::size_t i = 0; i < recording.odometry.size() && all.size() < most; ++i) {
       const StampedPose& sample = recording.odometry[i];
-      static_cast<void>(builder.add_odometry(sample.stamp, sample.pose,
-                                             i == 0 ? Matrix6d::Zero().eval() : recording.increment_covariance[i - 1]));
+      static_cast<void>(builder.add(OdometrySample{
+          sample.stamp, sample.pose, i == 0 ? Matrix6d::Zero().eval() : recording.increment_covariance[i - 1]}));
       for (auto submap = builder.take_submap(); submap && all.size() < most; submap = builder.take_submap()) {
         all.push_back(*submap);
         submap->cloud = any_cloud(rng, points);

@@ -60,11 +60,11 @@ std::vector<Seen> walk_one(const Recording& recording, const robot::SubmapConfig
   for (std::size_t k = 0; k < odometry.size(); ++k) {
     if (until_s > 0.0 && odometry[k].stamp - odometry.front().stamp > until_s) break;
     const Matrix6d covariance = k > 0 ? recording.increment_covariance[k - 1] : Matrix6d(Matrix6d::Zero());
-    value_or_exit(builder.add_odometry(odometry[k].stamp, odometry[k].pose, covariance));
+    value_or_exit(builder.add(OdometrySample{odometry[k].stamp, odometry[k].pose, covariance}));
     keep(builder.take_submap());
     if (!builder.wants_scan()) continue;
     if (const auto scan = value_or_exit(recording.scans->scan(k)))
-      if (const auto ok = builder.add_scan(*scan); !ok) fmt::print(stderr, "{}\n", ok.error().message);
+      if (const auto ok = builder.add(*scan); !ok) fmt::print(stderr, "{}\n", ok.error().message);
   }
   builder.finish();
   keep(builder.take_submap());

@@ -106,7 +106,7 @@ int main(int argc, char** argv) {
       T_odom_body = retract(T_odom_body * step, noise);
     }
     const double begin = cpu_ms();
-    const node::Step step = node->add_odometry({stamp, T_odom_body, covariance}, now);
+    const node::Step step = node->add(OdometrySample{stamp, T_odom_body, covariance}, now);
     day.back().sample_ms.push_back(cpu_ms() - begin);
     // The server has every submap at once.
     for (const bus::Envelope& message : step.messages) {

@@ -84,12 +84,12 @@ std::multimap<Timestamp, bus::Envelope> submaps_of(const mission::MissionInput& 
     };
     for (std::size_t i = 0; i < recording.odometry.size(); ++i) {
       const StampedPose& sample = recording.odometry[i];
-      static_cast<void>(builder.add_odometry(sample.stamp, sample.pose,
-                                             i == 0 ? Matrix6d::Zero().eval() : recording.increment_covariance[i - 1]));
+      static_cast<void>(builder.add(OdometrySample{
+          sample.stamp, sample.pose, i == 0 ? Matrix6d::Zero().eval() : recording.increment_covariance[i - 1]}));
       if (recording.visual) {
         const bool keyframe = builder.wants_scan();
         const TrackedImages images = recording.visual->images(i, keyframe);  // every one is tracked
-        if (keyframe && !images.images.empty()) static_cast<void>(builder.add_images(images));
+        if (keyframe && !images.images.empty()) static_cast<void>(builder.add(images));
       }
       take();
     }

@@ -82,7 +82,7 @@ int main() {
     for (std::uint32_t r = 0; r < 2; ++r) {
       if (step > 0) T_odom_body[r] = T_odom_body[r] * truth({r}, now - kStep_s).inverse() * truth({r}, now) * too_much;
       odometry[r].push_back({Timestamp{} + now, T_odom_body[r]});
-      if (const auto ok = robots[r].add_odometry(Timestamp{} + now, T_odom_body[r], covariance); !ok)
+      if (const auto ok = robots[r].add(OdometrySample{Timestamp{} + now, T_odom_body[r], covariance}); !ok)
         return std::fprintf(stderr, "%s\n", ok.error().message.c_str()), 1;
       if (step == kSteps) robots[r].finish();
       for (const SubmapMessage& submap : robots[r].take_outgoing()) to_server.push_back(wire::encode(submap));

@@ -44,9 +44,9 @@ std::string agent_state(bool corrected) {
   robot::RobotAgent agent(RobotId{1}, 7, {});
   const Trajectory odometry = robot::test::drifting_odometry(30);
   for (std::size_t i = 0; i < odometry.size(); ++i) {
-    static_cast<void>(agent.add_odometry(odometry[i].stamp, odometry[i].pose, robot::test::kStepCovariance));
+    static_cast<void>(agent.add(OdometrySample{odometry[i].stamp, odometry[i].pose, robot::test::kStepCovariance}));
     PointCloud cloud{{{1.0F, 2.0F, 3.0F}, {4.0F, 5.0F, 6.0F}}};
-    static_cast<void>(agent.add_scan({odometry[i].stamp, std::make_shared<const PointCloud>(cloud), {}}));
+    static_cast<void>(agent.add(Scan{odometry[i].stamp, std::make_shared<const PointCloud>(cloud), {}}));
   }
   if (corrected) agent.receive(robot::test::broadcast(agent, 1, robot::test::kWorld));
   return wire::encode(agent.state());
@@ -182,7 +182,7 @@ std::map<std::string, std::vector<std::string>> seeds() {
   const Scan scan{{5},
                   std::make_shared<const PointCloud>(PointCloud{{{1, 2, 3}, {4, 5, 6}}}),
                   std::make_shared<const std::vector<float>>(2, 0.1F)};
-  out["journal"] = {node::encode(node::OdometrySample{.stamp = {5}}), node::encode(scan),
+  out["journal"] = {node::encode(OdometrySample{.stamp = {5}}), node::encode(scan),
                     node::encode(node::HeardGraph{"frame"})};
 
   // hello, odometry, scan, end, images, imu, time, fix, and of a newer protocol (proto/tutti/v1/feed.proto)

@@ -117,12 +117,11 @@ void feed_message(std::string_view bytes) {
   const auto message = program::decode_from_client(bytes);
   if (!message) return;
   if (const auto* hello = std::get_if<program::FeedHello>(&*message); hello != nullptr && hello->sensors)
-    TUTTI_CHECK(intake::check_sensors(*hello->sensors), "sensors that cannot be");
-  intake::FeedSensors eye;
+    TUTTI_CHECK(check_sensors(*hello->sensors), "sensors that cannot be");
+  Sensors eye;
   eye.cameras.resize(1);
   eye.cameras[0].model = {.width_px = 2, .height_px = 2, .fx = 1.0, .fy = 1.0};
-  if (const auto* images = std::get_if<intake::FedImages>(&*message))
-    static_cast<void>(intake::check_images(*images, eye));
+  if (const auto* images = sample_in<EncodedImages>(*message)) static_cast<void>(check_images(*images, eye));
 }
 
 /// Whatever it is: an error or a value.

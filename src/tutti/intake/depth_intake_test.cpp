@@ -30,7 +30,7 @@ TEST(DepthIntake, DepthIsNeverACameraAndIsFedBesideIt) {
   EXPECT_EQ(robot.add(0, depth_image(kStart)), "");
   EXPECT_TRUE(robot.sensors().cameras.empty());  // the other has sent nothing
   EXPECT_EQ(robot.add(1, grey_image(kStart)), "");
-  const FeedSensors sensors = robot.sensors();
+  const Sensors sensors = robot.sensors();
   ASSERT_EQ(sensors.cameras.size(), 1U);
   ASSERT_TRUE(sensors.depth);
   EXPECT_EQ(sensors.depth->unit_m, 0.001);

@@ -262,7 +262,7 @@ Result<bool> ImagesIntake::choose(bool is_late) {
   return true;
 }
 
-void ImagesIntake::describe(FeedSensors& sensors) const {
+void ImagesIntake::describe(Sensors& sensors) const {
   std::vector<Camera> cameras;
   for (const std::size_t i : cameras_) {
     auto placed = place(topics_[i]);
@@ -344,8 +344,8 @@ Result<std::optional<EncodedImage>> ImagesIntake::depth_of(Timestamp instant) {
   return in_context(fmt::format("{}: depth at {} ns", of.topics.images, wrong.ns), depth.error());
 }
 
-Result<std::optional<FedImages>> ImagesIntake::next_images(Timestamp stamp, bool is_last) {
-  const std::optional<FedImages> none;
+Result<std::optional<EncodedImages>> ImagesIntake::next_images(Timestamp stamp, bool is_last) {
+  const std::optional<EncodedImages> none;
   if (!is_chosen()) return none;
   OneTopic& camera = topics_[cameras_.front()];
   while (!camera.waiting.empty() && odometry_.is_before_all(camera.waiting.front().stamp)) camera.pop();
@@ -365,7 +365,7 @@ Result<std::optional<FedImages>> ImagesIntake::next_images(Timestamp stamp, bool
   std::optional<EncodedImage> other = second_of(instant);
   auto depth = depth_of(instant);
   if (!depth) return tl::unexpected(depth.error());
-  FedImages out{.stamp = instant, .images = {}, .depth = std::move(*depth)};
+  EncodedImages out{.stamp = instant, .images = {}, .depth = std::move(*depth)};
   out.images.push_back(camera.pop().image);
   if (!other) return std::optional(std::move(out));
   other->camera = 1;

@@ -14,8 +14,8 @@
 #include "tutti/bags/ros_messages.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/intake/camera_topics.hpp"
-#include "tutti/intake/feed_sensors.hpp"
 #include "tutti/intake/ros_intake.hpp"
+#include "tutti/model/sensors.hpp"
 #include "tutti/model/visual.hpp"
 
 namespace tutti::intake {
@@ -58,7 +58,7 @@ class ImagesIntake {
   [[nodiscard]] const std::string& note() const { return note_; }
 
   /// Fills in the cameras and their depth, once they are chosen, and the IMU once its place is known.
-  void describe(FeedSensors& sensors) const;
+  void describe(Sensors& sensors) const;
   /// What is being waited for: "/a/camera_info: no sensor_msgs/CameraInfo"; empty when there is everything.
   [[nodiscard]] std::string missing() const;
   /// The calibration of this topic's camera is known.
@@ -71,7 +71,7 @@ class ImagesIntake {
   /// The next images that odometry up to `stamp` covers, of both cameras if the second's come in time; nothing when
   /// there are none; an error for images that come too late. With `is_last` nothing more comes. After describe() has
   /// filled in cameras.
-  Result<std::optional<FedImages>> next_images(Timestamp stamp, bool is_last = false);
+  Result<std::optional<EncodedImages>> next_images(Timestamp stamp, bool is_last = false);
   /// Drops images that are too late when odometry is at `stamp`.
   void drop_late(Timestamp stamp);
   /// The IMU samples that the robot takes when odometry is at `stamp`, in the body frame, at most as many as fit a

@@ -29,7 +29,7 @@ TEST(ImagesIntake, CamerasAndImuAreKnownOnceCalibrationAndPlaceAre) {
   EXPECT_FALSE(robot.sensors().imu);
   robot.place();
   EXPECT_EQ(robot.images.missing(), "");
-  const FeedSensors sensors = robot.sensors();
+  const Sensors sensors = robot.sensors();
   ASSERT_EQ(sensors.cameras.size(), 1U);
   EXPECT_EQ(sensors.cameras[0].T_body_camera, kBodyCamera);
   EXPECT_EQ(sensors.cameras[0].model.fx, 3.0);

@@ -226,7 +226,7 @@ Status RosIntake::take_points(std::string_view bytes, std::string_view type, Enc
   return {};
 }
 
-std::optional<node::OdometrySample> RosIntake::next_odometry(bool wait_for_scans) {
+std::optional<OdometrySample> RosIntake::next_odometry(bool wait_for_scans) {
   if (samples_.empty()) return std::nullopt;
   if (waits_for_place()) return std::nullopt;
   const StampedPose sample = samples_.front();
@@ -237,7 +237,7 @@ std::optional<node::OdometrySample> RosIntake::next_odometry(bool wait_for_scans
     history_.clear();
     has_whole_history_ = true;
   }
-  node::OdometrySample out{sample.stamp, sample.pose, Matrix6d::Zero()};
+  OdometrySample out{sample.stamp, sample.pose, Matrix6d::Zero()};
   if (last_) out.increment_covariance = robot::increment_covariances({*last_, sample}, config_.covariance).front();
   if (std::exchange(unseen_, false)) out.increment_covariance = unseen();
   last_ = sample;

@@ -19,9 +19,8 @@
 #include "tutti/base/result.hpp"
 #include "tutti/formats/pcd.hpp"
 #include "tutti/intake/missed_count.hpp"
-#include "tutti/model/point_cloud.hpp"
+#include "tutti/model/input.hpp"
 #include "tutti/model/trajectory.hpp"
-#include "tutti/node/journal.hpp"
 #include "tutti/perception/lidar/scan_times.hpp"
 #include "tutti/robot/odometry_covariance.hpp"
 #include "tutti/robot/stamp_watch.hpp"
@@ -85,7 +84,7 @@ class RosIntake {
   /// The next odometry sample to feed, in order of arrival. With `wait_for_scans` it is held back until a scan with its
   /// stamp or a later one has arrived. Also held back, for kHold_s of odometry's time once, while the first scans wait
   /// for the transform that places the LiDAR, as who publishes it may be heard later.
-  std::optional<node::OdometrySample> next_odometry(bool wait_for_scans);
+  std::optional<OdometrySample> next_odometry(bool wait_for_scans);
   /// The next scan that can be fed, because the motion up to the newest sample that next_odometry() returned covers its
   /// sweep. Nothing when none is due; an error when the scan is left out. When the scan is not wanted it is skipped,
   /// which costs nothing.

@@ -18,7 +18,7 @@ std::string why(const Status& status) { return status ? "" : status.error().mess
 
 /// All that is ready, one after the other as the robot gets it.
 struct Fed {
-  std::vector<node::OdometrySample> samples;
+  std::vector<OdometrySample> samples;
   std::vector<Scan> scans;
   std::vector<std::string> errors;
 };
@@ -371,7 +371,7 @@ TEST(RosIntake, AClockThatGoesBackIsFedAsTheRobotIsToSeeIt) {
       static_cast<void>(intake.add_odometry(odometry(i * kPeriod, 0.1 * i)));
       static_cast<void>(intake.add_points(points(i * kPeriod, kAtOnce)));
       const Fed now = feed(intake);
-      for (const node::OdometrySample& sample : now.samples) {
+      for (const OdometrySample& sample : now.samples) {
         const auto passed = robot.take(sample);
         taken += passed ? 1 : 0;
         anew += passed && !passed->why_anew.empty() ? 1 : 0;

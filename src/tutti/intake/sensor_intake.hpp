@@ -6,16 +6,14 @@
 #include <string>
 #include <string_view>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include "tutti/bags/ros_types.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/intake/camera_topics.hpp"
-#include "tutti/intake/feed_sensors.hpp"
 #include "tutti/intake/images_intake.hpp"
 #include "tutti/intake/ros_intake.hpp"
-#include "tutti/model/status.hpp"
+#include "tutti/model/input.hpp"
 
 namespace tutti::intake {
 
@@ -26,9 +24,6 @@ struct RawMessage {
   std::string_view encoding;  ///< As bags have it: "cdr", "ros1".
   std::string_view bytes;
 };
-
-/// An input of a robot.
-using Input = std::variant<node::OdometrySample, Scan, FedImages, std::vector<ImuSample>, PositionFix, Health>;
 
 /// How a robot's messages are read.
 struct SensorConfig {
@@ -74,7 +69,7 @@ class SensorIntake {
   }
 
   /// Cameras, depth and IMU, as far as they are known.
-  [[nodiscard]] const FeedSensors& sensors() const { return sensors_; }
+  [[nodiscard]] const Sensors& sensors() const { return sensors_; }
   /// Why no images, depth or IMU are used; empty while nothing is missing.
   [[nodiscard]] const std::string& missing() const { return missing_; }
   /// How messages are read, reported once after each change: points' times, places of antennas, cameras.
@@ -104,7 +99,7 @@ class SensorIntake {
   std::optional<Timestamp> fed_;                   ///< Odometry's newest that next() returned.
   std::optional<Timestamp> first_image_, looked_;  ///< By odometry's time.
   bool is_last_ = false, holds_for_scans_ = false, holds_for_images_ = false;
-  FeedSensors sensors_;
+  Sensors sensors_;
   std::string missing_;
   std::vector<std::string> notes_;
 };

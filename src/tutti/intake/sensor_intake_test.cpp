@@ -19,11 +19,12 @@ constexpr const char *kOdometry = "nav_msgs/msg/Odometry", *kTf = "tf2_msgs/msg/
 struct Letters {
   std::string out;
   std::vector<std::string> errors;
-  std::vector<node::OdometrySample> samples;
-  std::vector<FedImages> images;
-  void operator()(const node::OdometrySample& sample) { out += 'o', samples.push_back(sample); }
+  std::vector<OdometrySample> samples;
+  std::vector<EncodedImages> images;
+  void operator()(const OdometrySample& sample) { out += 'o', samples.push_back(sample); }
   void operator()(const Scan&) { out += 's'; }
-  void operator()(const FedImages& images_then) { out += 'p', images.push_back(images_then); }
+  void operator()(const EncodedImages& images_then) { out += 'p', images.push_back(images_then); }
+  void operator()(const TrackedImages&) { out += 't'; }
   void operator()(const std::vector<ImuSample>&) { out += 'i'; }
   void operator()(const PositionFix&) { out += 'f'; }
   void operator()(const Health&) { out += 'h'; }
@@ -216,7 +217,7 @@ TEST_F(SensorIntakeTest, OdometryThatIsSentAgainShowsHowTheBodyMoved) {
   other.odometry().begin_behind(Timestamp{kStart});
   EXPECT_TRUE(other.add({"odom", kOdometry, "cdr", odometry(kStart + kPeriod)}));
   const auto first = other.next(true).value();
-  EXPECT_EQ(std::get<node::OdometrySample>(*first).increment_covariance(0, 0), 1.0);
+  EXPECT_EQ(std::get<OdometrySample>(*first).increment_covariance(0, 0), 1.0);
 }
 
 TEST(NamedTopics, AreThoseOfOneCameraOrTwo) {

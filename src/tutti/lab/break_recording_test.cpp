@@ -42,11 +42,11 @@ std::map<std::string, fit::Misfit> said_of(const std::vector<MistakeConfig>& mis
   for (std::size_t k = 0; k < recording.odometry.size(); ++k) {
     const auto& [stamp, pose] = recording.odometry[k];
     const Matrix6d covariance = k == 0 ? Matrix6d(Matrix6d::Zero()) : recording.increment_covariance[k - 1];
-    static_cast<void>(agent.add_odometry(stamp, pose, covariance));
+    static_cast<void>(agent.add(OdometrySample{stamp, pose, covariance}));
     for (auto at = stamp_at(recording, recording.scan_stamps, next_scan); at && *at <= stamp;
          at = stamp_at(recording, recording.scan_stamps, ++next_scan)) {
       if (!agent.wants_scan(*at)) continue;
-      if (const auto scan = recording.scans->scan(next_scan); scan && *scan) static_cast<void>(agent.add_scan(**scan));
+      if (const auto scan = recording.scans->scan(next_scan); scan && *scan) static_cast<void>(agent.add(**scan));
     }
     collect();
   }

@@ -85,7 +85,7 @@ Submaps replayed(simulation::FlownRecording flown) {
 /// A robot with a feed, and its client.
 class Fed {
  public:
-  explicit Fed(const intake::FeedSensors& sensors) {
+  explicit Fed(const Sensors& sensors) {
     const auto open = [this] {
       return std::make_unique<LiveRobot>(
           std::move(node::RobotNode::open(RobotId{0}, 7, {.agent = agent()}, store_).value()));
@@ -140,23 +140,21 @@ class Fed {
   std::vector<std::string> refused_;
 };
 
-intake::FeedSensors sensors_of(const simulation::FlownRecording& flown) {
-  intake::FeedSensors out{
-      .scans = flown.recording.scans != nullptr, .cameras = flown.images.cameras, .depth = {}, .imu = {}};
+Sensors sensors_of(const simulation::FlownRecording& flown) {
+  Sensors out{.scans = flown.recording.scans != nullptr, .cameras = flown.images.cameras, .depth = {}, .imu = {}};
   if (flown.images.load_depth) out.depth = flown.images.depth;
   if (!flown.recording.imu.empty()) out.imu = flown.recording.imu_noise;
   return out;
 }
 
-intake::FedImages images_of(const ImageStream& stream, std::size_t instant, bool as_files) {
-  intake::FedImages out{stream.stamps[instant], {}, {}};
+EncodedImages images_of(const ImageStream& stream, std::size_t instant, bool as_files) {
+  EncodedImages out{stream.stamps[instant], {}, {}};
   for (std::uint32_t camera = 0; camera < stream.cameras.size(); ++camera) {
     const Image image = stream.load(instant, camera).value();
     out.images.push_back(
         {camera, !as_files, as_files ? formats::encode_png(image) : std::string(image.grey.begin(), image.grey.end())});
   }
-  if (stream.load_depth)
-    out.depth = intake::EncodedImage{0, false, formats::encode_depth(stream.load_depth(instant).value())};
+  if (stream.load_depth) out.depth = EncodedImage{0, false, formats::encode_depth(stream.load_depth(instant).value())};
   return out;
 }
 

@@ -27,8 +27,8 @@ constexpr int kWait_ms = 100;
 constexpr double kConnects_s = 120.0;
 constexpr std::size_t kMostInputs = 2'000, kMostBytes = 24U << 20U;  // of FeedFront::Limits less than half
 
-intake::FeedSensors sensors_of(const Recording& recording) {
-  intake::FeedSensors out{.scans = recording.scans != nullptr, .cameras = {}, .depth = {}, .imu = {}};
+Sensors sensors_of(const Recording& recording) {
+  Sensors out{.scans = recording.scans != nullptr, .cameras = {}, .depth = {}, .imu = {}};
   if (!recording.images) return out;
   out.cameras = recording.images->cameras;
   if (recording.images->load_depth) out.depth = recording.images->depth;
@@ -52,10 +52,10 @@ class Player {
   Status say_sensors(Timestamp now);
   Status say_fixes(Timestamp now, bool is_known);
   Status say_images(Timestamp now);
-  void note_said(Timestamp stamp, std::size_t bytes);
+  Status say(const Input& input, Timestamp now);
   void note_stored(const std::optional<Timestamp>& stored);
   Status wait_for_robot(const std::atomic<bool>& stop);
-  [[nodiscard]] std::optional<intake::FedImages> images(std::size_t instant, Timestamp stamp) const;
+  [[nodiscard]] std::optional<EncodedImages> images(std::size_t instant, Timestamp stamp) const;
   void score(const program::FeedTrajectory& trajectory);
 
   const FeedPlayerOptions& options_;
@@ -103,9 +103,11 @@ Status Player::hear_until(const std::atomic<bool>& stop, const IsIt& is_it) {
   return fail(ErrorCode::io, "stopped");
 }
 
-void Player::note_said(Timestamp stamp, std::size_t bytes) {
-  said_.emplace_back(stamp, bytes);
-  said_bytes_ += bytes;
+Status Player::say(const Input& input, Timestamp now) {
+  if (Status ok = client_->say(input); !ok) return ok;
+  said_.emplace_back(now, bytes_of(input));
+  said_bytes_ += said_.back().second;
+  return {};
 }
 
 void Player::note_stored(const std::optional<Timestamp>& stored) {
@@ -136,8 +138,7 @@ Status Player::say_sample(std::size_t i, const std::atomic<bool>& stop) {
   const auto& [stamp, pose] = recording.odometry[i];
   const Matrix6d covariance = i == 0 ? Matrix6d(Matrix6d::Zero()) : recording.increment_covariance[i - 1];
   if (Status ok = wait_for_robot(stop); !ok) return ok;
-  if (Status ok = client_->say(node::OdometrySample{stamp, pose, covariance}); !ok) return ok;
-  note_said(stamp, 0);
+  if (Status ok = say(OdometrySample{stamp, pose, covariance}, stamp); !ok) return ok;
   return hear_until(stop, [&](const program::FromRobot& message) {
     if (const auto* answer = std::get_if<program::FeedAnswer>(&message)) {
       wants_scan_ = answer->wants_scan;
@@ -162,11 +163,10 @@ Status Player::say_sensors(Timestamp now) {
   const auto is_due = [&] { return stamp_at(recording, recording.scan_stamps, scan_).value_or(kLastTimestamp) <= now; };
   for (; recording.scans && is_due(); ++scan_) {
     if (!wants_scan_ || is_known) continue;
-    const auto scan = recording.scans->scan(scan_);
+    auto scan = recording.scans->scan(scan_);
     if (!scan) return tl::unexpected(scan.error());
     if (!*scan) continue;
-    if (Status ok = client_->say(**scan); !ok) return ok;
-    note_said(now, (*scan)->cloud->points.size() * sizeof(Eigen::Vector3f));
+    if (Status ok = say(std::move(**scan), now); !ok) return ok;
   }
   return recording.images && !is_known ? say_images(now) : Status();
 }
@@ -177,8 +177,7 @@ Status Player::say_fixes(Timestamp now, bool is_known) {
   for (; fix_ < recording.fixes.size() && recording.fixes[fix_].stamp <= now; ++fix_) {
     const PositionFix& fix = recording.fixes[fix_];
     if (is_known || fix.stamp < recording.odometry.front().stamp) continue;
-    if (Status ok = client_->say(fix); !ok) return ok;
-    note_said(now, 0);
+    if (Status ok = say(fix, now); !ok) return ok;
   }
   return {};
 }
@@ -193,18 +192,17 @@ Status Player::say_images(Timestamp now) {
     if (stamp > (at_samples ? now + tolerance_s : now)) break;
     if (stamp + tolerance_s < robot_.recording.odometry.front().stamp) continue;
     const bool is_of_sample = at_samples && std::abs(stamp - now) <= tolerance_s;
-    const auto seen = images(images_, is_of_sample ? now : stamp);
+    auto seen = images(images_, is_of_sample ? now : stamp);
     if (!seen) continue;
-    if (Status ok = client_->say(*seen); !ok) return ok;
-    note_said(now, intake::bytes_of(*seen));
+    if (Status ok = say(std::move(*seen), now); !ok) return ok;
   }
   return {};
 }
 
 /// Without those that cannot be read: the robot finds out that there are none.
-std::optional<intake::FedImages> Player::images(std::size_t instant, Timestamp stamp) const {
+std::optional<EncodedImages> Player::images(std::size_t instant, Timestamp stamp) const {
   const ImageStream& stream = *robot_.recording.images;
-  intake::FedImages out{stamp, {}, {}};
+  EncodedImages out{stamp, {}, {}};
   for (std::uint32_t camera = 0; camera < stream.cameras.size(); ++camera) {
     const auto image = stream.load(instant, camera);
     if (!image || image->empty()) continue;
@@ -215,7 +213,7 @@ std::optional<intake::FedImages> Player::images(std::size_t instant, Timestamp s
   if (out.images.empty() || out.images.front().camera != 0) return std::nullopt;
   if (stream.load_depth)
     if (const auto depth = stream.load_depth(instant); depth && !depth->empty())
-      out.depth = intake::EncodedImage{0, false, formats::encode_depth(*depth)};
+      out.depth = EncodedImage{0, false, formats::encode_depth(*depth)};
   return out;
 }
 

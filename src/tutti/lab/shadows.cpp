@@ -30,9 +30,9 @@ Shadows::Shadows(const Recording& recording, const robot::AgentConfig& config, c
   }
 }
 
-void Shadows::add_odometry(const StampedPose& sample, const Matrix6d& covariance) {
+void Shadows::add(const OdometrySample& sample) {
   for (const Shadow& shadow : shadows_)
-    if (shadow.agent->add_odometry(sample.stamp, sample.pose, covariance)) shadow.agent->take_outgoing();
+    if (shadow.agent->add(sample)) shadow.agent->take_outgoing();
 }
 
 void Shadows::add_keyframe_time(Timestamp stamp) {

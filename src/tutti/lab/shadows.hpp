@@ -18,7 +18,7 @@ class Shadows final : public mission::Companions {
   /// `policies` are those that run beside the robot's own, config.policy.name. An unknown one throws.
   Shadows(const Recording& recording, const robot::AgentConfig& config, const std::vector<std::string>& policies,
           std::uint64_t seed);
-  void add_odometry(const StampedPose& sample, const Matrix6d& covariance) override;
+  void add(const OdometrySample& sample) override;
   void add_keyframe_time(Timestamp stamp) override;
   void receive(const ProxyGraphMessage& message, const robot::RobotAgent& own) override;
   [[nodiscard]] std::vector<std::pair<std::string, const robot::RobotAgent*>> agents() const override;

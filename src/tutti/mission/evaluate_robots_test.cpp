@@ -26,7 +26,7 @@ class EvaluateRobots : public ::testing::Test {
     for (int k = 0; k < kSamples; ++k) {
       recording_.recording.odometry.push_back({at(k), true_pose(k)});
       recording_.recording.reference.push_back({at(k), true_pose(k)});
-      ASSERT_TRUE(agent_.add_odometry(at(k), true_pose(k), covariance));
+      ASSERT_TRUE(agent_.add(OdometrySample{at(k), true_pose(k), covariance}));
     }
     agent_.finish();
     std::uint32_t index = 0;

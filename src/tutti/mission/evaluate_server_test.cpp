@@ -34,7 +34,7 @@ class EvaluateServer : public ::testing::Test {
                                {Eigen::Quaterniond::Identity(), {1.0 * k, 0, 0}}};
       run.recording.recording.odometry.push_back(sample);
       run.recording.recording.reference.push_back(sample);
-      ASSERT_TRUE(run.agent.add_odometry(sample.stamp, sample.pose, 1e-4 * Matrix6d::Identity()));
+      ASSERT_TRUE(run.agent.add(OdometrySample{sample.stamp, sample.pose, 1e-4 * Matrix6d::Identity()}));
     }
     run.agent.finish();
     for (const SubmapMessage& message : run.agent.take_outgoing())

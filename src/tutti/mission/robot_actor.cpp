@@ -83,12 +83,12 @@ double RobotActor::next_time() const {
 
 void RobotActor::replay_next(Timestamp now) {
   const Recording& recording = recording_.recording;
-  const StampedPose& sample = recording.odometry[next_];
-  const Matrix6d covariance = next_ == 0 ? Matrix6d(Matrix6d::Zero()) : recording.increment_covariance[next_ - 1];
-  if (companions_) companions_->add_odometry(sample, covariance);
+  OdometrySample sample{recording.odometry[next_].stamp, recording.odometry[next_].pose};
+  if (next_ > 0) sample.increment_covariance = recording.increment_covariance[next_ - 1];
+  if (companions_) companions_->add(sample);
   {
     const CpuScope cpu(cpu_s_);
-    take(node_->add_odometry({sample.stamp, sample.pose, covariance}, now));
+    take(node_->add(sample, now));
   }
   ++next_;
   feed_sensors(now);
@@ -118,7 +118,7 @@ void RobotActor::feed_fixes(Timestamp now) {
   for (; next_fix_ < recording.fixes.size() && recording.fixes[next_fix_].stamp <= recording.odometry[next_ - 1].stamp;
        ++next_fix_)
     if (recording.fixes[next_fix_].stamp >= recording.odometry.front().stamp)
-      take(node_->add_fix(recording.fixes[next_fix_], now));
+      take(node_->add(recording.fixes[next_fix_], now));
 }
 
 void RobotActor::feed_sensors(Timestamp now) {
@@ -154,7 +154,7 @@ void RobotActor::feed_scan(Timestamp now) {
   if (!*scan) return;
   const CpuScope cpu(cpu_s_);
   const std::size_t refused = refused_scans_.count;
-  take(node_->add_scan(**scan, now));
+  take(node_->add(**scan, now));
   if (refused == refused_scans_.count) ++taken_scans_;
 }
 
@@ -175,7 +175,7 @@ void RobotActor::feed_images(Timestamp stamp, bool keyframe, Timestamp now) {
   const CpuScope cpu(cpu_s_);
   images.imu = imu_since_keyframe(images.stamp);
   images.imu_noise = recording.imu_noise;
-  take(node_->add_images(images, now));
+  take(node_->add(std::move(images), now));
 }
 
 void RobotActor::report_refused(const std::string& why, Timestamp now) {

@@ -27,7 +27,7 @@ inline constexpr Timestamp kMissionStart{0};
 class Companions {
  public:
   virtual ~Companions() = default;
-  virtual void add_odometry(const StampedPose& sample, const Matrix6d& covariance) = 0;
+  virtual void add(const OdometrySample& sample) = 0;
   /// The robot's node has made a keyframe at a time between two samples.
   virtual void add_keyframe_time(Timestamp stamp) = 0;
   /// Called after the node has received the graph; `own` is the node's agent.

@@ -85,10 +85,10 @@ struct Robot {
       now = now + 0.2;
       const bool is_far = rng.bernoulli(0.05);  // not more often: what is taken next has to confirm it
       stamp = stamp + (is_far ? one_of(rng, {1e5, 1e9}) : one_of(rng, {1e-9, 0.01, 0.5, 2.0}));
-      done(node->add_odometry({stamp, any_extreme_pose(rng), any_extreme_covariance(rng)}, now));
+      done(node->add(OdometrySample{stamp, any_extreme_pose(rng), any_extreme_covariance(rng)}, now));
       if (node->agent().newest_sample() == stamp) ++taken;
       if (node->agent().wants_scan())
-        done(node->add_scan({stamp, std::make_shared<const PointCloud>(any_extreme_cloud(rng)), {}}, now));
+        done(node->add(Scan{stamp, std::make_shared<const PointCloud>(any_extreme_cloud(rng)), {}}, now));
       if (rng.bernoulli(0.1)) hear();
     }
   }
@@ -183,7 +183,7 @@ TEST(ExtremeInput, ASampleBeyondAllCoordinatesIsRefusedAndSaysSo) {
   for (const double far : {1.0001 * kMaxCoordinate_m, 1e300, std::numeric_limits<double>::max()}) {
     Pose3 T;
     T.translation.y() = -far;
-    const Step step = robot.node->add_odometry({robot.stamp, T, Matrix6d::Zero()}, robot.now);
+    const Step step = robot.node->add(OdometrySample{robot.stamp, T, Matrix6d::Zero()}, robot.now);
     ASSERT_EQ(step.events.size(), 1U);
     const std::string& why = std::get<SampleRefused>(step.events.front().what).why;
     EXPECT_NE(why.find("at most 1000000000 m"), std::string::npos) << why;

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "tutti/base/check.hpp"
 #include "tutti/wire/agent_state/agent_state.hpp"
 
 namespace tutti::node {
@@ -153,6 +154,10 @@ void read(Bytes& in, PositionFix& fix) {
   in.take_all(fix.p_body_antenna.data(), 3);
 }
 
+void write(const FedOnly auto& sample, std::string& /*out*/) {
+  TUTTI_CHECK(false, "{} in a journal, which has what agents take", kind_of(sample).name);
+}
+
 template <class Entry>
 Result<JournalEntry> read_entry(Bytes in) {
   Entry entry;
@@ -166,7 +171,10 @@ Result<JournalEntry> read_entry(Bytes in) {
 
 std::string encode(const JournalEntry& entry) {
   std::string out;
-  std::visit([&](const auto& what) { write(what, out); }, entry);
+  if (const auto* graph = std::get_if<HeardGraph>(&entry))
+    write(*graph, out);
+  else
+    std::visit([&](const auto& sample) { write(sample, out); }, std::get<Input>(entry));
   return out;
 }
 

@@ -29,7 +29,7 @@ Result<OdometryGate::Passed> OdometryGate::take(const OdometrySample& sample) {
 }
 
 Result<OdometryGate::Passed> OdometryGate::judge(const OdometrySample& sample) {
-  const auto usable = robot::usable_step(robot_, sample.stamp, sample.T_odom_body, sample.increment_covariance);
+  const auto usable = robot::usable_step(robot_, sample);
   if (!usable) return tl::unexpected(usable.error());
   const auto newest = watch_.newest();
   const Verdict verdict = watch_.take(sample.stamp);

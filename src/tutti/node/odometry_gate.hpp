@@ -7,7 +7,7 @@
 
 #include "tutti/base/ids.hpp"
 #include "tutti/base/result.hpp"
-#include "tutti/node/journal.hpp"
+#include "tutti/model/input.hpp"
 #include "tutti/robot/stamp_watch.hpp"
 
 namespace tutti::node {

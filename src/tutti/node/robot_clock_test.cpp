@@ -34,7 +34,7 @@ class RobotClock : public testing::TestWithParam<double> {
   }
   void add(Timestamp stamp) {
     const Pose3 T_odom_body{Eigen::Quaterniond::Identity(), {driven_s_, 0.0, 0.0}};
-    done(node_->add_odometry({stamp, T_odom_body, 1e-6 * Matrix6d::Identity()}, now_));
+    done(node_->add(OdometrySample{stamp, T_odom_body, 1e-6 * Matrix6d::Identity()}, now_));
   }
   /// By a clock that is this far off.
   void drive(double for_s, double clock_s = 0.0) {

@@ -38,8 +38,8 @@ struct Program {
   void drive(double from_s, double until_s) {
     for (double s = from_s; s < until_s; s += 0.1) {
       const Eigen::Vector3d p{s * std::cos(direction), s * std::sin(direction), 0.0};
-      take(node->add_odometry({kStart + s, {Eigen::Quaterniond::Identity(), p}, 1e-4 * Matrix6d::Identity()},
-                              Timestamp{} + s));
+      take(node->add(OdometrySample{kStart + s, {Eigen::Quaterniond::Identity(), p}, 1e-4 * Matrix6d::Identity()},
+                     Timestamp{} + s));
     }
   }
   storage::MemoryStore store;

@@ -16,6 +16,22 @@ namespace tutti::node {
 
 using namespace robot_tables;  // NOLINT
 
+namespace {
+
+/// The event of an input that the agent refuses.
+struct Refuse {
+  using What = decltype(Event::what);
+  RobotId robot;
+  std::string why;
+  What operator()(const Scan& /*scan*/) const { return ScanRefused{robot, why}; }
+  What operator()(const TrackedImages& /*images*/) const { return ImagesRefused{robot, why}; }
+  What operator()(const PositionFix& /*fix*/) const { return FixRefused{robot, why}; }
+  What operator()(const OdometrySample& /*sample*/) const { return SampleRefused{robot, why}; }
+  What operator()(const FedOnly auto& /*sample*/) const { return SampleRefused{robot, why}; }
+};
+
+}  // namespace
+
 Result<std::unique_ptr<RobotNode>> RobotNode::open(RobotId robot, std::uint64_t session, const RobotNodeConfig& config,
                                                    const storage::TableStore& store) {
   const auto stored = internal::read_stored(robot, store);
@@ -103,14 +119,11 @@ Status RobotNode::read_outbox() {
 
 /// No submap ends here: when one does, the journal goes in the same transaction.
 Status RobotNode::hear_again(const JournalEntry& entry) {
-  if (const auto* sample = std::get_if<OdometrySample>(&entry)) {
-    Status ok = agent_.add_odometry(sample->stamp, sample->T_odom_body, sample->increment_covariance);
-    agent_.take_odometry_jumps();  // reported when it came
+  if (const auto* input = std::get_if<Input>(&entry)) {
+    Status ok = agent_.add(*input);
+    agent_.take_odometry_jumps();  // reported when they came
     return ok;
   }
-  if (const auto* scan = std::get_if<Scan>(&entry)) return agent_.add_scan(*scan);
-  if (const auto* images = std::get_if<TrackedImages>(&entry)) return agent_.add_images(*images);
-  if (const auto* fix = std::get_if<PositionFix>(&entry)) return agent_.add_fix(*fix);
   const auto& heard = std::get<HeardGraph>(entry);
   const auto message = wire::decode_proxy_graph(heard.frame);
   if (!message) return tl::unexpected(message.error());
@@ -138,24 +151,33 @@ Step RobotNode::resume(Timestamp now) {
   return step;
 }
 
-Step RobotNode::add_odometry(const OdometrySample& sample, Timestamp now) {
+Step RobotNode::add(const Input& input, Timestamp now) {
   Step step;
-  const auto passed = gate_.take(sample);
-  if (!passed) {
-    step.emit(now, SampleRefused{agent_.robot(), passed.error().message});
-    return step;
+  if (const auto* scan = std::get_if<Scan>(&input); scan != nullptr && !agent_.wants_scan(scan->stamp))
+    return step;  // again, or nothing new
+  if (const auto* images = std::get_if<TrackedImages>(&input);
+      images != nullptr && images->stamp == agent_.heard_images())
+    return step;  // again
+  if (const auto* sample = std::get_if<OdometrySample>(&input)) {
+    const auto passed = gate_.take(*sample);
+    if (!passed) {
+      step.emit(now, SampleRefused{agent_.robot(), passed.error().message});
+      return step;
+    }
+    if (!passed->why_anew.empty()) step = begin_session(passed->why_anew, now);
+    if (passed->waited) hear(*passed->waited, now, step);
   }
-  if (!passed->why_anew.empty()) step = begin_session(passed->why_anew, now);
-  if (passed->waited) hear(*passed->waited, now, step);
-  hear(sample, now, step);
+  hear(input, now, step);
   return step;
 }
 
-void RobotNode::hear(const OdometrySample& sample, Timestamp now, Step& step) {
-  if (auto ok = agent_.add_odometry(sample.stamp, sample.T_odom_body, sample.increment_covariance); !ok)
-    return step.emit(now, SampleRefused{agent_.robot(), ok.error().message});
-  finished_ = false;
-  remember(sample, now, step);
+void RobotNode::hear(const Input& input, Timestamp now, Step& step) {
+  if (auto ok = agent_.add(input); !ok) {
+    const auto refuse = Refuse{agent_.robot(), ok.error().message};
+    return step.emit(now, std::visit(refuse, input));
+  }
+  if (std::holds_alternative<OdometrySample>(input)) finished_ = false;
+  remember(input, now, step);
   settle(now, step);
 }
 
@@ -163,39 +185,6 @@ void RobotNode::expect_sensors(bool scans, bool images) {
   config_.agent.submap.has_scans = scans;
   config_.agent.submap.has_images = images;
   agent_.expect_sensors(scans, images);
-}
-
-Step RobotNode::add_scan(const Scan& scan, Timestamp now) {
-  Step step;
-  if (!agent_.wants_scan(scan.stamp)) return step;  // again, or nothing new
-  if (auto ok = agent_.add_scan(scan); !ok) {
-    step.emit(now, ScanRefused{agent_.robot(), ok.error().message});
-    return step;
-  }
-  remember(scan, now, step);
-  settle(now, step);
-  return step;
-}
-
-Step RobotNode::add_images(const TrackedImages& images, Timestamp now) {
-  Step step;
-  if (images.stamp == agent_.heard_images()) return step;  // again
-  if (auto ok = agent_.add_images(images); !ok) {
-    step.emit(now, ImagesRefused{agent_.robot(), ok.error().message});
-    return step;
-  }
-  remember(images, now, step);
-  settle(now, step);
-  return step;
-}
-
-Step RobotNode::add_fix(const PositionFix& fix, Timestamp now) {
-  Step step;
-  if (auto ok = agent_.add_fix(fix); !ok)
-    step.emit(now, FixRefused{agent_.robot(), ok.error().message});
-  else
-    remember(fix, now, step);
-  return step;
 }
 
 void RobotNode::settle(Timestamp now, Step& step) {

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "tutti/model/input.hpp"
 #include "tutti/model/status.hpp"
 #include "tutti/node/journal.hpp"
 #include "tutti/node/odometry_gate.hpp"
@@ -59,13 +60,10 @@ class RobotNode {
   Step resume(Timestamp now);
   /// RobotAgent::expect_sensors(); not stored, so call it after every start.
   void expect_sensors(bool scans, bool images);
-  /// As the functions of RobotAgent with these names; what the agent refuses is reported as an event. Data that come
-  /// again, as after a restart, are refused or change nothing. Odometry passes an OdometryGate: where its clock begins
-  /// anew, so does the robot (begin_session()).
-  Step add_odometry(const OdometrySample& sample, Timestamp now);
-  Step add_scan(const Scan& scan, Timestamp now);
-  Step add_images(const TrackedImages& images, Timestamp now);
-  Step add_fix(const PositionFix& fix, Timestamp now);
+  /// RobotAgent::add(); what the agent refuses is reported as an event. Data that come again, as after a restart, are
+  /// refused or change nothing. Odometry passes an OdometryGate: where its clock begins anew, so does the robot
+  /// (begin_session()).
+  Step add(const Input& input, Timestamp now);
   Step finish(Timestamp now);
   /// Ends the last submap, and begins a session after all earlier ones, in a chain of its own. The outbox is kept.
   /// `why` is for people.
@@ -114,7 +112,8 @@ class RobotNode {
   Status set_aside(const wire::StateRows& checkpoint, std::uint64_t session);
   Status hear_again(const JournalEntry& entry);
   Status read_outbox();
-  void hear(const OdometrySample& sample, Timestamp now, Step& step);
+  /// What has passed the gate, or needs not.
+  void hear(const Input& input, Timestamp now, Step& step);
   void remember(const JournalEntry& entry, Timestamp now, Step& step);
   void write_journal(Step& step);
   /// Takes the submaps that have ended, after which the journal can be dropped.

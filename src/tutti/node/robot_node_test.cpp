@@ -46,11 +46,11 @@ class RobotNodeTest : public testing::Test {
     for (int i = from; i < to; ++i) {
       now_ = std::max(now_, Timestamp{} + (odometry_[i].stamp - odometry_[0].stamp));
       if (node_->next_timer() && *node_->next_timer() <= now_) done(node_->on_timer(now_));
-      done(node_->add_odometry({odometry_[i].stamp, odometry_[i].pose, robot::test::kStepCovariance}, now_));
+      done(node_->add(OdometrySample{odometry_[i].stamp, odometry_[i].pose, robot::test::kStepCovariance}, now_));
       if (!node_->agent().wants_scan()) continue;
       PointCloud cloud;
       cloud.points.emplace_back(1.0F * static_cast<float>(i), 5.0F, 1.0F);
-      done(node_->add_scan({odometry_[i].stamp, std::make_shared<const PointCloud>(cloud), {}}, now_));
+      done(node_->add(Scan{odometry_[i].stamp, std::make_shared<const PointCloud>(cloud), {}}, now_));
     }
   }
   Step hear(std::uint64_t revision) {
@@ -321,8 +321,8 @@ TEST_F(RobotNodeTest, RefusesWhatIsNotForIt) {
                            done(node_->receive(from_server(MessageKind::receipt, "garbage"), now_)),
                            done(node_->receive(from_server(MessageKind::proxy_graph, "garbage"), now_)),
                            done(node_->receive(from_server(MessageKind::job, "garbage"), now_)),
-                           done(node_->add_odometry({odometry_[3].stamp, {}, {}}, now_)),
-                           done(node_->add_scan({odometry_[3].stamp, std::make_shared<PointCloud>(), {}}, now_))})
+                           done(node_->add(OdometrySample{odometry_[3].stamp, {}, {}}, now_)),
+                           done(node_->add(Scan{odometry_[3].stamp, std::make_shared<PointCloud>(), {}}, now_))})
     EXPECT_EQ(step.events.size(), 1U);
   EXPECT_EQ(store_->tables(), before);
 }
@@ -334,11 +334,11 @@ TEST_F(RobotNodeTest, AScanThatComesAgainCountsOnce) {
   PointCloud cloud;
   cloud.points.emplace_back(1.0F, 5.0F, 1.0F);
   const Scan again{odometry_[50].stamp, std::make_shared<const PointCloud>(cloud), {}};
-  EXPECT_TRUE(done(node_->add_scan(again, now_)).writes.empty());
+  EXPECT_TRUE(done(node_->add(again, now_)).writes.empty());
   now_ = now_ + config_.journal_period_s;
   done(node_->on_timer(now_));
   restart();
-  EXPECT_TRUE(done(node_->add_scan(again, now_)).writes.empty());
+  EXPECT_TRUE(done(node_->add(again, now_)).writes.empty());
   EXPECT_EQ(node_->agent().state().submaps.scans.size(), scans);
 }
 
@@ -352,9 +352,9 @@ TEST_F(RobotNodeTest, AKillBetweenSamplesAndScansThatNeverMeetLosesNothing) {
   const auto live = [&](int from, int to) {
     for (int i = from; i < to; ++i) {
       now_ = Timestamp{} + 0.005 * i;
-      done(node_->add_odometry({start + 0.005 * i, pose(0.005 * i), 1e-7 * Matrix6d::Identity()}, now_));
+      done(node_->add(OdometrySample{start + 0.005 * i, pose(0.005 * i), 1e-7 * Matrix6d::Identity()}, now_));
       for (; scan_stamp(next_scan) < start + (0.005 * i - 0.03); ++next_scan)
-        done(node_->add_scan({scan_stamp(next_scan), cloud, {}}, now_));
+        done(node_->add(Scan{scan_stamp(next_scan), cloud, {}}, now_));
     }
   };
   live(0, 6000);
@@ -394,9 +394,10 @@ TEST_F(RobotNodeTest, KeyframesWithoutAScanAreReported) {
         for (const Event& event : step.events)
           if (const auto* missing = std::get_if<SensorMissing>(&event.what)) out.push_back(*missing);
       };
-      note(done(node_->add_odometry(
-          {stamp, {Eigen::Quaterniond::Identity(), {0.05 * i, 0.0, 0.0}}, 1e-7 * Matrix6d::Identity()}, now_)));
-      if (with_scans) note(done(node_->add_scan({stamp, cloud, {}}, now_)));
+      note(done(node_->add(
+          OdometrySample{stamp, {Eigen::Quaterniond::Identity(), {0.05 * i, 0.0, 0.0}}, 1e-7 * Matrix6d::Identity()},
+          now_)));
+      if (with_scans) note(done(node_->add(Scan{stamp, cloud, {}}, now_)));
     }
     return out;
   };

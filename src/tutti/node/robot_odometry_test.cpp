@@ -48,7 +48,7 @@ TEST_F(RobotOdometry, OdometryThatJumpsIsReportedAndAKillChangesNothing) {
   const auto live = [&](int from, int to) {
     for (int i = from; i < to; ++i) {
       now_ = Timestamp{} + 0.1 * i;
-      const Step step = done(node_->add_odometry({kStart + 0.1 * i, pose(i), 1e-6 * Matrix6d::Identity()}, now_));
+      const Step step = done(node_->add(OdometrySample{kStart + 0.1 * i, pose(i), 1e-6 * Matrix6d::Identity()}, now_));
       for (const Event& event : step.events)
         if (const auto* jumped = std::get_if<OdometryJumped>(&event.what)) reported.push_back(*jumped);
     }
@@ -82,7 +82,7 @@ TEST_F(RobotOdometry, OdometryThatJumpsIsReportedAndAKillChangesNothing) {
 
 TEST_F(RobotOdometry, SamplesThatAreRefusedInARowAreItsTrouble) {
   const auto add = [&](double t) {
-    return done(node_->add_odometry({kStart + t, {}, 1e-6 * Matrix6d::Identity()}, now_));
+    return done(node_->add(OdometrySample{kStart + t, {}, 1e-6 * Matrix6d::Identity()}, now_));
   };
   for (int i = 0; i < 10; ++i) add(0.1 * i);
   const auto refused = [&](std::uint64_t samples) {

@@ -37,7 +37,7 @@ struct Robot {
   Step walk(int i) {
     const Timestamp stamp = robot::test::at(i);
     if (i > 0) T_odom_body = T_odom_body * (robot::test::true_pose(i - 1).inverse() * robot::test::true_pose(i)) * bend;
-    return node->add_odometry({stamp, T_odom_body, robot::test::kStepCovariance}, Timestamp{} + 0.5 * i);
+    return node->add(OdometrySample{stamp, T_odom_body, robot::test::kStepCovariance}, Timestamp{} + 0.5 * i);
   }
   Step hear(const ProxyGraphMessage& message, Timestamp now) const {
     return node->receive({bus::Endpoint::server(),

@@ -12,7 +12,7 @@
 namespace tutti::program {
 namespace {
 
-Result<Image> decoded(const intake::EncodedImage& image, const CameraModel& camera, Timestamp stamp) {
+Result<Image> decoded(const EncodedImage& image, const CameraModel& camera, Timestamp stamp) {
   const std::string name = fmt::format("the image of camera {} at {} ns", image.camera, stamp.ns);
   if (!image.is_raw) return formats::decode_image(image.bytes, name, {camera.width_px, camera.height_px});
   Image out(camera.width_px, camera.height_px);
@@ -20,7 +20,7 @@ Result<Image> decoded(const intake::EncodedImage& image, const CameraModel& came
   return out;
 }
 
-Result<DepthImage> decoded_depth(const intake::EncodedImage& image, const CameraModel& camera, Timestamp stamp) {
+Result<DepthImage> decoded_depth(const EncodedImage& image, const CameraModel& camera, Timestamp stamp) {
   const std::string name = fmt::format("the depth image at {} ns", stamp.ns);
   if (!image.is_raw) return formats::decode_depth(image.bytes, name, {camera.width_px, camera.height_px});
   DepthImage out{camera.width_px, camera.height_px, {}};
@@ -34,7 +34,7 @@ Result<DepthImage> decoded_depth(const intake::EncodedImage& image, const Camera
 
 }  // namespace
 
-TrackedImages FedCamera::see(const intake::FedImages& images, bool keyframe) {
+TrackedImages FedCamera::see(const EncodedImages& images, bool keyframe) {
   constexpr std::int64_t kNsPerInstant =
       1'000'000;  // numbers that grow across restarts, at up to 1,000 images a second
   const auto instant = static_cast<std::uint64_t>(std::max<std::int64_t>(images.stamp.ns, 0) / kNsPerInstant);
@@ -49,7 +49,7 @@ TrackedImages FedCamera::see(const intake::FedImages& images, bool keyframe) {
   if (!tracker_) return out;
   visual::SeenImages seen{.stamp = images.stamp, .instant = instant, .images = {}};
   seen.images.resize(sensors_->cameras.size(), Image());
-  for (const intake::EncodedImage& image : images.images)
+  for (const EncodedImage& image : images.images)
     seen.images.at(image.camera) = decoded(image, sensors_->cameras[image.camera].model, images.stamp);
   if (images.depth)
     seen.load_depth = [&] { return decoded_depth(*images.depth, sensors_->cameras.front().model, images.stamp); };

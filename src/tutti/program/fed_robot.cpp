@@ -47,23 +47,23 @@ void FedRobot::end() {
     if (!take(*input)) return;
 }
 
-/// It was received before anybody knew whether it shows anything new.
-void FedRobot::hear(const Scan& scan, Timestamp now) {
+void FedRobot::hear(const Input& input, Timestamp now) {
+  if (const auto* images = std::get_if<EncodedImages>(&input)) return see(*images, now);
   const robot::RobotAgent& agent = robot_.node().agent();
-  if (agent.newest_sample() != scan.stamp || agent.wants_scan()) robot_.add_scan(scan, now);
+  const auto* scan = std::get_if<Scan>(&input);  // received before anybody knew whether it shows anything new
+  if (scan == nullptr || agent.newest_sample() != scan->stamp || agent.wants_scan()) robot_.add(input, now);
 }
 
 /// Every image is tracked, those of keyframes are kept.
-void FedRobot::hear(const std::shared_ptr<const intake::FedImages>& images, Timestamp now) {
+void FedRobot::see(const EncodedImages& images, Timestamp now) {
   const robot::RobotAgent& agent = robot_.node().agent();
-  const Timestamp stamp = images->stamp;
-  const bool is_keyframe = agent.wants_images(stamp);
-  TrackedImages seen = camera_.see(*images, is_keyframe);
-  emit_image_errors(stamp, now);
+  const bool is_keyframe = agent.wants_images(images.stamp);
+  TrackedImages seen = camera_.see(images, is_keyframe);
+  emit_image_errors(images.stamp, now);
   if (!is_keyframe || seen.images.empty()) return;
-  if (images->sensors->imu)
-    if (const auto before = agent.keyframe_before(stamp)) seen.imu = front_.imu(*before, stamp);
-  robot_.add_images(seen, now);
+  if (images.sensors->imu)
+    if (const auto before = agent.keyframe_before(images.stamp)) seen.imu = front_.imu(*before, images.stamp);
+  robot_.add(std::move(seen), now);
 }
 
 /// To the client all; of a row of images with errors the first is an event.

@@ -39,14 +39,12 @@ class FedRobot {
  private:
   /// False when the input cannot be stored, and the robot is destroyed.
   bool take(const FeedInput& input);
-  void hear(const node::OdometrySample& sample, Timestamp now) { robot_.add_odometry(sample, now); }
-  void hear(const Scan& scan, Timestamp now);
-  void hear(const std::shared_ptr<const intake::FedImages>& images, Timestamp now);
-  void hear(const PositionFix& fix, Timestamp now) { robot_.add_fix(fix, now); }
-  void hear(const std::shared_ptr<const intake::FeedSensors>& sensors, Timestamp /*now*/) { expect(*sensors); }
+  void hear(const Input& input, Timestamp now);
+  void see(const EncodedImages& images, Timestamp now);
+  void hear(const std::shared_ptr<const Sensors>& sensors, Timestamp /*now*/) { expect(*sensors); }
   void hear(FeedEnded, Timestamp now) { robot_.finish(now); }
   void hear(const FeedAnew& anew, Timestamp now) { robot_.begin_session(anew.why, now); }
-  void expect(const intake::FeedSensors& sensors) { robot_.expect_sensors(sensors.scans, !sensors.cameras.empty()); }
+  void expect(const Sensors& sensors) { robot_.expect_sensors(sensors.scans, !sensors.cameras.empty()); }
   void emit_image_errors(Timestamp stamp, Timestamp now);
   void publish();
 

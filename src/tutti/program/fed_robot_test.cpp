@@ -21,9 +21,7 @@ namespace fed_robot_test {
 constexpr RobotId kRobot{1};
 const Trajectory kOdometry = robot::test::drifting_odometry(400);
 
-node::OdometrySample sample(std::size_t i) {
-  return {kOdometry[i].stamp, kOdometry[i].pose, robot::test::kStepCovariance};
-}
+OdometrySample sample(std::size_t i) { return {kOdometry[i].stamp, kOdometry[i].pose, robot::test::kStepCovariance}; }
 
 Scan scan(std::size_t i) {
   PointCloud cloud;
@@ -48,10 +46,10 @@ class FedRobotTest : public testing::Test {
   }
   void feed(std::size_t from, std::size_t until) {
     for (std::size_t i = from; i < until; ++i) {
-      ASSERT_TRUE(front_->add_odometry(sample(i)));
+      ASSERT_TRUE(front_->add(sample(i)));
       ASSERT_EQ(front_->state().newest->stamp, kOdometry[i].stamp);
       if (i % 5 != 0) continue;
-      ASSERT_TRUE(front_->add_scan(scan(i)));
+      ASSERT_TRUE(front_->add(scan(i)));
     }
   }
   /// As Host::run() does, `count` times, until everything is taken.
@@ -67,9 +65,9 @@ class FedRobotTest : public testing::Test {
   void expect_the_robot_of_all_that_was_fed() {
     robot::RobotAgent alone(kRobot, 7, {});
     for (std::size_t i = 0; i < kOdometry.size(); ++i) {
-      ASSERT_TRUE(alone.add_odometry(sample(i).stamp, sample(i).T_odom_body, sample(i).increment_covariance));
+      ASSERT_TRUE(alone.add(OdometrySample{sample(i).stamp, sample(i).T_odom_body, sample(i).increment_covariance}));
       if (i % 5 != 0 || !alone.wants_scan()) continue;
-      ASSERT_TRUE(alone.add_scan(scan(i)));
+      ASSERT_TRUE(alone.add(scan(i)));
     }
     EXPECT_EQ(agent().keyframes(), alone.keyframes());
     EXPECT_EQ(agent().newest_sample(), kOdometry.back().stamp);
@@ -104,7 +102,7 @@ TEST_F(FedRobotTest, TakesWhatIsFedAndSaysHowFarItIsStored) {
 TEST(RobotView, CallsTeamMatesAsTheMissionDoesElseAsTheMapDoes) {
   storage::MemoryStore store(storage::robot_schema());
   const auto node = node::RobotNode::open(kRobot, 7, {}, store).value();
-  for (std::size_t i = 0; i < 200; ++i) static_cast<void>(node->add_odometry(sample(i), {}));
+  for (std::size_t i = 0; i < 200; ++i) static_cast<void>(node->add(sample(i), {}));
   const auto called = [&](std::uint64_t revision, const std::string& in_map, std::map<RobotId, std::string> names) {
     ProxyGraphMessage message = robot::test::broadcast(node->agent(), revision, robot::test::kWorld);
     message.graph.last_seen.front().name = in_map;
@@ -155,9 +153,9 @@ TEST_P(FedRobotClock, ThatGoesBackIsANewSessionWhateverTheDiskDoes) {
   const auto feed_back = [&](std::size_t from, std::size_t until) {
     std::size_t taken = 0;
     for (std::size_t i = from; i < until; ++i) {
-      node::OdometrySample back = sample(i);
+      OdometrySample back = sample(i);
       back.stamp = back.stamp - 3600.0;
-      taken += front_->add_odometry(back) ? 1 : 0;
+      taken += front_->add(back) ? 1 : 0;
     }
     return taken;
   };
@@ -204,7 +202,7 @@ TEST_F(FedRobotTest, WhatHasComeIsStoredBeforeItEnds) {
   feed(0, kOdometry.size());
   const std::atomic<bool> stop = true;
   host_->run(stop);
-  EXPECT_FALSE(front_->add_odometry({kOdometry.back().stamp + 1.0, {}, Matrix6d::Identity()}));
+  EXPECT_FALSE(front_->add(OdometrySample{kOdometry.back().stamp + 1.0, {}, Matrix6d::Identity()}));
   EXPECT_EQ(open_robot()->node().agent().newest_sample(), kOdometry.back().stamp);
 }
 

@@ -59,10 +59,7 @@ class LiveRobot final : public RobotDriver {
   void store_all() override { take(node_->store_all()); }
   node::Step take_step() override { return std::exchange(step_, {}); }
   std::vector<Json> take_notes() override { return std::exchange(notes_, {}); }
-  void add_odometry(const node::OdometrySample& sample, Timestamp now) { take(node_->add_odometry(sample, now)); }
-  void add_scan(const Scan& scan, Timestamp now) { take(node_->add_scan(scan, now)); }
-  void add_images(const TrackedImages& images, Timestamp now) { take(node_->add_images(images, now)); }
-  void add_fix(const PositionFix& fix, Timestamp now) { take(node_->add_fix(fix, now)); }
+  void add(const Input& input, Timestamp now) { take(node_->add(input, now)); }
   void begin_session(const std::string& why, Timestamp now) { take(node_->begin_session(why, now)); }
   /// Reports what became of samples before they reached the node.
   void emit(Timestamp now, const node::ImagesRefused& what) { step_.emit(now, what); }

@@ -45,24 +45,30 @@ RobotAgent::~RobotAgent() = default;
 RobotAgent::RobotAgent(RobotAgent&&) noexcept = default;
 RobotAgent& RobotAgent::operator=(RobotAgent&&) noexcept = default;
 
-Status RobotAgent::add_odometry(Timestamp stamp, const Pose3& T_fed_body, const Matrix6d& increment_covariance) {
-  const auto fed = usable_step(chain_.robot, stamp, T_fed_body, increment_covariance);
+Status RobotAgent::add(const Input& input) {
+  const auto* sample = std::get_if<OdometrySample>(&input);
+  Status ok = sample == nullptr ? submaps_.add(input) : add_odometry(*sample);
+  add_keyframes();
+  return ok;
+}
+
+Status RobotAgent::add_odometry(const OdometrySample& sample) {
+  const auto fed = usable_step(chain_.robot, sample);
   if (!fed) return tl::unexpected(fed.error());
   OdometryWatch watch = this->watch();
-  const auto [T_odom_body, jump] = watch.take({stamp, fed->T_odom_body});
+  const auto [T_odom_body, jump] = watch.take({sample.stamp, fed->T_odom_body});
   const Matrix6d covariance = jump ? unknown_step() : fed->covariance;
   const bool is_first = state_.keyframes.empty();
-  if (auto ok = submaps_.add_odometry(stamp, T_odom_body, covariance, jump.has_value()); !ok) return ok;
+  if (auto ok = submaps_.add(OdometryStep{sample.stamp, T_odom_body, covariance, jump.has_value()}); !ok) return ok;
   state_.watch = watch.state();
   if (jump) jumps_.push_back(*jump);
-  fit_.add_odometry({stamp, T_odom_body}, jump.has_value());
+  fit_.add_odometry({sample.stamp, T_odom_body}, jump.has_value());
   if (!is_first) {
     const Matrix6d moved =
         compound_covariance(state_.T_odom_body.inverse() * T_odom_body, state_.covariance, covariance);
     state_.covariance = 0.5 * (moved + moved.transpose());
   }
   state_.T_odom_body = T_odom_body;
-  add_keyframes();
   return {};
 }
 
@@ -81,18 +87,6 @@ void RobotAgent::add_keyframe(const KeyframeStep& step, std::uint32_t submap) {
   state_.submap_of.push_back(submap);
   if (step.keyframe.representative)
     state_.node_odometry.push_back(std::exchange(state_.since_node, {.T_a_b = {}, .covariance = Matrix6d::Zero()}));
-}
-
-Status RobotAgent::add_scan(const Scan& scan) {
-  Status ok = submaps_.add_scan(scan);
-  add_keyframes();
-  return ok;
-}
-
-Status RobotAgent::add_images(const TrackedImages& images) {
-  Status ok = submaps_.add_images(images);
-  add_keyframes();
-  return ok;
 }
 
 void RobotAgent::add_keyframe_time(Timestamp stamp) {

@@ -123,21 +123,16 @@ class RobotAgent {
   RobotAgent(RobotAgent&&) noexcept;
   RobotAgent& operator=(RobotAgent&&) noexcept;
 
-  /// Adds a sample of raw odometry; a bad one is refused and nothing changes (SubmapBuilder::add_odometry()).
-  /// `increment_covariance` (right tangent) is of the step since the previous sample, and ignored for the first.
-  /// Any later stamp is believed, so one far ahead shuts out all up to it: have a StampWatch decide before, as nodes
-  /// do. Quaternions that are off by rounding (1e-3) are normalised. Covariances may lack a coordinate (odometry in the
-  /// plane) or call one unknown; what is used and uploaded has an inverse, and standard deviations of at most 10 m and
-  /// 0.3 rad (geometry/covariance.hpp).
+  /// Adds an input; a bad one is refused and nothing changes (SubmapBuilder::add()).
+  ///
+  /// Any later stamp of odometry is believed, so one far ahead shuts out all up to it: have a StampWatch decide before,
+  /// as nodes do. Quaternions that are off by rounding (1e-3) are normalised. Covariances may lack a coordinate
+  /// (odometry in the plane) or call one unknown; what is used and uploaded has an inverse, and standard deviations of
+  /// at most 10 m and 0.3 rad (geometry/covariance.hpp).
   ///
   /// Where odometry jumps (OdometryWatch), the robot is assumed to stay where it is, with the largest covariance that a
   /// step may have. A submap of its own bridges the jump, so that no submap has what sensors saw on both sides.
-  Status add_odometry(Timestamp stamp, const Pose3& T_odom_body, const Matrix6d& increment_covariance);
-  Status add_scan(const Scan& scan);
-  /// SubmapBuilder::add_images()
-  Status add_images(const TrackedImages& images);
-  /// SubmapBuilder::add_fix()
-  Status add_fix(const PositionFix& fix) { return submaps_.add_fix(fix); }
+  Status add(const Input& input);
   /// SubmapBuilder::add_keyframe_time()
   void add_keyframe_time(Timestamp stamp);
   /// SubmapBuilder's functions of these names
@@ -161,7 +156,7 @@ class RobotAgent {
   /// Ends the run: the last, shorter submap becomes an outgoing message.
   void finish();
   /// The submaps that are ready to be sent, oldest first, each one once. This is where scans are merged, so that
-  /// add_odometry() and add_scan() return quickly; until then scans are kept whole, so call it regularly.
+  /// add() returns quickly; until then scans are kept whole, so call it regularly.
   std::vector<SubmapMessage> take_outgoing();
   /// SubmapBuilder::take_image_errors()
   std::vector<Error> take_image_errors() { return submaps_.take_image_errors(); }
@@ -225,6 +220,7 @@ class RobotAgent {
  private:
   RobotAgent(RobotId robot, const AgentConfig& config, std::unique_ptr<const consistency::ConstraintPolicy> policy,
              AgentState state);
+  Status add_odometry(const OdometrySample& sample);
   void add_keyframes();
   void add_keyframe(const KeyframeStep& step, std::uint32_t submap);
   [[nodiscard]] std::vector<consistency::RobotNode> nodes() const;

@@ -47,7 +47,7 @@ TEST_P(AgentPolicies, CorrectsOdometryInThePlaneAndOfUnknownHeight) {
     for (const int axis : {2, 3, 4}) covariance(axis, axis) = others;
     Trajectory truth;
     for (const auto& [stamp, pose] : drifting_odometry(240)) {
-      ASSERT_TRUE(agent.add_odometry(stamp, pose, covariance));
+      ASSERT_TRUE(agent.add(OdometrySample{stamp, pose, covariance}));
       truth.push_back({stamp, true_pose(static_cast<int>(truth.size()))});
     }
     const double before = evaluation::agreement(agent.corrected(), truth)->rmse_m;
@@ -141,7 +141,7 @@ TEST(Agent, CorrectsOdometryThatClaimsToBePerfect) {
   RobotAgent agent(RobotId{1}, 1, {});
   Trajectory truth;
   for (const auto& [stamp, pose] : drifting_odometry(240)) {
-    ASSERT_TRUE(agent.add_odometry(stamp, pose, Matrix6d::Zero()));
+    ASSERT_TRUE(agent.add(OdometrySample{stamp, pose, Matrix6d::Zero()}));
     truth.push_back({stamp, true_pose(static_cast<int>(truth.size()))});
   }
   const double before = evaluation::agreement(agent.corrected(), truth)->rmse_m;
@@ -273,7 +273,7 @@ TEST(Agent, KeepsKeyframesNotSamples) {
     for (int i = 0; i <= static_cast<int>(seconds * rate_hz); ++i) {
       const double t = static_cast<double>(i) / rate_hz;
       const Pose3 pose{Eigen::Quaterniond::Identity(), {std::min(0.6 * t, 60.0), 0.0, 0.0}};  // stands at last
-      EXPECT_TRUE(agent.add_odometry(at(0) + t, pose, kStepCovariance / rate_hz));
+      EXPECT_TRUE(agent.add(OdometrySample{at(0) + t, pose, kStepCovariance / rate_hz}));
       agent.take_outgoing();
     }
     const AgentState state = agent.state();
@@ -297,7 +297,7 @@ TEST(Agent, SaysWhereTheRobotIsNow) {
   std::uint64_t revision = 0;
   const Trajectory odometry = fine_odometry(240);
   for (std::size_t i = 0; i < odometry.size(); ++i) {
-    ASSERT_TRUE(agent.add_odometry(odometry[i].stamp, odometry[i].pose, kStepCovariance));
+    ASSERT_TRUE(agent.add(OdometrySample{odometry[i].stamp, odometry[i].pose, kStepCovariance}));
     EXPECT_EQ(agent.T_map_odom(), T_map_odom);  // to the bit
     EXPECT_LT(local(agent.T_map_odom() * odometry[i].pose, agent.T_map_body()).norm(), 1e-12);
     if (agent.wants_scan()) {  // a keyframe
@@ -337,8 +337,8 @@ TEST(Agent, MapsOnWithoutAServerAndUploadsOnlyRawOdometry) {
   RobotAgent corrected(RobotId{1}, 1, config);
   const Trajectory odometry = drifting_odometry(240);
   for (const StampedPose& sample : odometry) {
-    ASSERT_TRUE(alone.add_odometry(sample.stamp, sample.pose, kStepCovariance).has_value());
-    ASSERT_TRUE(corrected.add_odometry(sample.stamp, sample.pose, kStepCovariance).has_value());
+    ASSERT_TRUE(alone.add(OdometrySample{sample.stamp, sample.pose, kStepCovariance}).has_value());
+    ASSERT_TRUE(corrected.add(OdometrySample{sample.stamp, sample.pose, kStepCovariance}).has_value());
     if (sample.stamp == at(100)) corrected.receive(broadcast(corrected, 1, kWorld));
   }
   alone.finish();
@@ -361,7 +361,7 @@ TEST(Agent, WhatItTakesTheServerTakes) {
   RobotAgent agent(RobotId{1}, 1, {});
   for (auto [stamp, pose] : drifting_odometry(60)) {
     pose.rotation.coeffs() *= 1.0 + 1e-5;  // five digits were printed
-    ASSERT_TRUE(agent.add_odometry(stamp, pose, kStepCovariance));
+    ASSERT_TRUE(agent.add(OdometrySample{stamp, pose, kStepCovariance}));
   }
   agent.finish();
   const auto messages = agent.take_outgoing();
@@ -370,7 +370,7 @@ TEST(Agent, WhatItTakesTheServerTakes) {
     for (const Keyframe& keyframe : message.submap.keyframes) EXPECT_TRUE(is_valid(keyframe.T_odom_body));
   Matrix6d indefinite = kStepCovariance;
   indefinite(0, 5) = indefinite(5, 0) = 1.0;
-  const Status refused = agent.add_odometry(at(60), drifting_odometry(61).back().pose, indefinite);
+  const Status refused = agent.add(OdometrySample{at(60), drifting_odometry(61).back().pose, indefinite});
   ASSERT_FALSE(refused);
   EXPECT_NE(refused.error().message.find("semidefinite"), std::string::npos) << refused.error().message;
 }

@@ -60,9 +60,9 @@ struct Mission {
     const auto every = static_cast<int>(kScanStep_s / kOdometryStep_s);
     for (int k = 0; k * kOdometryStep_s < kDuration_s; ++k) {
       const double t = k * kOdometryStep_s;
-      ASSERT_TRUE(agent.add_odometry(kStart + t, odometry_at(t), covariance));
+      ASSERT_TRUE(agent.add(OdometrySample{kStart + t, odometry_at(t), covariance}));
       if (const double of = t - scans_late_s; k % every == 0 && of >= 0.0 && agent.wants_scan(kStart + t)) {
-        ASSERT_TRUE(agent.add_scan(scan_at(of)));
+        ASSERT_TRUE(agent.add(scan_at(of)));
         ++scans;
       }
       collect(agent);

@@ -31,10 +31,10 @@ Fed feed(RobotAgent& agent, double rate_hz, bool with_scans, const Offset& offse
   for (int i = 0; i < 60.0 * rate_hz; ++i) {
     const double t = i / rate_hz;
     const Pose3 fed = ahead(t + offset_m(t));
-    if (auto ok = agent.add_odometry(at(0) + t, fed, kCovariance); !ok) out.refused.push_back(ok.error());
+    if (auto ok = agent.add(OdometrySample{at(0) + t, fed, kCovariance}); !ok) out.refused.push_back(ok.error());
     EXPECT_LT(local(agent.T_odom_fed() * fed, agent.T_odom_body()).norm(), 1e-9) << t;
     const bool has_scan = with_scans && i % std::max(1, static_cast<int>(0.1 * rate_hz)) == 0;
-    if (has_scan && !agent.add_scan({at(0) + t, cloud, {}})) ADD_FAILURE() << t;
+    if (has_scan && !agent.add(Scan{at(0) + t, cloud, {}})) ADD_FAILURE() << t;
     for (const OdometryJump& jump : agent.take_odometry_jumps()) out.jumps.push_back(jump);
     for (SubmapMessage& submap : agent.take_outgoing()) out.submaps.push_back(std::move(submap));
   }
@@ -107,7 +107,7 @@ TEST(OdometryJumps, AnOutlierIsTwo) {
 
 TEST(OdometryJumps, AStampTwiceOrOfBeforeIsRefusedAndTheRobotGoesOn) {
   RobotAgent agent(RobotId{1}, 1, {});
-  const auto add = [&](double t, double x_m) { return agent.add_odometry(at(0) + t, ahead(x_m), kCovariance); };
+  const auto add = [&](double t, double x_m) { return agent.add(OdometrySample{at(0) + t, ahead(x_m), kCovariance}); };
   for (int i = 0; i < 100; ++i) ASSERT_TRUE(add(0.1 * i, 0.1 * i));
   const AgentHead before = agent.head();
   for (const double t : {9.9, 9.8, 0.0, -1.7e9}) {
@@ -131,7 +131,7 @@ TEST(OdometryJumps, TheMapSaysWhereTheRobotIsAfterwards) {
   int jumps = 0;
   for (std::size_t i = 0; i < odometry.size(); ++i) {
     const Pose3 fed = i < 120 ? odometry[i].pose : anew * odometry[i].pose;
-    ASSERT_TRUE(agent.add_odometry(odometry[i].stamp, fed, kStepCovariance));
+    ASSERT_TRUE(agent.add(OdometrySample{odometry[i].stamp, fed, kStepCovariance}));
     jumps += static_cast<int>(agent.take_odometry_jumps().size());
   }
   EXPECT_EQ(jumps, 1);

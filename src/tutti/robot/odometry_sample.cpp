@@ -16,12 +16,11 @@ constexpr double kRoundedQuaternion = 1e-3;
 
 }  // namespace
 
-Result<OdometryStep> usable_step(RobotId robot, Timestamp stamp, const Pose3& T_odom_body,
-                                 const Matrix6d& increment_covariance) {
-  OdometryStep step{.stamp = stamp, .T_odom_body = T_odom_body, .covariance = increment_covariance};
+Result<OdometryStep> usable_step(RobotId robot, const OdometrySample& sample) {
+  OdometryStep step{sample.stamp, sample.T_odom_body, sample.increment_covariance};
   if (is_valid(step.T_odom_body, kRoundedQuaternion)) step.T_odom_body.rotation.normalize();
   if (auto ok = check_step(robot, step); !ok) return tl::unexpected(ok.error());
-  step.covariance = invertible_covariance(bounded_covariance(increment_covariance, kUnknownStep_m, kUnknownStep_rad));
+  step.covariance = invertible_covariance(bounded_covariance(step.covariance, kUnknownStep_m, kUnknownStep_rad));
   return step;
 }
 

@@ -72,7 +72,7 @@ struct Drive {
       if (h.is_scan) {
         if (all || builder.wants_scan(at(h.stamp))) {
           const auto cloud = std::make_shared<const PointCloud>(PointCloud{{{5.0F, 3.0F, 1.0F}}});
-          const auto ok = builder.add_scan({at(h.stamp), cloud, {}});
+          const auto ok = builder.add(Scan{at(h.stamp), cloud, {}});
           EXPECT_TRUE(ok.has_value()) << ok.error().message;
         }
         continue;
@@ -80,7 +80,7 @@ struct Drive {
       Vector6d variance;
       variance << Eigen::Vector3d::Constant(1e-4), Eigen::Vector3d::Constant(1e-6);
       const Matrix6d covariance = (h.stamp - std::exchange(before, h.stamp)) * Matrix6d(variance.asDiagonal());
-      EXPECT_TRUE(builder.add_odometry(at(h.stamp), pose(h.stamp), covariance).has_value());
+      EXPECT_TRUE(builder.add(OdometrySample{at(h.stamp), pose(h.stamp), covariance}).has_value());
     }
     builder.finish();
     EXPECT_TRUE(builder.take_scan_errors().empty());
@@ -161,9 +161,10 @@ TEST(SensorTimeline, KeyframesDoNotWaitForASensorThatIsSilent) {
   std::vector<Timestamp> keyframes;
   for (int i = 0; i <= 2000; ++i) {  // 20 s, 1 m/s; no scan from 5 s to 15 s
     const double t = 0.01 * i;
-    ASSERT_TRUE(builder.add_odometry(at(t), {Eigen::Quaterniond::Identity(), {t, 0, 0}}, 1e-6 * Matrix6d::Identity()));
+    ASSERT_TRUE(
+        builder.add(OdometrySample{at(t), {Eigen::Quaterniond::Identity(), {t, 0, 0}}, 1e-6 * Matrix6d::Identity()}));
     if (i % 10 == 3 && (t < 5.0 || t > 15.0) && i > 3) {
-      ASSERT_TRUE(builder.add_scan({at(t - 0.005), cloud, {}}));
+      ASSERT_TRUE(builder.add(Scan{at(t - 0.005), cloud, {}}));
     }
     if (i == 1490) {
       EXPECT_GT(builder.state().keyframes_without_scan, 20U);
@@ -190,20 +191,21 @@ TEST(SensorTimeline, ImagesAreAtKeyframesWhateverTheirStamps) {
       return phase_s + k * period_s <= t ? std::optional(phase_s + k * period_s) : std::nullopt;
     };
     if (const auto scan = is_time(0.1, 0.0321); scan && builder.wants_scan(at(*scan))) {
-      ASSERT_TRUE(builder.add_scan({at(*scan), cloud, {}}));
+      ASSERT_TRUE(builder.add(Scan{at(*scan), cloud, {}}));
       ++scans;
     }
     const auto images = is_time(0.05, 0.0112);
     if (!images || !builder.wants_images(at(*images))) return;
     const TrackedImages seen{at(*images), cameras, {{0, {{{100.0F, 50.0F}, 0.8F, 0}}, {}}}, {}, {}};
-    const auto ok = builder.add_images(seen);
+    const auto ok = builder.add(seen);
     ASSERT_TRUE(ok.has_value()) << ok.error().message;
     ++taken;
     EXPECT_EQ(builder.state().images.back().stamp, builder.state().keyframes.back().stamp);
   };
   for (int i = 0; i <= 4000; ++i) {
     const double t = 0.005 * i;
-    ASSERT_TRUE(builder.add_odometry(at(t), {Eigen::Quaterniond::Identity(), {t, 0, 0}}, 1e-6 * Matrix6d::Identity()));
+    ASSERT_TRUE(
+        builder.add(OdometrySample{at(t), {Eigen::Quaterniond::Identity(), {t, 0, 0}}, 1e-6 * Matrix6d::Identity()}));
     hear(t);
   }
   std::size_t keyframes = 0;
@@ -213,7 +215,7 @@ TEST(SensorTimeline, ImagesAreAtKeyframesWhateverTheirStamps) {
   EXPECT_GE(scans, keyframes - 1);
   // Too late for its place.
   const TrackedImages late{at(18.0), cameras, {{0, {}, {}}}, {}, {}};
-  EXPECT_FALSE(builder.add_images(late).has_value());
+  EXPECT_FALSE(builder.add(late).has_value());
 }
 
 TEST(SensorTimeline, WhatWaitsIsSmallAtAThousandSamplesASecond) {
@@ -221,7 +223,8 @@ TEST(SensorTimeline, WhatWaitsIsSmallAtAThousandSamplesASecond) {
   std::size_t most = 0, history = 0;
   for (int i = 0; i < 5000; ++i) {
     const double t = 0.001 * i;
-    ASSERT_TRUE(builder.add_odometry(at(t), {Eigen::Quaterniond::Identity(), {t, 0, 0}}, 1e-9 * Matrix6d::Identity()));
+    ASSERT_TRUE(
+        builder.add(OdometrySample{at(t), {Eigen::Quaterniond::Identity(), {t, 0, 0}}, 1e-9 * Matrix6d::Identity()}));
     most = std::max(most, builder.state().waiting.odometry.size());
     history = std::max(history, builder.state().recent.size());
   }

@@ -82,17 +82,23 @@ void SubmapBuilder::drop_between(Timestamp before, Timestamp after, const std::s
   std::erase_if(state_.waiting_fixes, [&](const PositionFix& fix) { return fix.stamp > before && fix.stamp < after; });
 }
 
-Status SubmapBuilder::add_odometry(Timestamp stamp, const Pose3& T_odom_body, const Matrix6d& increment_covariance,
-                                   bool is_jump) {
-  const OdometryStep step{stamp, T_odom_body, increment_covariance, is_jump};
+Status SubmapBuilder::add(const Input& input) {
+  const InputKind& kind = kind_of(input);
+  if (kind.needs == Needs::odometry)
+    if (Status ok = check_time(stamp_of(input), kind); !ok) return ok;
+  return std::visit([this](const auto& sample) { return hear(sample); }, input);
+}
+
+Status SubmapBuilder::add(const OdometryStep& step) {
   if (auto ok = check_step(chain_.robot, step); !ok) return ok;
   const auto newest = newest_sample();
   if (!newest) {
     take({step, std::nullopt});
     return {};
   }
-  if (auto ok = check_follows(chain_.robot, stamp, newest); !ok) return ok;
-  if (is_jump || stamp - *newest > kLongestGap_s) drop_between(*newest, stamp, is_jump ? kAcrossJump : kTooFarApart);
+  if (auto ok = check_follows(chain_.robot, step.stamp, newest); !ok) return ok;
+  if (step.is_jump || step.stamp - *newest > kLongestGap_s)
+    drop_between(*newest, step.stamp, step.is_jump ? kAcrossJump : kTooFarApart);
   state_.waiting.add(step);
   advance();
   return {};
@@ -215,23 +221,23 @@ bool SubmapBuilder::wants_images(Timestamp stamp) const {
 }
 
 /// Whether odometry covers this time, or will.
-Status SubmapBuilder::check_time(Timestamp stamp, const char* what) const {
+Status SubmapBuilder::check_time(Timestamp stamp, const InputKind& kind) const {
   const auto newest = newest_sample();
-  if (!newest || stamp - *newest > kLongestGap_s)
+  if (!newest || stamp - *newest > kind.ahead_s)
     return fail(ErrorCode::invalid, "robot {}: {} at {} ns, no odometry within {} s before (latest: {} ns)",
-                chain_.robot.value, what, stamp.ns, kLongestGap_s, newest ? newest->ns : 0);
+                chain_.robot.value, kind.name, stamp.ns, kind.ahead_s, newest ? newest->ns : 0);
   if (stamp < state_.recent.front().stamp)
     return fail(ErrorCode::invalid,
                 "robot {}: {} at {} ns, no odometry is kept of that time (from {} ns on, latest: "
                 "{} ns): too late, or its clock is another one",
-                chain_.robot.value, what, stamp.ns, state_.recent.front().stamp.ns, newest->ns);
+                chain_.robot.value, kind.name, stamp.ns, state_.recent.front().stamp.ns, newest->ns);
   const std::deque<OdometryStep>& waiting = state_.waiting.odometry;
   const auto after = std::ranges::lower_bound(waiting, stamp, {}, &OdometryStep::stamp);
   if (after == waiting.end() || stamp <= state_.recent.back().stamp) return {};
   const Timestamp before = after == waiting.begin() ? state_.recent.back().stamp : std::prev(after)->stamp;
   if (after->stamp != stamp && (after->is_jump || after->stamp - before > kLongestGap_s))
     return fail(ErrorCode::invalid, "robot {}: {} at {} ns is between odometry at {} and {} ns, {}", chain_.robot.value,
-                what, stamp.ns, before.ns, after->stamp.ns, after->is_jump ? kAcrossJump : kTooFarApart);
+                kind.name, stamp.ns, before.ns, after->stamp.ns, after->is_jump ? kAcrossJump : kTooFarApart);
   return {};
 }
 
@@ -255,8 +261,7 @@ void SubmapBuilder::merge(const Scan& scan, const Pose3& T_odom_body) {
   before.scan_after = {scan.stamp, before.submap.keyframes.front().T_odom_body.inverse() * T_odom_body, scan.cloud};
 }
 
-Status SubmapBuilder::add_scan(const Scan& scan) {
-  if (auto ok = check_time(scan.stamp, "scan"); !ok) return ok;
+Status SubmapBuilder::hear(const Scan& scan) {
   if (!scan.cloud || scan.cloud->points.empty())
     return fail(ErrorCode::invalid, "robot {}: scan at {} ns is empty", chain_.robot.value, scan.stamp.ns);
   if (!wants_scan(scan.stamp)) return {};
@@ -283,8 +288,7 @@ void SubmapBuilder::keep(const TrackedImages& images) {
   }
 }
 
-Status SubmapBuilder::add_images(const TrackedImages& images) {
-  if (auto ok = check_time(images.stamp, "images"); !ok) return ok;
+Status SubmapBuilder::hear(const TrackedImages& images) {
   const auto where = [&] { return fmt::format("robot {}: images at {} ns", chain_.robot.value, images.stamp.ns); };
   if (auto ok = check_images(images); !ok) return in_context(where(), ok.error());
   if (!state_.images.empty() && *state_.images.back().cameras != *images.cameras)
@@ -305,7 +309,7 @@ Status SubmapBuilder::add_images(const TrackedImages& images) {
 }
 
 void SubmapBuilder::add_keyframe_time(Timestamp stamp) {
-  if (!check_time(stamp, "keyframe") || stamp <= state_.recent.back().stamp) return;
+  if (!check_time(stamp, {"keyframe", Needs::odometry}) || stamp <= state_.recent.back().stamp) return;
   if (has_scans()) state_.heard_scan = stamp;
   if (has_images()) state_.heard_images = stamp;
   state_.waiting.add(SensorSample{stamp, std::nullopt, std::nullopt});

@@ -10,6 +10,7 @@
 
 #include "tutti/base/config.hpp"
 #include "tutti/base/result.hpp"
+#include "tutti/model/input.hpp"
 #include "tutti/model/submap.hpp"
 #include "tutti/model/trajectory.hpp"
 #include "tutti/perception/fit/steady_drift.hpp"
@@ -142,24 +143,24 @@ class SubmapBuilder {
  public:
   SubmapBuilder(const ChainId& chain, const SubmapConfig& config, SubmapBuilderState state = {});
 
-  /// Adds a raw pose with the covariance of the step since the previous one (ignored for the first). Fails, and changes
-  /// nothing, unless stamps increase, the pose is within kMaxCoordinate_m with a unit quaternion, and
-  /// check_covariance() (geometry/covariance.hpp) passes. A jump is bridged by a submap of its own, from the previous
-  /// sample to this one, in which no sensor sees anything.
-  Status add_odometry(Timestamp stamp, const Pose3& T_odom_body, const Matrix6d& increment_covariance,
-                      bool is_jump = false);
-  /// Adds a scan that ends at its stamp, which may be between odometry samples and up to `kLongestGap_s` before the
-  /// next one; points are in the body frame. A sweep with ages is undistorted by odometry; it fails when it begins
-  /// before the first sample, or more than `kSweepHistoryS` ago. A scan at a keyframe is not required: one that shows
-  /// nothing new is left out.
-  Status add_scan(const Scan& scan);
-  /// Adds the images of one time; they are used when a keyframe is due at their stamp. Fails unless check_images()
-  /// passes and cameras are the same as before.
-  Status add_images(const TrackedImages& images);
-  /// Adds a position fix; its stamp may be as that of a scan. The fix belongs to the submap that is open at its stamp,
-  /// or to the one open now if it arrives up to kHistory_s late. A fix less than kFinestFix_s after the previous one,
-  /// or older, is skipped, because the errors of neighbouring fixes are the same.
-  Status add_fix(const PositionFix& fix);
+  /// Adds an input; an error states why it was refused, and nothing has changed then. Its stamp may be between odometry
+  /// samples, and InputKind::ahead_s after the newest.
+  /// - Odometry: the covariance is of the step since the previous sample (ignored for the first). Stamps must increase,
+  ///   the pose be within kMaxCoordinate_m with a unit quaternion, and check_covariance() (geometry/covariance.hpp)
+  ///   pass.
+  /// - A scan ends at its stamp; points are in the body frame. A sweep with ages is undistorted by odometry, and
+  /// refused
+  ///   when it begins before the first sample, or more than `kSweepHistoryS` ago. A scan at a keyframe is not required:
+  ///   one that shows nothing new is left out.
+  /// - Tracked images are used when a keyframe is due at their stamp; refused unless check_images() passes and cameras
+  ///   are the same as before.
+  /// - A fix belongs to the submap that is open at its stamp, or to the one open now if it arrives up to kHistory_s
+  ///   late. One less than kFinestFix_s after the previous one, or older, is skipped, because the errors of
+  ///   neighbouring fixes are the same.
+  Status add(const Input& input);
+  /// As a sample of odometry. A jump is bridged by a submap of its own, from the previous sample to this one, in which
+  /// no sensor sees anything.
+  Status add(const OdometryStep& step);
   /// Like a scan or images that are not given: makes the keyframe that these would make.
   void add_keyframe_time(Timestamp stamp);
   /// Sets SubmapConfig::has_scans and has_images when these become known later.
@@ -167,10 +168,10 @@ class SubmapBuilder {
     config_.has_scans = scans;
     config_.has_images = images;
   }
-  /// True if a scan with this stamp would be used. Also true when only later odometry can decide, or when add_scan()
+  /// True if a scan with this stamp would be used. Also true when only later odometry can decide, or when add()
   /// would fail.
   [[nodiscard]] bool wants_scan(Timestamp stamp) const;
-  /// The same for images, but false when add_images() would fail.
+  /// The same for images, but false when add() would fail.
   [[nodiscard]] bool wants_images(Timestamp stamp) const;
   /// True if a scan from now on would be used.
   [[nodiscard]] bool wants_scan() const;
@@ -216,7 +217,17 @@ class SubmapBuilder {
   [[nodiscard]] bool has_images() const { return config_.has_images || state_.heard_images; }
   [[nodiscard]] bool is_due_at(Timestamp stamp) const;
   void drop_between(Timestamp before, Timestamp after, const std::string& why);
-  Status check_time(Timestamp stamp, const char* what) const;
+  Status check_time(Timestamp stamp, const InputKind& kind) const;
+  Status hear(const OdometrySample& sample) {
+    return add(OdometryStep{sample.stamp, sample.T_odom_body, sample.increment_covariance});
+  }
+  Status hear(const Scan& scan);
+  Status hear(const TrackedImages& images);
+  Status hear(const PositionFix& fix);
+  Status hear(const FedOnly auto& sample) {
+    return fail(ErrorCode::unsupported, "robot {}: {}, expected odometry, a scan, tracked images or a fix",
+                chain_.robot.value, kind_of(sample).name);
+  }
   void advance();
   void take(SensorTimeline::Instant instant);
   [[nodiscard]] bool makes_keyframe(const SensorTimeline::Instant& instant);

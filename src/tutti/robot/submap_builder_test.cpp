@@ -24,9 +24,9 @@ std::vector<Submap> drive(SubmapBuilder& builder, double seconds, bool with_scan
   for (int i = 0; i < 50; ++i) cloud->points.emplace_back(5.0F, 0.5F * static_cast<float>(i), 1.0F);
   for (int i = 0; i <= static_cast<int>(std::lround(seconds * 10)); ++i) {
     const double t = 0.1 * i;
-    EXPECT_TRUE(builder.add_odometry(at(t), ahead(0.5 * t), kStepCovariance).has_value());
+    EXPECT_TRUE(builder.add(OdometrySample{at(t), ahead(0.5 * t), kStepCovariance}).has_value());
     if (with_scans) {
-      EXPECT_TRUE(builder.add_scan({at(t), cloud}).has_value());
+      EXPECT_TRUE(builder.add(Scan{at(t), cloud}).has_value());
     }
   }
   builder.finish();
@@ -81,7 +81,7 @@ std::vector<Submap> travel(double speed_mps, const SubmapConfig& config) {
   Rng rng(1);
   for (int i = 0; i <= 12'000; ++i) {
     const double t = 0.005 * i;
-    EXPECT_TRUE(builder.add_odometry(at(t), ahead(speed_mps * t + rng.normal(0.01)), kStepCovariance));
+    EXPECT_TRUE(builder.add(OdometrySample{at(t), ahead(speed_mps * t + rng.normal(0.01)), kStepCovariance}));
   }
   std::vector<Submap> out;
   while (auto submap = builder.take_submap()) out.push_back(std::move(*submap));
@@ -110,8 +110,8 @@ TEST(SubmapBuilder, MergingScansIsLeftToWhoTakesTheSubmap) {
   SubmapBuilder builder(RobotId{0}, {});
   const auto cloud = std::make_shared<PointCloud>(PointCloud{{{5.0F, 0.0F, 1.0F}}});
   for (int i = 0; i <= 45; ++i) {
-    ASSERT_TRUE(builder.add_odometry(at(0.5 * i), ahead(0.0), kStepCovariance));
-    ASSERT_TRUE(builder.add_scan({at(0.5 * i), cloud}));
+    ASSERT_TRUE(builder.add(OdometrySample{at(0.5 * i), ahead(0.0), kStepCovariance}));
+    ASSERT_TRUE(builder.add(Scan{at(0.5 * i), cloud}));
   }
   cloud->points[0].y() = 2.0F;
   for (std::uint32_t i = 0; i < 2; ++i) {
@@ -145,7 +145,7 @@ TEST(SubmapBuilder, SweepsAreUndistortedByTheOwnOdometry) {
   constexpr double kSpeed = 2.0, kWall = 5.0;  // a wall ahead of the start
   for (int i = 0; i <= 90; ++i) {
     const double t = 0.125 * i;
-    ASSERT_TRUE(builder.add_odometry(at(t), ahead(kSpeed * t), kStepCovariance).has_value());
+    ASSERT_TRUE(builder.add(OdometrySample{at(t), ahead(kSpeed * t), kStepCovariance}).has_value());
     if (!builder.wants_scan() || t < 0.25) continue;
     auto cloud = std::make_shared<PointCloud>();
     auto ages = std::make_shared<std::vector<float>>();
@@ -154,7 +154,7 @@ TEST(SubmapBuilder, SweepsAreUndistortedByTheOwnOdometry) {
       const double then = t - static_cast<double>(ages->back());
       cloud->points.emplace_back(static_cast<float>(kWall - kSpeed * then), 0.5F * static_cast<float>(k), 1.0F);
     }
-    ASSERT_TRUE(builder.add_scan({at(t), cloud, ages}).has_value());
+    ASSERT_TRUE(builder.add(Scan{at(t), cloud, ages}).has_value());
   }
   const auto submap = builder.take_submap();
   ASSERT_TRUE(submap && submap->cloud);
@@ -166,7 +166,7 @@ TEST(SubmapBuilder, WantsScansAtKeyframesOnly) {
   SubmapBuilder builder(RobotId{0}, {.keyframe_distance_m = 0.3, .keyframe_time_s = 100.0});
   EXPECT_FALSE(builder.wants_scan());
   for (int i = 0; i <= 60; ++i) {
-    ASSERT_TRUE(builder.add_odometry(at(0.1 * i), ahead(0.05 * i), kStepCovariance));
+    ASSERT_TRUE(builder.add(OdometrySample{at(0.1 * i), ahead(0.05 * i), kStepCovariance}));
     EXPECT_EQ(builder.wants_scan(), !builder.take_keyframes().empty());
   }
 }
@@ -175,12 +175,13 @@ TEST(SubmapBuilder, ASweepOlderThanTheKnownOdometryIsRefused) {
   SubmapBuilder builder(RobotId{0}, {});
   const auto cloud = std::make_shared<const PointCloud>(PointCloud{{{5.0F, 0.0F, 0.0F}}});
   const auto message = [&](double t, float age) {
-    const auto ok = builder.add_scan({at(t), cloud, std::make_shared<const std::vector<float>>(1, age)});
+    const auto ok = builder.add(Scan{at(t), cloud, std::make_shared<const std::vector<float>>(1, age)});
     return ok.has_value() ? std::string() : ok.error().message;
   };
-  ASSERT_TRUE(builder.add_odometry(at(0), ahead(0), kStepCovariance).has_value());
+  ASSERT_TRUE(builder.add(OdometrySample{at(0), ahead(0), kStepCovariance}).has_value());
   EXPECT_NE(message(0, 0.1F).find("0.1 s old"), std::string::npos);
-  for (int i = 1; i <= 80; ++i) ASSERT_TRUE(builder.add_odometry(at(0.125 * i), ahead(0), kStepCovariance).has_value());
+  for (int i = 1; i <= 80; ++i)
+    ASSERT_TRUE(builder.add(OdometrySample{at(0.125 * i), ahead(0), kStepCovariance}).has_value());
   EXPECT_NE(message(10, 2.0F).find("2 s old"), std::string::npos);
   EXPECT_EQ(message(10, static_cast<float>(SubmapBuilder::kSweepHistoryS)), "");
 }
@@ -188,22 +189,24 @@ TEST(SubmapBuilder, ASweepOlderThanTheKnownOdometryIsRefused) {
 TEST(SubmapBuilder, BadInputIsRefusedAndChangesNothing) {
   SubmapBuilder builder(RobotId{0}, {});
   const auto message = [](const auto& result) { return result.has_value() ? std::string() : result.error().message; };
-  EXPECT_NE(message(builder.add_scan({at(0), nullptr})).find("no odometry"), std::string::npos);
-  ASSERT_TRUE(builder.add_odometry(at(0), ahead(0), kStepCovariance).has_value());
-  EXPECT_NE(message(builder.add_odometry(at(0), ahead(1), kStepCovariance)).find("does not follow"), std::string::npos);
-  EXPECT_NE(message(builder.add_odometry(at(-1), ahead(1), kStepCovariance)).find("does not follow"),
+  EXPECT_NE(message(builder.add(Scan{at(0), nullptr})).find("no odometry"), std::string::npos);
+  ASSERT_TRUE(builder.add(OdometrySample{at(0), ahead(0), kStepCovariance}).has_value());
+  EXPECT_NE(message(builder.add(OdometrySample{at(0), ahead(1), kStepCovariance})).find("does not follow"),
+            std::string::npos);
+  EXPECT_NE(message(builder.add(OdometrySample{at(-1), ahead(1), kStepCovariance})).find("does not follow"),
             std::string::npos);
   Pose3 nan = ahead(1);
   nan.translation.y() = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_FALSE(builder.add_odometry(at(1), nan, kStepCovariance).has_value());
+  EXPECT_FALSE(builder.add(OdometrySample{at(1), nan, kStepCovariance}).has_value());
   Pose3 long_quaternion = ahead(1);
   long_quaternion.rotation.coeffs() *= 1.1;
-  EXPECT_NE(message(builder.add_odometry(at(1), long_quaternion, kStepCovariance)).find("1.1"), std::string::npos);
-  EXPECT_NE(message(builder.add_odometry(at(1), ahead(1), -kStepCovariance)).find("negative variance"),
+  EXPECT_NE(message(builder.add(OdometrySample{at(1), long_quaternion, kStepCovariance})).find("1.1"),
             std::string::npos);
-  EXPECT_NE(message(builder.add_scan({at(0), std::make_shared<PointCloud>()})).find("empty"), std::string::npos);
-  EXPECT_NE(message(builder.add_scan({at(5), std::make_shared<PointCloud>()})).find("no odometry"), std::string::npos);
-  ASSERT_TRUE(builder.add_odometry(at(1), ahead(1), kStepCovariance).has_value());
+  EXPECT_NE(message(builder.add(OdometrySample{at(1), ahead(1), -kStepCovariance})).find("negative variance"),
+            std::string::npos);
+  EXPECT_NE(message(builder.add(Scan{at(0), std::make_shared<PointCloud>()})).find("empty"), std::string::npos);
+  EXPECT_NE(message(builder.add(Scan{at(5), std::make_shared<PointCloud>()})).find("no odometry"), std::string::npos);
+  ASSERT_TRUE(builder.add(OdometrySample{at(1), ahead(1), kStepCovariance}).has_value());
   builder.finish();
   const auto last = builder.take_submap();
   ASSERT_TRUE(last.has_value());
@@ -240,10 +243,10 @@ std::vector<Submap> look_around(SubmapBuilder& builder, double seconds, bool swa
   };
   for (int i = 0; i <= static_cast<int>(std::lround(seconds * 10)); ++i) {
     const double t = 0.1 * i;
-    EXPECT_TRUE(builder.add_odometry(at(t), ahead(0.5 * t), kStepCovariance).has_value());
+    EXPECT_TRUE(builder.add(OdometrySample{at(t), ahead(0.5 * t), kStepCovariance}).has_value());
     take();
     if (builder.wants_scan()) {
-      EXPECT_TRUE(builder.add_images(images_at(at(t), 0.5 * t, swapped && i % 2 == 0)).has_value());
+      EXPECT_TRUE(builder.add(images_at(at(t), 0.5 * t, swapped && i % 2 == 0)).has_value());
       take();
     }
   }
@@ -299,20 +302,20 @@ TEST(SubmapBuilder, ImagesThatContradictTheOdometryAreLeftOutAndReported) {
 
 TEST(SubmapBuilder, ImagesElsewhereThanAtAKeyframeAreRefused) {
   SubmapBuilder builder(RobotId{3}, {});
-  EXPECT_FALSE(builder.add_images(images_at(at(0.0), 0.0)).has_value());
-  ASSERT_TRUE(builder.add_odometry(at(0.0), ahead(0.0), kStepCovariance).has_value());
-  EXPECT_FALSE(builder.add_images(images_at(at(1.1), 0.0)).has_value());
-  EXPECT_TRUE(builder.add_images(images_at(at(0.0), 0.0)).has_value());
-  EXPECT_FALSE(builder.add_images(images_at(at(0.0), 0.0)).has_value());  // again
-  ASSERT_TRUE(builder.add_odometry(at(0.1), ahead(0.05), kStepCovariance).has_value());
-  EXPECT_FALSE(builder.add_images(images_at(at(0.1), 0.05)).has_value());  // no keyframe
-  ASSERT_TRUE(builder.add_odometry(at(2.0), ahead(1.0), kStepCovariance).has_value());
+  EXPECT_FALSE(builder.add(images_at(at(0.0), 0.0)).has_value());
+  ASSERT_TRUE(builder.add(OdometrySample{at(0.0), ahead(0.0), kStepCovariance}).has_value());
+  EXPECT_FALSE(builder.add(images_at(at(1.1), 0.0)).has_value());
+  EXPECT_TRUE(builder.add(images_at(at(0.0), 0.0)).has_value());
+  EXPECT_FALSE(builder.add(images_at(at(0.0), 0.0)).has_value());  // again
+  ASSERT_TRUE(builder.add(OdometrySample{at(0.1), ahead(0.05), kStepCovariance}).has_value());
+  EXPECT_FALSE(builder.add(images_at(at(0.1), 0.05)).has_value());  // no keyframe
+  ASSERT_TRUE(builder.add(OdometrySample{at(2.0), ahead(1.0), kStepCovariance}).has_value());
   TrackedImages bad = images_at(at(2.0), 1.0);
   bad.images[0].keypoints[1].track = bad.images[0].keypoints[0].track;
-  EXPECT_FALSE(builder.add_images(bad).has_value());
+  EXPECT_FALSE(builder.add(bad).has_value());
   bad = images_at(at(2.0), 1.0);
   bad.cameras = std::make_shared<const std::vector<Camera>>(2, bad.cameras->front());
-  EXPECT_FALSE(builder.add_images(bad).has_value());  // not the robot's cameras
+  EXPECT_FALSE(builder.add(bad).has_value());  // not the robot's cameras
 }
 
 }  // namespace submap_builder_test

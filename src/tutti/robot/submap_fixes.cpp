@@ -18,10 +18,9 @@ void SubmapBuilder::place_fixes() {
   waiting.erase(waiting.begin(), later);
 }
 
-Status SubmapBuilder::add_fix(const PositionFix& fix) {
+Status SubmapBuilder::hear(const PositionFix& fix) {
   const auto where = [&] { return fmt::format("robot {}: fix at {} ns", chain_.robot.value, fix.stamp.ns); };
   if (auto ok = check_fix(fix.antenna, fix.covariance, fix.p_body_antenna); !ok) return in_context(where(), ok.error());
-  if (auto ok = check_time(fix.stamp, "fix"); !ok) return ok;
   if (state_.heard_fix && fix.stamp - *state_.heard_fix < kFinestFix_s) return {};
   state_.heard_fix = fix.stamp;
   state_.waiting_fixes.push_back(fix);

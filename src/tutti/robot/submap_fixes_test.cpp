@@ -31,9 +31,10 @@ std::vector<Submap> drive(SubmapBuilder& builder, const Drive& how) {
   int sent = 0;
   for (int i = 0; i <= static_cast<int>(10 * how.seconds); ++i) {
     const double t = 0.1 * i;
-    EXPECT_TRUE(builder.add_odometry(at(t), place(t), Matrix6d::Identity() * 1e-6, t == how.jump_at_s).has_value());
+    EXPECT_TRUE(
+        builder.add(OdometryStep{at(t), place(t), Matrix6d::Identity() * 1e-6, t == how.jump_at_s}).has_value());
     for (; sent / how.fixes_hz + how.late_s <= t; ++sent)
-      EXPECT_TRUE(builder.add_fix(fix_at(sent / how.fixes_hz)).has_value());
+      EXPECT_TRUE(builder.add(fix_at(sent / how.fixes_hz)).has_value());
     while (auto submap = builder.take_submap()) out.push_back(std::move(*submap));
   }
   builder.finish();
@@ -100,24 +101,24 @@ TEST(SubmapFixes, AcrossAJumpNoneIsOnTheWrongSide) {
 
 TEST(SubmapFixes, RefusesWhatIsNoFix) {
   SubmapBuilder builder(RobotId{3}, {});
-  EXPECT_FALSE(builder.add_fix(fix_at(0.0)).has_value());  // no odometry yet
-  ASSERT_TRUE(builder.add_odometry(at(0.0), {}, Matrix6d::Identity()).has_value());
+  EXPECT_FALSE(builder.add(fix_at(0.0)).has_value());  // no odometry yet
+  ASSERT_TRUE(builder.add(OdometrySample{at(0.0), {}, Matrix6d::Identity()}).has_value());
   const double nan = std::numeric_limits<double>::quiet_NaN();
   PositionFix fix = fix_at(0.0);
   fix.antenna.latitude_deg = 91.0;
-  EXPECT_EQ(builder.add_fix(fix).error().message, "robot 3: fix at 0 ns: latitude 91 degrees, expected -90 to 90");
+  EXPECT_EQ(builder.add(fix).error().message, "robot 3: fix at 0 ns: latitude 91 degrees, expected -90 to 90");
   for (const double bad : {nan, 0.0, -1.0, 1e30}) {
     fix = fix_at(0.0);
     fix.covariance(1, 1) = bad;
-    EXPECT_FALSE(builder.add_fix(fix).has_value());
+    EXPECT_FALSE(builder.add(fix).has_value());
   }
   fix = fix_at(0.0);
   fix.covariance(0, 1) = 3.0;  // not symmetric
-  EXPECT_FALSE(builder.add_fix(fix).has_value());
+  EXPECT_FALSE(builder.add(fix).has_value());
   fix = fix_at(0.0);
   fix.p_body_antenna.x() = nan;
-  EXPECT_FALSE(builder.add_fix(fix).has_value());
-  EXPECT_FALSE(builder.add_fix(fix_at(3600.0)).has_value());  // another clock
+  EXPECT_FALSE(builder.add(fix).has_value());
+  EXPECT_FALSE(builder.add(fix_at(3600.0)).has_value());  // another clock
   EXPECT_TRUE(builder.state().waiting_fixes.empty() && builder.state().fixes.empty());
 }
 

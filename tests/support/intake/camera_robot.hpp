@@ -42,10 +42,10 @@ struct CameraRobot {
     }
     return {kStart + i * kPeriod};
   }
-  FeedSensors sensors(bool is_late = false) {
+  Sensors sensors(bool is_late = false) {
     const auto chosen = images.choose(is_late);
     EXPECT_TRUE(chosen) << chosen.error().message;
-    FeedSensors out;
+    Sensors out;
     images.describe(out);
     return out;
   }

@@ -85,8 +85,8 @@ class Site {
   void walk(int samples) {
     for (const int end = walked_ + samples; walked_ < end; ++walked_) {
       pass(0.5);
-      robot_does(robot_->add_odometry({odometry_[walked_].stamp, odometry_[walked_].pose, robot::test::kStepCovariance},
-                                      now_));
+      robot_does(robot_->add(
+          OdometrySample{odometry_[walked_].stamp, odometry_[walked_].pose, robot::test::kStepCovariance}, now_));
       settle();
     }
     say();

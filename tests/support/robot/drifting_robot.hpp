@@ -35,7 +35,7 @@ inline Trajectory drifting_odometry(int samples) {
 
 inline void feed(RobotAgent& agent, const Trajectory& odometry) {
   for (const StampedPose& sample : odometry)
-    ASSERT_TRUE(agent.add_odometry(sample.stamp, sample.pose, kStepCovariance).has_value());
+    ASSERT_TRUE(agent.add(OdometrySample{sample.stamp, sample.pose, kStepCovariance}).has_value());
 }
 
 /// The server's view of what the agent uploaded: the truth, in a frame of its own, and another robot.

@@ -22,7 +22,7 @@ Pose3 read(const v1::Feed::Pose& in) {
 FromClient read(const v1::Feed::Odometry& in) {
   const Timestamp stamp{in.stamp_ns()};
   if (!in.has_t_odom_body()) return BadSample{stamp, "an odometry sample without T_odom_body"};
-  node::OdometrySample out{.stamp = stamp, .T_odom_body = read(in.t_odom_body())};
+  OdometrySample out{.stamp = stamp, .T_odom_body = read(in.t_odom_body())};
   const auto& numbers = in.increment_covariance();
   if (numbers.size() != 6 && numbers.size() != 36)
     return BadSample{
@@ -67,8 +67,8 @@ Camera read(const v1::Feed::Camera& in) {
 
 double or_default(double value, double otherwise) { return value == 0.0 ? otherwise : value; }
 
-Result<intake::FeedSensors> read(const v1::Feed::Sensors& in) {
-  intake::FeedSensors out{.scans = in.scans(), .cameras = {}, .depth = {}, .imu = {}};
+Result<Sensors> read(const v1::Feed::Sensors& in) {
+  Sensors out{.scans = in.scans(), .cameras = {}, .depth = {}, .imu = {}};
   for (const v1::Feed::Camera& camera : in.camera()) {
     if (!v1::Feed::Camera::Kind_IsValid(camera.kind()))
       return fail(ErrorCode::unsupported, "a camera of a kind ({}) that this program does not know",
@@ -89,7 +89,7 @@ Result<intake::FeedSensors> read(const v1::Feed::Sensors& in) {
                        or_default(in.imu().accelerometer_noise_density(), usual.accelerometer_noise_density),
                        or_default(in.imu().accelerometer_random_walk(), usual.accelerometer_random_walk)};
   }
-  if (auto ok = intake::check_sensors(out); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_sensors(out); !ok) return tl::unexpected(ok.error());
   return out;
 }
 
@@ -147,12 +147,12 @@ FromClient read(v1::Feed::Hello& in) {
   return out;
 }
 
-intake::EncodedImage read(v1::Feed::Image& in) {
+EncodedImage read(v1::Feed::Image& in) {
   return {in.camera(), in.encoding() == v1::Feed::Image::RAW, std::move(*in.mutable_data())};
 }
 
 FromClient read(v1::Feed::Images& in) {
-  intake::FedImages out{.stamp = {in.stamp_ns()}, .images = {}, .depth = {}};
+  EncodedImages out{.stamp = {in.stamp_ns()}, .images = {}, .depth = {}};
   const auto is_known = [](const v1::Feed::Image& image) {
     return v1::Feed::Image::Encoding_IsValid(image.encoding());
   };
@@ -203,11 +203,11 @@ FromClient read(v1::Feed::Raw& in) {
 FromClient read(const v1::Feed::Imu& in) {
   const int samples = in.stamp_ns_size();
   const Timestamp first{samples > 0 ? in.stamp_ns(0) : 0};
-  if (samples == 0 || static_cast<std::size_t>(samples) > intake::kMaxImuSamples || in.gyro_size() != 3 * samples ||
+  if (samples == 0 || static_cast<std::size_t>(samples) > kMaxImuSamples || in.gyro_size() != 3 * samples ||
       in.accelerometer_size() != 3 * samples)
     return BadSample{first, fmt::format("{} IMU samples with {} numbers of the gyro and {} of the accelerometer, "
                                         "expected 1 to {} samples and three numbers of both for each",
-                                        samples, in.gyro_size(), in.accelerometer_size(), intake::kMaxImuSamples)};
+                                        samples, in.gyro_size(), in.accelerometer_size(), kMaxImuSamples)};
   std::vector<ImuSample> out;
   out.reserve(static_cast<std::size_t>(samples));
   for (int i = 0; i < samples; ++i) {

@@ -16,7 +16,7 @@
 namespace tutti::program {
 
 Result<std::unique_ptr<FeedClient>> FeedClient::connect(const std::string& socket, const std::string& name,
-                                                        const intake::FeedSensors& sensors, bool wants_trajectory) {
+                                                        const Sensors& sensors, bool wants_trajectory) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   if (socket.empty() || socket.size() >= sizeof address.sun_path)
@@ -52,15 +52,7 @@ Status FeedClient::send(const v1::Feed& message) {
   return {};
 }
 
-Status FeedClient::say(const node::OdometrySample& sample) { return send(internal::message_of(sample)); }
-
-Status FeedClient::say(const Scan& scan) { return send(internal::message_of(scan)); }
-
-Status FeedClient::say(const intake::FedImages& images) { return send(internal::message_of(images)); }
-
-Status FeedClient::say(const std::vector<ImuSample>& samples) { return send(internal::message_of(samples)); }
-
-Status FeedClient::say(const PositionFix& fix) { return send(internal::message_of(fix)); }
+Status FeedClient::say(const Input& input) { return send(internal::message_of(input)); }
 
 Status FeedClient::say_time() {
   v1::Feed message;

@@ -23,16 +23,12 @@ class FeedClient {
   /// Connects and sends Hello; the robot's FeedWelcome is what hear() returns first. Fails when nobody listens on
   /// `socket`.
   static Result<std::unique_ptr<FeedClient>> connect(const std::string& socket, const std::string& name,
-                                                     const intake::FeedSensors& sensors, bool wants_trajectory);
+                                                     const Sensors& sensors, bool wants_trajectory);
   ~FeedClient();
   FeedClient(const FeedClient&) = delete;
   FeedClient& operator=(const FeedClient&) = delete;
 
-  Status say(const node::OdometrySample& sample);
-  Status say(const Scan& scan);
-  Status say(const intake::FedImages& images);
-  Status say(const std::vector<ImuSample>& samples);
-  Status say(const PositionFix& fix);
+  Status say(const Input& input);
   /// Asks which sample the robot has stored by now. The clock value in the message is a dummy, so do not use it to
   /// measure an offset.
   Status say_time();

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "tutti/base/result.hpp"
-#include "tutti/intake/feed_sensors.hpp"
-#include "tutti/node/journal.hpp"
+#include "tutti/model/input.hpp"
+#include "tutti/model/sensors.hpp"
 #include "tutti/program/feed/feed_target.hpp"
 #include "tutti/program/feed/smooth_map.hpp"
 #include "tutti/robot/odometry_covariance.hpp"
@@ -66,7 +66,7 @@ struct FeedHello {
   std::uint32_t version = 0;
   std::string client;
   bool listens_only = false;
-  Result<intake::FeedSensors> sensors = intake::FeedSensors{};  ///< An error states why such sensors cannot be.
+  Result<Sensors> sensors = Sensors{};  ///< An error states why such sensors cannot be.
   /// Nanoseconds, to be added to the client's stamps; or the client's time now.
   std::optional<std::int64_t> clock_offset_ns = {}, clock_now_ns = {};
   Result<std::optional<FeedRos>> ros = std::nullopt;  ///< An error states why these cannot be.
@@ -86,8 +86,7 @@ struct BadSample {
   std::string why;
 };
 /// What a client may send.
-using FromClient = std::variant<FeedHello, node::OdometrySample, Scan, FeedEnd, intake::FedImages,
-                                std::vector<ImuSample>, FeedTime, PositionFix, Health, FeedRaw, FeedUnknown, BadSample>;
+using FromClient = std::variant<FeedHello, Input, FeedEnd, FeedTime, FeedRaw, FeedUnknown, BadSample>;
 /// Decodes untrusted bytes; an error when they are no message of the protocol.
 Result<FromClient> decode_from_client(std::string_view payload);
 

@@ -75,19 +75,19 @@ TEST(FeedFrames, SayWhatAClientSays) {
   const std::string bytes = test::odometry({{-7}, pose}, covariance);
   EXPECT_EQ(test::messages(bytes).at(0).odometry().increment_covariance(1), covariance(0, 1));
   const auto sample = decode_from_client(bytes.substr(4));
-  const auto& odometry = std::get<node::OdometrySample>(*sample);
+  const auto& odometry = *sample_in<OdometrySample>(*sample);
   EXPECT_EQ(odometry.stamp.ns, -7);
   EXPECT_EQ(odometry.T_odom_body, pose);
   EXPECT_EQ(odometry.increment_covariance, covariance);  // by rows
   const auto seen = decode_from_client(test::scan({9}, 4).substr(4));
-  EXPECT_EQ(std::get<Scan>(*seen).cloud->points.size(), 4U);
-  EXPECT_EQ(std::get<Scan>(*seen).cloud->points[1], Eigen::Vector3f(4, 5, 6));
-  EXPECT_FALSE(std::get<Scan>(*seen).age_s);
+  EXPECT_EQ(sample_in<Scan>(*seen)->cloud->points.size(), 4U);
+  EXPECT_EQ(sample_in<Scan>(*seen)->cloud->points[1], Eigen::Vector3f(4, 5, 6));
+  EXPECT_FALSE(sample_in<Scan>(*seen)->age_s);
   v1::Feed diagonal;
   test::write(pose, *diagonal.mutable_odometry()->mutable_t_odom_body());
   for (int i = 1; i <= 6; ++i) diagonal.mutable_odometry()->add_increment_covariance(i);
   const auto of_diagonal = decode_from_client(diagonal.SerializeAsString());
-  EXPECT_EQ(std::get<node::OdometrySample>(*of_diagonal).increment_covariance,
+  EXPECT_EQ(sample_in<OdometrySample>(*of_diagonal)->increment_covariance,
             Matrix6d(Vector6d(1, 2, 3, 4, 5, 6).asDiagonal()));
 }
 

@@ -14,41 +14,17 @@
 namespace tutti::program {
 namespace {
 
-std::size_t scan_bytes_of(const FeedInput& input) {
-  const auto* scan = std::get_if<Scan>(&input);
-  if (scan == nullptr) return 0;
-  const std::size_t ages = scan->age_s ? scan->age_s->size() : 0;
-  return scan->cloud->points.size() * sizeof(Eigen::Vector3f) + ages * sizeof(float);
-}
-
-std::size_t image_bytes_of(const FeedInput& input) {
-  const auto* images = std::get_if<std::shared_ptr<const intake::FedImages>>(&input);
-  return images == nullptr ? 0 : intake::bytes_of(**images);
-}
-
-bool is_odometry(const FeedInput& input) { return std::holds_alternative<node::OdometrySample>(input); }
-
 /// One sample with the motion of both. Both were taken, so both are usable.
-node::OdometrySample joined(const node::OdometrySample& first, const node::OdometrySample& second) {
-  const auto usable = [](const node::OdometrySample& sample) {
-    return robot::usable_step({}, sample.stamp, sample.T_odom_body, sample.increment_covariance).value();
-  };
+OdometrySample joined(const OdometrySample& first, const OdometrySample& second) {
+  const auto usable = [](const OdometrySample& sample) { return robot::usable_step({}, sample).value(); };
   return {second.stamp, second.T_odom_body, robot::joined(usable(first), usable(second)).covariance};
 }
 
 }  // namespace
 
 Timestamp stamp_of(const FeedInput& input) {
-  struct Stamp {
-    Timestamp operator()(const node::OdometrySample& sample) const { return sample.stamp; }
-    Timestamp operator()(const Scan& scan) const { return scan.stamp; }
-    Timestamp operator()(const std::shared_ptr<const intake::FedImages>& images) const { return images->stamp; }
-    Timestamp operator()(const PositionFix& fix) const { return fix.stamp; }
-    Timestamp operator()(const FeedEnded&) const { return {}; }
-    Timestamp operator()(const std::shared_ptr<const intake::FeedSensors>&) const { return {}; }
-    Timestamp operator()(const FeedAnew&) const { return {}; }
-  };
-  return std::visit(Stamp{}, input);  // does not compile with a kind of input that is not named above
+  const auto* of_robot = std::get_if<Input>(&input);
+  return of_robot == nullptr ? Timestamp{} : stamp_of(*of_robot);
 }
 
 FeedFront::FeedFront(FeedState robot, const Limits& limits)
@@ -60,16 +36,21 @@ FeedFront::FeedFront(FeedState robot, const Limits& limits)
   localiser_.correct(robot_.watch, robot_.covariance);
 }
 
-Status FeedFront::add_odometry(const node::OdometrySample& sample) {
+Status FeedFront::add(Input input) {
   const std::scoped_lock lock(mutex_);
-  if (closed_) return fail(ErrorCode::io, "the robot's program ends");
+  if (closed_ && !std::holds_alternative<Health>(input)) return fail(ErrorCode::io, "the robot's program ends");
+  Status taken = std::visit([this](auto& sample) { return hear(sample); }, input);
+  fed_.notify_one();
+  return taken;
+}
+
+Status FeedFront::hear(OdometrySample& sample) {
   auto passed = gate_.take(sample);
   if (!passed) return tl::unexpected(passed.error());
   if (!passed->why_anew.empty()) begin_anew(std::move(passed->why_anew));
   if (passed->waited)
     if (Status ok = take(*passed->waited); !ok) return ok;
   if (Status ok = take(sample); !ok) return ok;
-  fed_.notify_one();
   if (waiting() > limits_.inputs) {
     note_behind(sample.stamp);
     thin();
@@ -77,23 +58,22 @@ Status FeedFront::add_odometry(const node::OdometrySample& sample) {
   return {};
 }
 
-Status FeedFront::take(const node::OdometrySample& sample) {
+Status FeedFront::take(const OdometrySample& sample) {
   const auto has_jumped = localiser_.add(sample);
   if (!has_jumped) return tl::unexpected(has_jumped.error());
   if (*has_jumped) jumps_.insert(sample.stamp);
   ended_ = false;
   push(sample);
-  release_images();
+  release();
   return {};
 }
 
 /// Until the robot has begun its new session, nothing that it reports is about what is fed now.
 void FeedFront::begin_anew(std::string why) {
-  release_images(true);
+  release(true);
   push(FeedAnew{std::move(why)});
   ++anew_;
-  newest_images_.reset();
-  newest_fix_.reset();
+  newest_ = {};
   imu_.clear();
   FeedState anew;
   anew.chain = robot_.chain;
@@ -106,48 +86,30 @@ void FeedFront::begin_anew(std::string why) {
   localiser_.correct(robot_.watch, robot_.covariance);
 }
 
-Status FeedFront::add_scan(const Scan& scan) {
-  const std::scoped_lock lock(mutex_);
-  if (closed_) return fail(ErrorCode::io, "the robot's program ends");
-  if (!scan.cloud) return fail(ErrorCode::invalid, "scan at {} ns has no cloud", scan.stamp.ns);
-  const std::size_t bytes = scan_bytes_of(scan);
-  if (scan_bytes_ + bytes > limits_.scan_bytes || waiting() >= limits_.inputs / 2) {
-    note_behind(scan.stamp);
-    ++scans_left_out_;
-    return fail(ErrorCode::io,
-                "the map is behind: {} inputs with {} bytes of scans wait, at most {} with {}; the scan at {} ns is "
-                "left out",
-                waiting(), scan_bytes_, limits_.inputs / 2, limits_.scan_bytes, scan.stamp.ns);
-  }
-  scan_bytes_ += bytes;
-  push(scan);
-  fed_.notify_one();
-  return {};
-}
-
 Status FeedFront::finish() {
   const std::scoped_lock lock(mutex_);
   if (closed_) return fail(ErrorCode::io, "the robot's program ends");
-  release_images(true);
+  release(true);
   push(FeedEnded{});
   fed_.notify_one();
   return {};
 }
 
 void FeedFront::note_behind(Timestamp stamp) {
-  if (samples_joined_ + scans_left_out_ + images_left_out_ == 0) behind_since_ = stamp;
+  const Load now{0, left_out_[index_of<Scan>()], samples_joined_, left_out_[index_of<EncodedImages>()]};
+  if (now == Load{}) behind_since_ = stamp;
 }
 
 /// Two samples that are closer than finest_s_ become one, as in SensorTimeline::add(); never across a jump.
-void FeedFront::push(FeedInput input) {
-  const auto* sample = std::get_if<node::OdometrySample>(&input);
+void FeedFront::push_back(Queued input) {
+  const auto* sample = sample_in<OdometrySample>(*input);
   if (sample != nullptr && waiting() >= 2) {
-    const auto* last = std::get_if<node::OdometrySample>(&inputs_.back());
-    const auto* before = std::get_if<node::OdometrySample>(&inputs_[inputs_.size() - 2]);
-    const auto jumps = [&](const node::OdometrySample& one) { return jumps_.contains(one.stamp); };
+    const auto* last = sample_in<OdometrySample>(*inputs_.back());
+    const auto* before = sample_in<OdometrySample>(*inputs_[inputs_.size() - 2]);
+    const auto jumps = [&](const OdometrySample& one) { return jumps_.contains(one.stamp); };
     if (last != nullptr && before != nullptr && sample->stamp - before->stamp < finest_s_ && !jumps(*last) &&
         !jumps(*sample)) {
-      inputs_.back() = joined(*last, *sample);
+      inputs_.back() = std::make_shared<const FeedInput>(joined(*last, *sample));
       ++samples_joined_;
       return;
     }
@@ -161,17 +123,17 @@ void FeedFront::thin() {
   double span_s = 0.0;
   std::size_t first = inputs_.size();  // where the odometry of a session begins
   for (std::size_t i = taken_; i < inputs_.size(); ++i) {
-    if (std::holds_alternative<FeedAnew>(inputs_[i])) first = inputs_.size();
-    if (!is_odometry(inputs_[i])) continue;
+    if (std::holds_alternative<FeedAnew>(*inputs_[i])) first = inputs_.size();
+    if (!sample_in<OdometrySample>(*inputs_[i])) continue;
     first = std::min(first, i);
-    span_s = std::max(span_s, stamp_of(inputs_[i]) - stamp_of(inputs_[first]));
+    span_s = std::max(span_s, stamp_of(*inputs_[i]) - stamp_of(*inputs_[first]));
   }
   finest_s_ = std::max(2.0 * finest_s_, 2.0 * span_s / static_cast<double>(limits_.inputs));
   while (waiting() > limits_.inputs / 4 * 3 && finest_s_ < 4.0 * span_s) {
-    std::deque<FeedInput> all = std::exchange(inputs_, {});
+    std::deque<Queued> all = std::exchange(inputs_, {});
     const auto of_robot = all.begin() + static_cast<std::ptrdiff_t>(taken_);
     inputs_.assign(std::make_move_iterator(all.begin()), std::make_move_iterator(of_robot));
-    for (auto input = of_robot; input != all.end(); ++input) push(std::move(*input));
+    for (auto input = of_robot; input != all.end(); ++input) push_back(std::move(*input));
     finest_s_ *= 2.0;
   }
 }
@@ -195,11 +157,12 @@ FeedState FeedFront::state() const {
     const Timestamp since = localiser_.newest() ? localiser_.newest()->stamp : Timestamp{};
     out.alerts.push_back({refused, since, since, since});
   }
-  if (scans_left_out_ + samples_joined_ + images_left_out_ > 0) {
+  const std::size_t scans = left_out_[index_of<Scan>()], images = left_out_[index_of<EncodedImages>()];
+  if (scans + samples_joined_ + images > 0) {
     const std::string text = fmt::format("the map is behind what is fed, localisation goes on: {}are left out{}",
-                                         images_left_out_ == 0  ? "scans "
-                                         : scans_left_out_ == 0 ? "images "
-                                                                : "scans and images ",
+                                         images == 0  ? "scans "
+                                         : scans == 0 ? "images "
+                                                      : "scans and images ",
                                          samples_joined_ > 0 ? ", odometry is taken together" : "");
     out.alerts.push_back({text, behind_since_, behind_since_, behind_since_});
   }
@@ -236,10 +199,10 @@ std::vector<FeedTrajectory> FeedFront::take_trajectories() {
   return out;
 }
 
-std::optional<FeedInput> FeedFront::take(double wall_s) {
+std::shared_ptr<const FeedInput> FeedFront::take(double wall_s) {
   std::unique_lock lock(mutex_);
   const auto has_more = [&] { return inputs_.size() > taken_; };
-  if (!fed_.wait_for(lock, std::chrono::duration<double>(wall_s), has_more)) return std::nullopt;
+  if (!fed_.wait_for(lock, std::chrono::duration<double>(wall_s), has_more)) return nullptr;
   in_hand_ = true;
   return inputs_[taken_++];
 }
@@ -249,7 +212,7 @@ void FeedFront::note_heard() {
   in_hand_ = false;
 }
 
-std::shared_ptr<const intake::FeedSensors> FeedFront::sensors() const {
+std::shared_ptr<const Sensors> FeedFront::sensors() const {
   const std::scoped_lock lock(mutex_);
   return sensors_;
 }
@@ -264,24 +227,29 @@ bool FeedFront::is_drained() const {
   return taken_ == inputs_.size();
 }
 
+void FeedFront::free_bytes_of(const FeedInput& input) {
+  if (const auto* of_robot = std::get_if<Input>(&input)) bytes_[of_robot->index()] -= bytes_of(*of_robot);
+}
+
 void FeedFront::note_stored() {
-  std::vector<FeedInput> stored;  // which are freed while nobody waits
+  std::vector<Queued> stored;  // which are freed while nobody waits
   const std::scoped_lock lock(mutex_);
   for (; taken_ > 0; --taken_) {
-    if (!std::holds_alternative<std::shared_ptr<const intake::FeedSensors>>(inputs_.front()))
-      ended_ = std::holds_alternative<FeedEnded>(inputs_.front());
-    if (const auto* sample = std::get_if<node::OdometrySample>(&inputs_.front())) stored_ = sample->stamp;
-    if (std::holds_alternative<FeedAnew>(inputs_.front())) {
+    const FeedInput& input = *inputs_.front();
+    if (!std::holds_alternative<std::shared_ptr<const Sensors>>(input))
+      ended_ = std::holds_alternative<FeedEnded>(input);
+    if (const auto* sample = sample_in<OdometrySample>(input)) stored_ = sample->stamp;
+    if (std::holds_alternative<FeedAnew>(input)) {
       stored_.reset();
       --anew_;
     }
-    scan_bytes_ -= scan_bytes_of(inputs_.front());
-    image_bytes_ -= image_bytes_of(inputs_.front());
+    free_bytes_of(input);
     stored.push_back(std::move(inputs_.front()));
     inputs_.pop_front();
   }
   if (!inputs_.empty()) return;
-  scans_left_out_ = samples_joined_ = images_left_out_ = 0;
+  left_out_ = {};
+  samples_joined_ = 0;
   finest_s_ = 0.0;
   jumps_.clear();
 }
@@ -292,24 +260,25 @@ void FeedFront::begin_again(const std::optional<Timestamp>& stored) {
   taken_ = 0;
   stored_ = stored;
   bool is_of_robot = true;  // and not of the session that it begins next
-  std::erase_if(inputs_, [&](const FeedInput& input) {
-    is_of_robot = is_of_robot && !std::holds_alternative<FeedAnew>(input);
-    return is_of_robot && is_odometry(input) && stored && stamp_of(input) <= *stored;
+  std::erase_if(inputs_, [&](const Queued& input) {
+    is_of_robot = is_of_robot && !std::holds_alternative<FeedAnew>(*input);
+    const auto* sample = sample_in<OdometrySample>(*input);
+    return is_of_robot && sample != nullptr && stored && sample->stamp <= *stored;
   });
 }
 
 /// The last one taken made the robot go.
 void FeedFront::leave_out_what_fails() {
   const auto input = inputs_.begin() + static_cast<std::ptrdiff_t>(taken_ - 1);
-  if (failed_.kind != input->index() || failed_.stamp != stamp_of(*input)) failed_ = {input->index(), stamp_of(*input)};
-  if (++failed_.times < limits_.tries) return;
-  refusals_.push_back({stamp_of(*input), fmt::format("left out: the robot's program failed {} times with it, which is "
-                                                     "a defect of it",
-                                                     failed_.times)});
-  scan_bytes_ -= scan_bytes_of(*input);
-  image_bytes_ -= image_bytes_of(*input);
+  failures_ = failed_ == *input ? failures_ + 1 : 1;
+  failed_ = *input;
+  if (failures_ < limits_.tries) return;
+  refusals_.push_back({stamp_of(**input), fmt::format("left out: the robot's program failed {} times with it, which is "
+                                                      "a defect of it",
+                                                      failures_)});
+  free_bytes_of(**input);
   inputs_.erase(input);
-  failed_ = {};
+  failed_.reset();
 }
 
 void FeedFront::refuse(Timestamp stamp, std::string why) {
@@ -350,18 +319,21 @@ bool FeedFront::has_ended() const {
 
 FeedFront::Load FeedFront::load() const {
   const std::scoped_lock lock(mutex_);
-  return {inputs_.size() - taken_, scans_left_out_, samples_joined_, images_left_out_};
+  return {inputs_.size() - taken_, left_out_[index_of<Scan>()], samples_joined_, left_out_[index_of<EncodedImages>()]};
 }
 
 bool FeedFront::is_filling() const {
   const std::scoped_lock lock(mutex_);
-  return inputs_.size() > limits_.inputs / 4 || scan_bytes_ > limits_.scan_bytes / 4 ||
-         image_bytes_ > limits_.image_bytes / 4;
+  return inputs_.size() > limits_.inputs / 4 || bytes_[index_of<Scan>()] > limits_.scan_bytes / 4 ||
+         bytes_[index_of<EncodedImages>()] > limits_.image_bytes / 4;
 }
 
 FeedFront::Figures FeedFront::figures() const {
   const std::scoped_lock lock(mutex_);
-  return {images_taken_, images_refused_, imu_taken_, imu_refused_, fixes_taken_, fixes_refused_, image_bytes_};
+  constexpr std::size_t kImages = index_of<EncodedImages>(), kImu = index_of<ImuSamples>(),
+                        kFixes = index_of<PositionFix>();
+  return {heard_[kImages], refused_[kImages], heard_[kImu],   refused_[kImu],
+          heard_[kFixes],  refused_[kFixes],  bytes_[kImages]};
 }
 
 }  // namespace tutti::program

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
@@ -25,11 +26,10 @@ struct FeedEnded {};
 struct FeedAnew {
   std::string why;
 };
-/// An input for the robot, cheap to copy. Sensors mean that later inputs are of these sensors.
-using FeedInput = std::variant<node::OdometrySample, Scan, FeedEnded, std::shared_ptr<const intake::FedImages>,
-                               std::shared_ptr<const intake::FeedSensors>, PositionFix, FeedAnew>;
+/// What the robot is handed. Sensors mean that later inputs are of these sensors.
+using FeedInput = std::variant<Input, FeedEnded, std::shared_ptr<const Sensors>, FeedAnew>;
 
-/// The input's stamp; zero for kinds that have none.
+/// The input's stamp; zero for what has none.
 Timestamp stamp_of(const FeedInput& input);
 
 /// Stands between a live feed and its robot, each of which runs in a thread of its own; every call may be made from
@@ -56,13 +56,8 @@ class FeedFront final : public FeedTarget {
   FeedFront(FeedState robot, const Limits& limits);
 
   // For the feed.
-  Status add_odometry(const node::OdometrySample& sample) override;
-  Status add_scan(const Scan& scan) override;
-  void set_sensors(const intake::FeedSensors& sensors) override;
-  Status add_images(intake::FedImages images) override;
-  Status add_imu(const std::vector<ImuSample>& samples) override;
-  Status add_fix(const PositionFix& fix) override;
-  void set_health(const Health& health) override;
+  Status add(Input input) override;
+  void set_sensors(const Sensors& sensors) override;
   Status finish() override;
   [[nodiscard]] FeedState state() const override;
   std::vector<FeedRefusal> take_refusals() override;
@@ -70,12 +65,12 @@ class FeedFront final : public FeedTarget {
   std::vector<FeedTrajectory> take_trajectories() override;
 
   // For the robot.
-  /// The next input, or nothing when none came within `wall_s` of wall time. Until note_heard() it counts as being
-  /// worked on, so that an input that makes the robot fail can be found.
-  std::optional<FeedInput> take(double wall_s);
+  /// The next input, or null when none came within `wall_s` of wall time. Until note_heard() it counts as being worked
+  /// on, so that an input that makes the robot fail can be found.
+  std::shared_ptr<const FeedInput> take(double wall_s);
   void note_heard();
   /// What inputs from now on come from; never null.
-  [[nodiscard]] std::shared_ptr<const intake::FeedSensors> sensors() const;
+  [[nodiscard]] std::shared_ptr<const Sensors> sensors() const;
   /// imu_over() the IMU samples that are kept.
   [[nodiscard]] std::vector<ImuSample> imu(Timestamp from, Timestamp until) const;
   /// The robot has taken every input.
@@ -123,28 +118,35 @@ class FeedFront final : public FeedTarget {
     std::size_t image_bytes = 0;  ///< Bytes of the images that wait now.
   };
   [[nodiscard]] Figures figures() const;
-  static constexpr double kAhead_s = 1.0;  ///< Images, IMU samples and fixes farther ahead of odometry are refused.
   static constexpr double kImuPatience_s = 0.2;  ///< Images wait for the IMU until odometry is this far past them.
 
  private:
   [[nodiscard]] std::size_t waiting() const { return inputs_.size() - taken_; }
-  Status take(const node::OdometrySample& sample);
+  Status hear(OdometrySample& sample);
+  Status hear(Scan& scan) { return hear_sensor(std::move(scan)); }
+  Status hear(EncodedImages& images);
+  Status hear(TrackedImages& images);
+  Status hear(ImuSamples& samples);
+  Status hear(PositionFix& fix) { return hear_sensor(fix); }
+  Status hear(Health& health);
+  Status hear_sensor(Input input);
+  Status take(const OdometrySample& sample);
   void begin_anew(std::string why);
-  void push(FeedInput input);
+  using Queued = std::shared_ptr<const FeedInput>;
+  void push(FeedInput input) { push_back(std::make_shared<const FeedInput>(std::move(input))); }
+  void push_back(Queued input);
   void note_behind(Timestamp stamp);
-  [[nodiscard]] bool is_ahead(Timestamp stamp) const;
-  Status may_wait(const intake::FedImages& images) const;
-  Status may_wait(const PositionFix& fix) const;
-  void release_images(bool all = false);
+  [[nodiscard]] bool is_ahead(Timestamp stamp, const InputKind& kind) const;
+  [[nodiscard]] Status may_wait(const Input& input) const;
+  [[nodiscard]] std::size_t most_bytes(const Input& input) const;
+  void free_bytes_of(const FeedInput& input);
+  void release(bool all = false);
   void thin();
   void leave_out_what_fails();
 
-  /// The input with which the robot's program failed last, and how often.
-  struct Failed {
-    std::size_t kind = 0;  ///< FeedInput::index()
-    Timestamp stamp;
-    int times = 0;
-  };
+  /// By Input::index().
+  template <class T>
+  using OfKinds = std::array<T, kInputKinds.size()>;
 
   const Limits limits_;
   mutable std::mutex mutex_;
@@ -152,24 +154,24 @@ class FeedFront final : public FeedTarget {
   FeedState robot_;          // as it was published
   node::OdometryGate gate_;  // before localiser_
   Localiser localiser_;
-  std::deque<FeedInput> inputs_;
-  std::size_t taken_ = 0;       // of them, from the front
-  std::size_t anew_ = 0;        // of them, how many FeedAnew
-  std::size_t scan_bytes_ = 0;  // in them
-  std::shared_ptr<const intake::FeedSensors> sensors_ = std::make_shared<const intake::FeedSensors>();
-  std::deque<std::shared_ptr<const intake::FedImages>> images_;  // that wait for odometry or the IMU
-  std::size_t image_bytes_ = 0;                                  // in them and in inputs_
-  std::optional<Timestamp> newest_images_, newest_fix_;
+  std::deque<Queued> inputs_;
+  std::size_t taken_ = 0;            // of them, from the front
+  std::size_t anew_ = 0;             // of them, how many FeedAnew
+  std::deque<Queued> held_;          // what waits for odometry or the IMU (Needs::odometry_and_imu)
+  OfKinds<std::size_t> bytes_{};     // in them and in inputs_
+  OfKinds<std::size_t> left_out_{};  // since all was taken last
+  OfKinds<std::optional<Timestamp>> newest_;
+  std::shared_ptr<const Sensors> sensors_ = std::make_shared<const Sensors>();
   std::deque<ImuSample> imu_;
-  std::uint64_t images_taken_ = 0, images_refused_ = 0, imu_taken_ = 0, imu_refused_ = 0, fixes_taken_ = 0,
-                fixes_refused_ = 0;
+  OfKinds<std::uint64_t> heard_{}, refused_{};
   bool in_hand_ = false;  // the last one taken, and not got through
-  Failed failed_;
+  Queued failed_;         // the input with which the robot's program failed last,
+  int failures_ = 0;      // and how often
   std::optional<Timestamp> stored_;
   std::vector<FeedRefusal> refusals_;
-  std::size_t scans_left_out_ = 0, samples_joined_ = 0, images_left_out_ = 0;  // since all was taken last
-  double finest_s_ = 0.0;                                                      // samples that are closer are one
-  std::set<Timestamp> jumps_;  // samples before which odometry has jumped
+  std::size_t samples_joined_ = 0;  // since all was taken last
+  double finest_s_ = 0.0;           // samples that are closer are one
+  std::set<Timestamp> jumps_;       // samples before which odometry has jumped
   Timestamp behind_since_;
   bool wants_trajectory_ = false;
   std::deque<FeedTrajectory> trajectories_;

@@ -16,9 +16,7 @@ namespace feed_front_fixes_test {
 
 const Trajectory kOdometry = robot::test::drifting_odometry(200);
 
-node::OdometrySample sample(std::size_t i) {
-  return {kOdometry[i].stamp, kOdometry[i].pose, robot::test::kStepCovariance};
-}
+OdometrySample sample(std::size_t i) { return {kOdometry[i].stamp, kOdometry[i].pose, robot::test::kStepCovariance}; }
 PositionFix fix(Timestamp stamp) {
   return {.stamp = stamp, .antenna = {46.5, 7.9, 600.0}, .p_body_antenna = {0.3, 0.0, 1.2}};
 }
@@ -28,11 +26,8 @@ std::string why(const Status& status) { return status ? "" : status.error().mess
 std::vector<std::string> work(FeedFront& front, test::NodeTarget& robot) {
   std::vector<std::string> out;
   while (const auto input = front.take(0.0)) {
-    const auto* odometry = std::get_if<node::OdometrySample>(&*input);
-    const auto* fix = std::get_if<PositionFix>(&*input);
-    const Status taken = odometry != nullptr ? robot.add_odometry(*odometry)
-                         : fix != nullptr    ? robot.add_fix(*fix)
-                                             : robot.finish();
+    const auto* of_robot = std::get_if<Input>(&*input);
+    const Status taken = of_robot != nullptr ? robot.add(*of_robot) : robot.finish();
     if (!taken) out.push_back(taken.error().message);
     front.note_heard();
   }
@@ -52,11 +47,11 @@ TEST(FeedFrontFixes, GarbageIsRefusedAtOnceAndOdometryGoesOn) {
   test::NodeTarget robot;
   FeedFront front(robot.state(), {});
   const auto expect = [&](const PositionFix& of, const std::string& part) {
-    const std::string refusal = why(front.add_fix(of));
+    const std::string refusal = why(front.add(of));
     EXPECT_NE(refusal.find(part), std::string::npos) << part << ": " << refusal;
   };
   expect(fix(kOdometry[0].stamp), "no odometry within 1 s before");
-  ASSERT_TRUE(front.add_odometry(sample(0)));
+  ASSERT_TRUE(front.add(sample(0)));
   const Timestamp now = kOdometry[0].stamp;
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const auto spoilt = [&](auto&& spoil) {
@@ -72,11 +67,11 @@ TEST(FeedFrontFixes, GarbageIsRefusedAtOnceAndOdometryGoesOn) {
   expect(spoilt([&](PositionFix& f) { f.covariance(0, 1) = f.covariance(1, 0) = 1e3; }), "positive semidefinite");
   expect(spoilt([&](PositionFix& f) { f.covariance(0, 1) = nan; }), "positive semidefinite");
   expect(spoilt([&](PositionFix& f) { f.p_body_antenna.y() = nan; }), "antenna nan m from the body");
-  EXPECT_EQ(why(front.add_fix(fix(now))), "");
+  EXPECT_EQ(why(front.add(fix(now))), "");
   expect(fix(now), "there was one at 1700000000000000000 ns, stamps must increase");
   expect(fix(now + -0.1), "stamps must increase");
   expect(fix(now + 3600.0), "no odometry within 1 s before");
-  for (std::size_t i = 1; i < 100; ++i) ASSERT_TRUE(front.add_odometry(sample(i)));
+  for (std::size_t i = 1; i < 100; ++i) ASSERT_TRUE(front.add(sample(i)));
   EXPECT_TRUE(work(front, robot).empty());
   EXPECT_EQ(front.figures().fixes, 1U);
   EXPECT_EQ(front.figures().fixes_left_out, 12U);
@@ -87,9 +82,9 @@ TEST(FeedFrontFixes, GarbageIsRefusedAtOnceAndOdometryGoesOn) {
 TEST(FeedFrontFixes, WhatComesTooLateIsRefusedLater) {
   test::NodeTarget robot;
   FeedFront front(robot.state(), {});
-  for (std::size_t i = 0; i < 20; ++i) ASSERT_TRUE(front.add_odometry(sample(i)));
-  EXPECT_EQ(why(front.add_fix(fix(kOdometry[5].stamp))), "");
-  EXPECT_EQ(why(front.add_fix(fix(kOdometry[19].stamp + -0.7))), "");  // as receivers are
+  for (std::size_t i = 0; i < 20; ++i) ASSERT_TRUE(front.add(sample(i)));
+  EXPECT_EQ(why(front.add(fix(kOdometry[5].stamp))), "");
+  EXPECT_EQ(why(front.add(fix(kOdometry[19].stamp + -0.7))), "");  // as receivers are
   const auto refused = work(front, robot);
   ASSERT_EQ(refused.size(), 1U);
   EXPECT_NE(refused[0].find("too late, or its clock is another one"), std::string::npos) << refused[0];
@@ -103,8 +98,8 @@ TEST(FeedFrontFixes, AHundredASecondAreThinnedAndHarmNothing) {
     test::NodeTarget robot;
     FeedFront front(robot.state(), {});
     for (std::size_t i = 0; i < kSamples; ++i) {
-      ASSERT_TRUE(front.add_odometry(sample(i)));
-      for (int k = 0; k < hz / 2; ++k) ASSERT_EQ(why(front.add_fix(fix(kOdometry[i].stamp + k / double(hz)))), "");
+      ASSERT_TRUE(front.add(sample(i)));
+      for (int k = 0; k < hz / 2; ++k) ASSERT_EQ(why(front.add(fix(kOdometry[i].stamp + k / double(hz)))), "");
       if (i % 10 == 9) {
         EXPECT_TRUE(work(front, robot).empty());
       }
@@ -130,9 +125,9 @@ TEST(FeedFrontFixes, OfARobotThatIsBehindTheyAreLeftOutBeforeOdometryIs) {
   FeedFront front(robot.state(), {.inputs = 40});
   std::size_t refused = 0;
   for (std::size_t i = 0; i < kOdometry.size(); ++i) {
-    ASSERT_TRUE(front.add_odometry(sample(i)));
+    ASSERT_TRUE(front.add(sample(i)));
     for (int k = 0; k < 5; ++k) {
-      const std::string refusal = why(front.add_fix(fix(kOdometry[i].stamp + 0.1 * k)));
+      const std::string refusal = why(front.add(fix(kOdometry[i].stamp + 0.1 * k)));
       if (refusal.empty()) continue;
       EXPECT_EQ(refusal.find("the map is behind: "), 0U) << refusal;
       ++refused;

@@ -11,22 +11,19 @@
 namespace tutti::program {
 namespace feed_front_images_test {
 
-using ImageSet = std::shared_ptr<const intake::FedImages>;
 const Trajectory kOdometry = robot::test::drifting_odometry(20);
 
-node::OdometrySample sample(std::size_t i) {
-  return {kOdometry[i].stamp, kOdometry[i].pose, robot::test::kStepCovariance};
-}
+OdometrySample sample(std::size_t i) { return {kOdometry[i].stamp, kOdometry[i].pose, robot::test::kStepCovariance}; }
 
 /// One camera of 8 x 4 pixels, with an IMU.
-intake::FeedSensors eyes() {
-  intake::FeedSensors out;
+Sensors eyes() {
+  Sensors out;
   out.cameras.resize(1);
   out.cameras[0].model = {.width_px = 8, .height_px = 4, .fx = 5.0, .fy = 5.0, .cx = 3.5, .cy = 1.5};
   out.imu = ImuNoise{};
   return out;
 }
-intake::FedImages images(Timestamp stamp) { return {stamp, {{0, true, std::string(32, 'x')}}, {}}; }
+EncodedImages images(Timestamp stamp) { return {stamp, {{0, true, std::string(32, 'x')}}, {}}; }
 std::vector<ImuSample> imu(Timestamp stamp) { return {{.stamp = stamp}}; }
 
 /// What the robot is given next: o, i, s (what is fed), or nothing.
@@ -34,9 +31,7 @@ char next(FeedFront& front) {
   const auto input = front.take(0.0);
   if (!input) return ' ';
   front.note_heard();
-  return std::holds_alternative<node::OdometrySample>(*input) ? 'o'
-         : std::holds_alternative<ImageSet>(*input)           ? 'i'
-                                                              : 's';
+  return sample_in<OdometrySample>(*input) ? 'o' : sample_in<EncodedImages>(*input) ? 'i' : 's';
 }
 
 /// The lock that odometry's answer needs is held for no copy of what an image set has.
@@ -44,49 +39,49 @@ TEST(FeedFrontImages, AreNotCopied) {
   FeedFront front(test::NodeTarget().state(), {});
   front.set_sensors(eyes());
   EXPECT_EQ(next(front), 's');
-  EXPECT_TRUE(front.add_odometry(sample(0)));
+  EXPECT_TRUE(front.add(sample(0)));
   EXPECT_EQ(next(front), 'o');
-  intake::FedImages fed = images(kOdometry[0].stamp);
+  EncodedImages fed = images(kOdometry[0].stamp);
   const char* const bytes = fed.images[0].bytes.data();
-  EXPECT_TRUE(front.add_images(std::move(fed)));
-  EXPECT_TRUE(front.add_imu(imu(kOdometry[0].stamp)));
+  EXPECT_TRUE(front.add(std::move(fed)));
+  EXPECT_TRUE(front.add(imu(kOdometry[0].stamp)));
   const auto taken = front.take(0.0);
-  ASSERT_TRUE(taken && std::holds_alternative<ImageSet>(*taken));
-  EXPECT_EQ(std::get<ImageSet>(*taken)->images[0].bytes.data(), bytes);
+  ASSERT_TRUE(taken && sample_in<EncodedImages>(*taken));
+  EXPECT_EQ(sample_in<EncodedImages>(*taken)->images[0].bytes.data(), bytes);
   front.note_heard();
   front.begin_again(kOdometry[0].stamp);  // the robot fails, and is handed them again
   EXPECT_EQ(next(front), 's');
   const auto again = front.take(0.0);
-  ASSERT_TRUE(again && std::holds_alternative<ImageSet>(*again));
-  EXPECT_EQ(std::get<ImageSet>(*again)->images[0].bytes.data(), bytes);
+  ASSERT_TRUE(again && sample_in<EncodedImages>(*again));
+  EXPECT_EQ(sample_in<EncodedImages>(*again)->images[0].bytes.data(), bytes);
 }
 
 TEST(FeedFrontImages, ImagesComeWhenOdometryAndTheImuHaveReachedThem) {
   FeedFront front(test::NodeTarget().state(), {});
   front.set_sensors(eyes());
   EXPECT_EQ(next(front), 's');
-  EXPECT_FALSE(front.add_images(images(kOdometry[0].stamp)));  // nobody knows yet where that is
-  EXPECT_TRUE(front.add_odometry(sample(0)));
+  EXPECT_FALSE(front.add(images(kOdometry[0].stamp)));  // nobody knows yet where that is
+  EXPECT_TRUE(front.add(sample(0)));
   EXPECT_EQ(next(front), 'o');
   const Timestamp between = kOdometry[1].stamp + -0.05;
-  EXPECT_TRUE(front.add_images(images(between)));
+  EXPECT_TRUE(front.add(images(between)));
   EXPECT_EQ(next(front), ' ');
-  EXPECT_TRUE(front.add_imu(imu(kOdometry[0].stamp)));
-  EXPECT_TRUE(front.add_odometry(sample(1)));
+  EXPECT_TRUE(front.add(imu(kOdometry[0].stamp)));
+  EXPECT_TRUE(front.add(sample(1)));
   EXPECT_EQ(next(front), 'o');
   EXPECT_EQ(next(front), ' ');
-  EXPECT_TRUE(front.add_imu(imu(between + 0.001)));
+  EXPECT_TRUE(front.add(imu(between + 0.001)));
   EXPECT_EQ(next(front), 'i');
   EXPECT_EQ(front.imu(kOdometry[0].stamp, between).size(), 2U);
-  EXPECT_FALSE(front.add_images(images(between)));  // again
-  EXPECT_TRUE(front.add_images(images(kOdometry[1].stamp)));
+  EXPECT_FALSE(front.add(images(between)));  // again
+  EXPECT_TRUE(front.add(images(kOdometry[1].stamp)));
   std::size_t i = 2;  // the IMU is not heard any more: it is not waited for
   for (; kOdometry[i].stamp - kOdometry[1].stamp < FeedFront::kImuPatience_s; ++i) {
-    EXPECT_TRUE(front.add_odometry(sample(i)));
+    EXPECT_TRUE(front.add(sample(i)));
     EXPECT_EQ(next(front), 'o');
     EXPECT_EQ(next(front), ' ');
   }
-  EXPECT_TRUE(front.add_odometry(sample(i)));
+  EXPECT_TRUE(front.add(sample(i)));
   EXPECT_EQ(next(front), 'o');
   EXPECT_EQ(next(front), 'i');
 }
@@ -94,30 +89,30 @@ TEST(FeedFrontImages, ImagesComeWhenOdometryAndTheImuHaveReachedThem) {
 TEST(FeedFrontImages, StampsThatJumpBackOrFarAheadAreRefusedAndDoNoHarm) {
   FeedFront front(test::NodeTarget().state(), {});
   front.set_sensors(eyes());
-  EXPECT_TRUE(front.add_odometry(sample(0)));
+  EXPECT_TRUE(front.add(sample(0)));
   const Timestamp now = kOdometry[0].stamp;
   const auto ahead =
-      front.add_imu({{now + 0.1, {}, {}}, {now + 3600.0, {}, {}}, {now + 0.05, {}, {}}, {now + 0.2, {}, {}}});
+      front.add(ImuSamples{{now + 0.1, {}, {}}, {now + 3600.0, {}, {}}, {now + 0.05, {}, {}}, {now + 0.2, {}, {}}});
   ASSERT_FALSE(ahead);
   EXPECT_NE(ahead.error().message.find("of 4 IMU samples"), std::string::npos) << ahead.error().message;
   EXPECT_EQ(front.figures().imu, 2U);
   EXPECT_EQ(front.figures().imu_left_out, 2U);
-  EXPECT_FALSE(front.add_images(images(now + 3600.0)));
-  EXPECT_TRUE(front.add_images(images(now + 0.1)));
-  EXPECT_FALSE(front.add_images(images(now + 0.05)));
+  EXPECT_FALSE(front.add(images(now + 3600.0)));
+  EXPECT_TRUE(front.add(images(now + 0.1)));
+  EXPECT_FALSE(front.add(images(now + 0.05)));
   EXPECT_EQ(front.figures().images, 1U);
   EXPECT_EQ(front.figures().images_left_out, 2U);
 }
 
 TEST(FeedFrontImages, WhatWaitsInImagesIsBoundedAndCounted) {
   FeedFront front(test::NodeTarget().state(), {.image_bytes = 1000, .imu = 50});
-  intake::FeedSensors sensors = eyes();
+  Sensors sensors = eyes();
   sensors.imu.reset();
   front.set_sensors(sensors);
-  EXPECT_TRUE(front.add_odometry(sample(0)));
+  EXPECT_TRUE(front.add(sample(0)));
   for (std::size_t i = 1; i <= 100; ++i) {  // at 60 Hz
     const Timestamp stamp = kOdometry[0].stamp + static_cast<double>(i) / 200.0;
-    const auto taken = front.add_images(images(stamp));
+    const auto taken = front.add(images(stamp));
     EXPECT_EQ(taken.has_value(), i <= 31) << i;
     if (!taken) {
       EXPECT_NE(taken.error().message.find("left out"), std::string::npos);
@@ -127,7 +122,7 @@ TEST(FeedFrontImages, WhatWaitsInImagesIsBoundedAndCounted) {
   EXPECT_EQ(front.figures().image_bytes, 31U * 32U);
   ASSERT_EQ(front.state().alerts.size(), 1U);
   EXPECT_NE(front.state().alerts[0].text.find("images are left out"), std::string::npos);
-  for (std::size_t i = 1; i <= 10; ++i) EXPECT_TRUE(front.add_odometry(sample(i)));
+  for (std::size_t i = 1; i <= 10; ++i) EXPECT_TRUE(front.add(sample(i)));
   while (next(front) != ' ') {
   }
   front.note_stored();
@@ -136,7 +131,7 @@ TEST(FeedFrontImages, WhatWaitsInImagesIsBoundedAndCounted) {
   sensors.imu = ImuNoise{};
   front.set_sensors(sensors);
   for (std::size_t i = 1; i <= 100; ++i)
-    EXPECT_TRUE(front.add_imu(imu(kOdometry[0].stamp + static_cast<double>(i) / 200.0)));
+    EXPECT_TRUE(front.add(imu(kOdometry[0].stamp + static_cast<double>(i) / 200.0)));
   EXPECT_EQ(front.imu(kFirstTimestamp, kLastTimestamp).size(), 50U);
 }
 

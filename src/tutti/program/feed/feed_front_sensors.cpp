@@ -9,70 +9,91 @@
 
 namespace tutti::program {
 
-void FeedFront::set_sensors(const intake::FeedSensors& sensors) {
+void FeedFront::set_sensors(const Sensors& sensors) {
   const std::scoped_lock lock(mutex_);
   if (sensors == *sensors_) return;
-  release_images(true);
-  sensors_ = std::make_shared<const intake::FeedSensors>(sensors);
+  release(true);
+  sensors_ = std::make_shared<const Sensors>(sensors);
   push(sensors_);
   fed_.notify_one();
 }
 
-bool FeedFront::is_ahead(Timestamp stamp) const {
-  return !localiser_.newest() || stamp - localiser_.newest()->stamp > kAhead_s;
+bool FeedFront::is_ahead(Timestamp stamp, const InputKind& kind) const {
+  return !localiser_.newest() || stamp - localiser_.newest()->stamp > kind.ahead_s;
 }
 
-Status FeedFront::may_wait(const intake::FedImages& images) const {
-  if (auto ok = intake::check_images(images, *sensors_); !ok) return ok;
-  if (newest_images_ && images.stamp <= *newest_images_)
-    return fail(ErrorCode::invalid, "images at {} ns: there were some at {} ns, stamps must increase", images.stamp.ns,
-                newest_images_->ns);
-  if (is_ahead(images.stamp))
-    return fail(ErrorCode::invalid, "images at {} ns: no odometry within {} s before", images.stamp.ns, kAhead_s);
-  if (image_bytes_ + intake::bytes_of(images) > limits_.image_bytes || waiting() + images_.size() >= limits_.inputs / 2)
-    return fail(ErrorCode::io,
-                "the map is behind: {} inputs and {} bytes of images wait, at most {} with {}; the images at {} ns are "
-                "left out",
-                waiting() + images_.size(), image_bytes_, limits_.inputs / 2, limits_.image_bytes, images.stamp.ns);
-  return {};
+std::size_t FeedFront::most_bytes(const Input& input) const {
+  return std::holds_alternative<Scan>(input) ? limits_.scan_bytes : limits_.image_bytes;
 }
 
-Status FeedFront::add_images(intake::FedImages fed) {
-  const auto images = std::make_shared<intake::FedImages>(std::move(fed));
-  const std::scoped_lock lock(mutex_);
-  if (closed_) return fail(ErrorCode::io, "the robot's program ends");
-  if (Status ok = may_wait(*images); !ok) {
-    ++images_refused_;
-    if (ok.error().code == ErrorCode::io) {
-      note_behind(images->stamp);
-      ++images_left_out_;
-    }
+/// Which scans and fixes are used, the robot decides (SubmapBuilder::add()), as of a recording.
+Status FeedFront::may_wait(const Input& input) const {
+  const InputKind& kind = kind_of(input);
+  const Timestamp stamp = stamp_of(input);
+  const auto where = [&] { return fmt::format("{} at {} ns", kind.name, stamp.ns); };
+  const auto* scan = std::get_if<Scan>(&input);
+  if (scan != nullptr && !scan->cloud) return fail(ErrorCode::invalid, "{} has no cloud", where());
+  if (const auto* images = std::get_if<EncodedImages>(&input))
+    if (auto ok = check_images(*images, *sensors_); !ok) return ok;
+  if (const auto* fix = std::get_if<PositionFix>(&input))
+    if (auto ok = check_fix(fix->antenna, fix->covariance, fix->p_body_antenna); !ok)
+      return in_context(where(), ok.error());
+  const std::optional<Timestamp>& newest = newest_[input.index()];
+  if (scan == nullptr && newest && stamp <= *newest)
+    return fail(ErrorCode::invalid, "{}: there was one at {} ns, stamps must increase", where(), newest->ns);
+  if (scan == nullptr && is_ahead(stamp, kind))
+    return fail(ErrorCode::invalid, "{}: no odometry within {} s before", where(), kind.ahead_s);
+  const std::size_t inputs = waiting() + held_.size(), bytes = bytes_[input.index()];
+  if (bytes + bytes_of(input) <= most_bytes(input) && inputs < limits_.inputs / 2) return {};
+  return fail(ErrorCode::io,
+              "the map is behind: {} inputs and {} bytes of this kind wait, at most {} with {}; left out: {}", inputs,
+              bytes, limits_.inputs / 2, most_bytes(input), where());
+}
+
+Status FeedFront::hear_sensor(Input input) {
+  const std::size_t kind = input.index();
+  const Timestamp stamp = stamp_of(input);
+  if (Status ok = may_wait(input); !ok) {
+    ++refused_[kind];
+    if (ok.error().code != ErrorCode::io) return ok;
+    note_behind(stamp);
+    ++left_out_[kind];
     return ok;
   }
-  ++images_taken_;
-  newest_images_ = images->stamp;
-  image_bytes_ += intake::bytes_of(*images);
-  images->sensors = sensors_;
-  images_.push_back(images);
-  release_images();
-  fed_.notify_one();
+  ++heard_[kind];
+  newest_[kind] = stamp;
+  bytes_[kind] += bytes_of(input);
+  if (kInputKinds[kind].needs != Needs::odometry_and_imu) {
+    push(std::move(input));
+    return {};
+  }
+  held_.push_back(std::make_shared<const FeedInput>(std::move(input)));
+  release();
   return {};
+}
+
+Status FeedFront::hear(EncodedImages& images) {
+  images.sensors = sensors_;
+  return hear_sensor(std::move(images));
+}
+
+Status FeedFront::hear(TrackedImages& images) {
+  return fail(ErrorCode::unsupported, "tracked images at {} ns, expected the images", images.stamp.ns);
 }
 
 /// Those whose odometry and IMU have come, or all: what has not come yet will not help them any more.
-void FeedFront::release_images(bool all) {
+void FeedFront::release(bool all) {
   const auto is_due = [&](Timestamp stamp) {
     if (all) return true;
     if (localiser_.newest()->stamp < stamp) return false;
     return !sensors_->imu || (!imu_.empty() && imu_.back().stamp >= stamp) ||
            localiser_.newest()->stamp - stamp >= kImuPatience_s;
   };
-  for (; !images_.empty() && is_due(images_.front()->stamp); images_.pop_front()) push(std::move(images_.front()));
+  for (; !held_.empty() && is_due(stamp_of(*held_.front())); held_.pop_front()) push_back(std::move(held_.front()));
 }
 
-Status FeedFront::add_imu(const std::vector<ImuSample>& samples) {
-  const std::scoped_lock lock(mutex_);
-  if (closed_) return fail(ErrorCode::io, "the robot's program ends");
+Status FeedFront::hear(ImuSamples& samples) {
+  constexpr std::size_t kImu = index_of<ImuSamples>();
   if (!sensors_->imu)
     return fail(ErrorCode::unsupported, "{} IMU samples: Hello said of no IMU (Sensors.imu)", samples.size());
   std::size_t backwards = 0, ahead = 0;
@@ -80,39 +101,27 @@ Status FeedFront::add_imu(const std::vector<ImuSample>& samples) {
     const bool is_backwards = !imu_.empty() && sample.stamp <= imu_.back().stamp;
     if (is_backwards)
       ++backwards;
-    else if (is_ahead(sample.stamp))
+    else if (is_ahead(sample.stamp, kInputKinds[kImu]))
       ++ahead;
     else
       imu_.push_back(sample);
   }
-  imu_taken_ += samples.size() - backwards - ahead;
-  imu_refused_ += backwards + ahead;
+  heard_[kImu] += samples.size() - backwards - ahead;
+  refused_[kImu] += backwards + ahead;
   while (imu_.size() > limits_.imu) imu_.pop_front();
-  release_images();
-  fed_.notify_one();
+  release();
   if (backwards + ahead == 0) return {};
   return fail(
       ErrorCode::invalid,
       "of {} IMU samples from {} ns on {} are not after the one before, and of {} there is no odometry within {} s "
       "before",
-      samples.size(), samples.front().stamp.ns, backwards, ahead, kAhead_s);
+      samples.size(), samples.front().stamp.ns, backwards, ahead, kInputKinds[kImu].ahead_s);
 }
 
-Status FeedFront::may_wait(const PositionFix& fix) const {
-  const auto where = [&] { return fmt::format("fix at {} ns", fix.stamp.ns); };
-  if (auto ok = check_fix(fix.antenna, fix.covariance, fix.p_body_antenna); !ok) return in_context(where(), ok.error());
-  if (newest_fix_ && fix.stamp <= *newest_fix_)
-    return fail(ErrorCode::invalid, "{}: there was one at {} ns, stamps must increase", where(), newest_fix_->ns);
-  if (is_ahead(fix.stamp)) return fail(ErrorCode::invalid, "{}: no odometry within {} s before", where(), kAhead_s);
-  if (waiting() < limits_.inputs / 2) return {};
-  return fail(ErrorCode::io, "the map is behind: {} inputs wait, at most {}; the {} is left out", waiting(),
-              limits_.inputs / 2, where());
-}
-
-void FeedFront::set_health(const Health& health) {
-  const std::scoped_lock lock(mutex_);
+Status FeedFront::hear(Health& health) {
   health_ = health;
   health_came_ = std::chrono::steady_clock::now();
+  return {};
 }
 
 Health FeedFront::health() const {
@@ -124,21 +133,6 @@ void FeedFront::say_status(const NodeStatus& status) {
   auto texts = field_texts(status);
   const std::scoped_lock lock(mutex_);
   if (!status_ || *status_ != texts) status_ = std::make_shared<const decltype(texts)>(std::move(texts));
-}
-
-/// Which of them are used, the robot decides (SubmapBuilder::add_fix()), as of a recording.
-Status FeedFront::add_fix(const PositionFix& fix) {
-  const std::scoped_lock lock(mutex_);
-  if (closed_) return fail(ErrorCode::io, "the robot's program ends");
-  if (Status ok = may_wait(fix); !ok) {
-    ++fixes_refused_;
-    return ok;
-  }
-  ++fixes_taken_;
-  newest_fix_ = fix.stamp;
-  push(fix);
-  fed_.notify_one();
-  return {};
 }
 
 }  // namespace tutti::program

@@ -16,9 +16,7 @@ namespace feed_front_test {
 
 const Trajectory kOdometry = robot::test::drifting_odometry(400);
 
-node::OdometrySample sample(std::size_t i) {
-  return {kOdometry[i].stamp, kOdometry[i].pose, robot::test::kStepCovariance};
-}
+OdometrySample sample(std::size_t i) { return {kOdometry[i].stamp, kOdometry[i].pose, robot::test::kStepCovariance}; }
 
 Scan scan(std::size_t i, std::size_t points = 10) {
   PointCloud cloud;
@@ -28,14 +26,13 @@ Scan scan(std::size_t i, std::size_t points = 10) {
 
 Status give(test::NodeTarget& robot, const FeedInput& input) {
   if (const auto* anew = std::get_if<FeedAnew>(&input)) return robot.begin_session(anew->why);
-  if (const auto* odometry = std::get_if<node::OdometrySample>(&input)) return robot.add_odometry(*odometry);
-  if (const auto* of = std::get_if<Scan>(&input)) return robot.add_scan(*of);
+  if (const auto* of_robot = std::get_if<Input>(&input)) return robot.add(*of_robot);
   return robot.finish();
 }
 
 /// Every `every`-th.
 Status give_scan(FeedTarget& robot, std::size_t i, std::size_t every) {
-  return i % every == 0 ? robot.add_scan(scan(i)) : Status();
+  return i % every == 0 ? robot.add(scan(i)) : Status();
 }
 
 /// A robot that takes what the front has, as far as it is let.
@@ -62,8 +59,8 @@ TEST(FeedFront, AnswersWhatTheRobotWouldHaveAnsweredWhileItIsBehind) {
   Behind behind;
   test::NodeTarget other;  // that answers at once
   for (std::size_t i = 0; i < 300; ++i) {
-    ASSERT_TRUE(behind.front.add_odometry(sample(i)));
-    ASSERT_TRUE(other.add_odometry(sample(i)));
+    ASSERT_TRUE(behind.front.add(sample(i)));
+    ASSERT_TRUE(other.add(sample(i)));
     const FeedState state = behind.front.state(), expected = other.state();
     ASSERT_EQ(state.newest->stamp, expected.newest->stamp);
     ASSERT_LT(local(state.newest->pose, expected.newest->pose).norm(), 1e-12) << i;
@@ -88,10 +85,10 @@ TEST(FeedFront, SeesWhereOdometryJumpsAsTheRobotDoes) {
   for (std::size_t i = 0; i < 300; ++i) {
     if (i == 100) T_fed_odom = kOdometry[i].pose.inverse();
     if (i == 105 || i == 200) T_fed_odom = elsewhere * T_fed_odom;
-    node::OdometrySample fed = sample(i);
+    OdometrySample fed = sample(i);
     fed.T_odom_body = T_fed_odom * fed.T_odom_body;
-    ASSERT_TRUE(behind.front.add_odometry(fed));
-    ASSERT_TRUE(other.add_odometry(fed));
+    ASSERT_TRUE(behind.front.add(fed));
+    ASSERT_TRUE(other.add(fed));
     const FeedState state = behind.front.state(), expected = other.state();
     ASSERT_EQ(state.newest, expected.newest) << i;
     ASSERT_LT(local(state.T_odom_fed, expected.T_odom_fed).norm(), 1e-9) << i;
@@ -106,14 +103,14 @@ TEST(FeedFront, SeesWhereOdometryJumpsAsTheRobotDoes) {
 TEST(FeedFront, WhatIsTakenTogetherIsNeverAcrossAJump) {
   Behind behind({.inputs = 40});
   for (std::size_t i = 0; i < 400; ++i) {
-    node::OdometrySample fed = sample(i);
+    OdometrySample fed = sample(i);
     if (i >= 123) fed.T_odom_body.translation.x() += 100.0;
-    ASSERT_TRUE(behind.front.add_odometry(fed));
+    ASSERT_TRUE(behind.front.add(fed));
   }
   std::optional<Timestamp> before;
   bool is_there = false;
   while (const auto input = behind.front.take(0.0)) {
-    const auto& one = std::get<node::OdometrySample>(*input);
+    const auto& one = *sample_in<OdometrySample>(*input);
     if (one.stamp == kOdometry[123].stamp) {
       is_there = true;
       EXPECT_EQ(before, kOdometry[122].stamp);
@@ -125,7 +122,7 @@ TEST(FeedFront, WhatIsTakenTogetherIsNeverAcrossAJump) {
 
 TEST(FeedFront, CarriesOnFromTheLastCorrection) {
   Behind behind;
-  for (std::size_t i = 0; i < 200; ++i) ASSERT_TRUE(behind.front.add_odometry(sample(i)));
+  for (std::size_t i = 0; i < 200; ++i) ASSERT_TRUE(behind.front.add(sample(i)));
   behind.work(150);
   const auto graph = robot::test::broadcast(behind.robot.node().agent(), 1, robot::test::kWorld);
   behind.robot.receive({bus::Endpoint::server(),
@@ -147,17 +144,17 @@ TEST(FeedFront, CarriesOnFromTheLastCorrection) {
 TEST(FeedFront, RefusesWhatTheRobotWouldRefuseAtOnce) {
   Behind behind;
   test::NodeTarget robot;
-  ASSERT_TRUE(behind.front.add_odometry(sample(1)));
-  ASSERT_TRUE(robot.add_odometry(sample(1)));
-  std::vector<node::OdometrySample> bad(6, sample(2));
+  ASSERT_TRUE(behind.front.add(sample(1)));
+  ASSERT_TRUE(robot.add(sample(1)));
+  std::vector<OdometrySample> bad(6, sample(2));
   bad[0].stamp = sample(1).stamp;
   bad[1].T_odom_body.translation.x() = std::numeric_limits<double>::quiet_NaN();
   bad[2].T_odom_body.translation.x() = 1e300;
   bad[3].T_odom_body.rotation.coeffs() *= 1.1;
   bad[4].increment_covariance(0, 0) = -1.0;
   bad[5].increment_covariance(0, 1) = 1.0;
-  for (const node::OdometrySample& one : bad) {
-    const Status by_front = behind.front.add_odometry(one), by_robot = robot.add_odometry(one);
+  for (const OdometrySample& one : bad) {
+    const Status by_front = behind.front.add(one), by_robot = robot.add(one);
     ASSERT_FALSE(by_front);
     ASSERT_FALSE(by_robot);
     EXPECT_EQ(by_front.error().message, by_robot.error().message);
@@ -169,8 +166,8 @@ TEST(FeedFront, WhatIsTooMuchCostsTheMapNotTheTrajectory) {
   Behind behind({.inputs = 50, .scan_bytes = 3 * 120});
   std::size_t refused = 0;
   for (std::size_t i = 0; i < 300; ++i) {
-    ASSERT_TRUE(behind.front.add_odometry(sample(i)));
-    const Status taken = behind.front.add_scan(scan(i));
+    ASSERT_TRUE(behind.front.add(sample(i)));
+    const Status taken = behind.front.add(scan(i));
     if (!taken) ++refused;
     EXPECT_TRUE(taken || taken.error().message.find("left out") != std::string::npos);
     ASSERT_EQ(behind.front.state().newest->stamp, kOdometry[i].stamp);
@@ -194,7 +191,7 @@ TEST(FeedFront, FillsUpUntilAllIsStored) {
   Behind behind({.inputs = 8});
   for (std::size_t i = 0; i < 3; ++i) {
     EXPECT_FALSE(behind.front.is_filling());
-    ASSERT_TRUE(behind.front.add_odometry(sample(i)));
+    ASSERT_TRUE(behind.front.add(sample(i)));
   }
   EXPECT_TRUE(behind.front.is_filling());
   while (behind.front.take(0.0)) behind.front.note_heard();
@@ -206,12 +203,13 @@ TEST(FeedFront, FillsUpUntilAllIsStored) {
 TEST(FeedFront, OfALongTimeTheWholeTrajectoryStaysEvenly) {
   FeedFront front(test::NodeTarget().state(), {.inputs = 100});
   for (std::size_t i = 0; i < kOdometry.size() * 20; ++i)
-    ASSERT_TRUE(front.add_odometry({Timestamp{} + 0.005 * static_cast<double>(i), {}, 1e-9 * Matrix6d::Identity()}));
+    ASSERT_TRUE(
+        front.add(OdometrySample{Timestamp{} + 0.005 * static_cast<double>(i), {}, 1e-9 * Matrix6d::Identity()}));
   std::optional<Timestamp> before;
   double longest_s = 0.0, variance = 0.0;
   std::size_t kept = 0;
   while (const auto input = front.take(0.0)) {
-    const auto& one = std::get<node::OdometrySample>(*input);
+    const auto& one = *sample_in<OdometrySample>(*input);
     if (before) longest_s = std::max(longest_s, one.stamp - *before);
     if (before) variance += one.increment_covariance(0, 0);
     before = one.stamp;
@@ -225,12 +223,12 @@ TEST(FeedFront, OfALongTimeTheWholeTrajectoryStaysEvenly) {
 
 TEST(FeedFront, ARobotThatIsMadeAgainGetsWhatItHadNotStored) {
   Behind behind;
-  for (std::size_t i = 0; i < 10; ++i) ASSERT_TRUE(behind.front.add_odometry(sample(i)));
+  for (std::size_t i = 0; i < 10; ++i) ASSERT_TRUE(behind.front.add(sample(i)));
   EXPECT_FALSE(behind.front.state().stored.has_value());
   behind.work();
   EXPECT_EQ(behind.front.state().stored, kOdometry[9].stamp);
-  for (std::size_t i = 10; i < 20; ++i) ASSERT_TRUE(behind.front.add_odometry(sample(i)));
-  for (std::size_t i = 0; i < 5; ++i) ASSERT_TRUE(behind.front.take(0.0).has_value());
+  for (std::size_t i = 10; i < 20; ++i) ASSERT_TRUE(behind.front.add(sample(i)));
+  for (std::size_t i = 0; i < 5; ++i) ASSERT_TRUE(behind.front.take(0.0));
   behind.front.note_heard();
   EXPECT_EQ(behind.front.state().stored, kOdometry[9].stamp);
   behind.front.begin_again(behind.robot.node().agent().newest_sample());
@@ -246,11 +244,11 @@ TEST(FeedFront, ARobotThatIsMadeAgainGetsWhatItHadNotStored) {
 
 TEST(FeedFront, AnInputWithWhichTheRobotGoesIsLeftOutAfterThreeTimes) {
   Behind behind({.tries = 3});
-  for (std::size_t i = 0; i < 10; ++i) ASSERT_TRUE(behind.front.add_odometry(sample(i)));
+  for (std::size_t i = 0; i < 10; ++i) ASSERT_TRUE(behind.front.add(sample(i)));
   for (int time = 0; time < 3; ++time) {
     EXPECT_TRUE(behind.front.take_refusals().empty());
     for (std::size_t i = 0; i <= 5; ++i) {
-      EXPECT_EQ(std::get<node::OdometrySample>(*behind.front.take(0.0)).stamp, kOdometry[i].stamp);
+      EXPECT_EQ(sample_in<OdometrySample>(*behind.front.take(0.0))->stamp, kOdometry[i].stamp);
       if (i < 5) behind.front.note_heard();
     }
     behind.front.begin_again(std::nullopt);
@@ -263,7 +261,7 @@ TEST(FeedFront, AnInputWithWhichTheRobotGoesIsLeftOutAfterThreeTimes) {
 
 TEST(FeedFront, EndsWhenEverythingIsStored) {
   Behind behind;
-  for (std::size_t i = 0; i < 10; ++i) ASSERT_TRUE(behind.front.add_odometry(sample(i)));
+  for (std::size_t i = 0; i < 10; ++i) ASSERT_TRUE(behind.front.add(sample(i)));
   ASSERT_TRUE(behind.front.finish());
   EXPECT_FALSE(behind.front.state().ended);
   while (behind.front.take(0.0)) behind.front.note_heard();
@@ -272,10 +270,10 @@ TEST(FeedFront, EndsWhenEverythingIsStored) {
   behind.work();
   EXPECT_TRUE(behind.front.state().ended);
   EXPECT_TRUE(behind.front.has_ended());
-  ASSERT_TRUE(behind.front.add_odometry(sample(10)));
+  ASSERT_TRUE(behind.front.add(sample(10)));
   EXPECT_FALSE(behind.front.has_ended());
   behind.front.close();
-  EXPECT_FALSE(behind.front.add_odometry(sample(11)));
+  EXPECT_FALSE(behind.front.add(sample(11)));
   EXPECT_EQ(behind.work(), 1U);
 }
 
@@ -283,7 +281,7 @@ TEST(FeedFront, TwoThreadsMakeTheSameRobot) {
   Behind behind;
   std::jthread feeder([&] {
     for (std::size_t i = 0; i < kOdometry.size(); ++i) {
-      EXPECT_TRUE(behind.front.add_odometry(sample(i)));
+      EXPECT_TRUE(behind.front.add(sample(i)));
       EXPECT_TRUE(give_scan(behind.front, i, 3));
       EXPECT_EQ(behind.front.state().newest->stamp, kOdometry[i].stamp);
       static_cast<void>(behind.front.take_refusals());
@@ -301,7 +299,7 @@ TEST(FeedFront, TwoThreadsMakeTheSameRobot) {
   }
   test::NodeTarget alone;
   for (std::size_t i = 0; i < kOdometry.size(); ++i) {
-    ASSERT_TRUE(alone.add_odometry(sample(i)));
+    ASSERT_TRUE(alone.add(sample(i)));
     ASSERT_TRUE(give_scan(alone, i, 3));
   }
   ASSERT_TRUE(alone.finish());

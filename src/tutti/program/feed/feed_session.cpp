@@ -11,37 +11,6 @@ namespace tutti::program {
 
 namespace {
 
-/// Moves the stamps of a message to the robot's clock. Returns the stamp for which there is no such time; nothing when
-/// all is well. Does not compile with a kind of message that is not named here.
-struct ToRobot {
-  using Wrong = std::optional<Timestamp>;
-  const FeedClock& clock;
-
-  [[nodiscard]] Wrong shift(Timestamp& stamp) const {
-    const auto moved = clock.to_robot(stamp);
-    if (!moved) return stamp;
-    stamp = *moved;
-    return std::nullopt;
-  }
-  Wrong operator()(node::OdometrySample& sample) const { return shift(sample.stamp); }
-  Wrong operator()(Scan& scan) const { return shift(scan.stamp); }
-  Wrong operator()(intake::FedImages& images) const { return shift(images.stamp); }
-  Wrong operator()(PositionFix& fix) const { return shift(fix.stamp); }
-  Wrong operator()(std::vector<ImuSample>& samples) const {
-    for (ImuSample& sample : samples)
-      if (const Wrong wrong = shift(sample.stamp)) return wrong;
-    return std::nullopt;
-  }
-  // Without a stamp, or answered by the client's clock.
-  Wrong operator()(const FeedHello&) const { return std::nullopt; }
-  Wrong operator()(const FeedEnd&) const { return std::nullopt; }
-  Wrong operator()(const FeedTime&) const { return std::nullopt; }
-  Wrong operator()(const Health&) const { return std::nullopt; }
-  Wrong operator()(const FeedRaw&) const { return std::nullopt; }
-  Wrong operator()(const FeedUnknown&) const { return std::nullopt; }
-  Wrong operator()(const BadSample&) const { return std::nullopt; }
-};
-
 /// The situation as compared with every sample: FeedState::status changes by itself, and takes longer to write.
 std::string without_status(FeedState state) {
   state.status.reset();
@@ -96,34 +65,34 @@ void FeedSession::take(Client client, FromClient message) {
   if (const auto* time = std::get_if<FeedTime>(&message)) return take_time(client, *time);
   if (const auto* raw = std::get_if<FeedRaw>(&message))
     return take_raw(client, {raw->topic, raw->type, raw->encoding, raw->bytes});
-  if (!std::holds_alternative<FeedEnd>(message)) return take_fed(client, std::move(message));
+  if (auto* input = std::get_if<Input>(&message)) return take_fed(client, std::move(*input));
   if (ros_) ros_->intake().end(), take_due(client);
   if (const Status ok = target_.finish(); !ok) return put(connection, refused_frame({}, ok.error().message, 0));
   connection.ended = connection.waits_for_end = true;
   answer_end();
 }
 
-void FeedSession::take_fed(Client client, FromClient message) {
+void FeedSession::take_fed(Client client, Input input) {
   Connection& connection = clients_.at(client);
-  if (const auto stamp = std::visit(ToRobot{last_.clock}, message))
+  std::optional<Timestamp> wrong;
+  for_each_stamp(input, [&](Timestamp& stamp) {
+    const auto moved = last_.clock.to_robot(stamp);
+    if (!moved && !wrong) wrong = stamp;
+    stamp = moved.value_or(stamp);
+  });
+  if (wrong)
     return put(
         connection,
         refused_frame(
-            *stamp, fmt::format("with the clock's offset of {} ns there is no such time", last_.clock.offset_ns()), 0));
-  if (const auto* sample = std::get_if<node::OdometrySample>(&message)) return take_odometry(client, *sample);
-  const auto take = [&](Timestamp stamp, const auto& add) {
-    if (connection.ended) return refuse(client, stamp, "the recording has ended");
-    if (const Status taken = add(); !taken) refuse(client, stamp, taken.error().message);
-  };
-  if (const auto* imu = std::get_if<std::vector<ImuSample>>(&message))
-    return take(imu->front().stamp, [&] { return target_.add_imu(*imu); });
-  if (auto* images = std::get_if<intake::FedImages>(&message))
-    return take(images->stamp, [&] { return target_.add_images(std::move(*images)); });
-  if (const auto* fix = std::get_if<PositionFix>(&message))
-    return take(fix->stamp, [&] { return target_.add_fix(*fix); });
-  if (const auto* health = std::get_if<Health>(&message)) return target_.set_health(*health);
-  const Scan& scan = std::get<Scan>(message);
-  take(scan.stamp, [&] { return target_.add_scan(scan); });
+            *wrong, fmt::format("with the clock's offset of {} ns there is no such time", last_.clock.offset_ns()), 0));
+  const Timestamp stamp = stamp_of(input);
+  const bool is_odometry = std::holds_alternative<OdometrySample>(input);
+  if (connection.ended && !std::holds_alternative<Health>(input))
+    return refuse(client, stamp, "the recording has ended");
+  const Status taken = target_.add(std::move(input));
+  if (!taken) refuse(client, stamp, taken.error().message);
+  if (is_odometry && taken) return answer(client);
+  if (is_odometry) refresh();  // many in a row are an alert
 }
 
 void FeedSession::take_time(Client client, const FeedTime& time) {
@@ -168,13 +137,7 @@ void FeedSession::greet(Client client, const FeedHello& hello) {
   put(connection, situation_frame(state, offset_ns(client)));
 }
 
-void FeedSession::take_odometry(Client client, const node::OdometrySample& sample) {
-  Connection& connection = clients_.at(client);
-  if (connection.ended) return refuse(client, sample.stamp, "the recording has ended");
-  if (const Status ok = target_.add_odometry(sample); !ok) {
-    refuse(client, sample.stamp, ok.error().message);
-    return refresh();  // many in a row are an alert
-  }
+void FeedSession::answer(Client client) {
   const FeedState state = target_.state();
   if (!(state.T_odom_fed == T_odom_fed_)) {
     const Pose3 before = std::exchange(T_odom_fed_, state.T_odom_fed);

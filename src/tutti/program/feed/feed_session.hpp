@@ -108,11 +108,12 @@ class FeedSession {
   [[nodiscard]] std::int64_t offset_ns(Client client) const { return feeder_ == client ? last_.clock.offset_ns() : 0; }
   void refuse(Client client, Timestamp stamp, const std::string& why);
   void take(Client client, FromClient message);
-  void take_fed(Client client, FromClient message);
+  void take_fed(Client client, Input input);
   void take_time(Client client, const FeedTime& time);
   void greet(Client client, const FeedHello& hello);
   void answer_end();
-  void take_odometry(Client client, const node::OdometrySample& sample);
+  /// After a sample of odometry was taken of this client.
+  void answer(Client client);
   // For a client that feeds raw messages: feed_session_ros.cpp.
   Status begin_ros(const FeedHello& hello);
   void take_raw(Client client, const intake::RawMessage& raw);
@@ -134,7 +135,7 @@ class FeedSession {
   Now now_;
   const intake::SensorConfig of_mission_;
   std::unique_ptr<RosClient> ros_;     ///< Belongs to the client that feeds, if raw messages.
-  intake::FeedSensors sensors_;        ///< As the target got them last,
+  Sensors sensors_;                    ///< As the target got them last,
   std::optional<FeedRos> sensors_of_;  ///< by a client that sent this.
 };
 

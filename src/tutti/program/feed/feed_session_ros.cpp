@@ -48,10 +48,9 @@ void FeedSession::take_raw(Client client, const intake::RawMessage& raw) {
 
 void FeedSession::take_due(Client client) {
   Connection& connection = clients_.at(client);
-  if (const intake::FeedSensors& known = ros_->intake().sensors(); !known.cameras.empty()) {
+  if (const Sensors& known = ros_->intake().sensors(); !known.cameras.empty()) {
     const bool scans = sensors_.scans;
-    if (intake::FeedSensors now = known; now.scans = scans, now != sensors_)
-      target_.set_sensors(sensors_ = std::move(now));
+    if (Sensors now = known; now.scans = scans, now != sensors_) target_.set_sensors(sensors_ = std::move(now));
   }
   while (!connection.over) {
     auto input = ros_->next();
@@ -60,7 +59,7 @@ void FeedSession::take_due(Client client) {
       continue;
     }
     if (!*input) break;
-    std::visit([&](auto& value) { take_fed(client, FromClient(std::move(value))); }, **input);
+    take_fed(client, std::move(**input));
   }
   for (const std::string& note : ros_->intake().take_notes()) put(connection, note_frame(note));
 }

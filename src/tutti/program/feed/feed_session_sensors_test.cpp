@@ -16,19 +16,17 @@ namespace feed_session_sensors_test {
 using Feed = v1::Feed;
 using FeedSessionSensors = test::SessionFixture;
 
-intake::FeedSensors one_camera() {
-  intake::FeedSensors out;
+Sensors one_camera() {
+  Sensors out;
   out.cameras.resize(1);
   out.cameras[0].model = {.width_px = 8, .height_px = 4, .fx = 5.0, .fy = 5.0, .cx = 3.5, .cy = 1.5};
   return out;
 }
-intake::FedImages raw(std::int64_t ns, std::size_t bytes = 32) {
-  return {{ns}, {{0, true, std::string(bytes, 'x')}}, {}};
-}
+EncodedImages raw(std::int64_t ns, std::size_t bytes = 32) { return {{ns}, {{0, true, std::string(bytes, 'x')}}, {}}; }
 
 TEST_F(FeedSessionSensors, TakesImagesAndImuAndRefusesThemByName) {
   session_.connect(1);
-  intake::FeedSensors sensors = one_camera();
+  Sensors sensors = one_camera();
   sensors.imu = ImuNoise{};
   const auto greeting = say(1, test::hello(test::sensors(sensors)));
   ASSERT_EQ(greeting.size(), 2U);
@@ -39,10 +37,10 @@ TEST_F(FeedSessionSensors, TakesImagesAndImuAndRefusesThemByName) {
   EXPECT_EQ(target_.seen, std::vector<Timestamp>{{5}});
   EXPECT_EQ(target_.felt, (std::vector<Timestamp>{{3}, {4}}));
   // Half an image, one of a camera that is not there, one of no encoding, depth of nobody, IMU of half a sample.
-  intake::FedImages second = raw(7);
+  EncodedImages second = raw(7);
   second.images[0].camera = 1;
-  intake::FedImages depth = raw(8);
-  depth.depth = intake::EncodedImage{0, true, std::string(64, 'x')};
+  EncodedImages depth = raw(8);
+  depth.depth = EncodedImage{0, true, std::string(64, 'x')};
   Feed strange, half;
   ASSERT_TRUE(strange.ParseFromString(test::images(raw(9)).substr(4)));
   strange.mutable_images()->mutable_image(0)->set_encoding(static_cast<Feed::Image::Encoding>(7));

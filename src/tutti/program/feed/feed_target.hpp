@@ -10,11 +10,8 @@
 
 #include "tutti/base/ids.hpp"
 #include "tutti/base/result.hpp"
-#include "tutti/intake/feed_sensors.hpp"
-#include "tutti/model/position_fix.hpp"
-#include "tutti/model/status.hpp"
+#include "tutti/model/input.hpp"
 #include "tutti/model/trajectory.hpp"
-#include "tutti/node/journal.hpp"
 #include "tutti/robot/next_keyframe.hpp"
 #include "tutti/robot/odometry_watch.hpp"
 
@@ -80,24 +77,10 @@ struct FeedRefusal {
 class FeedTarget {
  public:
   virtual ~FeedTarget() = default;
-  /// An error states why the sample was refused; nothing has changed then.
-  virtual Status add_odometry(const node::OdometrySample& sample) = 0;
-  virtual Status add_scan(const Scan& scan) = 0;
+  /// An error states why the input was refused, and nothing has changed then; or how many of the IMU's samples were.
+  virtual Status add(Input input) = 0;
   /// Sets what the client's later inputs come from.
-  virtual void set_sensors(const intake::FeedSensors& /*sensors*/) {}
-  virtual Status add_images(intake::FedImages images) {
-    return fail(ErrorCode::unsupported, "images at {} ns: this robot takes none", images.stamp.ns);
-  }
-  /// An error when any of the samples was left out.
-  virtual Status add_imu(const std::vector<ImuSample>& samples) {
-    return fail(ErrorCode::unsupported, "{} IMU samples: this robot takes none", samples.size());
-  }
-  /// An error means that the fix was left out, and why.
-  virtual Status add_fix(const PositionFix& fix) {
-    return fail(ErrorCode::unsupported, "fix at {} ns: this robot takes none", fix.stamp.ns);
-  }
-  /// What the robot's body reports of itself.
-  virtual void set_health(const Health& /*health*/) {}
+  virtual void set_sensors(const Sensors& /*sensors*/) {}
   /// Ends the recording; FeedState::ended shows when that is done.
   virtual Status finish() = 0;
   /// From now on take_trajectories() has something to return.

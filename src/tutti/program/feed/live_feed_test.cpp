@@ -73,8 +73,7 @@ std::unique_ptr<LiveFeed> opened(const std::string& path, const test::NodeTarget
 
 Status give(test::NodeTarget& robot, const FeedInput& input) {
   if (const auto* anew = std::get_if<FeedAnew>(&input)) return robot.begin_session(anew->why);
-  if (const auto* odometry = std::get_if<node::OdometrySample>(&input)) return robot.add_odometry(*odometry);
-  if (const auto* of = std::get_if<Scan>(&input)) return robot.add_scan(*of);
+  if (const auto* of_robot = std::get_if<Input>(&input)) return robot.add(*of_robot);
   return robot.finish();
 }
 
@@ -202,7 +201,7 @@ TEST(LiveFeed, SendsTheCorrectedTrajectoryToAFeedClient) {
   EXPECT_EQ(heard.constraints, 5U);
   EXPECT_EQ(heard.corrected, trajectory);
   EXPECT_EQ(heard.map, (Trajectory{trajectory[3], trajectory[9]}));
-  EXPECT_TRUE((*client)->say(node::OdometrySample{trajectory[0].stamp, trajectory[0].pose, Matrix6d::Zero()}));
+  EXPECT_TRUE((*client)->say(OdometrySample{trajectory[0].stamp, trajectory[0].pose, Matrix6d::Zero()}));
   EXPECT_EQ(std::get<FeedAnswer>(hear()).stamp, trajectory[0].stamp);
   EXPECT_TRUE(other.hear().has_welcome());
   EXPECT_TRUE(other.hear().has_situation());
@@ -223,7 +222,7 @@ TEST(LiveFeed, SaysTheEndBeforeItGoes) {
   FeedFront& front = feed->front();
   for (int i = 0; i < 2; ++i) {
     const auto input = front.take(10.0);
-    ASSERT_TRUE(input.has_value());
+    ASSERT_TRUE(input);
     EXPECT_TRUE(give(robot, *input));
     front.note_heard();
   }
@@ -233,7 +232,7 @@ TEST(LiveFeed, SaysTheEndBeforeItGoes) {
 }
 
 FeedHello of_ros() {
-  FeedHello out{.version = kFeedVersion, .client = "ros", .sensors = intake::FeedSensors{.scans = true}};
+  FeedHello out{.version = kFeedVersion, .client = "ros", .sensors = Sensors{.scans = true}};
   out.ros = std::optional(FeedRos{});
   return out;
 }
@@ -286,8 +285,7 @@ TEST(LocalClient, FeedsInMemoryAndOthersListen) {
   other.say(test::hello());
   EXPECT_TRUE(other.hear().has_welcome());
   std::size_t samples = 0;
-  while (const auto input = feed->front().take(0.0))
-    samples += std::holds_alternative<node::OdometrySample>(*input) ? 1 : 0;
+  while (const auto input = feed->front().take(0.0)) samples += sample_in<OdometrySample>(*input) ? 1 : 0;
   EXPECT_EQ(samples, 10U);
 }
 

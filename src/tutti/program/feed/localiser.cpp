@@ -5,8 +5,8 @@
 
 namespace tutti::program {
 
-Result<bool> Localiser::add(const node::OdometrySample& sample) {
-  const auto fed = robot::usable_step(robot_, sample.stamp, sample.T_odom_body, sample.increment_covariance);
+Result<bool> Localiser::add(const OdometrySample& sample) {
+  const auto fed = robot::usable_step(robot_, sample);
   if (!fed) return tl::unexpected(fed.error());
   const auto before = newest() ? std::optional(newest()->stamp) : std::nullopt;
   if (auto ok = robot::check_follows(robot_, sample.stamp, before); !ok) return tl::unexpected(ok.error());

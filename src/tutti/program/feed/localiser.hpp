@@ -7,16 +7,16 @@
 
 #include "tutti/base/ids.hpp"
 #include "tutti/base/result.hpp"
+#include "tutti/model/input.hpp"
 #include "tutti/model/relative_pose.hpp"
 #include "tutti/model/trajectory.hpp"
-#include "tutti/node/journal.hpp"
 #include "tutti/robot/odometry_watch.hpp"
 
 namespace tutti::program {
 
 /// Where a robot is while its agent is samples behind: the pose and its uncertainty at the agent's newest sample,
 /// carried on by the odometry since. Takes samples that passed an OdometryGate, and detects jumps of odometry, exactly
-/// as RobotAgent::add_odometry() does.
+/// as RobotAgent::add() does.
 class Localiser {
  public:
   /// When the agent is further behind, the oldest steps are compounded to one.
@@ -26,7 +26,7 @@ class Localiser {
 
   /// Adds a sample; returns whether odometry has jumped at it. An error states why the sample was refused; nothing has
   /// changed then.
-  Result<bool> add(const node::OdometrySample& sample);
+  Result<bool> add(const OdometrySample& sample);
   /// Takes over what the agent knows at its newest sample: the samples up to it, and the covariance there.
   void correct(const robot::OdometryWatch& watch, const Matrix6d& covariance);
 

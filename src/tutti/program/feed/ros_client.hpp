@@ -28,7 +28,7 @@ class RosClient {
   /// Fails when the message is not taken; next() has what is due then.
   Status add(const intake::RawMessage& raw);
   /// SensorIntake::next(). Scans are left out while the last answer wanted none.
-  Result<std::optional<intake::Input>> next() { return intake_.next(wants_scan_); }
+  Result<std::optional<Input>> next() { return intake_.next(wants_scan_); }
   [[nodiscard]] intake::SensorIntake& intake() { return intake_; }
   [[nodiscard]] const intake::SensorIntake& intake() const { return intake_; }
   /// Whether this client, which comes after `before`, has the same cameras and IMU.

@@ -215,7 +215,7 @@ bool Robot::join() {
   program::FeedHello hello{
       .version = program::kFeedVersion,
       .client = options_.who,
-      .sensors = intake::FeedSensors{.scans = !options_.points.empty(), .cameras = {}, .depth = {}, .imu = {}}};
+      .sensors = Sensors{.scans = !options_.points.empty(), .cameras = {}, .depth = {}, .imu = {}}};
   program::FeedRos ros;
   ros.odometry_frames = options_.odometry_frames;
   ros.map_frame = options_.map_frame;

@@ -90,9 +90,9 @@ TEST_F(RosRobots, IsFedByTopicsAndAnswersOnTopics) {
   std::size_t scans = 0, samples = 0, fixes = 0, transforms = 0, poses = 0;
   const auto read_all = [&] {
     while (const auto input = feed_->front().take(0.0)) {
-      samples += std::holds_alternative<node::OdometrySample>(*input) ? 1 : 0;
-      scans += std::holds_alternative<Scan>(*input) ? 1 : 0;
-      fixes += std::holds_alternative<PositionFix>(*input) ? 1 : 0;
+      samples += sample_in<OdometrySample>(*input) ? 1 : 0;
+      scans += sample_in<Scan>(*input) ? 1 : 0;
+      fixes += sample_in<PositionFix>(*input) ? 1 : 0;
       feed_->front().note_heard();
     }
     for (const std::string& cdr : taken(*tf)) {
@@ -148,7 +148,7 @@ TEST_F(RosRobots, ScansOfALivoxAreFed) {
               lidar->write(std::string(type) == kPoints ? points(stamp_, kAtOnce) : intake::test::livox(stamp_)));
           EXPECT_TRUE(odom->write(odometry(stamp_)));
           while (const auto input = feed_->front().take(0.0)) {
-            const auto* scan = std::get_if<Scan>(&*input);
+            const auto* scan = sample_in<Scan>(*input);
             is_fed = is_fed || (scan != nullptr && scan->cloud->points.at(0) == Eigen::Vector3f(5, 0, 0));
             feed_->front().note_heard();
           }
@@ -180,9 +180,9 @@ TEST_F(RosRobots, ImagesAndImuAreFedOnceTheirPlaceIsKnown) {
   std::size_t samples = 0, images = 0, sensors = 0;
   const auto read_all = [&] {
     while (const auto input = feed_->front().take(0.0)) {
-      samples += std::holds_alternative<node::OdometrySample>(*input) ? 1 : 0;
-      if (const auto* taken = std::get_if<std::shared_ptr<const intake::FedImages>>(&*input)) {
-        const intake::FedImages& seen = **taken;
+      samples += sample_in<OdometrySample>(*input) ? 1 : 0;
+      if (const auto* taken = sample_in<EncodedImages>(*input)) {
+        const EncodedImages& seen = *taken;
         ++images;
         EXPECT_EQ(seen.images.at(0).bytes, "abcdefghijkl");
         EXPECT_EQ(seen.sensors->cameras.size(), 1U);
@@ -220,8 +220,8 @@ TEST_F(RosRobots, ScansThatComeBeforeTheirTransformWaitForIt) {
   std::size_t scans = 0, samples = 0, i = 0;
   const auto read_all = [&] {
     while (const auto input = feed_->front().take(0.0)) {
-      samples += std::holds_alternative<node::OdometrySample>(*input) ? 1 : 0;
-      scans += std::holds_alternative<Scan>(*input) ? 1 : 0;
+      samples += sample_in<OdometrySample>(*input) ? 1 : 0;
+      scans += sample_in<Scan>(*input) ? 1 : 0;
       feed_->front().note_heard();
     }
   };
@@ -271,7 +271,7 @@ TEST_F(RosRobots, TransformsInTheNamespaceAreHeardAndAnsweredThere) {
                                       EXPECT_TRUE(cloud->write(points(stamp_, kAtOnce, "lidar")));
                                       EXPECT_TRUE(tf->write(intake::test::transform(stamp_, "odom", "base_link", {})));
                                       while (const auto input = feed_->front().take(0.0)) {
-                                        if (const auto* scan = std::get_if<Scan>(&*input); scan != nullptr) {
+                                        if (const auto* scan = sample_in<Scan>(*input); scan != nullptr) {
                                           EXPECT_EQ(scan->cloud->points.at(0), Eigen::Vector3f(5, 0, 2));
                                           ++scans;
                                         }
@@ -340,8 +340,8 @@ TEST_F(RosRobots, OdometryWaitsForTheScansOfItsTime) {
   const auto has_come = [&](std::size_t inputs) {
     return ::tutti::test::within(kPatience_s, [&] {
       while (const auto input = feed_->front().take(0.0)) {
-        order += std::holds_alternative<Scan>(*input) ? "s" : "";
-        order += std::holds_alternative<node::OdometrySample>(*input) ? "o" : "";
+        order += sample_in<Scan>(*input) ? "s" : "";
+        order += sample_in<OdometrySample>(*input) ? "o" : "";
         feed_->front().note_heard();
       }
       return order.size() >= inputs;

@@ -53,18 +53,20 @@ struct Mission {
     std::string sent;
     for (std::size_t i = from; i < to; ++i) {
       Rng rng = Rng(seed).fork(i);
-      EXPECT_TRUE(agent.add_odometry(odometry[i].stamp, odometry[i].pose, robot::test::kStepCovariance).has_value());
+      EXPECT_TRUE(
+          agent.add(OdometrySample{odometry[i].stamp, odometry[i].pose, robot::test::kStepCovariance}).has_value());
       const Timestamp stamp = odometry[i].stamp + (i == 0 ? 0.0 : sensors_after_s);
       if (agent.wants_scan(stamp) && rng.bernoulli(0.5)) {
         PointCloud cloud;
         for (int p = 0; p < 20; ++p) cloud.points.push_back(3.0F * Eigen::Vector3d(rng.normal(), 1, 2).cast<float>());
-        EXPECT_TRUE(agent.add_scan({stamp, std::make_shared<const PointCloud>(cloud), {}}).has_value());
+        EXPECT_TRUE(agent.add(Scan{stamp, std::make_shared<const PointCloud>(cloud), {}}).has_value());
       }
       if (agent.wants_images(stamp)) {
-        EXPECT_TRUE(agent.add_images(images_at(stamp, rng)).has_value());
+        EXPECT_TRUE(agent.add(images_at(stamp, rng)).has_value());
       }
       if (i % 3 == 1) {
-        EXPECT_TRUE(agent.add_fix({.stamp = stamp, .antenna = {46.5, 7.9, 1.0 * static_cast<double>(i)}}).has_value());
+        EXPECT_TRUE(
+            agent.add(PositionFix{.stamp = stamp, .antenna = {46.5, 7.9, 1.0 * static_cast<double>(i)}}).has_value());
       }
       if (rng.bernoulli(0.05)) {
         ProxyGraphMessage message = robot::test::broadcast(agent, i, robot::test::kWorld);
@@ -180,7 +182,7 @@ TEST(AgentState, RowsThatDoNotBelongTogetherAreRefused) {
         bad[key] = other_bytes;
         if (const auto state = decode_state_rows(bad)) {
           RobotAgent restored = mission.go_on(*state);
-          static_cast<void>(restored.add_odometry(at(1000), {}, robot::test::kStepCovariance));
+          static_cast<void>(restored.add(OdometrySample{at(1000), {}, robot::test::kStepCovariance}));
           ASSERT_FALSE(encode(restored.state()).empty());
         }
       }
@@ -225,7 +227,7 @@ TEST(AgentState, AnyChangeOfTheNumbersIsRefusedOrMakesAStateToGoOnFrom) {
     }
     ++accepted;
     RobotAgent restored = mission.go_on(*state);
-    static_cast<void>(restored.add_odometry(at(1000), {}, robot::test::kStepCovariance));
+    static_cast<void>(restored.add(OdometrySample{at(1000), {}, robot::test::kStepCovariance}));
     ASSERT_FALSE(encode(restored.state()).empty());
   }
   EXPECT_GT(accepted, 20);

@@ -26,7 +26,7 @@ inline std::string hello(bool listens_only = false, std::uint32_t version = kFee
   message.mutable_hello()->set_listens_only(listens_only);
   return framed(message);
 }
-inline v1::Feed::Sensors sensors(const intake::FeedSensors& of) {
+inline v1::Feed::Sensors sensors(const Sensors& of) {
   v1::Feed::Sensors out;
   write(of, out);
   return out;
@@ -37,12 +37,12 @@ inline std::string hello(const v1::Feed::Sensors& sensors) {
   *message.mutable_hello()->mutable_sensors() = sensors;
   return framed(message);
 }
-inline std::string images(const intake::FedImages& of) { return framed(internal::message_of(of)); }
+inline std::string images(const EncodedImages& of) { return framed(internal::message_of(of)); }
 inline std::string imu(const std::vector<ImuSample>& samples) { return framed(internal::message_of(samples)); }
 inline std::string fix(const PositionFix& of) { return framed(internal::message_of(of)); }
 
 inline std::string odometry(const StampedPose& at, const Matrix6d& covariance) {
-  return framed(internal::message_of(node::OdometrySample{at.stamp, at.pose, covariance}));
+  return framed(internal::message_of(OdometrySample{at.stamp, at.pose, covariance}));
 }
 inline std::string scan(Timestamp stamp, int points) {
   v1::Feed message;

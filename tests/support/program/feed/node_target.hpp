@@ -21,12 +21,10 @@ class NodeTarget final : public FeedTarget {
         view_("alpha") {
     carry_out(node_->resume({}));
   }
-  Status add_odometry(const node::OdometrySample& sample) override {
-    ended_ = false;
-    return carry_out(node_->add_odometry(sample, {}));
+  Status add(Input input) override {
+    if (std::holds_alternative<OdometrySample>(input)) ended_ = false;
+    return carry_out(node_->add(input, {}));
   }
-  Status add_scan(const Scan& scan) override { return carry_out(node_->add_scan(scan, {})); }
-  Status add_fix(const PositionFix& fix) override { return carry_out(node_->add_fix(fix, {})); }
   Status begin_session(const std::string& why) { return carry_out(node_->begin_session(why, {})); }
   Status finish() override {
     ended_ = true;

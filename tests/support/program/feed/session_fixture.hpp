@@ -15,14 +15,24 @@ namespace tutti::program::test {
 /// Takes samples of increasing stamps; what else it knows is set by hand.
 class ScriptedTarget final : public FeedTarget {
  public:
-  Status add_odometry(const node::OdometrySample& sample) override {
-    if (known.newest && sample.stamp <= known.newest->stamp) return fail(ErrorCode::invalid, "stamps must increase");
-    known.newest = {sample.stamp, sample.T_odom_body};
-    return {};
-  }
-  Status add_scan(const Scan& scan) override {
-    if (!known.newest || scan.stamp != known.newest->stamp) return fail(ErrorCode::invalid, "not of the newest sample");
-    scans.push_back(scan.stamp);
+  Status add(Input input) override {
+    if (const auto* sample = std::get_if<OdometrySample>(&input)) {
+      if (known.newest && sample->stamp <= known.newest->stamp) return fail(ErrorCode::invalid, "stamps must increase");
+      known.newest = {sample->stamp, sample->T_odom_body};
+    }
+    if (const auto* scan = std::get_if<Scan>(&input)) {
+      if (!known.newest || scan->stamp != known.newest->stamp)
+        return fail(ErrorCode::invalid, "not of the newest sample");
+      scans.push_back(scan->stamp);
+    }
+    if (const auto* images = std::get_if<EncodedImages>(&input)) {
+      if (auto ok = check_images(*images, sensors); !ok) return ok;
+      seen.push_back(images->stamp);
+    }
+    if (const auto* imu = std::get_if<ImuSamples>(&input))
+      for (const ImuSample& sample : *imu) felt.push_back(sample.stamp);
+    if (const auto* fix = std::get_if<PositionFix>(&input)) fixes.push_back(*fix);
+    if (const auto* of = std::get_if<Health>(&input)) health = *of;
     return {};
   }
   Status finish() override {
@@ -30,28 +40,14 @@ class ScriptedTarget final : public FeedTarget {
     known.ended = ends_at_once;
     return {};
   }
-  void set_sensors(const intake::FeedSensors& of) override { sensors = of; }
-  Status add_images(intake::FedImages images) override {
-    if (auto ok = intake::check_images(images, sensors); !ok) return ok;
-    seen.push_back(images.stamp);
-    return {};
-  }
-  Status add_imu(const std::vector<ImuSample>& samples) override {
-    for (const ImuSample& sample : samples) felt.push_back(sample.stamp);
-    return {};
-  }
-  Status add_fix(const PositionFix& fix) override {
-    fixes.push_back(fix);
-    return {};
-  }
-  void set_health(const Health& of) override { health = of; }
+  void set_sensors(const Sensors& of) override { sensors = of; }
   [[nodiscard]] FeedState state() const override { return known; }
   std::vector<FeedRefusal> take_refusals() override { return std::exchange(refusals, {}); }
 
   FeedState known{.chain = {RobotId{4}, 77}, .name = "alpha", .newest = {}};
   std::vector<Timestamp> scans, seen, felt;
   std::vector<PositionFix> fixes;
-  intake::FeedSensors sensors;
+  Sensors sensors;
   Health health;
   int finished = 0;
   bool ends_at_once = true;

@@ -2,14 +2,67 @@
 #include "tutti/program/feed/internal/feed_messages.hpp"
 
 #include "tutti/base/check.hpp"
+#include "tutti/wire/field_bytes.hpp"
 
 namespace tutti::program::internal {
 namespace {
 
-void write(const intake::EncodedImage& image, v1::Feed::Image& out) {
+void write(const EncodedImage& image, v1::Feed::Image& out) {
   out.set_camera(image.camera);
   out.set_encoding(image.is_raw ? v1::Feed::Image::RAW : v1::Feed::Image::FILE);
   out.set_data(image.bytes);
+}
+
+void write(const OdometrySample& sample, v1::Feed& message) {
+  auto& out = *message.mutable_odometry();
+  out.set_stamp_ns(sample.stamp.ns);
+  internal::write(sample.T_odom_body, *out.mutable_t_odom_body());
+  for (int i = 0; i < 36; ++i) out.add_increment_covariance(sample.increment_covariance(i / 6, i % 6));
+}
+
+void write(const Scan& scan, v1::Feed& message) {
+  auto& out = *message.mutable_scan();
+  out.set_stamp_ns(scan.stamp.ns);
+  for (const Eigen::Vector3f& point : scan.cloud->points)
+    for (const float x : point) out.add_xyz(x);
+  if (scan.age_s) out.mutable_age_s()->Add(scan.age_s->begin(), scan.age_s->end());
+}
+
+void write(const EncodedImages& images, v1::Feed& message) {
+  auto& out = *message.mutable_images();
+  out.set_stamp_ns(images.stamp.ns);
+  for (const EncodedImage& image : images.images) write(image, *out.add_image());
+  if (images.depth) write(*images.depth, *out.mutable_depth());
+}
+
+void write(const ImuSamples& samples, v1::Feed& message) {
+  auto& out = *message.mutable_imu();
+  for (const ImuSample& sample : samples) {
+    out.add_stamp_ns(sample.stamp.ns);
+    for (int i = 0; i < 3; ++i) {
+      out.add_gyro(sample.gyro[i]);
+      out.add_accelerometer(sample.accelerometer[i]);
+    }
+  }
+}
+
+void write(const PositionFix& fix, v1::Feed& message) {
+  auto& out = *message.mutable_fix();
+  out.set_stamp_ns(fix.stamp.ns);
+  out.set_latitude_deg(fix.antenna.latitude_deg);
+  out.set_longitude_deg(fix.antenna.longitude_deg);
+  out.set_height_m(fix.antenna.height_m);
+  for (int i = 0; i < 9; ++i) out.add_covariance_m2(fix.covariance(i / 3, i % 3));
+  for (const double x : fix.p_body_antenna) out.add_p_body_antenna(x);
+}
+
+void write(const Health& health, v1::Feed& message) {
+  TUTTI_CHECK(message.mutable_health()->ParseFromString(wire::field_bytes(health)), "health");
+}
+
+/// They are made on board.
+void write(const TrackedImages& images, v1::Feed& /*message*/) {
+  TUTTI_CHECK(false, "tracked images at {} ns are not fed", images.stamp.ns);
 }
 
 }  // namespace
@@ -24,7 +77,7 @@ void write(const Pose3& T, v1::Feed::Pose& out) {
   out.set_qw(T.rotation.w());
 }
 
-void write(const intake::FeedSensors& sensors, v1::Feed::Sensors& out) {
+void write(const Sensors& sensors, v1::Feed::Sensors& out) {
   out.set_scans(sensors.scans);
   for (const Camera& camera : sensors.cameras) {
     auto& to = *out.add_camera();
@@ -52,53 +105,9 @@ void write(const intake::FeedSensors& sensors, v1::Feed::Sensors& out) {
   out.mutable_imu()->set_accelerometer_random_walk(sensors.imu->accelerometer_random_walk);
 }
 
-v1::Feed message_of(const node::OdometrySample& sample) {
+v1::Feed message_of(const Input& input) {
   v1::Feed message;
-  message.mutable_odometry()->set_stamp_ns(sample.stamp.ns);
-  write(sample.T_odom_body, *message.mutable_odometry()->mutable_t_odom_body());
-  for (int i = 0; i < 36; ++i)
-    message.mutable_odometry()->add_increment_covariance(sample.increment_covariance(i / 6, i % 6));
-  return message;
-}
-
-v1::Feed message_of(const Scan& scan) {
-  v1::Feed message;
-  message.mutable_scan()->set_stamp_ns(scan.stamp.ns);
-  for (const Eigen::Vector3f& point : scan.cloud->points)
-    for (const float x : point) message.mutable_scan()->add_xyz(x);
-  if (scan.age_s) message.mutable_scan()->mutable_age_s()->Add(scan.age_s->begin(), scan.age_s->end());
-  return message;
-}
-
-v1::Feed message_of(const intake::FedImages& images) {
-  v1::Feed message;
-  message.mutable_images()->set_stamp_ns(images.stamp.ns);
-  for (const intake::EncodedImage& image : images.images) write(image, *message.mutable_images()->add_image());
-  if (images.depth) write(*images.depth, *message.mutable_images()->mutable_depth());
-  return message;
-}
-
-v1::Feed message_of(const std::vector<ImuSample>& samples) {
-  v1::Feed message;
-  for (const ImuSample& sample : samples) {
-    message.mutable_imu()->add_stamp_ns(sample.stamp.ns);
-    for (int i = 0; i < 3; ++i) {
-      message.mutable_imu()->add_gyro(sample.gyro[i]);
-      message.mutable_imu()->add_accelerometer(sample.accelerometer[i]);
-    }
-  }
-  return message;
-}
-
-v1::Feed message_of(const PositionFix& fix) {
-  v1::Feed message;
-  auto& out = *message.mutable_fix();
-  out.set_stamp_ns(fix.stamp.ns);
-  out.set_latitude_deg(fix.antenna.latitude_deg);
-  out.set_longitude_deg(fix.antenna.longitude_deg);
-  out.set_height_m(fix.antenna.height_m);
-  for (int i = 0; i < 9; ++i) out.add_covariance_m2(fix.covariance(i / 3, i % 3));
-  for (const double x : fix.p_body_antenna) out.add_p_body_antenna(x);
+  std::visit([&](const auto& sample) { write(sample, message); }, input);
   return message;
 }
 

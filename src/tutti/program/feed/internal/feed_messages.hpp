@@ -11,14 +11,10 @@
 namespace tutti::program::internal {
 
 void write(const Pose3& T, v1::Feed::Pose& out);
-void write(const intake::FeedSensors& sensors, v1::Feed::Sensors& out);
+void write(const Sensors& sensors, v1::Feed::Sensors& out);
 
 /// What a client sends.
-v1::Feed message_of(const node::OdometrySample& sample);
-v1::Feed message_of(const Scan& scan);
-v1::Feed message_of(const intake::FedImages& images);
-v1::Feed message_of(const std::vector<ImuSample>& samples);
-v1::Feed message_of(const PositionFix& fix);
+v1::Feed message_of(const Input& input);
 
 inline constexpr std::size_t kHeaderBytes = 4;
 /// As bytes on the socket: so many of the length, little endian, and the message. At most kMaxFeedBytes.

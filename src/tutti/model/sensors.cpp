@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/intake/feed_sensors.hpp"
+#include "tutti/model/sensors.hpp"
 
 #include <fmt/format.h>
 
 #include <cmath>
 #include <set>
 
-namespace tutti::intake {
+namespace tutti {
 namespace {
 
 std::size_t pixels_of(const Camera& camera) {
@@ -26,7 +26,7 @@ bool is_noise(double density) { return std::isfinite(density) && density > 0.0; 
 
 }  // namespace
 
-Status check_sensors(const FeedSensors& sensors) {
+Status check_sensors(const Sensors& sensors) {
   if (sensors.cameras.size() > 2)
     return fail(ErrorCode::unsupported, "{} cameras, expected one or two", sensors.cameras.size());
   if (sensors.depth && sensors.cameras.size() != 1)
@@ -62,7 +62,7 @@ Status check_sensors(const FeedSensors& sensors) {
   return {};
 }
 
-Status check_images(const FedImages& images, const FeedSensors& sensors) {
+Status check_images(const EncodedImages& images, const Sensors& sensors) {
   if (sensors.cameras.empty())
     return fail(ErrorCode::unsupported, "images at {} ns: no camera is set up, Hello said none (Sensors.camera)",
                 images.stamp.ns);
@@ -83,10 +83,10 @@ Status check_images(const FedImages& images, const FeedSensors& sensors) {
   return {};
 }
 
-std::size_t bytes_of(const FedImages& images) {
+std::size_t bytes_of(const EncodedImages& images) {
   std::size_t out = images.depth ? images.depth->bytes.size() : 0;
   for (const EncodedImage& image : images.images) out += image.bytes.size();
   return out;
 }
 
-}  // namespace tutti::intake
+}  // namespace tutti
