@@ -292,7 +292,7 @@ std::string ImagesIntake::missing() const {
                     fmt::join(names, ", ")));
   if (depth_)
     if (const auto& images = topics_[cameras_.front()].newest, &depth = topics_[*depth_].newest;
-        images && depth && *images - *depth > kSilent_s)
+        images && depth && *images - *depth > waiting::kUnknown_s)
       add(fmt::format("{} has ended, or is by another clock: its newest is of {} ns", topics_[*depth_].topics.images,
                       depth->ns));
   if (imu_.empty()) return out;
@@ -301,7 +301,7 @@ std::string ImagesIntake::missing() const {
 }
 
 void ImagesIntake::drop_late(Timestamp stamp) {
-  for (OneTopic& topic : topics_) topic.drop_before(stamp - kLatest_s);
+  for (OneTopic& topic : topics_) topic.drop_before(stamp - waiting::kLate_s);
 }
 
 bool ImagesIntake::reaches(Timestamp stamp) const {
@@ -351,12 +351,12 @@ Result<std::optional<EncodedImages>> ImagesIntake::next_images(Timestamp stamp, 
   while (!camera.waiting.empty() && odometry_.is_before_all(camera.waiting.front().stamp)) camera.pop();
   if (camera.waiting.empty() || camera.waiting.front().stamp > stamp) return none;
   const Timestamp instant = camera.waiting.front().stamp;
-  if (stamp - instant > kLatest_s) {
+  if (stamp - instant > waiting::kLate_s) {
     camera.pop();
     return fail(ErrorCode::invalid, "image at {} ns comes {:.1f} s after odometry of its time, expected at most {} s",
-                instant.ns, stamp - instant, kLatest_s);
+                instant.ns, stamp - instant, waiting::kLate_s);
   }
-  const bool is_patient = !is_last && stamp - instant < kPatience_s;
+  const bool is_patient = !is_last && stamp - instant < waiting::kPartner_s;
   const auto may_come = [&](const OneTopic& topic) {
     return is_patient && !(topic.newest && *topic.newest >= instant);
   };
@@ -377,7 +377,7 @@ std::vector<ImuSample> ImagesIntake::next_imu(Timestamp stamp) {
   std::vector<ImuSample> out;
   const auto T_body_imu = imu_place();
   if (!T_body_imu) return out;
-  while (!samples_.empty() && samples_.front().stamp - stamp <= kAhead_s && out.size() < kMaxImuSamples) {
+  while (!samples_.empty() && samples_.front().stamp - stamp <= waiting::kLate_s && out.size() < kMaxImuSamples) {
     out.push_back(bags::in_body(samples_.front(), *T_body_imu));
     samples_.pop_front();
   }

@@ -27,13 +27,8 @@ namespace tutti::intake {
 class ImagesIntake {
  public:
   using Encoding = bags::RosEncoding;
-  static constexpr double kLatest_s = 0.5;               ///< Behind odometry; the robot takes none later.
-  static constexpr double kPatience_s = 0.3;             ///< By odometry, for the second camera's image of a time.
-  static constexpr double kAhead_s = 0.5;                ///< IMU samples may be that far ahead of odometry.
   static constexpr std::size_t kMostBytes = 48U << 20U;  ///< Images that wait for odometry, before the oldest go.
   static constexpr std::size_t kMostSamples = 20'000;    ///< IMU samples that wait, before the oldest go.
-
-  static constexpr double kSilent_s = 5.0;  ///< Depth that is older than images by more has ended.
 
   /// `imu` is empty without an IMU. `odometry` must live as long as this.
   ImagesIntake(ImagesConfig config, std::vector<CameraTopics> topics, std::string imu, const RosIntake& odometry);

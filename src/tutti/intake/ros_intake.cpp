@@ -175,7 +175,7 @@ Status RosIntake::check_stamp(Timestamp stamp, const std::optional<Timestamp>& b
 
 Status RosIntake::check_follows(Timestamp stamp, const std::optional<Timestamp>& before) const {
   const std::optional<Timestamp>& newest = stamps_.newest();
-  const bool was_wrong = before && newest && *before - *newest > kAhead_s;
+  const bool was_wrong = before && newest && *before - *newest > waiting::kAhead_s;
   return was_wrong ? Status() : check_increases(stamp, before);
 }
 
@@ -269,7 +269,7 @@ bool RosIntake::waits_for_place() {
   if (is_placed_ || scans_.empty() || !frames_) return false;
   if (!held_since_) held_since_ = scans_.front().stamp;
   const auto newest = stamps_.newest();
-  const bool is_late = newest && *newest - *held_since_ > kHold_s;
+  const bool is_late = newest && *newest - *held_since_ > waiting::kUnknown_s;
   is_placed_ = is_late || lidar_pose(scans_.front().frame).has_value();
   return !is_placed_;
 }

@@ -60,7 +60,6 @@ class RosIntake {
   static constexpr std::size_t kMostFixes = 200;     ///< Fixes that wait for odometry; beyond it the oldest is dropped.
   static constexpr std::size_t kMostRefused = 8000;  ///< Samples that are kept until it is known whether they count.
   static constexpr std::size_t kMostFrames = 1000;   ///< Limit on the frames of /tf.
-  static constexpr double kHold_s = 5.0;  ///< At first scans, and odometry since, wait so long for the LiDAR's place.
   explicit RosIntake(IntakeConfig config) : config_(std::move(config)) {}
 
   /// The robot already has everything up to `newest` (FeedWelcome::newest): samples that wait and are older are
@@ -82,7 +81,7 @@ class RosIntake {
   Status add_tf(std::string_view bytes, bool is_static, TfOf of = TfOf::all, Encoding encoding = Encoding::cdr);
 
   /// The next odometry sample to feed, in order of arrival. With `wait_for_scans` it is held back until a scan with its
-  /// stamp or a later one has arrived. Also held back, for kHold_s of odometry's time once, while the first scans wait
+  /// stamp or a later one has arrived. Also held back, for waiting::kUnknown_s once, while the first scans wait
   /// for the transform that places the LiDAR, as who publishes it may be heard later.
   std::optional<OdometrySample> next_odometry(bool wait_for_scans);
   /// The next scan that can be fed, because the motion up to the newest sample that next_odometry() returned covers its
@@ -101,11 +100,10 @@ class RosIntake {
   /// T_body_frame by transforms that do not move; an error names those that are known.
   [[nodiscard]] Result<Pose3> pose_on_body(const std::string& frame) const;
   /// Fails for a stamp of a sensor's message that is not after `before`, the stamp of the message before, or that is by
-  /// another clock than odometry's. A `before` that is far ahead of odometry does not count: it was wrong itself, and
-  /// what waits and is not before `stamp` is to be dropped.
+  /// another clock than odometry's. A `before` that is more than waiting::kAhead_s ahead of odometry does not count: it
+  /// was wrong itself, and what waits and is not before `stamp` is to be dropped.
   [[nodiscard]] Status check_stamp(Timestamp stamp, const std::optional<Timestamp>& before) const;
   [[nodiscard]] Status check_follows(Timestamp stamp, const std::optional<Timestamp>& before) const;
-  static constexpr double kAhead_s = 1.0;  ///< What is farther ahead of odometry is "far ahead" for check_stamp().
   /// True for stamps from before the first odometry.
   [[nodiscard]] bool is_before_all(Timestamp stamp) const {
     return has_whole_history_ && !history_.empty() && stamp < history_.front().stamp;

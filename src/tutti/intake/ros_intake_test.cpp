@@ -124,7 +124,7 @@ TEST(RosIntake, TheLidarIsWhereStaticTransformsSay) {
 TEST(RosIntake, TheFirstScansAndOdometrySinceWaitForTheTransformOfTheLidar) {
   for (const bool comes : {true, false}) {
     RosIntake intake({});
-    constexpr auto kHeld = static_cast<int>(RosIntake::kHold_s / (kPeriod * 1e-9));
+    constexpr auto kHeld = static_cast<int>(waiting::kUnknown_s / (kPeriod * 1e-9));
     Fed fed;
     const auto take = [&](const Fed& more) {
       fed.samples.insert(fed.samples.end(), more.samples.begin(), more.samples.end());

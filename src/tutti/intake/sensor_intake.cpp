@@ -158,7 +158,7 @@ void SensorIntake::check_missing(bool is_new) {
 
 void SensorIntake::choose() {
   if (!first_image_ && images_->has_any_image()) first_image_ = fed_;
-  const bool is_late = first_image_ && fed_ && *fed_ - *first_image_ > kPatience_s;
+  const bool is_late = first_image_ && fed_ && *fed_ - *first_image_ > waiting::kUnknown_s;
   const auto chosen = images_->choose(is_late);
   if (!chosen) {
     missing_ = "no images are used: " + chosen.error().message;
@@ -184,7 +184,7 @@ Result<std::optional<Input>> SensorIntake::next(bool wants_scan) {
 
 bool SensorIntake::waits_for_images() const {
   const auto waiting = ros_.waiting();
-  if (!holds_for_images_ || !waiting || waiting->second - waiting->first > kLongestHold_s) return false;
+  if (!holds_for_images_ || !waiting || waiting->second - waiting->first > waiting::kHeld_s) return false;
   if (sensors_.cameras.empty()) return true;
   return images_ && !images_->is_filling() && !images_->reaches(waiting->first);
 }

@@ -41,9 +41,7 @@ Result<std::vector<CameraTopics>> named_topics(const ImagesConfig& config);
 /// wrong with a message, which then has no effect.
 class SensorIntake {
  public:
-  static constexpr double kPatience_s = 5.0;  ///< Topics that show nothing so long after another are left out.
-  static constexpr double kLongestHold_s = 20.0;
-
+  /// Topics of images that show nothing for waiting::kUnknown_s after the first of them are left out.
   explicit SensorIntake(IntakeConfig config) : ros_(std::move(config)) {}
   /// From now on images of `topics`, and with them samples of `imu` (may be empty), are taken.
   void take_images(ImagesConfig config, std::vector<CameraTopics> topics, std::string imu);
@@ -53,7 +51,7 @@ class SensorIntake {
   /// when one is left out. Scans that are not wanted are skipped.
   Result<std::optional<Input>> next(bool wants_scan);
   /// Where nothing may be lost: odometry waits for the scans, and for the images and IMU samples, that come with it.
-  /// For images it waits no longer than kLongestHold_s of its own time, and while there is room for those that came.
+  /// For images it waits no longer than waiting::kHeld_s, and while there is room for those that came.
   void hold_odometry(bool for_scans, bool for_images) {
     holds_for_scans_ = for_scans;
     holds_for_images_ = for_images;

@@ -177,7 +177,7 @@ TEST_F(SensorIntakeTest, OdometryWaitsForScansAndForCamerasForAWhile) {
   EXPECT_EQ(due(), "op");
   EXPECT_EQ(odometry_at(2), "");
   EXPECT_EQ(due(), "") << "no image yet";
-  constexpr int kHeld = static_cast<int>(SensorIntake::kLongestHold_s) * static_cast<int>(kSecond / kPeriod);
+  constexpr int kHeld = static_cast<int>(waiting::kHeld_s) * static_cast<int>(kSecond / kPeriod);
   EXPECT_EQ(odometry_at(2 + kHeld), "");
   EXPECT_EQ(due(), "") << "images may come yet";
   EXPECT_EQ(odometry_at(3 + kHeld), "");

@@ -38,13 +38,26 @@ template <class Sample>
 concept FedOnly =
     std::is_same_v<Sample, EncodedImages> || std::is_same_v<Sample, ImuSamples> || std::is_same_v<Sample, Health>;
 
+/// What is waited for and how long, by odometry's time, so that what belongs together comes together.
+namespace waiting {
+
+inline constexpr double kAhead_s = 1.0;    ///< A sensor may be heard this long before odometry of its stamp,
+inline constexpr double kLate_s = 0.5;     ///< and this long after it, unless what it shows can be placed later, too.
+inline constexpr double kPartner_s = 0.3;  ///< For the second camera's image, or depth, of the same time.
+inline constexpr double kImu_s = kLate_s - kPartner_s;  ///< For IMU samples up to images: what remains of kLate_s.
+inline constexpr double kSilent_s = 1.0;   ///< For a sensor at which a keyframe is due; then keyframes do without it.
+inline constexpr double kUnknown_s = 5.0;  ///< For where a sensor is on the robot, or what its topic has.
+inline constexpr double kHeld_s = 20.0;    ///< For images, where odometry waits so that none is lost.
+
+}  // namespace waiting
+
 /// What must have reached an input's stamp before it can be used.
 enum class Needs { nothing, odometry, odometry_and_imu };
 
 struct InputKind {
   const char* name;
   Needs needs;
-  double ahead_s = 1.0;  ///< It may be so far ahead of the newest odometry.
+  double ahead_s = waiting::kAhead_s;  ///< It may be so far ahead of the newest odometry.
 };
 
 /// By Input::index(). Odometry itself may make steps of `ahead_s`.

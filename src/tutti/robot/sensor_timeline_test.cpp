@@ -174,7 +174,7 @@ TEST(SensorTimeline, KeyframesDoNotWaitForASensorThatIsSilent) {
   EXPECT_LT(builder.state().keyframes_without_scan, 3U);
   double longest_s = 0.0;
   for (std::size_t i = 1; i < keyframes.size(); ++i) longest_s = std::max(longest_s, keyframes[i] - keyframes[i - 1]);
-  EXPECT_LE(longest_s, 0.3 + SubmapBuilder::kPatience_s + 0.02);
+  EXPECT_LE(longest_s, 0.3 + waiting::kSilent_s + 0.02);
   EXPECT_GT(longest_s, 1.0);
   EXPECT_GT(keyframes.size(), 50U);  // one per 0.3 or 0.4 m, but for the time of patience
 }
@@ -229,7 +229,7 @@ TEST(SensorTimeline, WhatWaitsIsSmallAtAThousandSamplesASecond) {
     history = std::max(history, builder.state().recent.size());
   }
   // One each 3 ms.
-  EXPECT_LE(static_cast<double>(most), 1.4 * SubmapBuilder::kLag_s / SensorTimeline::kFinest_s);
+  EXPECT_LE(static_cast<double>(most), 1.4 * waiting::kLate_s / SensorTimeline::kFinest_s);
   EXPECT_LE(static_cast<double>(history), 1.4 * SubmapBuilder::kHistory_s / SensorTimeline::kFinest_s);
   EXPECT_NEAR(builder.since_keyframe().covariance(3, 3),
               1e-9 * 1000 * (4.999 - (builder.state().keyframes.back().stamp - at(0))), 1e-11);

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <optional>
 
-#include "tutti/base/timestamp.hpp"
+#include "tutti/model/input.hpp"
 
 namespace tutti::robot {
 
@@ -12,7 +12,8 @@ namespace tutti::robot {
 /// a clock that was set back or began anew must not either. The verdicts are a function of the stamps so far.
 class StampWatch {
  public:
-  static constexpr double kFar_s = 60.0;  ///< A step of more than this needs a second stamp that confirms it.
+  /// A step of more than this needs a second stamp that confirms it.
+  static constexpr double kFar_s = kInputKinds[index_of<OdometrySample>()].ahead_s;
   static constexpr double kAnew_s = 2.0;  ///< Stamps before the newest, in order for longer than this, are of a clock
   static constexpr std::size_t kLeastAnew = 3;  ///< that began anew; so many are needed at least.
 

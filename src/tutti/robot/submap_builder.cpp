@@ -110,7 +110,7 @@ void SubmapBuilder::advance() {
   if (!newest) return;
   Timestamp until = *newest;
   if (has_scans() || has_images()) {
-    until = until - kLag_s;
+    until = until - waiting::kLate_s;
     const std::optional<Timestamp>& heard = has_images() ? state_.heard_images : state_.heard_scan;
     if (heard) until = std::max(until, *heard);
   }
@@ -125,7 +125,7 @@ bool SubmapBuilder::makes_keyframe(const SensorTimeline::Instant& instant) {
   if (!is_keyframe(step.stamp, step.T_odom_body)) return false;
   if (state_.keyframes.empty() || !has_sensors || is_waited_for || state_.is_blind) return true;
   if (!state_.due) state_.due = step.stamp;
-  state_.is_blind = step.stamp - *state_.due >= kPatience_s;
+  state_.is_blind = step.stamp - *state_.due >= waiting::kSilent_s;
   return state_.is_blind;
 }
 

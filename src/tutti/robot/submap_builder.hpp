@@ -113,14 +113,14 @@ struct SubmapBuilderState {
   std::vector<TrackedImages> images;     ///< At keyframes.
   std::vector<FinishedSubmap> finished;  ///< Not taken yet, oldest first.
   RelativePose since_keyframe{.T_a_b = {}, .covariance = Matrix6d::Zero()};
-  Trajectory recent;                           ///< Raw odometry over the longest sweep that can end now.
-  double distance_m = 0.0;                     ///< Travelled so far.
-  double representative_distance_m = 0.0;      ///< Value of distance_m at the last representative keyframe.
-  SensorTimeline waiting;                      ///< Everything after recent.back().
-  std::optional<Timestamp> heard_scan;         ///< Stamp of the newest.
-  std::optional<Timestamp> heard_images;       ///< Stamp of the newest.
-  std::optional<Timestamp> due;                ///< Since then a keyframe is due, and waits for a sensor.
-  bool is_blind = false;                       ///< The sensor that keyframes wait for was not heard for kPatience_s.
+  Trajectory recent;                       ///< Raw odometry over the longest sweep that can end now.
+  double distance_m = 0.0;                 ///< Travelled so far.
+  double representative_distance_m = 0.0;  ///< Value of distance_m at the last representative keyframe.
+  SensorTimeline waiting;                  ///< Everything after recent.back().
+  std::optional<Timestamp> heard_scan;     ///< Stamp of the newest.
+  std::optional<Timestamp> heard_images;   ///< Stamp of the newest.
+  std::optional<Timestamp> due;            ///< Since then a keyframe is due, and waits for a sensor.
+  bool is_blind = false;                   ///< The sensor that keyframes wait for was not heard for waiting::kSilent_s.
   std::uint64_t keyframes_without_scan = 0;    ///< Keyframes since the last one with a scan.
   std::uint64_t keyframes_without_images = 0;  ///< Keyframes since the last one with images.
   std::vector<PositionFix> waiting_fixes;      ///< Increasing stamps, all after recent.back().
@@ -133,12 +133,12 @@ struct SubmapBuilderState {
 ///
 /// Odometry and sensors have rates of their own. A robot with sensors has its keyframes where they see: at the first
 /// images (without a camera, the first scan) at which a keyframe is due, with odometry interpolated to that time. A
-/// plain odometry sample becomes a keyframe only when no sensor data arrives for `kPatience_s` after one is due.
+/// plain odometry sample becomes a keyframe only when no sensor data arrives for `waiting::kSilent_s` after one is due.
 ///
-/// For this the builder works with a delay: times are settled when they are `kLag_s` old, or older than what the
-/// sensor sent last. A scan that arrives after its time was settled is still merged where it belongs; such images are
-/// refused. Where every sample has its scan or images, nothing is delayed; a robot that is not known to have a sensor
-/// has its keyframes at once.
+/// For this the builder works with a delay: times are settled when they are `waiting::kLate_s` old, or older than what
+/// the sensor sent last. A scan that arrives after its time was settled is still merged where it belongs; such images
+/// are refused. Where every sample has its scan or images, nothing is delayed; a robot that is not known to have a
+/// sensor has its keyframes at once.
 class SubmapBuilder {
  public:
   SubmapBuilder(const ChainId& chain, const SubmapConfig& config, SubmapBuilderState state = {});
@@ -202,12 +202,10 @@ class SubmapBuilder {
   void finish();
 
   static constexpr double kSweepHistoryS = lidar::kLongestSweep_s;  ///< Longest sweep that can be undistorted.
-  static constexpr double kLag_s = 0.5;      ///< A sensor may be heard this long after odometry of its stamp.
   static constexpr double kHistory_s = 1.0;  ///< Settled odometry is kept this long, for sweeps and late scans.
   /// A little less than 0.5 s, so that a receiver of 2 Hz whose clock is fast loses none.
   static constexpr double kFinestFix_s = 0.45;
   static constexpr std::size_t kMostFixes = 200;  ///< Per submap; when there are more, some are dropped.
-  static constexpr double kPatience_s = 1.0;    ///< When a sensor is silent for longer, keyframes are made without it.
   static constexpr double kLongestGap_s = 1.0;  ///< Over longer gaps between samples nobody knows how the robot moved.
 
   [[nodiscard]] const SubmapBuilderState& state() const { return state_; }

@@ -118,7 +118,6 @@ class FeedFront final : public FeedTarget {
     std::size_t image_bytes = 0;  ///< Bytes of the images that wait now.
   };
   [[nodiscard]] Figures figures() const;
-  static constexpr double kImuPatience_s = 0.2;  ///< Images wait for the IMU until odometry is this far past them.
 
  private:
   [[nodiscard]] std::size_t waiting() const { return inputs_.size() - taken_; }

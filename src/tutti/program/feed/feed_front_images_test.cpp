@@ -76,7 +76,7 @@ TEST(FeedFrontImages, ImagesComeWhenOdometryAndTheImuHaveReachedThem) {
   EXPECT_FALSE(front.add(images(between)));  // again
   EXPECT_TRUE(front.add(images(kOdometry[1].stamp)));
   std::size_t i = 2;  // the IMU is not heard any more: it is not waited for
-  for (; kOdometry[i].stamp - kOdometry[1].stamp < FeedFront::kImuPatience_s; ++i) {
+  for (; kOdometry[i].stamp - kOdometry[1].stamp < waiting::kImu_s; ++i) {
     EXPECT_TRUE(front.add(sample(i)));
     EXPECT_EQ(next(front), 'o');
     EXPECT_EQ(next(front), ' ');

@@ -87,7 +87,7 @@ void FeedFront::release(bool all) {
     if (all) return true;
     if (localiser_.newest()->stamp < stamp) return false;
     return !sensors_->imu || (!imu_.empty() && imu_.back().stamp >= stamp) ||
-           localiser_.newest()->stamp - stamp >= kImuPatience_s;
+           localiser_.newest()->stamp - stamp >= waiting::kImu_s;
   };
   for (; !held_.empty() && is_due(stamp_of(*held_.front())); held_.pop_front()) push_back(std::move(held_.front()));
 }
