@@ -61,8 +61,8 @@ export const TIMES = {
   clouds_ms: 250,
   /** Until a panel has drawn what was just chosen. */
   seen_ms: 80,
-  /** What a picture that moves may take. */
-  moving_ms: 24,
+  /** Between pictures that move: 30 a second. */
+  moving_ms: 33,
   answer_ms: 20_000,
   /** The past of a long mission has some megabytes. */
   history_ms: 120_000,

@@ -87,18 +87,16 @@ export class Dresser {
   private height = height_ramp();
   private bad = Uint32Array.from({ length: 256 }, (_, i) => abgr(bad(i / 255)));
 
-  /** Of what the eye sees, with `most` points altogether. `all`: also of what it does not see. */
-  dress(world: World, clouds: Clouds, eye: Eye, d: Dressing, most: number, all = false): Map<string, Painted> {
+  /** Of what the eye sees. `all`: also of what it does not see. */
+  dress(world: World, clouds: Clouds, eye: Eye, d: Dressing, all = false): Map<string, Painted> {
     const out = new Map<string, Painted>();
     if (!d.options.layers.clouds) return out;
     const scales = scales_of(world, d);
-    let points = 0;
     for (const [id, placed] of world.placed) {
       const cloud = clouds.get(id);
       if (!cloud || cloud.n === 0) continue;
       const centre = transform(placed.T, cloud.centre);
       if (!all && !eye.sees(centre, cloud.radius_m)) continue;
-      points += cloud.n;
       const ramp =
         d.options.colour === "height" ? this.height : this.ramp(colour_of(placed, d, scales), d.faint(id), d.dark);
       const shades = d.options.colour === "survey" ? d.distances(id, cloud, placed.target) : null;
@@ -107,7 +105,6 @@ export class Dresser {
         ...(shades ? { shades } : {}),
       });
     }
-    if (points > most) for (const cloud of out.values()) cloud.count = Math.ceil((cloud.count * most) / points);
     return out;
   }
 
@@ -124,6 +121,15 @@ export class Dresser {
     if (this.ramps.size > 512) this.ramps.clear();
     return ramp;
   }
+}
+
+/** Leaves at most so many points, the same share of each cloud; whether these are all. */
+export function thin(clouds: Map<string, Painted>, most: number): boolean {
+  let points = 0;
+  for (const cloud of clouds.values()) points += cloud.count;
+  if (points <= most) return true;
+  for (const cloud of clouds.values()) cloud.count = Math.ceil((cloud.count * most) / points);
+  return false;
 }
 
 function painted(cloud: Cloud, T: readonly number[], ramp: Uint32Array, eye: Eye, centre: readonly number[]): Painted {

@@ -28,6 +28,7 @@ export class Ink {
   private c = this.canvas.getContext("2d")!;
   private segments: Segment[] = [];
   private labels: { x0: number; y0: number; x1: number; y1: number }[] = [];
+  private full = true;
 
   constructor(readonly eye: Eye) {}
 
@@ -37,7 +38,9 @@ export class Ink {
     this.c.setTransform(ratio, 0, 0, ratio, 0, 0);
   }
 
-  begin(): void {
+  /** `full`: with halos, dashes and filled rings. */
+  begin(full = true): void {
+    this.full = full;
     this.c.clearRect(0, 0, this.eye.width, this.eye.height);
     this.segments = [];
     this.labels = [];
@@ -79,7 +82,7 @@ export class Ink {
     this.pen(stroke);
     this.c.beginPath();
     points.forEach((q, i) => (i === 0 ? this.c.moveTo(q![0], q![1]) : this.c.lineTo(q![0], q![1])));
-    if (fill) {
+    if (fill && this.full) {
       this.c.fillStyle = fill;
       this.c.fill();
     }
@@ -119,11 +122,13 @@ export class Ink {
       box.y1 += 17;
     }
     this.labels.push(box);
-    c.lineWidth = 3.5;
-    c.lineJoin = "round";
-    c.setLineDash([]);
-    c.strokeStyle = halo;
-    c.strokeText(text, x, box.y0 + 12);
+    if (this.full) {
+      c.lineWidth = 3.5;
+      c.lineJoin = "round";
+      c.setLineDash([]);
+      c.strokeStyle = halo;
+      c.strokeText(text, x, box.y0 + 12);
+    }
     c.fillStyle = colour;
     c.fillText(text, x, box.y0 + 12);
     if (target) this.segments.push({ x0: x, y0: box.y0 + 8, x1: x + width, y1: box.y0 + 8, target, reach: 8 });
@@ -154,8 +159,9 @@ export class Ink {
   private pen({ colour, width = 1.5, dash = [] }: Stroke): void {
     this.c.strokeStyle = colour;
     this.c.lineWidth = width;
-    this.c.lineJoin = this.c.lineCap = "round";
-    this.c.setLineDash(dash);
+    this.c.lineJoin = this.full ? "round" : "bevel";
+    this.c.lineCap = this.full ? "round" : "butt";
+    this.c.setLineDash(this.full ? dash : []);
   }
 }
 

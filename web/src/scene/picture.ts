@@ -56,9 +56,10 @@ export const palette_of = (dark: boolean): Palette =>
 export const state_colour = (p: Palette, state: ClosureState, within = false): string =>
   state === "accepted" ? (within ? p.within : p.accepted) : state === "candidate" ? p.candidate : p.rejected;
 
-export function draw_picture(app: App, ink: Ink): void {
+/** `full`: with halos, dashes and filled rings, which take most of the time where there is no GPU. */
+export function draw_picture(app: App, ink: Ink, full: boolean): void {
   const palette = palette_of(app.dark);
-  ink.begin();
+  ink.begin(full);
   const { layers } = app.options;
   if (layers.estimates) draw_estimates(app, ink, palette);
   if (layers.tracks) draw_tracks(app, ink);

@@ -2,10 +2,9 @@
 /** The 3-D picture: points, and ink over them. Draws only when something changed. */
 import type { App } from "../app";
 import { worst_disagreement } from "../derive";
-import { LIMITS, TIMES } from "../limits";
 import type { Painted } from "../raster";
 import { SurveyDistance } from "../survey";
-import { Dresser, window_of } from "./dress";
+import { Dresser, thin, window_of } from "./dress";
 import type { Dressing } from "./dress";
 import { drawn } from "./extent";
 import { Eye } from "./eye";
@@ -13,6 +12,7 @@ import { Ink } from "./ink";
 import type { Target } from "./ink";
 import { CpuPainter, GpuPainter, gpu_name } from "./painters";
 import type { Painter } from "./painters";
+import { Pace } from "./pace";
 import { draw_picture } from "./picture";
 import { nearest_point } from "./pick";
 import type { Spot } from "./pick";
@@ -40,7 +40,7 @@ export class View {
   followed: number | null = null;
   /** Milliseconds of the last picture, points in it, pictures so far, and when the first with points was there. */
   last = { ms: 0, points: 0, pictures: 0, first_ms: 0 };
-  private ms_per_point = 0;
+  private pace = new Pace();
   private dresser = new Dresser();
   private dirty = true;
   /** Whether some of the map was in sight when it last changed, and the eye has not moved since. */
@@ -157,6 +157,7 @@ export class View {
   private frame(): void {
     requestAnimationFrame(() => this.frame());
     const now = performance.now();
+    this.pace.asked(now);
     const glides = this.app.world.step(now);
     const moves = glides || now - this.moved_ms < 150;
     if (this.followed !== null) this.follow();
@@ -178,32 +179,29 @@ export class View {
     const start = performance.now();
     const { app, eye } = this;
     eye.update();
+    if (!moves) this.pace.rest();
     const dressing = this.dressing();
-    const clouds = this.dresser.dress(app.world, app.clouds, eye, dressing, moves ? this.affordable() : Infinity);
+    const clouds = this.dresser.dress(app.world, app.clouds, eye, dressing);
     this.add_survey(clouds, dressing);
-    const fast = !moves || this.last.ms < TIMES.moving_ms;
+    const all = thin(clouds, moves ? this.pace.points : Infinity);
+    const full = !moves || this.pace.full;
     this.painter.draw(
       clouds,
       eye.matrix,
       eye.camera,
       window_of(app.world, app.options),
       app.dark ? kBackground.dark : kBackground.light,
-      app.options.edges && fast,
+      app.options.edges && full,
     );
-    draw_picture(app, this.ink);
+    draw_picture(app, this.ink, full);
     this.tool?.draw(this.ink);
     let points = 0;
     for (const cloud of clouds.values()) points += cloud.count;
+    if (moves) this.pace.drew(start, points, all);
     const now = performance.now();
     const first_ms = this.last.first_ms || (points > 0 ? now : 0);
     this.last = { ms: now - start, points, pictures: this.last.pictures + 1, first_ms };
-    if (points > 0) this.ms_per_point += 0.3 * ((now - start) / points - this.ms_per_point);
     for (const listener of this.draw_listeners) listener();
-  }
-
-  /** Points of a picture that moves, so that it goes on smoothly. */
-  private affordable(): number {
-    return this.ms_per_point > 0 ? Math.max(LIMITS.moving_points, TIMES.moving_ms / this.ms_per_point) : Infinity;
   }
 
   private add_survey(clouds: Map<string, Painted>, dressing: Dressing): void {

@@ -129,7 +129,6 @@ class Makers {
         ...view.dressing(),
         options: { ...app.options, colour: "robot", layers: { ...app.options.layers, clouds: true } },
       },
-      Infinity,
       true,
     );
     for (const [id, painted] of out) {
