@@ -18,7 +18,7 @@ struct FileKind {
   std::string_view magic;
   std::string_view name;
   std::string_view way_on;      ///< "{}" is the path.
-  std::string_view poses = {};  ///< What to type instead of `way_on`, where poses can be had of it.
+  std::string_view poses = {};  ///< Instead of `way_on` where poses are asked for and can be had.
   std::string_view graph = {};  ///< The same for pose graphs.
   std::size_t offset = 0;
   std::string_view text = {};  ///< Stands somewhere in the head, too.
