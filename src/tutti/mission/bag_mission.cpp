@@ -150,9 +150,8 @@ std::string known_folder(const fs::path& folder) {
   if (kind == kFolderKinds.end()) return "";
   const std::string inside = (kind->inside.empty() ? folder : folder / kind->inside).string();
   return fmt::format(
-      "is {}, which `tutti run` takes by a mission file, with odometry of your own: robots: [{{name: {}, {}}}], "
-      "closures: "
-      "{{verifier: {}}} (docs/data.md)",
+      "is {}, which `tutti run` takes by a mission file, with odometry of your own: {{robots: [{{name: {}, {}}}], "
+      "closures: {{verifier: {}}}}} (docs/data.md)",
       kind->name, robot_of_bag(inside), fmt::format(fmt::runtime(kind->robot), inside), kind->verifier);
 }
 
