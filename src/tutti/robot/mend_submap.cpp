@@ -62,33 +62,38 @@ Trajectory mended(const Trajectory& poses, const std::map<Timestamp, const fit::
   return out;
 }
 
-/// From the first scan to the last, by registration; where scans in between tell the way, from where that leads.
+/// From the first scan to `last`, by registration from where the steps in between lead, if they all are known.
 void add_far_step(const fit::FitScan& first, const fit::FitScan& last, const Trajectory& poses, SubmapSteps& out) {
   const Pose3 *from = at(poses, first.stamp), *to = at(poses, last.stamp);
   out.T_far_by_odometry = from->inverse() * *to;
+  out.far_distance_m = 0.0;
   for (std::size_t k = 1; k < poses.size(); ++k)
     if (poses[k - 1].stamp >= first.stamp && poses[k].stamp <= last.stamp)
       out.far_distance_m += (poses[k].pose.translation - poses[k - 1].pose.translation).norm();
   Pose3 T_by_steps;
   Timestamp until = first.stamp;
-  double missed_rad2 = 0.0, expected_rad2 = 0.0;
+  double missed_rad2 = 0.0, expected_rad2 = 0.0, missed_m2 = 0.0, expected_m2 = 0.0;
   for (const fit::ScanStep& step : out.near) {
+    if (until == last.stamp) break;
     if (step.from != until) return;
     T_by_steps = T_by_steps * step.T_from_to;
     until = step.to;
     const Pose3 by_odometry = at(poses, step.from)->inverse() * *at(poses, step.to);
     missed_rad2 += std::pow(so3_log(step.T_from_to.rotation.conjugate() * by_odometry.rotation).z(), 2);
     expected_rad2 += kNearTimes * step.covariance(5, 5);
+    missed_m2 += (step.T_from_to.translation - by_odometry.translation).squaredNorm();
+    expected_m2 += kNearTimes * step.covariance.topLeftCorner<3, 3>().trace();
   }
   out.other_rad2 = std::max(0.0, missed_rad2 - expected_rad2);
-  if (until == last.stamp) out.far = fit::step_between(first, last, T_by_steps, out.T_far_by_odometry);
+  if (until == last.stamp && missed_m2 <= expected_m2)  // else there is more wrong than a drift
+    out.far = fit::step_between(first, last, T_by_steps, out.T_far_by_odometry);
 }
 
 }  // namespace
 
 SubmapSteps scan_steps(const FinishedSubmap& finished, double min_range_m) {
   SubmapSteps out;
-  std::optional<fit::FitScan> first, last;
+  std::optional<fit::FitScan> first, middle, last;
   Pose3 T_submap_last;
   const auto add = [&](const lidar::PosedCloud& scan) {
     fit::FitScan seen = fit::make_fit_scan(scan.stamp, *scan.cloud, min_range_m);
@@ -99,12 +104,16 @@ SubmapSteps scan_steps(const FinishedSubmap& finished, double min_range_m) {
         out.near.push_back(*step);
     }
     if (!first) first = seen;
+    if (out.near.size() == finished.scans.size() / 2) middle = seen;
     last = std::move(seen);
     T_submap_last = scan.T_submap_body;
   };
   for (const lidar::PosedCloud& scan : finished.scans) add(scan);
   if (finished.scan_after) add(*finished.scan_after);
-  if (out.near.size() > 1) add_far_step(*first, *last, poses_of(finished), out);
+  if (out.near.size() < 2) return out;
+  const Trajectory poses = poses_of(finished);
+  add_far_step(*first, *last, poses, out);
+  if (!out.far && middle) add_far_step(*first, *middle, poses, out);  // round a corner nothing is seen of both
   return out;
 }
 
