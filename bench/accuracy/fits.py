@@ -80,7 +80,7 @@ with odometry's (`src/tutti/perception/fit`). What it says is the warning at the
 
 `missions/demo.yaml` in a tunnel of 2 x 2 blocks of 10 m, 120 s, two robots with 16 beams, seed 1; bravo is set up wrongly
 (`docs/simulation.md`). Nothing is corrected of the mistakes of setting up: the warning has what to type. Where odometry stood still
-(`frozen`), submaps have the scans' motion.
+(`frozen`), submaps have the scans' motion, and a steady drift of yaw (`drift`) is taken out of them.
 
 {chr(10).join(mistakes(arguments))}
 
