@@ -20,7 +20,6 @@
 #include "tutti/bags/near_types.hpp"
 #include "tutti/mission/bag_mission.hpp"
 #include "tutti/mission/bag_verdict.hpp"
-#include "tutti/program/stop.hpp"
 
 namespace tutti::app {
 namespace {
@@ -70,9 +69,8 @@ int check(const mission::BagVerdict& verdict) {
         return stop();
       });
   progress.close();
-  if (!found) return complain("bag info", "--check: " + found.error().message);
-  for (const std::string& line : found->lines) fmt::print("check: {}\n", printable(line));
-  return found->fits ? 0 : 1;
+  for (const std::string& line : found.lines) fmt::print("check: {}\n", printable(line));
+  return found.fits ? 0 : 1;
 }
 
 int show_bag(const std::string& path, bool is_checked) {

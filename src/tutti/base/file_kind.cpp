@@ -111,7 +111,7 @@ constexpr std::array kKinds{
     FileKind{"<html", "a web page", kPage},
 };
 
-/// What packs files, and what unpacks them.
+/// A program that packs files, and the one that unpacks them.
 struct Packer {
   std::string_view magic, name, unpack;
   std::size_t offset = 0;

@@ -9,7 +9,7 @@
 
 namespace tutti {
 
-/// What somebody gives a file for.
+/// The use that somebody gives a file for.
 enum class FileUse { recording, trajectory, graph };
 
 /// So much of a file says what it is; tables of SQLite have their names in its first pages.

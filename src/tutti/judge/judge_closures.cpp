@@ -120,11 +120,14 @@ Optimum Optimiser::explain(int least_support) const {
           .work = found.work};
 }
 
+Optimiser::Segments Optimiser::segments_of(std::size_t closure) const {
+  const PoseGraphEdge& edge = closure_edges_[closure];
+  return std::minmax({odometry_.segment(edge.from), odometry_.segment(edge.to)});
+}
+
 void Optimiser::leave_unjoined(std::vector<Objection>& objections) const {
-  std::map<std::pair<std::size_t, std::size_t>, std::vector<std::size_t>> between;
-  for (std::size_t c = 0; c < closures_.size(); ++c)
-    between[std::minmax({odometry_.segment(closure_edges_[c].from), odometry_.segment(closure_edges_[c].to)})]
-        .push_back(c);
+  std::map<Segments, std::vector<std::size_t>> between;
+  for (std::size_t c = 0; c < closures_.size(); ++c) between[segments_of(c)].push_back(c);
   const auto least = config_.min_joining_closures;
   for (const auto& [segments, all] : between) {
     if (segments.first == segments.second || std::ranges::any_of(all, [&](std::size_t c) { return certain_[c]; }))
@@ -142,11 +145,10 @@ bool Optimiser::leave_outvoted(std::vector<Objection>& objections) const {
     std::size_t in = 0, out = 0;
     [[nodiscard]] bool is_lost() const { return static_cast<double>(in) < kLeastShare * static_cast<double>(in + out); }
   };
-  using Pair = std::pair<std::size_t, std::size_t>;
-  std::map<Pair, Votes> votes;  // of a segment with itself, too
-  std::map<Pair, std::vector<std::size_t>> joining;
+  std::map<Segments, Votes> votes;  // of a segment with itself, too
+  std::map<Segments, std::vector<std::size_t>> joining;
   for (std::size_t c = 0; c < closures_.size(); ++c) {
-    const Pair ends = std::minmax({odometry_.segment(closure_edges_[c].from), odometry_.segment(closure_edges_[c].to)});
+    const Segments ends = segments_of(c);
     const bool is_in = objections[c] == Objection::none;
     ++(is_in ? votes[ends].in : votes[ends].out);
     if (ends.first != ends.second && is_in) joining[ends].push_back(c);

@@ -83,18 +83,17 @@ BagVerdict judge_bag(const std::filesystem::path& bag, const std::set<std::strin
     }
   }
   if (!input) return {.text = "not ready: " + input.error().message};
-  BagVerdict out{true, "ready: " + line, {}, std::move(mission)};
+  BagVerdict out{true, "ready: " + line, {}, std::move(mission), {}};
   for (MissionRecording& robot : input->robots) std::ranges::move(robot.warnings, std::back_inserter(out.warnings));
+  out.input = std::move(*input);
   return out;
 }
 
-Result<BagCheck> check_bag(const BagVerdict& verdict, const std::function<bool(double share)>& stop) {
-  const auto input = load_input(verdict.mission, {}, 1);
-  if (!input) return tl::unexpected(input.error());
+BagCheck check_bag(const BagVerdict& verdict, const std::function<bool(double share)>& stop) {
   BagCheck out;
-  const double robots = static_cast<double>(input->robots.size());
-  for (std::size_t k = 0; k < input->robots.size(); ++k) {
-    const MissionRecording& robot = input->robots[k];
+  const double robots = static_cast<double>(verdict.input.robots.size());
+  for (std::size_t k = 0; k < verdict.input.robots.size(); ++k) {
+    const MissionRecording& robot = verdict.input.robots[k];
     const std::string& name = robot.recording.name;
     if (!robot.recording.scans) {
       out.lines.push_back(fmt::format("{}: no scans to compare its odometry with", name));

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tutti/mission/mission_config.hpp"
+#include "tutti/mission/recordings.hpp"
 
 namespace tutti::mission {
 
@@ -17,7 +18,8 @@ struct BagVerdict {
   bool is_ready = false;
   std::string text;
   std::vector<std::string> warnings;  ///< Those that the mission would begin with.
-  MissionConfig mission;              ///< That the line runs, when ready.
+  MissionConfig mission;              ///< That the line runs, when ready,
+  MissionInput input;                 ///< and its recordings.
 };
 
 /// `robots`: the namespaces with odometry, of which each is a robot; none: the bag is one robot's.
@@ -29,6 +31,6 @@ struct BagCheck {
   bool fits = true;
   std::vector<std::string> lines;
 };
-Result<BagCheck> check_bag(const BagVerdict& verdict, const std::function<bool(double share)>& stop);
+BagCheck check_bag(const BagVerdict& verdict, const std::function<bool(double share)>& stop);
 
 }  // namespace tutti::mission

@@ -56,7 +56,7 @@ Result<std::string> plain_text(std::string text, const std::string& name) {
 
 namespace {
 
-/// What the first row of numbers is, where it is no pose.
+/// Names the first row of numbers, where it is no pose.
 std::string otherwise_a_row(std::string_view text) {
   for (const Separator separator : {Separator::comma, Separator::semicolon, Separator::whitespace}) {
     LineReader line(text, "", separator);

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "tutti/judge/closure_groups.hpp"
@@ -33,6 +34,9 @@ class Optimiser {
   /// Objections to each closure, and the odometry that failed, without a map. What it takes is gone when the map is
   /// optimised.
   [[nodiscard]] Optimum explain(int least_support) const;
+  /// The segments of odometry at a closure's ends, the first one first.
+  using Segments = std::pair<std::size_t, std::size_t>;
+  [[nodiscard]] Segments segments_of(std::size_t closure) const;
   /// Too few closures do not join two segments of odometry, unless an operator decided so.
   void leave_unjoined(std::vector<Objection>& objections) const;
   /// Takes out of the map what joins two segments of odometry whose closures, also those that each has with itself, are
