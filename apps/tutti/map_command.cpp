@@ -206,6 +206,9 @@ int merge_maps(const MergeOptions& options) {
   const auto merged = mapfile::merge(fs::path(options.maps[0]), fs::path(options.maps[1]), fs::path(options.out));
   if (!merged) return complain("map merge", merged.error().message);
   fmt::print("{}: {} submaps, of which {} were in both\n", options.out, merged->submaps, merged->shared);
+  for (const auto& [from, to] : merged->renumbered)
+    fmt::print("robot {}, session {} of {} is robot {}, session {} in it\n", from.robot.value, from.session,
+               options.maps[1], to.robot.value, to.session);
   return 0;
 }
 
@@ -282,8 +285,10 @@ void add_map_command(CLI::App& app, int& exit_code) {
   const auto merging = std::make_shared<MergeOptions>();
   CLI::App* merge = map->add_subcommand("merge", "Join two maps into a third; the two stay as they are.");
   merge->footer(
-      "The server that opens it looks for closures between them. A robot that is in both, with sessions of its own in "
-      "each, has them\nside by side. Refused: one number for two robots, one submap with two contents.\n"
+      "The server that opens it looks for closures between them. A robot is the same by its name, and its sessions are "
+      "side by side.\nWhere the second map has a number for another robot, or a session for another run, it gets a "
+      "free "
+      "one, which is said.\n"
       "Example: tutti map merge monday/map tuesday/map -o both/map\n");
   merge->add_option("maps", merging->maps, "The two maps.")->type_name("MAP")->required()->expected(2);
   merge->add_option("-o,--output", merging->out, "The map to be made; it must not be there.")

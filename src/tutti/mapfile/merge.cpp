@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tutti/mapfile/make_map.hpp"
+#include "tutti/mapfile/renumber.hpp"
 #include "tutti/node/decisions.hpp"
 #include "tutti/node/meta_keys.hpp"
 #include "tutti/node/robot_registry.hpp"
@@ -25,12 +26,12 @@ using storage::TableStore, storage::Write;
 /// What becomes of a row of `b` when there is another one in `a`: the bytes that are taken.
 using Choose = std::function<Result<std::string>(std::string_view key, std::string a, std::string b)>;
 
-/// Rows that are about one map alone: what became of it, and refinements and places, which join_refinements()
-/// and join_places() put.
+/// Rows that are about one map alone: what became of it, the poses that it holds, and refinements and places, which
+/// join_refinements() and join_places() put.
 bool is_of_one_map(const std::string& table, std::string_view key) {
   return table == map_tables::kMeta &&
          (key == node::kCountsKey || key == node::kLastUpdateKey || key.starts_with(node::kRefinementPrefix) ||
-          key.starts_with(node::kPlacePrefix));
+          key.starts_with(node::kPlacePrefix) || key.starts_with(node::kHeldPrefix));
 }
 
 /// Rows of `a`, and those of `b`, into the table; counts the keys that are in both.
@@ -235,12 +236,29 @@ Result<Merged> merge(const fs::path& a, const fs::path& b, const fs::path& out) 
   const auto one = open(a), other = open(b);
   for (const auto* opened : {&one, &other})
     if (!*opened) return tl::unexpected(opened->error());
+  const auto chains = chains_to_renumber(**one, **other);
+  if (!chains) return tl::unexpected(chains.error());
   Result<Merged> merged;
-  const Status made = make_map(out, [&](TableStore& map) {
-    merged = merge(**one, **other, map);
-    return merged ? Status() : Status(tl::unexpected(merged.error()));
-  });
+  const auto merge_with = [&](const TableStore& second) {
+    return make_map(out, [&](TableStore& map) {
+      merged = merge(**one, second, map);
+      return merged ? Status() : Status(tl::unexpected(merged.error()));
+    });
+  };
+  const fs::path renumbered = out.string() + ".renumbered";
+  Status made;
+  if (chains->empty()) {
+    made = merge_with(**other);
+  } else {
+    made = make_map(renumbered, [&](TableStore& map) { return renumber(**other, *chains, map); });
+    if (made) {
+      const auto second = open(renumbered);
+      made = second ? merge_with(**second) : tl::unexpected(second.error());
+    }
+    remove_store(renumbered);
+  }
   if (!made) return tl::unexpected(made.error());
+  merged->renumbered = *chains;
   return merged;
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <map>
 
 #include "tutti/mapfile/content.hpp"
 
@@ -10,7 +11,8 @@ namespace tutti::mapfile {
 
 struct Merged {
   std::size_t submaps = 0;
-  std::size_t shared = 0;  ///< Submaps that are in both maps.
+  std::size_t shared = 0;                 ///< Submaps that are in both maps.
+  std::map<ChainId, ChainId> renumbered;  ///< Chains of the second map that have other numbers in the third.
 };
 
 /// Puts what two maps contain into an empty third: submaps, verdicts, answers and decisions with their bytes unchanged,
@@ -22,7 +24,8 @@ struct Merged {
 /// decisions is taken, and the first map's settings.
 Result<Merged> merge(const storage::TableStore& a, const storage::TableStore& b, storage::TableStore& out);
 
-/// As above, with files. `out` must not exist; it appears whole or not at all.
+/// As above, with files; what would be in the way is numbered anew first (chains_to_renumber()), so that any two maps
+/// can be merged. `out` must not exist; it appears whole or not at all.
 Result<Merged> merge(const std::filesystem::path& a, const std::filesystem::path& b, const std::filesystem::path& out);
 
 }  // namespace tutti::mapfile

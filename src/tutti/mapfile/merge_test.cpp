@@ -8,6 +8,7 @@
 #include "support/mapfile/small_map.hpp"
 #include "tutti/base/file.hpp"
 #include "tutti/mapfile/closures.hpp"
+#include "tutti/mapfile/renumber.hpp"
 #include "tutti/node/meta_keys.hpp"
 #include "tutti/node/robot_registry.hpp"
 #include "tutti/storage/sqlite_store.hpp"
@@ -238,13 +239,63 @@ TEST_F(MergedFiles, AreNotThereWhenItFails) {
   EXPECT_FALSE(merge(a, folder_ / "missing", folder_ / "c").has_value());
   EXPECT_FALSE(merge(a, a, folder_ / "c").has_value());
   EXPECT_FALSE(merge(a, a, folder_ / "nowhere" / "c").has_value());
-  const fs::path b = file("b", {});
-  {
-    auto store = open(b).value();
-    Mapper({kAlpha}, *store).walk({kAlpha, 5}, 99);
+  EXPECT_EQ(files(), (std::set<std::string>{"a"}));
+}
+
+/// One number for two robots, and one session for two runs, as in any two maps of `tutti run`.
+TEST_F(MergedFiles, HaveFreeNumbersForWhatWouldBeInTheWay) {
+  const auto named = [&](const char* file, std::uint64_t seed, const std::vector<std::string>& names) {
+    auto store = storage::open_sqlite_store(folder_ / file, storage::map_schema(), {.min_free_bytes = 0}).value();
+    Mapper mapper({kAlpha, kBravo}, *store);
+    for (std::uint32_t robot = 0; robot < names.size(); ++robot) {
+      mapper.walk({RobotId{robot}, 0}, seed);
+      EXPECT_TRUE(store
+                      ->commit(std::vector<Write>{
+                          {"meta", node::RobotRegistry::key(RobotId{robot}), encode(node::RobotRow{names[robot], 0})}})
+                      .has_value());
+    }
+    return folder_ / file;
+  };
+  const fs::path a = named("a", 1, {"alpha"}), b = named("b", 99, {"bravo", "alpha"});
+  const auto merged = merge(a, b, folder_ / "c");
+  ASSERT_TRUE(merged.has_value()) << merged.error().message;
+  EXPECT_EQ(merged->shared, 0U);
+  EXPECT_EQ(merged->renumbered,
+            (std::map<ChainId, ChainId>{{{RobotId{0}, 0}, {RobotId{2}, 0}}, {{RobotId{1}, 0}, {RobotId{0}, 1}}}));
+  EXPECT_EQ(files(), (std::set<std::string>{"a", "b", "c"}));
+  const Content of_b = read(**open(b)).value(), both = read(**open(folder_ / "c")).value();
+  EXPECT_EQ(both.names, (std::map<RobotId, std::string>{{RobotId{0}, "alpha"}, {RobotId{2}, "bravo"}}));
+  EXPECT_EQ(both.submaps.size(), merged->submaps);
+  const SubmapId was{{RobotId{0}, 0}, 3}, is{{RobotId{2}, 0}, 3};
+  EXPECT_EQ(both.submaps.at(is)->keyframes, of_b.submaps.at(was)->keyframes);
+  EXPECT_EQ(both.payload_sizes.at(is), of_b.payload_sizes.at(was));
+}
+
+/// Robots 0 and 1 change places, and so do the ends of the closures between them.
+TEST(Renumber, TheMapIsTheSameUnderOtherNumbers) {
+  const auto map = map_of({{kAlpha, 5}, {kBravo, 6}});
+  const Content content = read(*map).value();
+  const std::string name = closures(content, estimate(content)).front().name;
+  ASSERT_TRUE(put_decision(*map, {name, Wish::reject, "ada", 5}).has_value());
+  MemoryStore other(storage::map_schema());
+  const ChainId alpha(RobotId{7}, 1), bravo(RobotId{4}, 2);
+  ASSERT_TRUE(renumber(*map, {{{kAlpha, 5}, alpha}, {{kBravo, 6}, bravo}}, other).has_value());
+  const Content before = read(*map).value(), after = read(other).value();
+  const server::MapEstimate was = estimate(before), is = estimate(after);
+  EXPECT_EQ(is.components, was.components);
+  EXPECT_EQ(accepted(is).size(), accepted(was).size());
+  EXPECT_EQ(after.decisions.size(), 1U);
+  EXPECT_NEAR(is.cost, was.cost, 1e-3 * was.cost);
+  const auto relative = [](const server::MapEstimate& made, const ChainId& one, const ChainId& two) {
+    return server::find_node(made, {one, 20})->T_world_body.inverse() *
+           server::find_node(made, {two, 40})->T_world_body;
+  };
+  const Vector6d difference = local(relative(was, {kAlpha, 5}, {kBravo, 6}), relative(is, alpha, bravo));
+  EXPECT_LT(difference.norm(), 1e-3);
+  for (const auto& [pair, verdict] : after.verdicts) {
+    EXPECT_LT(pair.first, pair.second);
+    for (const LoopClosure& closure : verdict.closures) EXPECT_EQ(closure.from.chain, pair.first.chain);
   }
-  EXPECT_FALSE(merge(a, b, folder_ / "c").has_value());
-  EXPECT_EQ(files(), (std::set<std::string>{"a", "b"}));
 }
 
 }  // namespace merge_test

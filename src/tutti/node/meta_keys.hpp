@@ -10,6 +10,8 @@ inline constexpr std::string_view kCountsKey = "counts";              ///< MapCo
 inline constexpr std::string_view kLastUpdateKey = "update";          ///< LastUpdate
 inline constexpr std::string_view kRefinementPrefix = "refinement/";  ///< refinement_key()
 inline constexpr std::string_view kPlacePrefix = "place/";            ///< place_of_row()
+/// Followed by a submap's key; the poses of its keyframes in a map that does not move.
+inline constexpr std::string_view kHeldPrefix = "held/";
 /// Followed by a robot's number; its submaps that are refused for good.
 inline constexpr std::string_view kRefusedPrefix = "refused/";
 

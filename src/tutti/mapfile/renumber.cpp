@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mapfile/renumber.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <functional>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "tutti/mapfile/content.hpp"
+#include "tutti/mapfile/make_map.hpp"
+#include "tutti/node/decisions.hpp"
+#include "tutti/node/meta_keys.hpp"
+#include "tutti/node/robot_registry.hpp"
+#include "tutti/node/submap_frames.hpp"
+#include "tutti/storage/map_tables.hpp"
+#include "tutti/wire/codec.hpp"
+#include "tutti/wire/refinement_codec.hpp"
+
+namespace tutti::mapfile {
+namespace {
+
+using storage::TableStore;
+using Chains = std::map<ChainId, ChainId>;
+
+ChainId renamed(const ChainId& chain, const Chains& chains) {
+  const auto found = chains.find(chain);
+  return found == chains.end() ? chain : found->second;
+}
+SubmapId renamed(const SubmapId& id, const Chains& chains) { return {renamed(id.chain, chains), id.index}; }
+KeyframeId renamed(const KeyframeId& id, const Chains& chains) { return {renamed(id.chain, chains), id.index}; }
+
+/// A closure between the same two keyframes; turned round when their submaps change places.
+LoopClosure renamed(LoopClosure closure, const Chains& chains, bool is_turned) {
+  closure.from = renamed(closure.from, chains);
+  closure.to = renamed(closure.to, chains);
+  if (is_turned) closure = {closure.to, closure.from, inverse(closure.measurement)};
+  return closure;
+}
+
+/// The pair with its smaller submap first, and whether that is the other one than before.
+std::pair<SubmapPair, bool> renamed(const SubmapPair& pair, const Chains& chains) {
+  const SubmapId first = renamed(pair.first, chains), second = renamed(pair.second, chains);
+  return second < first ? std::pair(SubmapPair{second, first}, true) : std::pair(SubmapPair{first, second}, false);
+}
+
+/// Copies a table, each row as `change` returns it; none where it returns nothing.
+Status copy(const TableStore& map, const char* table, Writer& out,
+            const std::function<Result<std::optional<storage::Write>>(std::string_view, std::string_view)>& change) {
+  Status ok;
+  const auto scanned = map.scan(table, {}, [&](std::string_view key, std::string_view bytes) {
+    auto row = change(key, bytes);
+    if (!row)
+      ok = tl::unexpected(row.error());
+    else if (*row)
+      ok = out.put(std::move(**row));
+    return ok.has_value();
+  });
+  return scanned ? ok : scanned;
+}
+
+Result<std::optional<storage::Write>> renamed_submap(std::string_view bytes, const Chains& chains) {
+  auto message = wire::decode_submap(bytes);
+  if (!message) return tl::unexpected(message.error());
+  SubmapId& id = message->submap.id;
+  if (!chains.contains(id.chain)) return storage::Write{map_tables::kSubmaps, node::key_of(id), std::string(bytes)};
+  id = renamed(id, chains);
+  message->header.robot = id.chain.robot;
+  message->header.session = id.chain.session;
+  return storage::Write{map_tables::kSubmaps, node::key_of(id), wire::encode(*message)};
+}
+
+Result<std::optional<storage::Write>> renamed_verdict(std::string_view bytes, const Chains& chains) {
+  auto verdict = wire::decode_verdict(bytes);
+  if (!verdict) return tl::unexpected(verdict.error());
+  const auto [pair, is_turned] = renamed(verdict->pair, chains);
+  verdict->pair = pair;
+  for (LoopClosure& closure : verdict->closures) closure = renamed(closure, chains, is_turned);
+  return storage::Write{map_tables::kVerdicts, node::key_of(pair), wire::encode(*verdict)};
+}
+
+Result<std::optional<storage::Write>> renamed_decision(const SubmapPair& former, std::string_view bytes,
+                                                       const Chains& chains) {
+  auto decision = wire::decode_decision(bytes);
+  if (!decision) return tl::unexpected(decision.error());
+  *decision = with_sessions(std::move(*decision), former);
+  const auto [pair, is_turned] = renamed(former, chains);
+  for (LoopClosure& closure : decision->by_hand) closure = renamed(closure, chains, is_turned);
+  decision->closure = to_string(pair.first) + "-" + to_string(pair.second);
+  return storage::Write{map_tables::kDecisions, node::key_of(pair), wire::encode(*decision)};
+}
+
+Refinement renamed(Refinement refinement, const Chains& chains) {
+  for (SubmapId& id : refinement.submaps) id = renamed(id, chains);
+  std::ranges::sort(refinement.submaps);
+  for (SubmapPair& pair : refinement.closed) pair = renamed(pair, chains).first;
+  std::ranges::sort(refinement.closed);
+  for (RefinedStep& step : refinement.steps) step.from = renamed(step.from, chains);
+  std::ranges::sort(refinement.steps, {}, &RefinedStep::from);
+  std::map<KeyframeId, Pose3> poses;
+  for (const auto& [id, pose] : refinement.T_world_body) poses.emplace(renamed(id, chains), pose);
+  refinement.T_world_body = std::move(poses);
+  return refinement;
+}
+
+/// The sessions of a robot under the number that one of them gets; all of a robot's are renamed to one number.
+node::RobotRow renamed(node::RobotRow row, RobotId robot, const Chains& chains) {
+  const auto session = [&](std::uint64_t s) { return renamed(ChainId(robot, s), chains).session; };
+  row.session = session(row.session);
+  for (auto* sessions : {&row.former, &row.rivals}) {
+    std::set<std::uint64_t> changed;
+    for (const std::uint64_t s : *sessions) changed.insert(session(s));
+    *sessions = std::move(changed);
+  }
+  return row;
+}
+
+Result<std::optional<storage::Write>> renamed_meta(std::string_view key, std::string_view bytes, const Chains& chains) {
+  if (key.starts_with(node::kRefusedPrefix) || key.starts_with(node::kHeldPrefix)) return std::nullopt;
+  if (const auto robot = node::RobotRegistry::robot_of(key)) {
+    const auto row = node::decode_robot(bytes);
+    if (!row) return fail(ErrorCode::parse, "the row '{}' of table 'meta' is damaged", key);
+    RobotId number = *robot;
+    for (const auto& [from, to] : chains)
+      if (from.robot == *robot) number = to.robot;
+    return storage::Write{map_tables::kMeta, node::RobotRegistry::key(number), encode(renamed(*row, *robot, chains))};
+  }
+  if (auto place = node::place_of_row(key, bytes)) {
+    for (server::Alike& alike : place->second.candidates) alike.submap = renamed(alike.submap, chains);
+    return node::to_row(renamed(place->first, chains), place->second);
+  }
+  if (key.starts_with(node::kRefinementPrefix)) {
+    auto refinement = wire::decode_refinement(bytes);
+    if (!refinement) return std::nullopt;  // as who opens the map: it is made again
+    return storage::Write{map_tables::kMeta, std::string(key), wire::encode(renamed(std::move(*refinement), chains))};
+  }
+  return storage::Write{map_tables::kMeta, std::string(key), std::string(bytes)};
+}
+
+std::map<std::string, RobotId> numbers_of(const std::map<RobotId, std::string>& names) {
+  std::map<std::string, RobotId> out;
+  for (const auto& [robot, name] : names) out.emplace(name, robot);
+  return out;
+}
+
+std::set<ChainId> chains_of(const server::SubmapSet& submaps) {
+  std::set<ChainId> out;
+  for (const auto& [id, submap] : submaps) out.insert(id.chain);
+  return out;
+}
+
+/// True if any submap of the chain is in both maps with other bytes.
+Result<bool> differs(const TableStore& a, const TableStore& b, const server::SubmapSet& of_b, const ChainId& chain) {
+  for (auto it = of_b.lower_bound({chain, 0}); it != of_b.end() && it->first.chain == chain; ++it) {
+    const std::string key = node::key_of(it->first);
+    const auto one = a.read(map_tables::kSubmaps, key), other = b.read(map_tables::kSubmaps, key);
+    if (!one) return tl::unexpected(one.error());
+    if (!other) return tl::unexpected(other.error());
+    if (*one && *other && **one != **other) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+Result<Chains> chains_to_renumber(const TableStore& a, const TableStore& b) {
+  const auto one = read(a), other = read(b);
+  if (!one) return in_context("the first map", one.error());
+  if (!other) return in_context("the second map", other.error());
+  const auto numbers = numbers_of(one->names);
+  const std::set<ChainId> there = chains_of(one->submaps), added = chains_of(other->submaps);
+  std::set<RobotId> taken;
+  std::map<RobotId, std::uint64_t> newest;  // session, by robot of the merged map
+  for (const ChainId& chain : there) {
+    taken.insert(chain.robot);
+    newest[chain.robot] = std::max(newest[chain.robot], chain.session);
+  }
+  for (const auto& [robot, name] : one->names) taken.insert(robot);
+  std::map<RobotId, RobotId> robots;
+  for (const ChainId& chain : added) {
+    if (robots.contains(chain.robot)) continue;
+    const auto name = other->names.find(chain.robot), name_there = one->names.find(chain.robot);
+    const auto same = name == other->names.end() ? numbers.end() : numbers.find(name->second);
+    const bool is_another =
+        name != other->names.end() && name_there != one->names.end() && name->second != name_there->second;
+    RobotId number = same != numbers.end() ? same->second : chain.robot;
+    if (same == numbers.end() && is_another)
+      for (number = {0}; taken.contains(number) || other->names.contains(number);) ++number.value;
+    taken.insert(number);
+    robots[chain.robot] = number;
+  }
+  Chains out;
+  for (const ChainId& chain : added) {
+    ChainId to(robots.at(chain.robot), chain.session);
+    if (there.contains(to)) {
+      const auto is_other_run = to == chain ? differs(a, b, other->submaps, chain) : Result<bool>(true);
+      if (!is_other_run) return tl::unexpected(is_other_run.error());
+      if (*is_other_run) to.session = newest[to.robot] + 1;
+    }
+    newest[to.robot] = std::max(newest[to.robot], to.session);
+    if (to != chain) out.emplace(chain, to);
+  }
+  return out;
+}
+
+Status renumber(const TableStore& map, const Chains& chains, TableStore& out) {
+  Writer writer(out);
+  if (auto ok = copy(map, map_tables::kSubmaps, writer,
+                     [&](std::string_view, std::string_view bytes) { return renamed_submap(bytes, chains); });
+      !ok)
+    return ok;
+  if (auto ok = copy(map, map_tables::kVerdicts, writer,
+                     [&](std::string_view, std::string_view bytes) { return renamed_verdict(bytes, chains); });
+      !ok)
+    return ok;
+  const auto decision = [&](std::string_view key, std::string_view bytes) -> Result<std::optional<storage::Write>> {
+    const auto pair = node::pair_of(key);
+    if (!pair) return fail(ErrorCode::parse, "a row of table 'decisions' has no pair of submaps as its key");
+    return renamed_decision(*pair, bytes, chains);
+  };
+  if (auto ok = copy(map, map_tables::kDecisions, writer, decision); !ok) return ok;
+  if (auto ok = copy(map, map_tables::kMeta, writer,
+                     [&](std::string_view key, std::string_view bytes) { return renamed_meta(key, bytes, chains); });
+      !ok)
+    return ok;
+  return writer.flush();
+}
+
+}  // namespace tutti::mapfile
