@@ -91,6 +91,9 @@ Status read_meta(const storage::TableStore& map, Content& content) {
   auto refinements = node::read_refinements(map);
   if (!refinements) return tl::unexpected(refinements.error());
   content.refinements = std::move(*refinements);
+  auto held = node::read_held_poses(map);
+  if (!held) return tl::unexpected(held.error());
+  content.held = std::move(*held);
   const auto places = node::read_places(map);
   if (!places) return tl::unexpected(places.error());
   content.candidates = server::restored(*places, static_cast<std::size_t>(content.settings.candidates_per_submap));
@@ -122,10 +125,11 @@ Result<Content> read(const storage::TableStore& map) {
 server::MapEstimate estimate(const Content& content) {
   const server::MapConfig& config = content.settings.map;
   const server::VerdictSet verdicts = server::of_candidates(content.verdicts, content.candidates, content.decisions);
-  return server::georeferenced(
+  auto map = server::georeferenced(
       server::refined(server::estimate_map_with_fixes(content.submaps, verdicts, config, content.decisions),
                       content.submaps, content.refinements),
       content.submaps, config.georeference, config.gnc);
+  return content.held.empty() ? map : server::hold(std::move(map), content.held, config.gnc.solver);
 }
 
 Result<std::unique_ptr<storage::TableStore>> open(const std::filesystem::path& file) {

@@ -74,20 +74,22 @@ Status make_map(const fs::path& out, const std::function<Status(storage::TableSt
   return make_store(out, storage::map_schema(), fill);
 }
 
+Status copy_rows(const storage::TableStore& from, storage::TableStore& to) {
+  Writer writer(to);
+  for (const std::string& table : storage::map_schema().tables) {
+    Status put;
+    const Status scanned = from.scan(table, {}, [&](std::string_view key, std::string_view bytes) {
+      put = writer.put({table, std::string(key), std::string(bytes)});
+      return put.has_value();
+    });
+    if (!scanned) return scanned;
+    if (!put) return put;
+  }
+  return writer.flush();
+}
+
 Status copy_map(const storage::TableStore& from, const fs::path& out) {
-  return make_map(out, [&from](storage::TableStore& to) -> Status {
-    Writer writer(to);
-    for (const std::string& table : storage::map_schema().tables) {
-      Status put;
-      const Status scanned = from.scan(table, {}, [&](std::string_view key, std::string_view bytes) {
-        put = writer.put({table, std::string(key), std::string(bytes)});
-        return put.has_value();
-      });
-      if (!scanned) return scanned;
-      if (!put) return put;
-    }
-    return writer.flush();
-  });
+  return make_map(out, [&from](storage::TableStore& to) { return copy_rows(from, to); });
 }
 
 }  // namespace tutti::mapfile

@@ -15,6 +15,8 @@ Status make_store(const std::filesystem::path& out, const storage::Schema& schem
                   const std::function<Status(storage::TableStore&)>& fill);
 /// Makes a new map's file in the same manner.
 Status make_map(const std::filesystem::path& out, const std::function<Status(storage::TableStore&)>& fill);
+/// All rows of one map's store into another, which is empty.
+Status copy_rows(const storage::TableStore& from, storage::TableStore& to);
 /// Makes a new map's file with all rows of another store; `out` as in make_map().
 Status copy_map(const storage::TableStore& from, const std::filesystem::path& out);
 /// The name that make_store() uses beside `out` until the file is whole, for programs that remove what an interrupted

@@ -140,6 +140,45 @@ Result<server::PlaceSet> read_places(const storage::TableStore& map) {
   return places;
 }
 
+storage::Write to_row(SubmapId id, const std::vector<std::pair<std::uint32_t, Pose3>>& held) {
+  std::string bytes;
+  const auto bits = [](double value) { return std::bit_cast<std::uint64_t>(value); };
+  for (const auto& [index, pose] : held) {
+    const Eigen::Vector3d& t = pose.translation;
+    const Eigen::Quaterniond& q = pose.rotation;
+    bytes += storage::key_of(
+        {index, bits(t.x()), bits(t.y()), bits(t.z()), bits(q.x()), bits(q.y()), bits(q.z()), bits(q.w())});
+  }
+  return {map_tables::kMeta, std::string(kHeldPrefix) + key_of(id), std::move(bytes)};
+}
+
+Result<server::HeldPoses> read_held_poses(const storage::TableStore& map) {
+  constexpr std::size_t kNumbers = 8;
+  server::HeldPoses held;
+  Status ok;
+  const auto scanned = map.scan(map_tables::kMeta, kHeldPrefix, [&](std::string_view key, std::string_view bytes) {
+    if (!key.starts_with(kHeldPrefix)) return false;
+    const auto id = submap_of_key(key.substr(kHeldPrefix.size()));
+    const std::size_t poses = bytes.size() / (8 * kNumbers);
+    const auto numbers = storage::numbers_of(bytes, kNumbers * poses);
+    if (!id || !numbers) {
+      ok = fail(ErrorCode::parse, "the row '{}' of table 'meta' is damaged, expected poses that are held", key);
+      return false;
+    }
+    const auto value = [&](std::size_t at) { return std::bit_cast<double>((*numbers)[at]); };
+    for (std::size_t at = 0; at < numbers->size(); at += kNumbers) {
+      const Pose3 pose{{value(at + 7), value(at + 4), value(at + 5), value(at + 6)},
+                       {value(at + 1), value(at + 2), value(at + 3)}};
+      if (!is_valid(pose)) ok = fail(ErrorCode::parse, "the row '{}' of table 'meta' has no valid poses", key);
+      held.emplace(KeyframeId{id->chain, static_cast<std::uint32_t>((*numbers)[at])}, pose);
+    }
+    return ok.has_value();
+  });
+  if (!scanned) return tl::unexpected(scanned.error());
+  if (!ok) return tl::unexpected(ok.error());
+  return held;
+}
+
 std::string encode(const RobotRow& row) {
   std::string bytes = storage::key_of({row.session, row.former.size(), row.rivals.size()});
   for (const auto* sessions : {&row.former, &row.rivals})

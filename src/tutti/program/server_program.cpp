@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -20,6 +21,7 @@
 #include "tutti/bus/mission_lease.hpp"
 #include "tutti/bus/nats_child.hpp"
 #include "tutti/mapfile/estimate_file.hpp"
+#include "tutti/mapfile/hold_map.hpp"
 #include "tutti/node/map_meta.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/program/bus_guard.hpp"
@@ -158,6 +160,7 @@ class ServerProgram {
   void tend_bus();
   Status admit_page();
   Status start_page();
+  Status begin_with_held();
   [[nodiscard]] std::string robot_command() const;
   [[nodiscard]] std::string trouble(const MissionStatus& status) const;
 
@@ -267,6 +270,28 @@ void ServerProgram::tend_bus() {
     log_->say(Level::warning, line);
 }
 
+/// Before the first start on a state folder.
+Status ServerProgram::begin_with_held() {
+  if (options_.held_map.empty()) return {};
+  const auto file = folder_->path() / kMapFile;
+  std::error_code failure;
+  if (std::filesystem::exists(file, failure)) {
+    const auto map = storage::open_sqlite_store(file, storage::map_schema(), {.has_readers = true});
+    if (!map) return tl::unexpected(map.error());
+    const auto held = node::read_held_poses(**map);
+    if (!held) return in_context(file.string(), held.error());
+    if (!held->empty()) return {};
+    return fail(ErrorCode::configuration,
+                "--map {}: {} has a map whose poses move, expected a state folder without a map, or one that began so",
+                options_.held_map.string(), folder_->path().string());
+  }
+  const auto held = mapfile::copy_held(options_.held_map, file);
+  if (!held) return in_context("--map", held.error());
+  log_->say(Level::info,
+            fmt::format("begins with {}, of which {} keyframes keep their poses", options_.held_map.string(), *held));
+  return {};
+}
+
 std::string ServerProgram::robot_command() const {
   return fmt::format("tutti robot --name NAME --bus {} --mission {} --state DIR {}{}",
                      bus::without_credentials(bus_.url), bus_.mission, guard_ ? "--credentials NAME.cred " : "",
@@ -292,6 +317,7 @@ Status ServerProgram::start() {
   if (!log) return tl::unexpected(log.error());
   log_ = std::move(*log);
   verifier_ = settings_.verifiers.verifier();
+  if (Status ok = begin_with_held(); !ok) return ok;
   auto store = storage::open_sqlite_store(folder_->path() / kMapFile, storage::map_schema(), {.has_readers = true});
   if (!store) return tl::unexpected(store.error());
   store_ = std::move(*store);

@@ -45,6 +45,7 @@ struct ServerSettings {
 /// How a server program runs.
 struct ServerOptions {
   std::filesystem::path state;
+  std::filesystem::path held_map;  ///< A map's file; where STATE has no map, it begins with this one, which is held.
   bus::BusOptions bus;        ///< The mission is that of the settings. No URL: the program starts its own nats-server,
   std::string listen;         ///< at this "HOST" or "HOST:PORT"; empty: on this machine only, at any free port.
   std::filesystem::path pki;  ///< Of `tutti pki`, for its own nats-server; empty: whoever reaches that may do all.

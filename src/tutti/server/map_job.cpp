@@ -17,6 +17,7 @@ MadeMap make_map(MapJob job) {
   }
   out.map = georeferenced(refined(*out.estimate, job.submaps, job.refinements), job.submaps, job.map.georeference,
                           job.map.gnc);
+  if (job.held) out.map = hold(std::move(out.map), *job.held, job.map.gnc.solver);
   if (!job.keeps_estimate) out.estimate.reset();
   out.message = {.header = {.robot = {}, .session = job.epoch, .sequence = job.revision},
                  .graph = monitor_graph(out.map, job.revision, job.proxy_graph, job.owners, &out.monitor)};

@@ -10,6 +10,7 @@
 #include "tutti/model/messages.hpp"
 #include "tutti/server/closure_verifier.hpp"
 #include "tutti/server/graph_monitor.hpp"
+#include "tutti/server/held_poses.hpp"
 #include "tutti/server/map_estimate.hpp"
 #include "tutti/server/refinements.hpp"
 
@@ -29,8 +30,9 @@ struct MapJob {
   std::uint64_t revision = 0;
   /// The map of the pose graph alone, when nothing has come that changes it; else null.
   std::shared_ptr<const MapEstimate> estimate;
-  bool keeps_estimate = false;       ///< It is asked for again, to refine the map.
-  std::vector<ChainId> owners = {};  ///< The sessions that own robots' numbers: these hear of the map.
+  bool keeps_estimate = false;                 ///< It is asked for again, to refine the map.
+  std::shared_ptr<const HeldPoses> held = {};  ///< The poses of a map that does not move; null: every pose may.
+  std::vector<ChainId> owners = {};            ///< The sessions that own robots' numbers: these hear of the map.
 };
 
 /// The map of a job.

@@ -360,7 +360,8 @@ MapJob MapServer::begin(std::uint64_t revision) {
              .epoch = state_.epoch,
              .revision = revision,
              .estimate = estimate_,
-             .keeps_estimate = refiner_ != nullptr};
+             .keeps_estimate = refiner_ != nullptr,
+             .held = state_.held};
   if (job.keeps_estimate) job.payload_sizes = state_.payload_sizes;
   return job;
 }

@@ -90,7 +90,8 @@ struct MapServerState {
   PlaceSet places;         ///< Each tells which candidates its submap has.
   RefusalCounts refused;   ///< Refusals by `verifier`.
   Refinements refinements;
-  std::uint64_t epoch = 0;  ///< Epoch of the server whose state this is.
+  std::shared_ptr<const HeldPoses> held;  ///< The poses of a map that does not move; null: every pose may.
+  std::uint64_t epoch = 0;                ///< Epoch of the server whose state this is.
   std::uint64_t revision = 0;
 };
 
