@@ -7,7 +7,7 @@ set(TUTTI_LIBRARIES_core base geometry model formats evaluation spectral estimat
 set(TUTTI_LIBRARIES_perception lidar fit visual visual_frontend bundle config images)
 set(TUTTI_LIBRARIES_robot robot wire agent_state)
 set(TUTTI_LIBRARIES_server server verifiers)
-set(TUTTI_LIBRARIES_net bus pki storage node mapfile)
+set(TUTTI_LIBRARIES_net localise bus pki storage node mapfile)
 # A component needs those before it, but for the server, which takes its messages from the robot's.
 set(TUTTI_INSTALLABLE core perception robot server net)
 

@@ -18,14 +18,19 @@
 #include "progress_line.hpp"
 #include "tutti/base/folder.hpp"
 #include "tutti/formats/ply.hpp"
+#include "tutti/lab/mission_input.hpp"
 #include "tutti/lab/run_mission.hpp"
+#include "tutti/mapfile/known_map.hpp"
 #include "tutti/mapfile/make_map.hpp"
 #include "tutti/mission/bag_mission.hpp"
 #include "tutti/mission/graph_recording.hpp"
+#include "tutti/mission/localise_mission.hpp"
+#include "tutti/mission/report/localise.hpp"
 #include "tutti/mission/report/report.hpp"
 #include "tutti/program/clock.hpp"
 #include "tutti/program/stop.hpp"
 #include "tutti/simulation/surface.hpp"
+#include "tutti/verifiers/sensor_verifier_maker.hpp"
 
 namespace tutti::app {
 namespace {
@@ -43,7 +48,8 @@ void show(const mission::Progress& progress, ProgressLine& line) {
 
 /// What `run` and `demo` share.
 struct MissionArguments {
-  fs::path mission, out, map;
+  fs::path mission, out, map, map_in;
+  bool frozen = false;
   mission::RunOptions run{.version = TUTTI_VERSION};
   std::vector<std::string> assignments;
   bool print_config = false;
@@ -76,6 +82,30 @@ void add_mission_options(CLI::App& command, MissionArguments& arguments) {
   command.add_flag("--print-config", arguments.print_config, "Print every setting with its value, and stop");
 }
 
+/// Replays the robots in a map that does not move, and reports where they were in it.
+Status localise(const lab::MissionConfig& config, const MissionArguments& arguments) {
+  if (!arguments.frozen)
+    return fail(ErrorCode::invalid, "--map-in {}: say what becomes of it: --frozen, which leaves every pose as it is",
+                arguments.map_in.string());
+  const auto map = mapfile::open_known_map(arguments.map_in);
+  if (!map) return in_context("--map-in", map.error());
+  const auto input = lab::load_input(config, arguments.run.data, arguments.run.seed);
+  if (!input) return tl::unexpected(input.error());
+  ProgressLine progress;
+  const auto stop = announced_stop("what is there is reported");
+  const auto robots = mission::localise_mission(
+      config, *input, *map, verifiers::make_verifier(config.closures), [&](const std::string& robot, double share) {
+        progress.show(share, fmt::format("{}: {:4.0f} %", robot, 100.0 * share));
+        return stop();
+      });
+  progress.close();
+  if (!robots) return tl::unexpected(robots.error());
+  if (auto ok = mission::write_localised(*robots, *map->known, arguments.out); !ok) return ok;
+  std::cout << mission::localised_text(*robots, *map->known) << "\n"
+            << (arguments.out / "localise.json").string() << '\n';
+  return {};
+}
+
 /// Runs, writes the report, prints the table. Returns the exit code.
 int run_and_report(const Result<lab::MissionConfig>& config, MissionArguments& arguments) {
   const auto failed = [](const std::string& message, int exit_code = 1) {
@@ -89,6 +119,10 @@ int run_and_report(const Result<lab::MissionConfig>& config, MissionArguments& a
   }
   const std::string out = arguments.out.string();
   if (auto made = make_folder(out); !made) return failed("--out " + made.error().message);  // before the mission
+  if (!arguments.map_in.empty()) {
+    const Status localised = localise(*config, arguments);
+    return localised ? 0 : failed(localised.error().message);
+  }
   if (!arguments.map.empty()) {
     if (auto made = make_folder_of(arguments.map); !made) return failed("--map " + made.error().message);
     std::error_code failure;
@@ -246,6 +280,15 @@ void add_run_command(CLI::App& app, int& exit_code) {
       ->type_name("NAME.KIND=TOPIC");
   command->add_option("--data", arguments->run.data, "Folder that the mission's file names are relative to")
       ->type_name("DIR");
+  auto* map_in =
+      command->add_option("--map-in", arguments->map_in, "A map's file to localise the robots in")->type_name("MAP");
+  command
+      ->add_flag(
+          "--frozen", arguments->frozen,
+          "With --map-in: no pose of the map moves. The mission's robots find their places in it, each alone and\n"
+          "without a start pose, and follow the map; OUT/localise.json, NAME_localised.tum and NAME_states.csv say\n"
+          "where they were and when they did not know")
+      ->needs(map_in);
   add_mission_options(*command, *arguments);
   command->callback([arguments, inputs, bags, topics, graph, &exit_code] {
     const auto run_text = [&](const fs::path& name, const char* option, const Result<std::string>& text) {

@@ -56,6 +56,19 @@ void add_server_command(CLI::App& app, int& exit_code) {
       *command, options->state,
       "Folder of this server: map, log, events, bus; made if missing. In a new one a map.tutti from elsewhere goes "
       "on");
+  CLI::Option* const held =
+      command
+          ->add_option("--map", options->held_map,
+                       "With --frozen, where STATE has no map yet: the map's file to begin with, which is not changed")
+          ->type_name("MAP");
+  const auto frozen = std::make_shared<bool>(false);
+  CLI::Option* const frozen_option =
+      command
+          ->add_flag("--frozen", *frozen,
+                     "No pose of MAP moves, to the bit: robots are laid into it and beside each other, and what they "
+                     "see of new ground grows\nbeside it in STATE/map.tutti (docs/localise.md)")
+          ->needs(held);
+  held->needs(frozen_option);
   add_bus_options(*command, options->bus, "A bus that runs already",
                   "Let other machines in without --pki: whoever reaches the port can write to the map");
   command
@@ -119,7 +132,20 @@ void add_robot_command(CLI::App& app, int& exit_code) {
   command->add_option("--name", options->name, "Its name in the mission; with --feed any, another for each robot")
       ->type_name("NAME")
       ->required();
-  add_bus_options(*command, options->bus)->required();
+  CLI::Option* const bus = add_bus_options(*command, options->bus);
+  const auto map = std::make_shared<std::filesystem::path>();
+  const auto localise = std::make_shared<bool>(false);
+  CLI::Option* const map_option =
+      command->add_option("--map", *map, "The map's file that --localise is about")->type_name("MAP");
+  CLI::Option* const localise_option =
+      command
+          ->add_flag(
+              "--localise", *localise,
+              "Find its place in MAP, which does not move, and follow it there; without --bus alone, and nothing\n"
+              "is kept for a server. Its state is in STATE/status.json, its poses are answered as ever "
+              "(docs/localise.md)")
+          ->needs(map_option);
+  map_option->needs(localise_option);
   add_state_option(*command, options->state,
                    "Folder of this robot: what it knows, and what is not sent yet; made if missing");
   add_mission_argument(*command, *common,
@@ -163,7 +189,10 @@ void add_robot_command(CLI::App& app, int& exit_code) {
       ->group("");
   const auto ros = add_ros_robot_options(*command);
   add_program_options(*command, *common);
-  command->callback([options, common, ros, &exit_code] {
+  command->callback([options, common, ros, bus, map, localise, &exit_code] {
+    options->is_alone = bus->count() == 0;
+    if (options->is_alone && !*localise && !common->print_config) throw CLI::RequiredError("--bus");
+    if (options->is_alone) options->bus.url = "memory://" + options->name;
     if (common->print_config) {
       exit_code = run_program("robot", *common, options->console, [&]() -> Status {
         const auto settings = lab::robot_settings(common->mission);
@@ -178,6 +207,11 @@ void add_robot_command(CLI::App& app, int& exit_code) {
     }
     exit_code = run_program("robot", *common, options->console, [&]() -> Status {
       if (Status ok = lab::fill_robot_options(common->mission, *options); !ok) return ok;
+      if (*localise) {
+        auto setup = lab::localise_setup(common->mission, *map);
+        if (!setup) return tl::unexpected(setup.error());
+        options->localise = std::move(*setup);
+      }
       if (wants_ros(*ros))
         if (Status ok = feed_from_ros(*ros, *options); !ok) return ok;
       return program::run_robot(*options, program::stop_asked());

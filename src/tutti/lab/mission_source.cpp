@@ -9,8 +9,10 @@
 #include "tutti/lab/closure_verifiers.hpp"
 #include "tutti/lab/mission_input.hpp"
 #include "tutti/lab/replayed_robot.hpp"
+#include "tutti/mapfile/known_map.hpp"
 #include "tutti/mission/runner.hpp"
 #include "tutti/simulation/recordings.hpp"
+#include "tutti/verifiers/sensor_verifier_maker.hpp"
 
 namespace tutti::lab {
 
@@ -143,6 +145,20 @@ Result<program::RobotSettings> robot_settings(const MissionSource& source) {
   const auto config = load(source);
   if (!config) return tl::unexpected(config.error());
   return settings_of_robot(source, *config);
+}
+
+Result<std::shared_ptr<const localise::Localiser::Setup>> localise_setup(const MissionSource& source,
+                                                                         const std::filesystem::path& map) {
+  const auto config = load(source);
+  if (!config) return tl::unexpected(config.error());
+  auto opened = mapfile::open_known_map(map);
+  if (!opened) return in_context("--map", opened.error());
+  return std::make_shared<const localise::Localiser::Setup>(
+      localise::Localiser::Setup{.map = std::move(opened->known),
+                                 .verifier = verifiers::make_verifier(config->closures),
+                                 .lidar = config->closures.lidar,
+                                 .submap = config->agent.submap,
+                                 .config = config->localise});
 }
 
 Status fill_robot_options(const MissionSource& source, program::RobotOptions& options) {

@@ -11,6 +11,7 @@
 #include "tutti/bus/simulated_radio.hpp"
 #include "tutti/estimation/bundle/refine_map.hpp"
 #include "tutti/evaluation/association.hpp"
+#include "tutti/localise/config.hpp"
 #include "tutti/perception/lidar/scan_times.hpp"
 #include "tutti/perception/visual/frontend/tracking_source.hpp"
 #include "tutti/robot/agent.hpp"
@@ -269,6 +270,7 @@ struct MissionConfig {
   verifiers::VerifierConfig closures;
   bus::LinkConfig link;
   std::vector<RobotLinkConfig> robot_links;
+  localise::LocaliserConfig localise;
   template <class V>
   void describe(V& v) {
     v.field("mission", mission, any(), "Name of the mission.");
@@ -289,6 +291,7 @@ struct MissionConfig {
     v.field("closures", closures);
     v.field("link", link);
     v.field("robot_links", robot_links, any(), "Radios of single robots.");
+    v.field("localise", localise, any(), "How robots find their places in a map that does not move.");
   }
 };
 

@@ -30,13 +30,17 @@ void UpdateStopwatch::stage_ended(robot::UpdateStage stage) {
 }
 
 RobotActor::RobotActor(const MissionRecording& recording, const robot::AgentConfig& config,
-                       const evaluation::AssociationConfig& association, std::unique_ptr<Companions> companions)
+                       const evaluation::AssociationConfig& association, std::unique_ptr<Companions> companions,
+                       std::shared_ptr<const localise::Localiser::Setup> localise)
     : RobotActor(recording, association, config.policy.name) {
   companions_ = std::move(companions);
   nothing_ = std::make_unique<const storage::MemoryStore>(storage::robot_schema());
-  node_ = node::RobotNode::open(recording.recording.robot, 0,
-                                {.agent = with_sensors(config, recording.recording), .keeps_state = false}, *nothing_)
-              .value();
+  node_ =
+      node::RobotNode::open(
+          recording.recording.robot, 0,
+          {.agent = with_sensors(config, recording.recording), .keeps_state = false, .localise = std::move(localise)},
+          *nothing_)
+          .value();
 }
 
 Result<std::unique_ptr<RobotActor>> RobotActor::open(const MissionRecording& recording,
@@ -140,7 +144,7 @@ void RobotActor::feed_sensors(Timestamp now) {
 
 void RobotActor::feed_at(Timestamp stamp, bool has_scan, bool has_images, Timestamp now) {
   const robot::RobotAgent& agent = node_->agent();
-  const bool wants_scan = has_scan && agent.wants_scan(stamp);
+  const bool wants_scan = has_scan && node_->wants_scan(stamp);
   const bool wants_images = has_images && agent.wants_images(stamp);
   if (wants_scan) feed_scan(now);
   if (has_images) feed_images(stamp, wants_images, now);

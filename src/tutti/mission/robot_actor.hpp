@@ -56,9 +56,10 @@ class UpdateStopwatch {
 /// collected from its node's events.
 class RobotActor {
  public:
-  /// `companions` may be null.
+  /// `companions` may be null, and `localise` is, unless the robot localises in a map.
   RobotActor(const MissionRecording& recording, const robot::AgentConfig& config,
-             const evaluation::AssociationConfig& association, std::unique_ptr<Companions> companions);
+             const evaluation::AssociationConfig& association, std::unique_ptr<Companions> companions,
+             std::shared_ptr<const localise::Localiser::Setup> localise = nullptr);
   /// A robot that may be killed: its node keeps its state in `store`, which must outlive the actor, and goes on where
   /// the recording stopped. It has no companions.
   static Result<std::unique_ptr<RobotActor>> open(const MissionRecording& recording,

@@ -30,6 +30,30 @@ struct Health {
   friend bool operator==(const Health&, const Health&) = default;
 };
 
+/// Where a robot is in a map that does not move, as it finds itself (localise::Located).
+struct InMap {
+  std::string map;            ///< The map's id; empty: it does not localise.
+  std::uint64_t version = 0;  ///< The map's.
+  std::string state;          ///< localise::to_string() of its state.
+  std::string why;            ///< What has led to it, for people.
+  Pose3 T_world_body;         ///< In the map's frame; the identity without `age_s`.
+  /// Standard deviations of its position (all three directions together) and of its heading.
+  std::optional<double> sigma_m, sigma_deg;
+  std::optional<double> age_s;  ///< Since the map last showed that it is there; nothing: it has no place.
+  template <class V>
+  void describe(V& v) {
+    v.field(1, "map_id", map);
+    v.field(2, "map_version", version);
+    v.field(3, "localisation", state, {.column = "localisation"});
+    v.field(4, "localisation_why", why);
+    v.field(5, "T_world_body", T_world_body);
+    v.field(6, "sigma_m", sigma_m, {.low = 0.0});
+    v.field(7, "sigma_deg", sigma_deg, {.low = 0.0});
+    v.field(8, "place_age_s", age_s, {.low = 0.0});
+  }
+  friend bool operator==(const InMap&, const InMap&) = default;
+};
+
 /// From a robot or worker to the server, every two seconds: a sign of life and the state. Fields that a role does not
 /// have are 0.
 struct NodeStatus {
@@ -52,6 +76,7 @@ struct NodeStatus {
   std::string trouble;          ///< A problem, for people; empty: none.
   std::vector<MethodId> can;    ///< A worker's verifiers and refiners; those without settings can be made with any.
   Health health;                ///< The newest that its body has reported within a minute.
+  InMap in_map;
   template <class V>
   void describe(V& v) {
     v.field(1, "name", name, {.text = FieldRule::Text::name});
@@ -72,6 +97,7 @@ struct NodeStatus {
     v.field(20, "can", can, {.at_most = 100});
     v.field(24, "submaps_begun", submaps);
     v.field(25, "health", health, {.is_flat = true});
+    v.field(26, "in_map", in_map, {.is_flat = true});
   }
   friend bool operator==(const NodeStatus&, const NodeStatus&) = default;
 };

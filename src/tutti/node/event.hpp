@@ -5,10 +5,12 @@
 #include <cstdint>
 #include <string>
 #include <variant>
+#include <vector>
 
 #include "tutti/base/ids.hpp"
 #include "tutti/base/timestamp.hpp"
 #include "tutti/bus/envelope.hpp"
+#include "tutti/localise/state.hpp"
 #include "tutti/model/closure_decision.hpp"
 #include "tutti/model/loop_closure.hpp"
 #include "tutti/model/refinement.hpp"
@@ -135,6 +137,12 @@ struct FixRefused {
   RobotId robot;
   std::string why;
 };
+/// A robot that localises in a map knows more or less of where it is than before.
+struct RobotLocated {
+  RobotId robot;
+  localise::Located located;
+  std::vector<std::string> places;  ///< Names of the submaps of located.places.
+};
 /// Many keyframes in a row lack what one of the robot's sensors sees, because the sensor is broken or its data come too
 /// late. Without it no closures are found.
 struct SensorMissing {
@@ -149,7 +157,7 @@ struct Event {
   std::variant<SubmapStored, VerdictsTaken, DecisionTaken, VerificationFailed, RefinementTaken, RefinementFailed,
                MapUpdated, ChangeOfMind, RobotUpdated, MessageRefused, RobotJoined, RobotRefused, StateLost,
                SessionBegun, SubmapsForgotten, SampleRefused, OdometryJumped, MisfitFound, ScanRefused, ImagesRefused,
-               SensorMissing, FixRefused>
+               SensorMissing, FixRefused, RobotLocated>
       what;
 };
 

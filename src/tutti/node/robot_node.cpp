@@ -153,8 +153,10 @@ Step RobotNode::resume(Timestamp now) {
 
 Step RobotNode::add(const Input& input, Timestamp now) {
   Step step;
-  if (const auto* scan = std::get_if<Scan>(&input); scan != nullptr && !agent_.wants_scan(scan->stamp))
-    return step;  // again, or nothing new
+  if (const auto* scan = std::get_if<Scan>(&input); scan != nullptr && !agent_.wants_scan(scan->stamp)) {
+    locate(input, now, step);
+    return step;  // again, or nothing new for the map that it makes
+  }
   if (const auto* images = std::get_if<TrackedImages>(&input);
       images != nullptr && images->stamp == agent_.heard_images())
     return step;  // again
@@ -178,6 +180,7 @@ void RobotNode::hear(const Input& input, Timestamp now, Step& step) {
   }
   if (std::holds_alternative<OdometrySample>(input)) finished_ = false;
   remember(input, now, step);
+  locate(input, now, step);
   settle(now, step);
 }
 
@@ -192,6 +195,7 @@ void RobotNode::settle(Timestamp now, Step& step) {
     step.emit(now, OdometryJumped{agent_.robot(), jump});
     ++jumps_;
     newest_jump_ = {now, jump};
+    if (localiser_) localiser_->search_anew("odometry has jumped");
   }
   for (Error& error : agent_.take_scan_errors())
     step.emit(now, ScanRefused{agent_.robot(), std::move(error.message), true});
@@ -341,6 +345,7 @@ NodeStatus RobotNode::status(Timestamp now) const {
                     .finished = finished_,
                     .jobs_done = 0,
                     .trouble = {}};
+  status.in_map = in_map();
   if (updated_) status.update_age_s = now - *updated_;
   status.trouble = plain_text(dispute().empty() ? odometry_trouble(now) : dispute());
   for (const auto& [kind, unread] : unread_)

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "tutti/localise/localiser.hpp"
 #include "tutti/model/input.hpp"
 #include "tutti/model/status.hpp"
 #include "tutti/node/journal.hpp"
@@ -36,6 +37,7 @@ struct RobotNodeConfig {
   double journal_period_s = 0.5;
   /// Keyframes without a scan (or images) after which SensorMissing is reported.
   std::uint64_t most_keyframes_without = 20;
+  std::shared_ptr<const localise::Localiser::Setup> localise;  ///< Null: it does not localise in a map.
   double jump_told_s = 600.0;  ///< How long status() reports that odometry has jumped, or why a session has begun.
 };
 
@@ -95,6 +97,12 @@ class RobotNode {
   [[nodiscard]] std::optional<std::uint64_t> owner_session() const { return owner_session_; }
 
   [[nodiscard]] const robot::RobotAgent& agent() const { return agent_; }
+  /// Finds the robot in a map; null when it does not localise. It is not stored: after a start it searches.
+  [[nodiscard]] const localise::Localiser* localiser() const { return localiser_ ? &*localiser_ : nullptr; }
+  /// True if a scan of this stamp would be used, by the agent or to localise.
+  [[nodiscard]] bool wants_scan(Timestamp stamp) const;
+  /// Localiser::suggest(), if the robot localises.
+  Step suggest(const RelativePose& T_world_body, Timestamp now);
   /// True when the newest graph since the start has the robot's last representative keyframe, so that the map has
   /// nothing more about itself for it.
   [[nodiscard]] bool is_whole_in_map() const;
@@ -106,7 +114,9 @@ class RobotNode {
 
  private:
   RobotNode(RobotId robot, const RobotNodeConfig& config, robot::AgentState state, const storage::TableStore& store)
-      : config_(config), store_(store), agent_(robot, config.agent, std::move(state)), gate_(robot) {}
+      : config_(config), store_(store), agent_(robot, config.agent, std::move(state)), gate_(robot) {
+    begin_localising();
+  }
 
   /// Moves the checkpoint and the journal to where nothing reads them, with the next checkpoint.
   Status set_aside(const wire::StateRows& checkpoint, std::uint64_t session);
@@ -114,6 +124,11 @@ class RobotNode {
   Status read_outbox();
   /// What has passed the gate, or needs not.
   void hear(const Input& input, Timestamp now, Step& step);
+  /// Tells the localiser, if there is one, and reports when it knows more or less than before.
+  void locate(const Input& input, Timestamp now, Step& step);
+  void tell_place(Timestamp now, Step& step);
+  [[nodiscard]] InMap in_map() const;
+  void begin_localising();
   void remember(const JournalEntry& entry, Timestamp now, Step& step);
   void write_journal(Step& step);
   /// Takes the submaps that have ended, after which the journal can be dropped.
@@ -154,6 +169,8 @@ class RobotNode {
   const storage::TableStore& store_;
   robot::RobotAgent agent_;
   OdometryGate gate_;  // for what agent_ takes
+  std::optional<localise::Localiser> localiser_;
+  std::optional<localise::State> told_;  // of it
   robot::StageObserver observer_;
   Uplink uplink_{config_.uplink};            // of the submaps in the outbox
   std::map<SubmapId, std::size_t> archive_;  // with their sizes

@@ -22,6 +22,7 @@ void RobotNode::change_session(const std::string& why, Timestamp now, Step& step
   const std::uint64_t session = agent_.chain().session + 1 + config_.incarnation;  // not what a copy would take
   agent_ = robot::RobotAgent(agent_.robot(), config_.agent, robot::AgentState{{.session = session}});
   gate_ = OdometryGate(agent_.robot());
+  begin_localising();
   obsolete_.assign(rows_.begin(), rows_.end());
   stored_ = {};
   finished_ = false;

@@ -2,6 +2,7 @@
 #include "tutti/program/event_log.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <spdlog/logger.h>
 #include <spdlog/sinks/base_sink.h>
 #include <spdlog/sinks/stdout_sinks.h>
@@ -243,6 +244,19 @@ EventReport report_of(const node::SensorMissing& missing) {
                             missing.sensor == "scan" ? "scans" : missing.sensor),
           missing.keyframes > 0 ? Level::warning : Level::info};
 }
+EventReport report_of(const node::RobotLocated& heard) {
+  const localise::Located& located = heard.located;
+  const bool is_known = located.state == localise::State::localised;
+  Json json{{"event", "robot_located"},
+            {"robot", heard.robot.value},
+            {"state", to_string(located.state)},
+            {"why", located.why},
+            {"places", heard.places}};
+  return {std::move(json),
+          fmt::format("robot {} is {} in its map: {}{}{}", heard.robot.value, to_string(located.state), located.why,
+                      heard.places.empty() ? "" : ": ", fmt::join(heard.places, ", ")),
+          is_known || located.state == localise::State::searching ? Level::info : Level::warning};
+}
 EventReport report_of(const node::FixRefused& refused) {
   return {{{"event", "fix_refused"}, {"robot", refused.robot.value}, {"why", refused.why}},
           "a fix was refused: " + refused.why,
@@ -276,6 +290,7 @@ std::string throttled_kind(const node::Event& event) {
   if (std::holds_alternative<node::ScanRefused>(event.what)) return "scan";
   if (std::holds_alternative<node::ImagesRefused>(event.what)) return "images";
   if (std::holds_alternative<node::FixRefused>(event.what)) return "fix";
+  if (std::holds_alternative<node::RobotLocated>(event.what)) return "place";
   return {};
 }
 

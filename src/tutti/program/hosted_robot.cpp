@@ -94,7 +94,7 @@ Answer HostedRobot::report(Timestamp now) {
 }
 
 bool HostedRobot::finished() const {
-  if (refused_) return true;
+  if (refused_ || (options_.is_alone && !options_.stay && has_ended())) return true;
   if (options_.stay || !has_ended() || !driver_->node().backlog().empty()) {
     settled_s_.reset();
     return false;

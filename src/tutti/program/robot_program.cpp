@@ -100,7 +100,9 @@ Result<std::unique_ptr<RobotDriver>> RobotProgram::open_driver() {
                                .name = options_.name,
                                .incarnation = incarnation_,
                                .uplink = {.bytes_per_s = options_.uplink_bytes_per_s},
-                               .max_archive_bytes = options_.max_archive_bytes};
+                               .max_archive_bytes = options_.max_archive_bytes,
+                               .localise = options_.localise};
+  config.keeps_state = !options_.is_alone;
   if (feed_) {
     const auto sensors = feed_->front().sensors();
     config.agent.submap.has_scans = sensors->scans;

@@ -14,6 +14,7 @@
 #include "tutti/base/result.hpp"
 #include "tutti/bus/transport.hpp"
 #include "tutti/intake/sensor_intake.hpp"
+#include "tutti/localise/localiser.hpp"
 #include "tutti/perception/visual/frontend/tracking_source.hpp"
 #include "tutti/program/event_log.hpp"
 #include "tutti/program/feed/live_feed.hpp"
@@ -57,7 +58,10 @@ struct RobotOptions {
   double uplink_bytes_per_s = 0.0;                            ///< Per second of mission time, for submaps; 0: no limit.
   std::uint64_t max_archive_bytes = std::uint64_t{1} << 30U;  ///< Size of the archive of submaps that the server has.
   bool stay = false;                                          ///< Go on after the recording, to hear later maps.
-  std::optional<std::uint64_t> session;                       ///< Nothing: the time when the state folder was made.
+  /// Null: it does not localise in a map.
+  std::shared_ptr<const localise::Localiser::Setup> localise;
+  bool is_alone = false;                 ///< There is no server: nothing is kept for one.
+  std::optional<std::uint64_t> session;  ///< Nothing: the time when the state folder was made.
   Level console = Level::warning;
   std::string version;
 };

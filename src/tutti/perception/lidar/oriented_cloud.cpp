@@ -120,4 +120,24 @@ OrientedCloud orient(std::vector<Eigen::Vector3f> points, std::span<const Eigen:
   return {std::move(index), std::move(normals), std::move(surface), nullptr};
 }
 
+OrientedCloud joined(std::span<const PosedOriented> clouds) {
+  std::vector<Eigen::Vector3f> points;
+  auto normals = std::make_shared<std::vector<Eigen::Vector3f>>();
+  auto surface = std::make_shared<std::vector<std::uint32_t>>();
+  auto roughness = std::make_shared<std::vector<float>>();
+  for (const auto& [T_frame_cloud, cloud] : clouds) {
+    const Eigen::Matrix3f R = T_frame_cloud.rotation.toRotationMatrix().cast<float>();
+    const Eigen::Vector3f t = T_frame_cloud.translation.cast<float>();
+    const auto offset = static_cast<std::uint32_t>(points.size());
+    for (std::size_t i = 0; i < cloud->size(); ++i) {
+      points.emplace_back(R * cloud->point(i) + t);
+      normals->emplace_back(R * cloud->normal(i));
+      roughness->push_back(cloud->roughness ? (*cloud->roughness)[i] : std::numeric_limits<float>::quiet_NaN());
+    }
+    for (const std::uint32_t i : *cloud->surface) surface->push_back(offset + i);
+  }
+  return {std::make_shared<const NeighbourIndex>(std::move(points)), std::move(normals), std::move(surface),
+          std::move(roughness)};
+}
+
 }  // namespace tutti::lidar

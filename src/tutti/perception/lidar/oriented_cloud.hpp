@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "tutti/geometry/pose3.hpp"
 #include "tutti/perception/lidar/closure_config.hpp"
 
 namespace tutti::lidar {
@@ -56,5 +57,13 @@ struct OrientedCloud {
 /// towards the origin without viewpoints. Points and viewpoints are in one frame, m. Deterministic.
 OrientedCloud orient(std::vector<Eigen::Vector3f> points, std::span<const Eigen::Vector3f> viewpoints,
                      const NormalConfig& config);
+
+/// A cloud that lies somewhere in another frame; the cloud must not be null.
+struct PosedOriented {
+  Pose3 T_frame_cloud;
+  const OrientedCloud* cloud = nullptr;
+};
+/// The clouds in one frame, one after the other, with the normals and the roughness that they have.
+OrientedCloud joined(std::span<const PosedOriented> clouds);
 
 }  // namespace tutti::lidar

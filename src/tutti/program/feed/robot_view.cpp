@@ -13,6 +13,21 @@ namespace {
 
 constexpr double kJumpAlert_s = 600.0;  // of odometry
 
+/// In a map that does not move the robot's own trajectory is tied to the map's world where the map shows the robot;
+/// that world is the first component's.
+void set_place(const localise::Located& located, bool wants_scan, const Pose3& T_map_body, FeedState& out) {
+  out.wants_scan |= wants_scan;
+  out.component.reset();
+  out.T_map_world.reset();
+  if (located.state == localise::State::localised) {
+    out.component = 0;
+    out.T_map_world = T_map_body * located.T_world_body->T_a_b.inverse();
+  } else if (located.state != localise::State::searching) {
+    out.alerts.push_back({fmt::format("{} in its map: {}", to_string(located.state), located.why), located.stamp,
+                          located.stamp, located.stamp});
+  }
+}
+
 }  // namespace
 
 void RobotView::note(const node::Event& event, const node::RobotNode& node) {
@@ -70,6 +85,8 @@ FeedState RobotView::state(const node::RobotNode& node) const {
                 .alerts = alerts_,
                 .next_keyframe = agent.next_keyframe(),
                 .watch = agent.watch()};
+  if (const localise::Localiser* localiser = node.localiser(); localiser != nullptr && out.newest)
+    set_place(localiser->located(), localiser->wants_scan(out.newest->stamp), agent.T_map_body(), out);
   for (const auto& [sensor, alert] : missing_) out.alerts.push_back(alert);
   if (const std::string dispute = node.dispute(); !dispute.empty())
     out.alerts.push_back({dispute, disputed_, disputed_, disputed_});

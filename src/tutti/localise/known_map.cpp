@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/localise/known_map.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+namespace tutti::localise {
+
+std::string KnownMap::name_of(SubmapId submap) const {
+  const auto name = names.find(submap.chain.robot);
+  return name == names.end() ? to_string(submap) : fmt::format("{}/{}", name->second, submap.index);
+}
+
+RobotId KnownMap::free_robot() const { return {submaps.empty() ? 0 : submaps.rbegin()->first.chain.robot.value + 1}; }
+
+std::vector<SubmapId> KnownMap::near(const Eigen::Vector3d& p_world, double radius_m, std::size_t most) const {
+  std::vector<std::pair<double, SubmapId>> within;
+  for (const auto& [submap, entry] : submaps)
+    if (const double distance_m = (entry.middle - p_world).norm(); distance_m <= radius_m)
+      within.emplace_back(distance_m, submap);
+  std::ranges::sort(within);
+  std::vector<SubmapId> out;
+  for (std::size_t k = 0; k < std::min(most, within.size()); ++k) out.push_back(within[k].second);
+  return out;
+}
+
+}  // namespace tutti::localise

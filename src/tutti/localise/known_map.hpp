@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tutti/base/ids.hpp"
+#include "tutti/model/submap.hpp"
+#include "tutti/server/payload_store.hpp"
+
+namespace tutti::localise {
+
+/// A map that does not move. Immutable; robots share it.
+struct KnownMap {
+  struct Entry {
+    std::shared_ptr<const Submap> submap;  ///< Without payloads; never null.
+    Pose3 T_world_submap;
+    Eigen::Vector3d middle = Eigen::Vector3d::Zero();  ///< Of its trajectory, in the map's frame, m.
+    std::string place;                                 ///< ClosureVerifier::place_of(); empty when it is unknown.
+    PayloadSize size;
+  };
+  std::string id;                        ///< Of the map, the same for all its versions.
+  std::uint64_t revision = 0;            ///< Of the map.
+  std::map<RobotId, std::string> names;  ///< Of the robots that made it, as far as they are known.
+  std::map<SubmapId, Entry> submaps;
+  std::shared_ptr<const server::PayloadStore> payloads;  ///< Never null.
+
+  /// A submap's name for people, such as "alpha/17".
+  [[nodiscard]] std::string name_of(SubmapId submap) const;
+  /// A robot number that no submap of the map has.
+  [[nodiscard]] RobotId free_robot() const;
+  /// The submaps whose middles are within `radius_m` of a point, nearest first, `most` at most.
+  [[nodiscard]] std::vector<SubmapId> near(const Eigen::Vector3d& p_world, double radius_m, std::size_t most) const;
+};
+
+}  // namespace tutti::localise

@@ -1,0 +1,335 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/localise/localiser.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <utility>
+
+#include "tutti/base/check.hpp"
+#include "tutti/geometry/covariance.hpp"
+#include "tutti/geometry/so3.hpp"
+#include "tutti/model/pose_at.hpp"
+#include "tutti/perception/lidar/undistort.hpp"
+
+namespace tutti::localise {
+namespace {
+
+constexpr int kConfirmations = 3;         // scans that a found place must lie under
+constexpr double kKept_s = 3.0;           // of odometry
+constexpr std::size_t kMostWaiting = 64;  // scans
+constexpr std::size_t kMostPending = 16;
+// Odometry errs by this at least, as a share of the distance, and per radian.
+constexpr double kDrift = 0.01, kDrift_rad_per_m = 0.2 * kRadPerDeg, kDrift_rad_per_rad = 0.01;
+constexpr double kStep_m = 0.002;
+// What the map itself errs by where the robot is.
+constexpr double kMap_m = 0.02, kMap_rad = 0.1 * kRadPerDeg;
+// Registrations of one stretch err alike: so much more than they say.
+constexpr double kAlike = 4.0;
+constexpr std::size_t kLeastAgreeing = 2;  // submaps of the map, or of the robot, that have the same place
+constexpr double kCameraAge_s = 25.0;      // a camera's submap is due before
+
+Matrix6d diagonal(double metres, double radians) {
+  Vector6d d;
+  d << Eigen::Vector3d::Constant(metres * metres), Eigen::Vector3d::Constant(radians * radians);
+  return d.asDiagonal();
+}
+
+/// What odometry may err by over one step, whatever it states.
+Matrix6d least_doubt(const Pose3& step) {
+  const double metres = step.translation.norm(), radians = rotation_angle(step);
+  return diagonal(kDrift * metres + kStep_m, kDrift_rad_per_m * metres + kDrift_rad_per_rad * radians);
+}
+
+/// The robot's pose at T_odom_body, by where it was found to be at another time.
+RelativePose carried_to(const Pose3& T_odom_body, const Hypothesis& place) {
+  const Pose3 step = place.at.pose.inverse() * T_odom_body;
+  return {place.T_world_body.T_a_b * step, compound_covariance(step, place.T_world_body.covariance, least_doubt(step))};
+}
+
+/// Submaps have the odometry that scans are registered from, whatever scans show of it.
+Localiser::Setup of_raw_odometry(Localiser::Setup setup) {
+  setup.submap.fit.scans = "off";
+  return setup;
+}
+
+}  // namespace
+
+Localiser::Localiser(Setup setup)
+    : setup_(of_raw_odometry(std::move(setup))),
+      local_maps_(setup_.map, setup_.lidar),
+      chain_(setup_.map->free_robot()),
+      submaps_(chain_, setup_.submap) {
+  TUTTI_CHECK(setup_.map != nullptr && setup_.verifier != nullptr, "no map or no verifier");
+}
+
+Status Localiser::add(const Input& input) {
+  return std::visit([&](const auto& sample) { return hear(sample); }, input);
+}
+
+Status Localiser::hear(const OdometrySample& sample) {
+  if (auto ok = submaps_.add(sample); !ok) return ok;
+  recent_.push_back({sample.stamp, sample.T_odom_body});
+  recent_steps_.push_back(bounded_covariance(sample.increment_covariance, 1.0, 0.2));
+  const auto old =
+      std::ranges::find_if(recent_, [&](const StampedPose& pose) { return sample.stamp - pose.stamp <= kKept_s; });
+  recent_steps_.erase(recent_steps_.begin(), recent_steps_.begin() + (old - recent_.begin()));
+  recent_.erase(recent_.begin(), old);
+  advance();
+  return {};
+}
+
+bool Localiser::wants_scan(Timestamp stamp) const {
+  return submaps_.wants_scan(stamp) || !last_match_ || stamp - *last_match_ >= setup_.config.track_every_s;
+}
+
+Status Localiser::hear(const Scan& scan) {
+  if (scan.cloud == nullptr) return fail(ErrorCode::invalid, "a scan without points");
+  if (submaps_.wants_scan(scan.stamp))
+    if (auto ok = submaps_.add(scan); !ok) return ok;
+  if (last_scan_ && scan.stamp <= *last_scan_) return {};
+  last_scan_ = scan.stamp;
+  if (waiting_.size() >= kMostWaiting) waiting_.pop_front();
+  waiting_.push_back(scan);
+  advance();
+  return {};
+}
+
+/// Uses the scans that odometry has reached, and the submaps that have ended.
+void Localiser::advance() {
+  while (!waiting_.empty() && !recent_.empty() && waiting_.front().stamp <= recent_.back().stamp) {
+    const Scan scan = std::move(waiting_.front());
+    waiting_.pop_front();
+    if (!last_match_ || scan.stamp - *last_match_ >= setup_.config.track_every_s) follow(scan);
+  }
+  take_submaps();
+}
+
+void Localiser::suggest(const RelativePose& T_world_body) {
+  search_anew("a start pose was given, which scans have not confirmed yet");
+  suggested_ = {T_world_body.T_a_b, T_world_body.covariance + diagonal(0.1, 0.02)};
+}
+
+void Localiser::begin_submaps() {
+  ++chain_.session;  // nothing of before belongs to what comes
+  submaps_ = robot::SubmapBuilder(chain_, setup_.submap);
+  const Trajectory recent = recent_;
+  for (std::size_t k = 0; k < recent.size(); ++k)
+    if (k + 1 == recent.size()) (void)submaps_.add(OdometrySample{recent[k].stamp, recent[k].pose, recent_steps_[k]});
+}
+
+void Localiser::search_anew(const std::string& why) {
+  track_.reset();
+  suggested_.reset();
+  pending_.clear();
+  places_.clear();
+  against_since_ = nothing_since_ = std::nullopt;
+  against_ = 0;
+  state_ = State::searching;
+  why_ = why;
+  begin_submaps();
+}
+
+/// Moves the pose with odometry to a time after it.
+void Localiser::predict_to(const StampedPose& at) {
+  const Pose3 step = track_->at.pose.inverse() * at.pose;
+  Matrix6d stated = Matrix6d::Zero();
+  for (std::size_t k = 0; k < recent_.size(); ++k)
+    if (recent_[k].stamp > track_->at.stamp && recent_[k].stamp <= at.stamp) stated += recent_steps_[k];
+  Matrix6d& covariance = track_->T_world_body.covariance;
+  covariance = compound_covariance(step, covariance, stated + least_doubt(step));
+  track_->T_world_body.T_a_b = track_->T_world_body.T_a_b * step;
+  track_->at = at;
+}
+
+/// The Kalman filter's update with a pose.
+void Localiser::correct(const RelativePose& measured) {
+  RelativePose& now = track_->T_world_body;
+  const Matrix6d S = now.covariance + measured.covariance;
+  const Matrix6d gain = S.ldlt().solve(now.covariance).transpose();
+  now.T_a_b = retract(now.T_a_b, gain * local(now.T_a_b, measured.T_a_b));
+  const Matrix6d rest = Matrix6d::Identity() - gain;
+  now.covariance = rest * now.covariance * rest.transpose() + gain * measured.covariance * gain.transpose();
+}
+
+void Localiser::follow(const Scan& scan) {
+  if (suggested_ && !track_) {
+    track_ =
+        Track{.T_world_body = *suggested_, .at = recent_.back(), .confirmed = scan.stamp, .to_confirm = kConfirmations};
+    suggested_.reset();
+  }
+  last_match_ = scan.stamp;
+  if (!track_) return;
+  const auto T_odom_body = pose_at(recent_, scan.stamp);
+  const auto undistorted = lidar::undistort(scan, recent_);
+  if (!T_odom_body || !undistorted || scan.stamp < track_->at.stamp) return;
+  predict_to({scan.stamp, *T_odom_body});
+  const LocalMap* local = local_maps_.about(track_->T_world_body.T_a_b.translation);
+  if (local == nullptr) return doubt({Evidence::nothing, "the map shows nothing there"}, scan.stamp);
+  const fit::FitScan thinned = fit::make_fit_scan(scan.stamp, *undistorted->cloud, setup_.submap.min_range_m);
+  ScanMatch match = match_scan(*local, thinned, track_->T_world_body.T_a_b);
+  ++work_.registered;
+  match.T_world_body.covariance *= kAlike;
+  const Assessment assessment = assess(match, track_->T_world_body);
+  if (assessment.evidence == Evidence::confirms)
+    confirm(match);
+  else
+    doubt(assessment, scan.stamp);
+}
+
+void Localiser::confirm(const ScanMatch& match) {
+  correct(match.T_world_body);
+  against_since_ = nothing_since_ = std::nullopt;
+  against_ = 0;
+  track_->confirmed = track_->at.stamp;
+  if (track_->to_confirm > 0 && --track_->to_confirm > 0) return;
+  state_ = State::localised;
+  why_ = fmt::format("{:.0f} % of the scan lies on the map", 100.0 * match.overlap);
+  pending_.clear();
+  places_.clear();
+}
+
+/// A scan that does not confirm the pose.
+void Localiser::doubt(const Assessment& assessment, Timestamp stamp) {
+  if (track_->to_confirm > 0) {  // it was a guess
+    track_->to_confirm = kConfirmations;
+    if (assessment.evidence == Evidence::against || stamp - track_->confirmed > setup_.config.off_map_after_s) {
+      track_.reset();
+      why_ = "a place that was found is not confirmed: " + assessment.why;
+    }
+    return;
+  }
+  if (assessment.evidence == Evidence::against) {
+    ++against_;
+    if (!against_since_) against_since_ = stamp;
+    if (stamp - *against_since_ < setup_.config.lost_after_s || against_ < 3) return;
+    search_anew(assessment.why);
+    state_ = State::lost;
+    return;
+  }
+  if (!nothing_since_) nothing_since_ = stamp;
+  if (stamp - *nothing_since_ < setup_.config.off_map_after_s) return;
+  state_ = State::off_map;
+  why_ = assessment.why;
+}
+
+void Localiser::take_submaps() {
+  while (const auto submap = submaps_.take_submap()) consider(*submap);
+}
+
+/// Compares a submap with the map, where that may tell something.
+void Localiser::consider(const Submap& submap) {
+  if (payload_size(submap) == PayloadSize()) return;
+  if (track_ && has_scans() && state_ == State::localised) return;  // scans follow it
+  const auto candidates =
+      most_alike(*setup_.map, *setup_.verifier, submap, static_cast<std::size_t>(setup_.config.candidates));
+  auto found = search(*setup_.map, *setup_.verifier, submap, candidates);
+  if (!found) {
+    why_ = found.error().message;
+    return;
+  }
+  work_.compared += found->compared;
+  if (state_ == State::localised)
+    follow_submap(*found);
+  else
+    decide(std::move(*found), submap);
+}
+
+void Localiser::decide(SearchResult found, const Submap& submap) {
+  const bool knows = track_ && track_->to_confirm == 0;  // it has left the map, say
+  if (found.places.empty() || found.places.front().accepted == 0) {
+    if (!knows && state_ != State::lost)
+      why_ = fmt::format("none of the {} submaps of the map that look most alike shows what it saw", found.compared);
+    if (!knows) places_.clear();
+    if (!knows && state_ == State::ambiguous) state_ = State::searching;
+    return;
+  }
+  const Pose3& T_odom_body = submap.keyframes.back().T_odom_body;
+  const auto was_seen = [&](const Hypothesis& place) {
+    return std::ranges::any_of(pending_, [&](const Hypothesis& p) { return is_same_place(p, place, T_odom_body); });
+  };
+  Hypothesis& best = found.places.front();
+  std::vector<Hypothesis> rivals = found.rivals();
+  const bool is_known = was_seen(best);
+  if (is_known) std::erase_if(rivals, [&](const Hypothesis& rival) { return !was_seen(rival); });
+  if (rivals.empty() && (is_known || best.accepted >= kLeastAgreeing)) return begin_track(best);
+  if (!knows) {
+    places_.clear();
+    state_ = rivals.empty() ? State::searching : State::ambiguous;
+    why_ = rivals.empty() ? "one submap of the map shows what it saw, and a second one is to agree"
+                          : fmt::format("{} places fit what it saw", rivals.size() + 1);
+    if (!rivals.empty()) places_.push_back({best.submap, best.T_world_odom() * T_odom_body});
+    for (const Hypothesis& rival : rivals) places_.push_back({rival.submap, rival.T_world_odom() * T_odom_body});
+  }
+  pending_.assign(1, best);
+  pending_.insert(pending_.end(), rivals.begin(), rivals.end());
+  if (pending_.size() > kMostPending) pending_.resize(kMostPending);
+}
+
+/// Goes on from a place that was found, which scans have to confirm; without scans it counts.
+void Localiser::begin_track(const Hypothesis& place) {
+  const StampedPose& now = recent_.back();
+  track_ = Track{.T_world_body = carried_to(now.pose, place),
+                 .at = now,
+                 .confirmed = now.stamp,
+                 .to_confirm = has_scans() ? kConfirmations : 0};
+  against_since_ = nothing_since_ = std::nullopt;
+  against_ = 0;
+  if (has_scans()) {
+    state_ = State::searching;
+    why_ = "a place was found, which scans are to confirm";
+    return;
+  }
+  state_ = State::localised;
+  why_ = fmt::format("{} submaps of the map show what it saw", place.accepted);
+  pending_.clear();
+  places_.clear();
+}
+
+/// A robot without scans: its submaps say whether it is still where it should be.
+void Localiser::follow_submap(const SearchResult& found) {
+  predict_to(recent_.back());
+  const Hypothesis here{.T_world_body = track_->T_world_body, .at = track_->at};
+  for (const Hypothesis& place : found.places) {
+    if (place.accepted == 0) break;
+    if (!is_same_place(here, place, track_->at.pose)) {
+      if (place.accepted < kLeastAgreeing || !found.rivals().empty()) continue;
+      search_anew(fmt::format("{} submaps of the map show it elsewhere", place.accepted));
+      state_ = State::lost;
+      return;
+    }
+    correct(carried_to(track_->at.pose, place));
+    track_->confirmed = track_->at.stamp;
+    why_ = fmt::format("{} submaps of the map show what it saw", place.accepted);
+    return;
+  }
+  if (track_->at.stamp - track_->confirmed <= kCameraAge_s) return;
+  state_ = State::off_map;
+  why_ = "no submap of the map shows what it saw";
+}
+
+Located Localiser::located() const {
+  Located out{.state = state_, .why = why_, .places = places_};
+  if (recent_.empty()) return out;
+  out.stamp = recent_.back().stamp;
+  if (!track_ || track_->to_confirm > 0) return out;
+  RelativePose pose = carried_to(recent_.back().pose, {.T_world_body = track_->T_world_body, .at = track_->at});
+  pose.covariance += diagonal(kMap_m, kMap_rad);
+  out.age_s = out.stamp - track_->confirmed;
+  if (state_ == State::localised && has_scans() && out.stamp - *last_scan_ > setup_.config.scan_silence_s) {
+    out.state = State::stale;
+    out.why = fmt::format("no scan has come for {:.1f} s", out.stamp - *last_scan_);
+  }
+  out.T_world_body = std::move(pose);
+  return out;
+}
+
+LocaliserWork Localiser::work() const {
+  LocaliserWork out = work_;
+  out.local_maps = local_maps_.made();
+  out.extracted = local_maps_.extracted();
+  return out;
+}
+
+}  // namespace tutti::localise

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tutti/base/result.hpp"
+#include "tutti/localise/config.hpp"
+#include "tutti/localise/known_map.hpp"
+#include "tutti/localise/local_map.hpp"
+#include "tutti/localise/place_search.hpp"
+#include "tutti/localise/scan_match.hpp"
+#include "tutti/localise/state.hpp"
+#include "tutti/model/input.hpp"
+#include "tutti/robot/submap_builder.hpp"
+#include "tutti/server/closure_verifier.hpp"
+
+namespace tutti::localise {
+
+/// Counts of work, which are deterministic.
+struct LocaliserWork {
+  std::size_t compared = 0;    ///< Submaps of the map, with submaps of the robot.
+  std::size_t registered = 0;  ///< Scans, on the map.
+  std::size_t local_maps = 0;
+  std::size_t extracted = 0;  ///< Submaps of the map whose features were computed for local maps.
+};
+
+/// Finds where one robot is in a map that does not move, and follows it there. While it does not know, each submap of
+/// the robot is compared with those of the map that look most alike, by the verifier that a server has. A place counts
+/// when no other fits nearly as well, two submaps of the map or two of the robot agree on it, and the next scans lie on
+/// the map there. Then every scan is registered on the nearest submaps from where odometry says that the robot is; a
+/// Kalman filter of the pose weighs odometry and scans by their covariances. Scans that contradict the map for a second
+/// end that.
+///
+/// A robot with a camera alone is followed by its submaps instead. Odometry's frame never jumps: only the pose in the
+/// map does. It has no threads, sockets or clocks; the same inputs give the same poses to the bit. Not for several
+/// threads at a time.
+class Localiser {
+ public:
+  struct Setup {
+    std::shared_ptr<const KnownMap> map;                      ///< Not null.
+    std::shared_ptr<const server::ClosureVerifier> verifier;  ///< Not null.
+    lidar::LidarClosureConfig lidar;                          ///< How clouds of submaps are read.
+    robot::SubmapConfig submap;
+    LocaliserConfig config;
+  };
+  explicit Localiser(Setup setup);
+
+  /// Odometry, scans and tracked images, as SubmapBuilder::add() takes them; other kinds do nothing. On an error
+  /// nothing has changed.
+  Status add(const Input& input);
+  /// Where somebody says that the robot is now, with a covariance (right tangent). It is tried by the next scans before
+  /// any other place, and counts only when they confirm it.
+  void suggest(const RelativePose& T_world_body);
+  /// Forgets where the robot is, and searches the whole map.
+  void search_anew(const std::string& why);
+
+  /// Where the robot is, at the newest odometry.
+  [[nodiscard]] Located located() const;
+  /// True for a scan of this stamp if it will be used.
+  [[nodiscard]] bool wants_scan(Timestamp stamp) const;
+  [[nodiscard]] const KnownMap& map() const { return *setup_.map; }
+  [[nodiscard]] LocaliserWork work() const;
+
+ private:
+  struct Track {
+    RelativePose T_world_body;  ///< At `at`; right tangent, without what the map itself errs by.
+    StampedPose at;             ///< By odometry.
+    Timestamp confirmed;        ///< When a scan last lay on the map.
+    int to_confirm = 0;         ///< Scans that are still to confirm it before it counts.
+  };
+
+  Status hear(const OdometrySample& sample);
+  Status hear(const Scan& scan);
+  Status hear(const TrackedImages& images) { return submaps_.add(images); }
+  Status hear(const auto&) { return {}; }
+  void begin_submaps();
+  void advance();
+  void follow(const Scan& scan);
+  void predict_to(const StampedPose& at);
+  void correct(const RelativePose& measured);
+  void confirm(const ScanMatch& match);
+  void doubt(const Assessment& assessment, Timestamp stamp);
+  void take_submaps();
+  void consider(const Submap& submap);
+  void decide(SearchResult found, const Submap& submap);
+  void begin_track(const Hypothesis& place);
+  void follow_submap(const SearchResult& found);
+  [[nodiscard]] bool has_scans() const { return last_scan_.has_value(); }
+
+  Setup setup_;
+  LocalMaps local_maps_;
+  ChainId chain_;
+  robot::SubmapBuilder submaps_;
+  Trajectory recent_;                    // raw odometry over the longest sweep and what waits
+  std::vector<Matrix6d> recent_steps_;   // covariance of the step to each
+  std::deque<Scan> waiting_;             // for odometry of their stamps
+  std::optional<Timestamp> last_scan_;   // the newest heard
+  std::optional<Timestamp> last_match_;  // the newest registered
+  std::optional<Track> track_;
+  std::optional<RelativePose> suggested_;
+  std::vector<Hypothesis> pending_;  // of earlier submaps, not decided
+  std::optional<Timestamp> against_since_, nothing_since_;
+  std::size_t against_ = 0;  // scans in a row
+  State state_ = State::searching;
+  std::string why_ = "it has not seen enough yet";
+  std::vector<PlaceFound> places_;
+  LocaliserWork work_;
+};
+
+}  // namespace tutti::localise

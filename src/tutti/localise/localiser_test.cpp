@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/localise/localiser.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+#include <memory>
+#include <set>
+
+#include "tutti/geometry/so3.hpp"
+#include "tutti/model/pose_at.hpp"
+#include "tutti/simulation/recordings.hpp"
+#include "tutti/verifiers/sensor_verifier_maker.hpp"
+
+namespace tutti::localise {
+namespace localiser_test {
+
+/// A piece of tunnel in which two robots made a map with perfect odometry, and a third drives with its own.
+struct World {
+  std::vector<Recording> robots;
+  std::shared_ptr<const KnownMap> map;
+};
+
+const verifiers::VerifierConfig kVerifier;
+
+std::shared_ptr<const server::ClosureVerifier> verifier() { return verifiers::make_verifier(kVerifier); }
+
+/// Feeds a robot's odometry and scans, from one sample to another, to what takes inputs.
+template <class Taker>
+void feed(const Recording& robot, const Trajectory& odometry, std::size_t from, std::size_t to, Taker& taker,
+          const std::function<void()>& after = {}) {
+  for (std::size_t k = from; k < std::min(to, odometry.size()); ++k) {
+    Matrix6d step = Matrix6d::Identity() * 1e-6;
+    ASSERT_TRUE(taker.add(OdometrySample{odometry[k].stamp, odometry[k].pose, step}).has_value());
+    if (taker.wants_scan(odometry[k].stamp))
+      if (const auto scan = robot.scans->scan(k); scan && *scan) (void)taker.add(**scan);
+    if (after) after();
+  }
+}
+
+std::shared_ptr<KnownMap> map_of(const std::vector<Recording>& robots) {
+  auto map = std::make_shared<KnownMap>();
+  auto payloads = std::make_shared<server::MemoryPayloadStore>();
+  for (const Recording& robot : robots) {
+    robot::SubmapConfig config;
+    config.fit.scans = "off";
+    config.has_scans = true;
+    robot::SubmapBuilder builder(ChainId(robot.robot), config);
+    feed(robot, robot.reference, 0, robot.reference.size(), builder);
+    builder.finish();
+    while (const auto submap = builder.take_submap()) {
+      KnownMap::Entry entry{.submap = std::make_shared<const Submap>(without_payloads(*submap)),
+                            .T_world_submap = submap->keyframes.front().T_odom_body,
+                            .place = verifier()->place_of(*submap),
+                            .size = payload_size(*submap)};
+      entry.middle = submap->keyframes[submap->keyframes.size() / 2].T_odom_body.translation;
+      EXPECT_TRUE(payloads->put(*submap).has_value());
+      map->submaps.emplace(submap->id, std::move(entry));
+    }
+    map->names[robot.robot] = robot.name;
+  }
+  map->payloads = std::move(payloads);
+  map->id = "test";
+  return map;
+}
+
+World make_world(std::uint64_t seed) {
+  simulation::SimulationConfig config;
+  config.sensors = "lidar";
+  config.lidar.rays_share = 0.5;
+  config.world.network.rows = 2;
+  config.world.network.columns = 2;
+  config.world.network.block_m = 22.0;
+  config.world.featureless_share = 0.0;
+  config.robots.resize(3);
+  for (auto& robot : config.robots) {
+    robot.walk.duration_s = 110.0;
+    robot.walk.rate_hz = 5.0;
+    robot.walk.pauses_per_min = 0.0;
+    robot.odometry.yaw_bias_deg_per_m = 0.1;
+  }
+  auto world = simulation::simulate_recordings(config, Timestamp{0}, seed);
+  EXPECT_TRUE(world.has_value()) << world.error().message;
+  World out{.robots = std::move(world->recordings), .map = {}};
+  out.map = map_of({out.robots[0], out.robots[1]});
+  return out;
+}
+const World& world() {
+  static const World made = make_world(3);
+  return made;
+}
+
+Localiser localiser(std::shared_ptr<const KnownMap> map) {
+  robot::SubmapConfig submap;
+  submap.has_scans = true;
+  return Localiser({.map = std::move(map), .verifier = verifier(), .submap = submap});
+}
+
+/// What was published, and what it was wrong by.
+struct Judged {
+  std::size_t published = 0, wrong = 0;
+  double worst_m = 0.0;
+  std::optional<double> first_fix_s;
+  std::set<State> states;
+  void add(const Located& located, const Trajectory& truth) {
+    states.insert(located.state);
+    if (located.state != State::localised) return;
+    ++published;
+    if (!first_fix_s) first_fix_s = located.stamp - truth.front().stamp;
+    const Vector6d error = local(located.T_world_body->T_a_b, *pose_at(truth, located.stamp));
+    worst_m = std::max(worst_m, error.head<3>().norm());
+    if (error.head<3>().norm() > 1.0 || error.tail<3>().norm() > 5.0 * kRadPerDeg) ++wrong;
+  }
+};
+
+TEST(Localiser, FindsItsPlaceInTwoSubmapsAndFollowsTheMap) {
+  const Recording& robot = world().robots[2];
+  Localiser one = localiser(world().map);
+  Judged judged;
+  feed(robot, robot.odometry, 0, robot.odometry.size(), one, [&] { judged.add(one.located(), robot.reference); });
+  ASSERT_TRUE(judged.first_fix_s.has_value()) << one.located().why;
+  EXPECT_LT(*judged.first_fix_s, 25.0);
+  EXPECT_EQ(judged.wrong, 0U);
+  EXPECT_LT(judged.worst_m, 0.3);
+  EXPECT_GT(judged.published, 400U);
+  EXPECT_LE(one.work().compared, 4U * 12U);
+  EXPECT_GT(one.work().registered, 300U);
+}
+
+TEST(Localiser, TheSameInputsGiveTheSamePosesToTheBit) {
+  const Recording& robot = world().robots[2];
+  std::vector<Pose3> poses[2];
+  for (auto& run : poses) {
+    Localiser one = localiser(world().map);
+    feed(robot, robot.odometry, 0, 200, one, [&] {
+      if (const auto located = one.located(); located.T_world_body) run.push_back(located.T_world_body->T_a_b);
+    });
+  }
+  EXPECT_FALSE(poses[0].empty());
+  EXPECT_TRUE(poses[0] == poses[1]);
+}
+
+/// The robot is carried to where it will be a minute later; its odometry notices nothing.
+TEST(Localiser, KidnappedItSaysThatItIsLostWithinTwoSecondsAndFindsItselfAgain) {
+  const Recording& robot = world().robots[2];
+  constexpr std::size_t kTaken = 200, kLater = 350;
+  Recording carried = robot;
+  Trajectory odometry(robot.odometry.begin(), robot.odometry.begin() + kTaken),
+      truth(robot.reference.begin(), robot.reference.begin() + kTaken);
+  const double gap_s = robot.odometry[kLater].stamp - robot.odometry[kTaken].stamp;
+  const Pose3 T_shift = robot.odometry[kTaken - 1].pose * robot.odometry[kLater].pose.inverse();
+  for (std::size_t k = kLater; k < robot.odometry.size(); ++k) {
+    odometry.push_back({robot.odometry[k].stamp - gap_s, T_shift * robot.odometry[k].pose});
+    truth.push_back({robot.reference[k].stamp - gap_s, robot.reference[k].pose});
+  }
+  Localiser one = localiser(world().map);
+  Judged judged;
+  std::optional<double> lost_s, found_s;
+  const Timestamp taken = odometry[kTaken].stamp;
+  for (std::size_t k = 0; k < odometry.size(); ++k) {
+    ASSERT_TRUE(one.add(OdometrySample{odometry[k].stamp, odometry[k].pose, Matrix6d::Identity() * 1e-6}).has_value());
+    const std::size_t of = k < kTaken ? k : k - kTaken + kLater;
+    if (auto scan = robot.scans->scan(of); scan && *scan) {
+      (*scan)->stamp = odometry[k].stamp;
+      (void)one.add(**scan);
+    }
+    const Located located = one.located();
+    if (located.stamp >= taken && located.state == State::lost && !lost_s) lost_s = located.stamp - taken;
+    if (lost_s && located.state == State::localised && !found_s) found_s = located.stamp - taken;
+    if (!(located.stamp >= taken && !lost_s)) judged.add(located, truth);
+  }
+  ASSERT_TRUE(lost_s.has_value());
+  EXPECT_LE(*lost_s, 2.0);
+  ASSERT_TRUE(found_s.has_value());
+  EXPECT_LE(*found_s, 35.0);
+  EXPECT_EQ(judged.wrong, 0U);
+}
+
+/// The map twice, side by side: nothing tells one from the other.
+TEST(Localiser, TwoPlacesThatAreAlikeAreBothNamedAndNothingIsPublished) {
+  auto twice = std::make_shared<KnownMap>(*world().map);
+  auto payloads = std::make_shared<server::MemoryPayloadStore>();
+  for (const auto& [id, entry] : world().map->submaps)
+    for (const std::uint32_t more : {0U, 2U}) {
+      const SubmapId copy{{{id.chain.robot.value + more}, 0}, id.index};
+      Submap submap = *entry.submap;
+      submap.id = copy;
+      submap.cloud = *world().map->payloads->cloud(id);
+      ASSERT_TRUE(payloads->put(submap).has_value());
+      KnownMap::Entry there = entry;
+      there.submap = std::make_shared<const Submap>(without_payloads(submap));
+      const Pose3 T_shift{Eigen::Quaterniond::Identity(), Eigen::Vector3d(100.0 * more, 0, 0)};
+      there.T_world_submap = T_shift * there.T_world_submap;
+      there.middle = T_shift * there.middle;
+      twice->submaps[copy] = there;
+    }
+  twice->payloads = payloads;
+  const Recording& robot = world().robots[2];
+  Localiser one = localiser(twice);
+  Judged judged;
+  std::size_t most_places = 0;
+  feed(robot, robot.odometry, 0, 250, one, [&] {
+    judged.add(one.located(), robot.reference);
+    most_places = std::max(most_places, one.located().places.size());
+  });
+  EXPECT_EQ(judged.published, 0U);
+  EXPECT_TRUE(judged.states.contains(State::ambiguous));
+  EXPECT_GE(most_places, 2U);
+}
+
+TEST(Localiser, InTheMapOfAnotherSiteNothingIsPublished) {
+  const World other = make_world(77);
+  const Recording& robot = other.robots[2];
+  Localiser one = localiser(world().map);
+  Judged judged;
+  feed(robot, robot.odometry, 0, robot.odometry.size(), one, [&] { judged.add(one.located(), robot.reference); });
+  EXPECT_EQ(judged.published, 0U);
+}
+
+TEST(Localiser, AStartPoseCountsOnlyWhenScansConfirmIt) {
+  const Recording& robot = world().robots[2];
+  const RelativePose truth{robot.reference[20].pose, Matrix6d::Identity() * 0.01};
+  for (const bool is_right : {true, false}) {
+    Localiser one = localiser(world().map);
+    feed(robot, robot.odometry, 0, 21, one);
+    RelativePose said = truth;
+    if (!is_right) said.T_a_b = said.T_a_b * Pose3{so3_exp({0, 0, 2.0}), {6.0, 2.0, 0.0}};
+    one.suggest(said);
+    Judged judged;
+    feed(robot, robot.odometry, 21, 41, one, [&] { judged.add(one.located(), robot.reference); });
+    EXPECT_EQ(judged.published > 0, is_right) << one.located().why;
+    EXPECT_EQ(judged.wrong, 0U);
+  }
+}
+
+/// Only what the other robot saw in its first 40 s is mapped.
+TEST(Localiser, BeyondTheMapItSaysSo) {
+  auto small = std::make_shared<KnownMap>(*world().map);
+  const Recording& robot = world().robots[1];
+  std::erase_if(small->submaps, [&](const auto& entry) {
+    return entry.first.chain.robot != robot.robot || entry.second.submap->keyframes.back().stamp > Timestamp{} + 40.0;
+  });
+  ASSERT_GE(small->submaps.size(), 2U);
+  Localiser one = localiser(small);
+  Judged judged;
+  feed(robot, robot.odometry, 0, robot.odometry.size(), one, [&] { judged.add(one.located(), robot.reference); });
+  EXPECT_GT(judged.published, 50U);
+  EXPECT_EQ(judged.wrong, 0U);
+  EXPECT_TRUE(judged.states.contains(State::off_map));
+}
+
+TEST(Localiser, WithoutScansItsPoseIsStale) {
+  const Recording& robot = world().robots[2];
+  Localiser one = localiser(world().map);
+  std::size_t k = 0;
+  for (; k < robot.odometry.size() && one.located().state != State::localised; ++k)
+    feed(robot, robot.odometry, k, k + 1, one);
+  ASSERT_LT(k + 20, robot.odometry.size());
+  for (std::size_t n = 0; n < 15; ++n, ++k)
+    ASSERT_TRUE(one.add(OdometrySample{robot.odometry[k].stamp, robot.odometry[k].pose, Matrix6d::Zero()}).has_value());
+  EXPECT_EQ(one.located().state, State::stale);
+  feed(robot, robot.odometry, k, k + 2, one);
+  EXPECT_EQ(one.located().state, State::localised);
+}
+
+}  // namespace localiser_test
+}  // namespace tutti::localise

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/localise/scan_match.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+
+#include "tutti/base/chi_square.hpp"
+#include "tutti/geometry/so3.hpp"
+#include "tutti/perception/lidar/registration.hpp"
+#include "tutti/perception/lidar/visibility.hpp"
+
+namespace tutti::localise {
+namespace {
+
+// What a registration on a map of voxels errs by at least.
+constexpr double kFloor_m = 0.02, kFloor_rad = 0.2 * kRadPerDeg;
+// Below this least eigenvalue of the normals' scatter a scan slides along the map, and how far is unknown.
+constexpr double kSliding = 0.03, kSlides_m = 1.0;
+constexpr float kVisibilityMargin_m = 0.5F;
+constexpr int kScanPoints = 400;    // that each submap's views are asked about
+constexpr int kMapPoints = 2000;    // that the scan's view is asked about
+constexpr float kSpacing_m = 0.3F;  // of points, between which a surface is closed
+
+constexpr double kLeastOverlap = 0.4;  // of a scan that confirms
+constexpr double kFewOverlap = 0.2;    // and below which it is nowhere near
+constexpr double kMostRmse_m = 0.15;
+constexpr double kMostContradiction = 0.2;  // of a scan that confirms
+constexpr double kContradiction = 0.35;     // from which it is against
+constexpr int kLeastInView = 200;           // points that can be against
+constexpr double kSurprise = 0.9999;        // probability of a difference that chance explains
+
+const lidar::RegistrationConfig& registration_config() {
+  static const lidar::RegistrationConfig config{.levels = {{1.5, 300, 6}, {0.6, 600, 6}, {0.3, 1200, 8}}};
+  return config;
+}
+
+void count_contradictions(const LocalMap& map, const fit::FitScan& scan, const Pose3& T_local_body, ScanMatch& out) {
+  int seen = 0, against = 0;
+  const auto add = [&](const lidar::VisibilityCount& count) {
+    seen += count.seen;
+    against += count.contradicting;
+  };
+  for (const auto& [T_submap_local, features] : map.viewers)
+    add(lidar::count_visible(*features->panoramas, scan.cloud, T_submap_local * T_local_body, kScanPoints,
+                             kVisibilityMargin_m));
+  const std::vector<lidar::DepthPanorama> own{{scan.cloud, Eigen::Vector3f::Zero(), kSpacing_m}};
+  add(lidar::count_visible(own, map.cloud, T_local_body.inverse(), kMapPoints, kVisibilityMargin_m));
+  out.in_view = seen + against;
+  out.contradiction = out.in_view > 0 ? static_cast<double>(against) / out.in_view : 0.0;
+}
+
+}  // namespace
+
+ScanMatch match_scan(const LocalMap& map, const fit::FitScan& scan, const Pose3& T_world_body) {
+  const Pose3 T_local_begun = map.T_world_local.inverse() * T_world_body;
+  const auto found = lidar::register_clouds(map.cloud, scan.cloud, T_local_begun, registration_config());
+  const bool is_usable = found.overlap > 0.0;
+  const Pose3 T_local_body = is_usable ? found.T_target_source : T_local_begun;
+  ScanMatch out{.T_world_body = {map.T_world_local * T_local_body, found.covariance},
+                .converged = is_usable,
+                .overlap = found.overlap,
+                .plane_rmse_m = found.plane_rmse_m};
+  Matrix6d& covariance = out.T_world_body.covariance;
+  if (found.min_translation_eigenvalue < kSliding)
+    covariance.topLeftCorner<3, 3>() += kSlides_m * kSlides_m * found.weakest_source * found.weakest_source.transpose();
+  covariance.diagonal().head<3>().array() += kFloor_m * kFloor_m;
+  covariance.diagonal().tail<3>().array() += kFloor_rad * kFloor_rad;
+  count_contradictions(map, scan, T_local_body, out);
+  return out;
+}
+
+Assessment assess(const ScanMatch& match, const RelativePose& predicted) {
+  if (match.in_view >= kLeastInView && match.contradiction >= kContradiction)
+    return {Evidence::against, fmt::format("{:.0f} % of what is in view stands where the other side looked through",
+                                           100.0 * match.contradiction)};
+  if (!match.converged || match.overlap < kFewOverlap)
+    return {Evidence::nothing, fmt::format("{:.0f} % of the scan lies on the map", 100.0 * match.overlap)};
+  const double surprise = squared_distance(predicted, match.T_world_body);
+  if (surprise > chi_square_quantile(kSurprise, 6)) {
+    const Vector6d by = local(predicted.T_a_b, match.T_world_body.T_a_b);
+    return {Evidence::against, fmt::format("the scan fits {:.2f} m and {:.1f} degrees from where the robot should be",
+                                           by.head<3>().norm(), by.tail<3>().norm() / kRadPerDeg)};
+  }
+  if (match.overlap < kLeastOverlap || match.plane_rmse_m > kMostRmse_m || match.contradiction > kMostContradiction)
+    return {Evidence::nothing, fmt::format("{:.0f} % of the scan lies on the map, {:.0f} % contradicts it",
+                                           100.0 * match.overlap, 100.0 * match.contradiction)};
+  return {Evidence::confirms, {}};
+}
+
+}  // namespace tutti::localise

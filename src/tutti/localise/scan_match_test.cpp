@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/localise/scan_match.hpp"
+
+#include <gtest/gtest.h>
+
+namespace tutti::localise {
+namespace scan_match_test {
+
+const RelativePose kHere{.T_a_b = {}, .covariance = Matrix6d::Identity() * 1e-3};
+
+ScanMatch good() {
+  return {.T_world_body = kHere, .converged = true, .overlap = 0.8, .plane_rmse_m = 0.04, .in_view = 2000};
+}
+
+TEST(ScanMatch, AScanThatLiesOnTheMapConfirms) {
+  EXPECT_EQ(assess(good(), kHere).evidence, Evidence::confirms);
+  EXPECT_TRUE(assess(good(), kHere).why.empty());
+}
+
+TEST(ScanMatch, SeenThroughWallsIsAgainstWhateverElseFits) {
+  ScanMatch match = good();
+  match.contradiction = 0.5;
+  EXPECT_EQ(assess(match, kHere).evidence, Evidence::against);
+  match.in_view = 50;  // of a handful of points nothing follows
+  EXPECT_NE(assess(match, kHere).evidence, Evidence::against);
+}
+
+TEST(ScanMatch, FarFromWhereTheRobotShouldBeIsAgainst) {
+  ScanMatch match = good();
+  match.T_world_body.T_a_b.translation.x() = 1.5;
+  EXPECT_EQ(assess(match, kHere).evidence, Evidence::against);
+  EXPECT_NE(assess(match, kHere).why.find("1.50 m"), std::string::npos);
+}
+
+TEST(ScanMatch, WhereTheMapShowsLittleNothingFollows) {
+  ScanMatch match = good();
+  match.overlap = 0.1;
+  match.T_world_body.T_a_b.translation.x() = 1.5;
+  EXPECT_EQ(assess(match, kHere).evidence, Evidence::nothing);
+  match.converged = false;
+  EXPECT_EQ(assess(match, kHere).evidence, Evidence::nothing);
+}
+
+}  // namespace scan_match_test
+}  // namespace tutti::localise

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tutti/base/ids.hpp"
+#include "tutti/base/timestamp.hpp"
+#include "tutti/model/relative_pose.hpp"
+
+namespace tutti::localise {
+
+/// What a robot knows of where it is in a map that does not move.
+enum class State : std::uint8_t {
+  searching,  ///< It has not found its place yet.
+  ambiguous,  ///< What it sees fits several places.
+  localised,  ///< One place explains what it sees.
+  off_map,    ///< It has left what the map shows; odometry goes on from its last place.
+  lost,       ///< What it sees contradicts where it was; it searches again.
+  stale,      ///< Its sensors have shown nothing for some time.
+};
+[[nodiscard]] constexpr std::string_view to_string(State state) {
+  constexpr std::string_view kWords[] = {"searching", "ambiguous", "localised", "off the map", "lost", "stale"};
+  return kWords[static_cast<std::size_t>(state)];
+}
+
+/// A place of the map, by the submap that shows it.
+struct PlaceFound {
+  SubmapId submap;
+  Pose3 T_world_body;
+};
+
+/// Where a robot is in a map.
+struct Located {
+  Timestamp stamp;  ///< The pose's, by the robot's clock.
+  State state = State::searching;
+  std::string why;  ///< What has led to the state, as a sentence's end.
+  /// In the map's frame; nothing unless the state is localised, off_map or stale. Only when it is localised does the
+  /// map show that the robot is there.
+  std::optional<RelativePose> T_world_body;
+  double age_s = 0.0;              ///< Since the map last showed it.
+  std::vector<PlaceFound> places;  ///< Where it may be, when it is ambiguous.
+};
+
+}  // namespace tutti::localise

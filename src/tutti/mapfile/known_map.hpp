@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "tutti/base/result.hpp"
+#include "tutti/localise/known_map.hpp"
+#include "tutti/mapfile/content.hpp"
+
+namespace tutti::mapfile {
+
+/// A map's file as a map to localise in, and what it was made from.
+struct OpenedMap {
+  std::shared_ptr<const localise::KnownMap> known;
+  Content content;
+  server::MapEstimate estimate;
+  std::uint32_t component = 0;  ///< Which one `known` is of: component_to_show().
+  std::size_t left_out = 0;     ///< Submaps of other components, whose places in it are unknown.
+};
+
+/// Reads a copy of a map's file (open_copy()): its largest component, with poses as a server has them. Clouds and
+/// images stay in the file and are read when they are needed. Errors: as read(), and that the map has no submap with a
+/// cloud or images.
+Result<OpenedMap> open_known_map(const std::filesystem::path& file);
+
+}  // namespace tutti::mapfile

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/localise_mission.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "tutti/evaluation/association.hpp"
+#include "tutti/geometry/alignment.hpp"
+#include "tutti/geometry/so3.hpp"
+#include "tutti/mission/load_meter.hpp"
+#include "tutti/mission/robot_actor.hpp"
+
+namespace tutti::mission {
+namespace {
+
+constexpr double kCourse_s = 0.1;
+
+/// The poses of a robot in the map, of all its sessions.
+Trajectory poses_in(const mapfile::OpenedMap& map, const std::string& robot) {
+  Trajectory out;
+  for (const MapNode& node : map.estimate.nodes) {
+    const auto name = map.content.names.find(node.id.chain.robot);
+    if (node.component == map.component && name != map.content.names.end() && name->second == robot)
+      out.push_back({node.stamp, node.T_world_body});
+  }
+  std::ranges::sort(out, {}, &StampedPose::stamp);
+  const auto twice = std::ranges::unique(out, {}, &StampedPose::stamp);
+  out.erase(twice.begin(), twice.end());
+  return out;
+}
+
+bool overlaps(const Trajectory& a, const Trajectory& b) {
+  return !a.empty() && !b.empty() && a.front().stamp <= b.back().stamp && b.front().stamp <= a.back().stamp;
+}
+
+/// T_world_reference, by the robots that made the map; nothing when none of them has a reference.
+std::optional<Pose3> reference_in(const mapfile::OpenedMap& map, const MissionInput& input,
+                                  const evaluation::AssociationConfig& association) {
+  std::vector<Eigen::Vector3d> in_world, in_reference;
+  for (const MissionRecording& robot : input.robots) {
+    const Trajectory poses = poses_in(map, robot.recording.name);
+    if (!overlaps(poses, robot.recording.reference)) continue;
+    for (const auto& pair : evaluation::associate(poses, robot.recording.reference, association)) {
+      in_world.push_back(pair.estimate.translation);
+      in_reference.push_back(pair.reference.translation);
+    }
+  }
+  if (in_world.size() < 3) return std::nullopt;
+  return align_points(in_world, in_reference);
+}
+
+LocaliseScore score_of(const std::vector<localise::Located>& course, const Trajectory& reference,
+                       const Pose3& T_world_reference, const evaluation::AssociationConfig& association) {
+  Trajectory published;
+  std::vector<const localise::Located*> of;
+  for (const auto& located : course)
+    if (located.state == localise::State::localised && located.T_world_body) {
+      published.push_back({located.stamp, located.T_world_body->T_a_b});
+      of.push_back(&located);
+    }
+  LocaliseScore out;
+  double squares = 0.0;
+  std::vector<double> degrees;
+  for (const auto& pair : evaluation::associate(published, reference, association)) {
+    const auto at = std::ranges::lower_bound(published, pair.stamp, {}, &StampedPose::stamp) - published.begin();
+    const Matrix6d& covariance = of[static_cast<std::size_t>(at)]->T_world_body->covariance;
+    const Vector6d error = local(pair.estimate, T_world_reference * pair.reference);
+    const double metres = error.head<3>().norm(), angle_deg = error.tail<3>().norm() / kRadPerDeg;
+    ++out.scored;
+    if (metres > LocaliseScore::kWrong_m || angle_deg > LocaliseScore::kWrong_deg) ++out.wrong;
+    squares += metres * metres;
+    out.max_m = std::max(out.max_m, metres);
+    degrees.push_back(angle_deg);
+    for (int axis = 0; axis < 3; ++axis)
+      for (int k = 0; k < 3; ++k)
+        if (std::abs(error[axis]) <= (k + 1) * std::sqrt(covariance(axis, axis))) out.within[k] += 1.0 / 3.0;
+  }
+  if (out.scored == 0) return out;
+  const auto count = static_cast<double>(out.scored);
+  out.rmse_m = std::sqrt(squares / count);
+  std::ranges::nth_element(degrees, degrees.begin() + static_cast<std::ptrdiff_t>(degrees.size() / 2));
+  out.median_deg = degrees[degrees.size() / 2];
+  for (double& share : out.within) share /= count;
+  return out;
+}
+
+/// Replays one recording alone.
+LocalisedRobot replay(const MissionRecording& recording, const MissionConfig& config,
+                      std::shared_ptr<const localise::Localiser::Setup> setup,
+                      const std::function<bool(const std::string&, double)>& stop) {
+  robot::AgentConfig agent = config.agent;
+  agent.submap.fit.scans = "off";  // nobody hears its map
+  RobotActor robot(recording, agent, config.association, nullptr, std::move(setup));
+  const localise::Localiser& localiser = *robot.node().localiser();
+  const Timestamp begin = recording.recording.odometry.front().stamp;
+  const double length_s = recording.recording.odometry.back().stamp - begin;
+  LocalisedRobot out{.name = recording.recording.name};
+  while (std::isfinite(robot.next_time())) {
+    const double time_s = robot.next_time();
+    if (stop && stop(out.name, length_s > 0.0 ? (time_s - recording.start_s) / length_s : 1.0)) break;
+    const std::size_t registered = localiser.work().registered;
+    const double cpu_s = robot.cpu_s();
+    robot.replay_next(kMissionStart + time_s);
+    robot.take_step();
+    if (localiser.work().registered > registered) out.scan_ms.push_back(1e3 * (robot.cpu_s() - cpu_s));
+    localise::Located now = localiser.located();
+    if (now.state == localise::State::localised && !out.first_fix_s) {
+      out.first_fix_s = now.stamp - begin;
+      out.first_fix_cpu_s = robot.cpu_s();
+    }
+    if (out.course.empty() || out.course.back().state != now.state || now.stamp - out.course.back().stamp >= kCourse_s)
+      out.course.push_back(std::move(now));
+  }
+  out.work = localiser.work();
+  out.cpu_s = robot.cpu_s();
+  out.troubles = robot.troubles();
+  if (!out.course.empty()) out.duration_s = out.course.back().stamp - begin;
+  return out;
+}
+
+}  // namespace
+
+double LocalisedRobot::share(localise::State state) const {
+  double in_state_s = 0.0;
+  for (std::size_t k = 0; k + 1 < course.size(); ++k)
+    if (course[k].state == state) in_state_s += course[k + 1].stamp - course[k].stamp;
+  return duration_s > 0.0 ? in_state_s / duration_s : 0.0;
+}
+
+Result<std::vector<LocalisedRobot>> localise_mission(
+    const MissionConfig& config, const MissionInput& input, const mapfile::OpenedMap& map,
+    std::shared_ptr<const server::ClosureVerifier> verifier,
+    const std::function<bool(const std::string&, double share)>& stop) {
+  const auto T_world_reference = reference_in(map, input, config.association);
+  std::vector<LocalisedRobot> out;
+  for (const MissionRecording& robot : input.robots) {
+    const Recording& recording = robot.recording;
+    if (recording.odometry.empty() || overlaps(poses_in(map, recording.name), recording.odometry)) continue;
+    auto setup = std::make_shared<const localise::Localiser::Setup>(
+        localise::Localiser::Setup{.map = map.known,
+                                   .verifier = verifier,
+                                   .lidar = config.closures.lidar,
+                                   .submap = with_sensors(config.agent, recording).submap,
+                                   .config = config.localise});
+    out.push_back(replay(robot, config, std::move(setup), stop));
+    if (T_world_reference && !recording.reference.empty())
+      out.back().score = score_of(out.back().course, recording.reference, *T_world_reference, config.association);
+  }
+  if (out.empty())
+    return fail(ErrorCode::invalid, "every robot of the mission has made this map, expected one to be localised in it");
+  return out;
+}
+
+}  // namespace tutti::mission

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tutti/base/result.hpp"
+#include "tutti/localise/localiser.hpp"
+#include "tutti/mapfile/known_map.hpp"
+#include "tutti/mission/mission_config.hpp"
+#include "tutti/mission/recordings.hpp"
+#include "tutti/server/closure_verifier.hpp"
+
+namespace tutti::mission {
+
+/// How far published poses are from where the robot was, in the map's frame: the reference laid on the map by the
+/// robots that made it, and by nothing of the robot that is scored.
+struct LocaliseScore {
+  std::size_t scored = 0;  ///< Poses of state localised with a reference.
+  std::size_t wrong = 0;   ///< Of those, by more than kWrong_m or kWrong_deg.
+  static constexpr double kWrong_m = 1.0, kWrong_deg = 5.0;
+  double rmse_m = 0.0, max_m = 0.0, median_deg = 0.0;
+  double within[3] = {};  ///< Share of the errors along x, y and z within 1, 2 and 3 standard deviations.
+};
+
+/// What became of one robot that was replayed in a map that does not move.
+struct LocalisedRobot {
+  std::string name;
+  double duration_s = 0.0;
+  std::vector<localise::Located> course;  ///< Ten a second at most, and every change of state.
+  std::optional<double> first_fix_s;      ///< Since its first sample.
+  double first_fix_cpu_s = 0.0;           ///< CPU until then.
+  localise::LocaliserWork work;
+  double cpu_s = 0.0;
+  std::vector<double> scan_ms;  ///< CPU of each scan that was registered.
+  std::optional<LocaliseScore> score;
+  std::vector<std::string> troubles;  ///< RobotActor::troubles()
+  /// Share of the time in this state.
+  [[nodiscard]] double share(localise::State state) const;
+};
+
+/// Replays every robot of the mission that did not make the map alone, without a server. `stop` is asked between
+/// samples. An error names a recording that cannot be read.
+Result<std::vector<LocalisedRobot>> localise_mission(const MissionConfig& config, const MissionInput& input,
+                                                     const mapfile::OpenedMap& map,
+                                                     std::shared_ptr<const server::ClosureVerifier> verifier,
+                                                     const std::function<bool(const std::string&, double share)>& stop);
+
+}  // namespace tutti::mission

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/report/localise.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tutti/base/file.hpp"
+#include "tutti/base/folder.hpp"
+#include "tutti/formats/trajectory_file.hpp"
+#include "tutti/mission/report/file_names.hpp"
+#include "tutti/mission/report/json_parts.hpp"
+#include "tutti/mission/report/table.hpp"
+
+namespace tutti::mission {
+namespace {
+
+using localise::Located, localise::State;
+constexpr State kStates[] = {State::searching, State::ambiguous, State::localised,
+                             State::off_map,   State::lost,      State::stale};
+constexpr std::size_t kMostChanges = 20;  // of one robot's states, on a console
+
+double quantile(std::vector<double> values, double share) {
+  if (values.empty()) return 0.0;
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::ranges::nth_element(values, at);
+  return *at;
+}
+
+Json json_of(const LocalisedRobot& robot) {
+  Json shares, score;
+  for (const State state : kStates) shares[std::string(to_string(state))] = number(robot.share(state));
+  if (robot.score)
+    score = {{"scored", robot.score->scored},
+             {"wrong", robot.score->wrong},
+             {"rmse_m", number(robot.score->rmse_m)},
+             {"max_m", number(robot.score->max_m)},
+             {"median_deg", number(robot.score->median_deg)},
+             {"within_sigma",
+              {number(robot.score->within[0]), number(robot.score->within[1]), number(robot.score->within[2])}}};
+  return {{"robot", robot.name},
+          {"duration_s", number(robot.duration_s)},
+          {"first_fix_s", number(robot.first_fix_s)},
+          {"share_of_time", shares},
+          {"score", score},
+          {"work",
+           {{"submaps_compared", robot.work.compared},
+            {"scans_registered", robot.work.registered},
+            {"local_maps", robot.work.local_maps},
+            {"features_extracted", robot.work.extracted}}},
+          {"troubles", robot.troubles},
+          {"timing",
+           {{"cpu_s", number(robot.cpu_s)},
+            {"first_fix_cpu_s", number(robot.first_fix_cpu_s)},
+            {"scan_ms_median", number(quantile(robot.scan_ms, 0.5))},
+            {"scan_ms_p99", number(quantile(robot.scan_ms, 0.99))}}}};
+}
+
+std::string states_csv(const LocalisedRobot& robot) {
+  std::string out = "stamp_s,state,age_s,x_m,y_m,z_m,qx,qy,qz,qw,sigma_x_m,sigma_y_m,sigma_z_m,sigma_yaw_rad,why\n";
+  for (const Located& located : robot.course) {
+    out += fmt::format("{:.6f},{},{:.3f},", static_cast<double>(located.stamp.ns) * 1e-9, to_string(located.state),
+                       located.age_s);
+    if (located.T_world_body) {
+      const auto& [T, covariance] = *located.T_world_body;
+      const Eigen::Vector3d& t = T.translation;
+      const Eigen::Quaterniond& q = T.rotation;
+      out += fmt::format("{:.4f},{:.4f},{:.4f},{:.6f},{:.6f},{:.6f},{:.6f},{:.4f},{:.4f},{:.4f},{:.5f},", t.x(), t.y(),
+                         t.z(), q.x(), q.y(), q.z(), q.w(), std::sqrt(covariance(0, 0)), std::sqrt(covariance(1, 1)),
+                         std::sqrt(covariance(2, 2)), std::sqrt(covariance(5, 5)));
+    } else {
+      out += ",,,,,,,,,,,";
+    }
+    out += '"' + located.why + "\"\n";
+  }
+  return out;
+}
+
+std::string changes_of(const LocalisedRobot& robot, const localise::KnownMap& map) {
+  std::string out;
+  std::size_t changes = 0;
+  std::optional<State> before;
+  for (const Located& located : robot.course) {
+    if (before == located.state) continue;
+    before = located.state;
+    if (++changes > kMostChanges) continue;
+    std::string places;
+    for (const localise::PlaceFound& place : located.places)
+      places += (places.empty() ? ": near submap " : ", ") + map.name_of(place.submap);
+    out += wrap(fmt::format("{:.1f} s: {}; {}{}", located.stamp - robot.course.front().stamp, to_string(located.state),
+                            located.why, places),
+                "  " + robot.name + ", ");
+  }
+  if (changes > kMostChanges) out += fmt::format("  {}: {} more changes\n", robot.name, changes - kMostChanges);
+  return out;
+}
+
+}  // namespace
+
+Status write_localised(const std::vector<LocalisedRobot>& robots, const localise::KnownMap& map,
+                       const std::filesystem::path& out_dir) {
+  if (auto made = make_folder(out_dir.string()); !made) return made;
+  Json json{{"map", map.id}, {"version", map.revision}, {"submaps", map.submaps.size()}, {"robots", Json::array()}};
+  for (const LocalisedRobot& robot : robots) {
+    json["robots"].push_back(json_of(robot));
+    Trajectory published;
+    for (const Located& located : robot.course)
+      if (located.state == State::localised && located.T_world_body &&
+          (published.empty() || published.back().stamp < located.stamp))
+        published.push_back({located.stamp, located.T_world_body->T_a_b});
+    const auto tum = out_dir / trajectory_file_name(robot.name, "localised");
+    if (auto ok = formats::write_tum(tum.string(), published); !ok) return ok;
+    const auto csv = (out_dir / trajectory_file_name(robot.name, "states")).replace_extension(".csv");
+    if (auto ok = write_file(csv.string(), states_csv(robot)); !ok) return ok;
+  }
+  return write_file((out_dir / "localise.json").string(), dump(json));
+}
+
+std::string localised_text(const std::vector<LocalisedRobot>& robots, const localise::KnownMap& map) {
+  std::string out =
+      fmt::format("map {}, version {}: {} submaps, which have not moved\n\n", map.id, map.revision, map.submaps.size());
+  TextTable table(1);
+  table.add({"robot", "first fix", "localised", "ambiguous", "off the map", "lost", "error", "worst", "wrong"});
+  table.rule();
+  for (const LocalisedRobot& robot : robots) {
+    const auto percent = [&](State state) { return fmt::format("{:.1f} %", 100.0 * robot.share(state)); };
+    const auto& score = robot.score;
+    table.add({robot.name, robot.first_fix_s ? fmt::format("{:.1f} s", *robot.first_fix_s) : "none",
+               percent(State::localised), percent(State::ambiguous), percent(State::off_map), percent(State::lost),
+               score && score->scored > 0 ? fmt::format("{:.3f} m", score->rmse_m) : "-",
+               score && score->scored > 0 ? fmt::format("{:.3f} m", score->max_m) : "-",
+               score ? fmt::format("{} of {}", score->wrong, score->scored) : "-"});
+  }
+  out += table.str() + '\n';
+  out +=
+      wrap(fmt::format("error: RMSE of published poses in the map's frame, which the robots that made the map tie to "
+                       "the reference. wrong: by more than {:g} m or {:g} degrees",
+                       LocaliseScore::kWrong_m, LocaliseScore::kWrong_deg),
+           "") +
+      "\n\n";
+  for (const LocalisedRobot& robot : robots) {
+    out += changes_of(robot, map);
+    for (const std::string& trouble : robot.troubles) out += wrap(trouble, "  " + robot.name + ": ");
+  }
+  return out;
+}
+
+}  // namespace tutti::mission

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tutti/base/result.hpp"
+#include "tutti/localise/known_map.hpp"
+#include "tutti/mission/localise_mission.hpp"
+
+namespace tutti::mission {
+
+/// Writes what became of robots in a map that does not move: localise.json (figures; what depends on this machine's
+/// clock is under "timing"), and a robot each NAME_localised.tum (published poses in the map's frame) and
+/// NAME_states.csv (every state with its pose, standard deviations and cause). Fails when a file cannot be written.
+Status write_localised(const std::vector<LocalisedRobot>& robots, const localise::KnownMap& map,
+                       const std::filesystem::path& out_dir);
+
+/// The same for a console: a table of the robots, and the changes of their states.
+std::string localised_text(const std::vector<LocalisedRobot>& robots, const localise::KnownMap& map);
+
+}  // namespace tutti::mission
