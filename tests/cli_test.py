@@ -408,6 +408,36 @@ class CommandLine(unittest.TestCase):
         self.expect(tutti("map", "merge", one, other, "-o", self.path / "both"), 1, "both", "there already")
         self.expect(tutti("map", "closure", "list", one), 0, "closure")
 
+    @unittest.skipIf(os.environ.get("TUTTI_SANITIZE"), "takes long")
+    def test_robots_are_localised_in_a_map_and_the_maps_are_merged(self):
+        missions = pathlib.Path(__file__).resolve().parents[1] / "missions"
+        mission, out, site = missions / "next_day.yaml", self.path / "loc", self.path / "site.tutti"
+        short = ["--set", "simulation.lidar.rays_share=0.25"]
+        self.expect(tutti("run", mission, *short, "--set", "duration_s=150", "--map", site, "--out", self.path / "mapped"), 0)
+        before = site.read_bytes()
+        self.expect(tutti("run", mission, *short, "--map-in", site, "--out", out), 1, "--frozen")
+        self.expect(tutti("run", mission, "--frozen", "--out", out), 2, "--map-in")
+        self.expect(tutti("run", mission, *short, "--map-in", self.path / "none", "--frozen", "--out", out), 1, "no such file")
+        (self.path / "text").write_text("x" * 5000)
+        self.expect(tutti("run", mission, *short, "--map-in", self.path / "text", "--frozen", "--out", out), 1, "not an SQLite")
+        self.expect(tutti("run", mission, *short, "--map-in", self.write_empty_map("empty"), "--frozen", "--out", out), 1,
+                    "no submap has a cloud")
+        self.expect(tutti("run", mission, *short, "--map-in", site, "--frozen", "--out", out), 0, "charlie", "delta", "localised")
+        self.assertEqual(site.read_bytes(), before)
+        robots = json.loads((out / "localise.json").read_text())["robots"]
+        self.assertEqual([robot["robot"] for robot in robots], ["charlie", "delta"])
+        for robot in robots:
+            self.assertEqual(robot["score"]["wrong"], 0)
+            self.assertGreater(robot["share_of_time"]["localised"], 0.3)
+            self.assertLess(robot["score"]["rmse_m"], 0.3)
+        self.assertTrue((out / "charlie_localised.tum").stat().st_size > 0)
+        self.expect(tutti("map", "merge", site, self.path / "loc" / "none", "-o", self.path / "both"), 1)
+        other = self.path / "other.tutti"
+        self.expect(tutti("run", mission, *short, "--seed", "2", "--set", "duration_s=60", "--map", other, "--out",
+                          self.path / "second"), 0)
+        self.expect(tutti("map", "merge", site, other, "-o", self.path / "both"), 0, "robot 0, session 0 of", "session 1")
+        self.expect(tutti("map", "info", self.path / "both"), 0, "submaps")
+
     def test_map_says_what_is_wrong(self):
         self.expect(tutti("map"), 2)
         self.expect(tutti("map", "list", self.path / "missing"), 1, "missing", "no such folder")

@@ -150,8 +150,9 @@ Json HostedRobot::status(Timestamp now) const {
               {"connected", link.connected},
               {"alone", alone_},
               {"refused", driver_->node().conflict().value_or("")},
-              {"line", fmt::format("{}, {} keyframes, {} submaps not stored yet, heard map revision {}{}{}",
+              {"line", fmt::format("{}, {} keyframes, {} submaps not stored yet, heard map revision {}{}{}{}",
                                    progress(time_s), status.keyframes, status.backlog_submaps, status.heard_revision,
+                                   status.in_map.state.empty() ? "" : ", in its map: " + status.in_map.state,
                                    link.connected ? "" : ", no link: " + link.last_error,
                                    alone_.empty() ? "" : ", " + alone_)}});
   if (status.trouble.empty()) out.erase("trouble");

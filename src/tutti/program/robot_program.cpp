@@ -231,6 +231,8 @@ Status RobotProgram::run(const std::atomic<bool>& stop) {
                 *robot->refused());
   if (robot == nullptr)
     log_->say(Level::error, "stops; what came last is not stored: " + host_->trouble());
+  else if (options_.is_alone)
+    log_->say(Level::info, "stops; it was alone, and nothing of what it saw is kept");
   else if (stop || robot->is_whole_in_map())
     log_->say(Level::info, "stops; everything is stored");
   else

@@ -31,9 +31,9 @@ FeedFront::FeedFront(FeedState robot, const Limits& limits)
     : limits_(limits),
       robot_(std::move(robot)),
       gate_(robot_.chain.robot, robot_.newest ? std::optional(robot_.newest->stamp) : std::nullopt),
-      localiser_(robot_.chain.robot) {
+      carried_(robot_.chain.robot) {
   if (robot_.newest) stored_ = robot_.newest->stamp;
-  localiser_.correct(robot_.watch, robot_.covariance);
+  carried_.correct(robot_.watch, robot_.covariance);
 }
 
 Status FeedFront::add(Input input) {
@@ -59,7 +59,7 @@ Status FeedFront::hear(OdometrySample& sample) {
 }
 
 Status FeedFront::take(const OdometrySample& sample) {
-  const auto has_jumped = localiser_.add(sample);
+  const auto has_jumped = carried_.add(sample);
   if (!has_jumped) return tl::unexpected(has_jumped.error());
   if (*has_jumped) jumps_.insert(sample.stamp);
   ended_ = false;
@@ -82,8 +82,8 @@ void FeedFront::begin_anew(std::string why) {
   anew.next_keyframe.last.reset();
   anew.watch = robot_.watch.anew();
   robot_ = std::move(anew);
-  localiser_ = Localiser(robot_.chain.robot);
-  localiser_.correct(robot_.watch, robot_.covariance);
+  carried_ = CarriedPose(robot_.chain.robot);
+  carried_.correct(robot_.watch, robot_.covariance);
 }
 
 Status FeedFront::finish() {
@@ -141,20 +141,20 @@ void FeedFront::thin() {
 FeedState FeedFront::state() const {
   const std::scoped_lock lock(mutex_);
   FeedState out = robot_;
-  out.newest = localiser_.newest();
-  out.T_odom_fed = localiser_.watch().T_odom_fed();
+  out.newest = carried_.newest();
+  out.T_odom_fed = carried_.watch().T_odom_fed();
   if (!(out.T_odom_fed == robot_.T_odom_fed))
     out.T_map_odom = robot_.T_map_odom * robot_.T_odom_fed.inverse() * out.T_odom_fed;
-  out.covariance = localiser_.covariance();
+  out.covariance = carried_.covariance();
   out.stored = stored_;
   out.ended = ended_ && inputs_.empty();
   // It would want a scan at samples that it has not heard yet where it wanted one, or where a keyframe is due.
-  if (localiser_.steps() > 0 || (out.newest && !robot_.newest))
+  if (carried_.steps() > 0 || (out.newest && !robot_.newest))
     out.wants_scan =
-        robot_.wants_scan || robot_.next_keyframe.is_due({out.newest->stamp, localiser_.watch().T_odom_body()});
+        robot_.wants_scan || robot_.next_keyframe.is_due({out.newest->stamp, carried_.watch().T_odom_body()});
   if (!trouble_.empty()) out.alerts.push_back({trouble_, trouble_since_, trouble_since_, trouble_since_});
   if (const std::string refused = gate_.trouble(); !refused.empty()) {
-    const Timestamp since = localiser_.newest() ? localiser_.newest()->stamp : Timestamp{};
+    const Timestamp since = carried_.newest() ? carried_.newest()->stamp : Timestamp{};
     out.alerts.push_back({refused, since, since, since});
   }
   const std::size_t scans = left_out_[index_of<Scan>()], images = left_out_[index_of<EncodedImages>()];
@@ -293,12 +293,12 @@ void FeedFront::publish(FeedState robot) {
   // One that was made again reports nothing until it has caught up.
   if (is_same && robot_.newest && (!robot.newest || robot.newest->stamp < robot_.newest->stamp)) return;
   robot_ = std::move(robot);
-  localiser_.correct(robot_.watch, robot_.covariance);
+  carried_.correct(robot_.watch, robot_.covariance);
 }
 
 void FeedFront::say_trouble(std::string trouble) {
   const std::scoped_lock lock(mutex_);
-  if (trouble_.empty() && localiser_.newest()) trouble_since_ = localiser_.newest()->stamp;
+  if (trouble_.empty() && carried_.newest()) trouble_since_ = carried_.newest()->stamp;
   trouble_ = std::move(trouble);
 }
 

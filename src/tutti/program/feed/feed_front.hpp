@@ -16,8 +16,8 @@
 #include <vector>
 
 #include "tutti/node/odometry_gate.hpp"
+#include "tutti/program/feed/carried_pose.hpp"
 #include "tutti/program/feed/feed_target.hpp"
-#include "tutti/program/feed/localiser.hpp"
 
 namespace tutti::program {
 
@@ -151,8 +151,8 @@ class FeedFront final : public FeedTarget {
   mutable std::mutex mutex_;
   std::condition_variable fed_;
   FeedState robot_;          // as it was published
-  node::OdometryGate gate_;  // before localiser_
-  Localiser localiser_;
+  node::OdometryGate gate_;  // before carried_
+  CarriedPose carried_;
   std::deque<Queued> inputs_;
   std::size_t taken_ = 0;            // of them, from the front
   std::size_t anew_ = 0;             // of them, how many FeedAnew

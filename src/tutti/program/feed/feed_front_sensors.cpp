@@ -19,7 +19,7 @@ void FeedFront::set_sensors(const Sensors& sensors) {
 }
 
 bool FeedFront::is_ahead(Timestamp stamp, const InputKind& kind) const {
-  return !localiser_.newest() || stamp - localiser_.newest()->stamp > kind.ahead_s;
+  return !carried_.newest() || stamp - carried_.newest()->stamp > kind.ahead_s;
 }
 
 std::size_t FeedFront::most_bytes(const Input& input) const {
@@ -85,9 +85,9 @@ Status FeedFront::hear(TrackedImages& images) {
 void FeedFront::release(bool all) {
   const auto is_due = [&](Timestamp stamp) {
     if (all) return true;
-    if (localiser_.newest()->stamp < stamp) return false;
+    if (carried_.newest()->stamp < stamp) return false;
     return !sensors_->imu || (!imu_.empty() && imu_.back().stamp >= stamp) ||
-           localiser_.newest()->stamp - stamp >= waiting::kImu_s;
+           carried_.newest()->stamp - stamp >= waiting::kImu_s;
   };
   for (; !held_.empty() && is_due(stamp_of(*held_.front())); held_.pop_front()) push_back(std::move(held_.front()));
 }

@@ -17,12 +17,12 @@ namespace tutti::program {
 /// Where a robot is while its agent is samples behind: the pose and its uncertainty at the agent's newest sample,
 /// carried on by the odometry since. Takes samples that passed an OdometryGate, and detects jumps of odometry, exactly
 /// as RobotAgent::add() does.
-class Localiser {
+class CarriedPose {
  public:
   /// When the agent is further behind, the oldest steps are compounded to one.
   static constexpr std::size_t kMostSteps = 1024;
 
-  explicit Localiser(RobotId robot) : robot_(robot) {}
+  explicit CarriedPose(RobotId robot) : robot_(robot) {}
 
   /// Adds a sample; returns whether odometry has jumped at it. An error states why the sample was refused; nothing has
   /// changed then.

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/program/feed/localiser.hpp"
+#include "tutti/program/feed/carried_pose.hpp"
 
 #include "tutti/robot/odometry_sample.hpp"
 
 namespace tutti::program {
 
-Result<bool> Localiser::add(const OdometrySample& sample) {
+Result<bool> CarriedPose::add(const OdometrySample& sample) {
   const auto fed = robot::usable_step(robot_, sample);
   if (!fed) return tl::unexpected(fed.error());
   const auto before = newest() ? std::optional(newest()->stamp) : std::nullopt;
@@ -23,12 +23,12 @@ Result<bool> Localiser::add(const OdometrySample& sample) {
   return jump.has_value();
 }
 
-void Localiser::carry(const RelativePose& motion) {
+void CarriedPose::carry(const RelativePose& motion) {
   const Matrix6d moved = compound_covariance(motion.T_a_b, covariance_, motion.covariance);
   covariance_ = 0.5 * (moved + moved.transpose());
 }
 
-void Localiser::correct(const robot::OdometryWatch& watch, const Matrix6d& covariance) {
+void CarriedPose::correct(const robot::OdometryWatch& watch, const Matrix6d& covariance) {
   const auto& heard = watch.state().newest;
   while (!steps_.empty() && heard && steps_.front().end <= heard->stamp) steps_.pop_front();
   // The agent may make something else of samples that were taken together.
