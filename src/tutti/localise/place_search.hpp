@@ -15,7 +15,7 @@ namespace tutti::localise {
 
 /// A place of the map that what a robot saw fits.
 struct Hypothesis {
-  SubmapId submap;            ///< Of the map, the one that fits best there.
+  SubmapId submap;            ///< The map's submap that fits best there.
   RelativePose T_world_body;  ///< At `at`; right tangent.
   StampedPose at;             ///< By odometry: T_odom_body.
   double quality = 0.0;       ///< How well it fits, in [0, 1].

@@ -21,7 +21,7 @@ namespace tutti::mission {
 /// robots that made it, and by nothing of the robot that is scored.
 struct LocaliseScore {
   std::size_t scored = 0;  ///< Poses of state localised with a reference.
-  std::size_t wrong = 0;   ///< Of those, by more than kWrong_m or kWrong_deg.
+  std::size_t wrong = 0;   ///< By more than kWrong_m or kWrong_deg; some of those.
   static constexpr double kWrong_m = 1.0, kWrong_deg = 5.0;
   double rmse_m = 0.0, max_m = 0.0, median_deg = 0.0;
   double within[3] = {};  ///< Share of the errors along x, y and z within 1, 2 and 3 standard deviations.
