@@ -153,7 +153,9 @@ MissionStatus ServerNode::mission_status(Timestamp now) const {
       if (known.last_conflict && now - *known.last_conflict < RobotRegistry::kOwnerIsThere_s)
         entry.conflict = plain_text(known.conflict);
     }
-    if (entry.status.name.empty()) entry.status.name = default_name(bus::Endpoint::of(robot));
+    if (entry.status.name.empty())
+      entry.status.name =
+          robot.value < config_.names.size() ? config_.names[robot.value] : default_name(bus::Endpoint::of(robot));
   }
   for (const auto& [number, worker] : workers_.all()) out.workers.push_back(worker);
   for (const auto& [from, refusals] : refusals_) out.refusals.push_back(refusals);

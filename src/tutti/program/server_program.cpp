@@ -188,6 +188,7 @@ Result<std::unique_ptr<Hosted>> ServerProgram::open_node() {
   node::ServerNodeConfig config{
       .server = settings_.server, .refiner = settings_.verifiers.refiner(), .accepts_others = settings_.accepts_others};
   config.incarnation = any_incarnation();
+  config.names = settings_.robots;
   config.wall_ns = [] { return static_cast<std::int64_t>(wall_clock_ns()); };
   if (guard_)
     config.name_objection = [this](RobotId robot, const std::string& name) { return guard_->objection(robot, name); };
