@@ -59,7 +59,8 @@ Result<std::string> SignIn::open(const std::string& key, const std::string& nonc
     return fail(ErrorCode::invalid, "the page was open for too long before signing in: try again");
   const pki::Member* const known = member(key, now_s);
   if (known == nullptr || !pki::is_signed(key, nonce, signature))
-    return fail(ErrorCode::invalid, "this credential is not one of this mission's, or is revoked");
+    return fail(ErrorCode::invalid,
+                "this credential is not one of this mission's, is revoked or has expired (tutti pki list)");
   if (!is_for_people(known->user))
     return fail(ErrorCode::invalid, "{}: the page is for operators and viewers (tutti pki add-operator, add-viewer)",
                 to_string(known->user));
