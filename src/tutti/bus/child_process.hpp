@@ -20,7 +20,8 @@ struct ChildCommand {
   int inherits = -1;                  ///< An open file that it gets, too; -1: none.
   bool has_our_variables = false;     ///< False: no TUTTI_.. of this program's environment, which may be secrets.
   std::uint64_t most_data_bytes = 0;  ///< Memory beyond which it gets none; 0: no limit.
-  bool goes_first = false;            ///< On a machine without memory the kernel ends it before others.
+  /// On a machine without memory the kernel ends it before others, and where cores are few others come before it.
+  bool goes_first = false;
 };
 
 /// A child process. It ends with this process, however this one ends: the kernel ends it with the thread that forked
