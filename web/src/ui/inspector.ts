@@ -104,6 +104,7 @@ async function decide(app: App, name: string, wish: Wish): Promise<void> {
 
 function numbers(app: App, closure: Closure): Child {
   if (closure.links.length === 0) return null;
+  const counted = closure.links.length > 1 ? ["link"] : []; // six columns are more than a phone shows
   return [
     h("h3", {}, "Numbers"),
     h(
@@ -118,7 +119,7 @@ function numbers(app: App, closure: Closure): Child {
           h(
             "tr",
             {},
-            ["link", "measured", "turn", "map differs", "by", "χ²"].map((t) => h("th", {}, t)),
+            [...counted, "measured", "turn", "map differs", "by", "χ²"].map((t) => h("th", {}, t)),
           ),
         ),
         h(
@@ -128,7 +129,7 @@ function numbers(app: App, closure: Closure): Child {
             h(
               "tr",
               { title: link.reason },
-              row(app, closure, link, i).map((t) => h("td", {}, t)),
+              [...counted.map(() => String(i + 1)), ...row(app, closure, link)].map((t) => h("td", {}, t)),
             ),
           ),
         ),
@@ -137,7 +138,7 @@ function numbers(app: App, closure: Closure): Child {
   ];
 }
 
-function row(app: App, closure: Closure, link: Link, i: number): string[] {
+function row(app: App, closure: Closure, link: Link): string[] {
   let [metres_off, degrees_off] = [link.misfit_m, link.misfit_deg];
   const [a, b] = [app.world.placed.get(closure.from), app.world.placed.get(closure.to)];
   if (metres_off === null && a && b && a.component === b.component) {
@@ -145,7 +146,6 @@ function row(app: App, closure: Closure, link: Link, i: number): string[] {
     [metres_off, degrees_off] = [distance(off, [0, 0, 0]), turn_deg(off)];
   }
   return [
-    String(i + 1),
     metres(Math.hypot(...link.T_from_to.slice(0, 3))),
     degrees(turn_deg(link.T_from_to)),
     metres(metres_off),
