@@ -176,6 +176,7 @@ function poses(value: unknown, ids: IdTable): s.Poses {
     revision: count(f.revision, "revision"),
     accepted: count(f.accepted, "accepted"),
     components: count(f.components, "components"),
+    unshown: count(f.unshown ?? 0, "unshown"),
     rows,
   };
 }

@@ -117,6 +117,8 @@ export interface Poses {
   revision: number;
   accepted: number;
   components: number;
+  /** Closures that are not sent, because there are too many. */
+  unshown: number;
   rows: Float64Array;
 }
 /** component, x, y, z, qx, qy, qz, qw, closures that join it to the map, sigma (both NaN: not computed). A component of NaN: not in the map. */

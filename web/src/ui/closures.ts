@@ -43,6 +43,7 @@ function content(app: App, view: View): Child[] {
       },
       { key: `filter ${state}`, "aria-pressed": String(filter.state === state) },
     );
+  const unshown = app.store.get("poses", app.at())?.unshown ?? 0;
   const rows = all.filter(([, c]) => shown(app, c)).reverse();
   return [
     h(
@@ -62,6 +63,9 @@ function content(app: App, view: View): Child[] {
     rows.slice(0, LIMITS.rows).map(([name, closure]) => row(app, view, name, closure)),
     rows.length === 0
       ? h("p", { class: "empty" }, all.length === 0 ? "No closure was found yet." : "None fits the filter.")
+      : null,
+    unshown > 0
+      ? h("p", { class: "empty" }, `${unshown} more are not sent: pairs that wait to be judged, or are refused`)
       : null,
     rows.length > LIMITS.rows
       ? h("p", { class: "empty" }, `and ${rows.length - LIMITS.rows} more: filter to see them`)

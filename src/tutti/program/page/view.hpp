@@ -98,13 +98,15 @@ struct MapMessages {
   std::vector<Message> closures;  ///< "closure/".
   Message poses;                  ///< Where all submaps are.
 };
-/// The value of "poses" alone.
+/// The value of "poses" alone. `unshown`: so many closures have no message.
 std::string poses_text(const mapfile::ShownMap& map, const std::map<SubmapId, std::size_t>& holding = {},
-                       const std::map<SubmapId, double>& sigma_m = {});
+                       const std::map<SubmapId, double>& sigma_m = {}, std::size_t unshown = 0);
+/// More than the 12,000 that a map judges. Each is a message, in the page, in its past and in every browser.
+inline constexpr std::size_t kMostClosures = 20'000;
 /// `holding` is of closures_holding(). `sigma_m`: how sure the server is of each submap (Comparisons); empty: that is
 /// not shown.
 MapMessages map_messages(const mapfile::ShownMap& map, const std::map<SubmapId, std::size_t>& holding,
-                         const std::map<SubmapId, double>& sigma_m = {});
+                         const std::map<SubmapId, double>& sigma_m = {}, std::size_t most_closures = kMostClosures);
 
 /// Whose raw odometry is compared with the map, and when.
 struct DisagreementOf {

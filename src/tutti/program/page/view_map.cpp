@@ -2,10 +2,14 @@
 // Submaps, where they are, and the closures between them, as messages.
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <map>
 #include <numbers>
 #include <set>
+#include <tuple>
 #include <utility>
+#include <vector>
 
 #include "tutti/mapfile/closures.hpp"
 #include "tutti/mapfile/placement.hpp"
@@ -124,10 +128,25 @@ std::string closure_json(const ShownMap& map, const mapfile::ClosureInfo& info) 
   return text_of(out);
 }
 
+/// The `most` that matter most: what operators decided, then what is in the map, then what is refused; of each the
+/// latest.
+void keep(std::size_t most, std::vector<mapfile::ClosureInfo>& closures) {
+  if (closures.size() <= most) return;
+  const auto rank = [](const mapfile::ClosureInfo& info) {
+    using enum mapfile::ClosureState;
+    const int kind = info.decision ? 0 : info.state == accepted ? 1 : info.state == rejected ? 2 : 3;
+    const auto age = -static_cast<std::int64_t>(info.pair.first.index) - info.pair.second.index;
+    return std::tuple(kind, age, info.pair);
+  };
+  std::ranges::nth_element(closures, closures.begin() + static_cast<std::ptrdiff_t>(most), {}, rank);
+  closures.erase(closures.begin() + static_cast<std::ptrdiff_t>(most), closures.end());
+  std::ranges::sort(closures, {}, &mapfile::ClosureInfo::pair);
+}
+
 }  // namespace
 
 std::string poses_text(const ShownMap& map, const std::map<SubmapId, std::size_t>& holding,
-                       const std::map<SubmapId, double>& sigma_m) {
+                       const std::map<SubmapId, double>& sigma_m, std::size_t unshown) {
   const auto accepted = std::ranges::count_if(map.map.closures, &server::JudgedClosure::accepted);
   std::map<std::uint32_t, Pose3> upright;
   FieldJson submaps = FieldJson::object();
@@ -145,6 +164,7 @@ std::string poses_text(const ShownMap& map, const std::map<SubmapId, std::size_t
   return text_of({{"revision", map.revision},
                   {"accepted", accepted},
                   {"components", map.map.components},
+                  {"unshown", unshown},
                   {"submaps", std::move(submaps)}});
 }
 
@@ -177,7 +197,7 @@ std::string evidence_text(const std::vector<Refusal>& evidence) {
 }
 
 MapMessages map_messages(const ShownMap& map, const std::map<SubmapId, std::size_t>& holding,
-                         const std::map<SubmapId, double>& sigma_m) {
+                         const std::map<SubmapId, double>& sigma_m, std::size_t most_closures) {
   const double time_s = map.time - Timestamp{};
   const server::ClosureNames names = map.content.closure_names();
   MapMessages out;
@@ -186,9 +206,12 @@ MapMessages map_messages(const ShownMap& map, const std::map<SubmapId, std::size
     const std::size_t points = size == map.content.payload_sizes.end() ? 0 : size->second.points;
     out.submaps.push_back({"submap/" + to_string(id), time_s, submap_json({id, names.of(id), submap.get(), points})});
   }
-  for (const mapfile::ClosureInfo& info : mapfile::closures(map.content, map.map))
+  std::vector<mapfile::ClosureInfo> closures = mapfile::closures(map.content, map.map);
+  const std::size_t all = closures.size();
+  keep(most_closures, closures);
+  for (const mapfile::ClosureInfo& info : closures)
     out.closures.push_back({"closure/" + info.name, time_s, closure_json(map, info)});
-  out.poses = {"poses", time_s, poses_text(map, holding, sigma_m)};
+  out.poses = {"poses", time_s, poses_text(map, holding, sigma_m, all - closures.size())};
   return out;
 }
 

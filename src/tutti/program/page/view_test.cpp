@@ -99,6 +99,16 @@ TEST_F(ViewOfAMap, HasEveryClosureWithWhyItIsInTheMapOrNot) {
   EXPECT_EQ(poses.at("accepted"), std::ranges::count_if(shown_.map.closures, &server::JudgedClosure::accepted));
 }
 
+TEST_F(ViewOfAMap, HasTheClosuresThatMatterMostAndCountsTheOthers) {
+  const auto in_the_map = [](const Message& message) { return json::parse(message.value).at("state") == "accepted"; };
+  const auto accepted = static_cast<std::size_t>(std::ranges::count_if(messages_.closures, in_the_map));
+  const MapMessages fewer = map_messages(shown_, closures_holding(shown_.content.submaps, shown_.map), {}, accepted);
+  EXPECT_EQ(fewer.closures.size(), accepted);
+  EXPECT_TRUE(std::ranges::all_of(fewer.closures, in_the_map));
+  EXPECT_EQ(json::parse(fewer.poses.value).at("unshown"), messages_.closures.size() - accepted);
+  EXPECT_EQ(json::parse(messages_.poses.value).at("unshown"), 0);
+}
+
 TEST_F(ViewOfAMap, TheSameMapGivesTheSameBytes) {
   const MapMessages again = map_messages(shown_, closures_holding(shown_.content.submaps, shown_.map));
   EXPECT_EQ(again.submaps, messages_.submaps);
