@@ -2,7 +2,7 @@
 // A server with `--pki`, and the page in a headless Chromium as an operator, a viewer and a stranger see it.
 // usage: log_in.mjs TUTTI MISSION. Ends with 1 if anything is not as it should be.
 import assert from "node:assert/strict";
-import { copyFileSync } from "node:fs";
+import { copyFileSync, readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { Browser } from "./chromium.mjs";
 import { play_with, Started } from "./started.mjs";
@@ -28,7 +28,7 @@ async function play(browser) {
     vera: add("viewer", "vera"),
     alpha: add("robot", "alpha", "--number", "0"),
   };
-  const { bus, page: url } = await started.server("--pki", pki, "--mission", "page");
+  const { program: server, bus, page: url } = await started.server("--pki", pki, "--mission", "page");
   assert.match(url, /^https:/);
   started.robot("alpha", bus, "--credentials", files.alpha, "--mission", "page");
 
@@ -71,10 +71,36 @@ async function play(browser) {
   await vera.until("who is revoked is asked again", asks, undefined, kPatience_ms);
   await log_in(vera, kept);
   await vera.until("and refused", () => /revoked/.test(document.querySelector("#notices").textContent));
+  step("a revoked viewer is out");
+
+  const nora = await browser.open(url);
+  const noras = add("viewer", "nora");
+  await log_in(nora, noras);
+  await nora.until("another viewer sees the map", sees, undefined, kPatience_ms);
+  const users = join(pki, "users"); // a certificate lasts a day at least, so its end is put back
+  writeFileSync(
+    users,
+    readFileSync(users, "utf8").replace(/^(viewer nora .* valid) .*$/m, "$1 2026-01-01 00:00:00 UTC"),
+  );
+  await nora.until("whose certificate has expired is asked again", asks, undefined, kPatience_ms);
+  await log_in(nora, noras);
+  await nora.until("and refused, with the reason", () =>
+    /expired/.test(document.querySelector("#notices").textContent),
+  );
+  step("a viewer whose certificate has expired is out, and told so");
+
+  const { pid } = JSON.parse(readFileSync(join(started.work, "server", "page", "status.json"), "utf8"));
+  process.kill(pid, "SIGKILL");
+  await eva.until("the operator is asked again", asks, undefined, kPatience_ms);
+  await log_in(eva, files.eva);
+  await eva.until("and sees the map again", sees, undefined, kPatience_ms);
+  assert.equal(server.exitCode, null);
+  step("the page is killed: it is there again, and the operator logs in again");
+
   await eva.press("Log out");
   await eva.until("who has logged out is asked again", asks);
-  step("a revoked viewer is out, and an operator who has logged out");
-  for (const page of [stranger, eva, vera]) assert.deepEqual(page.errors, [], "errors on the page");
+  step("who has logged out is out");
+  for (const page of [stranger, eva, vera, nora]) assert.deepEqual(page.errors, [], "errors on the page");
 }
 
 await play_with(await Browser.launch(undefined, { acceptInsecureCerts: true }), started, play); // the authority is the mission's own
