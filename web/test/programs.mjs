@@ -197,6 +197,71 @@ async function play(browser) {
   assert.match(readFileSync(marks, "utf8"), /door, locked/);
   step("a mark with a photo is in the map's file");
 
+  const placed = await page.evaluate(() => tutti.app.world.placed.size);
+  await page.press("Curves");
+  await page.page.select('[aria-label="Number"]', "backlog_submaps");
+  await page.until("a curve of every robot", () => document.querySelector(".curves .uplot canvas") !== null);
+  const keys = (await page.texts(".curves .key")).join();
+  for (const name of ["alpha", "bravo", "charlie"]) assert.match(keys, new RegExp(name));
+  assert.doesNotMatch(keys, /robot_\d/, "also before it was heard a robot has its mission's name");
+  await page.press("Alerts");
+  await page.press("Acknowledge");
+  await page.until(
+    "her name stands beside the alert",
+    () => /eva has seen it/.test(document.querySelector(".alert.seen")?.textContent),
+    undefined,
+    kPatience_ms,
+  );
+  step("a number is a curve, and an alert is acknowledged");
+
+  const early = await page.evaluate(() => {
+    const { times, values } = tutti.app.store.track("poses");
+    return times[values.findIndex((v) => v.accepted > 0)];
+  });
+  const { pid } = JSON.parse(readFileSync(join(work, "server", "page", "status.json"), "utf8"));
+  process.kill(pid, "SIGKILL");
+  await page.until("the page is not served", () => !/Live/.test(document.querySelector(".badge").textContent));
+  await page.until(
+    "and is there again",
+    () => /Live/.test(document.querySelector(".badge").textContent),
+    undefined,
+    kPatience_ms,
+  );
+  assert.equal(server.exitCode, null, "the server has not noticed");
+  step("the page's program is killed: another serves it");
+
+  await page.until(
+    "what was before is here again",
+    (t) => tutti.app.store.track("poses").times[0] <= t,
+    early,
+    kPatience_ms,
+  );
+  await page.evaluate((t) => tutti.app.set_time(t), early);
+  await page.until("the page says so", () => /Past/.test(document.querySelector(".badge").textContent));
+  await page.until("fewer submaps", (n) => tutti.app.world.placed.size < n, placed);
+  await page.until("nothing can be decided there", () =>
+    [...document.querySelectorAll(".tabs button")].every((b) => b.textContent !== "By hand"),
+  );
+  await page.press("Live");
+  await page.until("all again", (n) => tutti.app.world.placed.size === n, placed);
+  for (const phase of ["Recover", "Debrief", "Explore"]) await page.press(phase);
+  const file = join(work, "handed_over.html");
+  writeFileSync(file, await page.evaluate(() => tutti.saved_page(tutti.app)));
+  const saved = await browser.open(`file://${file}`);
+  await saved.until(
+    "the map that is handed over",
+    (n) => tutti.app.world.placed.size === n && tutti.view.last.points > 0,
+    placed,
+    kPatience_ms,
+  );
+  assert.ok(
+    await saved.evaluate((t) => tutti.app.store.track("poses").times[0] <= t, early),
+    "with what was before the restart",
+  );
+  assert.deepEqual(saved.errors, []);
+  await saved.close();
+  step("time is scrubbed, and the mission so far is handed over as a file");
+
   const late = await browser.open(url);
   const submaps = await page.evaluate(() => tutti.app.world.placed.size);
   await late.until(
