@@ -3,7 +3,7 @@
 """Checks what README.md and docs/ name against what is there; prints page:line for each name that is not.
 
 Everywhere: the options and settings of `tutti` commands, and the arguments of tutti_ros's launch files. In docs/extending.md, which
-says where to change what, also every file, function, type and table.
+says where to change what, also every file, function, type and table. A page of docs/results begins with what was asked.
 
 With --run, README.md's commands for one's own data are run as they stand there, the live ones against a running server (run_readme.py).
 
@@ -66,6 +66,9 @@ class Project:
 
 def breaches(root):
     project = Project(root)
+    for page in sorted((root / "docs/results").glob("*.md")):
+        if not re.match(r"# .+\n\nAsked (was|were) ", read(page)):
+            yield f"{page.relative_to(root).as_posix()}:3: a page of results begins with 'Asked was ..' or 'Asked were ..'"
     for page in [root / "README.md", *sorted((root / "docs").rglob("*.md"))]:
         name = page.relative_to(root).as_posix()
         block, command = False, ""

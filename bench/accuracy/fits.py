@@ -7,7 +7,7 @@ docs/data.md says what FOLDER holds.
 """
 import argparse
 
-from runs import mission_file, report_of, row, write_results
+from runs import mission_file, page, report_of, row, write_results
 
 SMALL = ["simulation.world.network={rows: 2, columns: 2, block_m: 10.0, jitter_m: 1.0}",
          "simulation.robots.0.walk.duration_s=120", "simulation.robots.1.walk.duration_s=120"]
@@ -46,7 +46,7 @@ def map_of(report):
 
 
 def mistakes(arguments):
-    lines = [row("bravo's mistake", "said", "maps", "closures between robots", "worst robot in the server's map, m"),
+    lines = [row("bravo's mistake", "reported", "maps", "closures between robots", "worst robot in the server's map, m"),
              row(*["---"] * 5)]
     report = run(arguments, "demo", SMALL)
     lines.append(row("none", said(report) or "nothing", *map_of(report)))
@@ -59,7 +59,7 @@ def mistakes(arguments):
 
 
 def honest(arguments):
-    lines = [row("recording", "said"), row("---", "---")]
+    lines = [row("recording", "reported"), row("---", "---")]
     for name, mission, assignments in HONEST:
         lines.append(row(name, said(run(arguments, mission, assignments)) or "nothing"))
     return lines
@@ -71,26 +71,20 @@ def main():
     parser.add_argument("--data", required=True)
     parser.add_argument("--keep", help="folder in which reports are kept, so that a run that was stopped goes on")
     arguments = parser.parse_args()
-    text = f"""# Does a robot fit itself?
-
-Written by `bench/accuracy/fits.py TUTTI --data FOLDER`. A robot registers each keyframe's scan on the one before and compares this motion
-with odometry's (`src/tutti/perception/fit`). What it says is the warning at the head of the report.
-
-## Mistakes (simulated)
-
-`missions/demo.yaml` in a tunnel of 2 x 2 blocks of 10 m, 120 s, two robots with 16 beams, seed 1; bravo is set up wrongly
-(`docs/simulation.md`). Nothing is corrected of the mistakes of setting up: the warning has what to type. Where odometry stood still
-(`frozen`), submaps have the scans' motion, and a steady drift of yaw (`drift`) is taken out of them.
-
-{chr(10).join(mistakes(arguments))}
-
-## Honest recordings
-
-Simulated but for the first. What is said of these is no mistake of setting up, but must be true.
-
-{chr(10).join(honest(arguments))}
-"""
-    write_results("fits.md", text.splitlines())
+    text = page(
+        "Does a robot fit itself?",
+        ["Asked was whether a robot's own scans show that it is set up wrongly or that its odometry fails, without a false alarm."],
+        mistakes(arguments),
+        ["bench/accuracy/fits.py TUTTI --data FOLDER"],
+        "A robot registers each keyframe's scan on the one before and compares this motion with odometry's",
+        "(`src/tutti/perception/fit`). What it reports is the warning at the head of the report. Simulated: `missions/demo.yaml` in a",
+        "tunnel of 2 x 2 blocks of 10 m, 120 s, two robots with 16 beams, seed 1; bravo is set up wrongly (`docs/simulation.md`).",
+        "Nothing is corrected of the mistakes of setting up: the warning has what to type. Where odometry stood still (`frozen`),",
+        "submaps have the scans' motion, and a steady drift of yaw (`drift`) is taken out of them.", "",
+        "## Honest recordings", "",
+        "Simulated but for the first. What is reported of these is no mistake of setting up, but must be true.", "",
+        *honest(arguments))
+    write_results("fits.md", text)
 
 
 if __name__ == "__main__":

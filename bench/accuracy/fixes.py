@@ -6,7 +6,7 @@ Usage: bench/accuracy/fixes.py TUTTI_PROGRAM [--seeds 3] [--keep FOLDER]
 """
 import argparse
 
-from runs import SOURCE, mission_file, report_of, row, write_results
+from runs import SOURCE, mission_file, page, report_of, row, write_results
 
 RECEIVER = {"rate_hz": 1.0, "sigma_m": 1.5, "sigma_up_m": 3.0}
 UPDATES = "server.update_least_s=600"  # the last map is all that counts here
@@ -69,18 +69,10 @@ def main():
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--keep", help="folder for finished runs, which are not repeated")
     arguments = parser.parse_args()
-    text = ["# Position fixes", "",
-            f"Written by `bench/accuracy/fixes.py TUTTI`; means over seeds 1 to {arguments.seeds}. `missions/apart_fixes.yaml`: two",
-            "robots of 1,200 m each, 120 m from each other, simulated without sensors; with loops as they go round, and with",
-            "odometry alone. RMSE in metres, after one rigid alignment: of the worse robot (*worst*) and of both at once where",
-            "they are joined (*both*). *refused*: share of submaps whose fixes do not count. Every figure is one call per seed:",
-            "`tutti run missions/apart_fixes.yaml --seed N --set receivers=[RECEIVER] --set server.map.georeference.mode=MODE`,",
-            f"`--set {UPDATES}`, RECEIVER `{receivers({})[11:-1]}` and what the row says; without loops",
-            "`--set closures.reference.radius_m=0.001`.", ""]
+    tables = {}
     for way, changes in WAYS:
-        text += [f"## {way[0].upper()}{way[1:]}", "",
-                 row("receiver", "off: worst", "only: both", "joined", "refused", "factors: worst", "both", "joined", "refused"),
-                 row("---", *["---:"] * 8)]
+        tables[way] = [row("receiver", "off: worst", "only: both", "merged", "refused", "factors: worst", "both", "merged", "refused"),
+                       row("---", *["---:"] * 8)]
         for name, case, others in CASES:
             if others and not changes:
                 continue  # an hour and more of loops takes minutes, and shows nothing: loops do without fixes
@@ -90,15 +82,27 @@ def main():
                 cells[mode] = figures([report_of(arguments.tutti, "run", mission_file("apart_fixes"), "--seed", seed,
                                                  *settings(changes, receiver, others, mode), keep=arguments.keep)
                                        for seed in range(1, arguments.seeds + 1)])
-            text.append(row(name, cells["off"][0], *cells["only"][1:], *cells["factors"]))
-            print(text[-1], flush=True)
-        text.append("")
-    text += ["A dash: not joined, because the place of one or both was not certain, as the report says. *only* does not bend, so odometry",
-             "that has drifted by 10 m has not the shape of its fixes. The 80 minutes were run without loops alone, but for those that pass",
-             "a place again to the millimetre. An antenna that is not known costs its length where fixes are of 5 cm.", "",
-             "Two wrong closures that agree joined the two 134.6 m off with seed 4 (mode `off`, with loops, errors of 1.5 m); `factors` takes them back: 0.57 m.",
-             "`tutti demo`, which has no fixes: `report.json` is the same, byte for byte, as before there were any.",
-             "Fed live (`tutti mission up missions/apart_fixes.yaml`, four minutes each) the map, its origin and which fixes count are those of `tutti run`, and the submaps the same bytes."]
+            tables[way].append(row(name, cells["off"][0], *cells["only"][1:], *cells["factors"]))
+            print(tables[way][-1], flush=True)
+    with_loops, without = WAYS
+    text = page(
+        "Position fixes",
+        ["Asked was what fixes of a receiver do for a map that has loops, and for one that has none, with receivers of every quality. RMSE in",
+         f"metres, after one rigid alignment: of the worse robot (*worst*) and of both at once where they are merged (*both*); with loops, means over seeds 1 to {arguments.seeds}."],
+        tables[with_loops[0]],
+        ["bench/accuracy/fixes.py TUTTI"],
+        "`missions/apart_fixes.yaml`: two robots of 1,200 m each, 120 m from each other, simulated without sensors; with loops as they go",
+        "round, and with odometry alone. *refused*: share of submaps whose fixes do not count. Every figure is one call per seed:",
+        "`tutti run missions/apart_fixes.yaml --seed N --set receivers=[RECEIVER] --set server.map.georeference.mode=MODE`,",
+        f"`--set {UPDATES}`, RECEIVER `{receivers({})[11:-1]}` and what the row says; without loops",
+        "`--set closures.reference.radius_m=0.001`.", "",
+        f"## {without[0][0].upper()}{without[0][1:]}", "", *tables[without[0]], "",
+        "A dash: not merged, because the place of one or both was not certain, as the report says. *only* does not bend, so odometry",
+        "that has drifted by 10 m has not the shape of its fixes. The 80 minutes were run without loops alone, but for those that pass",
+        "a place again to the millimetre. An antenna that is not known costs its length where fixes are of 5 cm.", "",
+        "Two wrong closures that agree joined the two 134.6 m off with seed 4 (mode `off`, with loops, errors of 1.5 m); `factors` takes them back: 0.57 m.",
+        "`tutti demo`, which has no fixes: `report.json` is the same, byte for byte, as before there were any.",
+        "Fed live (`tutti mission up missions/apart_fixes.yaml`, four minutes each) the map, its origin and which fixes count are those of `tutti run`, and the submaps the same bytes.")
     _, section, by_hand = (SOURCE / "docs/results/fixes.md").read_text().partition("\n## Another size of place")
     write_results("fixes.md", text + [section + by_hand])
 

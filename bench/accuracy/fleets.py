@@ -18,7 +18,7 @@ import statistics
 
 import forms
 import graph_scores
-from runs import compare, outcome_of, row, write_results
+from runs import compare, outcome_of, page, row, write_results
 
 FLEETS = {
     "kth wifi": "kth_r3_00_d06_d09_d10_wifi",
@@ -246,17 +246,18 @@ def main():
     reports, timings = [{fleet: outcome[i] for fleet, outcome in outcomes.items()} for i in range(2)]
     graphs = {fleet: Graph(folder / f"{name}.pyfg") for fleet, name in fleets.items()}
     edges = {fleet: accepted_edges(pathlib.Path(arguments.out) / name) for fleet, name in fleets.items()}
-    text = [
-        "# Real fleets", "",
-        "Three robots each, hand-held and car-borne LiDAR on two campuses (COSMO-Bench, of MCD's recordings; `docs/data.md`);",
-        "written by `bench/accuracy/fleets.py TUTTI --data FOLDER`. Each run: `tutti run --graph FLEET.pyfg " +
-        " ".join(f"--set {setting}" for setting in [compare(*COMPETITORS), *LIMITS]) + "`.",
+    text = page(
+        "Real fleets",
+        ["Asked was how close the map of a real fleet comes to that of a judge who knows which closures are wrong, and its robots to the map.",
+         "RMSE in metres after one rigid alignment (SE(3), no scale) at keyframes, each robot alone; in brackets the constraints that a robot holds at the end."],
+        robots_table(reports),
+        ["bench/accuracy/fleets.py TUTTI --data FOLDER   # each run: tutti run --graph FLEET.pyfg " +
+         " ".join(f"--set {setting}" for setting in [compare(*COMPETITORS), *LIMITS])],
+        "Three robots each, hand-held and car-borne LiDAR on two campuses (COSMO-Bench, of MCD's recordings; `docs/data.md`).",
         "Odometry as it came, every pose a keyframe; closures when a server got them over that radio (`wifi`, `proradio`), between",
-        "robots up to 13 minutes late; the truth as reference. RMSE in metres after one rigid alignment (SE(3), no scale) at",
-        "keyframes, each robot alone; `perfect judge`: the map of a judge who knows by the truth which closures are wrong; in",
-        "brackets the constraints that a robot holds at the end. Robots follow the first policy; `every_node` is the paper's",
-        "baseline.", *(["", "One of the four fleets only (`--quick`)."] if arguments.quick else []), "",
-        *robots_table(reports), "",
+        "robots up to 13 minutes late; the truth as reference. `perfect judge`: the map of a judge who knows by the truth which closures",
+        "are wrong. Robots follow the first policy; `every_node` is the paper's baseline.",
+        *(["", "One of the four fleets only (`--quick`)."] if arguments.quick else []), "",
         "## Over the course", "",
         "Right and wrong as the benchmark labels them. A closure within one submap of 10 s joins no two submaps and is left out.",
         "Joint ATE: all robots after one alignment. Worst instant: the update after which the map, or the robot that follows it,",
@@ -266,7 +267,7 @@ def main():
         "Published for a central server on this benchmark: 4.3 s in the median and",
         "17.7 s at p99 from closure to correction; 6.0 MB down and 11.3 MB up for four robots.", "",
         *course_table(reports, timings, graphs, edges), "",
-    ]
+    )
     for fleet, report in reports.items():
         text += [f"## {fleet}, minute by minute", "",
                  "At the last update before: RMSE of odometry, of the map and of the robot so far, m; accepted closures (wrong ones).", "",

@@ -9,7 +9,7 @@ import argparse
 import math
 import statistics
 
-from runs import mission_file, report_of, row, write_results
+from runs import mission_file, page, report_of, row, write_results
 
 
 def run(arguments, mission, seed, *assignments):
@@ -89,20 +89,14 @@ def main():
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--keep", help="folder for finished runs, which are not repeated")
     arguments = parser.parse_args()
-    text = [
-        "# HKU: two real LiDAR recordings of one place",
-        "",
-        "Real scans and FAST-LIO2 odometry of both recordings, replayed side by side; written by",
-        "`bench/accuracy/hku.py TUTTI --data FOLDER`. There is no external ground truth: closures and the transform are",
-        "compared with a reference derived from the same scans (repeatable to 1 mm and 0.013 degrees).",
-        "",
-        "## `missions/hku_two_sessions.yaml`, bravo's frame drawn from the seed",
-        "",
-        "To hold: one component, at least 60 closures between the robots, none wrong by more than 0.5 m or 2 degrees,",
-        "transform within 30 mm and 0.15 degrees at bravo's centroid, corrected within 20 mm RMS of the server.",
-        "",
-        *two_sessions(arguments),
-        "",
+    text = page(
+        "HKU: two real LiDAR recordings of one place",
+        ["Asked were one component, at least 60 closures between the robots, none wrong by more than 0.5 m or 2 degrees, a transform within",
+         "30 mm and 0.15 degrees at bravo's centroid, and corrected robots within 20 mm RMS of the server."],
+        two_sessions(arguments),
+        ["bench/accuracy/hku.py TUTTI --data FOLDER   # these: missions/hku_two_sessions.yaml, bravo's frame drawn from the seed"],
+        "Real scans and FAST-LIO2 odometry of both recordings, replayed side by side. There is no external ground truth: closures and",
+        "the transform are compared with a reference derived from the same scans (repeatable to 1 mm and 0.013 degrees).",
         "The seed draws bravo's frame and nothing else, so equal rows say that nothing depends on the frame; they are not",
         "ten independent trials.",
         "",
@@ -126,8 +120,7 @@ def main():
         "some closures attach the right place with a pose more than 2 degrees or 0.5 m off: their covariances say so since a submap's own",
         "bend counts (docs/decisions/lidar-closures-at-mission-scale.md; before, 0.24 m at 1.5 and 3.69 m at 2 degrees/m). At 2 robots are",
         "decimetres off, and at 3 no closure is found. At 0.3 alpha's motion over a second is a tenth worse than its raw odometry's.",
-        "",
-    ]
+    )
     write_results("hku.md", text)
 
 

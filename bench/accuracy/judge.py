@@ -11,7 +11,7 @@ import pathlib
 import statistics
 import subprocess
 
-from runs import row, write_results
+from runs import page, row, write_results
 
 PLACES = ("room", "hall", "tunnel", "street")
 # name: which maps of a place are in the row
@@ -55,17 +55,20 @@ def main():
     arguments = parser.parse_args()
     maps = {place: maps_of(arguments, place) for place in arguments.places}
     everything = [m for of in maps.values() for m in of]
-    text = ["# Outlier rejection in places of every scale", "",
-            f"Written by `bench/accuracy/judge.py JUDGE_PROGRAM --seeds {arguments.seeds} --places {' '.join(arguments.places)}`.",
-            "Simulated: two robots walk or drive through a network of corridors (room: 2.5 m between junctions, 0.7 m/s; hall: 8 m, 1 m/s;",
-            "tunnel: 60 m, 2 m/s; street: 120 m, 12 m/s), closures from the truth with noise. Every place with odometry that is honest,",
-            "three times too sure and three times too unsure of itself, holds or fails once (over up to 20 s, by as far as the robot",
-            "gets in a second or so and 5 to 25 degrees), and with no wrong closures, 10 % and a group at two segments that look",
-            "alike (18 or 32 s), or 30 %. RMSE of the whole map over that of a judge who knows which closures are wrong.", "",
-            row("maps", "how many", "median", "p90", "worst", "wrong accepted", "right kept", "failures made up"),
-            row(*["---"] * 8), line("all", everything)]
-    text += [line(place, of) for place, of in maps.items()]
-    text += [line(name, [m for m in everything if belongs(m)]) for name, belongs in ROWS.items()]
+    table = [row("maps", "how many", "median", "p90", "worst", "wrong accepted", "right kept", "failures made up"),
+             row(*["---"] * 8), line("all", everything)]
+    table += [line(place, of) for place, of in maps.items()]
+    table += [line(name, [m for m in everything if belongs(m)]) for name, belongs in ROWS.items()]
+    text = page(
+        "Outlier rejection in places of every scale",
+        ["Asked was how far a map is from that of a judge who knows which closures are wrong (ratio of RMSE), in places of every scale."],
+        table,
+        [f"bench/accuracy/judge.py JUDGE_PROGRAM --seeds {arguments.seeds} --places {' '.join(arguments.places)}"],
+        "Simulated: two robots walk or drive through a network of corridors (room: 2.5 m between junctions, 0.7 m/s; hall: 8 m, 1 m/s;",
+        "tunnel: 60 m, 2 m/s; street: 120 m, 12 m/s), closures from the truth with noise. Every place with odometry that is honest,",
+        "three times too sure and three times too unsure of itself, holds or fails once (over up to 20 s, by as far as the robot",
+        "gets in a second or so and 5 to 25 degrees), and with no wrong closures, 10 % and a group at two segments that look",
+        "alike (18 or 32 s), or 30 %. RMSE is of the whole map.")
     write_results("judge.md", text)
 
 

@@ -12,7 +12,7 @@ import concurrent.futures
 import pathlib
 import statistics
 
-from runs import mission_file, outcome_of, row, write_results
+from runs import mission_file, outcome_of, page, row, write_results
 
 REFERENCE = ["closures.verifier=reference", "simulation.sensors=none"]
 # name: (mission file below the shared folder or a mission's name, seeds, settings)
@@ -107,19 +107,10 @@ def main():
             return [m["rmse_m"] - m["onboard_rmse_m"] for m in instants]
         return of_report
 
-    text = ["# How good the map is", "",
-            "Written by `bench/accuracy/map.py TUTTI --shared FOLDER" + (" --before OTHER" if arguments.before else "") + "`.",
-            "Trajectories only, closures from the truth with noise, one in ten wrong unless stated (`*`: instead of LiDAR's). Odometry",
-            "of EuRoC and KITTI is real and replayed, the rest simulated. RMSE of each robot's part of the server's map, m,",
-            "aligned alone, median of the seeds; *perfect*: of the map of a judge who knows by the reference which closures are",
-            "wrong (docs/report.md). Over perfect: all robots and seeds at the end. Changes of mind: updates in which the map differed",
-            "from the one a robot followed by more than three of its own standard deviations. Maps: at the end. CPU: the server's without verification, median of the seeds. Worst",
-            "instant: by how many metres the map, and the robot corrected by it, were worse than raw odometry at most while the mission",
-            "ran (below 0: never).", "",
-            row("mission", "seeds", *(f"{label}: accepted (wrong)" for label, _ in programs),
-                "odometry", *(label for label, _ in programs), "perfect", "over perfect",
-                "changes of mind", "maps", "CPU s", "worst instant: map", "corrected"),
-            row(*["---"] * (11 + 2 * (len(programs) - 1) + 1))]
+    table = [row("mission", "seeds", *(f"{label}: accepted (wrong)" for label, _ in programs),
+                 "odometry", *(label for label, _ in programs), "perfect", "over perfect",
+                 "changes of mind", "maps", "CPU s", "worst instant: map", "corrected"),
+             row(*["---"] * (11 + 2 * (len(programs) - 1) + 1))]
     everything = {label: [] for label, _ in programs}
     for name in CASES:
         after = of("after", name)
@@ -129,19 +120,31 @@ def main():
             everything[label] += [m / p for own, report in zip(mine, after) for m, p in zip(own, perfect(report)) if m and p]
         harm = [max([value for report in after for value in worst(key)(report)], default=None)
                 for key in ("worst_server", "worst_corrected")]
-        text.append(row(name, len(list(seeds)), *(counts(of(label, name)) for label, _ in programs),
-                        median_of_robots(after, lambda r: [robot["onboard_rmse_m"] for robot in r["robots"]]),
-                        *(median_of_robots(of(label, name), errors) for label, _ in programs),
-                        median_of_robots(after, perfect), spread(ratios(after, errors, perfect)), changes_of_mind(after),
-                        spread_of([report["server"]["components"] for report in after]),
-                        f"{statistics.median(report['cpu_s'] for report in after):.1f}",
-                        *("-" if value is None else f"{value:.3f}" for value in harm)))
-    text.append("")
+        table.append(row(name, len(list(seeds)), *(counts(of(label, name)) for label, _ in programs),
+                         median_of_robots(after, lambda r: [robot["onboard_rmse_m"] for robot in r["robots"]]),
+                         *(median_of_robots(of(label, name), errors) for label, _ in programs),
+                         median_of_robots(after, perfect), spread(ratios(after, errors, perfect)), changes_of_mind(after),
+                         spread_of([report["server"]["components"] for report in after]),
+                         f"{statistics.median(report['cpu_s'] for report in after):.1f}",
+                         *("-" if value is None else f"{value:.3f}" for value in harm)))
+    over = []
     for label, values in everything.items():
         values.sort()
-        text.append(f"Over perfect, all {len(values)} robots, {label}: median {statistics.median(values):.3f}, "
-                    f"p90 {values[int(0.9 * (len(values) - 1))]:.3f}, worst {values[-1]:.3f} (asked: 1.02, 1.10, 1.5).")
-        text.append("")
+        over.append(f"Over perfect, all {len(values)} robots, {label}: median {statistics.median(values):.3f}, "
+                    f"p90 {values[int(0.9 * (len(values) - 1))]:.3f}, worst {values[-1]:.3f}.")
+    text = page(
+        "How good the map is",
+        ["Asked was a map as good as that of a judge who knows which closures are wrong: RMSE over that judge's at most 1.02 in the median,",
+         "1.10 at the 90th percentile, 1.5 at worst.", "", *over],
+        table,
+        ["bench/accuracy/map.py TUTTI --shared FOLDER" + (" --before OTHER" if arguments.before else "")],
+        "Trajectories only, closures from the truth with noise, one in ten wrong unless stated (`*`: instead of LiDAR's). Odometry",
+        "of EuRoC and KITTI is real and replayed, the rest simulated. RMSE of each robot's part of the server's map, m,",
+        "aligned alone, median of the seeds; *perfect*: of the map of a judge who knows by the reference which closures are",
+        "wrong (docs/report.md). Over perfect: all robots and seeds at the end. Changes of mind: updates in which the map differed",
+        "from the one a robot followed by more than three of its own standard deviations. Maps: at the end. CPU: the server's without",
+        "verification, median of the seeds. Worst instant: by how many metres the map, and the robot corrected by it, were worse than",
+        "raw odometry at most while the mission ran (below 0: never).")
     write_results("map.md", text)
 
 

@@ -49,11 +49,11 @@ def main():
     arguments = parser.parse_args()
     text = [
         "# All missions, all policies", "",
-        f"Seed {arguments.seed}; written by `bench/accuracy/missions.py TUTTI --data FOLDER`. RMSE in metres after one",
-        "rigid alignment (SE(3), no scale) at keyframes, in brackets the constraints held at the end; * is the policy the",
-        "robot follows. Where there is no reference, the figure is the RMSE to the server; a dash stands where the reference",
-        "covers less than 95 % of the trajectory. Which part of the input is real is stated in each line. `uniform` and `random` have the budget of `spectral`. `tunnel` and `terrace` are in",
-        f"`paper.md`. Every run: `--set {compare(*COMPETITORS)}`.", "",
+        "Asked was how far the server's map and every policy's robots are off in every mission: RMSE in metres after one rigid alignment",
+        "(SE(3), no scale) at keyframes, in brackets the constraints held at the end; * is the policy the robot follows.", "",
+        "```sh",
+        f"bench/accuracy/missions.py TUTTI --data FOLDER   # each run: --seed {arguments.seed} --set {compare(*COMPETITORS)}",
+        "```", "",
     ]
     options = ["--seed", arguments.seed, "--set", compare(*COMPETITORS)]
     text += section(report_of(arguments.tutti, "demo", *options, keep=arguments.keep))
@@ -65,6 +65,10 @@ def main():
         except subprocess.CalledProcessError as error:  # a mission whose data is not at hand, for example
             print(f"{name} was not run: {error.stderr.decode().strip()}", file=sys.stderr)
             text += [f"## {name}", "", "Not run: its data was not at hand, or the run failed.", ""]
+    text += ["## How to read the tables", "",
+             "Where there is no reference, the figure is the RMSE to the server; a dash stands where the reference covers less than 95 % of",
+             "the trajectory. Which part of the input is real is stated in each line. `uniform` and `random` have the budget of `spectral`.",
+             "`tunnel` and `terrace` are in `paper.md`."]
     write_results("missions.md", text)
 
 

@@ -13,7 +13,7 @@ import statistics
 import subprocess
 import tempfile
 
-from runs import row, write_results
+from runs import page, row, write_results
 
 METHODS = {
     "robust": "`tutti optimise --robust`",
@@ -92,17 +92,20 @@ def main():
     graphs = [run for run in runs if run["method"] == "robust"]
     wrong = [1 - run["right"] / run["closures"] for run in graphs]
     span = lambda key: f"{min(run[key] for run in graphs):,} to {max(run[key] for run in graphs):,}"
-    text = ["# Multi-robot pose graphs of others", "",
-            f"Written by `bench/accuracy/optimise.py GRAPHS_PROGRAM TUTTI_PROGRAM --data FOLDER --seeds {arguments.seeds}`.", "",
-            "COSMO-Bench's own files are in fleets.md; these are graphs made to its figures, written as its files are (PyFG):",
-            f"{len(graphs)} simulated ones of {span('robots')} robots who walk through streets 70 m apart, {span('poses')} poses 2 m apart,",
-            f"{span('closures')} closures from the truth with noise, {100 * min(wrong):.0f} to {100 * max(wrong):.0f} % of them wrong: strewn about, in blocks of",
-            "neighbours that agree, and in every second graph at two segments of 60 s that look alike, where all closures agree.",
-            "ATE: RMSE of all robots' positions after one alignment. GNC with Geman-McClure (Yang et al. 2020) has the same solver,",
-            "threshold (chi-square, 0.99) and reduction to the closures' ends as ours, and begins at odometry from where every robot",
-            "truly started, which ours does not know. Precision: of the accepted closures, those that are right; Geman-McClure has",
-            "accepted what ends below the threshold. Seconds of one core, while the other one was at work.", ""]
-    text += ["## All", ""] + table(runs)
+    text = page(
+        "Multi-robot pose graphs of others",
+        ["Asked was how far `tutti optimise --robust` is off on pose graphs of several robots with wrong closures, beside others' methods.",
+         "ATE: RMSE of all robots' positions after one alignment."],
+        table(runs),
+        [f"bench/accuracy/optimise.py GRAPHS_PROGRAM TUTTI_PROGRAM --data FOLDER --seeds {arguments.seeds}"],
+        "COSMO-Bench's own files are in fleets.md; these are graphs made to its figures, written as its files are (PyFG):",
+        f"{len(graphs)} simulated ones of {span('robots')} robots who walk through streets 70 m apart, {span('poses')} poses 2 m apart,",
+        f"{span('closures')} closures from the truth with noise, {100 * min(wrong):.0f} to {100 * max(wrong):.0f} % of them wrong: strewn about, in blocks of",
+        "neighbours that agree, and in every second graph at two segments of 60 s that look alike, where all closures agree.",
+        "GNC with Geman-McClure (Yang et al. 2020) has the same solver,",
+        "threshold (chi-square, 0.99) and reduction to the closures' ends as ours, and begins at odometry from where every robot",
+        "truly started, which ours does not know. Precision: of the accepted closures, those that are right; Geman-McClure has",
+        "accepted what ends below the threshold. Seconds of one core, while the other one was at work.")
     for odometry, name in ODOMETRY.items():
         text += ["", f"## {name[0].upper()}{name[1:]}", ""] + table([run for run in runs if run["odometry"] == odometry])
     text += ["", "**Where ours goes wrong** (above 5 m): one graph, with honest odometry and with odometry that fails. For some 100 s the",

@@ -69,5 +69,10 @@ def write_results(name, lines):
     (SOURCE / "docs" / "results" / name).write_text("\n".join(lines).rstrip() + "\n")
 
 
+def page(title, asked, table, command, *rest):
+    """The lines of a page of results: what was asked, the table that answers it, the command that makes it, and the rest."""
+    return [f"# {title}", "", *asked, "", *table, "", "```sh", *command, "```", "", *rest]
+
+
 def row(*cells):
     return "| " + " | ".join(str(cell) for cell in cells) + " |"

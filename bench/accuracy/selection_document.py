@@ -4,7 +4,7 @@ import collections
 import math
 import statistics
 
-from runs import row
+from runs import page, row
 from selection_jobs import (ABLATIONS, DEFAULT, FLEETS, LEAST_M, OLD, SHORT_S, TOP, rows_of)
 
 POLICIES = ["none", "every_node", "every_node_2", "spectral", TOP, "uniform", "random", "skeleton", OLD, DEFAULT]
@@ -306,10 +306,14 @@ def document(jobs, old):
     of_fleets = [l for l in results.lines if l["mission"] in FLEETS]
     seeds = sorted({l["seed"] for l in results.lines})
     missing = [f"{' '.join(map(str, key))}" for key in jobs.jobs if not jobs.path(key).exists()]
-    text = [
-        "# How a robot chooses its links", "",
-        "Written by `bench/accuracy/selection.py` (CONTRIBUTING.md). Whole missions in closed loop, "
-        f"{len(seeds)} seeds; tunnel, terrace and demo as",
+    asked = heading("asked", "measured", "")
+    for part in (first_line, second_line, third_line, fourth_line, fifth_line):
+        asked += [row(line, found, verdict(good)) for line, found, good in part(results)]
+    text = page(
+        "How a robot chooses its links",
+        ["Asked was which policy corrects robots best without ever harming one (harm: the robot's error over the better of map's and odometry's)."],
+        asked, ["bench/accuracy/selection.py TUTTI CALIBRATION_PROGRAM --data FOLDER   # CONTRIBUTING.md"],
+        f"Whole missions in closed loop, {len(seeds)} seeds; tunnel, terrace and demo as",
         "trajectories with closures from the truth. All policies of a run answer the same broadcasts: what a robot uploads",
         "is raw odometry, whatever it corrects. Weights of links are the same for all, but the column *old default* is",
         "recorded from the program before (its own map, its own weights). `uniform` and `random` hold as many links as",
@@ -319,11 +323,7 @@ def document(jobs, old):
         "Harm: after any broadcast, the robot's error over the better of map's and odometry's (taken for at least "
         f"{LEAST_M:g} m), and",
         "less that. RPE worse: corrected robots that are off by over 5 % more than odometry. "
-        f"Times with {jobs.arguments.jobs} processes on two cores{jobs.arguments.note and '; '}{jobs.arguments.note}.",
-        "", "## What was asked", ""]
-    text += heading("asked", "measured", "")
-    for part in (first_line, second_line, third_line, fourth_line, fifth_line):
-        text += [row(asked, found, verdict(good)) for asked, found, good in part(results)]
+        f"Times with {jobs.arguments.jobs} processes on two cores{jobs.arguments.note and '; '}{jobs.arguments.note}.")
     text += ["", f"What line 1 asks of the final error, wherever they correct, is met by: {as_good(results)}.", "",
              "## The missions of the tree", "", *policy_table(of_tree)]
     if of_fleets:
