@@ -14,6 +14,7 @@
 #include "tutti/bags/db3_reader.hpp"
 #include "tutti/bags/depth.hpp"
 #include "tutti/bags/mcap_reader.hpp"
+#include "tutti/bags/picture.hpp"
 #include "tutti/bags/point_cloud.hpp"
 #include "tutti/bags/ros1_reader.hpp"
 #include "tutti/bags/ros_messages.hpp"

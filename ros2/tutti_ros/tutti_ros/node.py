@@ -42,7 +42,8 @@ NOISE = {"translation_m_per_sqrt_m": 0.02, "translation_m_per_sqrt_deg": 0.001, 
          "rotation_deg_per_sqrt_m": 0.1, "rotation_deg_per_sqrt_deg": 0.02, "rotation_deg_per_sqrt_s": 0.02}
 GRID = "nav_msgs/msg/OccupancyGrid"
 ODOMETRY, TRANSFORMS, PATH = "nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage", "nav_msgs/msg/Path"
-CLOUD, LIVOX = "sensor_msgs/msg/PointCloud2", ("livox_ros_driver2/msg/CustomMsg", "livox_ros_driver/msg/CustomMsg")
+CLOUD = "sensor_msgs/msg/PointCloud2"
+LIVOX = tuple(f"{package}/msg/CustomMsg" for package in ("livox_ros_driver2", "livox_ros_driver", "livox_interfaces"))
 COMPRESSED = ("/compressed", "/compressedDepth")  # as image_transport names topics of CompressedImage
 TF_QOS = QoSProfile(depth=100)
 STATIC_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)

@@ -230,7 +230,7 @@ std::vector<std::string> uses(const BagInfo& info) {
       Row{"calibration", Use::calibration, nullptr},
       Row{"imu", Use::imu, nullptr},
       Row{"fixes", Use::fixes, nullptr},
-      Row{"tf", Use::transforms, "none: where the sensors are on the robot has to be said elsewhere"},
+      Row{"tf", Use::transforms, "none: where the sensors are on the robot has to be stated elsewhere"},
   };
   std::vector<std::string> out;
   const auto add = [&out](const char* name, const std::string& what) {

@@ -5,34 +5,9 @@
 #include <array>
 #include <cctype>
 #include <cstddef>
-#include <optional>
 
 namespace tutti::bags {
 namespace {
-
-/// Bytes of a pixel, and where its red is; of grey -1, of a Bayer pattern -2.
-struct PixelLayout {
-  std::string_view name;
-  std::uint32_t bytes = 1;
-  int red = -1;
-};
-constexpr int kGrey = -1, kBayer = -2;
-constexpr std::array kLayouts{PixelLayout{"mono8", 1, kGrey},
-                              PixelLayout{"8UC1", 1, kGrey},
-                              PixelLayout{"rgb8", 3, 0},
-                              PixelLayout{"bgr8", 3, 2},
-                              PixelLayout{"8UC3", 3, 2},
-                              PixelLayout{"rgba8", 4, 0},
-                              PixelLayout{"bgra8", 4, 2},
-                              PixelLayout{"bayer_rggb8", 1, kBayer},
-                              PixelLayout{"bayer_bggr8", 1, kBayer},
-                              PixelLayout{"bayer_gbrg8", 1, kBayer},
-                              PixelLayout{"bayer_grbg8", 1, kBayer}};
-
-const PixelLayout* pixel_layout_of(std::string_view encoding) {
-  const auto at = std::ranges::find(kLayouts, encoding, &PixelLayout::name);
-  return at == kLayouts.end() ? nullptr : &*at;
-}
 
 /// Without the zeros at the end, which some drivers write behind a model's coefficients.
 std::size_t count_coefficients(const std::vector<double>& d) {
@@ -66,16 +41,6 @@ Result<CameraKind> kind_of(const RosCameraInfo& message) {
               message.distortion_model, given, numbers);
 }
 
-std::uint8_t mean_of_four(const std::uint8_t* at, std::size_t right, std::size_t below) {
-  return static_cast<std::uint8_t>((at[0] + at[right] + at[below] + at[right + below] + 2) / 4);
-}
-
-/// By ITU-R BT.709, as PNG files are read.
-std::uint8_t luminance(const std::uint8_t* pixel, int red) {
-  constexpr int kRed = 13933, kGreen = 46871, kBlue = 4732;  // of 65536
-  return static_cast<std::uint8_t>((kRed * pixel[red] + kGreen * pixel[1] + kBlue * pixel[2 - red] + 32768) / 65536);
-}
-
 }  // namespace
 
 Result<CameraModel> to_camera(const RosCameraInfo& message) {
@@ -97,37 +62,6 @@ Result<CameraModel> to_camera(const RosCameraInfo& message) {
   std::copy_n(message.d.begin(), std::min(count_coefficients(message.d), out.distortion.size()),
               out.distortion.begin());
   if (auto ok = check_camera(out); !ok) return in_context("is the camera calibrated?", ok.error());
-  return out;
-}
-
-bool is_picture(std::string_view encoding) { return pixel_layout_of(encoding) != nullptr; }
-
-Status check_rows(const RosImage& message, std::uint32_t pixel_bytes) {
-  const std::uint64_t row = std::uint64_t{message.width} * pixel_bytes;
-  if (message.width == 0 || message.height == 0 || message.step < row ||
-      message.data.size() < (message.height - 1) * std::uint64_t{message.step} + row)
-    return fail(ErrorCode::invalid, "{} x {} pixels of {} bytes, rows of {} bytes, {} bytes in all", message.width,
-                message.height, pixel_bytes, message.step, message.data.size());
-  return {};
-}
-
-Result<Image> to_image(const RosImage& message) {
-  const PixelLayout* const layout = pixel_layout_of(message.encoding);
-  if (layout == nullptr)
-    return fail(ErrorCode::unsupported, "encoding '{:.40}', expected mono8, rgb8, bgr8, rgba8, bgra8 or bayer_..8",
-                message.encoding);
-  if (auto ok = check_rows(message, layout->bytes); !ok) return tl::unexpected(ok.error());
-  Image out(static_cast<int>(message.width), static_cast<int>(message.height));
-  const auto* const data = reinterpret_cast<const std::uint8_t*>(message.data.data());
-  std::uint8_t* to = out.grey.data();
-  for (std::uint32_t y = 0; y < message.height; ++y) {
-    const std::uint8_t* at = data + std::size_t{y} * message.step;
-    const std::size_t below = y + 1 < message.height ? message.step : 0;
-    for (std::uint32_t x = 0; x < message.width; ++x, at += layout->bytes)
-      *to++ = layout->red == kGrey    ? *at
-              : layout->red == kBayer ? mean_of_four(at, x + 1 < message.width ? 1 : 0, below)
-                                      : luminance(at, layout->red);
-  }
   return out;
 }
 

@@ -9,7 +9,6 @@
 #include "tutti/base/result.hpp"
 #include "tutti/geometry/camera.hpp"
 #include "tutti/geometry/pose3.hpp"
-#include "tutti/model/image.hpp"
 #include "tutti/model/visual.hpp"
 
 namespace tutti::bags {
@@ -18,16 +17,6 @@ namespace tutti::bags {
 /// rational_polynomial (8), equidistant or fisheye (4), double_sphere (2); no numbers mean no distortion. Other models
 /// and binned images are errors that name what was expected.
 Result<CameraModel> to_camera(const RosCameraInfo& message);
-
-/// The image as grey values: mono8 and 8UC1 as they are; rgb8, bgr8, rgba8, bgra8 and 8UC3 by their luminance; in a
-/// Bayer pattern of 8 bits each pixel becomes the mean of a square of two by two. Rows may be padded. Other encodings
-/// are an error that names them.
-Result<Image> to_image(const RosImage& message);
-/// True for the encodings that to_image() takes.
-bool is_picture(std::string_view encoding);
-
-/// Fails unless the message has as many bytes as its size, its step and so many bytes a pixel want.
-Status check_rows(const RosImage& message, std::uint32_t pixel_bytes);
 
 /// The topic of the CameraInfo that belongs to a topic of images: "/a/image_raw" and, compressed,
 /// "/a/image_raw/compressed" have "/a/camera_info" beside them.

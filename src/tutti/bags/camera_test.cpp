@@ -51,24 +51,6 @@ TEST(BagCamera, OneThatIsNotCalibratedIsRefused) {
   EXPECT_FALSE(to_camera(none));
 }
 
-TEST(BagCamera, ImagesBecomeGrey) {
-  const std::string colour("\xff\x00\x00\x00\xff\x00\x00\x00\xff\x07", 10);  // red, green, blue, and padding
-  const auto grey = [](const char* encoding, std::uint32_t width, std::uint32_t height, std::uint32_t step,
-                       std::string_view data) {
-    return to_image({.height = height, .width = width, .encoding = encoding, .step = step, .data = data});
-  };
-  using Bytes = std::vector<std::uint8_t>;
-  EXPECT_EQ(grey("rgb8", 3, 1, 10, colour)->grey, (Bytes{54, 182, 18}));
-  EXPECT_EQ(grey("bgr8", 3, 1, 10, colour)->grey, (Bytes{18, 182, 54}));
-  EXPECT_EQ(grey("mono8", 2, 2, 3, "abxcd")->grey, (Bytes{'a', 'b', 'c', 'd'}));
-  EXPECT_EQ(grey("bayer_rggb8", 2, 2, 2, std::string("\x10\x20\x30\x40", 4))->grey, (Bytes{40, 48, 56, 64}));
-  EXPECT_FALSE(grey("mono8", 2, 2, 3, "abxc"));
-  EXPECT_FALSE(grey("mono8", 2, 2, 1, "abcd"));
-  EXPECT_FALSE(grey("mono8", 0xffffffff, 0xffffffff, 0xffffffff, "abcd"));
-  EXPECT_NE(grey("16UC1", 1, 1, 2, "ab").error().message.find("encoding '16UC1'"), std::string::npos);
-  EXPECT_FALSE(is_picture("32FC1"));
-}
-
 TEST(BagCamera, CalibrationIsBesideImages) {
   EXPECT_EQ(camera_info_topic("/a/image_raw", false), "/a/camera_info");
   EXPECT_EQ(camera_info_topic("/a/image_raw/compressed", true), "/a/camera_info");

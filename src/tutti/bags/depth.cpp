@@ -8,9 +8,9 @@
 #include <cstddef>
 #include <cstring>
 
-#include "tutti/bags/camera.hpp"
 #include "tutti/bags/internal/cursor.hpp"
 #include "tutti/bags/internal/packed_picture.hpp"
+#include "tutti/bags/picture.hpp"
 #include "tutti/bags/transform_tree.hpp"
 
 namespace tutti::bags {

@@ -3,11 +3,11 @@
 
 #include "tutti/bags/camera.hpp"
 #include "tutti/bags/internal/packed_picture.hpp"
+#include "tutti/bags/picture.hpp"
 
 namespace tutti::bags {
 
 using internal::is_packed_picture;
-constexpr const char* kPictures = "mono8, rgb8, bgr8, rgba8, bgra8 or bayer_..8 (image_proc or the driver makes them)";
 
 bool ImageTopic::shows_depth() const { return first && is_depth(topic, first->encoding); }
 
@@ -19,7 +19,9 @@ Status ImageTopic::check_picture() const {
   if (!first) return fail(ErrorCode::invalid, "{}: no images", topic);
   if (shows_picture()) return {};
   if (shows_depth())
-    return fail(ErrorCode::unsupported, "{}: encoding '{:.40}' is no picture, but depth", topic, first->encoding);
+    return fail(ErrorCode::unsupported,
+                "{}: encoding '{:.40}' is no picture, but depth (a camera's own 16 bits are mono16)", topic,
+                first->encoding);
   return fail(ErrorCode::unsupported, "{}: encoding '{:.40}' is no picture that is read, expected {}", topic,
               first->encoding, is_compressed ? "JPEG or PNG" : kPictures);
 }

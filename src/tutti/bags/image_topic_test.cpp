@@ -19,10 +19,13 @@ TEST(ImageTopic, ShowsWhatItsFirstMessageDoes) {
   EXPECT_TRUE(topic("/image/compressed", "jpeg", true).check_picture().has_value());
   EXPECT_TRUE(topic("/depth", "16UC1").shows_depth());
   EXPECT_EQ(topic("/depth", "16UC1").check_picture().error().message,
-            "/depth: encoding '16UC1' is no picture, but depth");
-  EXPECT_EQ(topic("/flow", "32FC2").check_picture().error().message,
-            "/flow: encoding '32FC2' is no picture that is read, expected mono8, rgb8, bgr8, rgba8, bgra8 or bayer_..8 "
-            "(image_proc or the driver makes them)");
+            "/depth: encoding '16UC1' is no picture, but depth (a camera's own 16 bits are mono16)");
+  EXPECT_EQ(
+      topic("/flow", "32FC2").check_picture().error().message,
+      "/flow: encoding '32FC2' is no picture that is read, expected mono8, rgb8, bgr8, rgba8, bgra8 or bayer_..8, "
+      "the same of 16 bits, yuv422 (uyvy), yuyv (yuv422_yuy2) or nv12");
+  EXPECT_TRUE(topic("/thermal", "mono16").check_picture().has_value());
+  EXPECT_FALSE(topic("/depth/image", "mono16").shows_picture());
   EXPECT_EQ(topic("/video", "h264 (neither JPEG nor PNG)", true).check_picture().error().message,
             "/video: encoding 'h264 (neither JPEG nor PNG)' is no picture that is read, expected JPEG or PNG");
 }

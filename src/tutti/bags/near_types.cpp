@@ -67,7 +67,6 @@ constexpr std::array kTypes{
     NearType{"rslidar_msgs/", kRobosense},
     NearType{"robosense_msgs/", kRobosense},
     NearType{"nebula_msgs/", kNebula},
-    NearType{"livox_interfaces/", kLivox},
     NearType{"livox_sdk_vehicle_msgs/", kLivox},
     NearType{"sensor_msgs/LaserScan", kPlane},
     NearType{"sensor_msgs/MultiEchoLaserScan", kPlane},

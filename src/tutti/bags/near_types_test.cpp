@@ -11,7 +11,7 @@ namespace near_types_test {
 TEST(NearTypes, HaveAWayOnByBothNames) {
   for (const char* type : {"velodyne_msgs/msg/VelodyneScan", "velodyne_msgs/VelodyneScan", "sensor_msgs/msg/LaserScan",
                            "geometry_msgs/msg/PoseWithCovarianceStamped", "ouster_sensor_msgs/msg/PacketMsg",
-                           "sensor_msgs/msg/PointCloud", "livox_interfaces/msg/CustomMsg",
+                           "sensor_msgs/msg/PointCloud", "livox_sdk_vehicle_msgs/msg/CustomMsg",
                            "px4_msgs/msg/VehicleOdometry", "foxglove.PointCloud", "nmea_msgs/msg/Sentence"})
     EXPECT_FALSE(way_on(type).empty()) << type;
   EXPECT_TRUE(way_on("std_msgs/msg/String").empty());

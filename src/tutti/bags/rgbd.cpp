@@ -33,7 +33,7 @@ Status check_place(const ImageTopic& depth, const ImageTopic& camera, const Find
   const auto T_camera_depth = find(camera.first->frame, depth.first->frame);
   if (!T_camera_depth)
     return fail(ErrorCode::invalid,
-                "frame '{:.80}', expected '{:.80}' as of {}, or one at the same place (no transform joins them)",
+                "frame '{:.80}', expected '{:.80}' as of {}, or one at the same place (no transform links them)",
                 depth.first->frame, camera.first->frame, camera.topic);
   const double away_m = T_camera_depth->translation.norm(),
                turn_rad = T_camera_depth->rotation.angularDistance(Eigen::Quaterniond::Identity());

@@ -166,6 +166,7 @@ TEST(Ros1, EveryKnownTypeIsDecoded) {
       {"sensor_msgs/msg/PointCloud2", point_cloud(2)},
       {"livox_ros_driver2/msg/CustomMsg", livox(2)},
       {"livox_ros_driver/msg/CustomMsg", livox(2)},
+      {"livox_interfaces/msg/CustomMsg", livox(2)},
       {"sensor_msgs/msg/Image", image(2)},
       {"sensor_msgs/msg/CompressedImage", compressed_image(2)},
       {"sensor_msgs/msg/CameraInfo", camera_info(2)},

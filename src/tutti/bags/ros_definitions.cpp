@@ -29,6 +29,9 @@ constexpr std::string_view kLivox1Msg =
 constexpr std::string_view kLivox2Msg =
     "std_msgs/Header header\nuint64 timebase\nuint32 point_num\nuint8 lidar_id\nuint8[3] rsvd\n"
     "livox_ros_driver2/CustomPoint[] points\n";
+constexpr std::string_view kLivoxInterfacesMsg =
+    "std_msgs/Header header\nuint64 timebase\nuint32 point_num\nuint8 lidar_id\nuint8[3] rsvd\n"
+    "livox_interfaces/CustomPoint[] points\n";
 constexpr std::string_view kTimeSpan = "int32 sec\nuint32 nanosec\n";
 
 /// By short names, as definitions refer to each other: "nav_msgs/Odometry".
@@ -52,6 +55,8 @@ const std::map<std::string, std::string_view, std::less<>>& definitions() {
       {"geometry_msgs/Twist", "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n"},
       {"geometry_msgs/TwistWithCovariance", "geometry_msgs/Twist twist\nfloat64[36] covariance\n"},
       {"geometry_msgs/Vector3", kXyz},
+      {"livox_interfaces/CustomMsg", kLivoxInterfacesMsg},
+      {"livox_interfaces/CustomPoint", kLivoxPoint},
       {"livox_ros_driver/CustomMsg", kLivox1Msg},
       {"livox_ros_driver/CustomPoint", kLivoxPoint},
       {"livox_ros_driver2/CustomMsg", kLivox2Msg},

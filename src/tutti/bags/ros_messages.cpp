@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/bags/ros_messages.hpp"
 
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cstddef>
+#include <ranges>
 #include <span>
 #include <utility>
 
@@ -200,8 +203,8 @@ bool is_scan_type(std::string_view type) {
 Result<RosPointCloud> decode_scan(std::string_view type, std::string_view bytes, RosEncoding encoding) {
   const auto at = std::ranges::find(kScanTypes, type, &ScanType::name);
   if (at != kScanTypes.end()) return at->decode(bytes, encoding);
-  return fail(ErrorCode::unsupported, "type '{:.200}', expected one that holds scans: {}, {} or {}", type,
-              kScanTypes[0].name, kScanTypes[1].name, kScanTypes[2].name);
+  return fail(ErrorCode::unsupported, "type '{:.200}', expected one that holds scans: {}", type,
+              fmt::join(kScanTypes | std::views::transform(&ScanType::name), ", "));
 }
 
 Result<RosImu> decode_imu(std::string_view bytes, RosEncoding encoding) {

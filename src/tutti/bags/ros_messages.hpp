@@ -146,9 +146,9 @@ Result<RosCameraInfo> decode_camera_info(std::string_view bytes, RosEncoding enc
 Result<RosNavSatFix> decode_nav_sat_fix(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
 Result<RosBatteryState> decode_battery_state(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
 Result<RosPoseStamped> decode_pose_stamped(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
-/// Decodes CustomMsg of livox_ros_driver2 or livox_ros_driver as the cloud that it is: points with the fields
-/// `offset_time` (uint32, ns after header.stamp), x, y and z (float32, m). `timebase` is not read, as the driver writes
-/// the same time into header.stamp.
+/// Decodes CustomMsg of livox_ros_driver2, livox_ros_driver or livox_interfaces (livox_ros2_driver) as the cloud that
+/// it is: points with the fields `offset_time` (uint32, ns after header.stamp), x, y and z (float32, m). `timebase` is
+/// not read, as the driver writes the same time into header.stamp.
 Result<RosPointCloud> decode_livox(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
 
 /// The types of messages that contain the scan of a LiDAR.
@@ -156,9 +156,10 @@ struct ScanType {
   std::string_view name;
   Result<RosPointCloud> (*decode)(std::string_view bytes, RosEncoding encoding);
 };
-inline constexpr std::array<ScanType, 3> kScanTypes{{{"sensor_msgs/msg/PointCloud2", decode_point_cloud},
+inline constexpr std::array<ScanType, 4> kScanTypes{{{"sensor_msgs/msg/PointCloud2", decode_point_cloud},
                                                      {"livox_ros_driver2/msg/CustomMsg", decode_livox},
-                                                     {"livox_ros_driver/msg/CustomMsg", decode_livox}}};
+                                                     {"livox_ros_driver/msg/CustomMsg", decode_livox},
+                                                     {"livox_interfaces/msg/CustomMsg", decode_livox}}};
 [[nodiscard]] bool is_scan_type(std::string_view type);
 /// Decodes a message of one of kScanTypes; errors: another type.
 Result<RosPointCloud> decode_scan(std::string_view type, std::string_view bytes,

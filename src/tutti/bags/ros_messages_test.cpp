@@ -115,7 +115,7 @@ TEST(RosMessages, ScansAreDecodedByTheirType) {
   EXPECT_FALSE(is_scan_type("sensor_msgs/msg/LaserScan"));
   EXPECT_EQ(decode_scan("sensor_msgs/msg/LaserScan", livox()).error().message,
             "type 'sensor_msgs/msg/LaserScan', expected one that holds scans: sensor_msgs/msg/PointCloud2, "
-            "livox_ros_driver2/msg/CustomMsg or livox_ros_driver/msg/CustomMsg");
+            "livox_ros_driver2/msg/CustomMsg, livox_ros_driver/msg/CustomMsg, livox_interfaces/msg/CustomMsg");
 }
 
 class BothOrders : public ::testing::TestWithParam<bool> {};

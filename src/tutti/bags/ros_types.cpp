@@ -26,8 +26,9 @@ constexpr RosType kRosTypes[] = {
     {kScanTypes[0].name, Use::scans, decoded<kScanTypes[0].decode>},
     {kScanTypes[1].name, Use::scans, decoded<kScanTypes[1].decode>},
     {kScanTypes[2].name, Use::scans, decoded<kScanTypes[2].decode>},
+    {kScanTypes[3].name, Use::scans, decoded<kScanTypes[3].decode>},
 };
-static_assert(kScanTypes.size() == 3, "all of them are in the table");
+static_assert(kScanTypes.size() == 4, "all of them are in the table");
 
 const RosType* find(std::string_view type) {
   const auto* const at = std::ranges::find(kRosTypes, type, &RosType::name);

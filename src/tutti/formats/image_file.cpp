@@ -14,6 +14,7 @@
 #include "tutti/base/check.hpp"
 #include "tutti/base/file.hpp"
 #include "tutti/model/nearest_stamp.hpp"
+#include "tutti/model/picture_bits.hpp"
 
 namespace tutti::formats {
 namespace {
@@ -29,18 +30,77 @@ Status check_size(std::int64_t width, std::int64_t height, const std::string& na
               kMaxPixels);
 }
 
-Result<Image> decode_png(std::string_view bytes, const std::string& name, ExpectedSize expected) {
-  png_image header{};
-  header.version = PNG_IMAGE_VERSION;
-  const auto freed = [](png_image* it) { png_image_free(it); };
-  const std::unique_ptr<png_image, decltype(freed)> guard(&header, freed);
-  const auto failed = [&] { return fail(ErrorCode::parse, "{}: damaged PNG image: {}", name, header.message); };
+/// Its pixels and nothing about colour: libpng would turn depths by a gamma that some programs write beside them.
+std::string without_colour(std::string_view png) {
+  constexpr std::size_t kSignature = 8, kAround = 12;  // of a chunk: length, type and checksum
+  std::string out(png.substr(0, kSignature));
+  for (png.remove_prefix(std::min(kSignature, png.size())); png.size() >= kAround;) {
+    std::size_t length = 0;
+    for (std::size_t i = 0; i < 4; ++i) length = length << 8U | static_cast<unsigned char>(png[i]);
+    const std::string_view chunk = png.substr(0, kAround + length);
+    const std::string_view type = chunk.substr(4, 4);
+    if (type == "IHDR" || type == "IDAT" || type == "IEND") out += chunk;
+    png.remove_prefix(chunk.size());
+  }
+  return out;
+}
 
-  if (png_image_begin_read_from_memory(&header, bytes.data(), bytes.size()) == 0) return failed();
-  if (auto ok = check_size(header.width, header.height, name, expected); !ok) return tl::unexpected(ok.error());
-  header.format = PNG_FORMAT_GRAY;
-  Image image(static_cast<int>(header.width), static_cast<int>(header.height));
-  if (png_image_finish_read(&header, nullptr, image.grey.data(), 0, nullptr) == 0) return failed();
+/// A PNG file that is being read.
+class PngReader {
+ public:
+  explicit PngReader(std::string name) : name_(std::move(name)) { header_.version = PNG_IMAGE_VERSION; }
+  PngReader(const PngReader&) = delete;
+  PngReader& operator=(const PngReader&) = delete;
+  ~PngReader() { png_image_free(&header_); }
+
+  Status begin(std::string_view bytes, ExpectedSize expected) {
+    if (png_image_begin_read_from_memory(&header_, bytes.data(), bytes.size()) == 0) return failed();
+    return check_size(header_.width, header_.height, name_, expected);
+  }
+  Status finish(png_uint_32 format, void* pixels) {
+    header_.format = format;
+    if (png_image_finish_read(&header_, nullptr, pixels, 0, nullptr) == 0) return failed();
+    return {};
+  }
+  [[nodiscard]] int width() const { return static_cast<int>(header_.width); }
+  [[nodiscard]] int height() const { return static_cast<int>(header_.height); }
+  [[nodiscard]] png_uint_32 format() const { return header_.format; }
+  [[nodiscard]] bool has_16_bits() const { return (header_.format & PNG_FORMAT_FLAG_LINEAR) != 0; }
+
+ private:
+  [[nodiscard]] Status failed() const {
+    return fail(ErrorCode::parse, "{}: no PNG image, or a damaged one: {}", name_, header_.message);
+  }
+  std::string name_;
+  png_image header_{};
+};
+
+/// The grey values of a PNG image of 16 bits; colours by their luminance, unless `only_grey`.
+Result<DepthImage> decode_16_bits(std::string_view bytes, const std::string& name, ExpectedSize expected,
+                                  bool only_grey) {
+  const std::string plain = without_colour(bytes);
+  PngReader png(name);
+  if (auto ok = png.begin(plain, expected); !ok) return tl::unexpected(ok.error());
+  if (only_grey && png.format() != PNG_FORMAT_LINEAR_Y)
+    return fail(ErrorCode::unsupported, "{}: {} {}, expected a grey PNG image of 16 bits a pixel, as depth is", name,
+                png.has_16_bits() ? "16 bits of" : "8 bits of",
+                (png.format() & PNG_FORMAT_FLAG_COLOR) != 0 ? "colour" : "grey");
+  DepthImage out{png.width(), png.height(), {}};
+  out.value.resize(static_cast<std::size_t>(out.width_px) * static_cast<std::size_t>(out.height_px));
+  if (auto ok = png.finish(PNG_FORMAT_LINEAR_Y, out.value.data()); !ok) return tl::unexpected(ok.error());
+  return out;
+}
+
+Result<Image> decode_png(std::string_view bytes, const std::string& name, ExpectedSize expected) {
+  PngReader png(name);
+  if (auto ok = png.begin(bytes, expected); !ok) return tl::unexpected(ok.error());
+  if (png.has_16_bits()) {
+    const auto values = decode_16_bits(bytes, name, expected, false);
+    if (!values) return tl::unexpected(values.error());
+    return in_8_bits(values->width_px, values->height_px, values->value);
+  }
+  Image image(png.width(), png.height());
+  if (auto ok = png.finish(PNG_FORMAT_GRAY, image.grey.data()); !ok) return tl::unexpected(ok.error());
   return image;
 }
 
@@ -63,21 +123,6 @@ Result<Image> decode_jpeg(std::string_view bytes, const std::string& name, Expec
   return image;
 }
 
-/// Its pixels and nothing about colour: libpng would turn depths by a gamma that some programs write beside them.
-std::string without_colour(std::string_view png) {
-  constexpr std::size_t kSignature = 8, kAround = 12;  // of a chunk: length, type and checksum
-  std::string out(png.substr(0, kSignature));
-  for (png.remove_prefix(std::min(kSignature, png.size())); png.size() >= kAround;) {
-    std::size_t length = 0;
-    for (std::size_t i = 0; i < 4; ++i) length = length << 8U | static_cast<unsigned char>(png[i]);
-    const std::string_view chunk = png.substr(0, kAround + length);
-    const std::string_view type = chunk.substr(4, 4);
-    if (type == "IHDR" || type == "IDAT" || type == "IEND") out += chunk;
-    png.remove_prefix(chunk.size());
-  }
-  return out;
-}
-
 std::string encode(int width_px, int height_px, png_uint_32 format, const void* pixels) {
   png_image header{};
   header.version = PNG_IMAGE_VERSION;
@@ -95,24 +140,7 @@ std::string encode(int width_px, int height_px, png_uint_32 format, const void* 
 }  // namespace
 
 Result<DepthImage> decode_depth(std::string_view bytes, const std::string& name, ExpectedSize expected) {
-  png_image header{};
-  header.version = PNG_IMAGE_VERSION;
-  const auto freed = [](png_image* it) { png_image_free(it); };
-  const std::unique_ptr<png_image, decltype(freed)> guard(&header, freed);
-  const auto failed = [&] {
-    return fail(ErrorCode::parse, "{}: no PNG image, or a damaged one: {}", name, header.message);
-  };
-  const std::string plain = without_colour(bytes);
-  if (png_image_begin_read_from_memory(&header, plain.data(), plain.size()) == 0) return failed();
-  if (auto ok = check_size(header.width, header.height, name, expected); !ok) return tl::unexpected(ok.error());
-  if (header.format != PNG_FORMAT_LINEAR_Y)
-    return fail(ErrorCode::unsupported, "{}: {} {}, expected a grey PNG image of 16 bits a pixel, as depth is", name,
-                (header.format & PNG_FORMAT_FLAG_LINEAR) != 0 ? "16 bits of" : "8 bits of",
-                (header.format & PNG_FORMAT_FLAG_COLOR) != 0 ? "colour" : "grey");
-  DepthImage out{static_cast<int>(header.width), static_cast<int>(header.height), {}};
-  out.value.resize(std::size_t{header.width} * header.height);
-  if (png_image_finish_read(&header, nullptr, out.value.data(), 0, nullptr) == 0) return failed();
-  return out;
+  return decode_16_bits(bytes, name, expected, true);
 }
 
 Result<DepthImage> read_depth(const std::string& path) {

@@ -49,6 +49,11 @@ TEST(ImageFile, DepthReadsBackWhateverIsReportedOfItsColour) {
   EXPECT_FALSE(decode_depth(encode_png(Image(4, 4)), "grey.png"));
 }
 
+TEST(ImageFile, APictureOfSixteenBitsIsStretched) {
+  const DepthImage picture{4, 1, {0x100, 0x300, 0x500, 0x200}};
+  EXPECT_EQ(decode_image(encode_depth(picture), "a.png").value().grey, (std::vector<std::uint8_t>{0, 128, 255, 64}));
+}
+
 TEST(ImageFile, ARealJpegAndWhatIsLeftOfIt) {
   TUTTI_REQUIRE_SHARED(kReal);
   const std::string bytes = read_file(test::shared_path(kReal).string()).value();

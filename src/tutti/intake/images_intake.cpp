@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "tutti/bags/camera.hpp"
+#include "tutti/bags/picture.hpp"
 #include "tutti/bags/rgbd.hpp"
 #include "tutti/bags/transform_tree.hpp"
 #include "tutti/model/nearest_stamp.hpp"

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "tutti/bags/camera.hpp"
+#include "tutti/bags/picture.hpp"
 #include "tutti/bags/rgbd.hpp"
 #include "tutti/formats/image_file.hpp"
 #include "tutti/mission/bag_messages.hpp"

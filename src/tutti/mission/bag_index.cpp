@@ -9,6 +9,7 @@
 
 #include "tutti/bags/camera.hpp"
 #include "tutti/bags/near_types.hpp"
+#include "tutti/bags/picture.hpp"
 #include "tutti/bags/robot_namespace.hpp"
 #include "tutti/bags/ros_fix.hpp"
 #include "tutti/bags/ros_messages.hpp"

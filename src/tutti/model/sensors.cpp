@@ -64,7 +64,7 @@ Status check_sensors(const Sensors& sensors) {
 
 Status check_images(const EncodedImages& images, const Sensors& sensors) {
   if (sensors.cameras.empty())
-    return fail(ErrorCode::unsupported, "images at {} ns: no camera is set up, Hello said none (Sensors.camera)",
+    return fail(ErrorCode::unsupported, "images at {} ns: no camera is set up: Hello has none (Sensors.camera)",
                 images.stamp.ns);
   const auto where = [&] { return fmt::format("images at {} ns", images.stamp.ns); };
   std::set<std::uint32_t> seen;
@@ -77,7 +77,7 @@ Status check_images(const EncodedImages& images, const Sensors& sensors) {
   }
   if (!seen.contains(0)) return fail(ErrorCode::invalid, "{}: none of camera 0, which the others follow", where());
   if (!images.depth) return {};
-  if (!sensors.depth) return fail(ErrorCode::unsupported, "{}: depth, of which Hello said nothing", where());
+  if (!sensors.depth) return fail(ErrorCode::unsupported, "{}: depth, which Hello does not announce", where());
   if (auto ok = check_image(*images.depth, sensors.cameras.front(), 2, "a depth image"); !ok)
     return in_context(where(), ok.error());
   return {};

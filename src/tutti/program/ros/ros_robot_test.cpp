@@ -136,7 +136,8 @@ TEST_F(RosRobots, ScansOfALivoxAreFed) {
   start();
   const auto odom = publisher("/alpha/odom", kOdometry);
   ASSERT_TRUE(is_heard(*odom));
-  for (const char* const type : {"livox_ros_driver2/msg/CustomMsg", "livox_ros_driver/msg/CustomMsg", kPoints}) {
+  for (const char* const type : {"livox_ros_driver2/msg/CustomMsg", "livox_ros_driver/msg/CustomMsg",
+                                 "livox_interfaces/msg/CustomMsg", kPoints}) {
     const auto lidar = publisher("/alpha/points", type);
     ASSERT_TRUE(is_heard(*lidar)) << type << said();
     bool is_fed = false;
