@@ -20,6 +20,7 @@ struct FileKind {
   std::string_view way_on;      ///< "{}" is the path.
   std::string_view poses = {};  ///< Instead of `way_on` where poses are asked for and can be had.
   std::string_view graph = {};  ///< The same for pose graphs.
+  std::string_view map = {};    ///< The same for maps of Tutti's.
   std::size_t offset = 0;
   std::string_view text = {};  ///< Stands somewhere in the head, too.
 };
@@ -43,6 +44,8 @@ constexpr std::string_view kPosesOfBag =
     "tutti bag info {0} says what is in it; tutti run {0} --out out/poses writes its odometry as a .tum file";
 constexpr std::string_view kGraphOfBag =
     "tutti bag info {0} says what is in it; tutti run {0} --out out/graph writes graph.g2o";
+constexpr std::string_view kMapOfBag =
+    "tutti run {0} --out out/mine --map out/mine.tutti makes one of it; tutti bag info {0} says what is in it";
 constexpr std::string_view kMap = "a map of Tutti's";
 constexpr std::string_view kShowMap =
     "tutti map info {0} says what is in it; recordings are run again with their bags: tutti run --bag NAME=BAG ..";
@@ -93,9 +96,10 @@ constexpr std::array kKinds{
              .way_on = {},
              .poses = kPosesOfBag,
              .graph = kGraphOfBag,
+             .map = kMapOfBag,
              .text = "CREATE TABLE topics("},
-    FileKind{"\x89MCAP0\r\n", kRecording, {}, kPosesOfBag, kGraphOfBag},
-    FileKind{"#ROSBAG V2", kRecording, {}, kPosesOfBag, kGraphOfBag},
+    FileKind{"\x89MCAP0\r\n", kRecording, {}, kPosesOfBag, kGraphOfBag, kMapOfBag},
+    FileKind{"#ROSBAG V2", kRecording, {}, kPosesOfBag, kGraphOfBag, kMapOfBag},
     FileKind{"#ROSBAG V1", "a bag of ROS before 2010 (format 1)", "rosbag fix {0} fixed.bag makes one of today's"},
     FileKind{"\x89PNG", kImage, kImages},
     FileKind{"\xff\xd8\xff", kImage, kImages},
@@ -134,6 +138,7 @@ bool begins(std::string_view head, std::string_view magic, std::size_t offset) {
 std::string_view in_words(FileUse use) {
   return use == FileUse::recording ? "recording (.mcap, .db3, .bag)"
          : use == FileUse::graph   ? "pose graph"
+         : use == FileUse::map     ? "map of Tutti's (.tutti)"
                                    : "trajectory";
 }
 
@@ -167,9 +172,10 @@ std::string known_otherwise(std::string_view head, const std::string& path, File
   if (kind == kKinds.end()) return use == FileUse::recording ? known_text(head, path) : "";
   const std::string_view& own = use == FileUse::recording ? kind->way_on
                                 : use == FileUse::graph   ? kind->graph
+                                : use == FileUse::map     ? kind->map
                                                           : kind->poses;
   const std::string_view way = own.empty() ? kind->way_on : own;
-  if (way.empty()) return "";  // a recording that is given as one
+  if (way.empty() || (use == FileUse::map && kind->name == kMap)) return "";  // it is given as what it is
   return fmt::format("is {}, expected a {}: {}", kind->name, in_words(use), fmt::format(fmt::runtime(way), path));
 }
 

@@ -10,7 +10,7 @@
 namespace tutti {
 
 /// The use that somebody gives a file for.
-enum class FileUse { recording, trajectory, graph };
+enum class FileUse { recording, trajectory, graph, map };
 
 /// So much of a file says what it is; tables of SQLite have their names in its first pages.
 inline constexpr std::size_t kHeadBytes = std::size_t{1} << 16;

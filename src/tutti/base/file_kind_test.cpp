@@ -52,9 +52,12 @@ TEST(FileKind, OfAnotherCommandNamesTheCommand) {
   expect_said(FileUse::recording, map,
               "is a map of Tutti's, expected a recording (.mcap, .db3, .bag): tutti map info x/file");
   expect_said(FileUse::graph, map, "tutti map export x/file --g2o");
+  EXPECT_EQ(known_otherwise(map, "x", FileUse::map), "");
   for (const std::string& bag : {"\x89MCAP0\r\n"s, "#ROSBAG V2.0\n"s, "SQLite format 3\0 CREATE TABLE topics(id"s}) {
     expect_said(FileUse::trajectory, bag, "is a recording, expected a trajectory: tutti bag info x/file");
     expect_said(FileUse::graph, bag, "is a recording, expected a pose graph: tutti bag info x/file");
+    expect_said(FileUse::map, bag,
+                "is a recording, expected a map of Tutti's (.tutti): tutti run x/file --out out/mine");
     EXPECT_EQ(known_otherwise(bag, "x", FileUse::recording), "");
   }
   expect_said(FileUse::recording, "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\n",

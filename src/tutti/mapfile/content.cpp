@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "tutti/mapfile/check_map_file.hpp"
 #include "tutti/node/decisions.hpp"
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/server/georeference.hpp"
@@ -133,14 +134,13 @@ server::MapEstimate estimate(const Content& content) {
 }
 
 Result<std::unique_ptr<storage::TableStore>> open(const std::filesystem::path& file) {
-  std::error_code failure;
-  if (!std::filesystem::is_regular_file(file, failure))
-    return fail(ErrorCode::io, "{}: no such file, expected a map", file.string());
+  if (const Status is_map = check_map_file(file); !is_map) return tl::unexpected(is_map.error());
   return storage::open_sqlite_store(file, storage::map_schema());
 }
 
 Result<std::unique_ptr<storage::TableStore>> open_copy(const std::filesystem::path& file) {
   namespace fs = std::filesystem;
+  if (const Status is_map = check_map_file(file); !is_map) return tl::unexpected(is_map.error());
   std::error_code failure;
   std::string folder = (fs::temp_directory_path(failure) / "tutti_map_XXXXXX").string();
   if (::mkdtemp(folder.data()) == nullptr)

@@ -8,6 +8,8 @@
 #include <filesystem>
 
 #include "support/mapfile/small_map.hpp"
+#include "tutti/base/file.hpp"
+#include "tutti/mapfile/salvage.hpp"
 #include "tutti/storage/sqlite_store.hpp"
 
 namespace tutti::mapfile {
@@ -41,6 +43,21 @@ TEST(Content, OfAMapThatIsOpenACopyIsRead) {
   EXPECT_FALSE(open_copy(folder / "none").has_value());
   EXPECT_TRUE(fs::is_empty(temporary));
   setenv("TMPDIR", usual.c_str(), 1);
+  fs::remove_all(folder);
+}
+
+TEST(Content, OfABagIsNamedWithTheCommandThatMakesAMap) {
+  const fs::path folder = fs::path(testing::TempDir()) / ("content_of_a_bag_" + std::to_string(getpid()));
+  const fs::path bag = folder / "a.mcap";
+  fs::create_directories(folder);
+  ASSERT_TRUE(write_file(bag.string(), "\x89MCAP0\r\n and so on"));
+  for (const auto& asked : {open(bag).error().message, open_copy(bag).error().message,
+                            salvage(bag, folder / "out.tutti", 0).error().message})
+    EXPECT_NE(asked.find("a.mcap: is a recording, expected a map of Tutti's (.tutti): tutti run " + bag.string()),
+              std::string::npos)
+        << asked;
+  EXPECT_NE(open(folder).error().message.find("is a folder, expected a map of Tutti's (.tutti): tutti map list"),
+            std::string::npos);
   fs::remove_all(folder);
 }
 

@@ -9,6 +9,7 @@
 #include <span>
 #include <system_error>
 
+#include "tutti/mapfile/check_map_file.hpp"
 #include "tutti/mapfile/make_map.hpp"
 #include "tutti/node/decisions.hpp"
 #include "tutti/node/map_meta.hpp"
@@ -43,8 +44,8 @@ Status note_news(storage::TableStore& map) {
 
 /// With the log that is part of it.
 Status copy_store(const fs::path& in, const fs::path& copy) {
+  if (Status known = check_map_file(in); !known) return known;
   std::error_code failure;
-  if (!fs::is_regular_file(in, failure)) return fail(ErrorCode::io, "{}: no such file, expected a store", in.string());
   fs::copy_file(in, copy, failure);
   if (!failure && fs::exists(in.string() + "-wal"))
     fs::copy_file(in.string() + "-wal", copy.string() + "-wal", failure);
