@@ -366,7 +366,7 @@ robots:
   - {name: bravo, bag: bravo}
 agent: {submap: {duration_s: 5.0, representative_distance_m: 0.3, visual: {send_imu: true}}}
 tracking: {tracker: {descriptors: {kind: orb}}}
-closures: {verifier: visual, visual: {max_hamming: 0.2}}
+closures: {verifier: visual}
 )";
 
 /// Verifiers draw by submaps' names, hence the session. Alpha's cameras and IMU are found by type, because the
