@@ -99,7 +99,8 @@ void FitWatch::compare(const fit::SteadyDrift& drift) {
   };
   for (const fit::Misfit& misfit : misfits_) {
     const bool is_standstill = misfit.kind == fit::MisfitKind::stood_still;
-    if (is_in(misfit, said_) || (!is_standstill && !is_in(misfit, before))) continue;
+    const bool is_at_once = is_standstill || misfit.kind == fit::MisfitKind::scans_stand_still;
+    if (is_in(misfit, said_) || (!is_at_once && !is_in(misfit, before))) continue;
     if (!is_standstill) std::erase_if(said_, [&](const fit::Misfit& said) { return said.kind == misfit.kind; });
     said_.push_back(misfit);
     news_.push_back(misfit);

@@ -28,6 +28,8 @@ struct Mission {
   double scans_late_s = 0.0, points_times = 1.0;
   double frozen_from_s = 1e9, frozen_for_s = 5.0;
   double drift_deg_per_m = 0.0;
+  double duration_s = kDuration_s;
+  bool in_world = false;  ///< Clouds are moved into odometry's frame, and labelled with the sensor's.
   std::string fit = "use";
 
   std::vector<Submap> submaps;
@@ -49,6 +51,8 @@ struct Mission {
         Rng(static_cast<std::uint64_t>(t * 1000)));
     auto cloud = std::make_shared<PointCloud>(seen);
     for (Eigen::Vector3f& p : cloud->points) p *= static_cast<float>(points_times);
+    if (in_world)
+      for (Eigen::Vector3f& p : cloud->points) p = (T * p.cast<double>().eval()).cast<float>();
     return {kStart + (t + scans_late_s), cloud, nullptr};
   }
   void drive() {
@@ -58,7 +62,7 @@ struct Mission {
     RobotAgent agent(RobotId{0}, 1, config);
     const Matrix6d covariance = tutti::test::diagonal_covariance(1e-3, 1e-4);
     const auto every = static_cast<int>(kScanStep_s / kOdometryStep_s);
-    for (int k = 0; k * kOdometryStep_s < kDuration_s; ++k) {
+    for (int k = 0; k * kOdometryStep_s < duration_s; ++k) {
       const double t = k * kOdometryStep_s;
       ASSERT_TRUE(agent.add(OdometrySample{kStart + t, odometry_at(t), covariance}));
       if (const double of = t - scans_late_s; k % every == 0 && of >= 0.0 && agent.wants_scan(kStart + t)) {
@@ -120,6 +124,13 @@ TEST(FitWatch, ALateClockIsSaidOnce) {
   ASSERT_EQ(run.said.size(), 1U);
   EXPECT_EQ(run.said[0].kind, fit::MisfitKind::clock);
   EXPECT_NEAR(run.said[0].value, -0.6, 0.03);
+}
+
+TEST(FitWatch, ACloudThatIsInTheWorldIsSaidAfterOneSubmap) {
+  Mission run{.duration_s = 12.0, .in_world = true};
+  run.drive();
+  ASSERT_EQ(run.said.size(), 1U);
+  EXPECT_EQ(run.said[0].kind, fit::MisfitKind::scans_stand_still);
 }
 
 TEST(FitWatch, PointsThatAreNotInMetresAreSaid) {
