@@ -76,7 +76,7 @@ void bind_closure(py::module_& m) {
       .def_property_readonly(
           "state", [](const mapfile::ClosureInfo& i) { return std::string(to_string(i.state)); },
           "accepted, rejected or candidate, which was not judged.")
-      .def_readonly("reason", &mapfile::ClosureInfo::reason, "Why it is not accepted, or who said so.")
+      .def_readonly("reason", &mapfile::ClosureInfo::reason, "Why it is not accepted, or who decided so.")
       .def_property_readonly(
           "misfit_m",
           [](const mapfile::ClosureInfo& i) {

@@ -64,7 +64,7 @@ int check(const mission::BagVerdict& verdict) {
   if (!verdict.is_ready) return complain("bag info", "--check: the bag cannot be run");
   ProgressLine progress;
   const auto found =
-      mission::check_bag(verdict, [&progress, stop = announced_stop("what is known by now is said")](double share) {
+      mission::check_bag(verdict, [&progress, stop = announced_stop("what is known by now is reported")](double share) {
         progress.show(share, fmt::format("{:4.0f} % compared", 100.0 * share));
         return stop();
       });

@@ -254,10 +254,10 @@ int tell_why(const WhyOptions& options) {
 }  // namespace
 
 void add_map_command(CLI::App& app, int& exit_code) {
-  CLI::App* map = app.add_subcommand(
-      "map",
-      "Look into maps, export and join them, and say which closures are right. On files that no server has open, but "
-      "for 'export'.");
+  CLI::App* map = app.add_subcommand("map",
+                                     "Look into maps, export and merge them, and decide which closures are right. On "
+                                     "files that no server has open, but "
+                                     "for 'export'.");
   map->require_subcommand(1);
 
   const auto folder = std::make_shared<std::string>(".");
@@ -276,7 +276,7 @@ void add_map_command(CLI::App& app, int& exit_code) {
   const auto asked = std::make_shared<WhyOptions>();
   CLI::App* why = map->add_subcommand(
       "why",
-      "Why two robots' maps are not joined: which of their submaps came nearest to a closure, and what stopped it.");
+      "Why two robots' maps are not merged: which of their submaps came nearest to a closure, and what stopped it.");
   why->footer("Also of a map that a server has open. Example: tutti map why state/map.tutti alpha bravo\n");
   why->add_option("map", asked->map, "The map's file.")->type_name("MAP")->required();
   why->add_option("robots", asked->robots, "The two robots.")->type_name("ROBOT")->required()->expected(2);

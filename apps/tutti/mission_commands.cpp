@@ -41,7 +41,7 @@ void show(const mission::Progress& progress, ProgressLine& line) {
   const double share = progress.duration_s > 0.0 ? std::min(1.0, progress.time_s / progress.duration_s) : 1.0;
   const std::string maps = progress.components == 0   ? "no map yet"
                            : progress.components == 1 ? "1 map"
-                                                      : fmt::format("{} maps (not joined yet)", progress.components);
+                                                      : fmt::format("{} maps (not merged yet)", progress.components);
   line.show(share, fmt::format("{:4.0f} % of {:.0f} s   {} submaps, {} closures, {}", 100.0 * share,
                                progress.duration_s, progress.submaps, progress.closures, maps));
 }
@@ -223,7 +223,7 @@ void add_demo_command(CLI::App& app, int& exit_code) {
       ->add_option_function<std::string>(
           "--live", [live](const std::string& port) { live->emplace(port.empty() ? kPagePort : std::stoi(port)); },
           fmt::format("Watch it: the same robots as programs of their own, four times as fast as they walk, and their "
-                      "map on a\npage at this port of this machine, {} unless said otherwise",
+                      "map on a\npage at this port of this machine, {} unless stated otherwise",
                       kPagePort))
       ->expected(0, 1)
       ->check(CLI::Range(1, 65535) | CLI::IsMember(std::vector<std::string>{""}))
@@ -244,7 +244,7 @@ void add_run_command(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<MissionArguments>();
   CLI::App* command = app.add_subcommand(
       "run",
-      "Run a mission: replay (or simulate) its robots, join their maps on the server, send proxy graphs back,\n"
+      "Run a mission: replay (or simulate) its robots, merge their maps on the server, send proxy graphs back,\n"
       "correct the robots, and write a report (report.html, report.json, trajectories, graph, map).\n"
       "The same mission, data and seed give the same report.json.");
   const auto bags = std::make_shared<std::vector<std::string>>(), topics = std::make_shared<std::vector<std::string>>();

@@ -75,7 +75,7 @@ void add_mission_command(CLI::App& app, int& exit_code) {
                                             "each\n"
                                             "robot over its live feed; wait until every one has had its recording and "
                                             "heard the last map; stop them and write the same report as\n"
-                                            "tutti run. What each program said and stored is left in OUT/state.");
+                                            "tutti run. What each program reported and stored is left in OUT/state.");
   add_mission_argument(*command, *common, "The mission, or 'demo'")->required();
   command
       ->add_option("-o,--out", options->out,

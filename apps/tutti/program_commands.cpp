@@ -47,7 +47,7 @@ void add_server_command(CLI::App& app, int& exit_code) {
   options->version = TUTTI_VERSION;
   CLI::App* command = app.add_subcommand(
       "server",
-      "The mapping server: joins the maps of all robots of its bus into one file, STATE/map.tutti, and sends each "
+      "The mapping server: merges the maps of all robots of its bus into one file, STATE/map.tutti, and sends each "
       "robot\n"
       "what it needs. Without --bus it starts a nats-server of its own. Prints one line: the command that starts a "
       "robot.\n"

@@ -42,7 +42,7 @@ inline void add_rate_option(CLI::App& command, double& rate, const std::string& 
 inline void add_program_options(CLI::App& command, ProgramArguments& arguments) {
   command
       .add_option("--log-level", arguments.log_level,
-                  "What is said on stderr: debug, info, warning or error; STATE/log.txt has all from info on")
+                  "What is reported on stderr: debug, info, warning or error; STATE/log.txt has all from info on")
       ->check(CLI::IsMember({"debug", "info", "warning", "error"}))
       ->type_name("LEVEL")
       ->capture_default_str();

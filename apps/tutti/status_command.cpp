@@ -110,10 +110,9 @@ int show_once(bus::Port& port, View& view, const StatusOptions& options) {
   }
   const std::string error = view.problem().empty() ? port.state().last_error : view.problem();
   if (!connected) return complain("status", fmt::format("no link to a bus at {} ({})", options.bus.url, error));
-  return complain("status",
-                  fmt::format("there is a bus at {}, but no server{} has said anything on it{}", options.bus.url,
-                              options.bus.mission.empty() ? "" : " of mission '" + options.bus.mission + "'",
-                              error.empty() ? "" : " (" + error + ")"));
+  return complain("status", fmt::format("there is a bus at {}, but no server{} has reported on it{}", options.bus.url,
+                                        options.bus.mission.empty() ? "" : " of mission '" + options.bus.mission + "'",
+                                        error.empty() ? "" : " (" + error + ")"));
 }
 
 int watch(bus::Port& port, View& view, const StatusOptions& options) {
@@ -161,7 +160,7 @@ void add_status_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "status", "Who is there, and how the mission stands: what the server on this bus says every two seconds.");
   command->footer(
-      "Exit codes: 0 the server is there; 1 no bus, or no server (then what it said last); 2 usage.\n"
+      "Exit codes: 0 the server is there; 1 no bus, or no server (then what it reported last); 2 usage.\n"
       "Without --bus the server on this machine is asked.\n"
       "Example: tutti status --watch\n");
   add_bus_options(*command, options->bus);

@@ -8,7 +8,7 @@ export const COLOUR_MODES = {
   sigma: "uncertainty",
   held: "closures that hold it",
   disagreement: "disagreement with odometry",
-  part: "part of the map",
+  part: "component of the map",
   survey: "distance to the survey",
 } as const;
 export type ColourMode = keyof typeof COLOUR_MODES;
@@ -72,7 +72,7 @@ export function default_options(): Options {
 export const PHASES = {
   deploy: {
     name: "Deploy",
-    help: "Is everybody here, and joined?",
+    help: "Is everybody here, and merged?",
     tab: "alerts",
     colour: "robot",
     layers: { candidate: false, rejected: false },

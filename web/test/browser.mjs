@@ -61,7 +61,7 @@ test("a robot goes silent: grey, a circle, an alert; comes back and drains", () 
     await page.until("bravo is silent", () => document.querySelectorAll(".robot.silent").length === 1);
     assert.match((await page.texts(".robot.silent .detail"))[0], /May be within [23]\d\.\d\sm/);
     assert.ok(
-      (await page.texts(".alert")).some((text) => /^silent.*bravo/.test(text)),
+      (await page.texts(".alert")).some((text) => /^bravo: silent/.test(text)),
       (await page.texts(".alert")).join(),
     );
     assert.deepEqual(await page.texts(".robot b"), ["bravo", "alpha", "charlie"], "who is missed stands first");
@@ -100,7 +100,7 @@ test("an alert is acknowledged by one for all, and stays so over a reload", () =
       "loaded",
       () => tutti.app.ready && document.querySelector(".alerts")?.textContent.includes("acknowledged"),
     );
-    assert.match((await page.texts(".alert.seen"))[0], /^its part of the map is joined to no other.*charlie/);
+    assert.match((await page.texts(".alert.seen"))[0], /^charlie.*: its component of the map is merged with no other/);
   }));
 
 test("who comes late sees what was before, and where nothing is known", () => {
@@ -125,7 +125,7 @@ test("who comes late sees what was before, and where nothing is known", () => {
     assert.match((await page.texts(".clock .unknown"))[0], /^nothing before 0:01:40$/);
     await page.evaluate(() => tutti.app.set_time(125));
     await page.until("bravo was silent then", () =>
-      /silent.*bravo/.test(document.querySelector(".alert")?.textContent),
+      /bravo: silent/.test(document.querySelector(".alert")?.textContent),
     );
     assert.equal(
       await page.evaluate((name) => tutti.app.store.get("closure", 125, name).state, closure.name),
@@ -167,7 +167,7 @@ test("of a hundred robots one cause is one line, who is missed stands first, and
     const alerts = await page.texts(".alert");
     assert.equal(alerts.length, 2, alerts.join("\n"));
     assert.match(alerts[0], /^4 robots: silent.*r17, r42, r63, r88/);
-    assert.match(alerts[1], /^10 robots: its part of the map is joined to no other/);
+    assert.match(alerts[1], /^10 robots: its component of the map is merged with no other/);
     await page.press("Unfold");
     await page.until("each of the four", () => document.querySelectorAll(".alert").length === 6);
     await page.press("Fold");

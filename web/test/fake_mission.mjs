@@ -305,10 +305,10 @@ export class FakeMission {
       out.push({
         id: `map/${number}/alone`,
         severity: "info",
-        what: "its part of the map is joined to no other",
+        what: "its component of the map is merged with no other",
         where: this.robots[number],
         since_s: 30,
-        todo: "Ask “why not joined”, or add a closure by hand where both were.",
+        todo: "Ask “why not merged”, or add a closure by hand where both were.",
         robot: number,
         submap: null,
         closure: null,

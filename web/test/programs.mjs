@@ -39,7 +39,7 @@ async function play(browser) {
   await page.until("bravo is in the picture", () => tutti.app.world.placed.size > 0, undefined, kPatience_ms);
   robots.alpha = started.robot("alpha", bus); // whose map takes bravo's into another frame, out of the picture that there was
   await page.until(
-    "alpha and bravo are joined",
+    "alpha and bravo are merged",
     () =>
       tutti.app.world.parts.size === 1 &&
       new Set([...tutti.app.world.placed.values()].map((p) => p.submap.robot)).size === 2 &&
@@ -62,7 +62,7 @@ async function play(browser) {
     "that is an alert",
     () =>
       /charlie/.test(
-        [...document.querySelectorAll(".alert")].find((a) => /joined to no other/.test(a.textContent))?.textContent ??
+        [...document.querySelectorAll(".alert")].find((a) => /merged with no other/.test(a.textContent))?.textContent ??
           "",
       ),
     undefined,

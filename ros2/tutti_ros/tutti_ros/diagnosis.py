@@ -18,7 +18,7 @@ def diagnosis(link, correction, situation, trouble, is_alive=True):
     if situation:  # what the robot reports of itself; what is counted here stands above it
         values = {**{value.name: value.text for value in situation.status}, **values}
     mates = situation.team_mate if situation else []
-    values["team_mates"] = ", ".join(mate.name + ("" if mate.same_component else " (not joined yet)") for mate in mates)
+    values["team_mates"] = ", ".join(mate.name + ("" if mate.same_component else " (not merged yet)") for mate in mates)
     alerts = [alert.text for alert in situation.alert] if situation else []
     values.update({f"alert {i}": text for i, text in enumerate(alerts)})
     values.update({f"trouble {i}": text for i, text in enumerate(trouble)})

@@ -89,9 +89,10 @@ Result<std::string> cloud_of_map(const MapSource& map, const FormatSettings&, co
   const auto cloud = mapfile::export_cloud(*map.store, map.content, map.estimate, out, format);
   if (!cloud) return tl::unexpected(cloud.error());
   if (cloud->points == 0) return fail(ErrorCode::invalid, "{}: no submap has a cloud", map.file.string());
-  return fmt::format("{}: {} points of {} submaps{}{}", out.string(), cloud->points, cloud->submaps,
-                     cloud->left_out > 0 ? fmt::format("; {} are not tied to these", cloud->left_out) : "",
-                     cloud->of_the_largest ? "" : "; the largest part of the map has no clouds, this is of another");
+  return fmt::format(
+      "{}: {} points of {} submaps{}{}", out.string(), cloud->points, cloud->submaps,
+      cloud->left_out > 0 ? fmt::format("; {} are not tied to these", cloud->left_out) : "",
+      cloud->of_the_largest ? "" : "; the largest component of the map has no clouds, this is of another");
 }
 
 Result<std::string> ply_of_run(const fs::path& folder, const FormatSettings&, const fs::path& out) {

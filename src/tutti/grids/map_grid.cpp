@@ -131,7 +131,7 @@ Result<std::map<ChainId, double>> body_heights(MapPart& part, const MapGridConfi
   for (const auto& [chain, points] : below)
     if (const auto height = points.most()) out[chain] = *height;
   if (out.empty())
-    return fail(ErrorCode::invalid, "no points below any robot: where the ground is has to be said (body height)");
+    return fail(ErrorCode::invalid, "no points below any robot: where the ground is has to be stated (body height)");
   return out;
 }
 

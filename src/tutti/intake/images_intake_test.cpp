@@ -21,7 +21,7 @@ TEST(ImagesIntake, CamerasAndImuAreKnownOnceCalibrationAndPlaceAre) {
   ASSERT_TRUE(robot.images.add_info(0, bags::encode(calibration())));
   expect(robot.images.missing(), "/r/left/image_raw: no image");
   ASSERT_TRUE(robot.images.add_image(0, bags::encode(grey_image(kStart))));
-  expect(robot.images.missing(), "no odometry has said yet which frame is the body");
+  expect(robot.images.missing(), "no odometry has shown yet which frame is the body");
   robot.go(0);
   ASSERT_TRUE(robot.images.add_imu(imu(kStart)));
   expect(robot.images.missing(), "no transform from 'camera' to 'base_link' on /tf_static");

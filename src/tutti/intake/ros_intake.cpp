@@ -250,7 +250,7 @@ std::optional<OdometrySample> RosIntake::next_odometry(bool wait_for_scans) {
 }
 
 Result<Pose3> RosIntake::pose_on_body(const std::string& frame) const {
-  if (!frames_) return fail(ErrorCode::invalid, "no odometry has said yet which frame is the body");
+  if (!frames_) return fail(ErrorCode::invalid, "no odometry has shown yet which frame is the body");
   const std::string from = bags::frame_name(frame), &body = frames_->body;
   if (from == body) return Pose3{};
   if (const auto found = own_tree_.find(body, from)) return *found;

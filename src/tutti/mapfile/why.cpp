@@ -53,16 +53,16 @@ NearMiss miss_of(const server::ClosureNames& names, const SubmapPair& pair, cons
 
 std::string sentence_of(const WhyNotJoined& why, const std::string& robot, const std::string& other) {
   if (why.is_joined)
-    return fmt::format("{} and {} are joined: {} pairs of their submaps have closures in the map", robot, other,
+    return fmt::format("{} and {} are merged: {} pairs of their submaps have closures in the map", robot, other,
                        why.accepted);
   if (why.compared == 0)
     return fmt::format(
-        "{} and {} are not joined: none of their submaps were compared, not yet or because others look more alike from "
+        "{} and {} are not merged: none of their submaps were compared, not yet or because others look more alike from "
         "above (server.candidates_per_submap)",
         robot, other);
   if (why.nearest.empty())
-    return fmt::format("{} and {} are not joined: of {} pairs of submaps none came near", robot, other, why.compared);
-  return fmt::format("{} and {} are not joined: of {} pairs of submaps the nearest is {}, stopped by: {}", robot, other,
+    return fmt::format("{} and {} are not merged: of {} pairs of submaps none came near", robot, other, why.compared);
+  return fmt::format("{} and {} are not merged: of {} pairs of submaps the nearest is {}, stopped by: {}", robot, other,
                      why.compared, why.nearest.front().name, why.nearest.front().reason);
 }
 

@@ -40,7 +40,7 @@ TEST_F(WhyNot, SaysThatTheyAreJoinedWhenTheyAre) {
   ASSERT_TRUE(why.has_value()) << why.error().message;
   EXPECT_TRUE(why->is_joined);
   EXPECT_GT(why->accepted, 0U);
-  EXPECT_NE(why->sentence.find("are joined"), std::string::npos) << why->sentence;
+  EXPECT_NE(why->sentence.find("are merged"), std::string::npos) << why->sentence;
 }
 
 TEST_F(WhyNot, TheNearestIsWhatWasStoppedLastAndByLeast) {

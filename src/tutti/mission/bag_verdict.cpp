@@ -31,7 +31,7 @@ std::string word(const std::string& path) {
 /// Why no closure can be found with what the robot has seen.
 std::string without_sensors(const BagRecording& bag) {
   return fmt::format(
-      "{}: odometry alone joins no maps: no scans, and no images ({}); record a topic of "
+      "{}: odometry alone merges no maps: no scans, and no images ({}); record a topic of "
       "sensor_msgs/PointCloud2, or of images with its CameraInfo and /tf_static",
       bag.file, bag.no_images.empty() ? "none are there" : bag.no_images);
 }

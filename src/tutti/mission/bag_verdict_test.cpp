@@ -71,7 +71,7 @@ TEST_F(BagVerdicts, OneOfSeveralRobotsIsNamedForEach) {
 TEST_F(BagVerdicts, WhatRunWouldRefuseIsSaid) {
   const std::pair<const char*, const char*> cases[] = {
       {"no odometry", "no odometry: expected a topic of nav_msgs/Odometry"},
-      {"no scans", "odometry alone joins no maps: no scans, and no images (no sensor_msgs/Image"},
+      {"no scans", "odometry alone merges no maps: no scans, and no images (no sensor_msgs/Image"},
       {"no transform", "--set robots.alpha.T_body_lidar"},
       {"another clock", "robots.alpha.scan_time_offset_s="}};
   for (const auto& [kind, said] : cases) {

@@ -118,7 +118,7 @@ void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapE
     out.server_estimate = std::move(server_estimate);
     if (left_out > 0)
       record.notes.push_back(fmt::format(
-          "{}: the server holds parts of its trajectory that nothing joins; {} of {} keyframes are not in the "
+          "{}: the server holds components of its trajectory that no closure merges; {} of {} keyframes are not in the "
           "largest and left out of its figures",
           out.name, left_out, left_out + out.server_estimate.size()));
     if (!out.server_estimate.empty()) out.mapped_share = share_of(scoring.trajectory, out.server_estimate);

@@ -25,7 +25,7 @@ std::span<const OperatorSetting> operator_settings() {
        "The server optimises and broadcasts when there is news, but not more often than this."},
       {"closures.verifier", "Loop closures come from LiDAR scans, or from the reference where there are none."},
       {"closures.lidar.min_overlap",
-       "Two submaps that overlap less than this are not joined: lower finds more closures, and more wrong ones."},
+       "Two submaps that overlap less than this get no closure: lower finds more closures, and more wrong ones."},
       {"link.loss", "The share of radio messages that is lost."},
       {"link.bandwidth_bytes_per_s", "What the radio of a robot carries in each direction; 0 is unlimited."},
   }};

@@ -135,7 +135,7 @@ void RobotNode::receive_receipt(const bus::Envelope& envelope, Timestamp now, St
     }
     if (is_refused)
       step.emit(now, MessageRefused{bus::Endpoint::of(agent_.robot()), bus::MessageKind::submap,
-                                    fmt::format("submap {} is refused by the server, which last said: {}",
+                                    fmt::format("submap {} is refused by the server, which last reported: {}",
                                                 to_string(id), receipt->why_refused)});
     if (is_refused || receipt->contains(id))
       known.push_back(id);

@@ -73,9 +73,9 @@ std::string mission_status_text(const MissionStatus& status, double silent_s) {
   const auto say = [&out]<class... Args>(fmt::format_string<Args...> format, Args&&... args) {
     fmt::format_to(std::back_inserter(out), format, std::forward<Args>(args)...);
   };
-  if (silent_s > 0.0) say("No server: last seen {} ago. What it said then:\n", duration(silent_s));
+  if (silent_s > 0.0) say("No server: last seen {} ago. What it reported then:\n", duration(silent_s));
   say("server {}: {} submaps, {} closures, {}; revision {}{}{}\n", status.version, status.submaps, status.closures,
-      status.components > 1 ? fmt::format("{} parts that nothing joins yet", status.components) : "one map",
+      status.components > 1 ? fmt::format("{} components that no closure merges yet", status.components) : "one map",
       status.revision, status.has_news ? ", the next is due" : "",
       status.pending_jobs > 0 ? fmt::format(", {} jobs wait", status.pending_jobs) : "");
   if (!status.trouble.empty()) say("trouble: {}\n", status.trouble);

@@ -30,7 +30,7 @@ TEST(StatusText, SaysWhoIsThereAndHowItStands) {
                              .workers = {{3, Timestamp{} + 999.0, {.name = "worker_3", .jobs_done = 77}}},
                              .refusals = {{"robot", "submap", 5, "no good"}}};
   EXPECT_EQ(mission_status_text(status, 0.0),
-            "server 0.9: 31 submaps, 17 closures, 2 parts that nothing joins yet; revision 42, 4 jobs wait\n"
+            "server 0.9: 31 submaps, 17 closures, 2 components that no closure merges yet; revision 42, 4 jobs wait\n"
             "robot  last seen  backlog      last update  revision  submaps  alerts  battery %  state\n"
             "alpha  2 s ago    12 (3.4 MB)  10 min ago   41        30       2       41.25      maps: the disk is full\n"
             "bravo  never      -            never        -         1        0       -          not seen since the "
@@ -45,7 +45,7 @@ TEST(StatusText, SaysWhoIsThereAndHowItStands) {
 TEST(StatusText, SaysWhenNobodyIsThere) {
   const std::string text = mission_status_text({.version = "0.9"}, 200.0);
   EXPECT_EQ(text,
-            "No server: last seen 3 min ago. What it said then:\n"
+            "No server: last seen 3 min ago. What it reported then:\n"
             "server 0.9: 0 submaps, 0 closures, one map; revision 0\n"
             "Nobody is there: no robot and no worker.\n");
 }

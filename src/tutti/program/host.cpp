@@ -243,7 +243,7 @@ Status Host::carry_out_said() {
   Status carried_out;
   const auto thrown = thrown_by([&] { carried_out = store_and_send(std::exchange(said_, {})); });
   if (!thrown) return carried_out;
-  note_thrown("what it has said", *thrown);
+  note_thrown("what it has reported", *thrown);
   trouble_ = fmt::format("cannot carry out what it says, tries again every {} s: {}", kReopen_s, *thrown);
   return fail(ErrorCode::invalid, "{}", trouble_);
 }

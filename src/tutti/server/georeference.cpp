@@ -177,7 +177,7 @@ const char* to_string(FixObjection objection) {
     case FixObjection::misfit:
       return "they do not fit the map";
     case FixObjection::unaligned:
-      return "where their part of the map lies on the earth is not certain";
+      return "where their component of the map lies on the earth is not certain";
   }
   return "";
 }

@@ -36,7 +36,7 @@ export interface Legend {
 }
 
 const kHolding: { most: number; colour: Rgb; label: string }[] = [
-  { most: 0, colour: [150, 160, 175], label: "root of its part" },
+  { most: 0, colour: [150, 160, 175], label: "root of its component" },
   { most: 1, colour: [255, 93, 117], label: "1: hangs on one" },
   { most: 2, colour: [240, 180, 70], label: "2" },
   { most: Infinity, colour: [70, 200, 150], label: "3 or more" },
@@ -186,7 +186,7 @@ export function legend_of(world: World, d: Dressing): Legend {
       };
     case "part":
       return {
-        title: "part of the map",
+        title: "component of the map",
         entries: [...world.parts.values()].map((p) => ({
           colour: css(robot_rgb(p.component, d.dark)),
           label: `part ${p.component + 1}`,

@@ -263,7 +263,7 @@ function draw_part_names(app: App, ink: Ink, palette: Palette): void {
   const { parts } = app.world;
   if (parts.size < 2) return;
   const largest = Math.max(...[...parts.values()].map((p) => p.submaps));
-  const beside = parts.size > kFewParts ? "" : ": not joined, placed beside";
+  const beside = parts.size > kFewParts ? "" : ": not merged, placed beside";
   for (const part of parts.values()) {
     const at = [0, 1, 2].map((k) => (k === 1 ? part.low[1] : (part.low[k] + part.high[k]) / 2) + part.offset[k]);
     const text = part.submaps === largest ? `part ${part.component + 1}` : `part ${part.component + 1}${beside}`;

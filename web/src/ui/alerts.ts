@@ -128,14 +128,13 @@ function line(app: App, view: View, alert: Alert, seen: boolean): Child {
     h(
       "div",
       { class: "line" },
-      h("b", {}, alert.what),
+      h("b", {}, alert.where ? `${alert.where}: ${alert.what}` : alert.what),
       h(
         "span",
         { class: "seen", title: alert.since_s === null ? "" : `since ${moment(alert.since_s)}` },
         alert.since_s === null ? "" : span(app.shown() - alert.since_s),
       ),
     ),
-    alert.where ? h("p", {}, alert.where) : null,
     seen && seen_by(app, alert) ? h("p", { class: "names" }, `${seen_by(app, alert)} has seen it`) : null,
     alert.todo ? h("p", { class: "todo" }, alert.todo) : null,
     h(

@@ -203,7 +203,7 @@ function change_words(app: App): Child {
     if (moved > 0) per_robot.set(submap.robot, Math.max(per_robot.get(submap.robot) ?? 0, moved));
   }
   return [
-    change.joined > 0 ? h("p", {}, `It would join ${many(change.joined + 1, "part")} of the map.`) : null,
+    change.joined > 0 ? h("p", {}, `It would merge ${many(change.joined + 1, "component")} of the map.`) : null,
     change.largest_m > TIMES.ghost_m
       ? h(
           "p",

@@ -53,7 +53,7 @@ function heading(app: App, name: string, closure: Closure): Child {
       ? h(
           "p",
           { class: "decision" },
-          `${closure.decision.by || "Somebody"} said ${closure.decision.wish}${closure.decision.wall_ns ? ` at ${wall(closure.decision.wall_ns)}` : ""}.`,
+          `${closure.decision.by || "Somebody"} decided ${closure.decision.wish}${closure.decision.wall_ns ? ` at ${wall(closure.decision.wall_ns)}` : ""}.`,
         )
       : null,
   ];

@@ -154,7 +154,7 @@ function line(app: App, view: View, id: string, mark: Mark): HTMLElement {
             ? h(
                 "p",
                 { class: "detail" },
-                `Its submap is known to ${metres(sigma_m)} (one sigma) beside the rest of its robot's way. How well its place is known from the first keyframe of its part, which is another number, is in the table of marks (tutti export STATE/map.tutti --live -o marks.csv).`,
+                `Its submap is known to ${metres(sigma_m)} (one sigma) beside the rest of its robot's way. How well its place is known from the first keyframe of its component, which is another number, is in the table of marks (tutti export STATE/map.tutti --live -o marks.csv).`,
               )
             : null,
           mark.photo && is_photo(mark.photo) ? h("img", { src: mark.photo, alt: "Photo of the mark" }) : null,

@@ -260,7 +260,7 @@ function origins(report: Node): HTMLElement | null {
   }
   return rows.length
     ? section(
-        "Where odometry and map part",
+        "Where odometry and map differ",
         "Suspected: segments where the robot's comparison says that its odometry left the map. True: only the simulator knows them.",
         table(["robot", "origin", "from", "until", "moved", "turned", "over chance", ""], rows, 2),
       )

@@ -201,7 +201,7 @@ function icons(app: App, robot: RobotView): Child[] {
     icon("link", ...heard(robot)),
     icon(
       "joined",
-      main ? "Joined to the map" : joined ? "Its part is not joined to the largest part" : "Not in the map yet",
+      main ? "Merged into the map" : joined ? "Its component is not merged with the largest" : "Not in the map yet",
       main ? "on" : joined ? "warn" : "off",
     ),
     icon("corrects", corrects(status), status?.update_age_s == null ? "off" : "on"),

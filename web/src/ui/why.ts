@@ -39,7 +39,7 @@ export function why_panel(app: App, view: View, open: (tab: string) => void): HT
         names.map((name) => h("option", { value: name, selected: asked[end] === name }, name)),
       );
     return [
-      h("p", { class: "lead" }, "Why are these two not joined?"),
+      h("p", { class: "lead" }, "Why are these two not merged?"),
       h(
         "div",
         { class: "row" },

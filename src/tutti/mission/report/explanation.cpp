@@ -59,7 +59,7 @@ std::string format_motion_error(double translation_m, double rotation_rad) {
 std::string format_disagreement(const Explanation& e) {
   if (!e.disagrees()) return "odometry and map agree within what the server is sure of";
   const double largest = largest_significance(e);
-  return fmt::format("odometry and map part by up to {} the threshold{}", format_significance(largest),
+  return fmt::format("odometry and map differ by up to {} the threshold{}", format_significance(largest),
                      e.direction_significance == largest ? ", in what closures know best" : "");
 }
 

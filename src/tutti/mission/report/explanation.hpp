@@ -28,7 +28,7 @@ std::string format_origin(const consistency::SuspectedOrigin& origin, const Pict
 std::string format_place(const Eigen::Vector3d& place_m);
 /// Such as "0.10 m, 20.3 deg".
 std::string format_motion_error(double translation_m, double rotation_rad);
-/// A sentence such as "odometry and map part by up to 12 x the threshold", with the segment that odometry misses most
+/// A sentence such as "odometry and map differ by up to 12 x the threshold", with the segment that odometry misses most
 /// if there is one; or that they agree.
 std::string format_disagreement(const consistency::Explanation& explanation);
 /// The same for a robot's last update, of which the explanation must exist; or that there was nothing to compare with,

@@ -73,7 +73,7 @@ TEST(ReportText, ReportsAlertsAndDiscontinuities) {
   EXPECT_NE(text.find("alert    alpha: localisation failure suspected, 62.0 s - 72.0 s, at (12.3, -4.0, 0.0) m:"),
             std::string::npos)
       << text;
-  EXPECT_NE(text.find("compare  bravo: odometry and map part by up to"), std::string::npos) << text;
+  EXPECT_NE(text.find("compare  bravo: odometry and map differ by up to"), std::string::npos) << text;
   EXPECT_NE(text.find("change   alpha: correcting changed no motion over 1 s by more than 0.010 m and 0.400 deg"),
             std::string::npos)
       << text;
@@ -84,7 +84,7 @@ TEST(ReportText, ReportsAlertsAndDiscontinuities) {
   record.robots[1].explanation->direction_significance = 44.0;
   const std::string missed = report_text(record, "x");
   expect_readable(missed);
-  EXPECT_NE(missed.find("odometry and map part by up to 44 x the threshold, in what"), std::string::npos) << missed;
+  EXPECT_NE(missed.find("odometry and map differ by up to 44 x the threshold, in what"), std::string::npos) << missed;
   record.robots.resize(1);
   record.robots[0].explanation = test::example_explanation(record.robots[0].server_estimate, {});
   record.robots[0].alerts.clear();

@@ -95,7 +95,7 @@ void FeedFront::release(bool all) {
 Status FeedFront::hear(ImuSamples& samples) {
   constexpr std::size_t kImu = index_of<ImuSamples>();
   if (!sensors_->imu)
-    return fail(ErrorCode::unsupported, "{} IMU samples: Hello said of no IMU (Sensors.imu)", samples.size());
+    return fail(ErrorCode::unsupported, "{} IMU samples: Hello announces no IMU (Sensors.imu)", samples.size());
   std::size_t backwards = 0, ahead = 0;
   for (const ImuSample& sample : samples) {
     const bool is_backwards = !imu_.empty() && sample.stamp <= imu_.back().stamp;

@@ -59,7 +59,7 @@ void FeedSession::take(Client client, FromClient message) {
                                         unknown->number, fmt::join(kFromClient, ", "));
     return put(connection, refused_frame({}, why, 0));
   }
-  if (feeder_ != client) return close(client, "this client said that it only listens");
+  if (feeder_ != client) return close(client, "this client announced that it only listens");
   if (const auto* bad = std::get_if<BadSample>(&message))
     return put(connection, refused_frame(bad->stamp, bad->why, 0));  // by its own clock
   if (const auto* time = std::get_if<FeedTime>(&message)) return take_time(client, *time);

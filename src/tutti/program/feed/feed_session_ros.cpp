@@ -37,7 +37,7 @@ Status FeedSession::begin_ros(const FeedHello& hello) {
 void FeedSession::take_raw(Client client, const intake::RawMessage& raw) {
   Connection& connection = clients_.at(client);
   const auto refuse_raw = [&](const std::string& why) { put(connection, refused_frame({}, why, 0)); };
-  if (!ros_) return refuse_raw("a raw message, of which Hello said nothing (Hello.ros)");
+  if (!ros_) return refuse_raw("a raw message, which Hello does not announce (Hello.ros)");
   if (raw.type == RosClient::kPathType) {
     if (const auto path = ros_->path()) put(connection, raw_frame(*path), true);
     return;

@@ -61,7 +61,7 @@ void RobotView::note(const node::Event& event, const node::RobotNode& node) {
     if (alert.withdrawn_s) continue;
     const consistency::SuspectedOrigin& origin = alert.origin;
     alerts_.push_back(
-        {fmt::format("odometry and map part by {:.2f} m and {:.1f} degrees within {:.1f} m of trajectory, more "
+        {fmt::format("odometry and map differ by {:.2f} m and {:.1f} degrees within {:.1f} m of trajectory, more "
                      "than odometry allows for: localisation failed there, or the map is wrong",
                      origin.translation_m, origin.rotation_rad / kRadPerDeg, origin.length_m),
          *first_ + alert.known_since_s, origin.from, origin.until});

@@ -150,7 +150,7 @@ std::vector<Alert> Alerts::of_map(const mapfile::ShownMap& map, const std::map<S
     if (component == components.largest) continue;
     Alert alert{.id = fmt::format("map/{}/alone", robot.value),
                 .severity = "info",
-                .what = "its part of the map is joined to no other",
+                .what = "its component of the map is merged with no other",
                 .where = names.of(ChainId(robot)),
                 .todo = "Let it see a place that another robot has seen; or ask why there is no closure.",
                 .robot = robot};
@@ -171,7 +171,7 @@ std::vector<Alert> Alerts::of_map(const mapfile::ShownMap& map, const std::map<S
     if (closures == 1 && hanging.insert(submap.chain).second)
       out.push_back({.id = fmt::format("map/{}/hangs", to_string(submap.chain)),
                      .severity = "warning",
-                     .what = "its part hangs on one closure",
+                     .what = "its component hangs on one closure",
                      .where = names.of(submap.chain),
                      .todo = "Look at that closure; another meeting would settle it.",
                      .robot = submap.chain.robot});
