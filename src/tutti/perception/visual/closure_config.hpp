@@ -14,7 +14,7 @@ struct VisualClosureConfig {
   int min_landmarks = 30;         ///< Least number of landmarks with descriptors in a submap.
   /// Largest RMS error of a submap's landmarks in its own images: more shows a wrong calibration.
   double max_residual_px = 3.0;
-  double max_hamming = 0.2;       ///< Largest Hamming distance of a match, as a share of the bits.
+  double max_hamming = 0.2;        ///< Largest Hamming distance of a match, as a share of the bits.
   double max_hamming_ratio = 0.9;  ///< Ratio test with the nearest descriptor of another landmark.
   int min_matches = 8;             ///< Least number of matches to try a keyframe, and of inliers to believe it.
   AbsolutePoseConfig pose;         ///< RANSAC.
