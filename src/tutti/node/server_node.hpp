@@ -56,7 +56,8 @@ struct ServerNodeConfig {
   /// The server's clock, since the Unix epoch: no decision counts as later than it came. Empty: decisions count from
   /// when their operators say.
   std::function<std::int64_t()> wall_ns = {};
-  std::vector<std::string> names = {};  ///< Of the mission's robots, by number: so one is called until it is heard.
+  std::vector<std::string> names =
+      {};  ///< The names of the mission's robots, by number: so one is called until it is heard.
 };
 
 /// The server as a node: MapServer with its store and messages. It takes submaps, verdicts and operators' decisions,
