@@ -24,7 +24,7 @@ struct KnownMap {
     PayloadSize size;
   };
   std::string id;                        ///< Of the map, the same for all its versions.
-  std::uint64_t revision = 0;            ///< Of the map.
+  std::uint64_t revision = 0;            ///< The map's.
   std::map<RobotId, std::string> names;  ///< The robots that made it, as far as they are known.
   std::map<SubmapId, Entry> submaps;
   std::shared_ptr<const server::PayloadStore> payloads;  ///< Never null.
