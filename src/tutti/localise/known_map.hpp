@@ -23,7 +23,7 @@ struct KnownMap {
     std::string place;                                 ///< ClosureVerifier::place_of(); empty when it is unknown.
     PayloadSize size;
   };
-  std::string id;                        ///< Of the map, the same for all its versions.
+  std::string id;                        ///< The same for all versions of the map.
   std::uint64_t revision = 0;            ///< The map's.
   std::map<RobotId, std::string> names;  ///< The robots that made it, as far as they are known.
   std::map<SubmapId, Entry> submaps;
