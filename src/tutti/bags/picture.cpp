@@ -17,7 +17,7 @@ enum class Colour : std::uint8_t { grey, rgb, bgr, bayer };
 struct PixelLayout {
   std::string_view name;
   Colour colour = Colour::grey;
-  std::uint32_t samples = 1;  ///< Of a pixel.
+  std::uint32_t samples = 1;  ///< In a pixel.
   std::uint32_t first = 0;    ///< The sample to begin with.
   bool is_deep = false;       ///< 16 bits a sample.
 };

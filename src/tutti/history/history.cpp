@@ -84,6 +84,17 @@ std::pair<History::Tracks::const_iterator, History::Tracks::const_iterator> Hist
 
 Status History::put(std::span<const Message> messages) {
   const std::scoped_lock lock(mutex_);
+  while (!messages.empty()) {
+    std::size_t count = 0;
+    for (std::size_t bytes = 0; count < messages.size() && (count == 0 || bytes < kMostAtOnce); ++count)
+      bytes += messages[count].value.size();
+    if (Status done = put_some(messages.first(count)); !done) return done;
+    messages = messages.subspan(count);
+  }
+  return {};
+}
+
+Status History::put_some(std::span<const Message> messages) {
   Status done = add(messages);
   if (!done && done.error().code == ErrorCode::io) {
     room_ *= kEnough;

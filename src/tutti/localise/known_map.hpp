@@ -19,7 +19,7 @@ struct KnownMap {
   struct Entry {
     std::shared_ptr<const Submap> submap;  ///< Without payloads; never null.
     Pose3 T_world_submap;
-    Eigen::Vector3d middle = Eigen::Vector3d::Zero();  ///< Of its trajectory, in the map's frame, m.
+    Eigen::Vector3d middle = Eigen::Vector3d::Zero();  ///< Middle of its trajectory, in the map's frame, m.
     std::string place;                                 ///< ClosureVerifier::place_of(); empty when it is unknown.
     PayloadSize size;
   };

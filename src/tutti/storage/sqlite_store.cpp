@@ -138,8 +138,9 @@ Status SqliteStore::configure() {
   // A map comes from anywhere: nothing in it is run.
   if (options_.has_readers) sqlite3_busy_timeout(database_.get(), kOthersDone_ms);
   const char* const locks = options_.has_readers ? "PRAGMA locking_mode = NORMAL" : "PRAGMA locking_mode = EXCLUSIVE";
-  for (const char* sql : {locks, "PRAGMA trusted_schema = OFF", "PRAGMA secure_delete = OFF",
-                          "PRAGMA synchronous = FULL", "BEGIN EXCLUSIVE", "COMMIT"})
+  // A log that one large commit has made does not stay as large.
+  for (const char* sql : {locks, "PRAGMA journal_size_limit = 16777216", "PRAGMA trusted_schema = OFF",
+                          "PRAGMA secure_delete = OFF", "PRAGMA synchronous = FULL", "BEGIN EXCLUSIVE", "COMMIT"})
     if (const Status done = run(sql); !done) return done;
   return {};
 }
