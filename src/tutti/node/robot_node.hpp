@@ -101,8 +101,6 @@ class RobotNode {
   [[nodiscard]] const localise::Localiser* localiser() const { return localiser_ ? &*localiser_ : nullptr; }
   /// True if a scan of this stamp would be used, by the agent or to localise.
   [[nodiscard]] bool wants_scan(Timestamp stamp) const;
-  /// Localiser::suggest(), if the robot localises.
-  Step suggest(const RelativePose& T_world_body, Timestamp now);
   /// True when the newest graph since the start has the robot's last representative keyframe, so that the map has
   /// nothing more about itself for it.
   [[nodiscard]] bool is_whole_in_map() const;

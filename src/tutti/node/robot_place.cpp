@@ -27,14 +27,6 @@ void RobotNode::locate(const Input& input, Timestamp now, Step& step) {
   tell_place(now, step);
 }
 
-Step RobotNode::suggest(const RelativePose& T_world_body, Timestamp now) {
-  Step step;
-  if (!localiser_) return step;
-  localiser_->suggest(T_world_body);
-  tell_place(now, step);
-  return step;
-}
-
 void RobotNode::tell_place(Timestamp now, Step& step) {
   localise::Located located = localiser_->located();
   if (std::exchange(told_, located.state) == located.state) return;
