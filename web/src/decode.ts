@@ -83,6 +83,8 @@ function robot_status(value: unknown, what: string): s.RobotStatus {
     trouble: words(f.trouble, "trouble"),
     battery_v: maybe(f.battery_v, "battery_v"),
     battery_percent: maybe(f.battery_percent, "battery_percent"),
+    localisation: f.localisation === undefined ? "" : words(f.localisation, "localisation"),
+    localisation_why: f.localisation_why === undefined ? "" : words(f.localisation_why, "localisation_why"),
   };
 }
 

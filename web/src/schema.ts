@@ -50,6 +50,8 @@ export interface RobotStatus {
   trouble: string;
   battery_v: number | null;
   battery_percent: number | null;
+  localisation: string; // in a map that does not move; "": it does not localise
+  localisation_why: string;
 }
 
 export interface WorkerStatus {

@@ -249,6 +249,11 @@ function details(app: App, robot: RobotView): Child[] {
       `Backlog ${many(status.backlog_submaps, "submap")}, ${bytes(status.backlog_bytes)} · ${drains(robot, drain)}`,
       drain.state === "grows" ? "warn" : "",
     );
+  if (status?.localisation)
+    line(
+      `In its map: ${status.localisation}, ${status.localisation_why}`,
+      status.localisation === "localised" || status.localisation === "searching" ? "" : "warn",
+    );
   if (status?.conflict) line(status.conflict, "bad");
   if (status?.trouble) line(status.trouble, "bad");
   const loud = app.phase === "deploy" || (app.selection?.kind === "robot" && app.selection.number === robot.number);
