@@ -67,7 +67,7 @@ TEST(Rgbd, DepthIsRegisteredBySizeMatrixAndPlace) {
   EXPECT_EQ(
       why(depth, kColour),
       "frame 'elsewhere', expected 'color_optical' as of /color/image_raw, or one at the same place (no transform "
-      "joins them)");
+      "links them)");
 }
 
 TEST(Rgbd, OneCameraHasTheDepthThatIsRegisteredToIt) {
