@@ -51,7 +51,9 @@ void FedRobot::hear(const Input& input, Timestamp now) {
   if (const auto* images = std::get_if<EncodedImages>(&input)) return see(*images, now);
   const robot::RobotAgent& agent = robot_.node().agent();
   const auto* scan = std::get_if<Scan>(&input);  // received before anybody knew whether it shows anything new
-  if (scan == nullptr || agent.newest_sample() != scan->stamp || robot_.node().wants_scan(scan->stamp))
+  const localise::Localiser* localiser = robot_.node().localiser();
+  if (scan == nullptr || agent.newest_sample() != scan->stamp || agent.wants_scan() ||
+      (localiser != nullptr && localiser->wants_scan(scan->stamp)))
     robot_.add(input, now);
 }
 
