@@ -78,8 +78,8 @@ def main():
         table.append(row(name, kind, *cells(robots)))
     write_results("localise.md", page(
         "Robots in a map that does not move",
-        ["Asked: does a robot without a start pose find itself in a map that others made, does it follow it, and does it ever say",
-         "that it is where it is not?"],
+        ["Asked was whether a robot without a start pose finds itself in a map that others made, whether it follows it, and whether it",
+         "ever says that it is where it is not."],
         table,
         ["bench/accuracy/localise.py build/ci/apps/tutti/tutti --shared ../shared"],
         "*first fix*: robots that found their place, and the mean time until then; one submap is 10 s. *localised*, *ambiguous*: share of",
