@@ -208,7 +208,7 @@ test("a closure is inspected, rejected by name, taken back", () =>
       ["/api/decide", "reject", "eva"],
     );
     await page.until("the word is shown", () =>
-      /eva said reject/.test(document.querySelector(".inspector").textContent),
+      /eva decided reject/.test(document.querySelector(".inspector").textContent),
     );
     await page.press(/^Take back/);
     await page.until("it is in the map again", () =>
@@ -232,7 +232,7 @@ test("a closure by hand joins two parts, the map follows, and it is undone", () 
     await page.press("Register");
     await page.until("they fit", () => /They fit/.test(document.querySelector(".by-hand").textContent));
     await page.until("what it would change", () =>
-      /would join 2 parts of the map.*would move by up to \d\.\d+\sm \((alpha|bravo)\/\d+\); .*Dashed/.test(
+      /would merge 2 components of the map.*would move by up to \d\.\d+\sm \((alpha|bravo)\/\d+\); .*Dashed/.test(
         document.querySelector(".by-hand").textContent,
       ),
     );

@@ -130,7 +130,7 @@ async function play(browser) {
     kPatience_ms,
   );
   await page.until("eva's word stands beside it", () =>
-    /eva said reject/.test(document.querySelector(".inspector").textContent),
+    /eva decided reject/.test(document.querySelector(".inspector").textContent),
   );
   await page.press(/^Take back/);
   await page.until(
@@ -161,7 +161,7 @@ async function play(browser) {
   );
   await page.until(
     "what it would change",
-    () => /would join 2 parts/.test(document.querySelector(".by-hand").textContent),
+    () => /would merge 2 components/.test(document.querySelector(".by-hand").textContent),
     undefined,
     kPatience_ms,
   );
