@@ -7,16 +7,13 @@
 
 #include "tutti/base/chi_square.hpp"
 #include "tutti/geometry/so3.hpp"
-#include "tutti/perception/lidar/registration.hpp"
 #include "tutti/perception/lidar/visibility.hpp"
 
 namespace tutti::localise {
 namespace {
 
-// What a registration on a map of voxels errs by at least.
+// A registration on a map of voxels errs by this at least.
 constexpr double kFloor_m = 0.02, kFloor_rad = 0.2 * kRadPerDeg;
-// Below this least eigenvalue of the normals' scatter a scan slides along the map, and how far is unknown.
-constexpr double kSliding = 0.03, kSlides_m = 1.0;
 constexpr float kVisibilityMargin_m = 0.5F;
 constexpr int kScanPoints = 400;    // that each submap's views are asked about
 constexpr int kMapPoints = 2000;    // that the scan's view is asked about
@@ -57,15 +54,11 @@ ScanMatch match_scan(const LocalMap& map, const fit::FitScan& scan, const Pose3&
   const auto found = lidar::register_clouds(map.cloud, scan.cloud, T_local_begun, registration_config());
   const bool is_usable = found.overlap > 0.0;
   const Pose3 T_local_body = is_usable ? found.T_target_source : T_local_begun;
-  ScanMatch out{.T_world_body = {map.T_world_local * T_local_body, found.covariance},
-                .converged = is_usable,
-                .overlap = found.overlap,
-                .plane_rmse_m = found.plane_rmse_m};
-  Matrix6d& covariance = out.T_world_body.covariance;
-  if (found.min_translation_eigenvalue < kSliding)
-    covariance.topLeftCorner<3, 3>() += kSlides_m * kSlides_m * found.weakest_source * found.weakest_source.transpose();
-  covariance.diagonal().head<3>().array() += kFloor_m * kFloor_m;
-  covariance.diagonal().tail<3>().array() += kFloor_rad * kFloor_rad;
+  ScanMatch out{
+      .T_world_body = {map.T_world_local * T_local_body, fit::widened(found.covariance, found, kFloor_m, kFloor_rad)},
+      .converged = is_usable,
+      .overlap = found.overlap,
+      .plane_rmse_m = found.plane_rmse_m};
   count_contradictions(map, scan, T_local_body, out);
   return out;
 }

@@ -7,7 +7,6 @@
 
 #include "tutti/geometry/so3.hpp"
 #include "tutti/model/pose_at.hpp"
-#include "tutti/perception/lidar/registration.hpp"
 #include "tutti/perception/lidar/voxel_filter.hpp"
 
 namespace tutti::fit {
@@ -59,6 +58,15 @@ FitScan make_fit_scan(Timestamp stamp, const PointCloud& cloud, double min_range
   return {stamp, lidar::orient(std::move(points), {}, {})};
 }
 
+Matrix6d widened(Matrix6d covariance, const lidar::RegistrationResult& registration, double floor_m, double floor_rad) {
+  const Eigen::Vector3d& weakest = registration.weakest_source;
+  if (registration.min_translation_eigenvalue < kSliding)
+    covariance.topLeftCorner<3, 3>() += kSlides_m * kSlides_m * weakest * weakest.transpose();
+  covariance.diagonal().head<3>().array() += floor_m * floor_m;
+  covariance.diagonal().tail<3>().array() += floor_rad * floor_rad;
+  return covariance;
+}
+
 std::optional<Pose3> motion_over(const ScanStep& step, std::span<const StampedPose> odometry, double offset_s,
                                  double max_gap_s) {
   const auto from = pose_at(odometry, step.from + offset_s, max_gap_s);
@@ -97,12 +105,7 @@ std::optional<ScanStep> step_between(const FitScan& from, const FitScan& to, con
   if (!fits(best)) return std::nullopt;
   step.T_from_to = best.T_target_source;
   step.overlap = best.overlap;
-  step.covariance = best.covariance + ambiguity;
-  if (best.min_translation_eigenvalue < kSliding)
-    step.covariance.topLeftCorner<3, 3>() +=
-        kSlides_m * kSlides_m * best.weakest_source * best.weakest_source.transpose();
-  step.covariance.diagonal().head<3>().array() += kFloor_m * kFloor_m;
-  step.covariance.diagonal().tail<3>().array() += kFloor_rad * kFloor_rad;
+  step.covariance = widened(best.covariance + ambiguity, best, kFloor_m, kFloor_rad);
   return step;
 }
 

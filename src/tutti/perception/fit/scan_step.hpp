@@ -10,6 +10,7 @@
 #include "tutti/model/point_cloud.hpp"
 #include "tutti/model/trajectory.hpp"
 #include "tutti/perception/lidar/oriented_cloud.hpp"
+#include "tutti/perception/lidar/registration.hpp"
 
 namespace tutti::fit {
 
@@ -21,6 +22,10 @@ struct FitScan {
 
 /// Points nearer than `min_range_m` are on the robot itself and left out. At most kMostPoints are kept.
 FitScan make_fit_scan(Timestamp stamp, const PointCloud& cloud, double min_range_m);
+
+/// The covariance (right tangent) of a registration of scans with what it does not know of itself: how far along they
+/// slide, where hardly anything faces that direction; and `floor_m` and `floor_rad`, which it errs by at least.
+Matrix6d widened(Matrix6d covariance, const lidar::RegistrationResult& registration, double floor_m, double floor_rad);
 
 /// How the body moved from one scan to the next, as the two scans show it.
 struct ScanStep {
