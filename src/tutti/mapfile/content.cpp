@@ -11,7 +11,7 @@
 #include "tutti/mapfile/check_map_file.hpp"
 #include "tutti/node/decisions.hpp"
 #include "tutti/node/submap_frames.hpp"
-#include "tutti/server/georeference.hpp"
+#include "tutti/server/map_job.hpp"
 #include "tutti/server/refuted_closures.hpp"
 #include "tutti/storage/map_tables.hpp"
 #include "tutti/storage/sqlite_copy.hpp"
@@ -126,11 +126,8 @@ Result<Content> read(const storage::TableStore& map) {
 server::MapEstimate estimate(const Content& content) {
   const server::MapConfig& config = content.settings.map;
   const server::VerdictSet verdicts = server::of_candidates(content.verdicts, content.candidates, content.decisions);
-  auto map = server::georeferenced(
-      server::refined(server::estimate_map_with_fixes(content.submaps, verdicts, config, content.decisions),
-                      content.submaps, content.refinements),
-      content.submaps, config.georeference, config.gnc);
-  return content.held.empty() ? map : server::hold(std::move(map), content.held, config.gnc.solver);
+  return server::finished_map(server::estimate_map_with_fixes(content.submaps, verdicts, config, content.decisions),
+                              content.submaps, content.refinements, content.held, config);
 }
 
 Result<std::unique_ptr<storage::TableStore>> open(const std::filesystem::path& file) {

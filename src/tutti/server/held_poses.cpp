@@ -14,19 +14,19 @@ namespace tutti::server {
 namespace {
 
 /// The nodes of one component, and those among them that are held.
-struct HeldPart {
-  std::vector<std::size_t> nodes, held;
+struct HeldNodes {
+  std::vector<std::size_t> all, held;
 };
 
 /// T_held_world, by the positions of the held nodes; of one alone, by its pose.
-Pose3 to_held(const MapEstimate& map, const HeldPart& part, const HeldPoses& held) {
+Pose3 to_held(const MapEstimate& map, const HeldNodes& nodes, const HeldPoses& held) {
   std::vector<Eigen::Vector3d> before, after;
-  for (const std::size_t i : part.held) {
+  for (const std::size_t i : nodes.held) {
     before.push_back(map.nodes[i].T_world_body.translation);
     after.push_back(held.at(map.nodes[i].id).translation);
   }
-  if (part.held.size() < 3) {
-    const MapNode& node = map.nodes[part.held.front()];
+  if (nodes.held.size() < 3) {
+    const MapNode& node = map.nodes[nodes.held.front()];
     return held.at(node.id) * node.T_world_body.inverse();
   }
   return align_points(after, before);
@@ -35,21 +35,23 @@ Pose3 to_held(const MapEstimate& map, const HeldPart& part, const HeldPoses& hel
 }  // namespace
 
 MapEstimate hold(MapEstimate map, const HeldPoses& held, const estimation::SolverConfig& config) {
-  std::map<std::uint32_t, HeldPart> parts;
+  if (held.empty()) return map;
+  std::map<std::uint32_t, HeldNodes> components;
   for (std::size_t i = 0; i < map.nodes.size(); ++i) {
-    HeldPart& part = parts[map.nodes[i].component];
-    part.nodes.push_back(i);
-    if (held.contains(map.nodes[i].id)) part.held.push_back(i);
+    HeldNodes& of = components[map.nodes[i].component];
+    of.all.push_back(i);
+    if (held.contains(map.nodes[i].id)) of.held.push_back(i);
   }
   std::vector<std::size_t> fixed;
-  for (const auto& [component, part] : parts) {
-    if (part.held.empty()) continue;
-    const Pose3 T_held_world = to_held(map, part, held);
-    for (const std::size_t i : part.nodes) map.graph.poses[i] = T_held_world * map.nodes[i].T_world_body;
-    for (const std::size_t i : part.held) map.graph.poses[i] = held.at(map.nodes[i].id);
-    fixed.insert(fixed.end(), part.held.begin(), part.held.end());
+  for (const auto& [component, nodes] : components) {
+    const bool is_free = !nodes.held.empty();
+    const Pose3 T_held_world = is_free ? to_held(map, nodes, held) : Pose3{};
+    for (const std::size_t i : nodes.all)
+      map.graph.poses[i] = is_free ? T_held_world * map.nodes[i].T_world_body : map.nodes[i].T_world_body;
+    for (const std::size_t i : nodes.held) map.graph.poses[i] = held.at(map.nodes[i].id);
+    const std::vector<std::size_t>& stay = is_free ? nodes.held : nodes.all;
+    fixed.insert(fixed.end(), stay.begin(), stay.end());
   }
-  if (fixed.empty()) return map;
   std::ranges::sort(fixed);
   estimation::SolverConfig from_here = config;
   from_here.initialisation = "given";
@@ -57,7 +59,6 @@ MapEstimate hold(MapEstimate map, const HeldPoses& held, const estimation::Solve
       estimation::solve_pose_graph(map.graph, from_here, estimation::roles_of(map.graph, map.odometry_edges), fixed);
   if (estimation::is_usable(solved.summary.termination)) map.graph.poses = solved.poses;
   for (std::size_t i = 0; i < map.nodes.size(); ++i) map.nodes[i].T_world_body = map.graph.poses[i];
-  for (const std::size_t i : fixed) map.nodes[i].T_world_body = map.graph.poses[i] = held.at(map.nodes[i].id);
   return map;
 }
 

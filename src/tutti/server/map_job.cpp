@@ -8,6 +8,12 @@
 
 namespace tutti::server {
 
+MapEstimate finished_map(const MapEstimate& estimate, const SubmapSet& submaps, const Refinements& refinements,
+                         const HeldPoses& held, const MapConfig& config) {
+  return hold(georeferenced(refined(estimate, submaps, refinements), submaps, config.georeference, config.gnc), held,
+              config.gnc.solver);
+}
+
 MadeMap make_map(MapJob job) {
   MadeMap out{.job = {}, .estimate = job.estimate, .map = {}, .message = {}, .search = {}, .monitor = {}};
   if (out.estimate == nullptr) {
@@ -15,9 +21,7 @@ MadeMap make_map(MapJob job) {
         std::make_shared<const MapEstimate>(estimate_map_with_fixes(job.submaps, job.verdicts, job.map, job.decisions));
     out.search = out.estimate->work;
   }
-  out.map = georeferenced(refined(*out.estimate, job.submaps, job.refinements), job.submaps, job.map.georeference,
-                          job.map.gnc);
-  if (job.held) out.map = hold(std::move(out.map), *job.held, job.map.gnc.solver);
+  out.map = finished_map(*out.estimate, job.submaps, job.refinements, job.held ? *job.held : HeldPoses(), job.map);
   if (!job.keeps_estimate) out.estimate.reset();
   out.message = {.header = {.robot = {}, .session = job.epoch, .sequence = job.revision},
                  .graph = monitor_graph(out.map, job.revision, job.proxy_graph, job.owners, &out.monitor)};
