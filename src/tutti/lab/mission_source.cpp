@@ -10,6 +10,7 @@
 #include "tutti/lab/mission_input.hpp"
 #include "tutti/lab/replayed_robot.hpp"
 #include "tutti/mapfile/known_map.hpp"
+#include "tutti/mission/localise_mission.hpp"
 #include "tutti/mission/runner.hpp"
 #include "tutti/simulation/recordings.hpp"
 #include "tutti/verifiers/sensor_verifier_maker.hpp"
@@ -153,12 +154,8 @@ Result<std::shared_ptr<const localise::Localiser::Setup>> localise_setup(const M
   if (!config) return tl::unexpected(config.error());
   auto opened = mapfile::open_known_map(map);
   if (!opened) return in_context("--map", opened.error());
-  return std::make_shared<const localise::Localiser::Setup>(
-      localise::Localiser::Setup{.map = std::move(opened->known),
-                                 .verifier = verifiers::make_verifier(config->closures),
-                                 .lidar = config->closures.lidar,
-                                 .submap = config->agent.submap,
-                                 .config = config->localise});
+  return mission::localise_setup(*config, config->agent.submap, std::move(opened->known),
+                                 verifiers::make_verifier(config->closures));
 }
 
 Status fill_robot_options(const MissionSource& source, program::RobotOptions& options) {

@@ -1,17 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/localise/known_map.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <utility>
 
 namespace tutti::localise {
-
-std::string KnownMap::name_of(SubmapId submap) const {
-  const auto name = names.find(submap.chain.robot);
-  return name == names.end() ? to_string(submap) : fmt::format("{}/{}", name->second, submap.index);
-}
 
 RobotId KnownMap::free_robot() const { return {submaps.empty() ? 0 : submaps.rbegin()->first.chain.robot.value + 1}; }
 

@@ -10,6 +10,7 @@
 
 #include "tutti/base/ids.hpp"
 #include "tutti/model/submap.hpp"
+#include "tutti/server/closure_names.hpp"
 #include "tutti/server/payload_store.hpp"
 
 namespace tutti::localise {
@@ -23,14 +24,12 @@ struct KnownMap {
     std::string place;                                 ///< ClosureVerifier::place_of(); empty when it is unknown.
     PayloadSize size;
   };
-  std::string id;                        ///< The same for all versions of the map.
-  std::uint64_t revision = 0;            ///< The map's.
-  std::map<RobotId, std::string> names;  ///< The robots that made it, as far as they are known.
+  std::string id;                      ///< The same for all versions of the map.
+  std::uint64_t revision = 0;          ///< The map's.
+  server::ClosureNames names{{}, {}};  ///< Names of its submaps for people.
   std::map<SubmapId, Entry> submaps;
   std::shared_ptr<const server::PayloadStore> payloads;  ///< Never null.
 
-  /// A submap's name for people, such as "alpha/17".
-  [[nodiscard]] std::string name_of(SubmapId submap) const;
   /// A robot number that no submap of the map has.
   [[nodiscard]] RobotId free_robot() const;
   /// The submaps whose middles are within `radius_m` of a point, nearest first, `most` at most.

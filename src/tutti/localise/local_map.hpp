@@ -12,7 +12,7 @@
 
 namespace tutti::localise {
 
-/// What the map shows around one place: the clouds of the nearest submaps as one.
+/// The map around one place: the clouds of the nearest submaps as one.
 struct LocalMap {
   std::vector<SubmapId> submaps;  ///< By id.
   Pose3 T_world_local;            ///< The frame of the cloud, near it, so that its coordinates are small.

@@ -23,7 +23,7 @@ constexpr std::size_t kMostPending = 16;
 // Odometry errs by this at least, as a share of the distance, and per radian.
 constexpr double kDrift = 0.01, kDrift_rad_per_m = 0.2 * kRadPerDeg, kDrift_rad_per_rad = 0.01;
 constexpr double kStep_m = 0.002;
-// What the map itself errs by where the robot is.
+// The map itself errs by this where the robot is.
 constexpr double kMap_m = 0.02, kMap_rad = 0.1 * kRadPerDeg;
 // Registrations of one stretch err alike: so much more than they say.
 constexpr double kAlike = 4.0;
@@ -36,7 +36,7 @@ Matrix6d diagonal(double metres, double radians) {
   return d.asDiagonal();
 }
 
-/// What odometry may err by over one step, whatever it states.
+/// Odometry may err by this over one step, whatever it states.
 Matrix6d least_doubt(const Pose3& step) {
   const double metres = step.translation.norm(), radians = rotation_angle(step);
   return diagonal(kDrift * metres + kStep_m, kDrift_rad_per_m * metres + kDrift_rad_per_rad * radians);
@@ -114,9 +114,8 @@ void Localiser::suggest(const RelativePose& T_world_body) {
 void Localiser::begin_submaps() {
   ++chain_.session;  // nothing of before belongs to what comes
   submaps_ = robot::SubmapBuilder(chain_, setup_.submap);
-  const Trajectory recent = recent_;
-  for (std::size_t k = 0; k < recent.size(); ++k)
-    if (k + 1 == recent.size()) (void)submaps_.add(OdometrySample{recent[k].stamp, recent[k].pose, recent_steps_[k]});
+  if (!recent_.empty())
+    (void)submaps_.add(OdometrySample{recent_.back().stamp, recent_.back().pose, recent_steps_.back()});
 }
 
 void Localiser::search_anew(const std::string& why) {
@@ -216,6 +215,10 @@ void Localiser::doubt(const Assessment& assessment, Timestamp stamp) {
 
 void Localiser::take_submaps() {
   while (const auto submap = submaps_.take_submap()) consider(*submap);
+  // The robot's agent has the same and reports them; here they would only grow.
+  submaps_.take_keyframes();
+  submaps_.take_scan_errors();
+  submaps_.take_image_errors();
 }
 
 /// Compares a submap with the map, where that may tell something.
@@ -309,18 +312,21 @@ void Localiser::follow_submap(const SearchResult& found) {
   why_ = "no submap of the map shows what it saw";
 }
 
+State Localiser::state() const {
+  const bool is_silent =
+      has_scans() && !recent_.empty() && recent_.back().stamp - *last_scan_ > setup_.config.scan_silence_s;
+  return state_ == State::localised && is_silent ? State::stale : state_;
+}
+
 Located Localiser::located() const {
-  Located out{.state = state_, .why = why_, .places = places_};
+  Located out{.state = state(), .why = why_, .places = places_};
   if (recent_.empty()) return out;
   out.stamp = recent_.back().stamp;
   if (!track_ || track_->to_confirm > 0) return out;
   RelativePose pose = carried_to(recent_.back().pose, {.T_world_body = track_->T_world_body, .at = track_->at});
   pose.covariance += diagonal(kMap_m, kMap_rad);
   out.age_s = out.stamp - track_->confirmed;
-  if (state_ == State::localised && has_scans() && out.stamp - *last_scan_ > setup_.config.scan_silence_s) {
-    out.state = State::stale;
-    out.why = fmt::format("no scan has come for {:.1f} s", out.stamp - *last_scan_);
-  }
+  if (out.state == State::stale) out.why = fmt::format("no scan has come for {:.1f} s", out.stamp - *last_scan_);
   out.T_world_body = std::move(pose);
   return out;
 }

@@ -59,6 +59,7 @@ class Localiser {
   /// Forgets where the robot is, and searches the whole map.
   void search_anew(const std::string& why);
 
+  [[nodiscard]] State state() const;
   /// Where the robot is, at the newest odometry.
   [[nodiscard]] Located located() const;
   /// True for a scan of this stamp if it will be used.

@@ -58,7 +58,6 @@ std::shared_ptr<KnownMap> map_of(const std::vector<Recording>& robots) {
       EXPECT_TRUE(payloads->put(*submap).has_value());
       map->submaps.emplace(submap->id, std::move(entry));
     }
-    map->names[robot.robot] = robot.name;
   }
   map->payloads = std::move(payloads);
   map->id = "test";
@@ -97,7 +96,7 @@ Localiser localiser(std::shared_ptr<const KnownMap> map) {
   return Localiser({.map = std::move(map), .verifier = verifier(), .submap = submap});
 }
 
-/// What was published, and what it was wrong by.
+/// Counts what is published, and measures what it is wrong by.
 struct Judged {
   std::size_t published = 0, wrong = 0;
   double worst_m = 0.0;

@@ -57,7 +57,7 @@ Result<OpenedMap> open_known_map(const std::filesystem::path& file) {
   if (!map_id) return in_context(file.string(), map_id.error());
   known->id = *map_id;
   known->revision = out.content.meta.revision;
-  known->names = out.content.names;
+  known->names = out.content.closure_names();
   for (const auto& [id, submap] : out.content.submaps) {
     const auto size = out.content.payload_sizes.find(id);
     if (size == out.content.payload_sizes.end()) continue;

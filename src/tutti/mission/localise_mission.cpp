@@ -128,6 +128,16 @@ double LocalisedRobot::share(localise::State state) const {
   return duration_s > 0.0 ? in_state_s / duration_s : 0.0;
 }
 
+std::shared_ptr<const localise::Localiser::Setup> localise_setup(
+    const MissionConfig& config, const robot::SubmapConfig& submap, std::shared_ptr<const localise::KnownMap> map,
+    std::shared_ptr<const server::ClosureVerifier> verifier) {
+  return std::make_shared<const localise::Localiser::Setup>(localise::Localiser::Setup{.map = std::move(map),
+                                                                                       .verifier = std::move(verifier),
+                                                                                       .lidar = config.closures.lidar,
+                                                                                       .submap = submap,
+                                                                                       .config = config.localise});
+}
+
 Result<std::vector<LocalisedRobot>> localise_mission(
     const MissionConfig& config, const MissionInput& input, const mapfile::OpenedMap& map,
     std::shared_ptr<const server::ClosureVerifier> verifier,
@@ -137,12 +147,7 @@ Result<std::vector<LocalisedRobot>> localise_mission(
   for (const MissionRecording& robot : input.robots) {
     const Recording& recording = robot.recording;
     if (recording.odometry.empty() || overlaps(poses_in(map, recording.name), recording.odometry)) continue;
-    auto setup = std::make_shared<const localise::Localiser::Setup>(
-        localise::Localiser::Setup{.map = map.known,
-                                   .verifier = verifier,
-                                   .lidar = config.closures.lidar,
-                                   .submap = with_sensors(config.agent, recording).submap,
-                                   .config = config.localise});
+    auto setup = localise_setup(config, with_sensors(config.agent, recording).submap, map.known, verifier);
     out.push_back(replay(robot, config, std::move(setup), stop));
     if (T_world_reference && !recording.reference.empty())
       out.back().score = score_of(out.back().course, recording.reference, *T_world_reference, config.association);

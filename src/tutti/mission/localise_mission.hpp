@@ -43,6 +43,11 @@ struct LocalisedRobot {
   [[nodiscard]] double share(localise::State state) const;
 };
 
+/// What a robot with these submaps needs to localise in a map; none of the pointers may be null.
+std::shared_ptr<const localise::Localiser::Setup> localise_setup(
+    const MissionConfig& config, const robot::SubmapConfig& submap, std::shared_ptr<const localise::KnownMap> map,
+    std::shared_ptr<const server::ClosureVerifier> verifier);
+
 /// Replays every robot of the mission that did not make the map alone, without a server. `stop` is asked between
 /// samples. An error names a recording that cannot be read.
 Result<std::vector<LocalisedRobot>> localise_mission(const MissionConfig& config, const MissionInput& input,

@@ -28,10 +28,11 @@ void RobotNode::locate(const Input& input, Timestamp now, Step& step) {
 }
 
 void RobotNode::tell_place(Timestamp now, Step& step) {
+  const localise::State state = localiser_->state();
+  if (std::exchange(told_, state) == state) return;
   localise::Located located = localiser_->located();
-  if (std::exchange(told_, located.state) == located.state) return;
   std::vector<std::string> places;
-  for (const localise::PlaceFound& place : located.places) places.push_back(localiser_->map().name_of(place.submap));
+  for (const localise::PlaceFound& place : located.places) places.push_back(localiser_->map().names.of(place.submap));
   step.emit(now, RobotLocated{agent_.robot(), std::move(located), std::move(places)});
 }
 

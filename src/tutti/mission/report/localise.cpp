@@ -87,7 +87,7 @@ std::string changes_of(const LocalisedRobot& robot, const localise::KnownMap& ma
     if (++changes > kMostChanges) continue;
     std::string places;
     for (const localise::PlaceFound& place : located.places)
-      places += (places.empty() ? ": near submap " : ", ") + map.name_of(place.submap);
+      places += (places.empty() ? ": near submap " : ", ") + map.names.of(place.submap);
     out += wrap(fmt::format("{:.1f} s: {}; {}{}", located.stamp - robot.course.front().stamp, to_string(located.state),
                             located.why, places),
                 "  " + robot.name + ", ");
