@@ -283,12 +283,11 @@ void add_map_command(CLI::App& app, int& exit_code) {
   why->callback([asked, &exit_code] { exit_code = tell_why(*asked); });
 
   const auto merging = std::make_shared<MergeOptions>();
-  CLI::App* merge = map->add_subcommand("merge", "Join two maps into a third; the two stay as they are.");
+  CLI::App* merge = map->add_subcommand("merge", "Merge two maps into a third; the two stay as they are.");
   merge->footer(
       "The server that opens it looks for closures between them. A robot is the same by its name, and its sessions are "
       "side by side.\nWhere the second map has a number for another robot, or a session for another run, it gets a "
-      "free "
-      "one, which is said.\n"
+      "free one, which is reported.\n"
       "Example: tutti map merge monday/map tuesday/map -o both/map\n");
   merge->add_option("maps", merging->maps, "The two maps.")->type_name("MAP")->required()->expected(2);
   merge->add_option("-o,--output", merging->out, "The map to be made; it must not be there.")

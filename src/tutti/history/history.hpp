@@ -76,8 +76,7 @@ class History {
   History(std::unique_ptr<storage::TableStore> store, const HistoryOptions& options)
       : store_(std::move(store)), options_(options) {}
   Status read_index();
-  static constexpr std::size_t kMostAtOnce = std::size_t{4}
-                                             << 20U;  // bytes of values in a commit: the journal is as large
+  static constexpr std::size_t kMostAtOnce = 4'000'000;  // bytes of values in a commit: the journal is as large
   Status put_some(std::span<const Message> messages);
   Status add(std::span<const Message> messages);
   Status remove(const std::vector<Drop>& drops);

@@ -202,13 +202,15 @@ Status join_answers(const TableStore& a, const TableStore& b, Writer& out) {
   return scanned ? ok : scanned;
 }
 
-}  // namespace
+struct ReadMap {
+  const TableStore& store;
+  const Content& content;
+};
 
-Result<Merged> merge(const TableStore& a, const TableStore& b, TableStore& out) {
-  const auto one = read(a), other = read(b);
-  if (!one) return in_context("the first map", one.error());
-  if (!other) return in_context("the second map", other.error());
-  if (auto ok = check_robots(*one, *other); !ok) return tl::unexpected(ok.error());
+Result<Merged> merge_read(const ReadMap& first, const ReadMap& second, TableStore& out) {
+  const auto& [a, one] = first;
+  const auto& [b, other] = second;
+  if (auto ok = check_robots(one, other); !ok) return tl::unexpected(ok.error());
   Writer writer(out);
   const auto shared = join(a, b, map_tables::kSubmaps, no_two_submaps, writer);
   if (!shared) return tl::unexpected(shared.error());
@@ -218,15 +220,24 @@ Result<Merged> merge(const TableStore& a, const TableStore& b, TableStore& out) 
     if (const auto done = join(a, b, table, choose, writer); !done) return tl::unexpected(done.error());
   if (auto done = join_answers(a, b, writer); !done) return tl::unexpected(done.error());
   if (auto done = join_places(a, b, writer); !done) return tl::unexpected(done.error());
-  const auto revision = join_refinements(*one, *other, std::max(one->meta.revision, other->meta.revision), writer);
+  const auto revision = join_refinements(one, other, std::max(one.meta.revision, other.meta.revision), writer);
   if (!revision) return tl::unexpected(revision.error());
-  const node::MapMeta meta{.epoch = std::max(one->meta.epoch, other->meta.epoch) + 1,
+  const node::MapMeta meta{.epoch = std::max(one.meta.epoch, other.meta.epoch) + 1,
                            .revision = *revision,
                            .news = true,
-                           .start = std::max(one->meta.start, other->meta.start)};
+                           .start = std::max(one.meta.start, other.meta.start)};
   if (auto done = writer.put(node::to_row(meta)); !done) return tl::unexpected(done.error());
   if (auto done = writer.flush(); !done) return tl::unexpected(done.error());
-  return Merged{one->submaps.size() + other->submaps.size() - *shared, *shared};
+  return Merged{one.submaps.size() + other.submaps.size() - *shared, *shared};
+}
+
+}  // namespace
+
+Result<Merged> merge(const TableStore& a, const TableStore& b, TableStore& out) {
+  const auto one = read(a), other = read(b);
+  if (!one) return in_context("the first map", one.error());
+  if (!other) return in_context("the second map", other.error());
+  return merge_read({a, *one}, {b, *other}, out);
 }
 
 Result<Merged> merge(const fs::path& a, const fs::path& b, const fs::path& out) {
@@ -236,24 +247,28 @@ Result<Merged> merge(const fs::path& a, const fs::path& b, const fs::path& out) 
   const auto one = open(a), other = open(b);
   for (const auto* opened : {&one, &other})
     if (!*opened) return tl::unexpected(opened->error());
-  const auto chains = chains_to_renumber(**one, **other);
+  const auto of_one = read(**one), of_other = read(**other);
+  if (!of_one) return in_context(a.string(), of_one.error());
+  if (!of_other) return in_context(b.string(), of_other.error());
+  const auto chains = chains_to_renumber(**one, *of_one, **other, *of_other);
   if (!chains) return tl::unexpected(chains.error());
   Result<Merged> merged;
-  const auto merge_with = [&](const TableStore& second) {
+  const auto merge_with = [&](const TableStore& second, const Content& content) {
     return make_map(out, [&](TableStore& map) {
-      merged = merge(**one, second, map);
+      merged = merge_read({**one, *of_one}, {second, content}, map);
       return merged ? Status() : Status(tl::unexpected(merged.error()));
     });
   };
-  const fs::path renumbered = out.string() + ".renumbered";
   Status made;
   if (chains->empty()) {
-    made = merge_with(**other);
+    made = merge_with(**other, *of_other);
   } else {
+    const fs::path renumbered = out.string() + ".renumbered";
     made = make_map(renumbered, [&](TableStore& map) { return renumber(**other, *chains, map); });
     if (made) {
       const auto second = open(renumbered);
-      made = second ? merge_with(**second) : tl::unexpected(second.error());
+      const auto content = second ? read(**second) : tl::unexpected(second.error());
+      made = content ? merge_with(**second, *content) : tl::unexpected(content.error());
     }
     remove_store(renumbered);
   }

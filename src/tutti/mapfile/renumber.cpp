@@ -10,7 +10,6 @@
 #include <string>
 #include <utility>
 
-#include "tutti/mapfile/content.hpp"
 #include "tutti/mapfile/make_map.hpp"
 #include "tutti/node/decisions.hpp"
 #include "tutti/node/meta_keys.hpp"
@@ -166,29 +165,26 @@ Result<bool> differs(const TableStore& a, const TableStore& b, const server::Sub
 
 }  // namespace
 
-Result<Chains> chains_to_renumber(const TableStore& a, const TableStore& b) {
-  const auto one = read(a), other = read(b);
-  if (!one) return in_context("the first map", one.error());
-  if (!other) return in_context("the second map", other.error());
-  const auto numbers = numbers_of(one->names);
-  const std::set<ChainId> there = chains_of(one->submaps), added = chains_of(other->submaps);
+Result<Chains> chains_to_renumber(const TableStore& a, const Content& of_a, const TableStore& b, const Content& of_b) {
+  const auto numbers = numbers_of(of_a.names);
+  const std::set<ChainId> there = chains_of(of_a.submaps), added = chains_of(of_b.submaps);
   std::set<RobotId> taken;
   std::map<RobotId, std::uint64_t> newest;  // session, by robot of the merged map
   for (const ChainId& chain : there) {
     taken.insert(chain.robot);
     newest[chain.robot] = std::max(newest[chain.robot], chain.session);
   }
-  for (const auto& [robot, name] : one->names) taken.insert(robot);
+  for (const auto& [robot, name] : of_a.names) taken.insert(robot);
   std::map<RobotId, RobotId> robots;
   for (const ChainId& chain : added) {
     if (robots.contains(chain.robot)) continue;
-    const auto name = other->names.find(chain.robot), name_there = one->names.find(chain.robot);
-    const auto same = name == other->names.end() ? numbers.end() : numbers.find(name->second);
+    const auto name = of_b.names.find(chain.robot), name_there = of_a.names.find(chain.robot);
+    const auto same = name == of_b.names.end() ? numbers.end() : numbers.find(name->second);
     const bool is_another =
-        name != other->names.end() && name_there != one->names.end() && name->second != name_there->second;
+        name != of_b.names.end() && name_there != of_a.names.end() && name->second != name_there->second;
     RobotId number = same != numbers.end() ? same->second : chain.robot;
     if (same == numbers.end() && is_another)
-      for (number = {0}; taken.contains(number) || other->names.contains(number);) ++number.value;
+      for (number = {0}; taken.contains(number) || of_b.names.contains(number);) ++number.value;
     taken.insert(number);
     robots[chain.robot] = number;
   }
@@ -196,7 +192,7 @@ Result<Chains> chains_to_renumber(const TableStore& a, const TableStore& b) {
   for (const ChainId& chain : added) {
     ChainId to(robots.at(chain.robot), chain.session);
     if (there.contains(to)) {
-      const auto is_other_run = to == chain ? differs(a, b, other->submaps, chain) : Result<bool>(true);
+      const auto is_other_run = to == chain ? differs(a, b, of_b.submaps, chain) : Result<bool>(true);
       if (!is_other_run) return tl::unexpected(is_other_run.error());
       if (*is_other_run) to.session = newest[to.robot] + 1;
     }

@@ -161,6 +161,7 @@ class ServerProgram {
   Status admit_page();
   Status start_page();
   Status begin_with_held();
+  [[nodiscard]] Status check_held() const;
   [[nodiscard]] std::string robot_command() const;
   [[nodiscard]] std::string trouble(const MissionStatus& status) const;
 
@@ -276,21 +277,22 @@ Status ServerProgram::begin_with_held() {
   if (options_.held_map.empty()) return {};
   const auto file = folder_->path() / kMapFile;
   std::error_code failure;
-  if (std::filesystem::exists(file, failure)) {
-    const auto map = storage::open_sqlite_store(file, storage::map_schema(), {.has_readers = true});
-    if (!map) return tl::unexpected(map.error());
-    const auto held = node::read_held_poses(**map);
-    if (!held) return in_context(file.string(), held.error());
-    if (!held->empty()) return {};
-    return fail(ErrorCode::configuration,
-                "--map {}: {} has a map whose poses move, expected a state folder without a map, or one that began so",
-                options_.held_map.string(), folder_->path().string());
-  }
+  if (std::filesystem::exists(file, failure)) return {};  // check_held() sees to it
   const auto held = mapfile::copy_held(options_.held_map, file);
   if (!held) return in_context("--map", held.error());
   log_->say(Level::info,
             fmt::format("begins with {}, of which {} keyframes keep their poses", options_.held_map.string(), *held));
   return {};
+}
+
+Status ServerProgram::check_held() const {
+  if (options_.held_map.empty()) return {};
+  const auto held = node::read_held_poses(*store_);
+  if (!held) return tl::unexpected(held.error());
+  if (!held->empty()) return {};
+  return fail(ErrorCode::configuration,
+              "--map {}: {} has a map whose poses move, expected a state folder without a map, or one that began so",
+              options_.held_map.string(), folder_->path().string());
 }
 
 std::string ServerProgram::robot_command() const {
@@ -322,6 +324,7 @@ Status ServerProgram::start() {
   auto store = storage::open_sqlite_store(folder_->path() / kMapFile, storage::map_schema(), {.has_readers = true});
   if (!store) return tl::unexpected(store.error());
   store_ = std::move(*store);
+  if (Status ok = check_held(); !ok) return ok;
   if (options_.bus.url.empty()) {
     auto child = start_bus(options_, *address, guard_, folder_->path() / "bus");
     if (!child) return tl::unexpected(child.error());
