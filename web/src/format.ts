@@ -54,6 +54,9 @@ export function figure(x: Figure, unit = ""): string {
   return `${x.toFixed(digits)}${unit ? `\u00a0${unit}` : ""}`;
 }
 
+/** What fits a label, and a sign that there is more. */
+export const beginning = (text: string, most: number): string =>
+  text.length > most ? `${text.slice(0, most - 1).trimEnd()}…` : text;
 export const many = (n: number, one: string, several = `${one}s`): string => `${n} ${n === 1 ? one : several}`;
 
 /** A time of the day that is the same for everybody, "04:12:09 UTC"; from ms since 1970. */

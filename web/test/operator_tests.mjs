@@ -42,26 +42,32 @@ for (const [width, height] of [
     ));
 
 test("a hundred robots have a line each, and no name or colour choice is cut", () =>
-  served(a_hundred(), async (page, server, mission) => {
-    mission.troubled.set(5, "no scans for 20 s, and none before that either");
-    server.tick(1);
-    await page.until("the troubled one", () => document.querySelector(".robot .wrong") !== null);
-    const heights = await page.evaluate(() =>
-      [...document.querySelectorAll(".robot.brief")].map((e) => Math.round(e.getBoundingClientRect().height)),
-    );
-    assert.equal(heights.length, 100);
-    assert.ok(Math.max(...heights) <= 26, `${Math.max(...heights)} px`);
-    const lines = () =>
-      [...document.querySelectorAll(".legend-box .entry")].map((e) => [e.clientHeight, e.scrollHeight]).slice(0, 3);
-    await page.click(".legend-box button");
-    await page.until("the legend", () => document.querySelectorAll(".legend-box .swatch").length === 100);
-    for (const [height, needed] of await page.evaluate(lines)) assert.ok(height >= needed, `${height} of ${needed} px`);
-    const cut = () =>
-      [...document.querySelectorAll(".robot b, .tabs button, .tools button, .phases button, h1")]
-        .filter((e) => e.scrollWidth > e.clientWidth + 1)
-        .map((e) => e.textContent);
-    assert.deepEqual(await page.evaluate(cut), []);
-  }));
+  served(
+    small({ robots: fleet(100).map((name) => `robot_${name}`), submaps: 2, points: 50, apart: [] }),
+    async (page, server, mission) => {
+      mission.troubled.set(5, "no scans for 20 s, and none before that either");
+      mission.silent.set(17, mission.time);
+      mission.silent.set(18, mission.time - 5000);
+      server.tick(30);
+      await page.until("the troubled one", () => document.querySelector(".robot .wrong") !== null);
+      const heights = await page.evaluate(() =>
+        [...document.querySelectorAll(".robot.brief")].map((e) => Math.round(e.getBoundingClientRect().height)),
+      );
+      assert.equal(heights.length, 100);
+      assert.ok(Math.max(...heights) <= 26, `${Math.max(...heights)} px`);
+      const lines = () =>
+        [...document.querySelectorAll(".legend-box .entry")].map((e) => [e.clientHeight, e.scrollHeight]).slice(0, 3);
+      await page.click(".legend-box button");
+      await page.until("the legend", () => document.querySelectorAll(".legend-box .swatch").length === 100);
+      for (const [height, needed] of await page.evaluate(lines))
+        assert.ok(height >= needed, `${height} of ${needed} px`);
+      const cut = () =>
+        [...document.querySelectorAll(".robot b, .tabs button, .tools button, .phases button, h1")]
+          .filter((e) => e.scrollWidth > e.clientWidth + 1)
+          .map((e) => e.textContent);
+      assert.deepEqual(await page.evaluate(cut), []);
+    },
+  ));
 
 test("who is not heard has no green sign that he is", () =>
   served(small(), async (page, server, mission) => {
@@ -229,6 +235,12 @@ for (const [width, height, what] of [
           assert.deepEqual(covered, []);
           assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), "nothing is wider");
         }
+        await page.press("Debrief"); // whose legend has the longest title
+        await page.until("its legend", () => /uncertainty/.test(document.querySelector(".legend-box").textContent));
+        const free = () =>
+          document.querySelector(".legend-box").getBoundingClientRect().left -
+          document.querySelector(".middle .view").getBoundingClientRect().left;
+        assert.ok((await page.evaluate(free)) >= 165, `the scale has ${await page.evaluate(free)} px`);
       },
       {},
       { width, height },

@@ -3,7 +3,7 @@
 import type { App } from "../app";
 import { css, robot_rgb } from "../colours";
 import type { Correction } from "../derive";
-import { metres, moment, span } from "../format";
+import { beginning, metres, moment, span } from "../format";
 import { TIMES } from "../limits";
 import { distance, transform } from "../pose";
 import { POSE_ROW } from "../schema";
@@ -251,7 +251,7 @@ function draw_marks(app: App, ink: Ink, palette: Palette): void {
     const target = { kind: "mark", id } as const;
     const chosen = app.selection?.kind === "mark" && app.selection.id === id;
     ink.dot(at, chosen ? 7 : 5, palette.mark, palette.ink, target);
-    ink.label(at, mark.text.slice(0, 40) || "mark", palette.mark, palette.halo, target);
+    ink.label(at, beginning(mark.text, 40) || "mark", palette.mark, palette.halo, target);
   }
 }
 
