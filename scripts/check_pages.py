@@ -3,7 +3,8 @@
 """Checks what README.md and docs/ name against what is there; prints page:line for each name that is not.
 
 Everywhere: the options and settings of `tutti` commands, and the arguments of tutti_ros's launch files. In docs/extending.md, which
-says where to change what, also every file, function, type and table. A page of docs/results begins with what was asked.
+says where to change what, also every file, function, type and table. A page of docs/results begins with what was asked. A guide, which is
+a page of docs/ itself that is no reference, has 2,000 words at most.
 
 With --run, README.md's commands for one's own data are run as they stand there, the live ones against a running server (run_readme.py).
 
@@ -18,6 +19,8 @@ import run_readme
 SOURCES = {"src", "apps", "proto", "python", "ros2", "cmake", "tests", "scripts", "bench", "web/src", "web/test"}
 SUFFIXES = {".cpp", ".hpp", ".py", ".proto", ".txt", ".cmake", ".sh", ".yaml", ".ts", ".mjs"}
 EXTENDING = "docs/extending.md"
+REFERENCES = {"architecture.md", "data.md", "math.md", "protocol.md", "report.md"}
+MOST_WORDS = 2000
 CODE = re.compile(r"`([^`]+)`")
 COMMAND = re.compile(r"(?:^|[\s;])tutti (?:[a-z]+ ?)+.*")
 OPTION = re.compile(r"(?<![\w-])(--[a-z][a-z-]+)")
@@ -69,6 +72,9 @@ def breaches(root):
     for page in sorted((root / "docs/results").glob("*.md")):
         if not re.match(r"# .+\n\nAsked (was|were) ", read(page)):
             yield f"{page.relative_to(root).as_posix()}:3: a page of results begins with 'Asked was ..' or 'Asked were ..'"
+    for page in [root / "README.md", *sorted((root / "docs").glob("*.md"))]:
+        if page.name not in REFERENCES and (words := len(read(page).split())) > MOST_WORDS:
+            yield f"{page.relative_to(root).as_posix()}:1: {words} words, expected {MOST_WORDS} at most, as of any page that is no reference"
     for page in [root / "README.md", *sorted((root / "docs").rglob("*.md"))]:
         name = page.relative_to(root).as_posix()
         block, command = False, ""

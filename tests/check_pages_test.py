@@ -32,6 +32,11 @@ class CheckPages(unittest.TestCase):
                           "tutti map export --grid m.yaml\nros2 launch tutti_ros robot.launch.py odom:=a\nls --all\n```\n")
         self.assertEqual(code, 0, out)
 
+    def test_a_reference_may_be_long(self):
+        for page in ("docs/math.md", "docs/decisions/a.md"):
+            code, out = check(page, "word " * 2001)
+            self.assertEqual(code, 0, out)
+
     def test_each_breach_is_found(self):
         for page, text, said in (
                 ("README.md", "a\n`tutti run --bags a=b`\n", "README.md:2: option --bags"),
@@ -40,7 +45,8 @@ class CheckPages(unittest.TestCase):
                 ("docs/a.md", "`ros2 launch tutti_ros robot.launch.py odometry:=a`\n", "docs/a.md:1: argument odometry:="),
                 ("docs/a.md", "`ros2 launch tutti_ros robots.launch.py`\n", "docs/a.md:1: launch file robots.launch.py"),
                 ("docs/extending.md", "`robot/agents.hpp`\n", "docs/extending.md:1: file robot/agents.hpp"),
-                ("docs/extending.md", "`Agent::hear()`\n", "docs/extending.md:1: name Agent::hear()")):
+                ("docs/extending.md", "`Agent::hear()`\n", "docs/extending.md:1: name Agent::hear()"),
+                ("docs/a.md", "word " * 2001, "docs/a.md:1: 2001 words, expected 2000 at most")):
             code, out = check(page, text)
             self.assertEqual(code, 1, text)
             self.assertIn(said, out)
