@@ -30,6 +30,13 @@ def tutti(*arguments, cwd=None):
     return subprocess.run([TUTTI, *map(str, arguments)], capture_output=True, text=True, cwd=cwd, timeout=300)
 
 
+def wait_until_it_listens(program):
+    """to SIGTERM"""
+    status = pathlib.Path(f"/proc/{program.pid}/status")
+    while not int(status.read_text().split("SigCgt:")[1].split()[0], 16) >> (signal.SIGTERM - 1) & 1:
+        time.sleep(0.001)
+
+
 class CommandLine(unittest.TestCase):
     def setUp(self):
         self.folder = tempfile.TemporaryDirectory()
@@ -308,6 +315,17 @@ class CommandLine(unittest.TestCase):
             printed, said = program.communicate(timeout=60)
         self.assertEqual(program.returncode, 0, said)
         return printed, said
+
+    def test_a_second_signal_of_either_kind_ends_at_once(self):
+        for first, second in ((signal.SIGINT, signal.SIGTERM), (signal.SIGTERM, signal.SIGINT), (signal.SIGINT, signal.SIGINT)):
+            command = [TUTTI, "demo", "--out", str(self.path / "out")]  # simulates its recordings for seconds
+            with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as mission:
+                wait_until_it_listens(mission)
+                mission.send_signal(first)
+                while "once more ends at once" not in mission.stderr.readline():
+                    pass
+                mission.send_signal(second)
+                self.assertEqual(mission.wait(timeout=5), -second)
 
     def test_a_stopped_simulation_leaves_bags_that_can_be_read(self):
         printed, said = self.stopped("simulate", "demo", "-o", self.path / "bags", after="%")
@@ -654,9 +672,7 @@ class CommandLine(unittest.TestCase):
         for loss in ("none", "gnc"):
             with subprocess.Popen([TUTTI, "optimise", graph, "-o", out, "--loss", loss], stdout=subprocess.PIPE,
                                   stderr=subprocess.PIPE, text=True) as program:
-                status = pathlib.Path(f"/proc/{program.pid}/status")
-                while not int(status.read_text().split("SigCgt:")[1].split()[0], 16) >> (signal.SIGTERM - 1) & 1:
-                    time.sleep(0.001)
+                wait_until_it_listens(program)
                 program.send_signal(signal.SIGTERM)  # while it reads the graph
                 printed, said = program.communicate(timeout=60)
             self.assertEqual(program.returncode, 0, said)

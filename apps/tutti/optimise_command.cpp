@@ -54,7 +54,7 @@ Outcome optimise(const formats::G2oFile& file, const OptimiseOptions& options) {
   PoseGraph graph = file.graph;
   out.chi2_before = chi2(graph);
   const auto roles = roles_from_numbering(graph);
-  const auto stop = counted_stop("step", "the poses so far are written");
+  const auto stop = counted_stop("step");
   SolverConfig config{.max_iterations = options.max_iterations, .initialisation = options.initialisation};
   if (options.loss == "gnc") {
     out.solution = solve_pose_graph_gnc(graph, {.solver = config}, roles, file.fixed, stop).solution;
@@ -120,7 +120,8 @@ Status copy_stamps(const OptimiseOptions& options) {
 }
 
 int run(OptimiseOptions options) {
-  program::stop_on_signals();  // a graph that is large takes long to read, too
+  // A graph that is large takes long to read, too.
+  announced_stop(options.robust ? "the graph is written as it is decided so far" : "the poses so far are written");
   if (options.robust) {
     options.robustly.source.path = options.inputs.front();
     options.robustly.source.more.assign(options.inputs.begin() + 1, options.inputs.end());

@@ -25,8 +25,6 @@ namespace {
 
 using server::JudgedEdge;
 
-constexpr const char* kWhatIsThere = "the graph is written as it is decided so far";
-
 std::size_t robot_of(const MapNode& node) { return node.id.chain.robot.value; }
 
 std::string closures_beside(const std::string& output) {
@@ -111,7 +109,7 @@ int optimise_robust(const RobustOptions& options) {
   if (!truth) return complain("optimise", truth.error().message);
   const auto start = std::chrono::steady_clock::now();
   const std::clock_t cpu_start = std::clock();
-  const auto judged = judge(*graph, options.source.path, counted_stop("decision", kWhatIsThere));
+  const auto judged = judge(*graph, options.source.path, counted_stop("decision"));
   const double cpu_s = static_cast<double>(std::clock() - cpu_start) / CLOCKS_PER_SEC;
   const double time_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (!judged) return complain("optimise", judged.error().message + "; nothing written");

@@ -38,31 +38,26 @@ std::string ProgressLine::rest(double share) const {
                                   : fmt::format(", about {:.0f} min yet", rest_s / kMinute_s);
 }
 
-std::function<bool()> announced_stop(std::string what_follows) {
-  program::stop_on_signals();
-  return [what = std::move(what_follows), is_announced = std::make_shared<bool>(false)] {  // one for all copies
-    if (program::stop_asked() && !std::exchange(*is_announced, true))
-      std::cerr << "\ntutti: stopping: " << what << "; once more ends at once\n";
-    return program::stop_asked().load();
-  };
+std::function<bool()> announced_stop(const std::string& what_follows) {
+  program::stop_on_signals(fmt::format("\ntutti: stopping: {}; once more ends at once\n", what_follows));
+  return [] { return program::stop_asked().load(); };
 }
 
-std::function<bool()> counted_stop(std::string what_is_asked, std::string what_follows) {
+std::function<bool()> counted_stop(std::string what_is_asked) {
   struct Count {
     ProgressLine line;
     std::size_t asked = 0;
     std::chrono::steady_clock::time_point begun = std::chrono::steady_clock::now();
     ~Count() { line.close(); }
   };
-  return [what = std::move(what_is_asked), stop = announced_stop(std::move(what_follows)),
-          count = std::make_shared<Count>()] {
+  return [what = std::move(what_is_asked), count = std::make_shared<Count>()] {
     constexpr double kSilence_s = 2.0;
     const double spent_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - count->begun).count();
     ++count->asked;
     if (spent_s > kSilence_s)
       count->line.show(0.0, fmt::format("{} {}, {:.0f} s; ends when nothing changes any more, or with Ctrl-C", what,
                                         count->asked, spent_s));
-    return stop();
+    return program::stop_asked().load();
   };
 }
 

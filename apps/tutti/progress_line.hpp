@@ -25,10 +25,11 @@ class ProgressLine {
   Clock::time_point begun_ = Clock::now(), printed_ = begun_;
 };
 
-/// From now on the first Ctrl-C or SIGTERM makes the returned function true, which then says once on stderr what
-/// follows ("the report is made"); the second one ends the program at once.
-std::function<bool()> announced_stop(std::string what_follows);
-/// The same for what nobody knows the end of: after two seconds the progress line has how often it was asked ("step").
-std::function<bool()> counted_stop(std::string what_is_asked, std::string what_follows);
+/// From now on the first Ctrl-C or SIGTERM says on stderr what follows ("the report is made") and makes the returned
+/// function true; the second one ends the program at once.
+std::function<bool()> announced_stop(const std::string& what_follows);
+/// The same, once that is announced, for what nobody knows the end of: after two seconds the progress line has how
+/// often it was asked ("step").
+std::function<bool()> counted_stop(std::string what_is_asked);
 
 }  // namespace tutti::app

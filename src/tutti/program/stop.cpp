@@ -8,6 +8,8 @@
 #include <chrono>
 #include <csignal>
 #include <cstdint>
+#include <string>
+#include <utility>
 
 #include "tutti/program/clock.hpp"
 
@@ -17,16 +19,24 @@ namespace {
 std::atomic<bool> asked = false;
 static_assert(std::atomic<bool>::is_always_lock_free);  // a handler writes it
 
-void ask(int /*signal*/) { asked = true; }
+std::atomic<const std::string*> announcement = nullptr;  // of this program's life
+static_assert(decltype(announcement)::is_always_lock_free);
+
+void ask(int /*signal*/) {
+  asked = true;
+  for (const int signal : {SIGTERM, SIGINT}) static_cast<void>(std::signal(signal, SIG_DFL));
+  if (const std::string* said = announcement)
+    if (write(STDERR_FILENO, said->data(), said->size()) < 0) return;  // nobody listens
+}
 
 }  // namespace
 
 const std::atomic<bool>& stop_asked() { return asked; }
 
-void stop_on_signals() {
+void stop_on_signals(std::string said_at_once) {
+  if (!said_at_once.empty()) announcement = new std::string(std::move(said_at_once));
   struct sigaction action {};
   action.sa_handler = &ask;
-  action.sa_flags = static_cast<int>(SA_RESETHAND);
   sigemptyset(&action.sa_mask);
   sigaction(SIGTERM, &action, nullptr);
   sigaction(SIGINT, &action, nullptr);
