@@ -137,6 +137,14 @@ std::shared_ptr<RosArguments> add_ros_robot_options(CLI::App& robot) {
       ->type_name("TOPIC")
       ->capture_default_str()
       ->needs(ros);
+  robot
+      .add_option(
+          "--start-pose", out->robot.start_pose,
+          "Topic of geometry_msgs/PoseWithCovarianceStamped, below the namespace: where the robot is in the map "
+          "of --map, as RViz's \"2D Pose Estimate\" tells it; '' for none")
+      ->type_name("TOPIC")
+      ->capture_default_str()
+      ->needs(ros);
   robot.add_option("--fixes", out->robot.fixes, "Topic of sensor_msgs/NavSatFix, below the namespace; '' for none")
       ->type_name("TOPIC")
       ->capture_default_str()

@@ -60,6 +60,22 @@ class Programs(WithPrograms):
                                  ("l/i/compressed", "l/camera_info"), ("l/i/compressedDepth", "l/camera_info")):
             self.assertEqual(camera_info_topic(images), expected)
 
+    def test_start_poses_reach_the_robot_which_says_that_it_has_no_map(self):
+        self.start_robot("r1", "nats://127.0.0.1:1")
+        node = self.node("r1")
+        self.wait_for(lambda: node.link.state == "feeding", "the robot")
+        start = ros_stub.TYPES["geometry_msgs/PoseWithCovarianceStamped"]()
+        start.header.frame_id = "world"
+        start.pose.pose.orientation.w = 1.0
+        cdr = ros_stub.encode("geometry_msgs/PoseWithCovarianceStamped", start)
+        asked = ros_stub.types.SimpleNamespace(pose=start)
+        for ask in (lambda: node.callbacks["initialpose"](cdr), lambda: node.callbacks["set_initial_pose"](asked, None),
+                    lambda: node.callbacks["reinitialize_global_localization"](None, None)):
+            refused = node.link.counts["refused"]
+            ask()
+            self.wait_for(lambda: node.link.counts["refused"] > refused, "the robot's answer")
+            self.assertIn("this robot does not localise in a map", self.diagnosis(node)[1])
+
     def test_a_robot_alone_that_is_killed_once(self):
         bus = "nats://127.0.0.1:1"  # nobody is there: a robot needs no link
         node = self.node("r1")

@@ -271,7 +271,9 @@ def install():
            QoSProfile=lambda **what: what, qos_profile_sensor_data="sensor data")
     module("rcl_interfaces.msg", ParameterDescriptor=lambda **what: what)
     module("rclpy", init=lambda: None, try_shutdown=lambda: None, ok=lambda: True, executors=executors)
-    module("std_srvs.srv", Trigger=object)
+    module("rclpy.serialization", serialize_message=lambda message: encode(message.name_, message))
+    module("std_srvs.srv", Trigger=object, Empty=object)
+    module("nav2_msgs.srv", SetInitialPose=object)
     module("livox_ros_driver2.msg", CustomMsg=type("CustomMsg", (), {}))  # whose messages are taken as bytes
     for name, made in TYPES.items():
         package, word = name.split("/")

@@ -120,6 +120,10 @@ class Link:
         """One that nobody misses."""
         self._say_once(raw_frame(topic, kind, cdr))
 
+    def add_search(self):
+        """The robot is to search the whole map in which it localises."""
+        self._say_once(frame(start_pose=Feed.StartPose()))
+
     def _say_once(self, said):
         if self.state == "feeding":
             self.once.append(said)

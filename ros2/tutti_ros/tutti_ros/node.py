@@ -2,6 +2,7 @@
 """The node: hands what it subscribes to the robot program as it comes, and publishes what that answers as it comes. The robot
 reads and writes the bytes of ROS's messages itself (docs/ros.md)."""
 import collections
+import contextlib
 import importlib
 import struct
 
@@ -9,7 +10,8 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
-from std_srvs.srv import Trigger
+from rclpy.serialization import serialize_message
+from std_srvs.srv import Empty, Trigger
 
 from tutti_ros.connection import Connection
 from tutti_ros.diagnosis import diagnosis
@@ -42,6 +44,7 @@ NOISE = {"translation_m_per_sqrt_m": 0.02, "translation_m_per_sqrt_deg": 0.001, 
          "rotation_deg_per_sqrt_m": 0.1, "rotation_deg_per_sqrt_deg": 0.02, "rotation_deg_per_sqrt_s": 0.02}
 GRID = "nav_msgs/msg/OccupancyGrid"
 ODOMETRY, TRANSFORMS, PATH = "nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage", "nav_msgs/msg/Path"
+POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 CLOUD = "sensor_msgs/msg/PointCloud2"
 LIVOX = tuple(f"{package}/msg/CustomMsg" for package in ("livox_ros_driver2", "livox_ros_driver", "livox_interfaces"))
 COMPRESSED = ("/compressed", "/compressedDepth")  # as image_transport names topics of CompressedImage
@@ -75,12 +78,15 @@ class TuttiNode(Node):
         self.connection = Connection(self.socket, self.link, self.hear)
         self.outputs, self.topic_names = {}, {}  # publishers; subscribed topics, as ROS calls them
         for topic, kind, qos in (("/tf", TRANSFORMS, TF_QOS), ("corrected_path", PATH, LATCHED),
-                                 ("corrected_pose", "geometry_msgs/msg/PoseWithCovarianceStamped", 10),
+                                 ("corrected_pose", POSE, 10), ("localised_pose", POSE, 10),
                                  ("team_mates", "visualization_msgs/msg/MarkerArray", LATCHED)):
             self.outputs[topic] = self.create_publisher(message_type(kind), topic, qos)
         self.diagnostics_publisher = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._subscribe_all()
         self.create_service(Trigger, "~/end_recording", self.end_recording)
+        self.create_service(Empty, "reinitialize_global_localization", self.search_anew)  # nav2's names
+        with contextlib.suppress(ImportError):  # nav2_msgs are not everywhere
+            self.create_service(importlib.import_module("nav2_msgs.srv").SetInitialPose, "set_initial_pose", self.set_start_pose)
         self.create_timer(self.path_period_s, self.ask_for_path)
         self.create_timer(1.0, self.publish_diagnostics)
         self.connection.start()
@@ -130,6 +136,7 @@ class TuttiNode(Node):
         if self.grid and self.world_frame:
             self._subscribe(self.grid, GRID, LATCHED, link.add_lasting)
         self._subscribe("battery_state", "sensor_msgs/msg/BatteryState", sensor_qos, link.add_once)
+        self._subscribe("initialpose", POSE, 1, link.add_once)  # reliable, as RViz sends it
         if self.use_scans:
             self.scans = CLOUD, self._subscribe("points", CLOUD, sensor_qos, link.add, "scans")
             self.create_timer(1.0, self.look_for_scans)
@@ -177,6 +184,17 @@ class TuttiNode(Node):
             self.link.end_recording()
         self.connection.wake()
         response.success, response.message = True, "told the robot; it says when everything is stored"
+        return response
+
+    def search_anew(self, request, response):
+        """A robot that localises in a map forgets where it is, and searches the whole map."""
+        with self.connection.lock:
+            self.link.add_search()
+        self.connection.wake()
+        return response
+
+    def set_start_pose(self, request, response):
+        self.take(self.link.add_once, "initialpose", POSE, serialize_message(request.pose))
         return response
 
     # From the robot, in the thread of the connection.

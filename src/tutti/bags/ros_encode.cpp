@@ -98,9 +98,13 @@ std::array<double, 36> to_ros(const Matrix6d& matrix) {
 }
 
 std::array<double, 36> pose_covariance(const Matrix6d& covariance, const Eigen::Quaterniond& R_frame_body) {
+  return to_ros(covariance_of(covariance, R_frame_body.conjugate()));
+}
+
+Matrix6d covariance_of(const Matrix6d& pose_covariance, const Eigen::Quaterniond& R_frame_body) {
   Matrix6d turn = Matrix6d::Zero();
-  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = R_frame_body.toRotationMatrix();
-  return to_ros(Matrix6d(turn * covariance * turn.transpose()));
+  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = R_frame_body.toRotationMatrix().transpose();
+  return turn * pose_covariance * turn.transpose();
 }
 
 std::string encode(const RosOdometry& message) {

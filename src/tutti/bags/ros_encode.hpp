@@ -37,15 +37,13 @@ std::array<double, 36> to_ros(const Matrix6d& matrix);
 /// From the covariance of T_frame_body's right perturbation [m; rad], which is in the body's axes, to ROS's covariance
 /// of a pose: of a shift along, and a turn about, the axes of the frame.
 std::array<double, 36> pose_covariance(const Matrix6d& covariance, const Eigen::Quaterniond& R_frame_body);
+/// The other way round.
+Matrix6d covariance_of(const Matrix6d& pose_covariance, const Eigen::Quaterniond& R_frame_body);
 
-/// Types from here on are written only, not read: they are for viewers and planners.
-struct RosPoseWithCovariance {
-  RosHeader header;
-  RosPose pose;
-  std::array<double, 36> covariance{};  ///< As RosOdometry::pose_covariance.
-};
 /// As geometry_msgs/msg/PoseWithCovarianceStamped.
 std::string encode(const RosPoseWithCovariance& message);
+
+/// Types from here on are written only, not read: they are for viewers and planners.
 
 /// rosgraph_msgs/msg/Clock
 std::string encode_clock(Timestamp now);

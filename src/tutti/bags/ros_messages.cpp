@@ -296,6 +296,16 @@ Result<RosBatteryState> decode_battery_state(std::string_view bytes, RosEncoding
   });
 }
 
+Result<RosPoseWithCovariance> decode_pose_with_covariance(std::string_view bytes, RosEncoding encoding) {
+  return decode(bytes, encoding, "geometry_msgs/msg/PoseWithCovarianceStamped", [](Cursor& in) {
+    RosPoseWithCovariance out;
+    out.header = header(in);
+    out.pose = pose(in);
+    numbers(in, out.covariance, "pose.covariance");
+    return out;
+  });
+}
+
 Result<RosPoseStamped> decode_pose_stamped(std::string_view bytes, RosEncoding encoding) {
   return decode(bytes, encoding, "geometry_msgs/msg/PoseStamped", [](Cursor& in) {
     RosPoseStamped out;

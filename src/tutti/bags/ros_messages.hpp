@@ -133,6 +133,12 @@ struct RosPoseStamped {
   RosPose pose;
 };
 
+struct RosPoseWithCovariance {
+  RosHeader header;
+  RosPose pose;
+  std::array<double, 36> covariance{};  ///< As RosOdometry::pose_covariance.
+};
+
 /// Each takes all bytes of one message, for CDR with the 4-byte encapsulation header. Errors name type, byte (counted
 /// behind that header) and what was expected. Bytes may not be left over, except for up to three of padding in CDR.
 Result<RosOccupancyGrid> decode_occupancy_grid(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
@@ -145,6 +151,9 @@ Result<RosCompressedImage> decode_compressed_image(std::string_view bytes, RosEn
 Result<RosCameraInfo> decode_camera_info(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
 Result<RosNavSatFix> decode_nav_sat_fix(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
 Result<RosBatteryState> decode_battery_state(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
+/// Decodes geometry_msgs/msg/PoseWithCovarianceStamped.
+Result<RosPoseWithCovariance> decode_pose_with_covariance(std::string_view bytes,
+                                                          RosEncoding encoding = RosEncoding::cdr);
 Result<RosPoseStamped> decode_pose_stamped(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
 /// Decodes CustomMsg of livox_ros_driver2, livox_ros_driver or livox_interfaces (livox_ros2_driver) as the cloud that
 /// it is: points with the fields `offset_time` (uint32, ns after header.stamp), x, y and z (float32, m). `timebase` is

@@ -20,6 +20,7 @@ constexpr int kConfirmations = 3;         // scans that a found place must lie u
 constexpr double kKept_s = 3.0;           // of odometry
 constexpr std::size_t kMostWaiting = 64;  // scans
 constexpr std::size_t kMostPending = 16;
+constexpr int kStartScans = 3;  // that are tried from a start pose
 // Odometry errs by this at least, as a share of the distance, and per radian.
 constexpr double kDrift = 0.01, kDrift_rad_per_m = 0.2 * kRadPerDeg, kDrift_rad_per_rad = 0.01;
 constexpr double kStep_m = 0.002;
@@ -81,7 +82,9 @@ Status Localiser::hear(const OdometrySample& sample) {
 }
 
 bool Localiser::wants_scan(Timestamp stamp) const {
-  return submaps_.wants_scan(stamp) || !last_match_ || stamp - *last_match_ >= setup_.config.track_every_s;
+  const bool is_followed = track_ || start_;
+  return submaps_.wants_scan(stamp) ||
+         (is_followed && (!last_match_ || stamp - *last_match_ >= setup_.config.track_every_s));
 }
 
 Status Localiser::hear(const Scan& scan) {
@@ -106,9 +109,47 @@ void Localiser::advance() {
   take_submaps();
 }
 
-void Localiser::suggest(const RelativePose& T_world_body) {
+Status Localiser::hear(const StartPose& start) {
+  if (!start.T_world_body) {
+    search_anew("it was asked to search the whole map");
+    return {};
+  }
+  if (const Status ok = check_start_pose(start); !ok) return ok;
+  auto levels = tries_of(*setup_.map, start);
+  if (!levels) return tl::unexpected(levels.error());
   search_anew("a start pose was given, which scans have not confirmed yet");
-  suggested_ = {T_world_body.T_a_b, T_world_body.covariance + diagonal(0.1, 0.02)};
+  start_ = Start{std::move(*levels), recent_.empty() ? Timestamp{} : recent_.back().stamp};
+  return {};
+}
+
+/// Registers a scan from all poses that the start pose stands for. The place that fits best is followed, unless another
+/// one fits nearly as well.
+void Localiser::try_start(const Scan& scan) {
+  const auto T_odom_body = pose_at(recent_, scan.stamp);
+  const auto undistorted = lidar::undistort(scan, recent_);
+  if (!T_odom_body || !undistorted || scan.stamp < start_->said) return;
+  const fit::FitScan thinned = fit::make_fit_scan(scan.stamp, *undistorted->cloud, setup_.submap.min_range_m);
+  std::vector<StartFit> fits;
+  for (const StartTries& level : start_->levels)
+    if (const LocalMap* local = local_maps_.about(level.T_world_body.T_a_b.translation)) {
+      work_.registered += level.from.size();
+      add_fits(*local, thinned, level, fits);
+    }
+  if (fits.size() == 1) {
+    track_ = Track{.T_world_body = fits.front().prior,
+                   .at = {scan.stamp, *T_odom_body},
+                   .confirmed = scan.stamp,
+                   .to_confirm = kConfirmations,
+                   .gate = kAgreedGate};
+    fits.front().match.T_world_body.covariance *= kAlike;
+    correct(fits.front().match.T_world_body);
+    why_ = "the start pose fits, which more scans are to confirm";
+    return start_.reset();
+  }
+  if (++start_->scans < kStartScans) return;
+  why_ = fits.empty() ? "nothing within two standard deviations of the start pose fits what it sees"
+                      : fmt::format("{} places near the start pose fit what it sees", fits.size());
+  start_.reset();
 }
 
 void Localiser::begin_submaps() {
@@ -120,7 +161,7 @@ void Localiser::begin_submaps() {
 
 void Localiser::search_anew(const std::string& why) {
   track_.reset();
-  suggested_.reset();
+  start_.reset();
   pending_.clear();
   places_.clear();
   against_since_ = nothing_since_ = std::nullopt;
@@ -153,12 +194,8 @@ void Localiser::correct(const RelativePose& measured) {
 }
 
 void Localiser::follow(const Scan& scan) {
-  if (suggested_ && !track_) {
-    track_ =
-        Track{.T_world_body = *suggested_, .at = recent_.back(), .confirmed = scan.stamp, .to_confirm = kConfirmations};
-    suggested_.reset();
-  }
   last_match_ = scan.stamp;
+  if (start_ && !track_) return try_start(scan);
   if (!track_) return;
   const auto T_odom_body = pose_at(recent_, scan.stamp);
   const auto undistorted = lidar::undistort(scan, recent_);
@@ -170,7 +207,8 @@ void Localiser::follow(const Scan& scan) {
   ScanMatch match = match_scan(*local, thinned, track_->T_world_body.T_a_b);
   ++work_.registered;
   match.T_world_body.covariance *= kAlike;
-  const Assessment assessment = assess(match, track_->T_world_body);
+  const Assessment assessment = track_->to_confirm > 0 ? assess_guess(match, track_->T_world_body, track_->gate)
+                                                       : assess(match, track_->T_world_body);
   if (assessment.evidence == Evidence::confirms)
     confirm(match);
   else
@@ -182,9 +220,11 @@ void Localiser::confirm(const ScanMatch& match) {
   against_since_ = nothing_since_ = std::nullopt;
   against_ = 0;
   track_->confirmed = track_->at.stamp;
+  track_->overlap = match.overlap;
   if (track_->to_confirm > 0 && --track_->to_confirm > 0) return;
   state_ = State::localised;
-  why_ = fmt::format("{:.0f} % of the scan lies on the map", 100.0 * match.overlap);
+  why_ = fmt::format("{:.0f} % of the scan lies on the map, {:.0f} % contradicts it", 100.0 * match.overlap,
+                     100.0 * match.contradiction);
   pending_.clear();
   places_.clear();
 }
@@ -256,7 +296,10 @@ void Localiser::decide(SearchResult found, const Submap& submap) {
   std::vector<Hypothesis> rivals = found.rivals();
   const bool is_known = was_seen(best);
   if (is_known) std::erase_if(rivals, [&](const Hypothesis& rival) { return !was_seen(rival); });
-  if (rivals.empty() && (is_known || best.accepted >= kLeastAgreeing)) return begin_track(best);
+  if (rivals.empty() && (is_known || best.accepted >= kLeastAgreeing)) {
+    pending_.assign(1, best);  // should scans not confirm it, the next submap may
+    return begin_track(best, is_known ? kAgreedGate : kAloneGate);
+  }
   if (!knows) {
     places_.clear();
     state_ = rivals.empty() ? State::searching : State::ambiguous;
@@ -271,12 +314,13 @@ void Localiser::decide(SearchResult found, const Submap& submap) {
 }
 
 /// Goes on from a place that was found, which scans have to confirm; without scans it counts.
-void Localiser::begin_track(const Hypothesis& place) {
+void Localiser::begin_track(const Hypothesis& place, const GuessGate& gate) {
   const StampedPose& now = recent_.back();
   track_ = Track{.T_world_body = carried_to(now.pose, place),
                  .at = now,
                  .confirmed = now.stamp,
-                 .to_confirm = has_scans() ? kConfirmations : 0};
+                 .to_confirm = has_scans() ? kConfirmations : 0,
+                 .gate = gate};
   against_since_ = nothing_since_ = std::nullopt;
   against_ = 0;
   if (has_scans()) {
@@ -326,6 +370,7 @@ Located Localiser::located() const {
   RelativePose pose = carried_to(recent_.back().pose, {.T_world_body = track_->T_world_body, .at = track_->at});
   pose.covariance += diagonal(kMap_m, kMap_rad);
   out.age_s = out.stamp - track_->confirmed;
+  out.overlap = track_->overlap;
   if (out.state == State::stale) out.why = fmt::format("no scan has come for {:.1f} s", out.stamp - *last_scan_);
   out.T_world_body = std::move(pose);
   return out;

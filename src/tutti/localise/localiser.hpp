@@ -14,6 +14,7 @@
 #include "tutti/localise/local_map.hpp"
 #include "tutti/localise/place_search.hpp"
 #include "tutti/localise/scan_match.hpp"
+#include "tutti/localise/start_tries.hpp"
 #include "tutti/localise/state.hpp"
 #include "tutti/model/input.hpp"
 #include "tutti/robot/submap_builder.hpp"
@@ -50,12 +51,10 @@ class Localiser {
   };
   explicit Localiser(Setup setup);
 
-  /// Odometry, scans and tracked images, as SubmapBuilder::add() takes them; other kinds do nothing. On an error
-  /// nothing has changed.
+  /// Odometry, scans and tracked images, as SubmapBuilder::add() takes them; other kinds do nothing. A start pose is
+  /// tried by the next scans, of those that are not older than the newest odometry, before any other place, and counts
+  /// only when they confirm it (tries_of()); without a pose it is search_anew(). On an error nothing has changed.
   Status add(const Input& input);
-  /// Where somebody says that the robot is now, with a covariance (right tangent). It is tried by the next scans before
-  /// any other place, and counts only when they confirm it.
-  void suggest(const RelativePose& T_world_body);
   /// Forgets where the robot is, and searches the whole map.
   void search_anew(const std::string& why);
 
@@ -69,16 +68,20 @@ class Localiser {
 
  private:
   struct Track {
-    RelativePose T_world_body;  ///< At `at`; right tangent, without what the map itself errs by.
-    StampedPose at;             ///< By odometry.
-    Timestamp confirmed;        ///< When a scan last lay on the map.
-    int to_confirm = 0;         ///< Scans that are still to confirm it before it counts.
+    RelativePose T_world_body;      ///< At `at`; right tangent, without what the map itself errs by.
+    StampedPose at;                 ///< By odometry.
+    Timestamp confirmed;            ///< When a scan last lay on the map.
+    int to_confirm = 0;             ///< Scans that are still to confirm it before it counts,
+    GuessGate gate;                 ///< and what these must show.
+    std::optional<double> overlap;  ///< ScanMatch::overlap of that scan.
   };
 
   Status hear(const OdometrySample& sample);
   Status hear(const Scan& scan);
   Status hear(const TrackedImages& images) { return submaps_.add(images); }
+  Status hear(const StartPose& start);
   Status hear(const auto&) { return {}; }
+  void try_start(const Scan& scan);
   void begin_submaps();
   void advance();
   void follow(const Scan& scan);
@@ -89,7 +92,7 @@ class Localiser {
   void take_submaps();
   void consider(const Submap& submap);
   void decide(SearchResult found, const Submap& submap);
-  void begin_track(const Hypothesis& place);
+  void begin_track(const Hypothesis& place, const GuessGate& gate);
   void follow_submap(const SearchResult& found);
   [[nodiscard]] bool has_scans() const { return last_scan_.has_value(); }
 
@@ -103,7 +106,12 @@ class Localiser {
   std::optional<Timestamp> last_scan_;   // the newest heard
   std::optional<Timestamp> last_match_;  // the newest registered
   std::optional<Track> track_;
-  std::optional<RelativePose> suggested_;
+  struct Start {
+    std::vector<StartTries> levels;
+    Timestamp said;  ///< By odometry.
+    int scans = 0;   ///< That were tried.
+  };
+  std::optional<Start> start_;
   std::vector<Hypothesis> pending_;  // of earlier submaps, not decided
   std::optional<Timestamp> against_since_, nothing_since_;
   std::size_t against_ = 0;  // scans in a row

@@ -8,83 +8,15 @@
 #include <memory>
 #include <set>
 
+#include "support/localise/tunnel.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/model/pose_at.hpp"
-#include "tutti/simulation/recordings.hpp"
-#include "tutti/verifiers/sensor_verifier_maker.hpp"
 
 namespace tutti::localise {
 namespace localiser_test {
 
-/// A piece of tunnel in which two robots made a map with perfect odometry, and a third drives with its own.
-struct World {
-  std::vector<Recording> robots;
-  std::shared_ptr<const KnownMap> map;
-};
+using test::feed, test::make_world, test::verifier, test::World;
 
-const verifiers::VerifierConfig kVerifier;
-
-std::shared_ptr<const server::ClosureVerifier> verifier() { return verifiers::make_verifier(kVerifier); }
-
-/// Feeds a robot's odometry and scans, from one sample to another, to what takes inputs.
-template <class Taker>
-void feed(const Recording& robot, const Trajectory& odometry, std::size_t from, std::size_t to, Taker& taker,
-          const std::function<void()>& after = {}) {
-  for (std::size_t k = from; k < std::min(to, odometry.size()); ++k) {
-    Matrix6d step = Matrix6d::Identity() * 1e-6;
-    ASSERT_TRUE(taker.add(OdometrySample{odometry[k].stamp, odometry[k].pose, step}).has_value());
-    if (taker.wants_scan(odometry[k].stamp))
-      if (const auto scan = robot.scans->scan(k); scan && *scan) (void)taker.add(**scan);
-    if (after) after();
-  }
-}
-
-std::shared_ptr<KnownMap> map_of(const std::vector<Recording>& robots) {
-  auto map = std::make_shared<KnownMap>();
-  auto payloads = std::make_shared<server::MemoryPayloadStore>();
-  for (const Recording& robot : robots) {
-    robot::SubmapConfig config;
-    config.fit.scans = "off";
-    config.has_scans = true;
-    robot::SubmapBuilder builder(ChainId(robot.robot), config);
-    feed(robot, robot.reference, 0, robot.reference.size(), builder);
-    builder.finish();
-    while (const auto submap = builder.take_submap()) {
-      KnownMap::Entry entry{.submap = std::make_shared<const Submap>(without_payloads(*submap)),
-                            .T_world_submap = submap->keyframes.front().T_odom_body,
-                            .place = verifier()->place_of(*submap),
-                            .size = payload_size(*submap)};
-      entry.middle = submap->keyframes[submap->keyframes.size() / 2].T_odom_body.translation;
-      EXPECT_TRUE(payloads->put(*submap).has_value());
-      map->submaps.emplace(submap->id, std::move(entry));
-    }
-  }
-  map->payloads = std::move(payloads);
-  map->id = "test";
-  return map;
-}
-
-World make_world(std::uint64_t seed) {
-  simulation::SimulationConfig config;
-  config.sensors = "lidar";
-  config.lidar.rays_share = 0.5;
-  config.world.network.rows = 2;
-  config.world.network.columns = 2;
-  config.world.network.block_m = 22.0;
-  config.world.featureless_share = 0.0;
-  config.robots.resize(3);
-  for (auto& robot : config.robots) {
-    robot.walk.duration_s = 110.0;
-    robot.walk.rate_hz = 5.0;
-    robot.walk.pauses_per_min = 0.0;
-    robot.odometry.yaw_bias_deg_per_m = 0.1;
-  }
-  auto world = simulation::simulate_recordings(config, Timestamp{0}, seed);
-  EXPECT_TRUE(world.has_value()) << world.error().message;
-  World out{.robots = std::move(world->recordings), .map = {}};
-  out.map = map_of({out.robots[0], out.robots[1]});
-  return out;
-}
 const World& world() {
   static const World made = make_world(3);
   return made;
@@ -225,11 +157,53 @@ TEST(Localiser, AStartPoseCountsOnlyWhenScansConfirmIt) {
     feed(robot, robot.odometry, 0, 21, one);
     RelativePose said = truth;
     if (!is_right) said.T_a_b = said.T_a_b * Pose3{so3_exp({0, 0, 2.0}), {6.0, 2.0, 0.0}};
-    one.suggest(said);
+    ASSERT_TRUE(one.add(StartPose{said}).has_value());
     Judged judged;
     feed(robot, robot.odometry, 21, 41, one, [&] { judged.add(one.located(), robot.reference); });
     EXPECT_EQ(judged.published > 0, is_right) << one.located().why;
     EXPECT_EQ(judged.wrong, 0U);
+  }
+}
+
+/// As somebody clicks on a plan: a metre and 25 degrees beside, and at no height.
+TEST(Localiser, AStartPoseOnAPlanIsWithinTwoStandardDeviations) {
+  const Recording& robot = world().robots[2];
+  Matrix6d covariance = Matrix6d::Zero();
+  covariance.diagonal() << 0.4, 0.4, 0.0, 0.0, 0.0, 0.07;
+  Pose3 said = robot.reference[20].pose * Pose3{so3_exp({0, 0, 25.0 * kRadPerDeg}), {0.8, -0.6, 0.0}};
+  said.translation.z() = -7.0;
+  Localiser one = localiser(world().map);
+  feed(robot, robot.odometry, 0, 21, one);
+  ASSERT_TRUE(one.add(StartPose{RelativePose{said, covariance}, true}).has_value());
+  Judged judged;
+  feed(robot, robot.odometry, 21, 41, one, [&] { judged.add(one.located(), robot.reference); });
+  ASSERT_TRUE(judged.first_fix_s.has_value()) << one.located().why;
+  EXPECT_LT(*judged.first_fix_s - (robot.reference[20].stamp - robot.reference.front().stamp), 2.0);
+  EXPECT_EQ(judged.wrong, 0U);
+  EXPECT_LE(one.work().registered, 100U);
+
+  // Whoever says that nobody knows makes it search.
+  ASSERT_TRUE(one.add(StartPose{}).has_value());
+  EXPECT_EQ(one.located().state, State::searching);
+  EXPECT_FALSE(one.located().T_world_body.has_value());
+}
+
+TEST(Localiser, AStartPoseThatCannotBeTriedIsRefusedAndChangesNothing) {
+  const Recording& robot = world().robots[2];
+  Localiser one = localiser(world().map);
+  std::size_t k = 0;
+  for (; k < robot.odometry.size() && one.located().state != State::localised; ++k)
+    feed(robot, robot.odometry, k, k + 1, one);
+  RelativePose far{{Eigen::Quaterniond::Identity(), {900, 0, 0}}, Matrix6d::Identity() * 0.01}, vague = far;
+  vague.T_a_b = robot.reference[k].pose;
+  vague.covariance *= 10'000.0;
+  RelativePose wrong = vague;
+  wrong.covariance = -Matrix6d::Identity();
+  for (const RelativePose& bad : {far, vague, wrong}) {
+    const Status refused = one.add(StartPose{bad});
+    ASSERT_FALSE(refused.has_value());
+    EXPECT_NE(refused.error().message.find("a start pose"), std::string::npos) << refused.error().message;
+    EXPECT_EQ(one.located().state, State::localised);
   }
 }
 

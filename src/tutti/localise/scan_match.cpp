@@ -4,9 +4,11 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 
 #include "tutti/base/chi_square.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/localise/place_search.hpp"
 #include "tutti/perception/lidar/visibility.hpp"
 
 namespace tutti::localise {
@@ -79,6 +81,44 @@ Assessment assess(const ScanMatch& match, const RelativePose& predicted) {
     return {Evidence::nothing, fmt::format("{:.0f} % of the scan lies on the map, {:.0f} % contradicts it",
                                            100.0 * match.overlap, 100.0 * match.contradiction)};
   return {Evidence::confirms, {}};
+}
+
+Assessment assess_guess(const ScanMatch& match, const RelativePose& predicted, const GuessGate& gate) {
+  const Assessment out = assess(match, predicted);
+  if (out.evidence != Evidence::confirms) return out;
+  if (match.overlap >= gate.least_overlap && match.contradiction <= gate.most_contradiction) return out;
+  return {Evidence::nothing,
+          fmt::format("{:.0f} % of the scan lies on the map and {:.0f} % contradicts it, expected {:.0f} "
+                      "and {:.0f} % to begin with",
+                      100.0 * match.overlap, 100.0 * match.contradiction, 100.0 * gate.least_overlap,
+                      100.0 * gate.most_contradiction)};
+}
+
+namespace {
+
+/// One place: as near as two registrations of one scan end, or as their covariances allow, as along a corridor.
+bool is_one(const RelativePose& a, const RelativePose& b) {
+  const Vector6d apart = local(a.T_a_b, b.T_a_b);
+  if (apart.head<3>().norm() < 0.5 && apart.tail<3>().norm() < 3.0 * kRadPerDeg) return true;
+  return squared_distance(a, b) < chi_square_quantile(kSurprise, 6);
+}
+
+}  // namespace
+
+void add_fits(const LocalMap& map, const fit::FitScan& scan, const StartTries& tries, std::vector<StartFit>& fits) {
+  for (const Pose3& from : tries.from) {
+    StartFit fit{tries.T_world_body, match_scan(map, scan, from)};
+    if (assess_guess(fit.match, fit.prior, kAgreedGate).evidence != Evidence::confirms) continue;
+    const auto same = std::ranges::find_if(
+        fits, [&](const StartFit& other) { return is_one(other.match.T_world_body, fit.match.T_world_body); });
+    if (same == fits.end())
+      fits.push_back(std::move(fit));
+    else if (fit.quality() > same->quality())
+      *same = std::move(fit);
+  }
+  double best = 0.0;
+  for (const StartFit& fit : fits) best = std::max(best, fit.quality());
+  std::erase_if(fits, [&](const StartFit& fit) { return fit.quality() < kRival * best; });
 }
 
 }  // namespace tutti::localise

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "tutti/localise/local_map.hpp"
+#include "tutti/localise/start_tries.hpp"
 #include "tutti/model/relative_pose.hpp"
 #include "tutti/perception/fit/scan_step.hpp"
 
@@ -35,5 +37,25 @@ struct Assessment {
 };
 /// `predicted` is where the robot should be with its covariance, `match` begun there.
 Assessment assess(const ScanMatch& match, const RelativePose& predicted);
+/// What a scan must show where a place was found and is not confirmed yet: shares of it.
+struct GuessGate {
+  double least_overlap = 0.0, most_contradiction = 1.0;
+};
+/// Where two submaps of the robot, or somebody who gives a start pose, say so,
+inline constexpr GuessGate kAgreedGate{.least_overlap = 0.6, .most_contradiction = 0.15};
+/// and where one submap does: three quarters of a scan lie on the wrong one of two corridors that look alike.
+inline constexpr GuessGate kAloneGate{.least_overlap = 0.85, .most_contradiction = 0.03};
+/// As assess(), and only what passes the gate confirms.
+Assessment assess_guess(const ScanMatch& match, const RelativePose& predicted, const GuessGate& gate);
+
+/// A place that a scan fits, of those that a start pose stands for.
+struct StartFit {
+  RelativePose prior;  ///< StartTries::T_world_body
+  ScanMatch match;
+  [[nodiscard]] double quality() const { return match.overlap * (1.0 - match.contradiction); }
+};
+/// Adds the places where a scan confirms that it was taken, from all poses of `tries`. The best of those that are one
+/// place stays; those that fit less than kRival times as well as the best of all go.
+void add_fits(const LocalMap& map, const fit::FitScan& scan, const StartTries& tries, std::vector<StartFit>& fits);
 
 }  // namespace tutti::localise

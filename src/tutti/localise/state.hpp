@@ -42,6 +42,7 @@ struct Located {
   /// map show that the robot is there.
   std::optional<RelativePose> T_world_body;
   double age_s = 0.0;              ///< Since the map last showed it.
+  std::optional<double> overlap;   ///< Share of the scan that showed it last which lay on the map; of scans alone.
   std::vector<PlaceFound> places;  ///< Where it may be, when it is ambiguous.
 };
 

@@ -77,6 +77,8 @@ class RobotActor {
   [[nodiscard]] bool has_sensors() const { return recording_.recording.scans || recording_.recording.visual; }
   /// Replays one odometry sample with the sensor data up to it; after the last one the node ends its last submap.
   void replay_next(Timestamp now);
+  /// Where somebody says that it is in the map that it localises in.
+  void start_at(const StartPose& start, Timestamp now) { take(node_->add(start, now)); }
   void store_all() { take(node_->store_all()); }
   /// Ends the last submap before the recording ends.
   void finish(Timestamp now) { take(node_->finish(now)); }

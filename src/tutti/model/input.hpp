@@ -13,6 +13,7 @@
 #include "tutti/model/point_cloud.hpp"
 #include "tutti/model/position_fix.hpp"
 #include "tutti/model/sensors.hpp"
+#include "tutti/model/start_pose.hpp"
 #include "tutti/model/status.hpp"
 #include "tutti/model/visual.hpp"
 
@@ -31,12 +32,16 @@ using ImuSamples = std::vector<ImuSample>;
 
 /// Whoever feeds a robot gives encoded images and IMU samples; its program makes tracked images of them, which its
 /// agent takes.
-using Input = std::variant<OdometrySample, Scan, EncodedImages, TrackedImages, ImuSamples, PositionFix, Health>;
+using Input =
+    std::variant<OdometrySample, Scan, EncodedImages, TrackedImages, ImuSamples, PositionFix, Health, StartPose>;
+
+/// What has no stamp: it holds from when it comes.
+template <class Sample>
+concept Stampless = std::is_same_v<Sample, Health> || std::is_same_v<Sample, StartPose>;
 
 /// What a robot's program uses itself. Its agent takes the other kinds.
 template <class Sample>
-concept FedOnly =
-    std::is_same_v<Sample, EncodedImages> || std::is_same_v<Sample, ImuSamples> || std::is_same_v<Sample, Health>;
+concept FedOnly = std::is_same_v<Sample, EncodedImages> || std::is_same_v<Sample, ImuSamples> || Stampless<Sample>;
 
 /// What is waited for and how long, by odometry's time, so that what belongs together comes together.
 namespace waiting {
@@ -69,6 +74,7 @@ inline constexpr std::array<InputKind, std::variant_size_v<Input>> kInputKinds{{
     {"imu", Needs::nothing},
     {"fix", Needs::odometry},
     {"health", Needs::nothing, std::numeric_limits<double>::infinity()},
+    {"start pose", Needs::nothing, std::numeric_limits<double>::infinity()},
 }};
 /// Where a kind is in the table.
 template <class Sample, std::size_t kAt = 0>
@@ -80,7 +86,7 @@ template <class Sample, std::size_t kAt = 0>
 }
 [[nodiscard]] inline const InputKind& kind_of(const Input& input) { return kInputKinds[input.index()]; }
 
-/// Calls `use` with every stamp of an input: one, none of health, and one of each IMU sample.
+/// Calls `use` with every stamp of an input: one, none of what is Stampless, and one of each IMU sample.
 template <class AnyInput, class Use>
 void for_each_stamp(AnyInput& input, const Use& use) {
   std::visit(
@@ -90,7 +96,7 @@ void for_each_stamp(AnyInput& input, const Use& use) {
         else if constexpr (requires { sample.front().stamp; })
           for (auto& one : sample) use(one.stamp);
         else
-          static_assert(std::is_same_v<std::remove_cvref_t<decltype(sample)>, Health>);
+          static_assert(Stampless<std::remove_cvref_t<decltype(sample)>>);
       },
       input);
 }

@@ -39,7 +39,8 @@ struct InMap {
   Pose3 T_world_body;         ///< In the map's frame; the identity without `age_s`.
   /// Standard deviations of its position (all three directions together) and of its heading.
   std::optional<double> sigma_m, sigma_deg;
-  std::optional<double> age_s;  ///< Since the map last showed that it is there; nothing: it has no place.
+  std::optional<double> age_s;    ///< Since the map last showed that it is there; nothing: it has no place.
+  std::optional<double> overlap;  ///< Share of the scan that showed it last which lay on the map.
   template <class V>
   void describe(V& v) {
     v.field(1, "map_id", map);
@@ -50,6 +51,7 @@ struct InMap {
     v.field(6, "sigma_m", sigma_m, {.low = 0.0});
     v.field(7, "sigma_deg", sigma_deg, {.low = 0.0});
     v.field(8, "place_age_s", age_s, {.low = 0.0});
+    v.field(9, "place_overlap", overlap, {.low = 0.0, .high = 1.0});
   }
   friend bool operator==(const InMap&, const InMap&) = default;
 };

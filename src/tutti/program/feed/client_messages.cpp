@@ -19,20 +19,36 @@ Pose3 read(const v1::Feed::Pose& in) {
   return {Eigen::Quaterniond(in.qw(), in.qx(), in.qy(), in.qz()), {in.x(), in.y(), in.z()}};
 }
 
+Result<Matrix6d> read_covariance(const google::protobuf::RepeatedField<double>& numbers, const char* name) {
+  if (numbers.size() != 6 && numbers.size() != 36)
+    return fail(ErrorCode::invalid, "{} of {} numbers, expected 36, or 6 of its diagonal", name, numbers.size());
+  Matrix6d out = Matrix6d::Zero();
+  for (int i = 0; i < numbers.size(); ++i) {
+    if (numbers.size() == 6)
+      out(i, i) = numbers.Get(i);
+    else
+      out(i / 6, i % 6) = numbers.Get(i);
+  }
+  return out;
+}
+
 FromClient read(const v1::Feed::Odometry& in) {
   const Timestamp stamp{in.stamp_ns()};
   if (!in.has_t_odom_body()) return BadSample{stamp, "an odometry sample without T_odom_body"};
   OdometrySample out{.stamp = stamp, .T_odom_body = read(in.t_odom_body())};
-  const auto& numbers = in.increment_covariance();
-  if (numbers.size() != 6 && numbers.size() != 36)
-    return BadSample{
-        stamp, fmt::format("an increment_covariance of {} numbers, expected 36, or 6 of its diagonal", numbers.size())};
-  for (int i = 0; i < numbers.size(); ++i) {
-    if (numbers.size() == 6)
-      out.increment_covariance(i, i) = numbers.Get(i);
-    else
-      out.increment_covariance(i / 6, i % 6) = numbers.Get(i);
-  }
+  const auto covariance = read_covariance(in.increment_covariance(), "increment_covariance");
+  if (!covariance) return BadSample{stamp, "an " + covariance.error().message};
+  out.increment_covariance = *covariance;
+  return out;
+}
+
+FromClient read(const v1::Feed::StartPose& in) {
+  if (!in.has_t_world_body()) return StartPose{};
+  const auto covariance = read_covariance(in.covariance(), "covariance");
+  if (!covariance) return BadSample{{}, "a start pose with a " + covariance.error().message};
+  StartPose out{.T_world_body = RelativePose{read(in.t_world_body()), *covariance}, .is_planar = in.is_planar()};
+  if (const Status ok = check_start_pose(out); !ok) return BadSample{{}, ok.error().message};
+  out.T_world_body->T_a_b.rotation.normalize();
   return out;
 }
 
@@ -265,6 +281,8 @@ Result<FromClient> decode_from_client(std::string_view payload) {
       return read(message.health());
     case v1::Feed::kRaw:
       return read(*message.mutable_raw());
+    case v1::Feed::kStartPose:
+      return read(message.start_pose());
     case v1::Feed::kTime:
       return FeedTime{message.time().clock_now_ns()};
     default:

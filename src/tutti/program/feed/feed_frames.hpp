@@ -26,8 +26,8 @@ inline constexpr std::size_t kMaxFeedBytes = 16U << 20U;
 /// Size limit of a client's message while it does not feed: then only Hello is expected.
 inline constexpr std::size_t kMaxHelloBytes = 64U << 10U;
 /// Names of the messages a client may send; the index is the message's number in the protocol minus one.
-inline constexpr const char* kFromClient[] = {"hello", "odometry", "scan", "end_of_recording", "images",
-                                              "imu",   "time",     "fix",  "health",           "raw"};
+inline constexpr const char* kFromClient[] = {"hello", "odometry", "scan", "end_of_recording", "images", "imu", "time",
+                                              "fix",   "health",   "raw",  "start_pose"};
 
 /// Assembles frames from bytes as they arrive. Keeps at most one incomplete frame.
 class FrameReader {

@@ -128,6 +128,7 @@ class FeedFront final : public FeedTarget {
   Status hear(ImuSamples& samples);
   Status hear(PositionFix& fix) { return hear_sensor(fix); }
   Status hear(Health& health);
+  Status hear(StartPose& start);
   Status hear_sensor(Input input);
   Status take(const OdometrySample& sample);
   void begin_anew(std::string why);

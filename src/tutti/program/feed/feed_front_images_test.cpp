@@ -92,7 +92,7 @@ TEST(FeedFrontImages, StampsThatJumpBackOrFarAheadAreRefusedAndDoNoHarm) {
   EXPECT_TRUE(front.add(sample(0)));
   const Timestamp now = kOdometry[0].stamp;
   const auto ahead =
-      front.add(ImuSamples{{now + 0.1, {}, {}}, {now + 3600.0, {}, {}}, {now + 0.05, {}, {}}, {now + 0.2, {}, {}}});
+      front.add(ImuSamples{{.stamp = now + 0.1}, {.stamp = now + 3600.0}, {.stamp = now + 0.05}, {.stamp = now + 0.2}});
   ASSERT_FALSE(ahead);
   EXPECT_NE(ahead.error().message.find("of 4 IMU samples"), std::string::npos) << ahead.error().message;
   EXPECT_EQ(front.figures().imu, 2U);

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "tutti/base/field_text.hpp"
+#include "tutti/program/feed/agv_position.hpp"
 #include "tutti/program/feed/feed_front.hpp"
 
 namespace tutti::program {
@@ -124,6 +125,14 @@ Status FeedFront::hear(Health& health) {
   return {};
 }
 
+Status FeedFront::hear(StartPose& start) {
+  if (waiting() >= limits_.inputs / 2)
+    return fail(ErrorCode::io, "the map is behind: {} inputs wait, at most {} with a start pose", waiting(),
+                limits_.inputs / 2);
+  push(start);
+  return {};
+}
+
 Health FeedFront::health() const {
   const std::scoped_lock lock(mutex_);
   return std::chrono::steady_clock::now() - health_came_ < kHealthLasts ? health_ : Health{};
@@ -131,6 +140,7 @@ Health FeedFront::health() const {
 
 void FeedFront::say_status(const NodeStatus& status) {
   auto texts = field_texts(status);
+  if (!status.in_map.map.empty()) texts.emplace_back("agv_position", agv_position(status.in_map));
   const std::scoped_lock lock(mutex_);
   if (!status_ || *status_ != texts) status_ = std::make_shared<const decltype(texts)>(std::move(texts));
 }

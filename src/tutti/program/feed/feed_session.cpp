@@ -172,7 +172,7 @@ void FeedSession::refresh() {
   }
   const FeedState state = this->state();
   if (ros_)
-    for (const FeedRaw& raw : ros_->hear(state)) put(clients_.at(*feeder_), raw_frame(raw));
+    for (const FeedRaw& raw : ros_->hear(state, by_client(state.located))) put(clients_.at(*feeder_), raw_frame(raw));
   std::string now = without_status(state);
   if (now == situation_ && state.status == status_) return;
   situation_ = std::move(now);

@@ -84,6 +84,46 @@ TEST_F(FeedSessionRos, TheClientStatesFramesAndToleranceAndIsAnsweredByItsOwnClo
   EXPECT_EQ(tf[0].header.stamp.ns, kStart + kSecond / 2);
 }
 
+/// As RViz sends it: x, y and heading in the frame that it shows.
+TEST_F(FeedSessionRos, AStartPoseIsTakenInTheFrameOfTheKnownMap) {
+  Feed::Ros ros;
+  ros.set_world_frame("world");
+  begin(ros);
+  say(1, odometry_at(0));
+  const auto start = [](const std::string& frame) {
+    bags::RosPoseWithCovariance out{.header = {{}, frame}, .pose = {{4, 5, 0}}};
+    out.covariance[0] = out.covariance[7] = 0.25;
+    out.covariance[35] = 0.07;
+    return raw("initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", bags::encode(out));
+  };
+  EXPECT_TRUE(say(1, start("world")).empty());
+  ASSERT_EQ(target_.starts.size(), 1U);
+  EXPECT_TRUE(target_.starts[0].is_planar);
+  EXPECT_EQ(target_.starts[0].T_world_body->T_a_b.translation, Eigen::Vector3d(4, 5, 0));
+  EXPECT_EQ(target_.starts[0].T_world_body->covariance(5, 5), 0.07);
+
+  const auto refused = say(1, start("r1/map"));
+  ASSERT_EQ(kinds(refused), std::vector{Feed::kRefused});
+  EXPECT_EQ(refused[0].refused().why(),
+            "initialpose: a start pose in frame 'r1/map', expected 'world', the frame of the map that the robot "
+            "localises in, or 'r1/map' once it has found itself there");
+  target_.known.component = 0;
+  target_.known.T_map_world = Pose3{Eigen::Quaterniond::Identity(), {1, 0, 0}};
+  target_.known.T_world_body = RelativePose{{Eigen::Quaterniond::Identity(), {2, 0, 0}}, Matrix6d::Identity()};
+  target_.known.located = {kStart};
+  session_.refresh();
+  const auto told = say(1, "");
+  const auto pose = std::ranges::find(told, "localised_pose", [](const Feed& m) { return m.raw().topic(); });
+  ASSERT_NE(pose, told.end());
+  const auto localised = bags::decode_pose_with_covariance(pose->raw().data()).value();
+  EXPECT_EQ(localised.header.frame_id, "world");
+  EXPECT_EQ(localised.header.stamp.ns, kStart);
+  EXPECT_EQ(localised.pose.position.x(), 2.0);
+  EXPECT_TRUE(say(1, start("r1/map")).empty());
+  ASSERT_EQ(target_.starts.size(), 2U);
+  EXPECT_EQ(target_.starts[1].T_world_body->T_a_b.translation, Eigen::Vector3d(3, 5, 0));
+}
+
 TEST_F(FeedSessionRos, EverySensorReachesTheRobot) {
   Feed::Ros ros;
   ros.add_images("left/image_raw");

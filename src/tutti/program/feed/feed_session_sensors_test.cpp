@@ -33,7 +33,7 @@ TEST_F(FeedSessionSensors, TakesImagesAndImuAndRefusesThemByName) {
   EXPECT_EQ(target_.sensors, sensors);
   const auto& takes = greeting[0].welcome().takes();
   EXPECT_NE(std::ranges::find(takes, "images"), takes.end());
-  EXPECT_TRUE(say(1, test::images(raw(5)) + test::imu({{{3}, {}, {}}, {{4}, {}, {}}})).empty());
+  EXPECT_TRUE(say(1, test::images(raw(5)) + test::imu({{.stamp = {3}}, {.stamp = {4}}})).empty());
   EXPECT_EQ(target_.seen, std::vector<Timestamp>{{5}});
   EXPECT_EQ(target_.felt, (std::vector<Timestamp>{{3}, {4}}));
   // Half an image, one of a camera that is not there, one of no encoding, depth of nobody, IMU of half a sample.
@@ -44,7 +44,7 @@ TEST_F(FeedSessionSensors, TakesImagesAndImuAndRefusesThemByName) {
   Feed strange, half;
   ASSERT_TRUE(strange.ParseFromString(test::images(raw(9)).substr(4)));
   strange.mutable_images()->mutable_image(0)->set_encoding(static_cast<Feed::Image::Encoding>(7));
-  ASSERT_TRUE(half.ParseFromString(test::imu({{{10}, {}, {}}}).substr(4)));
+  ASSERT_TRUE(half.ParseFromString(test::imu({{.stamp = {10}}}).substr(4)));
   half.mutable_imu()->add_gyro(1.0);
   const std::vector<std::pair<std::string, std::string>> all{{test::images(raw(6, 16)), "16 bytes, expected 32"},
                                                              {test::images(second), "camera 1"},
@@ -71,6 +71,35 @@ TEST_F(FeedSessionSensors, WhatTheBodyReportsReachesTheRobotOrIsRefusedByName) {
   ASSERT_EQ(answer.size(), 1U);
   EXPECT_EQ(answer[0].refused().why(), "health: battery_percent: 101, expected 0 to 100");
   EXPECT_EQ(target_.health, (Health{.battery_v = 24.5}));
+}
+
+TEST_F(FeedSessionSensors, AStartPoseReachesTheRobotOrIsRefusedByName) {
+  join(1);
+  Feed good, nowhere, bad, none;
+  auto& start = *good.mutable_start_pose();
+  start.mutable_t_world_body()->set_x(3.0);
+  start.mutable_t_world_body()->set_qw(1.0);
+  for (int i = 0; i < 6; ++i) start.add_covariance(0.25);
+  start.set_is_planar(true);
+  nowhere.mutable_start_pose();
+  EXPECT_TRUE(say(1, test::framed(good)).empty());
+  EXPECT_TRUE(say(1, test::framed(nowhere)).empty());
+  ASSERT_EQ(target_.starts.size(), 2U);
+  EXPECT_EQ(target_.starts[0].T_world_body->T_a_b.translation.x(), 3.0);
+  EXPECT_EQ(target_.starts[0].T_world_body->covariance(5, 5), 0.25);
+  EXPECT_TRUE(target_.starts[0].is_planar);
+  EXPECT_FALSE(target_.starts[1].T_world_body.has_value());
+  bad = good;
+  bad.mutable_start_pose()->mutable_t_world_body()->set_qw(0.0);
+  none.mutable_start_pose()->mutable_t_world_body()->set_qw(1.0);
+  for (const auto& [message, why] :
+       {std::pair{bad, "a start pose whose quaternion has norm 0, expected 1"},
+        std::pair{none, "a start pose with a covariance of 0 numbers, expected 36, or 6 of its diagonal"}}) {
+    const auto answer = say(1, test::framed(message));
+    ASSERT_EQ(answer.size(), 1U);
+    EXPECT_EQ(answer[0].refused().why(), why);
+  }
+  EXPECT_EQ(target_.starts.size(), 2U);
 }
 
 TEST_F(FeedSessionSensors, WhatTheRobotReportsIsSentWhenItChanges) {
@@ -153,10 +182,10 @@ TEST_F(FeedSessionSensors, FixesComeAsTheyWereSent) {
 
 TEST_F(FeedSessionSensors, AMessageOfANewerProtocolIsRefusedByItsNumber) {
   join(1);
-  const std::string newer("\x0a\x00\x00\x00\x5a\x08\x12\x06 later", 14);  // field 11
+  const std::string newer("\x0a\x00\x00\x00\x62\x08\x12\x06 later", 14);  // field 12
   const auto answer = say(1, newer);
   ASSERT_EQ(answer.size(), 1U);
-  EXPECT_NE(answer[0].refused().why().find("number 11"), std::string::npos) << answer[0].refused().why();
+  EXPECT_NE(answer[0].refused().why().find("number 12"), std::string::npos) << answer[0].refused().why();
   EXPECT_NE(answer[0].refused().why().find("images"), std::string::npos);
   EXPECT_EQ(say(1, sample(20)).size(), 1U);
 }

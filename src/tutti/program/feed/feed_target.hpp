@@ -47,7 +47,11 @@ struct FeedState {
       map_age;                             ///< ProxyGraph::age() of the newest graph heard; zeros before the first.
   std::optional<std::uint32_t> component;  ///< The server's map's; nothing while the map does not know this chain.
   std::optional<Pose3> T_map_world;        ///< RobotAgent::T_map_world(): of that component's world.
-  bool wants_scan = false;                 ///< A scan from now on would be used.
+  /// In the frame of a map that does not move, while the robot is localised there; right tangent. Its stamp is
+  /// `located`.
+  std::optional<RelativePose> T_world_body;
+  Timestamp located;
+  bool wants_scan = false;  ///< A scan from now on would be used.
   std::vector<TeamMate> team_mates;
   std::vector<FeedAlert> alerts;
   /// field_texts() of the robot's NodeStatus, another one whenever these change; null before the first. Shared, because

@@ -22,6 +22,8 @@ void set_place(const localise::Located& located, bool wants_scan, const Pose3& T
   if (located.state == localise::State::localised) {
     out.component = 0;
     out.T_map_world = T_map_body * located.T_world_body->T_a_b.inverse();
+    out.T_world_body = located.T_world_body;
+    out.located = located.stamp;
   } else if (located.state != localise::State::searching) {
     out.alerts.push_back({fmt::format("{} in its map: {}", to_string(located.state), located.why), located.stamp,
                           located.stamp, located.stamp});

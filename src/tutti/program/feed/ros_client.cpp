@@ -72,7 +72,7 @@ std::vector<FeedRaw> RosClient::hear(const FeedAnswer& answer, const Pose3& T_od
   answers_->hear(answer, T_odom_body);
   std::vector<FeedRaw> out;
   if (auto transform = answers_->transform()) out.push_back({"/tf", bags::kTfType, kCdr, std::move(*transform)});
-  out.push_back({"corrected_pose", "geometry_msgs/msg/PoseWithCovarianceStamped", kCdr, answers_->pose()});
+  out.push_back({"corrected_pose", kPoseWithCovarianceType, kCdr, answers_->pose()});
   return out;
 }
 
@@ -86,21 +86,55 @@ Status RosClient::add(const intake::RawMessage& raw) {
     const auto own = without_world(raw.bytes, said_.world_frame);
     return intake_.add(own ? intake::RawMessage{raw.topic, raw.type, raw.encoding, *own} : raw);
   }
-  if (raw.type != RosGrid::kType) return intake_.add(raw);
-  const Status taken = grid_.take(raw.bytes);
+  const bool is_grid = raw.type == RosGrid::kType;
+  if (!is_grid && raw.type != kPoseWithCovarianceType) return intake_.add(raw);
+  const Status taken = is_grid ? grid_.take(raw.bytes) : take_start_pose(raw.bytes);
   return taken ? taken : in_context(plain_text(raw.topic, kLongest), taken.error());
 }
 
-std::vector<FeedRaw> RosClient::hear(const FeedState& known) {
+/// Its stamp is not read: it holds from when it comes, for scans that come later. Its pose is of a plan, as RViz sends
+/// it, unless it has a variance of height, roll or pitch.
+Status RosClient::take_start_pose(std::string_view cdr) {
+  const auto message = bags::decode_pose_with_covariance(cdr);
+  if (!message) return tl::unexpected(message.error());
+  const std::string frame = plain_text(message->header.frame_id, kLongest);
+  const std::string world = world_.empty() ? world_frame(said_.world_frame, 0) : world_;
+  const bool is_in_map = T_world_map_ && answers_ && frame == answers_->map_frame();
+  if (said_.world_frame.empty() || (frame != world && !is_in_map))
+    return fail(ErrorCode::invalid,
+                "a start pose in frame '{}', expected '{}', the frame of the map that the robot localises in{}", frame,
+                world, answers_ ? fmt::format(", or '{}' once it has found itself there", answers_->map_frame()) : "");
+  const Matrix6d in_axes = Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(message->covariance.data());
+  const Pose3 T_frame_body{message->pose.orientation, message->pose.position};
+  StartPose out{.T_world_body = RelativePose{is_in_map ? *T_world_map_ * T_frame_body : T_frame_body,
+                                             bags::covariance_of(in_axes, T_frame_body.rotation)},
+                .is_planar = in_axes(2, 2) <= 0.0 && in_axes(3, 3) <= 0.0 && in_axes(4, 4) <= 0.0};
+  if (const Status ok = check_start_pose(out); !ok) return ok;
+  start_ = std::move(out);
+  return {};
+}
+
+std::vector<FeedRaw> RosClient::hear(const FeedState& known, Timestamp located) {
   std::vector<FeedRaw> out = team_mates(known.team_mates);
-  if (!answers_ || said_.world_frame.empty()) return out;
-  if (!known.T_map_world || !known.component) {
-    answers_->hear_world({}, std::nullopt);
-    return out;
+  T_world_map_.reset();
+  world_.clear();
+  if (known.T_map_world && known.component) {
+    T_world_map_ = known.T_map_world->inverse();
+    world_ = world_frame(said_.world_frame, *known.component);
   }
-  const std::string world = world_frame(said_.world_frame, *known.component);
-  answers_->hear_world(world, known.T_map_world->inverse());
-  auto grid = grid_.next(world, *known.T_map_world, answers_->map_frame());
+  if (!answers_ || said_.world_frame.empty()) return out;
+  answers_->hear_world(world_, T_world_map_);
+  if (!T_world_map_) return out;
+  if (known.T_world_body && located_ != located) {
+    located_ = located;
+    const auto& [T, covariance] = *known.T_world_body;
+    out.push_back(
+        {"localised_pose", kPoseWithCovarianceType, kCdr,
+         bags::encode(bags::RosPoseWithCovariance{.header = {located, world_},
+                                                  .pose = bags::to_ros(T),
+                                                  .covariance = bags::pose_covariance(covariance, T.rotation)})});
+  }
+  auto grid = grid_.next(world_, *known.T_map_world, answers_->map_frame());
   if (!grid)
     intake_.note(grid.error().message);
   else if (*grid)

@@ -6,6 +6,7 @@
 
 #include "tutti/bags/ros_definitions.hpp"
 #include "tutti/bags/ros_types.hpp"
+#include "tutti/program/feed/ros_client.hpp"
 
 namespace tutti::ros {
 
@@ -15,7 +16,8 @@ Status RobotTopics::open() {
     Qos qos;
   };
   for (const auto& [name, type, qos] : {Topic{kTf, bags::kTfType, kTfQos},
-                                        {"corrected_pose", "geometry_msgs/msg/PoseWithCovarianceStamped", {}},
+                                        {"corrected_pose", program::RosClient::kPoseWithCovarianceType, {}},
+                                        {"localised_pose", program::RosClient::kPoseWithCovarianceType, {}},
                                         {kPath, "nav_msgs/msg/Path", kLatchedQos},
                                         {"team_mates", "visualization_msgs/msg/MarkerArray", kLatchedQos},
                                         {kDiagnostics, "diagnostic_msgs/msg/DiagnosticArray", {}}})

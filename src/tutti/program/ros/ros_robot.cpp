@@ -88,7 +88,8 @@ class Robot final : public RosRobot {
   RosRobotOptions options_;
   std::shared_ptr<Participant> participant_;
   program::LiveFeed* feed_ = nullptr;
-  std::unique_ptr<Reader> odometry_, points_, fixes_, battery_, grid_, tf_, tf_static_, own_tf_, own_tf_static_;
+  std::unique_ptr<Reader> odometry_, points_, fixes_, battery_, grid_, start_pose_, tf_, tf_static_, own_tf_,
+      own_tf_static_;
   std::unique_ptr<LocalClient> client_;
   program::FeedSituation situation_;
   intake::RosIntake::Counts counts_;
@@ -105,7 +106,8 @@ class Robot final : public RosRobot {
 
 Status Robot::open() {
   if (Status ok = topics_.open(); !ok) return ok;
-  for (const std::string& topic : {by_tf() ? "/tf" : options_.odometry, options_.points, options_.fixes})
+  for (const std::string& topic :
+       {by_tf() ? "/tf" : options_.odometry, options_.points, options_.fixes, options_.start_pose})
     if (const auto name = resolve(topic.empty() ? "none" : topic, options_.name_space); !name)
       return tl::unexpected(name.error());
   if (!options_.grid.empty()) {
@@ -165,6 +167,10 @@ Status Robot::subscribe() {
       !ok)
     return ok;
   if (Status ok = make(battery_, options_.battery, bags::kBatteryType, in_qos(false, 1)); !ok) return ok;
+  if (Status ok = make(start_pose_, options_.start_pose, program::RosClient::kPoseWithCovarianceType,
+                       {.reliable = true, .latched = false, .depth = 1});
+      !ok)
+    return ok;
   return make(fixes_, options_.fixes, bags::kFixType, in_qos(options_.lossless, kFixesDepth));
 }
 
@@ -240,7 +246,8 @@ void Robot::take_messages() {
   hold_odometry(true);
   if (own_tf_ && own_tf_->writers() > 0 && topics_.open_own_tf())
     options_.say(Level::info, fmt::format("transforms come on {}: map -> odom is published there", own_tf_->topic()));
-  for (const auto* reader : {&tf_static_, &own_tf_static_, &points_, &fixes_, &battery_, &grid_}) take(reader->get());
+  for (const auto* reader : {&tf_static_, &own_tf_static_, &points_, &fixes_, &battery_, &grid_, &start_pose_})
+    take(reader->get());
   if (images_) images_->take([this](Reader& reader) { take(&reader); });
   for (const auto* reader : {&tf_, &own_tf_, &odometry_}) take(reader->get());
   release_odometry();

@@ -22,6 +22,7 @@ struct RosRobotOptions {
   std::string fixes = "fix";                   ///< Topic of NavSatFix messages; empty: no position fixes.
   std::string battery = "battery_state";       ///< Topic of BatteryState messages; empty: none.
   std::optional<intake::ImagesConfig> images;  ///< Nothing: no images and no IMU.
+  std::string start_pose = "initialpose";      ///< Topic of PoseWithCovarianceStamped messages; empty: none.
   std::string grid = "/world/map";             ///< Topic of the server's OccupancyGrid; empty: none.
   std::string world_frame = "world";           ///< Empty: world -> map is not published, and no grid taken.
   std::string map_frame;                       ///< Empty: derived from odometry's frame, as RosAnswers does.

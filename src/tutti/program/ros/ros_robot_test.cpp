@@ -171,6 +171,27 @@ TEST_F(RosRobots, TheBatteryIsReported) {
 }
 
 /// Cameras are found by type; until their place is known, odometry is answered without them.
+/// RViz sends it once, when somebody clicks.
+TEST_F(RosRobots, AStartPoseOnInitialposeReachesTheRobot) {
+  start();
+  const auto clicked = publisher("/alpha/initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", {});
+  ASSERT_TRUE(is_heard(*clicked));
+  bags::RosPoseWithCovariance start{.header = {{}, "world"}, .pose = {{4, 5, 0}}};
+  start.covariance[0] = start.covariance[7] = start.covariance[35] = 0.25;
+  ASSERT_TRUE(clicked->write(bags::encode(start)));
+  const StartPose* given = nullptr;
+  std::shared_ptr<const program::FeedInput> input;
+  ASSERT_TRUE(::tutti::test::within(kPatience_s, [&] {
+    input = feed_->front().take(0.01);
+    if (input) feed_->front().note_heard();
+    return input && (given = sample_in<StartPose>(*input)) != nullptr;
+  })) << said();
+  EXPECT_EQ(given->T_world_body->T_a_b.translation, Eigen::Vector3d(4, 5, 0));
+  start.header.frame_id = "odom";
+  ASSERT_TRUE(clicked->write(bags::encode(start)));
+  EXPECT_TRUE(is_said("a start pose in frame 'odom', expected 'world'")) << said();
+}
+
 TEST_F(RosRobots, ImagesAndImuAreFedOnceTheirPlaceIsKnown) {
   start({.images = intake::ImagesConfig{}});
   const auto odom = publisher("/alpha/odom", kOdometry), camera = publisher("/alpha/front/image_raw", bags::kImageType),

@@ -33,6 +33,7 @@ class ScriptedTarget final : public FeedTarget {
       for (const ImuSample& sample : *imu) felt.push_back(sample.stamp);
     if (const auto* fix = std::get_if<PositionFix>(&input)) fixes.push_back(*fix);
     if (const auto* of = std::get_if<Health>(&input)) health = *of;
+    if (const auto* start = std::get_if<StartPose>(&input)) starts.push_back(*start);
     return {};
   }
   Status finish() override {
@@ -47,6 +48,7 @@ class ScriptedTarget final : public FeedTarget {
   FeedState known{.chain = {RobotId{4}, 77}, .name = "alpha", .newest = {}};
   std::vector<Timestamp> scans, seen, felt;
   std::vector<PositionFix> fixes;
+  std::vector<StartPose> starts;
   Sensors sensors;
   Health health;
   int finished = 0;

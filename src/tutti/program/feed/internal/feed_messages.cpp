@@ -60,6 +60,14 @@ void write(const Health& health, v1::Feed& message) {
   TUTTI_CHECK(message.mutable_health()->ParseFromString(wire::field_bytes(health)), "health");
 }
 
+void write(const StartPose& start, v1::Feed& message) {
+  auto& out = *message.mutable_start_pose();
+  out.set_is_planar(start.is_planar);
+  if (!start.T_world_body) return;
+  internal::write(start.T_world_body->T_a_b, *out.mutable_t_world_body());
+  for (int i = 0; i < 36; ++i) out.add_covariance(start.T_world_body->covariance(i / 6, i % 6));
+}
+
 /// They are made on board.
 void write(const TrackedImages& images, v1::Feed& /*message*/) {
   TUTTI_CHECK(false, "tracked images at {} ns are not fed", images.stamp.ns);
