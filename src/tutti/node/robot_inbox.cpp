@@ -71,10 +71,13 @@ void RobotNode::receive_graph(const bus::Envelope& envelope, Timestamp now, Step
     const auto own = nodes_of(heard, agent_.chain());
     mapped_until_ = own.empty() ? kFirstTimestamp : own.back().stamp;
   }
-  if (!agent_.is_news(heard)) return;
-  if (config_.keeps_state) remember(HeardGraph{wire::encode(**graph)}, now, step);
+  if (agent_.is_news(heard)) follow(**graph, now, step);
+}
+
+void RobotNode::follow(const ProxyGraphMessage& graph, Timestamp now, Step& step) {
+  if (config_.keeps_state) remember(HeardGraph{wire::encode(graph)}, now, step);
   write_journal(step);  // what is reported of it is true
-  step.emit(now, RobotUpdated{agent_.robot(), agent_.receive(**graph, observer_)});
+  step.emit(now, RobotUpdated{agent_.robot(), agent_.receive(graph, observer_)});
   note(std::get<RobotUpdated>(step.events.back().what).summary);
   updated_ = now;
 }

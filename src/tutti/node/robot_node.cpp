@@ -11,6 +11,7 @@
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/wire/agent_state/agent_state.hpp"
 #include "tutti/wire/codec.hpp"
+#include "tutti/wire/field_bytes.hpp"
 
 namespace tutti::node {
 
@@ -107,6 +108,7 @@ Status RobotNode::read_outbox() {
       foreign_sessions_.insert(session->front());
   };
   if (auto read = store_.sizes(kMeta, take_foreign); !read) return read;
+  if (auto read = begin_at_stored_place(); !read) return read;
   hold_foreign();
   const auto heard = store_.read(kMeta, kIncarnations);
   if (!heard) return tl::unexpected(heard.error());
@@ -153,6 +155,10 @@ Step RobotNode::resume(Timestamp now) {
 
 Step RobotNode::add(const Input& input, Timestamp now) {
   Step step;
+  if (const auto* start = std::get_if<StartPose>(&input)) {
+    hear(*start, now, step);
+    return step;
+  }
   if (const auto* scan = std::get_if<Scan>(&input); scan != nullptr && !agent_.wants_scan(scan->stamp)) {
     locate(input, now, step);
     return step;  // again, or nothing new for the map that it makes
@@ -237,6 +243,8 @@ void RobotNode::write_journal(Step& step) {
   for (std::string& entry : unwritten_)
     step.writes.push_back({kJournal, storage::key_of({journal_++}), std::move(entry)});
   unwritten_.clear();
+  if (const auto T_world_body = places_.take_unstored(); T_world_body && config_.keeps_state)
+    step.writes.push_back({kMeta, kPlace, wire::field_bytes(StoredPlace{localiser_->map().id, *T_world_body})});
 }
 
 std::optional<Timestamp> RobotNode::next_timer() const {

@@ -14,6 +14,7 @@
 #include "tutti/model/status.hpp"
 #include "tutti/node/journal.hpp"
 #include "tutti/node/odometry_gate.hpp"
+#include "tutti/node/place_record.hpp"
 #include "tutti/node/step.hpp"
 #include "tutti/node/uplink.hpp"
 #include "tutti/robot/agent.hpp"
@@ -97,7 +98,8 @@ class RobotNode {
   [[nodiscard]] std::optional<std::uint64_t> owner_session() const { return owner_session_; }
 
   [[nodiscard]] const robot::RobotAgent& agent() const { return agent_; }
-  /// Finds the robot in a map; null when it does not localise. It is not stored: after a start it searches.
+  /// Finds the robot in a map; null when it does not localise. Its last place alone is stored: after a start it is
+  /// tried first, and then the whole map is searched.
   [[nodiscard]] const localise::Localiser* localiser() const { return localiser_ ? &*localiser_ : nullptr; }
   /// True if a scan of this stamp would be used, by the agent or to localise.
   [[nodiscard]] bool wants_scan(Timestamp stamp) const;
@@ -124,9 +126,12 @@ class RobotNode {
   void hear(const Input& input, Timestamp now, Step& step);
   /// Tells the localiser, if there is one, and reports when it knows more or less than before.
   void locate(const Input& input, Timestamp now, Step& step);
+  void hear(const StartPose& start, Timestamp now, Step& step);
   void tell_place(Timestamp now, Step& step);
   [[nodiscard]] InMap in_map() const;
+  void follow(const ProxyGraphMessage& graph, Timestamp now, Step& step);
   void begin_localising();
+  Status begin_at_stored_place();
   void remember(const JournalEntry& entry, Timestamp now, Step& step);
   void write_journal(Step& step);
   /// Takes the submaps that have ended, after which the journal can be dropped.
@@ -168,7 +173,7 @@ class RobotNode {
   robot::RobotAgent agent_;
   OdometryGate gate_;  // for what agent_ takes
   std::optional<localise::Localiser> localiser_;
-  std::optional<localise::State> told_;  // of it
+  PlaceRecord places_;
   robot::StageObserver observer_;
   Uplink uplink_{config_.uplink};            // of the submaps in the outbox
   std::map<SubmapId, std::size_t> archive_;  // with their sizes

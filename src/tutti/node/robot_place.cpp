@@ -7,13 +7,27 @@
 
 #include "tutti/base/plain_text.hpp"
 #include "tutti/node/robot_node.hpp"
+#include "tutti/node/robot_tables.hpp"
+#include "tutti/wire/codec.hpp"
+#include "tutti/wire/field_bytes.hpp"
 
 namespace tutti::node {
 
 void RobotNode::begin_localising() {
   localiser_.reset();
-  told_.reset();
+  places_ = {};
   if (config_.localise) localiser_.emplace(*config_.localise);
+}
+
+/// A row that cannot be read, as one of a newer version, is as none.
+Status RobotNode::begin_at_stored_place() {
+  const auto row = store_.read(robot_tables::kMeta, robot_tables::kPlace);
+  if (!row) return tl::unexpected(row.error());
+  if (!*row || !localiser_) return {};
+  const auto stored = wire::read_fields<StoredPlace>(**row);
+  const auto start = stored ? start_at(*stored, localiser_->map()) : std::nullopt;
+  if (start && check_start_pose(*start)) (void)localiser_->add(*start);
+  return {};
 }
 
 bool RobotNode::wants_scan(Timestamp stamp) const {
@@ -25,11 +39,24 @@ void RobotNode::locate(const Input& input, Timestamp now, Step& step) {
   if (!localiser_) return;
   (void)localiser_->add(input);
   tell_place(now, step);
+  if (base_ || !places_.wants(agent_, localiser_->state())) return;  // where there is a server, its map corrects it
+  places_.note(agent_, localiser_->located());
+  if (const auto graph = places_.graph_if_due(agent_))  // as it will be read again after a start
+    follow(wire::decode_proxy_graph(wire::encode(*graph)).value(), now, step);
+}
+
+void RobotNode::hear(const StartPose& start, Timestamp now, Step& step) {
+  const Status ok = localiser_ ? localiser_->add(start)
+                               : fail(ErrorCode::unsupported,
+                                      "a start pose, and this robot does not localise in a map: start it with --map "
+                                      "FILE --localise");
+  if (!ok) return step.emit(now, SampleRefused{agent_.robot(), ok.error().message});
+  places_.forget_state();  // somebody has asked
+  tell_place(now, step);
 }
 
 void RobotNode::tell_place(Timestamp now, Step& step) {
-  const localise::State state = localiser_->state();
-  if (std::exchange(told_, state) == state) return;
+  if (!places_.is_news(localiser_->state())) return;
   localise::Located located = localiser_->located();
   std::vector<std::string> places;
   for (const localise::PlaceFound& place : located.places) places.push_back(localiser_->map().names.of(place.submap));
@@ -47,13 +74,15 @@ InMap RobotNode::in_map() const {
             .T_world_body = {},
             .sigma_m = {},
             .sigma_deg = {},
-            .age_s = {}};
+            .age_s = {},
+            .overlap = {}};
   if (!located.T_world_body) return out;
   const Matrix6d& covariance = located.T_world_body->covariance;
   out.T_world_body = located.T_world_body->T_a_b;
   out.sigma_m = std::sqrt(covariance.topLeftCorner<3, 3>().trace());
   out.sigma_deg = std::sqrt(covariance(5, 5)) * kDegPerRad;
   out.age_s = std::max(0.0, located.age_s);
+  out.overlap = located.overlap;
   return out;
 }
 

@@ -21,6 +21,7 @@ inline constexpr const char* kSession = "session";  // newest session on this st
 inline constexpr const char* kLost = "lost";        // why there is no checkpoint, until it is reported
 // the server's incarnations in the last graph and in the last receipt
 inline constexpr const char* kIncarnations = "incarnations";
+inline constexpr const char* kPlace = "place";            // where it was last in a map that does not move (StoredPlace)
 inline constexpr std::string_view kForeign = "foreign/";  // followed by a session that another body has, too
 
 }  // namespace tutti::node::robot_tables
