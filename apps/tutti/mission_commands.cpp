@@ -20,6 +20,7 @@
 #include "tutti/formats/ply.hpp"
 #include "tutti/lab/mission_input.hpp"
 #include "tutti/lab/run_mission.hpp"
+#include "tutti/mapfile/hold_map.hpp"
 #include "tutti/mapfile/known_map.hpp"
 #include "tutti/mapfile/make_map.hpp"
 #include "tutti/mission/bag_mission.hpp"
@@ -49,7 +50,9 @@ void show(const mission::Progress& progress, ProgressLine& line) {
 /// What `run` and `demo` share.
 struct MissionArguments {
   fs::path mission, out, map, map_in;
-  bool frozen = false;
+  bool frozen = false, extend = false;
+  double restart_s = 0.0;
+  RobotId first_robot{0};
   mission::RunOptions run{.version = TUTTI_VERSION};
   std::vector<std::string> assignments;
   bool print_config = false;
@@ -84,25 +87,42 @@ void add_mission_options(CLI::App& command, MissionArguments& arguments) {
 
 /// Replays the robots in a map that does not move, and reports where they were in it.
 Status localise(const lab::MissionConfig& config, const MissionArguments& arguments) {
-  if (!arguments.frozen)
-    return fail(ErrorCode::invalid, "--map-in {}: say what becomes of it: --frozen, which leaves every pose as it is",
-                arguments.map_in.string());
   const auto map = mapfile::open_known_map(arguments.map_in);
   if (!map) return in_context("--map-in", map.error());
   const auto input = lab::load_input(config, arguments.run.data, arguments.run.seed);
   if (!input) return tl::unexpected(input.error());
   ProgressLine progress;
   const auto stop = announced_stop("what is there is reported");
-  const auto robots = mission::localise_mission(
-      config, *input, *map, verifiers::make_verifier(config.closures), [&](const std::string& robot, double share) {
-        progress.show(share, fmt::format("{}: {:4.0f} %", robot, 100.0 * share));
-        return stop();
-      });
+  const auto robots =
+      mission::localise_mission(config, *input, *map, verifiers::make_verifier(config.closures), arguments.restart_s,
+                                [&](const std::string& robot, double share) {
+                                  progress.show(share, fmt::format("{}: {:4.0f} %", robot, 100.0 * share));
+                                  return stop();
+                                });
   progress.close();
   if (!robots) return tl::unexpected(robots.error());
   if (auto ok = mission::write_localised(*robots, *map->known, arguments.out); !ok) return ok;
   std::cout << mission::localised_text(*robots, *map->known) << "\n"
             << (arguments.out / "localise.json").string() << '\n';
+  return {};
+}
+
+/// Robots of the mission are laid into the map, and beside each other.
+Status begin_with_map(MissionArguments& arguments) {
+  if (!arguments.extend)
+    return fail(ErrorCode::invalid,
+                "--map-in {}: say what becomes of it: --frozen, where robots find their places in it, each alone; or "
+                "--extend, where they add to it",
+                arguments.map_in.string());
+  if (arguments.map.empty())
+    return fail(ErrorCode::invalid,
+                "--extend: say where the map goes with what was added, with --map NEW.tutti: {} is "
+                "not changed",
+                arguments.map_in.string());
+  auto map = mapfile::read_held(arguments.map_in);
+  if (!map) return in_context("--map-in", map.error());
+  arguments.run.map = std::move(map->rows);
+  arguments.first_robot = map->free_robot;
   return {};
 }
 
@@ -120,8 +140,8 @@ int run_and_report(const Result<lab::MissionConfig>& config, MissionArguments& a
   const std::string out = arguments.out.string();
   if (auto made = make_folder(out); !made) return failed("--out " + made.error().message);  // before the mission
   if (!arguments.map_in.empty()) {
-    const Status localised = localise(*config, arguments);
-    return localised ? 0 : failed(localised.error().message);
+    const Status begun = arguments.frozen ? localise(*config, arguments) : begin_with_map(arguments);
+    if (arguments.frozen || !begun) return begun ? 0 : failed(begun.error().message);
   }
   if (!arguments.map.empty()) {
     if (auto made = make_folder_of(arguments.map); !made) return failed("--map " + made.error().message);
@@ -136,7 +156,7 @@ int run_and_report(const Result<lab::MissionConfig>& config, MissionArguments& a
   arguments.run.progress = [&progress](const mission::Progress& now) { show(now, progress); };
   arguments.run.warn = [](const std::string& warning) { std::cerr << "tutti: warning: " << warning << '\n'; };
   arguments.run.stop = announced_stop("report and map of what is there are made");
-  const auto record = lab::run_mission(*config, arguments.run);
+  const auto record = lab::run_mission(*config, arguments.run, arguments.first_robot);
   progress.close();
   if (!record) {
     const bool wants_data = record.error().code == ErrorCode::io && arguments.run.data.empty();
@@ -289,6 +309,16 @@ void add_run_command(CLI::App& app, int& exit_code) {
           "without a start pose, and follow the map; OUT/localise.json, NAME_localised.tum and NAME_states.csv say\n"
           "where they were and when they did not know")
       ->needs(map_in);
+  command
+      ->add_flag("--extend", arguments->extend,
+                 "With --map-in: no pose of the map moves, and the mission's robots add to it what they see of new\n"
+                 "ground; --map says where the map with it goes")
+      ->needs(map_in)
+      ->excludes("--frozen");
+  add_number(*command, "--restart-every", arguments->restart_s,
+             "With --frozen: robots forget where they are so often, to see how they find their places; 0: never", "S",
+             within(0.0, 1e6))
+      ->needs("--frozen");
   add_mission_options(*command, *arguments);
   command->callback([arguments, inputs, bags, topics, graph, &exit_code] {
     const auto run_text = [&](const fs::path& name, const char* option, const Result<std::string>& text) {

@@ -34,10 +34,12 @@ Result<mission::MissionInput> corrected_input(MissionConfig& config, const missi
 
 }  // namespace
 
-Result<mission::MissionRecord> run_mission(const MissionConfig& given, mission::RunOptions options) {
+Result<mission::MissionRecord> run_mission(const MissionConfig& given, mission::RunOptions options,
+                                           RobotId first_robot) {
   MissionConfig config = given;
   auto input = corrected_input(config, options);
   if (!input) return tl::unexpected(input.error());
+  for (mission::MissionRecording& robot : input->robots) robot.recording.robot.value += first_robot.value;
   options.settings_yaml = to_yaml(config);
   mission::MissionParts parts{.input = std::move(*input),
                               .verifier = nullptr,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/mapfile/hold_map.hpp"
 
+#include <algorithm>
 #include <map>
 #include <utility>
 #include <vector>
@@ -8,6 +9,7 @@
 #include "tutti/mapfile/content.hpp"
 #include "tutti/mapfile/make_map.hpp"
 #include "tutti/mapfile/placement.hpp"
+#include "tutti/storage/map_tables.hpp"
 
 namespace tutti::mapfile {
 
@@ -44,6 +46,20 @@ Result<std::size_t> copy_held(const std::filesystem::path& map, const std::files
   });
   if (!made) return tl::unexpected(made.error());
   return held;
+}
+
+Result<HeldMap> read_held(const std::filesystem::path& map) {
+  const auto from = open_copy(map);
+  if (!from) return tl::unexpected(from.error());
+  storage::MemoryStore copy(storage::map_schema());
+  if (auto ok = copy_rows(**from, copy); !ok) return tl::unexpected(ok.error());
+  if (auto held = hold_map(copy); !held) return tl::unexpected(held.error());
+  const auto content = read(copy);
+  if (!content) return tl::unexpected(content.error());
+  HeldMap out{.rows = copy.tables(), .free_robot = RobotId{0}};
+  for (const auto& [id, submap] : content->submaps)
+    out.free_robot.value = std::max(out.free_robot.value, id.chain.robot.value + 1);
+  return out;
 }
 
 }  // namespace tutti::mapfile

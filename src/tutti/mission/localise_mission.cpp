@@ -87,7 +87,7 @@ LocaliseScore score_of(const std::vector<localise::Located>& course, const Traje
 
 /// Replays one recording alone.
 LocalisedRobot replay(const MissionRecording& recording, const MissionConfig& config,
-                      std::shared_ptr<const localise::Localiser::Setup> setup,
+                      std::shared_ptr<const localise::Localiser::Setup> setup, double restart_s,
                       const std::function<bool(const std::string&, double)>& stop) {
   robot::AgentConfig agent = config.agent;
   agent.submap.fit.scans = "off";  // nobody hears its map
@@ -96,18 +96,25 @@ LocalisedRobot replay(const MissionRecording& recording, const MissionConfig& co
   const Timestamp begin = recording.recording.odometry.front().stamp;
   const double length_s = recording.recording.odometry.back().stamp - begin;
   LocalisedRobot out{.name = recording.recording.name};
+  out.starts.emplace_back();
   while (std::isfinite(robot.next_time())) {
     const double time_s = robot.next_time();
     if (stop && stop(out.name, length_s > 0.0 ? (time_s - recording.start_s) / length_s : 1.0)) break;
     const std::size_t registered = localiser.work().registered;
     const double cpu_s = robot.cpu_s();
+    if (const double since_s = time_s - recording.start_s;
+        restart_s > 0.0 && since_s >= restart_s * static_cast<double>(out.starts.size()) &&
+        since_s + restart_s <= length_s) {
+      robot.start_at({}, kMissionStart + time_s);
+      out.starts.push_back({.at_s = since_s});
+    }
     robot.replay_next(kMissionStart + time_s);
     robot.take_step();
     if (localiser.work().registered > registered) out.scan_ms.push_back(1e3 * (robot.cpu_s() - cpu_s));
     localise::Located now = localiser.located();
-    if (now.state == localise::State::localised && !out.first_fix_s) {
-      out.first_fix_s = now.stamp - begin;
-      out.first_fix_cpu_s = robot.cpu_s();
+    if (now.state == localise::State::localised && !out.starts.back().fix_after_s) {
+      out.starts.back().fix_after_s = now.stamp - begin - out.starts.back().at_s;
+      if (out.starts.size() == 1) out.first_fix_cpu_s = robot.cpu_s();
     }
     if (out.course.empty() || out.course.back().state != now.state || now.stamp - out.course.back().stamp >= kCourse_s)
       out.course.push_back(std::move(now));
@@ -140,7 +147,7 @@ std::shared_ptr<const localise::Localiser::Setup> localise_setup(
 
 Result<std::vector<LocalisedRobot>> localise_mission(
     const MissionConfig& config, const MissionInput& input, const mapfile::OpenedMap& map,
-    std::shared_ptr<const server::ClosureVerifier> verifier,
+    std::shared_ptr<const server::ClosureVerifier> verifier, double restart_s,
     const std::function<bool(const std::string&, double share)>& stop) {
   const auto T_world_reference = reference_in(map, input, config.association);
   std::vector<LocalisedRobot> out;
@@ -148,7 +155,7 @@ Result<std::vector<LocalisedRobot>> localise_mission(
     const Recording& recording = robot.recording;
     if (recording.odometry.empty() || overlaps(poses_in(map, recording.name), recording.odometry)) continue;
     auto setup = localise_setup(config, with_sensors(config.agent, recording).submap, map.known, verifier);
-    out.push_back(replay(robot, config, std::move(setup), stop));
+    out.push_back(replay(robot, config, std::move(setup), restart_s, stop));
     if (T_world_reference && !recording.reference.empty())
       out.back().score = score_of(out.back().course, recording.reference, *T_world_reference, config.association);
   }

@@ -32,8 +32,13 @@ struct LocalisedRobot {
   std::string name;
   double duration_s = 0.0;
   std::vector<localise::Located> course;  ///< Ten a second at most, and every change of state.
-  std::optional<double> first_fix_s;      ///< Since its first sample.
-  double first_fix_cpu_s = 0.0;           ///< CPU until then.
+  /// When it began to search the whole map, and after how long it was localised.
+  struct Start {
+    double at_s = 0.0;  ///< Since its first sample.
+    std::optional<double> fix_after_s;
+  };
+  std::vector<Start> starts;     ///< The first at its first sample.
+  double first_fix_cpu_s = 0.0;  ///< CPU until the first one was localised.
   localise::LocaliserWork work;
   double cpu_s = 0.0;
   std::vector<double> scan_ms;  ///< CPU of each scan that was registered.
@@ -48,11 +53,13 @@ std::shared_ptr<const localise::Localiser::Setup> localise_setup(
     const MissionConfig& config, const robot::SubmapConfig& submap, std::shared_ptr<const localise::KnownMap> map,
     std::shared_ptr<const server::ClosureVerifier> verifier);
 
-/// Replays every robot of the mission that did not make the map alone, without a server. `stop` is asked between
-/// samples. An error names a recording that cannot be read.
+/// Replays every robot of the mission that did not make the map alone, without a server. Every `restart_s`, unless it
+/// is 0, it forgets where it is, so that there are many starts. `stop` is asked between samples. An error names a
+/// recording that cannot be read.
 Result<std::vector<LocalisedRobot>> localise_mission(const MissionConfig& config, const MissionInput& input,
                                                      const mapfile::OpenedMap& map,
                                                      std::shared_ptr<const server::ClosureVerifier> verifier,
+                                                     double restart_s,
                                                      const std::function<bool(const std::string&, double share)>& stop);
 
 }  // namespace tutti::mission

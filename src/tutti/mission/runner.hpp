@@ -15,7 +15,7 @@
 #include "tutti/mission/recordings.hpp"
 #include "tutti/mission/robot_actor.hpp"
 #include "tutti/server/closure_verifier.hpp"
-#include "tutti/storage/table_store.hpp"
+#include "tutti/storage/memory_store.hpp"
 
 namespace tutti::mission {
 
@@ -53,6 +53,8 @@ struct RunOptions {
   /// Asked between steps. Once it is true the mission ends as if recordings ended there, with a note on that. Not set:
   /// never.
   std::function<bool()> stop;
+  /// Rows of the map that the mission's robots extend (storage::map_schema()), in which their numbers are free.
+  storage::MemoryStore::Tables map;
   /// Called with the server's store when the mission is over.
   std::function<Status(const storage::TableStore&)> keep_map;
 };

@@ -29,7 +29,9 @@ double quantile(std::vector<double> values, double share) {
 }
 
 Json json_of(const LocalisedRobot& robot) {
-  Json shares, score;
+  Json shares, score, starts = Json::array();
+  for (const LocalisedRobot::Start& start : robot.starts)
+    starts.push_back({{"at_s", number(start.at_s)}, {"fix_after_s", number(start.fix_after_s)}});
   for (const State state : kStates) shares[std::string(to_string(state))] = number(robot.share(state));
   if (robot.score)
     score = {{"scored", robot.score->scored},
@@ -41,7 +43,7 @@ Json json_of(const LocalisedRobot& robot) {
               {number(robot.score->within[0]), number(robot.score->within[1]), number(robot.score->within[2])}}};
   return {{"robot", robot.name},
           {"duration_s", number(robot.duration_s)},
-          {"first_fix_s", number(robot.first_fix_s)},
+          {"starts", starts},
           {"share_of_time", shares},
           {"score", score},
           {"work",
@@ -121,24 +123,29 @@ std::string localised_text(const std::vector<LocalisedRobot>& robots, const loca
   std::string out =
       fmt::format("map {}, version {}: {} submaps, which have not moved\n\n", map.id, map.revision, map.submaps.size());
   TextTable table(1);
-  table.add({"robot", "first fix", "localised", "ambiguous", "off the map", "lost", "error", "worst", "wrong"});
+  table.add({"robot", "starts", "fixes", "after", "localised", "ambiguous", "off the map", "lost", "error", "worst",
+             "wrong"});
   table.rule();
   for (const LocalisedRobot& robot : robots) {
     const auto percent = [&](State state) { return fmt::format("{:.1f} %", 100.0 * robot.share(state)); };
     const auto& score = robot.score;
-    table.add({robot.name, robot.first_fix_s ? fmt::format("{:.1f} s", *robot.first_fix_s) : "none",
-               percent(State::localised), percent(State::ambiguous), percent(State::off_map), percent(State::lost),
+    std::vector<double> after_s;
+    for (const LocalisedRobot::Start& start : robot.starts)
+      if (start.fix_after_s) after_s.push_back(*start.fix_after_s);
+    table.add({robot.name, std::to_string(robot.starts.size()), std::to_string(after_s.size()),
+               after_s.empty() ? "-" : fmt::format("{:.1f} s", quantile(after_s, 0.5)), percent(State::localised),
+               percent(State::ambiguous), percent(State::off_map), percent(State::lost),
                score && score->scored > 0 ? fmt::format("{:.3f} m", score->rmse_m) : "-",
                score && score->scored > 0 ? fmt::format("{:.3f} m", score->max_m) : "-",
                score ? fmt::format("{} of {}", score->wrong, score->scored) : "-"});
   }
   out += table.str() + '\n';
-  out +=
-      wrap(fmt::format("error: RMSE of published poses in the map's frame, which the robots that made the map tie to "
-                       "the reference. wrong: by more than {:g} m or {:g} degrees",
-                       LocaliseScore::kWrong_m, LocaliseScore::kWrong_deg),
-           "") +
-      "\n\n";
+  out += wrap(fmt::format("after: median time from a start to its fix. error: RMSE of published poses in the map's "
+                          "frame, which the robots that made the map tie to "
+                          "the reference. wrong: by more than {:g} m or {:g} degrees",
+                          LocaliseScore::kWrong_m, LocaliseScore::kWrong_deg),
+              "") +
+         "\n\n";
   for (const LocalisedRobot& robot : robots) {
     out += changes_of(robot, map);
     for (const std::string& trouble : robot.troubles) out += wrap(trouble, "  " + robot.name + ": ");
