@@ -28,6 +28,7 @@ struct Letters {
   void operator()(const std::vector<ImuSample>&) { out += 'i'; }
   void operator()(const PositionFix&) { out += 'f'; }
   void operator()(const Health&) { out += 'h'; }
+  void operator()(const StartPose&) { out += 'a'; }
 };
 
 class SensorIntakeTest : public testing::Test {

@@ -44,7 +44,7 @@ struct GuessGate {
 /// Where two submaps of the robot, or somebody who gives a start pose, say so,
 inline constexpr GuessGate kAgreedGate{.least_overlap = 0.6, .most_contradiction = 0.15};
 /// and where one submap does: three quarters of a scan lie on the wrong one of two corridors that look alike.
-inline constexpr GuessGate kAloneGate{.least_overlap = 0.85, .most_contradiction = 0.03};
+inline constexpr GuessGate kAloneGate{.least_overlap = 0.82, .most_contradiction = 0.06};
 /// As assess(), and only what passes the gate confirms.
 Assessment assess_guess(const ScanMatch& match, const RelativePose& predicted, const GuessGate& gate);
 
