@@ -33,6 +33,7 @@ class Search {
     if (is_out_of_patience()) return best;
     if (Solution proposal = without_impossible(proposed()); proposal.solved && !proposal.failed.empty())
       keep_better(best, without_idle(std::move(proposal)));
+    ask_standstills(best);
     return refuse_groups(std::move(groups), best) ? without_idle(std::move(best)) : best;
   }
 
@@ -57,6 +58,23 @@ class Search {
         windows.push_back(window);
     }
     return solver_.judge({std::move(windows), {}}, std::move(all.optimum));
+  }
+
+  /// Odometry may have failed where it stood still, and only there: among all odometry, many small failures nearby
+  /// explain the same, and do not pay for themselves.
+  void ask_standstills(Solution& best) const {
+    constexpr std::size_t kMost = 5;
+    const std::vector<Window> standstills = solver_.standstills();
+    for (std::size_t k = 0; k < std::min(kMost, standstills.size()); ++k) {
+      if (is_out_of_patience() || best.unexplained < config_.least_votes + 1.0) return;
+      Hypothesis other = best.hypothesis;
+      std::erase_if(other.windows, [&](const Window& window) {
+        return window.first <= standstills[k].last && standstills[k].first <= window.last;
+      });
+      other.windows.push_back(standstills[k]);
+      std::ranges::sort(other.windows, {}, &Window::first);
+      keep_better(best, solver_.solve(std::move(other)));
+    }
   }
 
   /// Takes back the windows in which odometry would have missed more than the robot can have moved. They go first: what

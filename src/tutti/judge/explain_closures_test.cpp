@@ -184,6 +184,26 @@ TEST(OutlierRejection, SeveralFailuresAreFoundByASearchAndByOneCutShort) {
   }
 }
 
+/// A front end that repeats its last pose while the robot goes on.
+TEST(OutlierRejection, OdometryThatStoodStillFailedThere) {
+  constexpr std::size_t kFrom = 12, kTo = 15;
+  Laps laps;
+  for (std::size_t k = kFrom; k < kTo; ++k) laps.graph.edges[k].T_from_to = {};
+  for (std::size_t k = 0; k + 1 < kNodes; ++k)
+    laps.graph.poses[k + 1] = laps.graph.poses[k] * laps.graph.edges[k].T_from_to;
+  laps.close_laps(1);
+  const Solver solver(laps);
+  const std::vector<Window> still = solver.solver.standstills();
+  ASSERT_EQ(still.size(), 1U);
+  EXPECT_LE(still[0].last - still[0].first, 2U);
+  const Judgement judgement = laps.explain();
+  EXPECT_LE(std::ranges::count(judgement.accepted, false), 3) << "those from the nodes in between";
+  ASSERT_EQ(judgement.failed.size(), 1U);
+  EXPECT_LE(judgement.failed[0].from, kFrom);
+  EXPECT_GE(judgement.failed[0].to, kTo);
+  EXPECT_TRUE(Solver(Laps()).solver.standstills().empty());
+}
+
 TEST(OutlierRejection, PlacesThatLookAlikeBlameNothing) {
   Laps laps;
   laps.close_laps(10);

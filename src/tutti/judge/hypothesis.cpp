@@ -30,6 +30,9 @@ constexpr double kRadian_s = 5.0;
 /// Odometry fails by no more than a body moves in the time that it took, and in so many seconds more, as what jumps
 /// between two samples has moved in no time at all.
 constexpr double kReach_s = 2.0;
+/// Odometry stands still where it goes slower than this share of the usual speed and turns slower than so many radians
+/// a second; for at least so many seconds it is worth a question.
+constexpr double kStillShare = 0.01, kStill_radps = 0.1 * kRadPerDeg, kLeastStill_s = 2.0;
 /// Where solutions begin is solved to this share of the cost: with wrong closures in it the rest takes most of the
 /// steps, and says nothing.
 constexpr double kBeginning = 1e-3;
@@ -131,6 +134,32 @@ Window HypothesisSolver::around(std::size_t run) const {
   };
   while (out.first > 0 && is_near(out.first - 1)) --out.first;
   while (out.last + 1 < runs_.size() && is_near(out.last + 1)) ++out.last;
+  return out;
+}
+
+std::vector<Window> HypothesisSolver::standstills() const {
+  struct Still {
+    Window window;
+    double duration_s = 0.0;
+  };
+  std::vector<Still> all;
+  std::size_t until = 0;  // node at which the newest one ends
+  for (std::size_t run = 0; run < runs_.size(); ++run)
+    for (std::size_t node = begin_of(run); node < end_of(run); ++node) {
+      const double duration_s = odometry_.seconds(node + 1) - odometry_.seconds(node);
+      const Pose3 motion = odometry_.T(node, node + 1);
+      const bool is_still = motion.translation.norm() <= kStillShare * odometry_.usual_speed() * duration_s &&
+                            rotation_angle(motion) <= kStill_radps * duration_s;
+      if (!is_still) continue;
+      if (all.empty() || until != node || run > all.back().window.last + 1) all.push_back({.window = {run, run}});
+      all.back().window.last = run;
+      all.back().duration_s += duration_s;
+      until = node + 1;
+    }
+  std::erase_if(all, [](const Still& still) { return still.duration_s < kLeastStill_s; });
+  std::ranges::stable_sort(all, std::ranges::greater(), &Still::duration_s);
+  std::vector<Window> out;
+  for (const Still& still : all) out.push_back(still.window);
   return out;
 }
 

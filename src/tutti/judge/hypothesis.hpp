@@ -64,6 +64,9 @@ class HypothesisSolver {
   [[nodiscard]] std::size_t runs() const { return runs_.size(); }
   /// The runs within config.search_s of a run, on the same segment of odometry.
   [[nodiscard]] Window around(std::size_t run) const;
+  /// The runs over which odometry stood still for so long that it may have lost itself: wheels in the air, a front end
+  /// that repeats its last pose. The longest first.
+  [[nodiscard]] std::vector<Window> standstills() const;
   /// Cost of all calls so far.
   [[nodiscard]] const SearchWork& work() const { return work_; }
   [[nodiscard]] double votes(std::size_t closure) const { return votes_[closure]; }
