@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <utility>
 
 namespace tutti::lidar {
@@ -44,24 +45,40 @@ PointTimes::Zero zero_of(double first_s, double last_s, Timestamp stamp) {
   return is_near ? PointTimes::Zero::odometry_clock : PointTimes::Zero::unknown;
 }
 
+/// One of `share` points may stray on either side, by more than so many times the span of the others.
+struct Strays {
+  std::size_t share;
+  double spans;
+};
+/// A few that are as far away as a sweep is long; or many that are farther than any sweep is longer than the part of it
+/// in which a LiDAR in the open sees nearly all of its points.
+constexpr std::array<Strays, 2> kStrays = {{{50, 1.0}, {10, 30.0}}};
+
+/// Times that are no strays, first and last.
+std::pair<double, double> bounds_of(std::vector<double>& times, const Strays& strays) {
+  const auto trimmed = static_cast<std::ptrdiff_t>(std::max<std::size_t>(1, times.size() / strays.share));
+  std::ranges::nth_element(times, times.begin() + trimmed);
+  const double low = times[static_cast<std::size_t>(trimmed)];
+  std::ranges::nth_element(times, times.end() - 1 - trimmed);
+  const double high = times[times.size() - 1 - static_cast<std::size_t>(trimmed)];
+  const double most = high > low ? strays.spans * (high - low) : std::numeric_limits<double>::infinity();
+  return {low - most, high + most};
+}
+
 }  // namespace
 
 std::size_t drop_stray_times(formats::TimedCloud& scan) {
-  constexpr std::size_t kFewest = 10, kShare = 50;  // points, and one of how many may stray on either side
+  constexpr std::size_t kFewest = 10;  // points
   const std::size_t count = scan.times.size();
   if (count < kFewest || scan.cloud.points.size() != count) return 0;
   std::vector<double> times = scan.times;
   if (!std::ranges::all_of(times, [](double time) { return std::isfinite(time); })) return 0;
-  const auto trimmed = static_cast<std::ptrdiff_t>(std::max<std::size_t>(1, count / kShare));
-  std::ranges::nth_element(times, times.begin() + trimmed);
-  const double low = times[static_cast<std::size_t>(trimmed)];
-  std::ranges::nth_element(times, times.end() - 1 - trimmed);
-  const double high = times[count - 1 - static_cast<std::size_t>(trimmed)];
-  const double span = high - low;
-  if (!(span > 0.0)) return 0;
+  const auto [few_low, few_high] = bounds_of(times, kStrays[0]);
+  const auto [many_low, many_high] = bounds_of(times, kStrays[1]);
+  const double low = std::max(few_low, many_low), high = std::min(few_high, many_high);
   std::size_t kept = 0;
   for (std::size_t i = 0; i < count; ++i) {
-    if (scan.times[i] < low - span || scan.times[i] > high + span) continue;
+    if (scan.times[i] < low || scan.times[i] > high) continue;
     scan.times[kept] = scan.times[i];
     scan.cloud.points[kept++] = scan.cloud.points[i];
   }

@@ -122,6 +122,21 @@ TEST(ScanTimes, FewTimesThatStrayAreLeftOutAndDoNotDecideTheUnit) {
   EXPECT_EQ(drop_stray_times(same), 0U);
 }
 
+/// More of them stray farther; what a LiDAR in the open sees of its sweep's begin and end is no stray.
+TEST(ScanTimes, ATwentiethMayStrayFarAway) {
+  std::vector<double> times, open_field;
+  for (int i = 0; i < 2000; ++i) {
+    times.push_back(i % 20 == 7 ? 7.0 : 0.00005 * i);
+    open_field.push_back(i % 10 == 7 ? 0.00005 * i : 0.05 + 0.000002 * i);
+  }
+  auto scan = scan_with(times), honest = scan_with(open_field);
+  const auto found = find_point_times(scan, Timestamp{}, {});
+  ASSERT_TRUE(found && *found);
+  EXPECT_EQ((*found)->unit, "s");
+  EXPECT_EQ((*found)->strays, 100U);
+  EXPECT_EQ(drop_stray_times(honest), 0U);
+}
+
 TEST(ScanTimes, AreReportedInWords) {
   EXPECT_EQ(in_words(std::nullopt), "scans are taken as deskewed to the stamps of their poses");
   EXPECT_EQ(in_words(PointTimes{.field = "t", .unit = "ns", .unit_s = 1e-9, .zero = Zero::sweep_begin}),
