@@ -131,6 +131,12 @@ int run(OptimiseOptions options) {
   }
   auto file = formats::read_g2o(options.inputs);
   if (!file) return complain("optimise", file.error().message);
+  if (file->graph.edges.empty())
+    return complain(
+        "optimise",
+        fmt::format("{}: {} vertices and no edge between poses: nothing to optimise{}", options.inputs.front(),
+                    file->vertex_ids.size(),
+                    file->left_out.empty() ? "" : "; lines of other kinds: " + formats::counted(file->left_out)));
   const Outcome outcome = optimise(*file, options);
   print(*file, outcome, options);
   const auto termination = outcome.solution.summary.termination;

@@ -118,6 +118,20 @@ TEST_F(OthersTrajectories, BadRowsAreLeftOutAndTheRestSorted) {
   EXPECT_NE(report_.notes("f")[0].find("f: 4 rows left out, the first because: "), std::string::npos);
 }
 
+/// A covariance that only some rows have is behind the pose.
+TEST_F(OthersTrajectories, RowsMayHaveMoreColumnsThanTheFirst) {
+  for (const char* const text : {"1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1 0.1 0.2\n3 2 0 0 0 0 0 1\n",
+                                 "1 0 0 0 0 0 0 1 0.1 0.2\n2 1 0 0 0 0 0 1\n3 2 0 0 0 0 0 1 0.1\n"}) {
+    const auto poses = read(text);
+    ASSERT_TRUE(poses) << poses.error().message;
+    EXPECT_EQ(poses->size(), 3U) << text;
+    EXPECT_TRUE(report_.left_out.empty()) << text;
+  }
+  const auto header_alone = read("timestamp,x,y,z,qx,qy,qz,qw\n");
+  ASSERT_TRUE(header_alone) << header_alone.error().message;
+  EXPECT_TRUE(header_alone->empty());
+}
+
 TEST_F(OthersTrajectories, StampsSeparatorsAndNames) {
   for (const char* text :
        {"1700000000.5,1,2,3,0,0,0.6,0.8\n", "1700000000.5, 1, 2, 3, 0, 0, 0.6, 0.8\n",
@@ -131,6 +145,8 @@ TEST_F(OthersTrajectories, StampsSeparatorsAndNames) {
         "num, t, x, y, z, qx, qy, qz, qw\n7, 1700000000.5, 1, 2, 3, 0, 0, 0.6, 0.8\n",
         ",time,pos_x,pos_y,pos_z,quat_x,quat_y,quat_z,quat_w\n0,1700000000.5,1,2,3,0,0,0.6,0.8\n",
         "# sec,nsec,x,y,z,qx,qy,qz,qw\n1700000000,500000000,1,2,3,0,0,0.6,0.8\n",
+        "timestamp x y z qw qx qy qz\n1700000000.5,1,2,3,0.8,0,0,0.6\n",
+        "timestamp,x,y,z,qw,qx,qy,qz\n1700000000.5 1 2 3 0.8 0 0 0.6\n",
         "%time,field.header.seq,field.header.stamp,field.header.frame_id,field.pose.pose.position.x,"
         "field.pose.pose.position.y,field.pose.pose.position.z,field.pose.pose.orientation.x,"
         "field.pose.pose.orientation.y,field.pose.pose.orientation.z,field.pose.pose.orientation.w,"

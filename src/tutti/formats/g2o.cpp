@@ -14,6 +14,7 @@
 #include "tutti/base/check.hpp"
 #include "tutti/base/file_kind.hpp"
 #include "tutti/formats/internal/chain.hpp"
+#include "tutti/formats/internal/foreign_text.hpp"
 #include "tutti/formats/internal/g2o_lines.hpp"
 #include "tutti/formats/symbol_keys.hpp"
 
@@ -127,6 +128,13 @@ Result<G2oFile> assemble(const G2oLines& lines, const std::string& name) {
   return file;
 }
 
+/// With line ends and decimal points as here; UTF-16 is an error that says what to type.
+Result<std::string> read_text(const std::string& path) {
+  return read_file_for(FileUse::graph, path).and_then([&](std::string text) {
+    return internal::plain_text(std::move(text), path);
+  });
+}
+
 Status place_along_edges(G2oFile& file, const std::string& name) {
   const std::size_t components = internal::chain_poses(file.graph, file.vertex_ids);
   if (components != 1)
@@ -185,15 +193,13 @@ Result<G2oFile> parse_g2o(std::string_view text, const std::string& name) {
 }
 
 Result<G2oFile> read_g2o_edges(const std::string& path) {
-  return read_file_for(FileUse::graph, path).and_then([&](const std::string& text) {
-    return parse_g2o_edges(text, path);
-  });
+  return read_text(path).and_then([&](const std::string& text) { return parse_g2o_edges(text, path); });
 }
 
 Result<G2oFile> read_g2o(std::span<const std::string> paths) {
   G2oLines lines;
   for (const std::string& path : paths) {
-    const auto text = read_file_for(FileUse::graph, path);
+    const auto text = read_text(path);
     if (!text) return tl::unexpected(text.error());
     if (auto ok = internal::read_g2o_lines(*text, path, lines); !ok) return tl::unexpected(ok.error());
   }

@@ -22,6 +22,7 @@ TEST(OthersGraphs, LinesOfOtherOptimisersAreLeftOutAndCounted) {
   EXPECT_EQ(counted(file->left_out),
             "1 x EDGE_PRIOR_SE2, 2 x EDGE_SE2_XY, 1 x PARAMS_SE2OFFSET, 1 x ROBOTLASER1, 1 x VERTEX_XY");
   EXPECT_EQ(parse_g2o(poses, "g")->left_out.size(), 0U);
+  EXPECT_EQ(parse_g2o("// made by\n% hand\n" + poses, "g")->left_out.size(), 0U);
   const auto fixed = parse_g2o(poses + "VERTEX_XY 7 1 2\nFIX 7\nFIX 0\n", "g");
   ASSERT_TRUE(fixed) << fixed.error().message;
   EXPECT_EQ(counted(fixed->left_out), "1 x FIX, 1 x VERTEX_XY");

@@ -84,10 +84,12 @@ Result<Pose3> read_pose(const LineReader& line, const TrajectoryLayout& layout) 
   return Pose3{*q, {v[0], v[1], v[2]}};
 }
 
-/// `otherwise`: the stamp of a row that has none.
+/// `otherwise`: the stamp of a row that has none. Unless `is_strict`, what is behind the pose, such as a covariance,
+/// may be there in some rows only.
 Result<StampedPose> read_row(const LineReader& line, const TrajectoryLayout& layout, double rate_hz,
-                             Timestamp otherwise) {
-  if (auto ok = line.expect_columns(layout.count, layout.columns); !ok) return tl::unexpected(ok.error());
+                             Timestamp otherwise, bool is_strict) {
+  if (is_strict || layout.is_matrix || line.columns().size() < layout.needed())
+    if (auto ok = line.expect_columns(layout.count, layout.columns); !ok) return tl::unexpected(ok.error());
   StampedPose out{otherwise, {}};
   if (layout.stamp) {
     const auto stamp = read_stamp(line, layout, rate_hz);
@@ -127,7 +129,7 @@ Result<Trajectory> read_rows(std::string_view text, const std::string& name, con
   std::vector<Error> bad;
   std::size_t unreadable = 0;
   for (std::size_t k = 0; line.next(); ++k) {
-    auto row = read_row(line, layout, rate_hz, numbered(start, static_cast<double>(k), rate_hz));
+    auto row = read_row(line, layout, rate_hz, numbered(start, static_cast<double>(k), rate_hz), report == nullptr);
     if (!row && report == nullptr) return tl::unexpected(row.error());
     if (!row) {
       unreadable += row.error().code == ErrorCode::parse ? 1 : 0;

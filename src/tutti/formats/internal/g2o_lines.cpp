@@ -150,6 +150,7 @@ bool looks_like_tag(std::string_view text) {
 
 Status read_line(const LineReader& line, G2oLines& lines) {
   const std::string_view tag = line.columns()[0];
+  if (tag.starts_with("//") || tag.starts_with('%')) return {};  // a comment
   if (tag == "FIX") {
     for (std::size_t i = 1; i < line.columns().size(); ++i) {
       const auto id = line.integer(i, "vertex id");

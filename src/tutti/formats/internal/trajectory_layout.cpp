@@ -18,18 +18,30 @@ constexpr std::string_view kTum = "stamp x y z qx qy qz qw";
 constexpr std::string_view kEuroc = "stamp[ns],px,py,pz,qw,qx,qy,qz,...";
 constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
 
-/// The separator that makes a pose of the first row; or else the one that is in it.
+bool is_header(std::span<const std::string_view> columns) {
+  return std::ranges::none_of(columns, [](std::string_view c) { return parse_number(c).has_value(); });
+}
+
+constexpr std::array kSeparators{Separator::comma, Separator::semicolon, Separator::whitespace};
+
+/// The separator that makes a pose of the first row with numbers, or else of the first one; or else the one that is in
+/// it. Names may be separated otherwise than numbers are.
 Separator separator_of(std::string_view text) {
-  for (const Separator separator : {Separator::comma, Separator::semicolon, Separator::whitespace}) {
+  constexpr int kMostHeaderRows = 20;
+  for (const Separator separator : kSeparators) {
+    LineReader line(text, "", separator);
+    for (int row = 0; row < kMostHeaderRows && line.next(); ++row)
+      if (!is_header(line.columns())) {
+        if (line.columns().size() >= kPoseColumns) return separator;
+        break;
+      }
+  }
+  for (const Separator separator : kSeparators) {
     LineReader line(text, "", separator);
     if (line.next() && line.columns().size() >= kPoseColumns) return separator;
   }
   LineReader line(text, "", Separator::comma);
   return line.next() && line.columns().size() > 1 ? Separator::comma : Separator::whitespace;
-}
-
-bool is_header(std::span<const std::string_view> columns) {
-  return std::ranges::none_of(columns, [](std::string_view c) { return parse_number(c).has_value(); });
 }
 
 std::string lower(std::string_view text) {
@@ -164,6 +176,16 @@ std::optional<Named> behind_another(std::span<const std::string_view> columns) {
   return out;
 }
 
+/// Named by a row, whatever separates its names.
+std::optional<Named> named_in_row(std::string_view row) {
+  for (const Separator separator : kSeparators) {
+    LineReader names(row, "", separator);
+    if (!names.next()) return std::nullopt;
+    if (auto named = read_names(names.columns())) return named;
+  }
+  return std::nullopt;
+}
+
 /// Named by one of the comments before the first row; the last one counts.
 std::optional<Named> named_in_comment(std::string_view text, Separator separator) {
   std::optional<Named> out;
@@ -289,8 +311,11 @@ TrajectoryLayout find_layout(std::string_view text, std::string_view format) {
   if (!line.next()) return out;
   auto named = named_in_comment(text, out.separator);
   for (; is_header(line.columns()); ++out.header_rows) {
-    if (auto names = read_names(line.columns())) named = names;
-    if (!line.next()) return out;
+    const std::string_view first = line.columns().front(), last = line.columns().back();
+    if (auto names = named_in_row({first.data(), last.data() + last.size()})) named = names;
+    if (line.next()) continue;
+    out.header_rows = out.header_rows == 0 ? 1 : 0;  // names alone; or no rows that are read, whose first is the error
+    return out;
   }
   if (!named) named = as_ros_prints(line.columns());
   if (!named && format != "kitti") named = behind_another(line.columns());

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <optional>
@@ -27,6 +28,11 @@ struct TrajectoryLayout {
   std::array<std::size_t, 7> at = {1, 2, 3, 4, 5, 6, 7};  ///< x y z qx qy qz qw
   std::size_t matrix = 0;                                 ///< Column of the first of 12 numbers.
   std::size_t ignored = 0;                                ///< Columns that are not read.
+  /// Columns that a row must have: those up to the last one that is read. A matrix has all.
+  [[nodiscard]] std::size_t needed() const {
+    const std::size_t last = std::max({stamp.value_or(0), fraction.value_or(0), *std::ranges::max_element(at)});
+    return is_matrix ? count : last + 1;
+  }
 };
 
 TrajectoryLayout tum_layout();
