@@ -90,6 +90,20 @@ Result<std::unique_ptr<BagReader>> open_folder(const fs::path& folder) {
     if (metadata) {
       for (const std::string& file : metadata->files) files.push_back((folder / file).string());
       messages = metadata->messages;
+      const auto exists = [&](const std::string& file) { return fs::exists(file, failure); };
+      const bool is_none_there = !files.empty() && std::ranges::none_of(files, exists);
+      if (is_none_there && there.empty())
+        return fail(ErrorCode::io,
+                    "{}: names {}, which is not there, nor is another .mcap, .db3 or .bag: expected the "
+                    "recording's files beside it",
+                    metadata_file.string(), fs::path(files.front()).filename().string());
+      if (is_none_there) {
+        notes.push_back(
+            fmt::format("{}: names {}, which is not there (renamed?); the files of the folder are read in "
+                        "the order of their names",
+                        metadata_file.string(), fs::path(files.front()).filename().string()));
+        files.clear();
+      }
     } else {
       notes.push_back(metadata.error().message + "; the files of the folder are read in the order of their names");
     }

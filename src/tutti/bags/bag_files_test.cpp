@@ -108,6 +108,21 @@ TEST_F(BagFolders, AFileThatIsMissingCostsItsMessages) {
   EXPECT_NE(read.notes[0].find("other.mcap: is not named by metadata.yaml"), std::string::npos) << read.notes[0];
 }
 
+/// Folders are renamed, and files with them; or metadata alone is in a repository.
+TEST_F(BagFolders, MetadataThatNamesNoFileThatIsThereIsSaid) {
+  const auto files = write_rosbag2(folder_, samples(), Storage::mcap, Packing::none, 100);
+  ASSERT_EQ(files.size(), 1U);
+  fs::rename(folder_ / files[0], folder_ / "renamed.mcap");
+  auto bag = open_bag(folder_.string()).value();
+  const Read read = read_all(*bag);
+  EXPECT_EQ(read.messages.size(), 23U);
+  ASSERT_EQ(read.notes.size(), 1U);
+  EXPECT_NE(read.notes[0].find("names bag_0.mcap, which is not there (renamed?)"), std::string::npos) << read.notes[0];
+  fs::remove(folder_ / "renamed.mcap");
+  const std::string refused = open_bag(folder_.string()).error().message;
+  EXPECT_NE(refused.find("names bag_0.mcap, which is not there, nor is another .mcap"), std::string::npos) << refused;
+}
+
 TEST_F(BagFolders, WhatSomethingElseHasPackedIsNamedWithWhatToType) {
   fs::create_directories(folder_);
   const auto said = [&](const char* name, const std::string& bytes) {

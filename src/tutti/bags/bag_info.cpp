@@ -128,8 +128,9 @@ std::string refusal_of(const TopicInfo& topic, const ImageTopic& images) {
     return camera ? "" : ", of no use: " + camera.error().message;
   }
   if (topic.use != Use::fixes || topic.has_fix) return "";
-  return ", of no use: " + (topic.refused_fix.empty() ? "no message has a fix (status -1)"
-                                                      : "no message is a fix, the first because: " + topic.refused_fix);
+  return ", of no use: " + (topic.refused_fix.empty()
+                                ? "no message has a fix (status -1, or 0 degrees north and 0 east)"
+                                : "no message is a fix, the first because: " + topic.refused_fix);
 }
 
 /// Without those that show depth.

@@ -8,7 +8,8 @@
 namespace tutti::bags {
 
 Result<std::optional<ReceivedFix>> to_fix(const RosNavSatFix& message) {
-  if (message.status < 0) return std::nullopt;
+  const bool is_unset = message.latitude_deg == 0.0 && message.longitude_deg == 0.0;
+  if (message.status < 0 || is_unset) return std::nullopt;
   ReceivedFix out{.fix = {.stamp = message.header.stamp,
                           .antenna = {message.latitude_deg, message.longitude_deg, message.altitude_m}},
                   .frame = frame_name(message.header.frame_id)};

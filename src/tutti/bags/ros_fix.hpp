@@ -21,8 +21,9 @@ struct ReceivedFix {
 /// The standard deviation of an altitude that a receiver does not have (NaN): it decides nothing.
 inline constexpr double kUnknownAltitude_m = 1e4;
 
-/// The fix in a message; nothing when the receiver reports that it has none (status -1). A covariance of type 0, or
-/// with a variance of zero or less (many drivers write 0 or -1), counts as not stated. Fails as check_fix() does.
+/// The fix in a message; nothing when the receiver reports that it has none (status -1), or is at 0 degrees north and 0
+/// east, as one that has not found itself yet. A covariance of type 0, or with a variance of zero or less (many drivers
+/// write 0 or -1), counts as not stated. Fails as check_fix() does.
 Result<std::optional<ReceivedFix>> to_fix(const RosNavSatFix& message);
 
 }  // namespace tutti::bags

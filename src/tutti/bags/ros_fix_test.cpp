@@ -61,7 +61,9 @@ TEST(RosFix, WithoutAnAltitudeItCountsInThePlane) {
 }
 
 TEST(RosFix, OfAReceiverWithoutOneIsNoneAndGarbageIsDistinguished) {
-  RosNavSatFix none = message(), nowhere = message(), skewed = message();
+  RosNavSatFix none = message(), nowhere = message(), skewed = message(), unset = message();
+  unset.latitude_deg = unset.longitude_deg = 0.0;
+  EXPECT_FALSE(heard(unset).value().has_value());
   none.status = -1;
   none.latitude_deg = nowhere.latitude_deg = std::numeric_limits<double>::quiet_NaN();
   skewed.position_covariance[1] = 100.0;

@@ -13,6 +13,7 @@ namespace tutti::bags {
 namespace {
 
 constexpr double kFarAhead_s = 10.0;
+constexpr double kClockSet_s = 86'400.0;  // no robot rests that long within a recording: its clock was set
 constexpr std::size_t kLeastConfirmed = 3, kConfirmed = 5;  // messages that must be of the same clock
 
 /// True if the messages from `at` on, a few, are all before `limit`.
@@ -20,6 +21,13 @@ bool stays_before(std::span<const Arrival> arrivals, std::size_t at, Timestamp l
   const auto next = arrivals.subspan(at, std::min(kConfirmed, arrivals.size() - at));
   return next.size() >= kLeastConfirmed &&
          std::ranges::all_of(next, [&](const Arrival& arrival) { return arrival.stamp < limit; });
+}
+
+/// The same behind it.
+bool stays_behind(std::span<const Arrival> arrivals, std::size_t at, Timestamp limit) {
+  const auto next = arrivals.subspan(at, std::min(kConfirmed, arrivals.size() - at));
+  return next.size() >= kLeastConfirmed &&
+         std::ranges::all_of(next, [&](const Arrival& arrival) { return arrival.stamp > limit; });
 }
 
 using Refused = std::vector<std::pair<std::size_t, std::string>>;
@@ -36,7 +44,8 @@ std::pair<std::vector<StampOrder::Run>, Refused> runs_of(std::span<const Arrival
     }
     StampOrder::Run& run = runs.back();
     const Timestamp oldest = run.last - kSortWithin_s;
-    if (stamp < oldest && stays_before(arrivals, i, oldest)) {
+    const Timestamp set = run.last + kClockSet_s;
+    if ((stamp < oldest && stays_before(arrivals, i, oldest)) || (stamp > set && stays_behind(arrivals, i, set))) {
       runs.push_back({i, i + 1, stamp, stamp});
       continue;
     }
@@ -57,7 +66,8 @@ std::pair<std::vector<StampOrder::Run>, Refused> runs_of(std::span<const Arrival
 }  // namespace
 
 std::vector<std::size_t> log_order(std::span<const Arrival> arrivals) {
-  constexpr std::size_t kLong = 10;  // messages
+  constexpr std::size_t kLong = 10;        // messages
+  constexpr std::size_t kPerExchange = 4;  // runs; stretches that change places make two or three each
   std::vector<std::size_t> stored(arrivals.size());
   std::iota(stored.begin(), stored.end(), std::size_t{0});
   std::vector<std::size_t> logged = stored;
@@ -67,7 +77,8 @@ std::vector<std::size_t> log_order(std::span<const Arrival> arrivals) {
     stretches += arrivals[i].logged < arrivals[i - 1].logged ? 1 : 0;
     runs += logged[i] != logged[i - 1] + 1 ? 1 : 0;
   }
-  const bool alternate = arrivals.size() < kLong * runs && arrivals.size() >= kLong * stretches;
+  const bool alternate =
+      arrivals.size() < kLong * runs && arrivals.size() >= kLong * stretches && runs > kPerExchange * stretches;
   return alternate ? stored : logged;
 }
 

@@ -44,7 +44,7 @@ struct StampOrder {
 std::vector<std::size_t> log_order(std::span<const Arrival> arrivals);
 
 /// `arrivals` are in the order in which they were logged. One stamp that is far ahead or behind starts no run: a clock
-/// starts again when the messages that follow go on behind it, too.
+/// starts again when the messages that follow go on behind it, too; a day ahead, it was set.
 StampOrder order_by_stamp(std::span<const Arrival> arrivals);
 
 }  // namespace tutti::bags

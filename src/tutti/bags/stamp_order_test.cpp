@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <numeric>
 
 namespace tutti::bags {
@@ -66,6 +67,18 @@ TEST(StampOrder, OfAClockThatStartsAgainTheLongestRunIsUsed) {
             "out)");
 }
 
+/// Drivers stamp by a clock that is not set yet at first, or not at all.
+TEST(StampOrder, WhatCameBeforeTheClockWasSetIsARunOfItsOwn) {
+  constexpr int kSet = 17'000'000;  // tenths: 20 days
+  for (const auto& before : {std::vector<int>(20, 0), counting(0, 20)}) {
+    const StampOrder order = order_of(before + counting(kSet, kSet + 200));
+    EXPECT_EQ(order.used.size(), 200U);
+    ASSERT_EQ(order.runs.size(), 2U);
+    EXPECT_EQ(order.run, 1U);
+  }
+  EXPECT_EQ(order_of(counting(0, 50) + std::vector<int>{kSet} + counting(50, 100)).used.size(), 100U);
+}
+
 /// A gap, as of a recorder that was stopped, is none.
 TEST(StampOrder, ALongGapIsNoNewClock) {
   const StampOrder order = order_of(counting(0, 50) + counting(9000, 9050));
@@ -89,6 +102,14 @@ TEST(StampOrder, ChunksInAnyOrderAreReadByTheirLogTimes) {
   const auto sorted = log_order(shuffled);
   for (std::size_t i = 0; i < sorted.size(); ++i)
     EXPECT_EQ(shuffled[sorted[i]].logged.ns, static_cast<std::int64_t>(i) * 100'000'000);
+  std::vector<Arrival> exchanged = logged({{0, 70}});  // short chunks of a topic that is not often in them
+  for (std::size_t at = 0; at + 8 <= exchanged.size(); at += 16)
+    std::swap_ranges(exchanged.begin() + static_cast<std::ptrdiff_t>(at),
+                     exchanged.begin() + static_cast<std::ptrdiff_t>(at + 4),
+                     exchanged.begin() + static_cast<std::ptrdiff_t>(at + 4));
+  const auto in_time = log_order(exchanged);
+  for (std::size_t i = 0; i < in_time.size(); ++i)
+    EXPECT_EQ(exchanged[in_time[i]].logged.ns, static_cast<std::int64_t>(i) * 100'000'000);
   const auto again = log_order(logged({{0, 300}, {0, 200}}));  // the recorder's clock started again
   EXPECT_TRUE(std::ranges::is_sorted(again));
 }

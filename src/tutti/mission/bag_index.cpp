@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <tuple>
 #include <utility>
 
 #include "tutti/bags/camera.hpp"
@@ -97,6 +98,7 @@ class Indexer {
   /// Gives topics of images what is beside them.
   void end() {
     for (auto& [topic, track] : index.scans) keep_frame(track, scan_frames_[topic]);
+    for (auto& [topic, track] : index.odometry) keep_body(track, odometry_frames_[topic]);
     for (auto& [topic, track] : index.images)
       if (const auto at = infos_.find(bags::camera_info_topic(topic, track.seen.is_compressed)); at != infos_.end())
         track.seen.info = at->second;
@@ -105,12 +107,37 @@ class Indexer {
   BagIndex index;
 
  private:
-  static void take_odometry(OdometryTrack& track, const BagMessage& message) {
+  void take_odometry(OdometryTrack& track, const BagMessage& message) {
     const auto odometry = bags::decode_odometry(message.data, encoding_of(message));
     if (!odometry) return refuse(track, odometry.error());
-    if (track.frame.empty()) track.frame = bags::frame_name(odometry->header.frame_id);
-    if (track.body.empty()) track.body = bags::frame_name(odometry->child_frame_id);
     take_pose(track, message, odometry->header.stamp, odometry->pose.position, odometry->pose.orientation);
+    auto& frames = odometry_frames_[message.channel->topic];
+    if (track.poses.size() > frames.size())
+      frames.emplace_back(bags::frame_name(odometry->header.frame_id), bags::frame_name(odometry->child_frame_id));
+  }
+
+  /// The frames that most poses name are the topic's; those that name others are of something else.
+  static void keep_body(OdometryTrack& track, const std::vector<std::pair<std::string, std::string>>& frames) {
+    std::map<std::pair<std::string, std::string>, std::size_t> counts;
+    for (const auto& of_pose : frames)
+      if (of_pose != std::pair<std::string, std::string>()) ++counts[of_pose];
+    if (counts.empty()) return;
+    std::tie(track.frame, track.body) =
+        std::ranges::max_element(counts, {}, [](const auto& entry) { return entry.second; })->first;
+    const auto is_of = [](const std::string& name, const std::string& topic) { return name.empty() || name == topic; };
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      if (!is_of(frames[i].first, track.frame) || !is_of(frames[i].second, track.body)) {
+        track.refused.add(track.arrivals[i].message,
+                          fmt::format("frames '{:.80}' -> '{:.80}', expected '{:.80}' -> '{:.80}' as of most",
+                                      frames[i].first, frames[i].second, track.frame, track.body));
+        continue;
+      }
+      track.poses[kept] = track.poses[i];
+      track.arrivals[kept++] = track.arrivals[i];
+    }
+    track.poses.resize(kept);
+    track.arrivals.resize(kept);
   }
 
   static void take_pose_stamped(OdometryTrack& track, const BagMessage& message) {
@@ -247,6 +274,7 @@ class Indexer {
   bool with_images_;
   std::map<std::string, bags::RosCameraInfo> infos_;             // of each topic the first that is calibrated
   std::map<std::string, std::vector<std::string>> scan_frames_;  // of each scan of a topic
+  std::map<std::string, std::vector<std::pair<std::string, std::string>>> odometry_frames_;  // and of each pose
 };
 
 }  // namespace

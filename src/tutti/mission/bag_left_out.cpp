@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
 #include <utility>
 
 #include "tutti/robot/submap_builder.hpp"
@@ -96,8 +97,19 @@ void warn_of_sensor(const BagIndex& index, const TakenOdometry& odometry, const 
                             fmt::join(why, ", "), type.empty() ? "" : "; ", fmt::join(type, "; ")));
 }
 
+/// What to type if the files of a folder are of a robot each; empty for one file.
+std::string robots_in(const std::string& folder) {
+  std::vector<std::string> files;
+  std::error_code failure;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, failure))
+    if (entry.path().filename() != "metadata.yaml") files.push_back(entry.path().string());
+  std::ranges::sort(files);
+  return files.size() < 2 ? "" : fmt::format("if its files are of a robot each: tutti run {}", fmt::join(files, " "));
+}
+
 /// What to type to make bags of the parts before and after the one that is used.
 std::string cut(const OdometryTrack& track, const std::string& file) {
+  if (const std::string robots = robots_in(file); !robots.empty()) return robots;
   const auto [from, to] = std::ranges::minmax(track.arrivals, {}, &bags::Arrival::logged);
   constexpr double kSecond_ns = 1e9;
   const auto seconds = [](Timestamp stamp, double (*round)(double)) {

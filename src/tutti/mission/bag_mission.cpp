@@ -155,6 +155,13 @@ std::string known_folder(const fs::path& folder) {
       kind->name, robot_of_bag(inside), fmt::format(fmt::runtime(kind->robot), inside), kind->verifier);
 }
 
+Status check_is_one(const fs::path& bag) {
+  std::error_code failure;
+  if (!fs::is_directory(bag, failure) || look_into(bag).files.empty()) return {};
+  const auto inside = bags_in(bag);
+  return inside ? Status() : tl::unexpected(inside.error());
+}
+
 std::string robot_of_bag(const fs::path& path) {
   fs::path last = path.has_filename() ? path.filename() : path.parent_path().filename();
   std::string out = last.string().substr(0, last.string().find('.', 1));

@@ -17,6 +17,9 @@ Result<std::string> bag_mission(const std::vector<std::string>& bags, const std:
 /// True of "demo" and of YAML files: what is no bag.
 bool is_mission_file(const std::string& input);
 
+/// Fails where a folder holds several bags of which nothing says that they are one, with the lines that may be meant.
+Status check_is_one(const std::filesystem::path& bag);
+
 /// The name of the robot whose bag this is: the file's or folder's name up to a dot, of letters, digits, '_' and '-'.
 std::string robot_of_bag(const std::filesystem::path& bag);
 

@@ -4,9 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <set>
+#include <string_view>
 #include <utility>
 
 #include "tutti/bags/robot_namespace.hpp"
@@ -141,14 +143,20 @@ std::string refused_transforms(const bags::TransformTree& tree) {
 }
 
 /// Scans that were moved into the odometry's frame already lost where the LiDAR was.
-Error in_world(const BagIndex& index, const std::string& frame, const RobotConfig& robot) {
+Error in_world(const BagIndex& index, const std::string& frame, const char* what, const RobotConfig& robot) {
   std::string others;
   for (const auto& [topic, track] : index.scans)
     if (has_any(track) && track.frame != frame) others = topic;
-  return {ErrorCode::invalid,
-          fmt::format("scans are in '{}', the odometry's own frame: they are moved into it already. Take the cloud of "
-                      "the body or of the sensor (of FAST-LIO /cloud_registered_body): {}",
-                      frame, flag(robot, "scans", others.empty() ? "TOPIC" : others))};
+  return {ErrorCode::invalid, fmt::format("scans are in '{}', {}: they are moved into it already. Take the cloud of "
+                                          "the body or of the sensor (of FAST-LIO /cloud_registered_body): {}",
+                                          frame, what, flag(robot, "scans", others.empty() ? "TOPIC" : others))};
+}
+
+/// Names of frames in which front ends put clouds that they have moved.
+bool is_of_the_world(const std::string& frame) {
+  constexpr std::array<std::string_view, 8> kNames{"map",   "world", "odom",        "global",
+                                                   "earth", "utm",   "camera_init", "local_origin"};
+  return std::ranges::find(kNames, frame.substr(frame.find_last_of('/') + 1)) != kNames.end();
 }
 
 Result<Pose3> find_lidar(const BagIndex& index, const OdometryTrack& odometry, const std::string& lidar,
@@ -162,7 +170,8 @@ Result<Pose3> find_lidar(const BagIndex& index, const OdometryTrack& odometry, c
     note = "scans are in the odometry's body frame";
     return Pose3{};
   }
-  if (lidar == odometry.frame && !lidar.empty()) return tl::unexpected(in_world(index, lidar, robot));
+  if (lidar == odometry.frame && !lidar.empty())
+    return tl::unexpected(in_world(index, lidar, "the odometry's own frame", robot));
   if (body.empty()) {
     note = fmt::format("nothing says which body the odometry is of: taken as that of the scans, {}", lidar);
     return Pose3{};
@@ -171,6 +180,8 @@ Result<Pose3> find_lidar(const BagIndex& index, const OdometryTrack& odometry, c
     note = fmt::format("{} is in {} by the bag's transforms", lidar, body);
     return *found;
   }
+  if (is_of_the_world(lidar))
+    return tl::unexpected(in_world(index, lidar, "by its name a frame that no robot carries", robot));
   const std::string frames = index.tree.frames();
   return fail(ErrorCode::invalid,
               "where the LiDAR is on the robot is not known: no transform from '{}' to '{}', frames that do not move "
@@ -222,8 +233,8 @@ void note_no_fixes(const BagIndex& index, std::vector<std::string>& notes) {
   for (const auto& [topic, track] : index.fixes) {
     if (track.refused.count > 0) notes.push_back(note_of(topic, track.refused, track.messages));
     if (track.without > 0)
-      notes.push_back(
-          fmt::format("{}: {} of {} messages are without a fix (status -1)", topic, track.without, track.messages));
+      notes.push_back(fmt::format("{}: {} of {} messages are without a fix (status -1, or 0 degrees north and 0 east)",
+                                  topic, track.without, track.messages));
   }
 }
 

@@ -60,6 +60,7 @@ MissionConfig mission_of(const std::vector<RobotConfig>& robots, const std::stri
 }  // namespace
 
 BagVerdict judge_bag(const std::filesystem::path& bag, const std::set<std::string>& robots) {
+  if (const Status one = check_is_one(bag); !one) return {.text = "not ready: " + one.error().message};
   const std::string plain = MissionConfig{}.closures.verifier;
   std::vector<RobotConfig> configs;
   std::string line = "tutti run";

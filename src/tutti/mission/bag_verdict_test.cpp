@@ -68,6 +68,16 @@ TEST_F(BagVerdicts, OneOfSeveralRobotsIsNamedForEach) {
             fmt::format("ready: tutti run --bag alpha={0} --bag bravo={0} --out out/alpha", file().string()));
 }
 
+TEST_F(BagVerdicts, AFolderOfTwoRobotsBagsIsAskedAbout) {
+  record({""});
+  fs::copy_file(file(), folder_ / "bravo.mcap");
+  const BagVerdict verdict = judge_bag(folder_, {});
+  EXPECT_FALSE(verdict.is_ready);
+  EXPECT_NE(verdict.text.find("are they one robot each? tutti run "), std::string::npos) << verdict.text;
+  fs::rename(file(), folder_ / "bravo_1.mcap");  // files of one recording, by their names
+  EXPECT_TRUE(judge_bag(folder_, {}).is_ready);
+}
+
 TEST_F(BagVerdicts, WhatRunWouldRefuseIsSaid) {
   const std::pair<const char*, const char*> cases[] = {
       {"no odometry", "no odometry: expected a topic of nav_msgs/Odometry"},

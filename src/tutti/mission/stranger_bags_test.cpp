@@ -325,6 +325,35 @@ TEST_F(StrangerBags, TheFrameOfMostScansCountsNotOfTheFirst) {
   expect_note(bag, "/points: 3 of 40 messages refused, the first because: message 1: frame '', expected 'lidar' as of");
 }
 
+TEST_F(StrangerBags, TheFramesOfMostPosesCountNotOfTheFirst) {
+  for (const char* const body : {"", "odom_child"}) {
+    std::vector<Sample> samples = samples_of({});
+    int first = 0;
+    for (Sample& sample : samples)
+      if (sample.type == kOdometry && first++ < 3) {
+        const Timestamp stamp{static_cast<std::int64_t>(sample.ns)};
+        sample.data = odometry_of(stamp, at_x(stamp - kStart), *body == 0 ? "" : "odom", body);
+      }
+    write({samples});
+    const auto bag = read("alpha");
+    ASSERT_TRUE(bag) << bag.error().message;
+    EXPECT_EQ(bag->odometry.size(), *body == 0 ? kPoses : kPoses - 3);
+    if (*body != 0) expect_note(bag, "message 1: frames 'odom' -> 'odom_child', expected 'odom' -> 'base_link' as of");
+  }
+}
+
+/// No transform leads from a frame that no robot carries.
+TEST_F(StrangerBags, ScansInAFrameOfTheWorldAreTheMapsAlready) {
+  std::vector<Sample> samples = samples_of({});
+  for (Sample& sample : samples) {
+    const Timestamp stamp{static_cast<std::int64_t>(sample.ns)};
+    if (sample.type == kCloud) sample.data = cloud_of(stamp, "robot/map", {{1, 2, 3}});
+  }
+  write({samples});
+  expect_note(read("alpha"),
+              "scans are in 'robot/map', by its name a frame that no robot carries: they are moved into");
+}
+
 TEST_F(StrangerBags, ALidarTensOfMetresAwayIsDoubted) {
   write({samples_of({.lidar_x_m = 300.0})});
   expect_note(
