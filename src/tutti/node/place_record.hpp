@@ -32,7 +32,7 @@ std::optional<StartPose> start_at(const StoredPlace& place, const localise::Know
 
 /// Where a robot was localised in a map as it drove: from it a robot without a server makes the proxy graph that a
 /// server would send, so that its own trajectory is corrected by the map in the same way, by the comparison and the
-/// constraints of the paper. Of it the last place alone is stored.
+/// constraints of the paper. Only the last place is stored.
 class PlaceRecord {
  public:
   /// True when the state is another than at the last call, and at the first one.
