@@ -37,8 +37,7 @@ constexpr std::array kRights{
     listens(kRobotUser, "_INBOX.robot.{number}.>", kOwnInbox),
 
     publishes(kWorkerUser, "$JS.API.CONSUMER.MSG.NEXT.JOBS_{mission}.workers", "asks for a job"),
-    publishes(kWorkerUser, "mission.{mission}.worker.{number}.settle",
-              "says that a job of its own is done, or goes on"),
+    publishes(kWorkerUser, "$JS.ACK.JOBS_{mission}.workers.>", "says that a job is done, or goes on"),
     publishes(kWorkerUser, "mission.{mission}.worker.{number}.status", "its own status"),
     publishes(kWorkerUser, "mission.{mission}.worker.{number}.verdicts", "its answers"),
     publishes(kWorkerUser, "mission.{mission}.worker.{number}.refinement", "its refinements of the map"),
@@ -75,7 +74,7 @@ constexpr std::array kRights{
     publishes(kServerUser, "$JS.API.CONSUMER.*.*.JOBS_{mission}.workers", "the same, and jobs for its own worker"),
     publishes(kServerUser, "$JS.ACK.SUBMAPS_{mission}.server.>", "says what is stored"),
     publishes(kServerUser, "$JS.ACK.VERDICTS_{mission}.server.>", "says what is stored"),
-    publishes(kServerUser, "$JS.ACK.JOBS_{mission}.workers.>", "passes on what workers say of their own jobs"),
+    publishes(kServerUser, "$JS.ACK.JOBS_{mission}.workers.>", "of its own worker's jobs"),
     publishes(kServerUser, "$KV.GRAPH_{mission}.>", "graphs, receipts and the mission's status"),
     publishes(kServerUser, "$KV.TUTTI_SERVERS.{mission}", "the lease of the mission"),
     publishes(kServerUser, kAskLease, "the lease of the mission"),
@@ -84,7 +83,6 @@ constexpr std::array kRights{
     publishes(kServerUser, "mission.{mission}.worker.0.*", "its own worker"),
     listens(kServerUser, "mission.{mission}.*.*.status", "statuses of robots and workers"),
     listens(kServerUser, "mission.{mission}.worker.*.submap_request", "what workers ask for"),
-    listens(kServerUser, "mission.{mission}.worker.*.settle", "what workers say of their jobs"),
     listens(kServerUser, "mission.{mission}.worker.0.submap_copy", "its own worker"),
     listens(kServerUser, "_INBOX.server.{number}.>", kOwnInbox),
 };

@@ -23,7 +23,6 @@
 #include "tutti/base/file.hpp"
 #include "tutti/base/own_file.hpp"
 #include "tutti/bus/bus_address.hpp"
-#include "tutti/bus/bus_rights.hpp"
 #include "tutti/bus/internal/nats_connection.hpp"
 
 namespace tutti::bus {
@@ -143,20 +142,11 @@ Status NatsChild::wait_until_ready() {
   }
 }
 
-/// Nats-server 2.9 looks through who is connected with the list of certificates that it had before it read a new one
-/// (`recheckPinnedCerts`). So it reads each change twice, the second time with a list that differs by nobody's.
 Result<bool> NatsChild::configure(int port) {
   std::string text = configuration(folder_, options_, port);
-  const bool is_new = text != configured_;
-  if (!is_new && !reads_again_) return false;
-  std::string written = text;
-  const std::size_t pinned = text.find(kPinned);
-  if (pinned != std::string::npos && !has_nobody_)
-    written.insert(pinned + kPinned.size(), fmt::format("\"{:064}\", ", 0));
-  if (Status done = replace_file(folder_ / kConfiguration, written, false, 0600); !done)
-    return tl::unexpected(done.error());
-  has_nobody_ = !has_nobody_;
-  reads_again_ = is_new && pinned != std::string::npos;
+  if (text == configured_) return false;
+  if (Status written = replace_file(folder_ / kConfiguration, text, false, 0600); !written)
+    return tl::unexpected(written.error());
   configured_ = std::move(text);
   return true;
 }

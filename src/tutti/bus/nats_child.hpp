@@ -85,9 +85,7 @@ class NatsChild {
   NatsChildOptions options_;
   int lock_ = -1;  ///< The lock file, open and locked; the child inherits it and holds the lock until it ends.
   std::unique_ptr<ChildProcess> process_;
-  std::string configured_;       ///< Its configuration, without nobody's certificate.
-  bool has_nobody_ = false;      ///< The one that was written has it.
-  bool reads_again_ = false;     ///< It is to be written once more.
+  std::string configured_;       ///< Its configuration.
   std::uintmax_t log_read_ = 0;  ///< So much of its log.
   std::string url_;
   int pid_ = -1;

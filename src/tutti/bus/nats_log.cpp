@@ -24,14 +24,13 @@ struct HandshakeEnd {
   std::string_view go;
   std::string_view plain;
 };
-constexpr std::array<HandshakeEnd, 9> kHandshakeEnds{{
+constexpr std::array<HandshakeEnd, 8> kHandshakeEnds{{
     // A client that does not trust the bus hangs up with an alert that Go cannot decrypt.
     {"bad record MAC", "hung up at the bus's certificate, and showed no certificate of this mission"},
     {"remote error", "hung up at the bus's certificate, and showed no certificate of this mission"},
     {"didn't provide a certificate", "showed no certificate of this mission"},
     {"unknown authority", "showed no certificate of this mission, but one of another authority"},
     {"certificate has expired", "showed a certificate that has expired"},
-    {"not pinned", "showed the certificate of one who is not a member any more, revoked or expired"},
     {"does not look like a TLS handshake", "does not speak TLS"},
     {"i/o timeout", "showed no certificate of this mission in time"},
     {"EOF", "hung up, and showed no certificate of this mission"},

@@ -35,7 +35,6 @@ TEST(NatsLogTest, ExplainsPlainlyWhyNobodyWasLetIn) {
       {"tls: failed to verify certificate: x509: certificate signed by unknown authority", "another authority"},
       {"tls: failed to verify certificate: x509: certificate has expired or is not yet valid: current time 2026-11-25",
        "has expired"},
-      {"certificate not pinned", "not a member any more"},
       {"tls: first record does not look like a TLS handshake", "does not speak TLS"},
       {"read tcp 127.0.0.1:4222->127.0.0.1:40000: i/o timeout", "in time"}};
   for (const auto& [end, expected] : ends) {

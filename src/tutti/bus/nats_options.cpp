@@ -54,8 +54,8 @@ std::string advice_to(const BusUser& member, natsStatus status, const std::strin
            "pki`), or has expired by this machine's clock, which may be wrong: compare `date -u` on both";
   if (status == NATS_SSL_ERROR || status == NATS_PROTOCOL_ERROR || status == NATS_IO_ERROR)
     return fmt::format(
-        "the bus hung up: has {} been revoked, or its certificate expired (tutti pki list, tutti pki renew), or is "
-        "the bus's clock wrong (date -u)?",
+        "the bus hung up: has the certificate of {} expired (tutti pki list, tutti pki renew), or is the bus's "
+        "clock wrong (date -u)?",
         to_string(member));
   return {};
 }

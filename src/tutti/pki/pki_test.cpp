@@ -94,38 +94,6 @@ TEST_F(PkiTest, WhoIsRevokedIsCutOffAndOthersStay) {
   EXPECT_NE(refusals.all.front().what.find("authentication error"), std::string::npos) << refusals.all.front().what;
 }
 
-/// The certificate of a robot that was lost, with a key of somebody who is still a member.
-TEST_F(PkiTest, ARevokedCertificateOpensNothingWithAnybodysKey) {
-  start_bus();
-  const auto alpha = add(BusRole::robot, "alpha", 3), bravo = add(BusRole::robot, "bravo", 4),
-             anna = add(BusRole::operates, "anna");
-  test::prepare(options(credentials("server")));
-  const auto with_certificate_of_alpha = [&](bus::BusCredentials whose) {
-    whose.certificate = alpha.certificate;
-    return whose;
-  };
-  const auto other = open(Endpoint::of(RobotId{4}), bravo);
-  const auto mixed = bus::NatsConnection::open(options(with_certificate_of_alpha(bravo)), "mixed").value();
-  ASSERT_TRUE(within(10.0, [&] { return other->state().connected; }));
-  ASSERT_TRUE(mixed->publish("mission.cave.robot.3.submap", "", "", "as alpha"));
-  mixed->flush();
-  EXPECT_NE(mixed->denied().find("mission.cave.robot.3.submap"), std::string::npos) << "it is bravo, and alpha not too";
-  ASSERT_TRUE(pki_->revoke("alpha"));
-  tend();
-  tend();
-  EXPECT_TRUE(within(10.0, [&] { return !mixed->connected(); }));
-  for (const auto& whose : {alpha, bravo, anna, credentials("server"), add(BusRole::robot, "alpha", 3)}) {
-    const auto refused = bus::NatsConnection::open(options(with_certificate_of_alpha(whose)), "refused");
-    ASSERT_FALSE(refused.has_value()) << to_string(*whose.known);
-    EXPECT_NE(refused.error().message.find("revoked"), std::string::npos) << refused.error().message;
-  }
-  const auto refusals = child_->take_refusals();
-  ASSERT_FALSE(refusals.all.empty());
-  EXPECT_NE(refusals.all.back().what.find("not a member any more"), std::string::npos) << refusals.all.back().what;
-  EXPECT_TRUE(other->state().connected);
-  EXPECT_EQ(other->state().reconnects, 0U);
-}
-
 TEST_F(PkiTest, WhoseCertificateExpiresWhileConnectedIsCutOff) {
   start_bus();
   const auto alpha = add(BusRole::robot, "alpha", 3, 1), bravo = add(BusRole::robot, "bravo", 4, 2);

@@ -76,29 +76,6 @@ std::string word_of(MessageKind kind) {
   return word;
 }
 
-std::string settle_subject(const std::string& mission, const std::string& worker) {
-  return fmt::format("mission.{}.worker.{}.settle", mission, worker);
-}
-
-std::uint32_t settler_of(std::string_view subject) {
-  const auto words = split(subject, '.');
-  return words.size() < 2 ? 0 : number_of(words[words.size() - 2]).value_or(0);
-}
-
-/// "SECRET $JS.ACK.STREAM.CONSUMER.DELIVERIES.SEQUENCE.SEQUENCE_OF_CONSUMER.TIME.PENDING +ACK"
-std::optional<Settlement> settlement_of(std::string_view text, std::string_view stream) {
-  constexpr std::array<std::string_view, 4> kVerbs{"+ACK", "+WPI", "-NAK", "+TERM"};
-  const auto words = split(text, ' ');
-  if (words.size() != 3 || std::ranges::count(kVerbs, words[2]) == 0) return std::nullopt;
-  const auto tokens = split(words[1], '.');
-  if (tokens.size() != 9 || tokens[0] != "$JS" || tokens[1] != "ACK" || tokens[2] != stream) return std::nullopt;
-  Settlement out{std::string(words[0]), std::string(words[1]), std::string(words[2])};
-  const std::string_view number = tokens[5];
-  const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), out.sequence);
-  if (error != std::errc() || end != number.data() + number.size()) return std::nullopt;
-  return out;
-}
-
 std::string subject_of(const std::string& mission, const Envelope& envelope) {
   switch (delivery_of(envelope.kind)) {
     case Delivery::retained:
