@@ -133,7 +133,9 @@ TEST(BagInfo, FixesThatAreNoneAreOfNoUse) {
   none.status = -1;
   e7.latitude_deg *= 1e7;  // as some receivers' protocols have it
   EXPECT_EQ(fixes_row({none, e7, good}), "fixes        /fix (gps)");
-  EXPECT_EQ(fixes_row({none, none}), "fixes        /fix (gps), of no use: no message has a fix (status -1)");
+  EXPECT_EQ(fixes_row({none, none}),
+            "fixes        /fix (gps), of no use: no message has a fix (status -1, or 0 degrees "
+            "north and 0 east)");
   const std::string refused = fixes_row({none, e7, e7});
   EXPECT_TRUE(
       refused.starts_with("fixes        /fix (gps), of no use: no message is a fix, the first because: message 2: "))
