@@ -44,10 +44,10 @@ Result<std::unique_ptr<ServerNode>> ServerNode::open(std::set<RobotId> robots,
   auto opened = OpenedMap::from(store, verifier->id());
   if (!opened) return tl::unexpected(opened.error());
   if (opened->epoch > 0) epoch = opened->epoch;
-  if (config.accepts_others) {
-    for (const auto& [robot, receipt] : opened->receipts) robots.insert(robot);
+  // Verdicts on the submaps of a map's robots come also where these robots are not of this mission.
+  for (const auto& [robot, receipt] : opened->receipts) robots.insert(robot);
+  if (config.accepts_others)
     for (const auto& [robot, entry] : opened->registry.robots()) robots.insert(robot);
-  }
   auto marks = read_marks(store);
   if (!marks) return tl::unexpected(marks.error());
   std::unique_ptr<ServerNode> node(new ServerNode(std::move(robots), std::move(verifier), config, epoch,

@@ -67,8 +67,8 @@ struct ServerNodeConfig {
 class ServerNode {
  public:
   /// On an empty store, begins a new map of this epoch, which must be larger than any before (server::MapServer);
-  /// otherwise goes on with the stored map. Fails when the store has something other than a map. The store must outlive
-  /// the node.
+  /// otherwise goes on with the stored map, whose robots are of the mission, too. Fails when the store has something
+  /// other than a map. The store must outlive the node.
   static Result<std::unique_ptr<ServerNode>> open(std::set<RobotId> robots,
                                                   std::shared_ptr<const server::ClosureVerifier> verifier,
                                                   const ServerNodeConfig& config, std::uint64_t epoch,
