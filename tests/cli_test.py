@@ -59,7 +59,7 @@ class CommandLine(unittest.TestCase):
         for command in ("run", "demo", "eval", "optimise", "world", "simulate", "export", "compare", "settings", "status", "map", "server", "robot", "worker", "pki"):
             self.expect(tutti(command, "--help"), 0, "--help")
         self.expect(tutti("mission", "up", "--help"), 0, "--workers")
-        for command in ("list", "info", "export", "merge", "closure"):
+        for command in ("list", "info", "export", "merge", "log", "diff", "revert", "closure"):
             self.expect(tutti("map", command, "--help"), 0, "--help")
         for command in ("list", "show", "accept", "reject", "withdraw"):
             self.expect(tutti("map", "closure", command, "--help"), 0, "--help")
@@ -453,6 +453,36 @@ class CommandLine(unittest.TestCase):
                           self.path / "second"), 0)
         self.expect(tutti("map", "merge", site, other, "-o", self.path / "both"), 0, "robot 0, session 0 of", "session 1")
         self.expect(tutti("map", "info", self.path / "both"), 0, "submaps")
+        changes = self.path / "changes.ply"
+        self.expect(tutti("map", "diff", site, self.path / "both", "--ply", changes), 0, "before:", "both times", "is there no more")
+        self.assertTrue(changes.read_bytes().startswith(b"ply"))
+
+    def test_a_map_is_extended_and_taken_back(self):
+        day, next_day, back = (self.path / name for name in ("day.tutti", "next.tutti", "back.tutti"))
+        extend = ["run", "demo", *BRIEF, "--seed", "2", "--map-in", day, "--extend"]
+        self.expect(tutti("demo", *BRIEF, "--map", day, "--out", self.path / "one"), 0)
+        before = day.read_bytes()
+        self.expect(tutti(*extend, "--out", self.path / "two"), 1, "--map NEW.tutti")
+        self.expect(tutti(*extend, "--map", next_day, "--out", self.path / "two"), 0)
+        self.expect(tutti(*extend, "--map", next_day, "--out", self.path / "two"), 2, "is there already")
+        self.expect(tutti("map", "log", day), 0, "not held", "alpha, bravo")
+        log = tutti("map", "log", next_day)
+        self.expect(log, 0, "alpha, bravo", "alpha.2, bravo.2")  # robots of the same names
+        self.assertEqual([line.split()[0] for line in log.stdout.splitlines()], ["version", "1", "2"])
+        self.expect(tutti("map", "revert", next_day, "--to", "1", "-o", back), 0, "6 submaps")
+        self.expect(tutti("map", "revert", next_day, "--to", "2", "-o", self.path / "x"), 1, "versions 1 to 2")
+        for file in (day, next_day, back):
+            self.expect(tutti("map", "export", file, "--tum", f"{file}.tum"), 0)
+        for robot in ("alpha.tum", "bravo.tum"):
+            first, later, reverted = (pathlib.Path(f"{file}.tum", robot).read_text() for file in (day, next_day, back))
+            self.assertEqual(first, later)
+            self.assertEqual(first, reverted)
+        self.assertEqual(day.read_bytes(), before)
+        self.expect(tutti("map", "diff", day), 1, "has one version", "two maps")
+        self.expect(tutti("map", "diff", next_day, day), 1, "every session")
+        self.expect(tutti("map", "diff", next_day, "--version", "7"), 1, "no version 7")
+        self.expect(tutti("map", "diff", day, next_day, "--version", "2"), 2, "--version")
+        self.expect(tutti("map", "diff", next_day), 1, "no clouds")
 
     def test_map_says_what_is_wrong(self):
         self.expect(tutti("map"), 2)

@@ -306,6 +306,7 @@ void add_map_command(CLI::App& app, int& exit_code) {
   salvage->add_option("-o,--output", *whole, "The map to be made; it must not be there.")->type_name("MAP")->required();
   salvage->callback([damaged, whole, &exit_code] { exit_code = salvage_map(*damaged, *whole); });
 
+  add_map_versions_commands(*map, exit_code);
   add_map_closure_command(*map, exit_code);
 }
 

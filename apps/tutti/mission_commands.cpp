@@ -22,7 +22,6 @@
 #include "tutti/lab/run_mission.hpp"
 #include "tutti/mapfile/hold_map.hpp"
 #include "tutti/mapfile/known_map.hpp"
-#include "tutti/mapfile/make_map.hpp"
 #include "tutti/mission/bag_mission.hpp"
 #include "tutti/mission/graph_recording.hpp"
 #include "tutti/mission/localise_mission.hpp"
@@ -52,7 +51,6 @@ struct MissionArguments {
   fs::path mission, out, map, map_in;
   bool frozen = false, extend = false;
   double restart_s = 0.0;
-  RobotId first_robot{0};
   mission::RunOptions run{.version = TUTTI_VERSION};
   std::vector<std::string> assignments;
   bool print_config = false;
@@ -107,8 +105,9 @@ Status localise(const lab::MissionConfig& config, const MissionArguments& argume
   return {};
 }
 
-/// Robots of the mission are laid into the map, and beside each other.
-Status begin_with_map(MissionArguments& arguments) {
+/// The map that robots of the mission are laid into, and beside each other.
+Result<mapfile::HeldMap> map_to_extend(const MissionArguments& arguments) {
+  if (arguments.map_in.empty()) return mapfile::HeldMap();
   if (!arguments.extend)
     return fail(ErrorCode::invalid,
                 "--map-in {}: say what becomes of it: --frozen, where robots find their places in it, each alone; or "
@@ -119,11 +118,9 @@ Status begin_with_map(MissionArguments& arguments) {
                 "--extend: say where the map goes with what was added, with --map NEW.tutti: {} is "
                 "not changed",
                 arguments.map_in.string());
-  auto map = mapfile::read_held(arguments.map_in);
+  auto map = mapfile::read_held(arguments.map_in, static_cast<std::int64_t>(program::wall_clock_ns()));
   if (!map) return in_context("--map-in", map.error());
-  arguments.run.map = std::move(map->rows);
-  arguments.first_robot = map->free_robot;
-  return {};
+  return map;
 }
 
 /// Runs, writes the report, prints the table. Returns the exit code.
@@ -139,24 +136,27 @@ int run_and_report(const Result<lab::MissionConfig>& config, MissionArguments& a
   }
   const std::string out = arguments.out.string();
   if (auto made = make_folder(out); !made) return failed("--out " + made.error().message);  // before the mission
-  if (!arguments.map_in.empty()) {
-    const Status begun = arguments.frozen ? localise(*config, arguments) : begin_with_map(arguments);
-    if (arguments.frozen || !begun) return begun ? 0 : failed(begun.error().message);
+  if (arguments.frozen) {
+    const Status localised = localise(*config, arguments);
+    return localised ? 0 : failed(localised.error().message);
   }
+  auto extended = map_to_extend(arguments);
+  if (!extended) return failed(extended.error().message);
+  arguments.run.map = std::move(*extended);
   if (!arguments.map.empty()) {
     if (auto made = make_folder_of(arguments.map); !made) return failed("--map " + made.error().message);
     std::error_code failure;
     if (fs::exists(arguments.map, failure))
       return failed(fmt::format("--map {}: is there already", arguments.map.string()), 2);
     arguments.run.keep_map = [&arguments](const storage::TableStore& map) {
-      return mapfile::copy_map(map, arguments.map);
+      return mapfile::keep_extended(arguments.run.map, map, arguments.map);
     };
   }
   ProgressLine progress;
   arguments.run.progress = [&progress](const mission::Progress& now) { show(now, progress); };
   arguments.run.warn = [](const std::string& warning) { std::cerr << "tutti: warning: " << warning << '\n'; };
   arguments.run.stop = announced_stop("report and map of what is there are made");
-  const auto record = lab::run_mission(*config, arguments.run, arguments.first_robot);
+  const auto record = lab::run_mission(*config, arguments.run);
   progress.close();
   if (!record) {
     const bool wants_data = record.error().code == ErrorCode::io && arguments.run.data.empty();

@@ -34,12 +34,11 @@ Result<mission::MissionInput> corrected_input(MissionConfig& config, const missi
 
 }  // namespace
 
-Result<mission::MissionRecord> run_mission(const MissionConfig& given, mission::RunOptions options,
-                                           RobotId first_robot) {
+Result<mission::MissionRecord> run_mission(const MissionConfig& given, mission::RunOptions options) {
   MissionConfig config = given;
   auto input = corrected_input(config, options);
   if (!input) return tl::unexpected(input.error());
-  for (mission::MissionRecording& robot : input->robots) robot.recording.robot.value += first_robot.value;
+  for (mission::MissionRecording& robot : input->robots) robot.recording.robot.value += options.map.free_robot.value;
   options.settings_yaml = to_yaml(config);
   mission::MissionParts parts{.input = std::move(*input),
                               .verifier = nullptr,

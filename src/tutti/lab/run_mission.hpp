@@ -8,8 +8,7 @@
 namespace tutti::lab {
 
 /// Runs a mission file by mission::run_mission(): simulates its robots or reads their recordings, and adds what the
-/// laboratory spoils and compares. Its robots have numbers from `first_robot` on.
-Result<mission::MissionRecord> run_mission(const MissionConfig& config, mission::RunOptions options,
-                                           RobotId first_robot = RobotId{0});
+/// laboratory spoils and compares. Its robots have numbers that options.map has free.
+Result<mission::MissionRecord> run_mission(const MissionConfig& config, mission::RunOptions options);
 
 }  // namespace tutti::lab

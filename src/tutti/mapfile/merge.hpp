@@ -25,8 +25,8 @@ struct Merged {
 Result<Merged> merge(const storage::TableStore& a, const storage::TableStore& b, storage::TableStore& out);
 
 /// As above, with files; what would be in the way is numbered anew first (chains_to_renumber()), so that any two maps
-/// can be merged; a map that is held (hold_map()) is not any more. `out` must not exist; it appears whole or not at
-/// all.
+/// can be merged; a map that is held (hold_map()) is not any more, and has one version. `out` must not exist; it
+/// appears whole or not at all.
 Result<Merged> merge(const std::filesystem::path& a, const std::filesystem::path& b, const std::filesystem::path& out);
 
 }  // namespace tutti::mapfile

@@ -12,7 +12,9 @@
 
 #include "tutti/mapfile/make_map.hpp"
 #include "tutti/node/decisions.hpp"
+#include "tutti/node/map_meta.hpp"
 #include "tutti/node/meta_keys.hpp"
+#include "tutti/node/refused_rows.hpp"
 #include "tutti/node/robot_registry.hpp"
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/storage/map_tables.hpp"
@@ -72,13 +74,33 @@ Result<std::optional<storage::Write>> renamed_submap(std::string_view bytes, con
   return storage::Write{map_tables::kSubmaps, node::key_of(id), wire::encode(*message)};
 }
 
+ClosureVerdict renamed(ClosureVerdict verdict, const Chains& chains) {
+  const auto [pair, is_turned] = renamed(verdict.pair, chains);
+  verdict.pair = pair;
+  for (LoopClosure& closure : verdict.closures) closure = renamed(closure, chains, is_turned);
+  return verdict;
+}
+
 Result<std::optional<storage::Write>> renamed_verdict(std::string_view bytes, const Chains& chains) {
   auto verdict = wire::decode_verdict(bytes);
   if (!verdict) return tl::unexpected(verdict.error());
-  const auto [pair, is_turned] = renamed(verdict->pair, chains);
-  verdict->pair = pair;
-  for (LoopClosure& closure : verdict->closures) closure = renamed(closure, chains, is_turned);
-  return storage::Write{map_tables::kVerdicts, node::key_of(pair), wire::encode(*verdict)};
+  *verdict = renamed(std::move(*verdict), chains);
+  return storage::Write{map_tables::kVerdicts, node::key_of(verdict->pair), wire::encode(*verdict)};
+}
+
+/// Refusals, so that nobody verifies these pairs again. Answers that were not believed stay behind.
+Status renumber_refusals(const TableStore& map, const Chains& chains, Writer& out) {
+  Status ok;
+  const auto scanned = map.scan(map_tables::kAnswers, {}, [&](std::string_view, std::string_view bytes) {
+    auto refused = wire::decode_verdicts(bytes);
+    if (!refused) return true;  // who opens the map reads it no better
+    for (ClosureVerdict& verdict : refused->verdicts) verdict = renamed(std::move(verdict), chains);
+    std::erase_if(refused->verdicts, [](const ClosureVerdict& verdict) { return !verdict.refusal; });
+    for (storage::Write& row : node::rows_of_refusals(*refused))
+      if (ok) ok = out.put(std::move(row));
+    return ok.has_value();
+  });
+  return scanned ? ok : scanned;
 }
 
 Result<std::optional<storage::Write>> renamed_decision(const SubmapPair& former, std::string_view bytes,
@@ -118,7 +140,13 @@ node::RobotRow renamed(node::RobotRow row, RobotId robot, const Chains& chains) 
 }
 
 Result<std::optional<storage::Write>> renamed_meta(std::string_view key, std::string_view bytes, const Chains& chains) {
-  if (key.starts_with(node::kRefusedPrefix) || key.starts_with(node::kHeldPrefix)) return std::nullopt;
+  if (key.starts_with(node::kRefusedPrefix)) return std::nullopt;
+  if (key.starts_with(node::kHeldPrefix)) {
+    const auto id = node::submap_of_key(key.substr(node::kHeldPrefix.size()));
+    if (!id) return fail(ErrorCode::parse, "the row '{}' of table 'meta' is damaged", key);
+    return storage::Write{map_tables::kMeta, std::string(node::kHeldPrefix) + node::key_of(renamed(*id, chains)),
+                          std::string(bytes)};
+  }
   if (const auto robot = node::RobotRegistry::robot_of(key)) {
     const auto row = node::decode_robot(bytes);
     if (!row) return fail(ErrorCode::parse, "the row '{}' of table 'meta' is damaged", key);
@@ -212,6 +240,7 @@ Status renumber(const TableStore& map, const Chains& chains, TableStore& out) {
                      [&](std::string_view, std::string_view bytes) { return renamed_verdict(bytes, chains); });
       !ok)
     return ok;
+  if (auto ok = renumber_refusals(map, chains, writer); !ok) return ok;
   const auto decision = [&](std::string_view key, std::string_view bytes) -> Result<std::optional<storage::Write>> {
     const auto pair = node::pair_of(key);
     if (!pair) return fail(ErrorCode::parse, "a row of table 'decisions' has no pair of submaps as its key");

@@ -18,8 +18,8 @@ Result<std::map<ChainId, ChainId>> chains_to_renumber(const storage::TableStore&
                                                       const storage::TableStore& b, const Content& of_b);
 
 /// Writes a map with other numbers for some chains into an empty store. The pose of every keyframe stays as it is.
-/// Submaps are coded anew, so that their clouds may move by half a cell of wire::CloudCodec when they were coded with
-/// other settings than its defaults. Refused pairs are left out: the server that opens the map asks for them again.
+/// Submaps of these chains are coded anew, so that their clouds may move by half a cell of wire::CloudCodec when they
+/// were coded with other settings than its defaults. Answers that were not believed, and refused submaps, are left out.
 Status renumber(const storage::TableStore& map, const std::map<ChainId, ChainId>& chains, storage::TableStore& out);
 
 }  // namespace tutti::mapfile

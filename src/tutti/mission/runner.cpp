@@ -52,7 +52,7 @@ class MissionRun {
                                      : std::max(1U, std::thread::hardware_concurrency())),
         meter_(std::move(parts.verifier), std::move(parts.refiner)),
         network_(radio(), kMissionStart),
-        store_(storage::map_schema(), options.map),
+        store_(storage::map_schema(), options.map.rows),
         server_(node::ServerNode::open(robot_ids(recordings_), meter_.verifier(),
                                        {.server = config.server,
                                         .pairs_per_job = SubmapPair::kMost,

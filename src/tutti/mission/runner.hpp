@@ -10,12 +10,12 @@
 #include <vector>
 
 #include "tutti/base/result.hpp"
+#include "tutti/mapfile/hold_map.hpp"
 #include "tutti/mission/mission_config.hpp"
 #include "tutti/mission/record.hpp"
 #include "tutti/mission/recordings.hpp"
 #include "tutti/mission/robot_actor.hpp"
 #include "tutti/server/closure_verifier.hpp"
-#include "tutti/storage/memory_store.hpp"
 
 namespace tutti::mission {
 
@@ -53,8 +53,8 @@ struct RunOptions {
   /// Asked between steps. Once it is true the mission ends as if recordings ended there, with a note on that. Not set:
   /// never.
   std::function<bool()> stop;
-  /// Rows of the map that the mission's robots extend (storage::map_schema()), in which their numbers are free.
-  storage::MemoryStore::Tables map;
+  /// The map that the mission's robots extend, in which their numbers are free.
+  mapfile::HeldMap map;
   /// Called with the server's store when the mission is over.
   std::function<Status(const storage::TableStore&)> keep_map;
 };

@@ -278,7 +278,7 @@ Status ServerProgram::begin_with_held() {
   const auto file = folder_->path() / kMapFile;
   std::error_code failure;
   if (std::filesystem::exists(file, failure)) return {};  // check_held() sees to it
-  const auto held = mapfile::copy_held(options_.held_map, file);
+  const auto held = mapfile::copy_held(options_.held_map, file, static_cast<std::int64_t>(wall_clock_ns()));
   if (!held) return in_context("--map", held.error());
   log_->say(Level::info,
             fmt::format("begins with {}, of which {} keyframes keep their poses", options_.held_map.string(), *held));

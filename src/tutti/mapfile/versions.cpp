@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mapfile/versions.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "tutti/mapfile/make_map.hpp"
+#include "tutti/node/decisions.hpp"
+#include "tutti/node/meta_keys.hpp"
+#include "tutti/node/refused_rows.hpp"
+#include "tutti/node/robot_registry.hpp"
+#include "tutti/node/submap_frames.hpp"
+#include "tutti/storage/map_tables.hpp"
+#include "tutti/wire/codec.hpp"
+#include "tutti/wire/refinement_codec.hpp"
+
+namespace tutti::mapfile {
+namespace {
+
+using storage::TableStore, storage::Write;
+using LaterChains = std::set<ChainId>;
+
+std::optional<std::uint64_t> number_of(std::string_view key) {
+  key.remove_prefix(node::kVersionPrefix.size());
+  std::uint64_t number = 0;
+  const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), number);
+  return error == std::errc() && end == key.data() + key.size() ? std::optional(number) : std::nullopt;
+}
+
+std::optional<Version> version_of(std::string_view key, std::string_view bytes) {
+  const auto number = number_of(key);
+  const auto numbers = storage::numbers_of(bytes, bytes.size() / 8);
+  if (!number || !numbers || numbers->size() % 2 != 1) return std::nullopt;
+  Version out{.number = *number, .held_ns = static_cast<std::int64_t>(numbers->front())};
+  for (std::size_t i = 1; i < numbers->size(); i += 2)
+    out.chains.emplace(RobotId{static_cast<std::uint32_t>((*numbers)[i])}, (*numbers)[i + 1]);
+  return out;
+}
+
+/// A map without some of its chains.
+class Without {
+ public:
+  explicit Without(const LaterChains& chains) : chains_(chains) {}
+  [[nodiscard]] bool has(const SubmapId& id) const { return !chains_.contains(id.chain); }
+  [[nodiscard]] bool has(const SubmapPair& pair) const { return has(pair.first) && has(pair.second); }
+  [[nodiscard]] bool has(const Refinement& refinement) const {
+    const auto its = [&](const auto& id) { return has(id); };
+    return std::ranges::all_of(refinement.submaps, its) && std::ranges::all_of(refinement.closed, its) &&
+           std::ranges::all_of(refinement.T_world_body,
+                               [&](const auto& of) { return !chains_.contains(of.first.chain); });
+  }
+
+ private:
+  const LaterChains& chains_;
+};
+
+using NewRows = std::vector<Write>;
+
+NewRows refusals_without(std::string_view bytes, const Without& without) {
+  auto refused = wire::decode_verdicts(bytes);
+  if (!refused) return {};
+  std::erase_if(refused->verdicts,
+                [&](const ClosureVerdict& verdict) { return !verdict.refusal || !without.has(verdict.pair); });
+  return node::rows_of_refusals(*refused);
+}
+
+/// NewRows of table `meta` in a map that ends before version `until`, and has the robots `stays`.
+NewRows meta_without(std::string_view key, std::string_view bytes, const Without& without,
+                     const std::set<RobotId>& stays, std::uint64_t until) {
+  const auto same_if = [&](bool is_kept) {
+    return is_kept ? NewRows{{map_tables::kMeta, std::string(key), std::string(bytes)}} : NewRows();
+  };
+  if (key == node::kCountsKey || key == node::kLastUpdateKey) return {};
+  if (key.starts_with(node::kVersionPrefix)) return same_if(number_of(key).value_or(until) < until);
+  if (const auto robot = node::RobotRegistry::robot_of(key)) return same_if(stays.contains(*robot));
+  if (key.starts_with(node::kHeldPrefix)) {
+    const auto id = node::submap_of_key(key.substr(node::kHeldPrefix.size()));
+    return same_if(id && without.has(*id));
+  }
+  if (auto place = node::place_of_row(key, bytes)) {
+    std::erase_if(place->second.candidates, [&](const server::Alike& alike) { return !without.has(alike.submap); });
+    return without.has(place->first) ? NewRows{node::to_row(place->first, place->second)} : NewRows();
+  }
+  if (key.starts_with(node::kRefinementPrefix)) {
+    const auto refinement = wire::decode_refinement(bytes);
+    return same_if(refinement && without.has(*refinement));
+  }
+  return same_if(true);
+}
+
+/// Everything but what later versions, from number `until` on, added.
+Status copy_without(const TableStore& map, const LaterChains& later, std::uint64_t until, TableStore& to) {
+  const Without without(later);
+  Writer out(to);
+  std::set<RobotId> stays;
+  Status ok;
+  /// `rows(key, bytes)`: what stands in the row's place.
+  const auto copy = [&](const char* table, const auto& rows) {
+    const auto scanned = map.scan(table, {}, [&](std::string_view key, std::string_view bytes) {
+      for (Write& row : rows(key, bytes))
+        if (ok) ok = out.put(std::move(row));
+      return ok.has_value();
+    });
+    if (!scanned) ok = scanned;
+    return ok.has_value();
+  };
+  const auto pairs_of = [&](const char* table) {
+    return [&, table](std::string_view key, std::string_view bytes) {
+      const auto pair = node::pair_of(key);
+      return pair && without.has(*pair) ? NewRows{{table, std::string(key), std::string(bytes)}} : NewRows();
+    };
+  };
+  const auto submap = [&](std::string_view key, std::string_view bytes) {
+    const auto id = node::submap_of_key(key);
+    if (!id || !without.has(*id)) return NewRows();
+    stays.insert(id->chain.robot);
+    return NewRows{{map_tables::kSubmaps, std::string(key), std::string(bytes)}};
+  };
+  const auto refusals = [&](std::string_view, std::string_view bytes) { return refusals_without(bytes, without); };
+  const auto meta = [&](std::string_view key, std::string_view bytes) {
+    return meta_without(key, bytes, without, stays, until);
+  };
+  const bool done = copy(map_tables::kSubmaps, submap) &&
+                    copy(map_tables::kVerdicts, pairs_of(map_tables::kVerdicts)) &&
+                    copy(map_tables::kDecisions, pairs_of(map_tables::kDecisions)) &&
+                    copy(map_tables::kAnswers, refusals) && copy(map_tables::kMeta, meta);
+  return done ? out.flush() : ok;
+}
+
+}  // namespace
+
+storage::Write to_row(const Version& version) {
+  std::string bytes = storage::key_of({static_cast<std::uint64_t>(version.held_ns)});
+  for (const ChainId& chain : version.chains) bytes += storage::key_of({chain.robot.value, chain.session});
+  return {map_tables::kMeta, fmt::format("{}{}", node::kVersionPrefix, version.number), std::move(bytes)};
+}
+
+Result<std::vector<Version>> versions(const TableStore& map) {
+  std::vector<Version> out;
+  Status ok;
+  const auto scanned = map.scan(map_tables::kMeta, node::kVersionPrefix, [&](std::string_view key, auto bytes) {
+    if (!key.starts_with(node::kVersionPrefix)) return false;
+    auto version = version_of(key, bytes);
+    if (version)
+      out.push_back(std::move(*version));
+    else
+      ok = fail(ErrorCode::parse, "the row '{}' of table 'meta' is damaged, expected a version's sessions", key);
+    return ok.has_value();
+  });
+  if (!scanned || !ok) return tl::unexpected(scanned ? ok.error() : scanned.error());
+  std::ranges::sort(out, {}, &Version::number);
+  Version newest{.number = out.empty() ? 1 : out.back().number + 1};
+  const auto sized = map.sizes(map_tables::kSubmaps, [&](std::string_view key, std::size_t) {
+    if (const auto id = node::submap_of_key(key)) newest.chains.insert(id->chain);
+  });
+  if (!sized) return tl::unexpected(sized.error());
+  for (const Version& version : out)
+    for (const ChainId& chain : version.chains) newest.chains.erase(chain);
+  if (out.empty() || !newest.chains.empty()) out.push_back(std::move(newest));
+  return out;
+}
+
+VersionSize size_of(const Version& version, const Content& content, const server::MapEstimate& map) {
+  VersionSize out;
+  for (const auto& [id, submap] : content.submaps) {
+    if (!version.chains.contains(id.chain)) continue;
+    ++out.submaps;
+    out.keyframes += submap->keyframes.size();
+    out.minutes += (submap->keyframes.back().stamp - submap->keyframes.front().stamp) / 60.0;
+  }
+  for (const server::JudgedClosure& judged : map.closures) {
+    const bool from = version.chains.contains(judged.closure.from.chain);
+    const bool to = version.chains.contains(judged.closure.to.chain);
+    if (!judged.accepted || (!from && !to)) continue;
+    ++(from && to ? out.own_closures : out.earlier_closures);
+  }
+  return out;
+}
+
+Result<std::size_t> revert(const std::filesystem::path& map, std::uint64_t number, const std::filesystem::path& out) {
+  const auto from = open_copy(map);
+  if (!from) return tl::unexpected(from.error());
+  const auto all = versions(**from);
+  if (!all) return in_context(map.string(), all.error());
+  const auto at = std::ranges::find(*all, number, &Version::number);
+  if (at == all->end() || at + 1 == all->end())
+    return fail(ErrorCode::invalid, "{}: has versions 1 to {}, expected one before the last, not {}", map.string(),
+                all->back().number, number);
+  LaterChains later;
+  for (auto version = at + 1; version != all->end(); ++version) later.merge(LaterChains(version->chains));
+  std::size_t left_out = 0;
+  const auto sized = (*from)->sizes(map_tables::kSubmaps, [&](std::string_view key, std::size_t) {
+    const auto id = node::submap_of_key(key);
+    left_out += id && later.contains(id->chain) ? 1 : 0;
+  });
+  if (!sized) return tl::unexpected(sized.error());
+  const Status made = make_map(out, [&](TableStore& to) { return copy_without(**from, later, number + 1, to); });
+  if (!made) return tl::unexpected(made.error());
+  return left_out;
+}
+
+}  // namespace tutti::mapfile
