@@ -43,7 +43,7 @@ Matrix6d covariance_of(const Matrix6d& pose_covariance, const Eigen::Quaterniond
 /// As geometry_msgs/msg/PoseWithCovarianceStamped.
 std::string encode(const RosPoseWithCovariance& message);
 
-/// Types from here on are written only, not read: they are for viewers and planners.
+// The types that follow are written only, not read: they are for viewers and planners.
 
 /// rosgraph_msgs/msg/Clock
 std::string encode_clock(Timestamp now);

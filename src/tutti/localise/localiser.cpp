@@ -115,29 +115,37 @@ Status Localiser::hear(const StartPose& start) {
     return {};
   }
   if (const Status ok = check_start_pose(start); !ok) return ok;
-  auto levels = tries_of(*setup_.map, start);
+  StartPose normalised = start;
+  normalised.T_world_body->T_a_b.rotation.normalize();
+  auto levels = tries_of(*setup_.map, normalised);
   if (!levels) return tl::unexpected(levels.error());
   search_anew("a start pose was given, which scans have not confirmed yet");
   start_ = Start{std::move(*levels), recent_.empty() ? Timestamp{} : recent_.back().stamp};
   return {};
 }
 
+std::optional<Localiser::ReadyScan> Localiser::ready(const Scan& scan, Timestamp not_before) const {
+  const auto T_odom_body = pose_at(recent_, scan.stamp);
+  const auto undistorted = lidar::undistort(scan, recent_);
+  if (!T_odom_body || !undistorted || scan.stamp < not_before) return std::nullopt;
+  return ReadyScan{{scan.stamp, *T_odom_body},
+                   fit::make_fit_scan(scan.stamp, *undistorted->cloud, setup_.submap.min_range_m)};
+}
+
 /// Registers a scan from all poses that the start pose stands for. The place that fits best is followed, unless another
 /// one fits nearly as well.
 void Localiser::try_start(const Scan& scan) {
-  const auto T_odom_body = pose_at(recent_, scan.stamp);
-  const auto undistorted = lidar::undistort(scan, recent_);
-  if (!T_odom_body || !undistorted || scan.stamp < start_->said) return;
-  const fit::FitScan thinned = fit::make_fit_scan(scan.stamp, *undistorted->cloud, setup_.submap.min_range_m);
+  const auto usable = ready(scan, start_->said);
+  if (!usable) return;
   std::vector<StartFit> fits;
   for (const StartTries& level : start_->levels)
     if (const LocalMap* local = local_maps_.about(level.T_world_body.T_a_b.translation)) {
       work_.registered += level.from.size();
-      add_fits(*local, thinned, level, fits);
+      add_fits(*local, usable->scan, level, fits);
     }
   if (fits.size() == 1) {
     track_ = Track{.T_world_body = fits.front().prior,
-                   .at = {scan.stamp, *T_odom_body},
+                   .at = usable->at,
                    .confirmed = scan.stamp,
                    .to_confirm = kConfirmations,
                    .gate = kAgreedGate};
@@ -197,14 +205,12 @@ void Localiser::follow(const Scan& scan) {
   last_match_ = scan.stamp;
   if (start_ && !track_) return try_start(scan);
   if (!track_) return;
-  const auto T_odom_body = pose_at(recent_, scan.stamp);
-  const auto undistorted = lidar::undistort(scan, recent_);
-  if (!T_odom_body || !undistorted || scan.stamp < track_->at.stamp) return;
-  predict_to({scan.stamp, *T_odom_body});
+  const auto usable = ready(scan, track_->at.stamp);
+  if (!usable) return;
+  predict_to(usable->at);
   const LocalMap* local = local_maps_.about(track_->T_world_body.T_a_b.translation);
   if (local == nullptr) return doubt({Evidence::nothing, "the map shows nothing there"}, scan.stamp);
-  const fit::FitScan thinned = fit::make_fit_scan(scan.stamp, *undistorted->cloud, setup_.submap.min_range_m);
-  ScanMatch match = match_scan(*local, thinned, track_->T_world_body.T_a_b);
+  ScanMatch match = match_scan(*local, usable->scan, track_->T_world_body.T_a_b);
   ++work_.registered;
   match.T_world_body.covariance *= kAlike;
   const Assessment assessment = track_->to_confirm > 0 ? assess_guess(match, track_->T_world_body, track_->gate)

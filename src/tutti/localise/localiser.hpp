@@ -81,6 +81,13 @@ class Localiser {
   Status hear(const TrackedImages& images) { return submaps_.add(images); }
   Status hear(const StartPose& start);
   Status hear(const auto&) { return {}; }
+  /// A scan as it is registered, and where odometry was then.
+  struct ReadyScan {
+    StampedPose at;
+    fit::FitScan scan;
+  };
+  /// Nothing for a scan that is older, or that odometry does not reach.
+  [[nodiscard]] std::optional<ReadyScan> ready(const Scan& scan, Timestamp not_before) const;
   void try_start(const Scan& scan);
   void begin_submaps();
   void advance();

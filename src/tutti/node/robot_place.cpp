@@ -26,7 +26,7 @@ Status RobotNode::begin_at_stored_place() {
   if (!*row || !localiser_) return {};
   const auto stored = wire::read_fields<StoredPlace>(**row);
   const auto start = stored ? start_at(*stored, localiser_->map()) : std::nullopt;
-  if (start && check_start_pose(*start)) (void)localiser_->add(*start);
+  if (start) (void)localiser_->add(*start);  // one that cannot be is refused
   return {};
 }
 

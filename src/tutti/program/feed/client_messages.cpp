@@ -48,7 +48,6 @@ FromClient read(const v1::Feed::StartPose& in) {
   if (!covariance) return BadSample{{}, "a start pose with a " + covariance.error().message};
   StartPose out{.T_world_body = RelativePose{read(in.t_world_body()), *covariance}, .is_planar = in.is_planar()};
   if (const Status ok = check_start_pose(out); !ok) return BadSample{{}, ok.error().message};
-  out.T_world_body->T_a_b.rotation.normalize();
   return out;
 }
 
