@@ -3,6 +3,7 @@
 
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tutti/bus/bus_credentials.hpp"
@@ -33,5 +34,8 @@ struct KeyedUser {
 /// they may publish passes, and nothing else: whoever publishes or asks chooses where the bus answers, the bus does not
 /// check that subject against their rights, and an empty answer at `$JS.API.STREAM.DELETE.X` removes a stream.
 std::string authorization(const std::string& mission, const std::vector<KeyedUser>& users);
+
+/// How the list of the certificates that are let in begins, in the block `tls` before these.
+inline constexpr std::string_view kPinned = "pinned_certs: [";
 
 }  // namespace tutti::bus

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -80,13 +82,20 @@ class NatsChild {
   [[nodiscard]] Status wait_until_ready();
   /// Writes its configuration. True: it is another than before.
   Result<bool> configure(int port);
+  /// Who was refused, and whether it has read its configuration.
+  void read_log();
 
   std::filesystem::path folder_;
   NatsChildOptions options_;
   int lock_ = -1;  ///< The lock file, open and locked; the child inherits it and holds the lock until it ends.
   std::unique_ptr<ChildProcess> process_;
-  std::string configured_;       ///< Its configuration.
+  std::string configured_;    ///< Its configuration, without nobody's certificate.
+  bool has_nobody_ = false;   ///< The one that was written has it.
+  bool reads_again_ = false;  ///< It is to be written once more.
+  /// When it was told to read its configuration; nothing: its log says that it has.
+  std::optional<std::chrono::steady_clock::time_point> told_;
   std::uintmax_t log_read_ = 0;  ///< So much of its log.
+  Refusals refusals_;            ///< What was refused there, and was not taken yet.
   std::string url_;
   int pid_ = -1;
 };

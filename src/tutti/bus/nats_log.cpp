@@ -24,13 +24,14 @@ struct HandshakeEnd {
   std::string_view go;
   std::string_view plain;
 };
-constexpr std::array<HandshakeEnd, 8> kHandshakeEnds{{
+constexpr std::array<HandshakeEnd, 9> kHandshakeEnds{{
     // A client that does not trust the bus hangs up with an alert that Go cannot decrypt.
     {"bad record MAC", "hung up at the bus's certificate, and showed no certificate of this mission"},
     {"remote error", "hung up at the bus's certificate, and showed no certificate of this mission"},
     {"didn't provide a certificate", "showed no certificate of this mission"},
     {"unknown authority", "showed no certificate of this mission, but one of another authority"},
     {"certificate has expired", "showed a certificate that has expired"},
+    {"not pinned", "showed the certificate of one who is not a member any more, revoked or expired"},
     {"does not look like a TLS handshake", "does not speak TLS"},
     {"i/o timeout", "showed no certificate of this mission in time"},
     {"EOF", "hung up, and showed no certificate of this mission"},
@@ -80,6 +81,13 @@ std::optional<BusRefusal> refusal_of(std::string_view line) {
                                             : "be answered at ") +
              plain_text(subject, kLongest);
   return out;
+}
+
+/// `[17] 2026/01/31 12:00:00.000000 [INF] Reloaded server configuration`. What strangers choose is behind the level.
+bool has_read_configuration(std::string_view line) {
+  line.remove_prefix(std::min(line.find(" ["), line.size()));
+  return line.starts_with(" [INF] Reloaded server configuration") ||
+         line.starts_with(" [ERR] Failed to reload server configuration");
 }
 
 }  // namespace tutti::bus

@@ -16,5 +16,7 @@ struct BusRefusal {
 };
 /// Nothing: the line is of something else.
 std::optional<BusRefusal> refusal_of(std::string_view line);
+/// It has read its configuration again, or tried to.
+bool has_read_configuration(std::string_view line);
 
 }  // namespace tutti::bus

@@ -35,6 +35,7 @@ TEST(NatsLogTest, ExplainsPlainlyWhyNobodyWasLetIn) {
       {"tls: failed to verify certificate: x509: certificate signed by unknown authority", "another authority"},
       {"tls: failed to verify certificate: x509: certificate has expired or is not yet valid: current time 2026-11-25",
        "has expired"},
+      {"certificate not pinned", "not a member any more"},
       {"tls: first record does not look like a TLS handshake", "does not speak TLS"},
       {"read tcp 127.0.0.1:4222->127.0.0.1:40000: i/o timeout", "in time"}};
   for (const auto& [end, expected] : ends) {
@@ -61,6 +62,15 @@ TEST(NatsLogTest, OtherLinesAreNothing) {
   for (const char* line : {"", "[17] 2026/11/25 08:40:55.258113 [INF] Starting nats-server", "[ERR] ", "[ERR] - cid:4",
                            "[17] [WRN] 10.0.0.7:1 - cid:4 - TLS handshake error"})
     EXPECT_FALSE(refusal_of(line)) << line;
+}
+
+TEST(NatsLogTest, SaysThatTheConfigurationWasReadAgain) {
+  const std::string begin = "[17] 2026/11/25 08:40:55.809955 ";
+  EXPECT_TRUE(has_read_configuration(begin + "[INF] Reloaded server configuration"));
+  EXPECT_TRUE(has_read_configuration(begin + "[ERR] Failed to reload server configuration: 'x'"));
+  EXPECT_FALSE(has_read_configuration(begin + "[INF] Reloaded: tls = enabled"));
+  EXPECT_FALSE(has_read_configuration(kBegin + "\"v1:C: [INF] Reloaded server configuration\" - Publish Violation"));
+  EXPECT_FALSE(has_read_configuration(""));
 }
 
 }  // namespace nats_log_test

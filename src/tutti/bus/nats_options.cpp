@@ -54,8 +54,8 @@ std::string advice_to(const BusUser& member, natsStatus status, const std::strin
            "pki`), or has expired by this machine's clock, which may be wrong: compare `date -u` on both";
   if (status == NATS_SSL_ERROR || status == NATS_PROTOCOL_ERROR || status == NATS_IO_ERROR)
     return fmt::format(
-        "the bus hung up: has the certificate of {} expired (tutti pki list, tutti pki renew), or is the bus's "
-        "clock wrong (date -u)?",
+        "the bus hung up: has {} been revoked, or its certificate expired (tutti pki list, tutti pki renew), or is "
+        "the bus's clock wrong (date -u)?",
         to_string(member));
   return {};
 }
@@ -80,6 +80,15 @@ std::string why_not_let_in(natsStatus status, const BusUrl& url, const BusCreden
   const std::string advice =
       credentials.known ? advice_to(*credentials.known, status, detail) : advice_to_stranger(status, url);
   return advice.empty() ? "" : " (" + advice + ")";
+}
+
+/// Libnats tries again for ever when a bus hangs up in the midst of TLS, and keeps the status alone.
+std::string NatsConnection::not_let_in() const {
+  const char* text = nullptr;
+  const natsStatus status = natsConnection_GetLastError(connection_, &text);
+  const auto url = parse_bus_url(url_);
+  if (!url || connected() || (status != NATS_PROTOCOL_ERROR && status != NATS_SSL_ERROR)) return {};
+  return failure(status, "connecting").value().message + why_not_let_in(status, *url, credentials_);
 }
 
 NatsOwned<natsOptions> make_options(const BusUrl& url, const BusCredentials& credentials, const std::string& name) {

@@ -209,6 +209,7 @@ void JetStreamPort::send_all() {
     const NatsConnection& connection = *present->connection;
     const bool connected = connection.connected();
     if (!connected && connection.is_outdated()) connection.close();
+    if (const std::string why = connection.not_let_in(); !why.empty()) note(why);
     const std::uint64_t reconnects = connection.reconnects();
     if (reconnects != reconnects_ || !connected) {
       const std::scoped_lock guard(mutex_);

@@ -83,10 +83,16 @@ bool add_extension(X509* made, X509* issuer, int kind, const std::string& value)
   return extension && X509_add_ext(made, extension.get(), -1) == 1;
 }
 
-/// `issuer` null: the certificate signs itself.
+Owned<EVP_PKEY> key_of(const std::string& text) {
+  return Owned<EVP_PKEY>(PEM_read_bio_PrivateKey(reader_of(text).get(), nullptr, nullptr, nullptr));
+}
+
+/// `issuer` null: the certificate signs itself. `old_key` empty: a new one.
 Result<bus::Certificate> make(const std::string& name, int days, X509* issuer, EVP_PKEY* signer,
-                              const std::vector<std::pair<int, std::string>>& extensions) {
-  const Owned<EVP_PKEY> key(EVP_PKEY_Q_keygen(nullptr, nullptr, "EC", "P-256"));
+                              const std::vector<std::pair<int, std::string>>& extensions,
+                              const std::string& old_key = {}) {
+  const Owned<EVP_PKEY> key =
+      old_key.empty() ? Owned<EVP_PKEY>(EVP_PKEY_Q_keygen(nullptr, nullptr, "EC", "P-256")) : key_of(old_key);
   const Owned<X509> made(X509_new());
   if (!key || !made) return failure("a key");
   X509_NAME* const subject = X509_get_subject_name(made.get());
@@ -126,9 +132,10 @@ Status check_host_name(const std::string& name) {
 }
 
 Result<bus::Certificate> make_certificate(const bus::Certificate& authority, const std::string& name, bool is_bus,
-                                          int days, const std::vector<std::string>& more_names) {
+                                          int days, const std::vector<std::string>& more_names,
+                                          const std::string& key) {
   const Owned<X509> issuer = certificate_of(authority.text);
-  const Owned<EVP_PKEY> signer(PEM_read_bio_PrivateKey(reader_of(authority.key).get(), nullptr, nullptr, nullptr));
+  const Owned<EVP_PKEY> signer = key_of(authority.key);
   if (!issuer || !signer) return failure("the authority's certificate and key");
   std::vector<std::pair<int, std::string>> extensions{{NID_basic_constraints, "critical,CA:FALSE"},
                                                       {NID_key_usage, "critical,digitalSignature"},
@@ -140,11 +147,23 @@ Result<bus::Certificate> make_certificate(const bus::Certificate& authority, con
     if (more != name) names += (is_address(more) ? ",IP:" : ",DNS:") + more;
   }
   if (is_bus) extensions.emplace_back(NID_subject_alt_name, names);
-  return make(name, days, issuer.get(), signer.get(), extensions);
+  return make(name, days, issuer.get(), signer.get(), extensions, key);
 }
 
 Result<std::string> valid_until(const std::string& certificate) {
   return holder_of(certificate_of(certificate).get()).map(&CertificateHolder::until);
+}
+
+Result<std::string> key_hash_of(const std::string& certificate) {
+  const Owned<X509> from = certificate_of(certificate);
+  unsigned char* made = nullptr;
+  const int size = from ? i2d_X509_PUBKEY(X509_get_X509_PUBKEY(from.get()), &made) : 0;
+  if (size <= 0) return failure("a certificate");
+  std::array<unsigned char, 32> hash{};
+  const bool done = EVP_Digest(made, static_cast<std::size_t>(size), hash.data(), nullptr, EVP_sha256(), nullptr) == 1;
+  OPENSSL_free(made);
+  if (!done) return failure("a certificate");
+  return fmt::format("{:02x}", fmt::join(hash, ""));
 }
 
 Result<std::vector<std::string>> names_of(const std::string& certificate) {

@@ -17,12 +17,17 @@ namespace tutti::pki {
 /// Makes that of an authority, which signs the others.
 Result<bus::Certificate> make_authority(const std::string& name, int days);
 /// Makes that of a bus under `name` and `more_names` (of machines, and addresses), or of somebody who connects to it.
+/// `key`: Certificate::key of the one that it follows; empty: a new key.
 Result<bus::Certificate> make_certificate(const bus::Certificate& authority, const std::string& name, bool is_bus,
-                                          int days, const std::vector<std::string>& more_names = {});
+                                          int days, const std::vector<std::string>& more_names = {},
+                                          const std::string& key = {});
 /// Whether a bus's certificate can have this name.
 Status check_host_name(const std::string& name);
 /// The names and addresses of a bus's certificate, the first one first.
 Result<std::vector<std::string>> names_of(const std::string& certificate);
+/// 64 hexadecimal digits: SHA-256 of a certificate's public key (SubjectPublicKeyInfo), as nats-server's
+/// `pinned_certs`.
+Result<std::string> key_hash_of(const std::string& certificate);
 /// "2027-01-31 12:00:00 UTC", until when a certificate is valid.
 Result<std::string> valid_until(const std::string& certificate);
 /// Whose a certificate is, as given to make_certificate(), and until when it is valid. Who signed it is for the TLS

@@ -29,6 +29,36 @@ TEST(CertificatesTest, EachIsAnotherAndSaysUntilWhen) {
   EXPECT_EQ(valid_until(one->text)->size(), std::string("2027-01-31 12:00:00 UTC").size());
 }
 
+/// The one of `openssl x509 -pubkey -noout | openssl pkey -pubin -outform der | sha256sum`.
+TEST(CertificatesTest, TheHashOfItsKeyIsThatOfOpenSsl) {
+  EXPECT_EQ(key_hash_of(R"(-----BEGIN CERTIFICATE-----
+MIIBdjCCAR2gAwIBAgIUJcM6xRl3zzF2SDIOs0v2PIRErcMwCgYIKoZIzj0EAwIw
+DTELMAkGA1UEAwwCY2EwHhcNMjYxMTI5MjEwNzQxWhcNMjcwMTE4MjEwNzQxWjAQ
+MQ4wDAYDVQQDDAVhbHBoYTBZMBMGByqGSM49AgEGCCqGSM49AwEHA0IABHqJb0th
+oBGmprwvpemG82QRQ3fIF/LRcRO/hc5DG6CucWURlxPqwnKls2N9MB/KWFh0iNub
+lsvq/2HwxTiPk2CjWDBWMBQGA1UdEQQNMAuCCWxvY2FsaG9zdDAdBgNVHQ4EFgQU
+PbEjhzkJComNMotJv6Hv3etIP6UwHwYDVR0jBBgwFoAU6DdI/NpFxFWHyqCV73dL
+SL5DT6MwCgYIKoZIzj0EAwIDRwAwRAIgR73snb7ScPo0O3lpo5zROSXE07uuLCEJ
+kxawPe70uqECIHvIapziUKO010SM9XeWsC5Bgzdfz5eOWW6Me/Tk0MDm
+-----END CERTIFICATE-----
+)")
+                .value(),
+            "c8f3989ca0d6c787e3285f21c31cff11a935f17d6499c7ee13d519334796b240");
+}
+
+TEST(CertificatesTest, ARenewedOneHasTheKeyOfTheOneBefore) {
+  const auto authority = make_authority("authority", 10).value();
+  const auto one = make_certificate(authority, "robot alpha", false, 1).value();
+  const auto next = make_certificate(authority, "robot alpha", false, 2, {}, one.key);
+  ASSERT_TRUE(next) << next.error().message;
+  EXPECT_NE(next->text, one.text);
+  EXPECT_EQ(next->key, one.key);
+  EXPECT_EQ(key_hash_of(next->text).value(), key_hash_of(one.text).value());
+  EXPECT_NE(key_hash_of(make_certificate(authority, "robot alpha", false, 1)->text).value(),
+            key_hash_of(one.text).value());
+  EXPECT_FALSE(make_certificate(authority, "robot alpha", false, 1, {}, "no key"));
+}
+
 TEST(CertificatesTest, ThatOfABusHasTheNamesOfItsMachineToo) {
   const auto authority = make_authority("authority", 10).value();
   const auto bus =
@@ -61,6 +91,7 @@ TEST(CertificatesTest, TheyAreValidForAClockThatIsYearsBehind) {
 TEST(CertificatesTest, WhatIsNoCertificateIsRefused) {
   const auto authority = make_authority("authority", 10).value();
   EXPECT_FALSE(valid_until(""));
+  EXPECT_FALSE(key_hash_of(authority.key));
   EXPECT_FALSE(valid_until(authority.key));
   EXPECT_FALSE(make_certificate({authority.text, ""}, "a", false, 1));
   EXPECT_FALSE(make_certificate({"", authority.key}, "a", false, 1));

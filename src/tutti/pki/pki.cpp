@@ -47,12 +47,12 @@ Result<bus::Certificate> read_certificate(const fs::path& text, const fs::path& 
   return bus::Certificate{std::move(*certificate), std::move(*secret)};
 }
 
-/// "robot alpha 2147483655 UABC.. valid 2027-01-31 12:00:00 UTC"
+/// "robot alpha 2147483655 UABC.. 0a1b.. valid 2027-01-31 12:00:00 UTC"
 std::optional<Member> member_of(const std::string& line, const std::string& mission) {
   std::istringstream words(line);
   std::string role, state;
   Member out;
-  words >> role >> out.user.name >> out.user.number >> out.key >> state;
+  words >> role >> out.user.name >> out.user.number >> out.key >> out.certificate >> state;
   const auto known = bus::role_of(role);
   if (!words || !known || (state != "valid" && state != "revoked")) return std::nullopt;
   out.user.role = *known;
@@ -63,8 +63,8 @@ std::optional<Member> member_of(const std::string& line, const std::string& miss
 }
 
 std::string line_of(const Member& member) {
-  return fmt::format("{} {} {} {} {} {}\n", name(member.user.role), member.user.name, member.user.number, member.key,
-                     member.is_revoked ? "revoked" : "valid", member.until);
+  return fmt::format("{} {} {} {} {} {} {}\n", name(member.user.role), member.user.name, member.user.number, member.key,
+                     member.certificate, member.is_revoked ? "revoked" : "valid", member.until);
 }
 
 Status check_name(const std::string& name) {
@@ -138,7 +138,12 @@ Status Pki::read() {
   if (!text) return in_context("`tutti pki init` makes it", text.error());
   std::istringstream lines(*text);
   std::string line;
-  const auto wrong = [&] { return fail(ErrorCode::invalid, "{}: '{}': expected a line of `tutti pki`", file, line); };
+  const auto wrong = [&] {
+    return fail(ErrorCode::invalid,
+                "{}: '{}': expected a line of `tutti pki` (it does not read what development versions wrote: make the "
+                "folder anew, `tutti pki init`)",
+                file, line);
+  };
   if (!std::getline(lines, line) || line != kFirstLine) return wrong();
   if (!std::getline(lines, mission_) || !bus::check_mission_name(mission_)) return wrong();
   members_.clear();
@@ -163,15 +168,19 @@ Status Pki::write() const {
 /// The line of the bus's certificate makes a renewed one another configuration, which is read anew.
 Result<std::string> Pki::bus_configuration(const std::string& now) const {
   std::vector<bus::KeyedUser> users;
-  for (const Member& member : members_)
-    if (!member.is_revoked && !member.has_expired(now)) users.push_back({member.user, member.key});
+  std::string pins;
+  for (const Member& member : members_) {
+    if (member.is_revoked || member.has_expired(now)) continue;
+    users.push_back({member.user, member.key});
+    pins += fmt::format("{}\"{}\"", pins.empty() ? "" : ", ", member.certificate);
+  }
   const auto own = read_file((folder_ / kBusCertificate).string());
   if (!own) return tl::unexpected(own.error());
   const auto quoted = [&](const char* file) { return '"' + (folder_ / file).string() + '"'; };
   return fmt::format(
       "# by `tutti pki`; mission {}, certificate of the bus {:016x}\n"
-      "tls {{ cert_file: {}, key_file: {}, ca_file: {}, verify: true, timeout: 2 }}\n{}",
-      mission_, content_hash(*own), quoted(kBusCertificate), quoted(kBusKey), quoted(kAuthority),
+      "tls {{ cert_file: {}, key_file: {}, ca_file: {}, verify: true, timeout: 2, {}{}] }}\n{}",
+      mission_, content_hash(*own), quoted(kBusCertificate), quoted(kBusKey), quoted(kAuthority), bus::kPinned, pins,
       bus::authorization(mission_, users));
 }
 
@@ -184,20 +193,23 @@ Status Pki::make_bus_certificate(int days, const std::vector<std::string>& names
   return write_private(folder_ / kBusCertificate, made->text);
 }
 
-Status Pki::write_credential(const bus::BusUser& user, const bus::NatsKey& key, int days, std::string& until) const {
+Status Pki::write_credential(Member& member, const bus::NatsKey& key, const std::string& certificate_key,
+                             int days) const {
   const auto authority = read_certificate(folder_ / kAuthority, folder_ / kAuthorityKey);
   if (!authority) return tl::unexpected(authority.error());
-  auto certificate = make_certificate(*authority, to_string(user), false, days);
+  auto certificate = make_certificate(*authority, to_string(member.user), false, days, {}, certificate_key);
   if (!certificate) return tl::unexpected(certificate.error());
-  auto valid = valid_until(certificate->text);
-  if (!valid) return tl::unexpected(valid.error());
-  until = std::move(*valid);
+  auto until = valid_until(certificate->text), hash = key_hash_of(certificate->text);
+  if (!until) return tl::unexpected(until.error());
+  if (!hash) return tl::unexpected(hash.error());
+  member.until = std::move(*until);
+  member.certificate = std::move(*hash);
   bus::BusCredentials credentials;
-  credentials.known = user;
+  credentials.known = member.user;
   credentials.key = key;
   credentials.certificate = std::move(*certificate);
   credentials.authority = authority->text;
-  return write_private(credential(user.name), credentials_text(credentials));
+  return write_private(credential(member.user.name), credentials_text(credentials));
 }
 
 Member* Pki::find(const std::string& name) {
@@ -225,8 +237,8 @@ Result<fs::path> Pki::add(bus::BusRole role, const std::string& name, std::optio
   }
   user.number = role == bus::BusRole::server ? 0 : number.value_or(user.number + 1);
   const bus::NatsKey key = make_nats_key();
-  Member member{.user = user, .key = key.open, .is_revoked = false, .until = {}};
-  if (Status done = write_credential(user, key, days, member.until); !done) return tl::unexpected(done.error());
+  Member member{.user = user, .key = key.open};
+  if (Status done = write_credential(member, key, "", days); !done) return tl::unexpected(done.error());
   members_.push_back(std::move(member));
   if (Status done = write(); !done) return tl::unexpected(done.error());
   return credential(name);
@@ -261,10 +273,10 @@ Status Pki::renew(const std::string& name, int days, const std::vector<std::stri
   if (member == nullptr || member->is_revoked)
     return fail(ErrorCode::configuration, "{}: nobody is called so, or not any more (tutti pki list)", name);
   const auto credentials = bus::read_credentials(credential(name).string());
-  if (!credentials) return in_context("its credential is needed here, for the key that stays", credentials.error());
+  if (!credentials) return in_context("its credential is needed here, for the keys that stay", credentials.error());
   if (credentials->key.open != member->key)
     return fail(ErrorCode::invalid, "{}: another key than {} has", credential(name).string(), to_string(member->user));
-  if (Status done = write_credential(member->user, credentials->key, days, member->until); !done) return done;
+  if (Status done = write_credential(*member, credentials->key, credentials->certificate.key, days); !done) return done;
   return write();
 }
 

@@ -15,9 +15,10 @@ namespace tutti::pki {
 /// Somebody whom the bus of a mission knows, or knew.
 struct Member {
   bus::BusUser user;
-  std::string key;  ///< bus::NatsKey::open
+  std::string key;               ///< bus::NatsKey::open
+  std::string certificate = {};  ///< key_hash_of() it.
   bool is_revoked = false;
-  std::string until;  ///< valid_until() of the certificate.
+  std::string until = {};  ///< valid_until() of the certificate.
   /// At this time (utc_text()) its certificate has expired. The server's own never does in this sense: cut off from
   /// its own bus it would end the mission, and nobody else comes in with an expired one either.
   [[nodiscard]] bool has_expired(const std::string& now) const {
@@ -45,14 +46,14 @@ class Pki {
   /// there is a member of that name or, among robots, number.
   Result<std::filesystem::path> add(bus::BusRole role, const std::string& name, std::optional<std::uint32_t> number,
                                     int days = kDays);
-  /// Its key opens nothing any more; the credential is removed.
+  /// Neither its key nor its certificate opens anything any more; the credential is removed.
   Status revoke(const std::string& name);
-  /// A new certificate for a member, with the key that it has; with no name for the bus, whose certificate keeps its
-  /// names and gets `more_names`. Whoever is connected stays so.
+  /// A new certificate for a member, with the keys that it has, so that the one before stays good until it expires;
+  /// with no name for the bus, whose certificate keeps its names and gets `more_names`. Whoever is connected stays so.
   Status renew(const std::string& name, int days = kDays, const std::vector<std::string>& more_names = {});
 
-  /// The blocks `tls`, `authorization` and `accounts` of nats-server's configuration, with the rights of all who are
-  /// not revoked and, at this time (utc_text()), have a certificate that has not expired.
+  /// The blocks `tls`, `authorization` and `accounts` of nats-server's configuration, with the certificates and the
+  /// rights of all who are not revoked and, at this time (utc_text()), have a certificate that has not expired.
   [[nodiscard]] Result<std::string> bus_configuration(const std::string& now) const;
   [[nodiscard]] const std::string& mission() const { return mission_; }
   [[nodiscard]] const std::vector<Member>& members() const { return members_; }
@@ -69,8 +70,9 @@ class Pki {
   Status read();
   [[nodiscard]] Status write() const;
   [[nodiscard]] Status make_bus_certificate(int days, const std::vector<std::string>& names) const;
-  [[nodiscard]] Status write_credential(const bus::BusUser& user, const bus::NatsKey& key, int days,
-                                        std::string& until) const;
+  /// With another certificate, of this key (empty: a new one); what the member has of it follows.
+  [[nodiscard]] Status write_credential(Member& member, const bus::NatsKey& key, const std::string& certificate_key,
+                                        int days) const;
   [[nodiscard]] Member* find(const std::string& name);
 
   std::filesystem::path folder_;

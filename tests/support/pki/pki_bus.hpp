@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -49,6 +50,14 @@ class PkiBus : public ::testing::Test {
     child_->set_rights(pki_->bus_configuration(now).value());
     EXPECT_TRUE(child_->tend());
   }
+  /// Whether it becomes true while the bus is tended.
+  template <class Condition>
+  bool tended_until(Condition&& condition, const std::string& now = "") {
+    return test::within(30.0, [&] {
+      tend(now);
+      return condition();
+    });
+  }
   bus::BusCredentials add(bus::BusRole role, const std::string& name, std::optional<std::uint32_t> number = {},
                           int days = pki::kDays) {
     const auto file = pki_->add(role, name, number, days);
@@ -60,8 +69,15 @@ class PkiBus : public ::testing::Test {
   }
   /// The bus reads its new rights when it gets to it: who comes before is refused once, and a test counts refusals.
   void wait_until_known(const bus::BusCredentials& who) {
-    EXPECT_TRUE(test::within(30.0, [&] { return bus::NatsConnection::open(options(who), "newcomer").has_value(); }));
+    EXPECT_TRUE(tended_until([&] { return bus::NatsConnection::open(options(who), "newcomer").has_value(); }));
     static_cast<void>(child_->take_refusals());
+  }
+  /// Whether the bus's log says, now or soon, that somebody was refused as one of these words.
+  bool is_refused_as(const std::string& words) {
+    return test::within(10.0, [&] {
+      const auto refusals = child_->take_refusals().all;
+      return std::ranges::any_of(refusals, [&](const auto& one) { return one.what.find(words) != std::string::npos; });
+    });
   }
   /// What members were refused since the last call that is not theirs to do. A handshake in whose midst the bus reads
   /// its rights again is refused, too, and tried again by whoever connects: that is none of these.

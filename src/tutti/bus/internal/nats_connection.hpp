@@ -62,6 +62,8 @@ class NatsConnection {
   /// The credentials' file has others than this connection, which it will never use.
   [[nodiscard]] bool is_outdated() const { return read_again(credentials_) != credentials_; }
   void close() const { natsConnection_Close(connection_); }
+  /// Why the bus hangs up on this connection, which tries to come back; empty: it is there, or the bus is not.
+  [[nodiscard]] std::string not_let_in() const;
   /// What the bus does not let this connection do, in its words; empty: it has refused nothing.
   [[nodiscard]] std::string denied() const;
   /// An error of libnats as one of ours: where, while doing what, why.
