@@ -37,7 +37,8 @@ constexpr std::array kRights{
     listens(kRobotUser, "_INBOX.robot.{number}.>", kOwnInbox),
 
     publishes(kWorkerUser, "$JS.API.CONSUMER.MSG.NEXT.JOBS_{mission}.workers", "asks for a job"),
-    publishes(kWorkerUser, "$JS.ACK.JOBS_{mission}.workers.>", "says that a job is done, or goes on"),
+    publishes(kWorkerUser, "mission.{mission}.worker.{number}.settle",
+              "says that a job of its own is done, or goes on"),
     publishes(kWorkerUser, "mission.{mission}.worker.{number}.status", "its own status"),
     publishes(kWorkerUser, "mission.{mission}.worker.{number}.verdicts", "its answers"),
     publishes(kWorkerUser, "mission.{mission}.worker.{number}.refinement", "its refinements of the map"),
@@ -74,7 +75,7 @@ constexpr std::array kRights{
     publishes(kServerUser, "$JS.API.CONSUMER.*.*.JOBS_{mission}.workers", "the same, and jobs for its own worker"),
     publishes(kServerUser, "$JS.ACK.SUBMAPS_{mission}.server.>", "says what is stored"),
     publishes(kServerUser, "$JS.ACK.VERDICTS_{mission}.server.>", "says what is stored"),
-    publishes(kServerUser, "$JS.ACK.JOBS_{mission}.workers.>", "of its own worker's jobs"),
+    publishes(kServerUser, "$JS.ACK.JOBS_{mission}.workers.>", "passes on what workers say of their own jobs"),
     publishes(kServerUser, "$KV.GRAPH_{mission}.>", "graphs, receipts and the mission's status"),
     publishes(kServerUser, "$KV.TUTTI_SERVERS.{mission}", "the lease of the mission"),
     publishes(kServerUser, kAskLease, "the lease of the mission"),
@@ -83,6 +84,7 @@ constexpr std::array kRights{
     publishes(kServerUser, "mission.{mission}.worker.0.*", "its own worker"),
     listens(kServerUser, "mission.{mission}.*.*.status", "statuses of robots and workers"),
     listens(kServerUser, "mission.{mission}.worker.*.submap_request", "what workers ask for"),
+    listens(kServerUser, "mission.{mission}.worker.*.settle", "what workers say of their jobs"),
     listens(kServerUser, "mission.{mission}.worker.0.submap_copy", "its own worker"),
     listens(kServerUser, "_INBOX.server.{number}.>", kOwnInbox),
 };
@@ -103,9 +105,10 @@ std::string user_block(const KeyedUser& one) {
   return fmt::format(
       "      # {}\n      {{ nkey: {}, permissions: {{\n        publish: {{ allow: [{}] }}\n        subscribe: {{ "
       "allow: "
-      "[{}] }} }} }}\n",
+      "[{}] }}{} }} }}\n",
       to_string(one.user), one.key, quoted(subjects_of(one.user, BusRight::To::publish)),
-      quoted(subjects_of(one.user, BusRight::To::subscribe)));
+      quoted(subjects_of(one.user, BusRight::To::subscribe)),
+      one.user.role == BusRole::server ? ", allow_responses: true" : "");
 }
 
 /// What passes between the accounts: all that members publish and subscribe to, but their inboxes.

@@ -237,21 +237,14 @@ Result<NatsOwned<kvStore>> NatsConnection::bucket(const std::string& name, std::
   return NatsOwned<kvStore>(store);
 }
 
-Status NatsConnection::acknowledge(const std::string& reply) const {
-  natsMsg* answer = nullptr;
-  const natsStatus status =
-      natsConnection_RequestString(&answer, connection_, reply.c_str(), "+ACK", kNatsAnswer.count());
-  const NatsOwned<natsMsg> owned(answer);
-  return status == NATS_OK ? Status() : failure(status, "acknowledging");
-}
-
 Status NatsConnection::publish(const std::string& subject, const std::string& answer_to, const std::string& id,
-                               std::string_view bytes) const {
+                               std::string_view bytes, const std::string& secret) const {
   natsMsg* made = nullptr;
   natsStatus status = natsMsg_Create(&made, subject.c_str(), answer_to.empty() ? nullptr : answer_to.c_str(),
                                      bytes.data(), static_cast<int>(bytes.size()));
   const NatsOwned<natsMsg> message(made);
   if (status == NATS_OK && !id.empty()) status = natsMsgHeader_Set(made, "Nats-Msg-Id", id.c_str());
+  if (status == NATS_OK && !secret.empty()) status = natsMsgHeader_Set(made, kSecret, secret.c_str());
   if (status == NATS_OK) status = natsConnection_PublishMsg(connection_, made);
   return status == NATS_OK ? Status() : failure(status, "sending to " + subject);
 }

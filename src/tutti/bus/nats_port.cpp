@@ -26,6 +26,8 @@ std::string name_of(Endpoint end) { return fmt::format("{}_{}", name(end.role), 
 JetStreamPort::JetStreamPort(Endpoint self, BusOptions options)
     : self_(self),
       options_(std::move(options)),
+      settle_at_(self.role == Endpoint::Role::worker ? settle_subject(options_.mission, std::to_string(self.number))
+                                                     : ""),
       answer_to_(fmt::format("{}.sent_{}_{}", inbox_of(options_.credentials, name_of(self)), getpid(),
                              Clock::now().time_since_epoch().count())),
       outbox_(options_.mission, options_.max_waiting_bytes),
@@ -41,6 +43,7 @@ JetStreamPort::JetStreamPort(Endpoint self, BusOptions options)
       threads_.emplace_back([this, all = "mission." + mission + ".worker.*.submap_request"] { hear_best_effort(all); });
       threads_.emplace_back([this] { watch(); });
       threads_.emplace_back([this] { keep_jobs_ours(); });
+      threads_.emplace_back([this] { settle_jobs(); });
       break;
     case Endpoint::Role::robot:
     case Endpoint::Role::viewer:
@@ -109,6 +112,8 @@ LinkState JetStreamPort::state() const {
                   .streams_made_anew = streams_made_anew_,
                   .jobs_removed = jobs_removed_,
                   .strange_jobs = strange_jobs_,
+                  .strange_settlements = strange_settlements_,
+                  .strange_settler = strange_settler_,
                   .unconfirmed_s = 0.0,
                   .denied = session_ ? session_->connection->denied() : "",
                   .given_in_vain = given_in_vain_,
@@ -166,12 +171,13 @@ bool JetStreamPort::send_one(const NatsConnection& connection) {
     std::swap(busy, busy_);
     strays = inbox_.take_strays();
   }
-  for (const std::string& reply : busy) static_cast<void>(connection.publish(reply, "", "", "+WPI"));
-  for (const std::string& reply : strays) static_cast<void>(connection.publish(reply, "", "", "+ACK"));
+  for (const std::string& reply : busy) static_cast<void>(connection.settle(reply, "+WPI"));
+  for (const std::string& reply : strays) static_cast<void>(connection.settle(reply, "+ACK"));
   if (!piece) return false;
   const bool confirmed = piece->delivery != Delivery::best_effort;
   const std::string answer = confirmed ? fmt::format("{}.{}", answer_to_, piece->number) : "";
-  const Status sent = connection.publish(piece->subject, answer, piece->id, piece->bytes());
+  const std::string secret = piece->delivery == Delivery::work_queue ? secrets_.of(piece->id) : "";
+  const Status sent = connection.publish(piece->subject, answer, piece->id, piece->bytes(), secret);
   if (sent) return true;
   note(sent.error().message);
   const std::scoped_lock guard(mutex_);
@@ -280,7 +286,7 @@ void JetStreamPort::say_farewell() {
   while (Clock::now() < end && send_one(connection)) continue;
   while (Clock::now() < end && acknowledge_one(connection)) continue;
   const std::scoped_lock guard(mutex_);
-  for (const std::string& reply : inbox_.unacknowledged()) static_cast<void>(connection.publish(reply, "", "", "-NAK"));
+  for (const std::string& reply : inbox_.unacknowledged()) static_cast<void>(connection.settle(reply, "-NAK"));
   connection.flush();
 }
 

@@ -97,7 +97,7 @@ void JetStreamPort::pull(const std::string& stream, const std::string& consumer)
         const std::string inbox = present.connection->make_inbox();
         const auto subscription = present.connection->subscribe(inbox + ".*");
         if (!subscription) return tl::unexpected(subscription.error());
-        return std::make_unique<NatsPull>(present.connection, stream, consumer, *subscription, inbox);
+        return std::make_unique<NatsPull>(present.connection, stream, consumer, *subscription, inbox, settle_at_);
       },
       [&](const std::unique_ptr<NatsPull>& from, Session& present) {
         if (is_stranded(stream)) return false;
@@ -218,6 +218,40 @@ void JetStreamPort::keep_jobs_ours() {
        });
 }
 
+/// The bus would let any worker say so of any job, given or not. A job's secret is in the job: whoever knows it has
+/// been given it. What is said of a job that is gone does nothing.
+void JetStreamPort::settle_jobs() {
+  const std::string jobs = job_stream(options_.mission);
+  const auto passes = [&](natsMsg* heard, const NatsConnection& connection) {
+    const auto said = settlement_of(bytes_of(heard), jobs);
+    if (!said) return false;
+    const auto secret = connection.secret_of(jobs, said->sequence);
+    if (!secret) note(secret.error().message);  // the worker says it again
+    if (!secret) return true;
+    const bool is_gone = !*secret;
+    if (!is_gone && **secret != said->secret) return false;
+    const Status done = is_gone                ? Status()
+                        : said->verb == "+ACK" ? connection.acknowledge(said->reply)
+                                               : connection.settle(said->reply, said->verb);
+    if (!done) note(done.error().message);
+    const char* const answer_to = natsMsg_GetReply(heard);
+    if (done && answer_to != nullptr) static_cast<void>(connection.publish(answer_to, "", "", "+OK"));
+    return true;
+  };
+  keep([&](Session& present) { return present.connection->subscribe(settle_subject(options_.mission, "*")); },
+       [&](natsSubscription* subscription, Session& present) {
+         natsMsg* heard = nullptr;
+         const natsStatus status = natsSubscription_NextMsg(&heard, subscription, kListen_ms);
+         const NatsOwned<natsMsg> message(heard);
+         if (status != NATS_OK) return status == NATS_TIMEOUT;
+         if (passes(heard, *present.connection)) return true;
+         const std::scoped_lock guard(mutex_);
+         ++strange_settlements_;
+         strange_settler_ = settler_of(natsMsg_GetSubject(heard));
+         return true;
+       });
+}
+
 void JetStreamPort::put_returned(natsMsg* message) {
   const char* id = nullptr;
   natsMsgHeader_Get(message, "Nats-Msg-Id", &id);
@@ -233,7 +267,7 @@ void JetStreamPort::take_in(natsMsg* message, const NatsConnection& connection) 
   const auto part = part_of(id == nullptr ? "" : id);
   const auto address = address_of(natsMsg_GetSubject(message));
   const bool job = self_.role == Endpoint::Role::worker;
-  const std::string reply = natsMsg_GetReply(message);
+  const std::string reply = reply_of(message, settle_at_);
   bool ours = part && (job ? delivery_of(part->kind) == Delivery::work_queue : address && address->kind == part->kind);
   std::unique_lock guard(mutex_);
   if (ours)
@@ -243,7 +277,7 @@ void JetStreamPort::take_in(natsMsg* message, const NatsConnection& connection) 
   ++refused_;
   last_error_ = fmt::format("{}: id '{}' is none of ours", natsMsg_GetSubject(message), id == nullptr ? "" : id);
   guard.unlock();
-  static_cast<void>(connection.publish(reply, "", "", "+TERM"));  // or it would come for ever
+  static_cast<void>(connection.settle(reply, "+TERM"));  // or it would come for ever
 }
 
 void JetStreamPort::hear_best_effort(const std::string& subject) {

@@ -29,6 +29,10 @@ struct LinkState {
   std::uint64_t streams_made_anew = 0;  ///< Server's port only: streams that the bus had lost, or gave nothing of.
   std::uint64_t jobs_removed = 0;       ///< Server's port only: jobs that no worker gets any more.
   std::uint64_t strange_jobs = 0;       ///< Server's port only: jobs that it has not sent, and has removed.
+  /// Server's port only: how often a worker has said that a job is done, or else, which it had not been given; nothing
+  /// has come of it. And the number of the last such worker.
+  std::uint64_t strange_settlements = 0;
+  std::uint32_t strange_settler = 0;
   /// For how long a connected bus has confirmed nothing of what was sent.
   double unconfirmed_s = 0.0;
   /// What the bus does not let this program do, in the bus's words, since it connected; empty: nothing was refused.

@@ -2,6 +2,7 @@
 // What members and strangers try that is not theirs to do, on a real bus: nothing of it arrives, each attempt is in
 // what the bus reports, and those who belong go on.
 #include <arpa/inet.h>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -147,6 +148,7 @@ const std::vector<std::string> kOfTheServerAlone{"$JS.API.STREAM.DELETE.SUBMAPS_
                                                  "$JS.API.CONSUMER.MSG.NEXT.SUBMAPS_cave.server",
                                                  "$JS.API.CONSUMER.DURABLE.CREATE.JOBS_cave.workers",
                                                  "$JS.ACK.SUBMAPS_cave.server.1.1.1.1.0",
+                                                 "$JS.ACK.JOBS_cave.workers.1.1.1.1.0",
                                                  "$KV.TUTTI_SERVERS.cave",
                                                  "$KV.GRAPH_cave.robot.3.receipt",
                                                  "$KV.GRAPH_cave.robot.4.receipt",
@@ -155,10 +157,10 @@ const std::vector<std::string> kOfTheServerAlone{"$JS.API.STREAM.DELETE.SUBMAPS_
                                                  "mission.cave.jobs.loop",
                                                  "mission.cave.worker.1.submap_copy",
                                                  "_INBOX.server.0.anything"};
-const std::vector<std::string> kOfOthers{"mission.cave.robot.4.submap",    "mission.cave.robot.4.status",
-                                         "mission.cave.worker.2.status",   "mission.cave.worker.2.verdicts",
-                                         "mission.cave.viewer.0.decision", "mission.cave.operator.berta.decision",
-                                         "mission.tunnel.robot.3.submap",  "mission.tunnel.worker.1.verdicts"};
+const std::vector<std::string> kOfOthers{
+    "mission.cave.robot.4.submap",          "mission.cave.robot.4.status",   "mission.cave.worker.2.status",
+    "mission.cave.worker.2.verdicts",       "mission.cave.worker.2.settle",  "mission.cave.viewer.0.decision",
+    "mission.cave.operator.berta.decision", "mission.tunnel.robot.3.submap", "mission.tunnel.worker.1.verdicts"};
 
 TEST_F(Intruders, NobodyButTheServerTouchesStreamsReceiptsAndTheLease) {
   for (const auto* who : {&alpha_, &worker_, &anna_, &vera_}) {
@@ -232,16 +234,68 @@ TEST_F(Intruders, WhatTheBusAnswersIsNobodysMessage) {
       ASSERT_TRUE(connection->publish(bus::subject_of("cave", submap), subject, to_string(part), "own"));
     }
   connection->flush();
-  const auto came = heard(*hub_, sent - 1);  // one is refused: its answer was to be an acknowledgement
-  EXPECT_EQ(std::ranges::count(came, "own", [](const bus::Envelope& one) { return *one.bytes; }), sent - 1);
+  const auto came = heard(*hub_, sent - 2);  // two are refused: their answers were to be acknowledgements
+  EXPECT_EQ(std::ranges::count(came, "own", [](const bus::Envelope& one) { return *one.bytes; }), sent - 2);
   EXPECT_EQ(heard(*robot_, 1).size(), 1U);
   expect_all_is_well();
   std::set<std::string> reported;
   for (const bus::BusRefusal& refusal : rights_refused()) reported.insert(refusal.what);
-  EXPECT_EQ(reported, std::set<std::string>{"be answered at $JS.ACK.SUBMAPS_cave.server.1.1.1.1.0"});
+  EXPECT_EQ(reported, (std::set<std::string>{"be answered at $JS.ACK.JOBS_cave.workers.1.1.1.1.0",
+                                             "be answered at $JS.ACK.SUBMAPS_cave.server.1.1.1.1.0"}));
+  EXPECT_EQ(hub_->state().strange_settlements, 0U) << "worker 2 has said nothing";
   const auto base = connect(credentials("server"));
   for (const char* stream : {"SUBMAPS_cave", "VERDICTS_cave", "JOBS_cave", "KV_GRAPH_cave"})
     EXPECT_TRUE(base->has_stream(stream).value()) << stream;
+}
+
+/// Jobs that wait, and one that another worker has. Who has been given a job knows its secret; another guesses, or has
+/// none.
+TEST_F(Intruders, AWorkerEndsNoJobsButItsOwn) {
+  const auto other = add(BusRole::worker, "thief");
+  const auto honest = open(Endpoint::worker(1), worker_);
+  const auto job = [](const std::string& id) {
+    return bus::Envelope{Endpoint::server(), Endpoint::any_worker(), MessageKind::job, id, bytes(id)};
+  };
+  ASSERT_TRUE(hub_->send(job("j0")));
+  EXPECT_EQ(heard(*honest, 1).size(), 1U);
+  ASSERT_TRUE(within(60.0, [&] { return honest->state().waiting_acknowledgements == 0; })) << "the hub listens";
+  for (const char* id : {"j1", "j2", "j3"}) ASSERT_TRUE(hub_->send(job(id)));
+  std::vector<bus::Received> first;
+  ASSERT_TRUE(within(60.0, [&] {
+    for (bus::Received& one : honest->receive()) first.push_back(std::move(one));
+    return !first.empty() && hub_->state().waiting_messages == 0;
+  }));
+  const auto thief = connect(other);
+  ASSERT_NE(thief, nullptr);
+  for (const char* secret : {"", "0", "0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef"})
+    for (int sequence = 2; sequence <= 4; ++sequence)
+      for (const char* verb : {"+ACK", "+TERM", "-NAK", "+WPI"})
+        ASSERT_TRUE(thief->publish(
+            "mission.cave.worker.2.settle", "", "",
+            fmt::format("{} $JS.ACK.JOBS_cave.workers.1.{}.{}.1.0 {}", secret, sequence, sequence, verb)));
+  for (const char* text : {"", "+ACK", "a b c", "0 $JS.ACK.SUBMAPS_cave.server.1.1.1.1.0 +ACK"})
+    ASSERT_TRUE(thief->publish("mission.cave.worker.2.settle", "", "", text));
+  thief->flush();
+  EXPECT_TRUE(within(60.0, [&] { return hub_->state().strange_settlements >= 40; }))
+      << hub_->state().strange_settlements;
+  EXPECT_EQ(hub_->state().strange_settler, 2U);
+  std::vector<std::string> came;
+  EXPECT_TRUE(within(60.0, [&] {
+    for (bus::Received& one : honest->receive()) first.push_back(std::move(one));
+    for (const bus::Received& one : std::exchange(first, {})) {
+      came.push_back(one.envelope.id);
+      honest->acknowledge(one.ticket);
+    }
+    return came.size() == 3 && honest->state().waiting_acknowledgements == 0;
+  }));
+  EXPECT_EQ(came, (std::vector<std::string>{"j1", "j2", "j3"})) << "each once, in their order";
+  EXPECT_EQ(hub_->state().strange_settlements, 40U) << "of the honest one nothing is strange";
+  const auto base = connect(credentials("server"));
+  EXPECT_TRUE(within(10.0, [&] {
+    const auto state = base->read_state("JOBS_cave", "workers");
+    return state && *state && (*state)->messages == 0;
+  })) << "its own it has ended";
+  expect_all_is_well();
 }
 
 /// Fifty who begin TLS, a byte now and then: the bus gives all of a handshake two seconds.

@@ -50,6 +50,15 @@ std::vector<LinkWatch::Line> LinkWatch::check(const bus::LinkState& state, doubl
   if (is_in_vain && !reported_in_vain_) say(Level::error, trouble_);
   if (!is_in_vain && reported_in_vain_) say(Level::info, "jobs are answered again");
   reported_in_vain_ = is_in_vain;
+  const bool was_strange = strange_s_ && wall_s - *strange_s_ < kStrange_s;
+  if (std::exchange(strange_settlements_, state.strange_settlements) < state.strange_settlements) strange_s_ = wall_s;
+  if (strange_s_ && wall_s - *strange_s_ < kStrange_s) {
+    trouble_ = fmt::format(
+        "worker number {} says of jobs that it was not given that they are done ({} times so far), of which nothing "
+        "comes: an intruder has its credential? (tutti pki list, tutti pki revoke)",
+        state.strange_settler, state.strange_settlements);
+    if (!was_strange) say(Level::warning, trouble_);
+  }
   if (!state.denied.empty()) {
     trouble_ = fmt::format("the bus {} does not allow this program what it needs: {}", state.url, state.denied);
     if (std::exchange(reported_denied_, state.denied) != state.denied) say(Level::error, trouble_);

@@ -13,11 +13,13 @@
 namespace tutti::program {
 
 /// Reports changes of a program's link to the bus: there is no link, or none any more; the bus stores nothing, as when
-/// its disk is full; it does not allow something; it had lost its streams; it gives jobs to workers in vain.
+/// its disk is full; it does not allow something; it had lost its streams; it gives jobs to workers in vain; a worker
+/// speaks of others' jobs.
 class LinkWatch {
  public:
   static constexpr double kPatience_s = 5.0;  ///< A missing link is reported after this time.
   static constexpr double kStores_s = 25.0;   ///< Longer than a port waits for one confirmation.
+  static constexpr double kStrange_s = 60.0;  ///< A worker that speaks of others' jobs is trouble for so long.
 
   struct Line {
     Level level = Level::info;
@@ -34,6 +36,8 @@ class LinkWatch {
   bool said_gone_ = false;
   bool reported_full_ = false;
   bool reported_in_vain_ = false;
+  std::uint64_t strange_settlements_ = 0;
+  std::optional<double> strange_s_;  ///< When the last of these came.
   std::string reported_denied_;
   std::uint64_t made_anew_ = 0;
   std::string trouble_;

@@ -84,6 +84,25 @@ TEST(LinkWatch, ABusThatStoresNothingIsReportedToBeFull) {
   EXPECT_TRUE(watch.check(state, 23).empty());
 }
 
+TEST(LinkWatch, AWorkerThatSpeaksOfOthersJobsIsNamed) {
+  LinkWatch watch;
+  bus::LinkState state{.url = "nats://base:4222", .connected = true};
+  EXPECT_TRUE(watch.check(state, 0).empty());
+  state.strange_settlements = 40;
+  state.strange_settler = 7;
+  const auto lines = watch.check(state, 1);
+  ASSERT_EQ(lines.size(), 1U);
+  EXPECT_TRUE(has(lines[0].sentence, "worker number 7")) << lines[0].sentence;
+  EXPECT_TRUE(has(lines[0].sentence, "40 times")) << lines[0].sentence;
+  for (int s = 2; s < 100; ++s) {
+    state.strange_settlements += 10;
+    EXPECT_TRUE(watch.check(state, s).empty()) << "said once";
+    EXPECT_NE(watch.trouble(), "") << s;
+  }
+  watch.check(state, 160);
+  EXPECT_EQ(watch.trouble(), "");
+}
+
 TEST(LinkWatch, JobsGivenInVainAndWhatTheBusDoesNotAllowAreAlerts) {
   LinkWatch watch;
   bus::LinkState state{.url = "nats://base:4222", .connected = true, .given_in_vain = 60};

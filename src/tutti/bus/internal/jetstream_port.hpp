@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -22,6 +23,16 @@ namespace tutti::bus {
 
 inline constexpr auto kTick = std::chrono::milliseconds(100);
 inline constexpr auto kTryAgain = std::chrono::milliseconds(500);
+
+/// What goes with each job, and nobody guesses who has not been given it. Another one at each start.
+class JobSecrets {
+ public:
+  JobSecrets();
+  [[nodiscard]] std::string of(const std::string& id) const;
+
+ private:
+  std::array<unsigned char, 32> key_{};
+};
 
 /// A connection with where the bus confirms what was sent over it.
 struct Session {
@@ -67,6 +78,8 @@ class JetStreamPort final : public Port {
   void watch();
   /// Over the jobs: what this server has not sent goes, before it keeps workers from what it has.
   void keep_jobs_ours();
+  /// Passes on what workers say of their jobs, and not what they say of others'.
+  void settle_jobs();
   [[nodiscard]] bool is_stranded(const std::string& stream) const {
     const std::scoped_lock guard(mutex_);
     return stranded_ == stream;
@@ -90,6 +103,8 @@ class JetStreamPort final : public Port {
 
   Endpoint self_;
   BusOptions options_;
+  std::string settle_at_;  ///< A worker's, for its jobs.
+  JobSecrets secrets_;
   std::string answer_to_;  ///< Confirmation of piece 7 comes to "ANSWER_TO.7".
   std::atomic<bool> stopping_ = false;
   std::atomic<std::uint64_t> cuts_ = 0;     ///< Sessions and reconnections so far.
@@ -112,6 +127,8 @@ class JetStreamPort final : public Port {
   std::uint64_t jobs_removed_ = 0;
   std::unordered_set<std::uint64_t> jobs_sent_;  ///< Hashes of their ids; the server's.
   std::uint64_t strange_jobs_ = 0;
+  std::uint64_t strange_settlements_ = 0;
+  std::uint32_t strange_settler_ = 0;
   std::uint64_t given_in_vain_ = 0;
   std::optional<std::chrono::steady_clock::time_point> untaken_since_;  ///< Jobs wait, and nobody has one.
   std::uint64_t refused_ = 0;

@@ -37,6 +37,9 @@ inline constexpr std::chrono::milliseconds kNatsAnswer{5000};
 /// Parts that a consumer has been given and has not acknowledged; then the bus waits. More than an inbox can hold.
 inline constexpr std::uint64_t kMostUnacknowledged = 65'536;
 
+/// The header of a message that has a secret.
+inline constexpr const char* kSecret = "Tutti-Secret";
+
 /// TLS with a bus whose certificate this authority (PEM) has signed, and no other, whatever the system trusts.
 bool secure_by_authority(natsOptions* options, const std::string& authority);
 
@@ -113,11 +116,15 @@ class NatsConnection {
   /// The value retained at this subject; nothing if there is none, or one that is_of_another_subject().
   [[nodiscard]] Result<std::optional<std::string>> retained(const std::string& bucket,
                                                             const std::string& subject) const;
-  /// The message is acknowledged, and the bus has confirmed it.
+  /// The message is acknowledged, and the bus has confirmed it. `reply`: reply_of() it.
   [[nodiscard]] Status acknowledge(const std::string& reply) const;
-  /// Not waiting for an answer; `id` and `answer_to` may be empty.
+  /// Says of a message: "+WPI", work on it goes on; "+ACK", "-NAK", "+TERM". Waits for nothing.
+  [[nodiscard]] Status settle(const std::string& reply, const std::string& verb) const;
+  /// The secret of a message of a stream, "" if it has none; nothing: the message is gone.
+  [[nodiscard]] Result<std::optional<std::string>> secret_of(const std::string& stream, std::uint64_t sequence) const;
+  /// Not waiting for an answer; `id`, `answer_to` and `secret` may be empty.
   [[nodiscard]] Status publish(const std::string& subject, const std::string& answer_to, const std::string& id,
-                               std::string_view bytes) const;
+                               std::string_view bytes, const std::string& secret = {}) const;
   void flush() const { natsConnection_FlushTimeout(connection_, kNatsAnswer.count()); }
 
  private:
@@ -135,6 +142,8 @@ class NatsConnection {
 };
 
 std::string_view bytes_of(const natsMsg* message);
+/// Where a message is settled: its reply, or for one with a secret "SETTLE_AT SECRET REPLY".
+std::string reply_of(natsMsg* message, const std::string& settle_at);
 /// The bus has answered a question about a value of another subject, and whoever asked had it answer at this one: the
 /// bus checks where members publish, but not where they are answered.
 bool is_of_another_subject(natsMsg* message, const std::string& subject);

@@ -42,6 +42,11 @@ std::optional<std::uint32_t> number_of(std::string_view text) {
   return error == std::errc() && end == text.data() + text.size() ? std::optional(number) : std::nullopt;
 }
 
+bool is_number(std::string_view text) {
+  constexpr std::size_t kDigits = 19;  // of 64 bits
+  return !text.empty() && text.size() <= kDigits && text.find_first_not_of("0123456789") == std::string_view::npos;
+}
+
 /// "h00c0ffee00c0ffee"
 std::optional<std::uint64_t> content_of(std::string_view word) {
   constexpr std::size_t kDigits = 16;
@@ -74,6 +79,31 @@ std::string word_of(MessageKind kind) {
   std::string word = wire::name(kind);
   std::ranges::replace(word, ' ', '_');
   return word;
+}
+
+std::string settle_subject(const std::string& mission, const std::string& worker) {
+  return fmt::format("mission.{}.worker.{}.settle", mission, worker);
+}
+
+std::uint32_t settler_of(std::string_view subject) {
+  const auto words = split(subject, '.');
+  return words.size() < 2 ? 0 : number_of(words[words.size() - 2]).value_or(0);
+}
+
+/// "SECRET $JS.ACK.STREAM.workers.DELIVERIES.SEQUENCE.SEQUENCE_OF_CONSUMER.TIME.PENDING +ACK". Nothing else: the server
+/// may publish no other subject, and would be in trouble with the bus for it.
+std::optional<Settlement> settlement_of(std::string_view text, std::string_view stream) {
+  constexpr std::array<std::string_view, 4> kVerbs{"+ACK", "+WPI", "-NAK", "+TERM"};
+  constexpr std::size_t kNumbers = 5;
+  const auto words = split(text, ' ');
+  const std::string begin = fmt::format("$JS.ACK.{}.workers.", stream);
+  if (words.size() != 3 || std::ranges::count(kVerbs, words[2]) == 0 || !words[1].starts_with(begin))
+    return std::nullopt;
+  const auto numbers = split(words[1].substr(begin.size()), '.');
+  if (numbers.size() != kNumbers || !std::ranges::all_of(numbers, is_number)) return std::nullopt;
+  Settlement out{std::string(words[0]), std::string(words[1]), std::string(words[2])};
+  std::from_chars(numbers[1].data(), numbers[1].data() + numbers[1].size(), out.sequence);
+  return out;
 }
 
 std::string subject_of(const std::string& mission, const Envelope& envelope) {

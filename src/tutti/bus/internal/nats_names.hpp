@@ -27,6 +27,18 @@ bool is_mission_name(std::string_view mission);
 std::string subject_of(const std::string& mission, const Envelope& envelope);
 /// "proxy_graph"
 std::string word_of(MessageKind kind);
+/// "mission.M.worker.7.settle": where a worker says of its jobs that they are done, go on, or come back. Its server
+/// passes that on to the bus, as the bus itself lets everybody say so of everybody's.
+std::string settle_subject(const std::string& mission, const std::string& worker);
+/// Which worker it is; 0 also for what is no such subject.
+std::uint32_t settler_of(std::string_view subject);
+/// What a worker says there: the job's secret, which is in the job; where the bus is to learn it; and what.
+struct Settlement {
+  std::string secret, reply, verb;
+  std::uint64_t sequence = 0;  ///< The job's, in its stream.
+};
+/// Nothing: no such text, or of another stream than this one.
+std::optional<Settlement> settlement_of(std::string_view text, std::string_view stream);
 
 /// What a subject of ours has on its message; nothing when it is none of a robot, a worker or the viewers.
 struct Address {

@@ -92,5 +92,26 @@ RC_GTEST_PROP(NatsNames, AMessageIsPutTogetherFromItsPartsInAnyOrderAnyOfThemAga
   RC_ASSERT(put_together == all);
 }
 
+TEST(NatsNames, WhatAWorkerSaysOfAJobIsReadOrRefused) {
+  EXPECT_EQ(settle_subject("cave", "7"), "mission.cave.worker.7.settle");
+  EXPECT_EQ(settler_of(settle_subject("cave", "7")), 7U);
+  const std::string reply = "$JS.ACK.JOBS_cave.workers.1.42.3.1700000000000000000.5";
+  const auto said = settlement_of("ab12 " + reply + " +WPI", "JOBS_cave");
+  ASSERT_TRUE(said);
+  EXPECT_EQ(said->secret, "ab12");
+  EXPECT_EQ(said->reply, reply);
+  EXPECT_EQ(said->verb, "+WPI");
+  EXPECT_EQ(said->sequence, 42U);
+  EXPECT_FALSE(settlement_of("ab12 " + reply + " +WPI", "SUBMAPS_cave"));
+  for (const std::string& wrong :
+       {std::string(), reply, "ab12 " + reply, "ab12 " + reply + " +NXT", "ab12  " + reply + " +ACK",
+        "ab12 " + reply + ".1 +ACK", std::string("ab12 $JS.ACK.JOBS_cave.workers.1.x.3.1.5 +ACK"),
+        std::string("ab12 $JS.API.JOBS_cave.workers.1.42.3.1.5 +ACK"),
+        std::string("ab12 $JS.ACK.JOBS_cave.others.1.42.3.1.5 +ACK"),
+        std::string("ab12 $JS.ACK.JOBS_cave.workers.1.42.*.1.5 +ACK"),
+        std::string("ab12 $JS.ACK.JOBS_cave.workers.1.42..1.5 +ACK")})
+    EXPECT_FALSE(settlement_of(wrong, "JOBS_cave")) << wrong;
+}
+
 }  // namespace nats_names_test
 }  // namespace tutti::bus

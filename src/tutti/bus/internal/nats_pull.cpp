@@ -18,18 +18,19 @@ constexpr std::chrono::milliseconds kIsLost(1000);  // and so much later it will
 }  // namespace
 
 NatsPull::NatsPull(std::shared_ptr<NatsConnection> connection, const std::string& stream, const std::string& consumer,
-                   natsSubscription* subscription, std::string inbox)
+                   natsSubscription* subscription, std::string inbox, std::string settle_at)
     : connection_(std::move(connection)),
       ask_(fmt::format("$JS.API.CONSUMER.MSG.NEXT.{}.{}", stream, consumer)),
       subscription_(subscription),
-      inbox_(std::move(inbox)) {}
+      inbox_(std::move(inbox)),
+      settle_at_(std::move(settle_at)) {}
 
 NatsPull::~NatsPull() {
   while (left_ > 0 && Clock::now() < until_) {
     const Next late = next(0);
     if (late.state == State::lost) break;
     if (late.state == State::message)
-      static_cast<void>(connection_->publish(natsMsg_GetReply(late.message.get()), "", "", "-NAK"));
+      static_cast<void>(connection_->settle(reply_of(late.message.get(), settle_at_), "-NAK"));
   }
   natsSubscription_Unsubscribe(subscription_);
 }

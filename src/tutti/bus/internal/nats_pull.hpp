@@ -14,8 +14,9 @@ namespace tutti::bus {
 /// past the end of its list when messages of an earlier fetch come late, as over a link that stalls.
 class NatsPull {
  public:
+  /// `settle_at`: as in reply_of().
   NatsPull(std::shared_ptr<NatsConnection> connection, const std::string& stream, const std::string& consumer,
-           natsSubscription* subscription, std::string inbox);
+           natsSubscription* subscription, std::string inbox, std::string settle_at = {});
   /// What still comes is given back, so that another gets it at once.
   ~NatsPull();
   NatsPull(const NatsPull&) = delete;
@@ -41,6 +42,7 @@ class NatsPull {
   std::string ask_;  ///< Where to.
   natsSubscription* subscription_;
   std::string inbox_;  ///< All requests'; each has a number behind it.
+  std::string settle_at_;
   std::uint64_t requests_ = 0;
   int left_ = 0;         ///< The last request's.
   bool partly_ = false;  ///< Some of them came, and since then nothing was missed.
