@@ -49,7 +49,7 @@ export const palette_of = (dark: boolean): Palette =>
         candidate: "#a67c00",
         rejected: "#c8203c",
         ghost: "#5a4a12",
-        mark: "#b8860b",
+        mark: "#8a6100",
         onboard: "#c24e00",
       };
 
