@@ -34,7 +34,7 @@ bool within(double seconds, Condition&& condition) {
 inline void prepare(const bus::BusOptions& options) {
   const auto server = bus::open_port(bus::Endpoint::server(), options);
   ASSERT_TRUE(server.has_value()) << server.error().message;
-  EXPECT_TRUE(within(10.0, [&] { return (*server)->state().connected; })) << (*server)->state().last_error;
+  EXPECT_TRUE(within(60.0, [&] { return (*server)->state().connected; })) << (*server)->state().last_error;
 }
 
 /// A nats-server in a folder of its own, with a link in front of it for the robots.
