@@ -331,7 +331,7 @@ TEST(Scenarios, OtherParametersAreRepairedAsWell) {
          {world + "ramp_rise_m=1.5", robot + "odometry.scripted.0.up_m=-2", robot + "odometry.scripted.0.length_m=8"},
          0.7, 0.1);
   expect("degenerate",
-         {robot + "odometry.yaw_drift_deg_per_m=0.05", robot + "odometry.scale_percent=1",
+         {robot + "odometry.yaw_bias_deg_per_m=0.05", robot + "odometry.scale_percent=1",
           robot + "odometry.slips_per_km=4", robot + "odometry.slip_deg=5"},
          0.8, 0.5);
 }

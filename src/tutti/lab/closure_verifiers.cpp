@@ -147,7 +147,8 @@ std::shared_ptr<const server::ClosureVerifier> make_closure_verifier(
   auto verifier = own != nullptr ? own->make(config, recordings, seed) : config.closures.kind().make(config.closures);
   MethodId id = verifier->id();
   if (changes.wrong_share > 0.0)
-    verifier = std::make_shared<SpoiledClosureVerifier>(std::move(verifier), changes.wrong_share, changes.wrong, seed);
+    verifier = std::make_shared<SpoiledClosureVerifier>(std::move(verifier), changes.wrong_share,
+                                                        SpoiledClosureConfig{}, seed);
   id.settings = settings_hash(tutti::to_yaml(dump_config(DrawnSettings{config.closures, changes, seed})) +
                               extent_of(config, recordings));
   return std::make_shared<verifiers::NamedVerifier>(std::move(verifier), std::move(id), "");

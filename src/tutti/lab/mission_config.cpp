@@ -7,6 +7,7 @@
 #include <array>
 #include <iterator>
 #include <memory>
+#include <string_view>
 #include <utility>
 
 #include "tutti/lab/demo_missions.hpp"
@@ -19,6 +20,42 @@ namespace {
 constexpr double kEveryPose_s = 1e-6;
 
 mission::MissionConfig& of_recordings(MissionConfig& config) { return config; }
+
+constexpr std::string_view kDefault = "what was its default is always so, leave it out";
+constexpr std::string_view kOfKind = "simulated odometry has a kind, see `tutti settings odometry.kind`";
+/// Settings of the version before: a key from any of its words on, and what is to be done instead.
+constexpr std::array<std::pair<std::string_view, std::string_view>, 15> kGone = {{
+    {"odometry.tilt_deg_per_sqrt_m", kOfKind},
+    {"odometry.floor_m", kOfKind},
+    {"odometry.floor_deg", kOfKind},
+    {"odometry.yaw_drift_deg_per_m", "odometry.yaw_bias_deg_per_m drifts, too"},
+    {"odometry.consistent_length_m", kOfKind},
+    {"odometry.stated_sigma_factor", kOfKind},
+    {"odometry.slip_m", "it is always 0.1, leave it out"},
+    {"odometry.degeneracy", "set odometry.slide_percent, or odometry.kind to sliding"},
+    {"odometry.failure", "set odometry.kind to failing, or odometry.scripted"},
+    {"closures.wrong", kDefault},
+    {"place", kDefault},
+    {"hall.world", kDefault},
+    {"hall.imu", kDefault},
+    {"hall.lidar", kDefault},
+    {"flight.rate_hz", kDefault},
+}};
+
+void complain_of_gone(const ConfigNode& node, const std::string& path, config_internal::Findings& findings) {
+  for (std::size_t i = 0; i < node.list.size(); ++i)
+    complain_of_gone(node.list[i], fmt::format("{}.{}", path, i), findings);
+  for (const auto& [key, value] : node.map) {
+    const std::string full = path.empty() ? key : path + "." + key;
+    const auto gone = std::ranges::find_if(kGone, [dotted = "." + full](const auto& setting) {
+      return dotted.ends_with(fmt::format(".{}", setting.first));
+    });
+    if (gone == kGone.end())
+      complain_of_gone(value, full, findings);
+    else
+      config_internal::complain(findings, value, full, fmt::format("is no setting any more: {}", gone->second));
+  }
+}
 
 /// For each simulated robot; one without a name is named by its place in the list.
 template <class Robots>
@@ -96,6 +133,9 @@ ConfigNode without_verifier(ConfigNode root) {
 }  // namespace
 
 Result<MissionConfig> read_mission(const ConfigNode& root, const std::string& name) {
+  config_internal::Findings gone;
+  complain_of_gone(root, "", gone);
+  if (const auto ok = config_internal::to_status(name, gone.problems); !ok) return tl::unexpected(ok.error());
   MissionConfig config;
   ConfigLoader loader;
   loader.load(root, config);

@@ -54,7 +54,6 @@ struct ClosureChanges {
   std::string verifier = mission::MissionConfig().closures.verifier;
   simulation::ReferenceClosureConfig reference;
   double wrong_share = 0.0;
-  SpoiledClosureConfig wrong;
   std::vector<PlantedClosureConfig> planted;
   template <class V>
   void describe(V& v) {
@@ -63,7 +62,6 @@ struct ClosureChanges {
     v.field("reference", reference);
     v.field("wrong_share", wrong_share, between(0.0, 0.9),
             "Share of the closures found that are made wrong on purpose.");
-    v.field("wrong", wrong, any(), "How wrong these are.");
     v.field("planted", planted, any(), "reference: wrong closures at given places and times.");
   }
   /// The chosen row of lab_verifiers(); null: sensors' closures are found.
@@ -86,7 +84,6 @@ struct MissionConfig : mission::MissionConfig {
   std::vector<RobotChanges> robot_changes;  ///< For `robots`, by position; those beyond its end are not changed.
   ClosureChanges closure_changes;           ///< If these are not made up, `closures` says how closures are found.
   std::vector<simulation::ReceiverConfig> receivers;
-  simulation::PlaceConfig place;
   std::vector<MistakeConfig> mistakes;
   std::vector<std::string> compare_policies;  ///< In addition to the one that the robots follow.
 
@@ -100,7 +97,6 @@ struct MissionConfig : mission::MissionConfig {
     v.field("robots", robot_changes, any(), "The robots whose recordings are replayed.");
     v.field("closures", closure_changes);
     v.field("receivers", receivers, any(), "Simulated receivers of robots whose true poses are known.");
-    v.field("place", place, any(), "Where on the earth these robots are.");
     v.field("mistakes", mistakes, any(),
             "Robots that are set up wrongly, or whose odometry fails, to see what is said.");
     v.field("compare_policies", compare_policies, any(),

@@ -51,6 +51,19 @@ TEST(MissionConfig, WhatAMissionNeedsIsAskedForByName) {
   EXPECT_NE(problem_with("robots: [{name: 'a/b', odometry: {file: a}, scans: s}]").find("a/b"), std::string::npos);
 }
 
+TEST(MissionConfig, OfASettingThatIsGoneItIsSaidWhatToDo) {
+  const auto expect = [](const std::string& more, const std::string& said) {
+    const std::string problem = problem_with(kGood + more);
+    EXPECT_NE(problem.find(said), std::string::npos) << problem;
+  };
+  expect("hall: {imu: false}\n", "hall.imu: is no setting any more: what was its default is always so");
+  expect("place: {height_m: 3}\n", "place: is no setting any more");
+  expect("simulation: {robots: [{odometry: {floor_m: 1}}]}\n",
+         "simulation.robots.0.odometry.floor_m: is no setting any more: simulated odometry has a kind");
+  expect("simulation: {robots: [{odometry: {degeneracy: {slide_percent: 2}}}]}\n", "set odometry.slide_percent");
+  expect("robots_in_place: {}\n", "robots_in_place: unknown key");
+}
+
 TEST(MissionConfig, ImagesComeFromOnePlace) {
   const auto problem = [](const std::string& images, const std::string& odometry = "{file: a}") {
     return problem_with("robots: [{name: a, odometry: " + odometry + ", images: {" + images +

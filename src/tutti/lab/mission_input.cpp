@@ -90,7 +90,7 @@ Status add_fixes(const MissionConfig& config, std::uint64_t seed, const std::vec
       any = true;
       if (robot->reference.empty())
         return fail(ErrorCode::configuration, "receivers: robot {} has no reference to make fixes of", robot->name);
-      robot->fixes = simulation::simulate_fixes(robot->reference, receiver, config.place,
+      robot->fixes = simulation::simulate_fixes(robot->reference, receiver, simulation::PlaceConfig{},
                                                 Rng(seed).fork("receiver/" + robot->name));
     }
     if (!any) return fail(ErrorCode::configuration, "receivers: no robot is called '{}'", receiver.robot);

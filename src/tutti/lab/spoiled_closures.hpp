@@ -15,12 +15,8 @@ namespace tutti::lab {
 
 /// How wrong closures are that the laboratory puts into a mission.
 struct SpoiledClosureConfig {
+  /// Share of the wrong ones that agree with their neighbours, as places that look alike cause.
   double agreeing_share = 0.3;
-  template <class V>
-  void describe(V& v) {
-    v.field("agreeing_share", agreeing_share, between(0.0, 1.0),
-            "Share of the wrong ones that agree with their neighbours, as places that look alike cause.");
-  }
 };
 
 /// Makes a share of another verifier's accepted verdicts wrong, with their covariance unchanged. Which ones, and how

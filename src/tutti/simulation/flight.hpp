@@ -26,7 +26,6 @@ struct FlightConfig {
   template <class V>
   void describe(V& v) {
     v.field("duration_s", duration_s, above_zero_to(7.0 * 86400.0), "Length of the flight.");
-    v.field("rate_hz", rate_hz, between(0.1, 1000.0), "Poses per second.");
     v.field("height_m", height_m, between(0.0, 100.0), "Mean height above the floor.");
     v.field("start_deg", start_deg, between(-360.0, 360.0), "Where on the ellipse it begins.");
   }

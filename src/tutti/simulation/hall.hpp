@@ -18,13 +18,6 @@ struct HallConfig {
   double height_m = 5.0;
   int boxes = 40;
   double plain_share = 0.15;  ///< Share of the boxes' faces that have no texture.
-  template <class V>
-  void describe(V& v) {
-    v.field("length_m", length_m, between(12.0, 1000.0), "x, about the origin.");
-    v.field("width_m", width_m, between(12.0, 1000.0), "y, about the origin.");
-    v.field("height_m", height_m, between(3.0, 100.0), "From the floor, z = 0.");
-    v.field("boxes", boxes, between(0, 10000), "A quarter of them in the middle.");
-  }
 };
 
 /// One flat rectangle, which is triangles 2 i and 2 i + 1 of the mesh.

@@ -54,7 +54,8 @@ Result<SimulatedHall> simulate_hall(const HallMissionConfig& config, Timestamp s
     recording.robot = RobotId{static_cast<std::uint32_t>(out.robots.size())};
     recording.name = robot.name;
     recording.reference = simulate_flight(robot.flight, start + robot.start_s);
-    OdometrySimulation simulated = simulate_odometry(recording.reference, {}, {robot.odometry}, own.fork("odometry"));
+    OdometrySimulation simulated =
+        simulate_odometry(recording.reference, {}, robot.odometry.config(), own.fork("odometry"));
     recording.odometry = std::move(simulated.odometry);
     recording.increment_covariance = std::move(simulated.increment_covariance);
     recording.drift_origins = std::move(simulated.drift_origins);

@@ -24,14 +24,14 @@ struct FlyingRobotConfig {
   std::string sensors = "visual";
   double start_s = 0.0;
   FlightConfig flight;
-  OdometryDriftConfig odometry;
+  OdometryChoice odometry;
   template <class V>
   void describe(V& v) {
     v.field("name", name, any(), "Unique name.");
     v.field("sensors", sensors, one_of({"visual", "lidar", "both"}), "What it carries.");
     v.field("start_s", start_s, between(0.0, kLongest_s), "Mission time at which it starts to fly.");
     v.field("flight", flight, any(), "Where it flies.");
-    v.field("odometry", odometry, any(), "Drift of its odometry.");
+    v.field("odometry", odometry, any(), "Errors of its odometry.");
   }
 };
 
@@ -42,18 +42,16 @@ struct HallMissionConfig {
   int cameras = 1;
   bool depth = false;
   bool half_resolution = true;  ///< Images of 376 x 240 pixels instead of 752 x 480, in a quarter of the time.
-  bool imu = true;
+  bool imu = true;              ///< Robots with a camera have an IMU, too.
   LidarChoice lidar;
   std::vector<FlyingRobotConfig> robots;
   template <class V>
   void describe(V& v) {
-    v.field("world", world, any(), "Where they fly.");
+    v.field("boxes", world.boxes, between(0, 10000), "How many stand there, a quarter of them in the middle.");
     v.field("cameras", cameras, between(1, 2),
             "How many a robot with cameras has; the second is 11 cm to the right of the first.");
     v.field("depth", depth, any(),
             "The camera, of one, is an RGB-D camera: depth within 8 m, 1.4 mm off at 1 m, growing with its square.");
-    v.field("imu", imu, any(), "Robots with a camera have an IMU, too.");
-    v.field("lidar", lidar, any(), "LiDARs.");
     v.field("robots", robots, any(), "The robots, each with its own start and odom frame.");
   }
 };

@@ -301,6 +301,73 @@ std::vector<Surroundings> surroundings_along(const CorridorWorld& world, const T
   return out;
 }
 
+const std::vector<OdometryKind>& odometry_kinds() {
+  static const std::vector<OdometryKind> rows{
+      {"honest", "drifts by a few thousandths of the distance, as it says", {}},
+      {"better",
+       "twenty times better than it says",
+       {.translation_m_per_sqrt_m = 0.0005,
+        .yaw_deg_per_sqrt_m = 0.0025,
+        .tilt_deg_per_sqrt_m = 0.0005,
+        .floor_m = 0.000005,
+        .floor_deg = 0.00005,
+        .yaw_bias_deg_per_m = 0.00015,
+        .scale_percent = 0.01,
+        .stated_sigma_factor = 20.0}},
+      {"precise",
+       "a third of honest's random walk, and less drift",
+       {.translation_m_per_sqrt_m = 0.003,
+        .yaw_deg_per_sqrt_m = 0.01,
+        .tilt_deg_per_sqrt_m = 0.005,
+        .yaw_bias_deg_per_m = 0.0005,
+        .scale_percent = 0.03}},
+      {"unsure",
+       "twice honest's random walk of position, and says three times as much as there is",
+       {.translation_m_per_sqrt_m = 0.02, .stated_sigma_factor = 3.0}},
+      {"drifting", "yaw drifts ten times as much as honest's", {.yaw_bias_deg_per_m = 0.03, .scale_percent = 0.5}},
+      {"legged",
+       "slips twice in a kilometre, slides along featureless corridors",
+       {.slips_per_km = 2.0, .degeneracy = {.slide_percent = 1.8, .along_m_per_sqrt_m = 0.03}}},
+      {"stumbling",
+       "slips six times in a kilometre, slides, and its yaw drifts by a tenth of a degree in a metre",
+       {.yaw_bias_deg_per_m = 0.1,
+        .scale_percent = 0.5,
+        .slips_per_km = 6.0,
+        .slip_deg = 0.5,
+        .degeneracy = {.slide_percent = 2.5, .along_m_per_sqrt_m = 0.03}}},
+      {"sliding",
+       "slides by 3 % or more along featureless corridors",
+       {.degeneracy = {.slide_percent = 5.0, .least_slide_percent = 3.0, .along_m_per_sqrt_m = 0.03}}},
+      {"failing",
+       "turns by 5.8 degrees over 30 m in the open, which its covariance does not show",
+       {.failure = {.after_m = 30.0, .length_m = 30.0, .yaw_deg = 5.8}}},
+      {"visual",
+       "as visual-inertial odometry of a flight",
+       {.translation_m_per_sqrt_m = 0.02,
+        .yaw_deg_per_sqrt_m = 0.25,
+        .tilt_deg_per_sqrt_m = 0.05,
+        .yaw_bias_deg_per_m = 0.18,
+        .scale_percent = 0.5}},
+  };
+  return rows;
+}
+
+OdometryNoiseConfig OdometryChoice::config() const {
+  const OdometryKind* row = row_of(odometry_kinds(), kind);
+  TUTTI_CHECK(row != nullptr, "odometry '{}'", kind);
+  OdometryNoiseConfig out = row->config;
+  const auto set = [](double& number, const std::optional<double>& given) { number = given.value_or(number); };
+  set(out.translation_m_per_sqrt_m, translation_m_per_sqrt_m);
+  set(out.yaw_deg_per_sqrt_m, yaw_deg_per_sqrt_m);
+  set(out.yaw_bias_deg_per_m, yaw_bias_deg_per_m);
+  set(out.scale_percent, scale_percent);
+  set(out.slips_per_km, slips_per_km);
+  set(out.slip_deg, slip_deg);
+  set(out.degeneracy.slide_percent, slide_percent);
+  out.scripted = scripted;
+  return out;
+}
+
 OdometrySimulation simulate_odometry(const Trajectory& truth, std::span<const Surroundings> surroundings,
                                      const OdometryNoiseConfig& config, Rng rng) {
   TUTTI_CHECK(surroundings.empty() || surroundings.size() == truth.size(), "{} surroundings, {} poses",

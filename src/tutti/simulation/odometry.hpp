@@ -3,11 +3,15 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <optional>
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "tutti/base/config.hpp"
 #include "tutti/base/random.hpp"
+#include "tutti/base/rows.hpp"
 #include "tutti/geometry/pose3.hpp"
 #include "tutti/model/recording.hpp"
 #include "tutti/model/trajectory.hpp"
@@ -19,33 +23,17 @@ namespace tutti::simulation {
 /// Errors along featureless corridors, where nothing tells the position along the axis. The robot notices: its
 /// covariance is inflated along the axis.
 struct DegeneracyConfig {
-  double slide_percent = 3.0;
-  double least_slide_percent = 0.0;
-  double along_m_per_sqrt_m = 0.05;
-  template <class V>
-  void describe(V& v) {
-    v.field("slide_percent", slide_percent, between(0.0, 50.0),
-            "Error of the speed along the axis, drawn anew at every visit.");
-    v.field("least_slide_percent", least_slide_percent, between(0.0, 50.0),
-            "What is drawn smaller becomes this large, with its sign.");
-    v.field("along_m_per_sqrt_m", along_m_per_sqrt_m, between(0.0, kFarthest_m), "Random walk along the axis.");
-  }
+  double slide_percent = 3.0;        ///< Error of the speed along the axis, drawn anew at every visit.
+  double least_slide_percent = 0.0;  ///< A smaller slide becomes this large, with its sign.
+  double along_m_per_sqrt_m = 0.05;  ///< Random walk along the axis.
 };
 
 /// A localisation failure under the open sky, once per run, which the covariance does not show.
 struct FailureConfig {
-  double after_m = 5.0;
-  double length_m = 20.0;
-  double yaw_deg = 0.0;
-  double drift_m = 0.0;
-  template <class V>
-  void describe(V& v) {
-    v.field("after_m", after_m, between(0.0, kFarthest_m), "Begins after this distance in the open.");
-    v.field("length_m", length_m, above_zero_to(kFarthest_m), "Lasts this long, or until the robot is back inside.");
-    v.field("yaw_deg", yaw_deg, between(0.0, 180.0), "Yaw error it ends with, to either side.");
-    v.field("drift_m", drift_m, between(0.0, kFarthest_m),
-            "Position error it ends with, in one drawn horizontal direction.");
-  }
+  double after_m = 5.0;    ///< Begins after this distance in the open,
+  double length_m = 20.0;  ///< and lasts this long, or until the robot is back inside.
+  double yaw_deg = 0.0;    ///< Yaw error it ends with, to either side.
+  double drift_m = 0.0;    ///< Position error it ends with, in one drawn horizontal direction.
 };
 
 /// One error at a given place of the run, which the covariance does not show: odometry reports this move and turn in
@@ -71,56 +59,58 @@ struct ScriptedErrorConfig {
   }
 };
 
-/// Drift of an odometry that knows gravity: yaw drifts more than tilt. All are standard deviations; the constants of
-/// one run (scale, yaw drift) are drawn once from them.
-struct OdometryDriftConfig {
-  double translation_m_per_sqrt_m = 0.01;
-  double yaw_deg_per_sqrt_m = 0.05;
-  double tilt_deg_per_sqrt_m = 0.01;
-  double floor_m = 1e-4;
-  double floor_deg = 1e-3;
-  double yaw_bias_deg_per_m = 0.003;
-  double yaw_drift_deg_per_m = 0.0;
-  double scale_percent = 0.2;
+/// Errors of an odometry that knows gravity: yaw drifts more than tilt. All are standard deviations; the constants of
+/// one run (scale, yaw drift) are drawn once from them. The robot's covariance shows neither slips nor failures.
+struct OdometryNoiseConfig {
+  double translation_m_per_sqrt_m = 0.01;  ///< Random walk of position, per axis.
+  double yaw_deg_per_sqrt_m = 0.05;        ///< Random walk of yaw.
+  double tilt_deg_per_sqrt_m = 0.01;       ///< Random walk of roll and of pitch.
+  double floor_m = 1e-4;                   ///< Position noise of an increment even when standing still, per axis.
+  double floor_deg = 1e-3;                 ///< Rotation noise of an increment even when standing still.
+  double yaw_bias_deg_per_m = 0.003;       ///< Slowly varying yaw drift (Gauss-Markov).
+  double yaw_drift_deg_per_m = 0.0;        ///< Constant yaw drift of the run.
+  double scale_percent = 0.2;              ///< Constant scale error of the run.
+  /// Length at which the covariance of independent increments matches the constant errors.
   double consistent_length_m = 50.0;
+  /// Stated standard deviations over the honest ones: above 1 the odometry is better than it says.
   double stated_sigma_factor = 1.0;
-  template <class V>
-  void describe(V& v) {
-    v.field("translation_m_per_sqrt_m", translation_m_per_sqrt_m, between(0.0, kFarthest_m),
-            "Random walk of position, per axis.");
-    v.field("yaw_deg_per_sqrt_m", yaw_deg_per_sqrt_m, between(0.0, 180.0), "Random walk of yaw.");
-    v.field("tilt_deg_per_sqrt_m", tilt_deg_per_sqrt_m, between(0.0, 180.0), "Random walk of roll and of pitch.");
-    v.field("floor_m", floor_m, above_zero_to(kFarthest_m),
-            "Position noise of an increment even when standing still, per axis.");
-    v.field("floor_deg", floor_deg, above_zero_to(180.0), "Rotation noise of an increment even when standing still.");
-    v.field("yaw_bias_deg_per_m", yaw_bias_deg_per_m, between(0.0, 180.0), "Slowly varying yaw drift (Gauss-Markov).");
-    v.field("yaw_drift_deg_per_m", yaw_drift_deg_per_m, between(0.0, 180.0), "Constant yaw drift of the run.");
-    v.field("scale_percent", scale_percent, between(0.0, 50.0), "Constant scale error of the run.");
-    v.field("consistent_length_m", consistent_length_m, above_zero_to(kFarthest_m),
-            "Length at which the covariance of independent increments matches the constant errors.");
-    v.field("stated_sigma_factor", stated_sigma_factor, above_zero_to(1e6),
-            "Stated standard deviations over the honest ones: above 1 the odometry is better than it says.");
-  }
-};
-
-/// Drift, and what a robot's covariance does not show or shows along one axis alone.
-struct OdometryNoiseConfig : OdometryDriftConfig {
-  double slips_per_km = 0.0;
-  double slip_m = 1.0;
-  double slip_deg = 10.0;
+  double slips_per_km = 0.0;  ///< Sudden errors.
+  double slip_m = 0.1;        ///< Horizontal size of a slip, per axis.
+  double slip_deg = 0.2;      ///< Yaw of a slip.
   DegeneracyConfig degeneracy;
   FailureConfig failure;
   std::vector<ScriptedErrorConfig> scripted;
+};
+
+/// An odometry that can be chosen.
+struct OdometryKind {
+  std::string_view name, help;
+  OdometryNoiseConfig config;
+};
+const std::vector<OdometryKind>& odometry_kinds();
+
+/// The errors of a simulated robot's odometry: those of a kind, and what is given beside it instead.
+struct OdometryChoice {
+  std::string kind = "honest";
+  std::optional<double> translation_m_per_sqrt_m, yaw_deg_per_sqrt_m, yaw_bias_deg_per_m, scale_percent, slips_per_km,
+      slip_deg, slide_percent;
+  std::vector<ScriptedErrorConfig> scripted;
   template <class V>
   void describe(V& v) {
-    OdometryDriftConfig::describe(v);
+    v.field("kind", kind, one_of(names_of(odometry_kinds())),
+            help_of(odometry_kinds()) + ". What follows counts instead of the kind's own.");
+    v.field("translation_m_per_sqrt_m", translation_m_per_sqrt_m, between(0.0, kFarthest_m),
+            "Random walk of position, per axis.");
+    v.field("yaw_deg_per_sqrt_m", yaw_deg_per_sqrt_m, between(0.0, 180.0), "Random walk of yaw.");
+    v.field("yaw_bias_deg_per_m", yaw_bias_deg_per_m, between(0.0, 180.0), "Slowly varying yaw drift (Gauss-Markov).");
+    v.field("scale_percent", scale_percent, between(0.0, 50.0), "Constant scale error of the run.");
     v.field("slips_per_km", slips_per_km, between(0.0, 1e6), "Sudden errors that the covariance does not know.");
-    v.field("slip_m", slip_m, between(0.0, kFarthest_m), "Horizontal size of a slip, per axis.");
     v.field("slip_deg", slip_deg, between(0.0, 180.0), "Yaw of a slip.");
-    v.field("degeneracy", degeneracy, any(), "Along featureless corridors.");
-    v.field("failure", failure, any(), "In the open.");
+    v.field("slide_percent", slide_percent, between(0.0, 50.0),
+            "Error of the speed along featureless corridors, drawn anew at every visit.");
     v.field("scripted", scripted, any(), "Errors of given size at given places.");
   }
+  [[nodiscard]] OdometryNoiseConfig config() const;
 };
 
 /// The corridor a robot is in at one sample.

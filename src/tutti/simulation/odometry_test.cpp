@@ -64,6 +64,23 @@ double mean_normalised_error(const OdometryNoiseConfig& config, double segment_m
   return sum / count;
 }
 
+TEST(SimulateOdometry, WhatIsGivenCountsInsteadOfTheKindsOwn) {
+  for (const OdometryKind& kind : odometry_kinds()) {
+    const OdometryNoiseConfig own = OdometryChoice{.kind = std::string(kind.name)}.config();
+    EXPECT_EQ(own.yaw_bias_deg_per_m, kind.config.yaw_bias_deg_per_m) << kind.name;
+    EXPECT_EQ(own.stated_sigma_factor, kind.config.stated_sigma_factor) << kind.name;
+    OdometryChoice given{.kind = std::string(kind.name)};
+    given.slide_percent = 7.0;
+    given.slips_per_km = 0.0;
+    given.scripted = {{.after_m = 3.0}};
+    const OdometryNoiseConfig changed = given.config();
+    EXPECT_EQ(changed.degeneracy.slide_percent, 7.0) << kind.name;
+    EXPECT_EQ(changed.slips_per_km, 0.0) << kind.name;
+    EXPECT_EQ(changed.scale_percent, kind.config.scale_percent) << kind.name;
+    EXPECT_EQ(changed.scripted.size(), 1U) << kind.name;
+  }
+}
+
 OdometryNoiseConfig white_noise() {
   OdometryNoiseConfig config;
   config.yaw_bias_deg_per_m = 0.0;
@@ -103,6 +120,8 @@ TEST(SimulateOdometry, InflationIsWhatKeepsStrongConstantErrorsHonest) {
 TEST(SimulateOdometry, SlipsAreNotInTheCovariance) {
   OdometryNoiseConfig config = white_noise();
   config.slips_per_km = 20.0;
+  config.slip_m = 1.0;
+  config.slip_deg = 10.0;
   EXPECT_GT(mean_normalised_error(config, 50.0, 100), 10.0);
 }
 
@@ -201,6 +220,8 @@ TEST(SimulateOdometry, OriginsOfDriftSayWhenAndHowMuch) {
   const auto around = corridor_between(truth, CorridorKind::featureless, 10.0, 40.0);
   OdometryNoiseConfig config;
   config.slips_per_km = 50.0;
+  config.slip_m = 1.0;
+  config.slip_deg = 10.0;
   int slips = 0;
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     const auto simulated = simulate_odometry(truth, around, config, Rng(seed));

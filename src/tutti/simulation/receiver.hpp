@@ -11,19 +11,12 @@
 
 namespace tutti::simulation {
 
-/// Where on the earth a simulated world is.
+/// Where on the earth a simulated world is (WGS 84): the truth's origin, and how far its x axis points north of east.
 struct PlaceConfig {
   double latitude_deg = 46.5;
   double longitude_deg = 7.9;
   double height_m = 600.0;
   double yaw_deg = 25.0;
-  template <class V>
-  void describe(V& v) {
-    v.field("latitude_deg", latitude_deg, between(-90.0, 90.0), "Where the truth's origin is; WGS 84.");
-    v.field("longitude_deg", longitude_deg, between(-180.0, 180.0), "The same.");
-    v.field("height_m", height_m, between(-1e4, 1e4), "Above the ellipsoid.");
-    v.field("yaw_deg", yaw_deg, between(-180.0, 180.0), "The truth's x axis points so far north of east.");
-  }
 };
 
 /// A satellite receiver on a robot, and its errors.

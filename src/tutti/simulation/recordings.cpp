@@ -37,8 +37,9 @@ Recording simulate_robot(const SimulatedRobotConfig& config, const CorridorWorld
                          std::optional<std::size_t> junction, Timestamp start, const Rng& rng) {
   Recording recording;
   recording.reference = simulate_walk(network, config.walk, start, junction, rng.fork("walk"));
-  OdometrySimulation simulated = simulate_odometry(
-      recording.reference, surroundings_along(network, recording.reference), config.odometry, rng.fork("odometry"));
+  OdometrySimulation simulated =
+      simulate_odometry(recording.reference, surroundings_along(network, recording.reference), config.odometry.config(),
+                        rng.fork("odometry"));
   recording.odometry = std::move(simulated.odometry);
   recording.increment_covariance = std::move(simulated.increment_covariance);
   recording.drift_origins = std::move(simulated.drift_origins);

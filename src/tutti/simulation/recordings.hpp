@@ -27,7 +27,7 @@ struct SimulatedRobotConfig {
   double start_s = 0.0;
   std::optional<int> start_junction;  ///< Where it starts; none: far from the others. A route has one, too.
   WalkConfig walk;
-  OdometryNoiseConfig odometry;
+  OdometryChoice odometry;
   template <class V>
   void describe(V& v) {
     v.field("name", name, any(), "Unique name; empty: alpha, bravo, ... by place in the list.");

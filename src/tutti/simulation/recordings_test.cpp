@@ -106,7 +106,7 @@ TEST(SimulateRecordings, SettingsThatCannotBeComputedAreRefused) {
   for (const std::string setting :
        {"robots: [{walk: {duration_s: .inf}}]", "robots: [{walk: {rate_hz: 1e9}}]", "robots: [{start_s: .inf}]",
         "robots: [{walk: {length_m: .inf}}]", "robots: [{walk: {lookahead_m: 0}}]",
-        "robots: [{odometry: {slip_m: .inf}}]", "world: {network: {block_m: 0.001}}", "world: {roof_length_m: .inf}",
+        "robots: [{odometry: {slip_deg: .inf}}]", "world: {network: {block_m: 0.001}}", "world: {roof_length_m: .inf}",
         "surface: {width_m: .inf}", "surface: {body_height_m: .inf}", "lidar: {rays_share: .inf}"}) {
     const auto node = parse_yaml(setting, "simulation");
     ASSERT_TRUE(node.has_value()) << setting;
