@@ -36,7 +36,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 15> kGone = 
     {"odometry.failure", "set odometry.kind to failing, or odometry.scripted"},
     {"closures.wrong", kDefault},
     {"place", kDefault},
-    {"hall.world", kDefault},
+    {"hall.world", "hall.boxes says how many boxes stand there, and what else was its default is always so"},
     {"hall.imu", kDefault},
     {"hall.lidar", kDefault},
     {"flight.rate_hz", kDefault},
