@@ -10,7 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include "tutti/base/config.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/bus/bus_credentials.hpp"
 #include "tutti/bus/child_process.hpp"
@@ -19,28 +18,18 @@
 namespace tutti::bus {
 
 struct NatsChildOptions {
-  std::string program = "nats-server";
+  std::string program = "nats-server";  ///< Searched for in PATH, then in /usr/sbin.
   std::string host = "127.0.0.1";
-  int port = 0;
-  bool allow_insecure = false;
+  int port = 0;                 ///< 0: the port of the last time if that is free, else any from 20000 on.
+  bool allow_insecure = false;  ///< Listen at other addresses than this machine's own, without TLS.
   /// The blocks `tls`, `authorization` and `accounts` of nats-server's configuration (pki::Pki::bus_configuration()),
   /// and the server's own credential; empty: whoever reaches the bus may do all.
   std::string rights = {};
   BusCredentials credentials = {};
-  std::uint64_t max_store_bytes = std::uint64_t{4} << 30U;
+  std::uint64_t max_store_bytes = std::uint64_t{4} << 30U;  ///< What messages may take on the disk.
+  /// Beside max_store_bytes, this must be free on the disk: nats-server hangs on a full one.
   std::uint64_t min_free_bytes = std::uint64_t{1} << 30U;
-  double start_timeout_s = 30.0;
-  template <class V>
-  void describe(V& v) {
-    v.field("program", program, any(), "Searched for in PATH, then in /usr/sbin.");
-    v.field("host", host, any(), "Address to listen at.");
-    v.field("port", port, between(0, 65535), "0 = the port of the last time if that is free, else any from 20000 on.");
-    v.field("allow_insecure", allow_insecure, any(), "Listen at other addresses than this machine's own, without TLS.");
-    v.field("max_store_bytes", max_store_bytes, greater_than(0.0), "What messages may take on the disk.");
-    v.field("min_free_bytes", min_free_bytes, any(),
-            "Beside max_store_bytes, this must be free on the disk: nats-server hangs on a full one.");
-    v.field("start_timeout_s", start_timeout_s, greater_than(0.0), "It must be ready by then.");
-  }
+  double start_timeout_s = 30.0;  ///< It must be ready by then.
 };
 
 /// A nats-server with JetStream as a child process. The child ends with this process, however this one ends. Its folder

@@ -8,24 +8,17 @@
 #include <set>
 #include <vector>
 
-#include "tutti/base/config.hpp"
 #include "tutti/base/ids.hpp"
 #include "tutti/base/timestamp.hpp"
 
 namespace tutti::node {
 
-/// How much of its link a robot's submaps may use; `describe` explains it.
+/// How much of its link a robot's submaps may use.
 struct UplinkConfig {
-  double bytes_per_s = 0.0;
+  double bytes_per_s = 0.0;  ///< In seconds of the mission; 0: no limit.
+  /// Limit on what was sent and is not confirmed by the server; the rest waits at the robot, the newest for the first
+  /// room. 0: no limit.
   std::uint64_t max_under_way_bytes = std::uint64_t{1} << 20U;
-  template <class V>
-  void describe(V& v) {
-    v.field("bytes_per_s", bytes_per_s, between(0.0, 1e12),
-            "What a robot's submaps may take of its link, in seconds of the mission; 0 = no limit.");
-    v.field("max_under_way_bytes", max_under_way_bytes, any(),
-            "Of submaps sent and not confirmed by the server; the rest waits at the robot, the newest for the first "
-            "room. 0 = no limit.");
-  }
 };
 
 /// Decides when which of a robot's submaps is sent to the server: the newest first. Each sent submap occupies the link

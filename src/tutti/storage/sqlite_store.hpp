@@ -5,24 +5,18 @@
 #include <filesystem>
 #include <memory>
 
-#include "tutti/base/config.hpp"
 #include "tutti/storage/table_store.hpp"
 
 namespace tutti::storage {
 
 /// Limits on what a store adds to the disk.
 struct SqliteOptions {
+  /// Free space on the disk below which no row is added: a full disk stops others too.
   std::uint64_t min_free_bytes = std::uint64_t{256} << 20U;
-  std::uint64_t max_bytes = 0;
+  std::uint64_t max_bytes = 0;  ///< Size above which the file does not grow; 0: as far as the disk goes.
   /// Others may read the file meanwhile (open_sqlite_reader()). Two that open it so do not see each other: who does has
   /// another lock, as of a state folder.
   bool has_readers = false;
-  template <class V>
-  void describe(V& v) {
-    v.field("min_free_bytes", min_free_bytes, any(),
-            "Free space on the disk below which no row is added: a full disk stops others too.");
-    v.field("max_bytes", max_bytes, any(), "Size above which the file does not grow; 0 = as far as the disk goes.");
-  }
 };
 
 /// Opens a store in one SQLite file, which is made if it is missing. While the store is open and after a crash FILE-wal
