@@ -219,7 +219,7 @@ void add_diff_command(CLI::App& map, int& exit_code) {
       "diff",
       "What was there and is no more, and what is there since: by what was seen, and seen through, in either time.");
   diff->footer(
-      "Of one map: its newest version against those before. Of two: what the second has beyond the first.\n"
+      "With one map: its newest version against those before. With two: what the second has beyond the first.\n"
       "Example: tutti map diff site.tutti && tutti map diff monday.tutti tuesday.tutti --ply changes.ply\n");
   diff->add_option("maps", options->maps, "A map with several versions, or a map and a later version of it.")
       ->type_name("MAP")
