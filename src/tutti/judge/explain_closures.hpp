@@ -44,11 +44,11 @@ struct Judgement {
 /// closures are wrong for certain. Its misfit is that of the pose graph solved under it by graduated non-convexity,
 /// with every closure truncated and the closures at one keyframe sharing one vote, plus the price of its failed
 /// segments. The hypothesis with the least misfit is taken. Tried are: nothing failed; what fails when all odometry may
-/// fail, less whatever does not pay for itself; that it failed where it stood still; and the largest `groups` of closures
-/// as wrong all together. `graph`:
-/// its first `odometry_edges` edges are odometry, all others closures, and `groups` are positions among these.
-/// `certain`: per closure whether an operator vouches for it (empty: none); such a closure is never truncated and never
-/// tried as wrong. The result does not depend on the order of the closures, but for rounding.
+/// fail, less whatever does not pay for itself; that it failed where it stood still; and the largest `groups` of
+/// closures as wrong all together. `graph`: its first `odometry_edges` edges are odometry, all others closures, and
+/// `groups` are positions among these. `certain`: per closure whether an operator vouches for it (empty: none); such a
+/// closure is never truncated and never tried as wrong. The result does not depend on the order of the closures, but
+/// for rounding.
 Judgement explain_closures(PoseGraph graph, const OdometryTrajectories& odometry, std::size_t odometry_edges,
                            std::span<const std::vector<std::size_t>> groups, const OutlierRejectionConfig& config,
                            const estimation::GncConfig& gnc, const std::vector<bool>& certain = {});
