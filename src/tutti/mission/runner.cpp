@@ -114,10 +114,14 @@ class MissionRun {
       if (auto ok = robot.actor->check_scans(); !ok) return ok;
     return {};
   }
-  /// The server's map, with the names that robots send in statuses, which a mission in virtual time does not have.
+  /// The server's map, with the names that robots send in statuses, which a mission in virtual time does not have. A
+  /// robot that has not begun has none: it may be one of an earlier day.
   [[nodiscard]] const storage::TableStore& named_map() {
     std::vector<storage::Write> rows;
+    std::set<RobotId> mapped;
+    for (const auto& [id, submap] : server_->map_server().state().submaps) mapped.insert(id.chain.robot);
     for (const MissionRecording& recording : recordings_) {
+      if (!mapped.contains(recording.recording.robot)) continue;
       const std::string key = node::RobotRegistry::key(recording.recording.robot);
       const auto stored = store_.read(map_tables::kMeta, key).value();
       node::RobotRow row = stored ? node::decode_robot(*stored).value() : node::RobotRow{};
