@@ -64,8 +64,10 @@ int show_log(const std::string& file) {
   if (!map) return complain("map log", map.error().message);
   fmt::print("{:>7}  {:<16} {:>8} {:>10} {:>8} {:>9} {:>13}  {}\n", "version", "held (UTC)", "submaps", "keyframes",
              "minutes", "closures", "with earlier", "sessions");
-  for (const Version& version : map->versions) {
-    const auto size = mapfile::size_of(version, map->content, map->map);
+  const auto sizes = mapfile::sizes_of(map->versions, map->content, map->map);
+  for (std::size_t k = 0; k < sizes.size(); ++k) {
+    const Version& version = map->versions[k];
+    const mapfile::VersionSize& size = sizes[k];
     const std::string held =
         version.held_ns == 0
             ? "not held"

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -165,19 +166,25 @@ Result<std::vector<Version>> versions(const TableStore& map) {
   return out;
 }
 
-VersionSize size_of(const Version& version, const Content& content, const server::MapEstimate& map) {
-  VersionSize out;
+std::vector<VersionSize> sizes_of(const std::vector<Version>& all, const Content& content,
+                                  const server::MapEstimate& map) {
+  std::vector<VersionSize> out(all.size());
+  std::map<ChainId, std::size_t> added_by;
+  for (std::size_t k = 0; k < all.size(); ++k)
+    for (const ChainId& chain : all[k].chains) added_by.emplace(chain, k);
   for (const auto& [id, submap] : content.submaps) {
-    if (!version.chains.contains(id.chain)) continue;
-    ++out.submaps;
-    out.keyframes += submap->keyframes.size();
-    out.minutes += (submap->keyframes.back().stamp - submap->keyframes.front().stamp) / 60.0;
+    const auto by = added_by.find(id.chain);
+    if (by == added_by.end()) continue;
+    VersionSize& size = out[by->second];
+    ++size.submaps;
+    size.keyframes += submap->keyframes.size();
+    size.minutes += (submap->keyframes.back().stamp - submap->keyframes.front().stamp) / 60.0;
   }
   for (const server::JudgedClosure& judged : map.closures) {
-    const bool from = version.chains.contains(judged.closure.from.chain);
-    const bool to = version.chains.contains(judged.closure.to.chain);
-    if (!judged.accepted || (!from && !to)) continue;
-    ++(from && to ? out.own_closures : out.earlier_closures);
+    const auto from = added_by.find(judged.closure.from.chain), to = added_by.find(judged.closure.to.chain);
+    if (!judged.accepted || from == added_by.end() || to == added_by.end()) continue;
+    VersionSize& later = out[std::max(from->second, to->second)];
+    ++(from->second == to->second ? later.own_closures : later.earlier_closures);
   }
   return out;
 }

@@ -30,7 +30,9 @@ struct VersionSize {
   std::size_t own_closures = 0;      ///< Accepted ones between its sessions.
   std::size_t earlier_closures = 0;  ///< Accepted ones with earlier versions.
 };
-VersionSize size_of(const Version& version, const Content& content, const server::MapEstimate& map);
+/// `all`: versions() of the map.
+std::vector<VersionSize> sizes_of(const std::vector<Version>& all, const Content& content,
+                                  const server::MapEstimate& map);
 
 /// Makes a map's file `out`, which must not exist, of `map` as it was in a version: what later ones added is left out,
 /// and poses of that version, which were held, are as they were. Returns the number of submaps that are left out.

@@ -90,10 +90,12 @@ TEST_F(Versions, ARobotOfTheSameNameIsThatRobotInAnotherSession) {
   for (const auto& [id, pose] : held) EXPECT_EQ(now.at(id), pose) << "held to the bit";
   const server::MapEstimate made = estimate(both);
   EXPECT_EQ(made.components, 1U);
-  const VersionSize size = size_of(all[1], both, made);
-  EXPECT_GT(size.earlier_closures, 10U);
-  EXPECT_GT(size.own_closures, 0U);
-  EXPECT_EQ(size.submaps + size_of(all[0], both, made).submaps, both.submaps.size());
+  const auto sizes = sizes_of(all, both, made);
+  ASSERT_EQ(sizes.size(), 2U);
+  EXPECT_EQ(sizes[0].earlier_closures, 0U);
+  EXPECT_GT(sizes[1].earlier_closures, 10U);
+  EXPECT_GT(sizes[1].own_closures, 0U);
+  EXPECT_EQ(sizes[0].submaps + sizes[1].submaps, both.submaps.size());
 }
 
 TEST_F(Versions, WhatIsHeldAgainIsTheNextOne) {
