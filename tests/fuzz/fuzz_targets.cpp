@@ -41,8 +41,8 @@
 #include "tutti/formats/trajectory_file.hpp"
 #include "tutti/node/journal.hpp"
 #include "tutti/program/feed/feed_frames.hpp"
-#include "tutti/program/feed/feed_settings.hpp"
 #include "tutti/program/feed/ros_grid.hpp"
+#include "tutti/server/map_server.hpp"
 #include "tutti/wire/agent_state/agent_state.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
@@ -198,7 +198,7 @@ void yaml(std::string_view bytes) {
   const auto node = parse_yaml(std::string(bytes), "fuzz");
   if (!node) return;
   static_cast<void>(parse_yaml(to_yaml(*node), "again"));
-  program::FeedSettings settings;
+  server::ServerConfig settings;
   if (const Status read = load_config(*node, settings, "fuzz"); !read)
     TUTTI_CHECK(read.error().message.size() < 100'000, "a message of {} letters", read.error().message.size());
 }
