@@ -321,8 +321,8 @@ TEST(Scenarios, OtherParametersAreRepairedAsWell) {
     EXPECT_GT(*record.robots[0].onboard.rmse_m, least_onboard_m) << name;
     EXPECT_LT(*record.server.joint.rmse_m, most_server_m) << name;
   };
-  // With the seeds 1001 to 1003: onboard at least 3.59, 0.97, 1.21 m; server at most 0.062, 0.070, 0.82 m (with 1001
-  // 0.35 m); corrected at most 1.04 times the server.
+  // With the seeds 1001 to 1003: onboard at least 3.59, 0.97, 2.70 m; server at most 0.062, 0.070, 0.44 m; corrected at
+  // most 1.04 times the server.
   expect("spin",
          {world + "network.block_m=24", robot + "walk.length_m=384", robot + "walk.duration_s=510",
           robot + "odometry.scripted.0.yaw_deg=-12"},
@@ -333,7 +333,7 @@ TEST(Scenarios, OtherParametersAreRepairedAsWell) {
   expect("degenerate",
          {robot + "odometry.yaw_bias_deg_per_m=0.05", robot + "odometry.scale_percent=1",
           robot + "odometry.slips_per_km=4", robot + "odometry.slip_deg=5"},
-         0.8, 0.5);
+         2.0, 0.5);
 }
 
 // Measured: joint server RMSE 0.29 to 0.32 m (05) and 0.48 to 0.97 m (07), seeds 1 to 3; 0.30 and 0.59 m with seed 1.
