@@ -72,6 +72,13 @@ class Buffer {
     return std::nullopt;
   }
 
+  /// Which frame is the parent of which, for messages.
+  [[nodiscard]] std::string text() const {
+    std::string out;
+    for (const auto& [child, parent] : newest_) out += parent.first + " -> " + child + "\n";
+    return out;
+  }
+
  private:
   std::map<std::string, std::pair<std::string, Pose3>> newest_;
 };
@@ -224,7 +231,7 @@ TEST_P(RosFleet, EveryPoseOfARobotIsOnAFreeCellOfItsGridAndInOneTree) {
     fmt::print("{}: {} of {} poses are on free cells{}\n", name, stack.free, stack.poses, stack.others);
     EXPECT_EQ(stack.free, stack.poses) << name;
     const Buffer& buffer = buffers.at(is_nav2 ? "/" + name + "/tf" : "/tf");
-    EXPECT_TRUE(buffer.find("world", stack.prefix + "base_link")) << name << output_of(name);
+    EXPECT_TRUE(buffer.find("world", stack.prefix + "base_link")) << name << output_of(name) << buffer.text();
     if (!is_nav2) {
       EXPECT_TRUE(buffer.find("world", "alpha/base_link") && buffer.find("world", "bravo/base_link"));
     }

@@ -52,18 +52,33 @@ void RosAnswers::hear(const FeedTrajectory& trajectory) {
   while (!tail_.empty() && tail_.front().stamp <= trajectory_.back().stamp) tail_.pop_front();
 }
 
+bags::RosTransform RosAnswers::world_transform(Timestamp stamp) const {
+  return {.header = {stamp + tolerance_s_, world_},
+          .child_frame_id = map_,
+          .translation = T_world_map_->translation,
+          .rotation = T_world_map_->rotation};
+}
+
 std::optional<std::string> RosAnswers::transform() {
   if (!last_ || (said_ && last_->stamp <= *said_)) return std::nullopt;
   said_ = last_->stamp;
-  const auto transform = [&](const std::string& parent, const std::string& child, const Pose3& T) {
-    return bags::RosTransform{.header = {last_->stamp + tolerance_s_, parent},
-                              .child_frame_id = child,
-                              .translation = T.translation,
-                              .rotation = T.rotation};
-  };
-  std::vector<bags::RosTransform> out{transform(map_, odom_, last_->T_map_odom)};
-  if (T_world_map_ && world_ != map_) out.push_back(transform(world_, map_, *T_world_map_));
+  repeats_ns_ = 0;
+  std::vector<bags::RosTransform> out{{.header = {last_->stamp + tolerance_s_, map_},
+                                       .child_frame_id = odom_,
+                                       .translation = last_->T_map_odom.translation,
+                                       .rotation = last_->T_map_odom.rotation}};
+  said_world_.reset();
+  if (T_world_map_ && world_ != map_) {
+    out.push_back(world_transform(*said_));
+    said_world_.emplace(world_, *T_world_map_);
+  }
   return bags::encode(out);
+}
+
+std::optional<std::string> RosAnswers::moved_world() {
+  if (!said_ || !T_world_map_ || world_ == map_ || said_world_ == std::pair(world_, *T_world_map_)) return std::nullopt;
+  said_world_.emplace(world_, *T_world_map_);
+  return bags::encode(std::vector<bags::RosTransform>{world_transform({said_->ns + ++repeats_ns_})});
 }
 
 std::string RosAnswers::pose() const {

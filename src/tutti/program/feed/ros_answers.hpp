@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tutti/bags/ros_encode.hpp"
@@ -35,6 +37,9 @@ class RosAnswers {
   /// TFMessage with map -> odom, and world -> map once that is known, as of the last answer; nothing when that stamp
   /// was published already, because tf2 warns of repeated ones.
   std::optional<std::string> transform();
+  /// TFMessage with world -> map alone, where that has changed since it was published: a robot that stands still, or
+  /// has ended, has no odometry that would bring it. Its stamp is a nanosecond later than the one before.
+  std::optional<std::string> moved_world();
   /// PoseWithCovarianceStamped: where the body is on the map.
   [[nodiscard]] std::string pose() const;
   /// Path: the trajectory as the map corrects it, followed by the odometry since.
@@ -51,6 +56,10 @@ class RosAnswers {
   double tolerance_s_;
   std::optional<FeedAnswer> last_;
   std::optional<Timestamp> said_;
+  /// As transform() and moved_world() publish it.
+  [[nodiscard]] bags::RosTransform world_transform(Timestamp stamp) const;
+  std::optional<std::pair<std::string, Pose3>> said_world_;
+  std::int64_t repeats_ns_ = 0;   // of moved_world() since said_
   Trajectory trajectory_;         ///< T_map_body
   std::deque<StampedPose> tail_;  ///< T_odom_body since the end of trajectory_.
   std::vector<TeamMate> team_mates_;

@@ -31,6 +31,29 @@ TEST(RosAnswers, MapToOdomIsSentOnceForEachStamp) {
   EXPECT_FALSE(answers.transform());
 }
 
+/// Two maps become one after a robot has stopped, so that no odometry comes any more.
+TEST(RosAnswers, AWorldThatMovesIsSentWithoutOdometryToo) {
+  RosAnswers answers("odom", "", 0.1);
+  answers.hear_world("world_1", Pose3{});
+  EXPECT_FALSE(answers.moved_world()) << "nothing was published yet";
+  answers.hear(answer(1'000'000'000, {}), {});
+  ASSERT_EQ(bags::decode_tf(answers.transform().value()).value().size(), 2U);
+  EXPECT_FALSE(answers.moved_world());
+  for (std::int64_t k = 1; k <= 2; ++k) {
+    const Pose3 T_world_map{Eigen::Quaterniond::Identity(), {1.0 * static_cast<double>(k), 0, 0}};
+    answers.hear_world("world", T_world_map);
+    const auto moved = bags::decode_tf(answers.moved_world().value()).value();
+    ASSERT_EQ(moved.size(), 1U);
+    EXPECT_EQ(moved[0].header.frame_id, "world");
+    EXPECT_EQ(moved[0].child_frame_id, "map");
+    EXPECT_EQ(moved[0].translation, T_world_map.translation);
+    EXPECT_EQ(moved[0].header.stamp.ns, 1'100'000'000 + k) << "tf2 drops what repeats a stamp";
+    EXPECT_FALSE(answers.moved_world());
+  }
+  answers.hear_world("", std::nullopt);
+  EXPECT_FALSE(answers.moved_world());
+}
+
 TEST(RosAnswers, FramesAreMadeOfOdometrys) {
   EXPECT_EQ(RosAnswers("odom", "", 0.0).map_frame(), "map");
   EXPECT_EQ(RosAnswers("camera_init", "", 0.0).map_frame(), "map");

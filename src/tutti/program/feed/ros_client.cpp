@@ -124,6 +124,7 @@ std::vector<FeedRaw> RosClient::hear(const FeedState& known, Timestamp located) 
   }
   if (!answers_ || said_.world_frame.empty()) return out;
   answers_->hear_world(world_, T_world_map_);
+  if (auto moved = answers_->moved_world()) out.push_back({"/tf", bags::kTfType, kCdr, std::move(*moved)});
   if (!T_world_map_) return out;
   if (known.T_world_body && located_ != located) {
     located_ = located;
