@@ -10,8 +10,6 @@
 namespace tutti::grids {
 namespace {
 
-using Cube = SeenSpace::Cube;
-
 constexpr std::uint32_t kEnoughRays = 3;
 
 /// `visit(cube)` with the cube and the 26 around it, until it returns true; whether it did.
@@ -22,10 +20,6 @@ bool any_around(const Cube& at, const Visit& visit) {
       for (int z = at[2] - 1; z <= at[2] + 1; ++z)
         if (visit(Cube{x, y, z})) return true;
   return false;
-}
-
-Eigen::Vector3d middle_of(const Cube& at, double voxel_m) {
-  return voxel_m * (Eigen::Vector3d(at[0], at[1], at[2]).array() + 0.5).matrix();
 }
 
 /// Takes all cubes that touch `first`, one after another, out of `cubes`.
@@ -51,17 +45,21 @@ ChangedThing thing_of(const std::vector<Cube>& group, bool appeared, double voxe
 
 }  // namespace
 
-SeenSpace::Cube SeenSpace::cube_of(const Eigen::Vector3d& point) const {
-  const Eigen::Array3d at = (point.array() / config_.voxel_m).floor();
+Cube cube_of(const Eigen::Vector3d& point, double voxel_m) {
+  const Eigen::Array3d at = (point.array() / voxel_m).floor();
   return {static_cast<int>(at.x()), static_cast<int>(at.y()), static_cast<int>(at.z())};
+}
+
+Eigen::Vector3d middle_of(const Cube& at, double voxel_m) {
+  return voxel_m * Eigen::Vector3d(at[0] + 0.5, at[1] + 0.5, at[2] + 0.5);
 }
 
 /// Every cube on the way but the last, as long as `visit` returns true.
 template <class Visit>
 void SeenSpace::along(const Eigen::Vector3d& from, const Eigen::Vector3d& to, const Visit& visit) const {
   const Eigen::Vector3d ray = to - from;
-  Cube at = cube_of(from);
-  const Cube end = cube_of(to);
+  Cube at = cube_of(from, config_.voxel_m);
+  const Cube end = cube_of(to, config_.voxel_m);
   Eigen::Array3d next, step;  // as shares of the ray: where the next cube begins, and how long one is
   for (int k = 0; k < 3; ++k) {
     const double edge = config_.voxel_m * (at[k] + (ray[k] > 0.0 ? 1 : 0));
@@ -82,14 +80,13 @@ void SeenSpace::add(const LevelSubmap& submap) {
   std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> rays;
   for (const Eigen::Vector3f& one : submap.points) {
     const Eigen::Vector3d point = one.cast<double>();
-    const StampedPose& nearest = *std::ranges::min_element(
-        submap.keyframes, {}, [&](const StampedPose& k) { return (k.pose.translation - point).squaredNorm(); });
-    if ((nearest.pose.translation - point).norm() > config_.range_m) continue;
-    rays.emplace_back(nearest.pose.translation, point);
+    const Eigen::Vector3d& from = nearest_pose(submap, point).translation;
+    if ((from - point).norm() > config_.range_m) continue;
+    rays.emplace_back(from, point);
     if (is_mate(submap, point, config_.mate_m))
-      cubes_[cube_of(point)].has_mate = true;
+      cubes_[cube_of(point, config_.voxel_m)].has_mate = true;
     else
-      hit.insert(cube_of(point));
+      hit.insert(cube_of(point, config_.voxel_m));
   }
   for (const auto& [from, to] : rays)
     along(from, to, [&](const Cube& at) {

@@ -18,11 +18,15 @@ struct ChangeConfig {
   double mate_m = 0.7;    ///< As GridConfig::mate_m.
 };
 
+/// A cube of space, by its place among those of one size: that of 0, 0, 0 has a corner in the origin.
+using Cube = std::array<int, 3>;
+Cube cube_of(const Eigen::Vector3d& point, double voxel_m);
+Eigen::Vector3d middle_of(const Cube& at, double voxel_m);
+
 /// The cubes of space in which submaps saw something, or through which they saw. A ray goes from the nearest pose of
 /// the submap to a point, and ends where the same submap has another one.
 class SeenSpace {
  public:
-  using Cube = std::array<int, 3>;
   struct Votes {
     std::uint32_t hits = 0, passes = 0;  ///< Submaps that saw something there, and that saw through it.
     std::uint32_t rays = 0;              ///< Rays through it.
@@ -41,7 +45,6 @@ class SeenSpace {
   [[nodiscard]] const ChangeConfig& config() const { return config_; }
 
  private:
-  [[nodiscard]] Cube cube_of(const Eigen::Vector3d& point) const;
   template <class Visit>
   void along(const Eigen::Vector3d& from, const Eigen::Vector3d& to, const Visit& visit) const;
 
@@ -63,8 +66,9 @@ struct Changes {
   std::size_t unseen_before = 0, unseen_now = 0;        ///< Things where the other time nobody looked.
 };
 
-/// What is there `now` where `before` was nothing, and the other way round: a thing in a cube that the other saw empty
-/// with all its neighbours. Fewer than kLeastCubes that touch each other are `unsure`. Both have the same voxels.
+/// Finds things that are there `now` where `before` was nothing, and the other way round: each in a cube that the other
+/// saw empty with all its neighbours. Fewer than kLeastCubes that touch each other are `unsure`. Both have the same
+/// voxels.
 Changes find_changes(const SeenSpace& before, const SeenSpace& now);
 inline constexpr std::size_t kLeastCubes = 4;
 

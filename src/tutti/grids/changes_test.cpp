@@ -21,7 +21,7 @@ struct Box {
   [[nodiscard]] bool has(const Vector3d& p) const { return ((p - middle).array().abs() <= 0.5 * size.array()).all(); }
 };
 
-/// What a robot sees that drives from -3 to 3 along x in a hall of 12 x 8 x 3 m: each ray ends at the first box or
+/// A submap of a robot that drives from -3 to 3 along x in a hall of 12 x 8 x 3 m: each ray ends at the first box or
 /// wall. Positions have an error of 3 cm.
 LevelSubmap drive(const std::vector<Box>& boxes, std::uint64_t seed, double from_x = -3.0) {
   LevelSubmap out;

@@ -17,6 +17,13 @@ constexpr int kPassesAHit = 2;
 
 }  // namespace
 
+const Pose3& nearest_pose(const LevelSubmap& submap, const Eigen::Vector3d& point) {
+  return std::ranges::min_element(
+             submap.keyframes, {},
+             [&](const StampedPose& keyframe) { return (keyframe.pose.translation - point).squaredNorm(); })
+      ->pose;
+}
+
 bool is_mate(const LevelSubmap& submap, const Eigen::Vector3d& point, double mate_m) {
   return std::ranges::any_of(submap.mates, [&](const Eigen::Vector3d& mate) { return (mate - point).norm() < mate_m; });
 }
@@ -164,10 +171,9 @@ void GridBuilder::add(const LevelSubmap& submap) {
   std::vector<Ray> rays;
   for (const Eigen::Vector3f& one : submap.points) {
     const Eigen::Vector3d point = one.cast<double>();
-    const StampedPose& nearest = *std::ranges::min_element(
-        submap.keyframes, {}, [&](const StampedPose& k) { return (k.pose.translation - point).squaredNorm(); });
-    if ((nearest.pose.translation - point).head<2>().norm() > config_.range_m) continue;
-    rays.push_back({nearest.pose.translation, point});
+    const Eigen::Vector3d& from = nearest_pose(submap, point).translation;
+    if ((from - point).head<2>().norm() > config_.range_m) continue;
+    rays.push_back({from, point});
     if (is_mate(submap, point, config_.mate_m)) continue;
     around(point, [&](Index at) {
       if (is_in_slab(at, point.z())) mark(hit_by_, hits_, at);

@@ -32,6 +32,8 @@ struct LevelSubmap {
 /// A point of the ground below a robot's trajectory, level frame.
 using Ground = Eigen::Vector3d;
 
+/// The pose of the submap, which has one, that is nearest to a point (level frame).
+const Pose3& nearest_pose(const LevelSubmap& submap, const Eigen::Vector3d& point);
 /// True for a point (level frame) of another robot's body.
 bool is_mate(const LevelSubmap& submap, const Eigen::Vector3d& point, double mate_m);
 

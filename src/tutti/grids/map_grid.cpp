@@ -7,6 +7,7 @@
 #include <set>
 #include <vector>
 
+#include "tutti/grids/changes.hpp"
 #include "tutti/grids/internal/map_part.hpp"
 
 namespace tutti::grids {
@@ -19,9 +20,7 @@ class Below {
     constexpr double kNear_m = 4.0;
     for (const Eigen::Vector3f& one : submap.points) {
       const Eigen::Vector3d point = one.cast<double>();
-      const StampedPose& nearest = *std::ranges::min_element(
-          submap.keyframes, {}, [&](const StampedPose& k) { return (k.pose.translation - point).squaredNorm(); });
-      const Eigen::Vector3d down = nearest.pose.translation - point;
+      const Eigen::Vector3d down = nearest_pose(submap, point).translation - point;
       const auto bin = static_cast<std::size_t>(std::max(0.0, down.z()) / kBin_m);
       if (down.z() > kLeast_m && down.head<2>().norm() < kNear_m && bin < bins_.size()) ++bins_[bin];
     }
@@ -98,18 +97,16 @@ Result<MapGrid> grid_of_map(const storage::TableStore& store, const mapfile::Con
 Result<PointCloud> voxels_of_map(const storage::TableStore& store, const mapfile::Content& content,
                                  const server::MapEstimate& map, double voxel_m, double mate_m) {
   MapPart part(store, content, map);
-  std::set<std::array<int, 3>> voxels;
+  std::set<Cube> voxels;
   const auto added = part.each(Pose3{}, [&](const ChainId&, const LevelSubmap& submap) {
     for (const Eigen::Vector3f& point : submap.points) {
-      if (is_mate(submap, point.cast<double>(), mate_m)) continue;
-      const Eigen::Array3d at = (point.cast<double>().array() / voxel_m).floor();
-      voxels.insert({static_cast<int>(at.x()), static_cast<int>(at.y()), static_cast<int>(at.z())});
+      const Eigen::Vector3d at = point.cast<double>();
+      if (!is_mate(submap, at, mate_m)) voxels.insert(cube_of(at, voxel_m));
     }
   });
   if (!added) return tl::unexpected(added.error());
   PointCloud out;
-  for (const auto& [x, y, z] : voxels)
-    out.points.push_back((voxel_m * Eigen::Vector3d(x + 0.5, y + 0.5, z + 0.5)).cast<float>());
+  for (const Cube& voxel : voxels) out.points.push_back(middle_of(voxel, voxel_m).cast<float>());
   return out;
 }
 
