@@ -86,16 +86,10 @@ struct DiffOptions {
   grids::ChangeConfig changes;
 };
 
-/// Sessions before and since.
+/// Which sessions are compared.
 struct Compared {
   Chains before, since;
 };
-
-Chains chains_of(const mapfile::Content& content) {
-  Chains out;
-  for (const auto& [id, submap] : content.submaps) out.insert(id.chain);
-  return out;
-}
 
 Result<Compared> compared_versions(const ReadMap& map, std::optional<std::uint64_t> number, const std::string& file) {
   const std::uint64_t which = number.value_or(map.versions.back().number);
@@ -116,8 +110,8 @@ Result<Compared> compared_versions(const ReadMap& map, std::optional<std::uint64
 /// Prints how far poses of `before` have moved.
 Result<Compared> compared_maps(const ReadMap& before, const ReadMap& map, const DiffOptions& options) {
   Compared out;
-  const Chains there = chains_of(map.content);
-  for (const ChainId& chain : chains_of(before.content))
+  const Chains there = map.content.chains();
+  for (const ChainId& chain : before.content.chains())
     if (there.contains(chain)) out.before.insert(chain);
   std::ranges::set_difference(there, out.before, std::inserter(out.since, out.since.end()));
   if (out.before.empty() || out.since.empty())
@@ -133,6 +127,13 @@ Result<Compared> compared_maps(const ReadMap& before, const ReadMap& map, const 
     fmt::print("poses of {}: {} in both, moved by {:.3f} m at most\n", options.maps.front(), moved_m.size(),
                *std::ranges::max_element(moved_m));
   return out;
+}
+
+Result<Compared> compared(const ReadMap& map, const DiffOptions& options) {
+  if (options.maps.size() == 1) return compared_versions(map, options.version, options.maps.front());
+  const auto before = read_map(options.maps.front());
+  if (!before) return tl::unexpected(before.error());
+  return compared_maps(*before, map, options);
 }
 
 void print_things(const grids::Changes& changes, bool appeared) {
@@ -175,20 +176,13 @@ int show_diff(const DiffOptions& options) {
   const std::string& file = options.maps.back();
   const auto map = read_map(file);
   if (!map) return complain(kDiff, map.error().message);
-  Result<Compared> compared = fail(ErrorCode::invalid, "");
-  if (options.maps.size() == 2) {
-    const auto before = read_map(options.maps.front());
-    if (!before) return complain(kDiff, before.error().message);
-    compared = compared_maps(*before, *map, options);
-  } else {
-    compared = compared_versions(*map, options.version, file);
-  }
-  if (!compared) return complain(kDiff, compared.error().message);
+  const auto sessions = compared(*map, options);
+  if (!sessions) return complain(kDiff, sessions.error().message);
   const auto changes =
-      grids::changes_of_map(*map->store, map->content, map->map, compared->before, compared->since, options.changes);
+      grids::changes_of_map(*map->store, map->content, map->map, sessions->before, sessions->since, options.changes);
   if (!changes) return complain(kDiff, file + ": " + changes.error().message);
-  fmt::print("before: {}\nsince:  {}\n", names_of(compared->before, map->content),
-             names_of(compared->since, map->content));
+  fmt::print("before: {}\nsince:  {}\n", names_of(sessions->before, map->content),
+             names_of(sessions->since, map->content));
   fmt::print("cubes of {:g} m: {} with something both times, {} new, {} gone, {} too few to be sure\n",
              options.changes.voxel_m, changes->same, changes->appeared.size(), changes->gone.size(),
              changes->unsure.size());

@@ -110,11 +110,13 @@ Status read_meta(const storage::TableStore& map, Content& content) {
 
 }  // namespace
 
-server::ClosureNames Content::closure_names() const {
-  std::set<ChainId> chains;
-  for (const auto& [id, submap] : submaps) chains.insert(chains.end(), id.chain);
-  return {names, chains};
+std::set<ChainId> Content::chains() const {
+  std::set<ChainId> out;
+  for (const auto& [id, submap] : submaps) out.insert(out.end(), id.chain);
+  return out;
 }
+
+server::ClosureNames Content::closure_names() const { return {names, chains()}; }
 
 Result<Content> read(const storage::TableStore& map) {
   Content content;

@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 
 #include "tutti/node/map_meta.hpp"
@@ -40,6 +41,8 @@ struct Content {
   };
   std::map<std::string, Table> tables;
 
+  /// All that have submaps.
+  [[nodiscard]] std::set<ChainId> chains() const;
   [[nodiscard]] server::ClosureNames closure_names() const;
 };
 

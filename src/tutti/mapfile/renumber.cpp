@@ -173,12 +173,6 @@ std::map<std::string, RobotId> numbers_of(const std::map<RobotId, std::string>& 
   return out;
 }
 
-std::set<ChainId> chains_of(const server::SubmapSet& submaps) {
-  std::set<ChainId> out;
-  for (const auto& [id, submap] : submaps) out.insert(id.chain);
-  return out;
-}
-
 /// True if any submap of the chain is in both maps with other bytes.
 Result<bool> differs(const TableStore& a, const TableStore& b, const server::SubmapSet& of_b, const ChainId& chain) {
   for (auto it = of_b.lower_bound({chain, 0}); it != of_b.end() && it->first.chain == chain; ++it) {
@@ -195,7 +189,7 @@ Result<bool> differs(const TableStore& a, const TableStore& b, const server::Sub
 
 Result<Chains> chains_to_renumber(const TableStore& a, const Content& of_a, const TableStore& b, const Content& of_b) {
   const auto numbers = numbers_of(of_a.names);
-  const std::set<ChainId> there = chains_of(of_a.submaps), added = chains_of(of_b.submaps);
+  const std::set<ChainId> there = of_a.chains(), added = of_b.chains();
   std::set<RobotId> taken;
   std::map<RobotId, std::uint64_t> newest;  // session, by robot of the merged map
   for (const ChainId& chain : there) {

@@ -24,7 +24,7 @@ namespace tutti::mapfile {
 namespace {
 
 using storage::TableStore, storage::Write;
-using LaterChains = std::set<ChainId>;
+using LaterChains = std::set<ChainId>;  // those that are left out
 
 std::optional<std::uint64_t> number_of(std::string_view key) {
   key.remove_prefix(node::kVersionPrefix.size());
@@ -70,7 +70,7 @@ NewRows refusals_without(std::string_view bytes, const Without& without) {
   return node::rows_of_refusals(*refused);
 }
 
-/// NewRows of table `meta` in a map that ends before version `until`, and has the robots `stays`.
+/// The row of table `meta`, or none, in a map that ends before version `until`, and has the robots `stays`.
 NewRows meta_without(std::string_view key, std::string_view bytes, const Without& without,
                      const std::set<RobotId>& stays, std::uint64_t until) {
   const auto same_if = [&](bool is_kept) {

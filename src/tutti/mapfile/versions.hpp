@@ -12,7 +12,8 @@
 
 namespace tutti::mapfile {
 
-/// What was added to a map until its poses were held again (hold_map()): each version has what those before it have.
+/// The sessions that were added to a map until its poses were held again (hold_map()). A version has those of all
+/// before it, too.
 struct Version {
   std::uint64_t number = 1;
   std::int64_t held_ns = 0;  ///< When its poses were held, since the Unix epoch; 0: they may move.
@@ -23,7 +24,7 @@ Result<std::vector<Version>> versions(const storage::TableStore& map);
 /// A row `version/NUMBER`, encoded as numbers of 8 bytes: when it was held, then robot and session of each chain.
 storage::Write to_row(const Version& version);
 
-/// What a version consists of.
+/// How much a version added.
 struct VersionSize {
   std::size_t submaps = 0, keyframes = 0;
   double minutes = 0.0;
