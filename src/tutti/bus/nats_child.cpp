@@ -34,7 +34,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr auto kWaitForPort = std::chrono::seconds(2);
 constexpr auto kPollEvery = std::chrono::milliseconds(3);
-constexpr auto kReadsWithin = std::chrono::seconds(10);  // or is told again to read its configuration
+constexpr auto kReadsWithin = std::chrono::seconds(10);  // or the signal to read its configuration comes again
 constexpr auto kOthersMayEnd = std::chrono::seconds(2);  // the nats-server of a killed process ends a little later
 constexpr std::uintmax_t kMostLog = 8U << 20U;           // then it begins again: strangers make it grow
 constexpr const char* kConfiguration = "configuration";  // in its folder
@@ -172,7 +172,7 @@ Status NatsChild::launch(int port) {
   const auto log = open_own_file(folder_ / "log", O_CREAT | O_WRONLY | O_TRUNC | O_APPEND, 0600);
   if (!log) return tl::unexpected(log.error());
   log_read_ = 0;
-  told_.reset();
+  signalled_.reset();
   process_ = std::make_unique<ChildProcess>(ChildCommand{.words = {options_.program, "-c", file.string()},
                                                          .elsewhere = options_.program == kProgram ? kElsewhere : "",
                                                          .output = *log,
@@ -231,12 +231,12 @@ Status NatsChild::tend() {
   }
   if (!running()) return launch(port_of(url_));
   read_log();
-  if (told_ && Clock::now() < *told_ + kReadsWithin) return {};  // of two signals that wait it sees one
-  const auto changed = told_ ? Result<bool>(true) : configure(port_of(url_));
+  if (signalled_ && Clock::now() < *signalled_ + kReadsWithin) return {};  // of two signals that wait it sees one
+  const auto changed = signalled_ ? Result<bool>(true) : configure(port_of(url_));
   if (!changed) return tl::unexpected(changed.error());
   if (!*changed) return {};
   kill(pid_, SIGHUP);
-  told_ = Clock::now();
+  signalled_ = Clock::now();
   return {};
 }
 
@@ -252,7 +252,7 @@ void NatsChild::read_log() {
   std::string line;
   while (std::getline(log, line) && !log.eof()) {  // what ends without a newline is not whole yet
     log_read_ += line.size() + 1;
-    if (has_read_configuration(line)) told_.reset();
+    if (has_read_configuration(line)) signalled_.reset();
     auto refusal = refusal_of(line);
     if (refusal && refusals_.all.size() < kMostRefusals)
       refusals_.all.push_back(std::move(*refusal));

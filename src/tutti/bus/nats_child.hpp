@@ -81,8 +81,8 @@ class NatsChild {
   std::string configured_;    ///< Its configuration, without nobody's certificate.
   bool has_nobody_ = false;   ///< The one that was written has it.
   bool reads_again_ = false;  ///< It is to be written once more.
-  /// When it was told to read its configuration; nothing: its log says that it has.
-  std::optional<std::chrono::steady_clock::time_point> told_;
+  /// When it was sent the signal to read its configuration; nothing: its log says that it has.
+  std::optional<std::chrono::steady_clock::time_point> signalled_;
   std::uintmax_t log_read_ = 0;  ///< So much of its log.
   Refusals refusals_;            ///< What was refused there, and was not taken yet.
   std::string url_;

@@ -24,7 +24,8 @@ namespace tutti::bus {
 inline constexpr auto kTick = std::chrono::milliseconds(100);
 inline constexpr auto kTryAgain = std::chrono::milliseconds(500);
 
-/// What goes with each job, and nobody guesses who has not been given it. Another one at each start.
+/// Makes the secret that goes with each job: nobody guesses it who has not been given the job, and each start has
+/// others.
 class JobSecrets {
  public:
   JobSecrets();

@@ -32,7 +32,7 @@ std::string word_of(MessageKind kind);
 std::string settle_subject(const std::string& mission, const std::string& worker);
 /// Which worker it is; 0 also for what is no such subject.
 std::uint32_t settler_of(std::string_view subject);
-/// What a worker says there: the job's secret, which is in the job; where the bus is to learn it; and what.
+/// A worker says there the secret that is in the job, where the bus is to learn of it, and what has become of it.
 struct Settlement {
   std::string secret, reply, verb;
   std::uint64_t sequence = 0;  ///< The job's, in its stream.

@@ -52,12 +52,13 @@ class RosAnswers {
   [[nodiscard]] const std::string& map_frame() const { return map_; }
 
  private:
+  /// As transform() and moved_world() publish it.
+  [[nodiscard]] bags::RosTransform world_transform(Timestamp stamp) const;
+
   std::string odom_, map_;
   double tolerance_s_;
   std::optional<FeedAnswer> last_;
   std::optional<Timestamp> said_;
-  /// As transform() and moved_world() publish it.
-  [[nodiscard]] bags::RosTransform world_transform(Timestamp stamp) const;
   std::optional<std::pair<std::string, Pose3>> said_world_;
   std::int64_t repeats_ns_ = 0;   // of moved_world() since said_
   Trajectory trajectory_;         ///< T_map_body
