@@ -75,7 +75,7 @@ FeedState RobotView::state(const node::RobotNode& node) const {
   const robot::RobotAgent& agent = node.agent();
   FeedState out{.chain = agent.chain(),
                 .name = name_,
-                .newest = {},
+                .newest = agent.newest_fed(),
                 .T_map_odom = agent.T_map_odom() * agent.T_odom_fed(),
                 .T_odom_fed = agent.T_odom_fed(),
                 .covariance = agent.covariance(),
@@ -92,7 +92,6 @@ FeedState RobotView::state(const node::RobotNode& node) const {
   for (const auto& [sensor, alert] : missing_) out.alerts.push_back(alert);
   if (const std::string dispute = node.dispute(); !dispute.empty())
     out.alerts.push_back({dispute, disputed_, disputed_, disputed_});
-  out.newest = agent.newest_fed();
   if (!begun_.empty() && !agent.keyframes().empty())
     if (const Timestamp since = agent.keyframes().front().stamp; out.newest->stamp - since < kJumpAlert_s)
       out.alerts.push_back({begun_, since, since, since});

@@ -16,8 +16,10 @@ namespace tutti::program::test {
 class NodeTarget final : public FeedTarget {
  public:
   explicit NodeTarget(RobotId robot = RobotId{1}, const robot::AgentConfig& config = {})
+      : NodeTarget(robot, node::RobotNodeConfig{.agent = config}) {}
+  NodeTarget(RobotId robot, const node::RobotNodeConfig& config)
       : store_(storage::robot_schema()),
-        node_(node::RobotNode::open(robot, 7, {.agent = config}, store_).value()),
+        node_(node::RobotNode::open(robot, 7, config, store_).value()),
         view_("alpha") {
     carry_out(node_->resume({}));
   }
