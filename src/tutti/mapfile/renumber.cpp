@@ -10,11 +10,10 @@
 #include <string>
 #include <utility>
 
-#include "tutti/mapfile/make_map.hpp"
+#include "tutti/mapfile/changed_tables.hpp"
 #include "tutti/node/decisions.hpp"
 #include "tutti/node/map_meta.hpp"
 #include "tutti/node/meta_keys.hpp"
-#include "tutti/node/refused_rows.hpp"
 #include "tutti/node/robot_registry.hpp"
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/storage/map_tables.hpp"
@@ -48,30 +47,15 @@ std::pair<SubmapPair, bool> renamed(const SubmapPair& pair, const Chains& chains
   return second < first ? std::pair(SubmapPair{second, first}, true) : std::pair(SubmapPair{first, second}, false);
 }
 
-/// Copies a table, each row as `change` returns it; none where it returns nothing.
-Status copy(const TableStore& map, const char* table, Writer& out,
-            const std::function<Result<std::optional<storage::Write>>(std::string_view, std::string_view)>& change) {
-  Status ok;
-  const auto scanned = map.scan(table, {}, [&](std::string_view key, std::string_view bytes) {
-    auto row = change(key, bytes);
-    if (!row)
-      ok = tl::unexpected(row.error());
-    else if (*row)
-      ok = out.put(std::move(**row));
-    return ok.has_value();
-  });
-  return scanned ? ok : scanned;
-}
-
-Result<std::optional<storage::Write>> renamed_submap(std::string_view bytes, const Chains& chains) {
+Result<NewRows> renamed_submap(std::string_view bytes, const Chains& chains) {
   auto message = wire::decode_submap(bytes);
   if (!message) return tl::unexpected(message.error());
   SubmapId& id = message->submap.id;
-  if (!chains.contains(id.chain)) return storage::Write{map_tables::kSubmaps, node::key_of(id), std::string(bytes)};
+  if (!chains.contains(id.chain)) return NewRows{{map_tables::kSubmaps, node::key_of(id), std::string(bytes)}};
   id = renamed(id, chains);
   message->header.robot = id.chain.robot;
   message->header.session = id.chain.session;
-  return storage::Write{map_tables::kSubmaps, node::key_of(id), wire::encode(*message)};
+  return NewRows{{map_tables::kSubmaps, node::key_of(id), wire::encode(*message)}};
 }
 
 ClosureVerdict renamed(ClosureVerdict verdict, const Chains& chains) {
@@ -81,37 +65,23 @@ ClosureVerdict renamed(ClosureVerdict verdict, const Chains& chains) {
   return verdict;
 }
 
-Result<std::optional<storage::Write>> renamed_verdict(std::string_view bytes, const Chains& chains) {
+Result<NewRows> renamed_verdict(std::string_view bytes, const Chains& chains) {
   auto verdict = wire::decode_verdict(bytes);
   if (!verdict) return tl::unexpected(verdict.error());
   *verdict = renamed(std::move(*verdict), chains);
-  return storage::Write{map_tables::kVerdicts, node::key_of(verdict->pair), wire::encode(*verdict)};
+  return NewRows{{map_tables::kVerdicts, node::key_of(verdict->pair), wire::encode(*verdict)}};
 }
 
-/// Refusals, so that nobody verifies these pairs again. Answers that were not believed stay behind.
-Status renumber_refusals(const TableStore& map, const Chains& chains, Writer& out) {
-  Status ok;
-  const auto scanned = map.scan(map_tables::kAnswers, {}, [&](std::string_view, std::string_view bytes) {
-    auto refused = wire::decode_verdicts(bytes);
-    if (!refused) return true;  // who opens the map reads it no better
-    for (ClosureVerdict& verdict : refused->verdicts) verdict = renamed(std::move(verdict), chains);
-    std::erase_if(refused->verdicts, [](const ClosureVerdict& verdict) { return !verdict.refusal; });
-    for (storage::Write& row : node::rows_of_refusals(*refused))
-      if (ok) ok = out.put(std::move(row));
-    return ok.has_value();
-  });
-  return scanned ? ok : scanned;
-}
-
-Result<std::optional<storage::Write>> renamed_decision(const SubmapPair& former, std::string_view bytes,
-                                                       const Chains& chains) {
+Result<NewRows> renamed_decision(std::string_view key, std::string_view bytes, const Chains& chains) {
+  const auto former = node::pair_of(key);
+  if (!former) return fail(ErrorCode::parse, "a row of table 'decisions' has no pair of submaps as its key");
   auto decision = wire::decode_decision(bytes);
   if (!decision) return tl::unexpected(decision.error());
-  *decision = with_sessions(std::move(*decision), former);
-  const auto [pair, is_turned] = renamed(former, chains);
+  *decision = with_sessions(std::move(*decision), *former);
+  const auto [pair, is_turned] = renamed(*former, chains);
   for (LoopClosure& closure : decision->by_hand) closure = renamed(closure, chains, is_turned);
   decision->closure = to_string(pair.first) + "-" + to_string(pair.second);
-  return storage::Write{map_tables::kDecisions, node::key_of(pair), wire::encode(*decision)};
+  return NewRows{{map_tables::kDecisions, node::key_of(pair), wire::encode(*decision)}};
 }
 
 Refinement renamed(Refinement refinement, const Chains& chains) {
@@ -139,13 +109,13 @@ node::RobotRow renamed(node::RobotRow row, RobotId robot, const Chains& chains) 
   return row;
 }
 
-Result<std::optional<storage::Write>> renamed_meta(std::string_view key, std::string_view bytes, const Chains& chains) {
-  if (key.starts_with(node::kRefusedPrefix)) return std::nullopt;
+Result<NewRows> renamed_meta(std::string_view key, std::string_view bytes, const Chains& chains) {
+  if (key.starts_with(node::kRefusedPrefix)) return NewRows();  // written anew, by refusals
   if (key.starts_with(node::kHeldPrefix)) {
     const auto id = node::submap_of_key(key.substr(node::kHeldPrefix.size()));
     if (!id) return fail(ErrorCode::parse, "the row '{}' of table 'meta' is damaged", key);
-    return storage::Write{map_tables::kMeta, std::string(node::kHeldPrefix) + node::key_of(renamed(*id, chains)),
-                          std::string(bytes)};
+    return NewRows{
+        {map_tables::kMeta, std::string(node::kHeldPrefix) + node::key_of(renamed(*id, chains)), std::string(bytes)}};
   }
   if (const auto robot = node::RobotRegistry::robot_of(key)) {
     const auto row = node::decode_robot(bytes);
@@ -153,18 +123,18 @@ Result<std::optional<storage::Write>> renamed_meta(std::string_view key, std::st
     RobotId number = *robot;
     for (const auto& [from, to] : chains)
       if (from.robot == *robot) number = to.robot;
-    return storage::Write{map_tables::kMeta, node::RobotRegistry::key(number), encode(renamed(*row, *robot, chains))};
+    return NewRows{{map_tables::kMeta, node::RobotRegistry::key(number), encode(renamed(*row, *robot, chains))}};
   }
   if (auto place = node::place_of_row(key, bytes)) {
     for (server::Alike& alike : place->second.candidates) alike.submap = renamed(alike.submap, chains);
-    return node::to_row(renamed(place->first, chains), place->second);
+    return NewRows{node::to_row(renamed(place->first, chains), place->second)};
   }
   if (key.starts_with(node::kRefinementPrefix)) {
     auto refinement = wire::decode_refinement(bytes);
-    if (!refinement) return std::nullopt;  // as who opens the map: it is made again
-    return storage::Write{map_tables::kMeta, std::string(key), wire::encode(renamed(std::move(*refinement), chains))};
+    if (!refinement) return NewRows();  // as who opens the map: it is made again
+    return NewRows{{map_tables::kMeta, std::string(key), wire::encode(renamed(std::move(*refinement), chains))}};
   }
-  return storage::Write{map_tables::kMeta, std::string(key), std::string(bytes)};
+  return NewRows{{map_tables::kMeta, std::string(key), std::string(bytes)}};
 }
 
 std::map<std::string, RobotId> numbers_of(const std::map<RobotId, std::string>& names) {
@@ -225,27 +195,23 @@ Result<Chains> chains_to_renumber(const TableStore& a, const Content& of_a, cons
 }
 
 Status renumber(const TableStore& map, const Chains& chains, TableStore& out) {
-  Writer writer(out);
-  if (auto ok = copy(map, map_tables::kSubmaps, writer,
-                     [&](std::string_view, std::string_view bytes) { return renamed_submap(bytes, chains); });
-      !ok)
-    return ok;
-  if (auto ok = copy(map, map_tables::kVerdicts, writer,
-                     [&](std::string_view, std::string_view bytes) { return renamed_verdict(bytes, chains); });
-      !ok)
-    return ok;
-  if (auto ok = renumber_refusals(map, chains, writer); !ok) return ok;
-  const auto decision = [&](std::string_view key, std::string_view bytes) -> Result<std::optional<storage::Write>> {
-    const auto pair = node::pair_of(key);
-    if (!pair) return fail(ErrorCode::parse, "a row of table 'decisions' has no pair of submaps as its key");
-    return renamed_decision(*pair, bytes, chains);
+  const auto submap = [&](std::string_view, std::string_view bytes) { return renamed_submap(bytes, chains); };
+  const auto verdict = [&](std::string_view, std::string_view bytes) { return renamed_verdict(bytes, chains); };
+  const auto refusals = [&](std::string_view, std::string_view bytes) {
+    return refusals_of(bytes, [&](ClosureVerdict& refused) {
+      refused = renamed(std::move(refused), chains);
+      return true;
+    });
   };
-  if (auto ok = copy(map, map_tables::kDecisions, writer, decision); !ok) return ok;
-  if (auto ok = copy(map, map_tables::kMeta, writer,
-                     [&](std::string_view key, std::string_view bytes) { return renamed_meta(key, bytes, chains); });
-      !ok)
-    return ok;
-  return writer.flush();
+  const auto decision = [&](auto key, auto bytes) { return renamed_decision(key, bytes, chains); };
+  const auto meta = [&](auto key, auto bytes) { return renamed_meta(key, bytes, chains); };
+  return copy_changed(map,
+                      {{map_tables::kSubmaps, submap},
+                       {map_tables::kVerdicts, verdict},
+                       {map_tables::kAnswers, refusals},
+                       {map_tables::kDecisions, decision},
+                       {map_tables::kMeta, meta}},
+                      out);
 }
 
 }  // namespace tutti::mapfile

@@ -10,10 +10,10 @@
 #include <string>
 #include <utility>
 
+#include "tutti/mapfile/changed_tables.hpp"
 #include "tutti/mapfile/make_map.hpp"
 #include "tutti/node/decisions.hpp"
 #include "tutti/node/meta_keys.hpp"
-#include "tutti/node/refused_rows.hpp"
 #include "tutti/node/robot_registry.hpp"
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/storage/map_tables.hpp"
@@ -23,7 +23,7 @@
 namespace tutti::mapfile {
 namespace {
 
-using storage::TableStore, storage::Write;
+using storage::TableStore;
 using LaterChains = std::set<ChainId>;  // those that are left out
 
 std::optional<std::uint64_t> number_of(std::string_view key) {
@@ -60,16 +60,6 @@ class Without {
   const LaterChains& chains_;
 };
 
-using NewRows = std::vector<Write>;
-
-NewRows refusals_without(std::string_view bytes, const Without& without) {
-  auto refused = wire::decode_verdicts(bytes);
-  if (!refused) return {};
-  std::erase_if(refused->verdicts,
-                [&](const ClosureVerdict& verdict) { return !verdict.refusal || !without.has(verdict.pair); });
-  return node::rows_of_refusals(*refused);
-}
-
 /// The row of table `meta`, or none, in a map that ends before version `until`, and has the robots `stays`.
 NewRows meta_without(std::string_view key, std::string_view bytes, const Without& without,
                      const std::set<RobotId>& stays, std::uint64_t until) {
@@ -97,19 +87,7 @@ NewRows meta_without(std::string_view key, std::string_view bytes, const Without
 /// Everything but what later versions, from number `until` on, added.
 Status copy_without(const TableStore& map, const LaterChains& later, std::uint64_t until, TableStore& to) {
   const Without without(later);
-  Writer out(to);
   std::set<RobotId> stays;
-  Status ok;
-  /// `rows(key, bytes)`: what stands in the row's place.
-  const auto copy = [&](const char* table, const auto& rows) {
-    const auto scanned = map.scan(table, {}, [&](std::string_view key, std::string_view bytes) {
-      for (Write& row : rows(key, bytes))
-        if (ok) ok = out.put(std::move(row));
-      return ok.has_value();
-    });
-    if (!scanned) ok = scanned;
-    return ok.has_value();
-  };
   const auto pairs_of = [&](const char* table) {
     return [&, table](std::string_view key, std::string_view bytes) {
       const auto pair = node::pair_of(key);
@@ -122,15 +100,19 @@ Status copy_without(const TableStore& map, const LaterChains& later, std::uint64
     stays.insert(id->chain.robot);
     return NewRows{{map_tables::kSubmaps, std::string(key), std::string(bytes)}};
   };
-  const auto refusals = [&](std::string_view, std::string_view bytes) { return refusals_without(bytes, without); };
+  const auto refusals = [&](std::string_view, std::string_view bytes) {
+    return refusals_of(bytes, [&](const ClosureVerdict& refused) { return without.has(refused.pair); });
+  };
   const auto meta = [&](std::string_view key, std::string_view bytes) {
     return meta_without(key, bytes, without, stays, until);
   };
-  const bool done = copy(map_tables::kSubmaps, submap) &&
-                    copy(map_tables::kVerdicts, pairs_of(map_tables::kVerdicts)) &&
-                    copy(map_tables::kDecisions, pairs_of(map_tables::kDecisions)) &&
-                    copy(map_tables::kAnswers, refusals) && copy(map_tables::kMeta, meta);
-  return done ? out.flush() : ok;
+  return copy_changed(map,
+                      {{map_tables::kSubmaps, submap},
+                       {map_tables::kVerdicts, pairs_of(map_tables::kVerdicts)},
+                       {map_tables::kDecisions, pairs_of(map_tables::kDecisions)},
+                       {map_tables::kAnswers, refusals},
+                       {map_tables::kMeta, meta}},  // last: it has the robots whose submaps stay
+                      to);
 }
 
 }  // namespace
