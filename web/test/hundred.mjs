@@ -35,7 +35,7 @@ ${Array.from(
   { length: kRobots },
   (_, i) => `    - name: ${name_of(i)}
       walk: {duration_s: ${only === undefined || only === i ? 60 * kMinutes + 1200 : 1}, rate_hz: 2, min_speed_mps: 0.4, max_speed_mps: 0.7, lookahead_m: 1.2, gait: driving}
-      odometry: {slips_per_km: 1.0, slip_m: 0.1, slip_deg: 0.2, yaw_bias_deg_per_m: 0.02}`,
+      odometry: {slips_per_km: 1.0, slip_deg: 0.2, yaw_bias_deg_per_m: 0.02}`,
 ).join("\n")}
 agent:
   submap: {duration_s: 60.0, distance_m: 30, representative_distance_m: 2, keyframe_distance_m: 2, keyframe_time_s: 5, keyframe_angle_deg: 45, voxel_m: 0.5}

@@ -72,7 +72,8 @@ void check_robot(const MissionStatus& status, const MissionStatus::Robot& robot,
     out.push_back(robot_alert(robot, "backlog", "warning",
                               fmt::format("{} submaps are not on the server yet", own.backlog_submaps),
                               "Bring it nearer to the base, or wait: the newest come first."));
-  if (is_heard && !own.finished && robot.submaps > 0 && status.revision > 0 &&
+  const bool is_behind = own.heard_revision < status.revision;
+  if (is_heard && !own.finished && robot.submaps > 0 && is_behind &&
       (!robot.last_update || status.time - *robot.last_update > longest_without_update_s(status)))
     out.push_back(robot_alert(robot, "uncorrected", "warning", "does not use the map",
                               "The way down may be cut: it hears no proxy graph."));
@@ -95,6 +96,19 @@ Alert server_alert(const char* kind, const char* severity, std::string what, std
           .what = std::move(what),
           .where = "server",
           .todo = std::move(todo)};
+}
+
+/// Robots that use the newest map cannot do more: it is the server that is late with the next.
+void check_age_of_map(const MissionStatus& status, std::vector<Alert>& out) {
+  std::optional<Timestamp> newest;
+  for (const MissionStatus::Robot& robot : status.robots)
+    if (robot.last_update && (!newest || *newest < *robot.last_update)) newest = robot.last_update;
+  if (!status.has_news || !newest || status.time - *newest <= longest_without_update_s(status)) return;
+  Alert alert = server_alert("late", "warning", "no new map although submaps have come",
+                             "Many submaps, wrong closures or too little CPU make an update long: look at the server's "
+                             "machine. Robots use the last map meanwhile.");
+  alert.since_s = *newest - Timestamp{};
+  out.push_back(std::move(alert));
 }
 
 void sort(std::vector<Alert>& alerts) {
@@ -138,6 +152,7 @@ std::vector<Alert> Alerts::of_status(const MissionStatus& status) {
   if (status.pending_jobs > kManyWaitingJobs)
     out.push_back(server_alert("jobs", "info", fmt::format("{} jobs wait for workers", status.pending_jobs),
                                "Closures come late. Start more workers (tutti worker)."));
+  check_age_of_map(status, out);
   for (const MissionStatus::Robot& robot : status.robots) check_robot(status, robot, silent_s_, out);
   return dated(std::move(out), status_since_, status.time - Timestamp{});
 }

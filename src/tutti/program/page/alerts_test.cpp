@@ -61,6 +61,7 @@ TEST(Alerts, EveryTroubleIsReportedWithWhenItBegan) {
   robot.refused = 1;
   robot.unread = 1;
   robot.last_update = std::nullopt;
+  robot.status.heard_revision = 0;
   status.trouble = "the bus does not run";
   status.waiting = 3;
   status.pending_jobs = 1000;
@@ -86,11 +87,25 @@ TEST(Alerts, EveryTroubleIsReportedWithWhenItBegan) {
 TEST(Alerts, OfALargeMapARobotMayHearLater) {
   MissionStatus status = status_at(1000.0, 999.0);
   status.robots.front().last_update = status.time - 400.0;
+  status.robots.front().status.heard_revision = status.revision - 1;
   EXPECT_EQ(Alerts().of_status(status).front().id, "robot/4/uncorrected");
   status.submaps = 10'000;  // may take 600 s
   EXPECT_TRUE(Alerts().of_status(status).empty());
   status.robots.front().last_update = status.time - 700.0;
   EXPECT_EQ(Alerts().of_status(status).front().id, "robot/4/uncorrected");
+}
+
+/// A hundred robots were told that their way down was cut, while an update of the map took the server 16 minutes.
+TEST(Alerts, WhoUsesTheNewestMapIsNotBlamedForItsAge) {
+  MissionStatus status = status_at(1000.0, 999.0);
+  status.robots.front().last_update = status.time - 400.0;
+  status.robots.front().status.heard_revision = status.revision;
+  EXPECT_TRUE(Alerts().of_status(status).empty()) << "nothing has come since";
+  status.has_news = true;
+  const auto found = Alerts().of_status(status);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found.front().id, "server/late");
+  EXPECT_EQ(found.front().since_s, 600.0);
 }
 
 TEST(Alerts, AMapShowsWhoIsAlone) {
