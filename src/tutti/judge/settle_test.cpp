@@ -74,7 +74,7 @@ TEST(Settle, WrongClosuresThatAreInGo) {
   Circle circle;
   for (std::size_t k = 2; k < Circle::kLap; k += 7) circle.close(k);
   circle.close(33, Pose3{{}, {6.0, 0.0, 0.0}});
-  circle.close(77, Pose3{so3_exp({0.0, 0.0, 0.5}), {}});
+  circle.close(77, Pose3{so3_exp({0.0, 0.0, 0.5}), Eigen::Vector3d::Zero()});
   std::vector<char> in(circle.graph.edges.size() - circle.odometry_edges, 1);
   const Settled settled = circle.settled(in);
   std::vector<char> right = in;

@@ -148,9 +148,9 @@ TEST(DisagreementOnUp, CamerasThatDriveTowardsEachOtherAgree) {
 TEST(LevelFrame, AMapThatStandsIsShownAsItIs) {
   server::MapEstimate map;
   for (std::uint32_t i = 0; i < 4; ++i)
-    map.nodes.push_back(
-        {.id = {{RobotId{0}, 5}, i},
-         .T_world_body = {Eigen::Quaterniond(Eigen::AngleAxisd(0.01 * i, Eigen::Vector3d::UnitY())), {}}});
+    map.nodes.push_back({.id = {{RobotId{0}, 5}, i},
+                         .T_world_body = {Eigen::Quaterniond(Eigen::AngleAxisd(0.01 * i, Eigen::Vector3d::UnitY())),
+                                          Eigen::Vector3d::Zero()}});
   EXPECT_EQ(upright_frame(map, 0), Pose3()) << "where nothing turns much, z is believed";
   for (MapNode& node : map.nodes) node.T_world_body.rotation = Eigen::Quaterniond(0.0, 1.0, 0.0, 0.0);
   EXPECT_LT((upright_frame(map, 0).rotation * Eigen::Vector3d(1.0, 2.0, 3.0) - Eigen::Vector3d(1.0, -2.0, -3.0)).norm(),

@@ -119,8 +119,8 @@ const std::vector<Case>& cases() {
       {"mirrored", [](Robot& r) { r.mirrored = true; }, MisfitKind::upside_down, std::nullopt},
       {"NED and FRD",
        [](Robot& r) {
-         const Pose3 ned{Eigen::Quaterniond(0, std::sqrt(0.5), std::sqrt(0.5), 0), {}};
-         const Pose3 frd{Eigen::Quaterniond(0, 1, 0, 0), {}};
+         const Pose3 ned{Eigen::Quaterniond(0, std::sqrt(0.5), std::sqrt(0.5), 0), Eigen::Vector3d::Zero()};
+         const Pose3 frd{Eigen::Quaterniond(0, 1, 0, 0), Eigen::Vector3d::Zero()};
          r.odometry = with_poses(r.odometry, [&](Pose T) { return ned * T * frd; });
        },
        MisfitKind::upside_down, std::nullopt},
