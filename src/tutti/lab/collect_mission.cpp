@@ -111,6 +111,7 @@ Status take(const Json& event, const std::string& name, Robot& robot) try {
   if (what == "misfit_found") {
     fit::Misfit misfit;
     misfit.kind = fit::misfit_kind(event.value("kind", "")).value_or(misfit.kind);
+    if (event.value("by", "") == to_string(fit::Witness::images)) misfit.by = fit::Witness::images;
     if (const Status ok = read_json_fields(event, misfit); !ok) return ok;
     mission::note_misfit(misfit, robot.finished.misfits);
   }

@@ -13,6 +13,7 @@
 #include "tutti/mission/misfit_record.hpp"
 #include "tutti/mission/recordings.hpp"
 #include "tutti/mission/robot_alone.hpp"
+#include "tutti/perception/fit/odometry_fit.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -57,6 +58,17 @@ MissionConfig mission_of(const std::vector<RobotConfig>& robots, const std::stri
   return config;
 }
 
+/// What is known of a robot in which nothing contradicts.
+std::string compared(const Recording& recording, std::uint64_t steps) {
+  if (!recording.scans && !recording.visual) return "no scans or images to compare its odometry with";
+  const std::string seen = recording.scans ? "scans" : "images";
+  if (steps >= fit::kFewestSteps) return fmt::format("{} and odometry say the same motion", seen);
+  return fmt::format(
+      "not known: {} motions could be compared with its odometry, expected {} and more{}", steps, fit::kFewestSteps,
+      recording.scans ? "; scans too few or with too few points"
+                      : "; that takes two cameras or one with depth, and points nearer than some metres");
+}
+
 }  // namespace
 
 BagVerdict judge_bag(const std::filesystem::path& bag, const std::set<std::string>& robots) {
@@ -96,14 +108,10 @@ BagCheck check_bag(const BagVerdict& verdict, const std::function<bool(double sh
   for (std::size_t k = 0; k < verdict.input.robots.size(); ++k) {
     const MissionRecording& robot = verdict.input.robots[k];
     const std::string& name = robot.recording.name;
-    if (!robot.recording.scans) {
-      out.lines.push_back(fmt::format("{}: no scans to compare its odometry with", name));
-      continue;
-    }
-    const auto misfits = misfits_alone(
+    const auto [misfits, steps] = fit_alone(
         robot, verdict.mission, [&](double share) { return stop && stop((static_cast<double>(k) + share) / robots); });
     for (const fit::Misfit& misfit : misfits) out.lines.push_back(warning_of(name, record_of(misfit, robot)));
-    if (misfits.empty()) out.lines.push_back(fmt::format("{}: scans and odometry say the same motion", name));
+    if (misfits.empty()) out.lines.push_back(fmt::format("{}: {}", name, compared(robot.recording, steps)));
     out.fits = out.fits && misfits.empty();
   }
   return out;

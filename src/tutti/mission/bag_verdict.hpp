@@ -26,7 +26,7 @@ struct BagVerdict {
 BagVerdict judge_bag(const std::filesystem::path& bag, const std::set<std::string>& robots);
 
 /// Whether the robots of a bag that is ready fit themselves: what their scans say of odometry, mounting and clock
-/// (misfits_alone()). A line for each contradiction, or one for a robot that has none.
+/// (fit_alone()). A line for each contradiction, or one for a robot that has none.
 struct BagCheck {
   bool fits = true;
   std::vector<std::string> lines;

@@ -10,6 +10,7 @@ namespace tutti::mission {
 using ScanSetup = MissionRecording::ScanSetup;
 
 std::optional<ScanSetup> corrected_setup(const fit::Misfit& misfit, const ScanSetup& stated) {
+  if (misfit.by != fit::Witness::scans) return std::nullopt;
   ScanSetup out = stated;
   const bool is_of_pose = misfit.kind == fit::MisfitKind::turned || misfit.kind == fit::MisfitKind::displaced ||
                           misfit.kind == fit::MisfitKind::upside_down;
@@ -57,7 +58,8 @@ std::string warning_of(const std::string& robot, const MisfitRecord& misfit) {
 void note_misfit(const fit::Misfit& misfit, std::vector<fit::Misfit>& all) {
   std::erase_if(all, [&](const fit::Misfit& before) {
     if (before.kind != misfit.kind) return false;
-    return misfit.kind != fit::MisfitKind::stood_still || (before.from <= misfit.to && misfit.from <= before.to);
+    if (misfit.kind == fit::MisfitKind::stood_still) return before.from <= misfit.to && misfit.from <= before.to;
+    return before.by == misfit.by;
   });
   all.push_back(misfit);
 }

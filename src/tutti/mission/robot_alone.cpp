@@ -11,8 +11,8 @@
 
 namespace tutti::mission {
 
-std::vector<fit::Misfit> misfits_alone(const MissionRecording& recording, const MissionConfig& config,
-                                       const std::function<bool(double share)>& stop) {
+FitAlone fit_alone(const MissionRecording& recording, const MissionConfig& config,
+                   const std::function<bool(double share)>& stop) {
   RobotActor robot(recording, config.agent, config.association, nullptr);
   const Trajectory& odometry = recording.recording.odometry;
   const double begin_s = recording.start_s;
@@ -23,7 +23,7 @@ std::vector<fit::Misfit> misfits_alone(const MissionRecording& recording, const 
     robot.replay_next(kMissionStart + time_s);
     robot.take_step();
   }
-  return robot.misfits();
+  return {robot.misfits(), robot.node().agent().fit().registrations()};
 }
 
 std::vector<std::string> correct_robots(const std::vector<MissionRecording>& recordings, MissionConfig& config) {
@@ -32,7 +32,7 @@ std::vector<std::string> correct_robots(const std::vector<MissionRecording>& rec
     const std::string& name = recording.recording.name;
     const auto robot = std::ranges::find(config.robots, name, &RobotConfig::name);
     if (robot == config.robots.end() || !recording.scan_setup) continue;
-    for (const fit::Misfit& misfit : misfits_alone(recording, config)) {
+    for (const fit::Misfit& misfit : fit_alone(recording, config).misfits) {
       const auto setup = corrected_setup(misfit, *recording.scan_setup);
       if (!setup) continue;
       const Eigen::Vector3d &t = setup->T_body_lidar.translation, rpy = to_rpy_deg(setup->T_body_lidar.rotation);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
@@ -11,12 +12,17 @@
 
 namespace tutti::mission {
 
-/// In what a robot's scans contradict its odometry when its recording is replayed alone, without a server. `stop` is
-/// asked between samples, with the share of the recording that is replayed; not set: never.
-std::vector<fit::Misfit> misfits_alone(const MissionRecording& recording, const MissionConfig& config,
-                                       const std::function<bool(double share)>& stop = {});
+/// How a robot's scans and images and its odometry fit each other.
+struct FitAlone {
+  std::vector<fit::Misfit> misfits;
+  std::uint64_t steps = 0;  ///< Motions that were compared.
+};
+/// Replays a robot's recording alone, without a server. `stop` is asked between samples, with the share of the
+/// recording that is replayed; not set: never.
+FitAlone fit_alone(const MissionRecording& recording, const MissionConfig& config,
+                   const std::function<bool(double share)>& stop = {});
 
-/// Sets clock and pose of each robot's LiDAR in `config` to what its scans say (misfits_alone()), where the recording
+/// Sets clock and pose of each robot's LiDAR in `config` to what its scans say (fit_alone()), where the recording
 /// lets them be set. Returns a sentence for each change; none: nothing is to be corrected.
 std::vector<std::string> correct_robots(const std::vector<MissionRecording>& recordings, MissionConfig& config);
 

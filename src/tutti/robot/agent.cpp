@@ -125,7 +125,7 @@ std::optional<std::uint64_t> RobotAgent::keyframes_without_images() const {
 std::vector<SubmapMessage> RobotAgent::take_outgoing() {
   std::vector<SubmapMessage> out;
   const auto observe = [&](const FinishedSubmap& finished, const SubmapSteps& steps) {
-    fit_.add_scans(finished.scans, steps, submaps_.state().drift);
+    fit_.add(finished, steps, submaps_.state().drift);
   };
   while (auto submap = submaps_.take_submap(observe))
     out.push_back({.header = {.robot = chain_.robot, .session = chain_.session, .sequence = state_.sequence++},

@@ -49,10 +49,10 @@ Result<VisualPayload> see(const Submap& submap, const std::vector<TrackedImages>
 
 }  // namespace
 
-/// Compares a finished submap's scans with odometry, and mends it.
+/// Compares what a finished submap's sensors show with odometry, and mends it.
 void SubmapBuilder::fit(FinishedSubmap& finished, const ObserveScans& observe) {
   SubmapSteps steps;
-  if (config_.fit.scans != "off" && !finished.scans.empty()) steps = scan_steps(finished, config_.min_range_m);
+  if (config_.fit.scans != "off") steps = steps_of(finished, config_.min_range_m);
   if (steps.far) state_.drift.add(*steps.far, steps.T_far_by_odometry, steps.far_distance_m, steps.other_rad2);
   if (observe) observe(finished, steps);
   const bool was_mended = state_.T_mended_odom != Pose3{};

@@ -39,7 +39,8 @@ double median_range_m(const PointCloud& cloud) {
 
 bool is_same(const fit::Misfit& a, const fit::Misfit& b) {
   if (a.kind != b.kind) return false;
-  if (a.kind == fit::MisfitKind::stood_still) return a.from <= b.to && b.from <= a.to;
+  if (a.kind == fit::MisfitKind::stood_still) return a.from <= b.to && b.from <= a.to;  // whoever says so
+  if (a.by != b.by) return false;
   return std::abs(a.value - b.value) <= kOtherSize * std::max(std::abs(a.value), std::abs(b.value));
 }
 
@@ -49,7 +50,7 @@ void FitWatch::add_odometry(const StampedPose& T_odom_body, bool is_jump) {
   if (!is_on_) return;
   if (is_jump) {
     odometry_.clear();
-    steps_.clear();
+    steps_ = {};
   }
   const bool is_close = odometry_.size() >= 2 && T_odom_body.stamp - odometry_[odometry_.size() - 2].stamp < kFinest_s;
   if (is_close)
@@ -59,41 +60,56 @@ void FitWatch::add_odometry(const StampedPose& T_odom_body, bool is_jump) {
   if (odometry_.size() > kMostSamples) odometry_.erase(odometry_.begin(), odometry_.begin() + kMostSamples / 2);
 }
 
-void FitWatch::add_scans(std::span<const lidar::PosedCloud> scans, const SubmapSteps& steps,
-                         const fit::SteadyDrift& drift) {
-  if (!is_on_ || scans.empty()) return;
-  for (const lidar::PosedCloud& scan : scans) {
+void FitWatch::add(const FinishedSubmap& submap, const SubmapSteps& steps, const fit::SteadyDrift& drift) {
+  if (!is_on_ || (submap.scans.empty() && steps.by_images.empty())) return;
+  for (const lidar::PosedCloud& scan : submap.scans) {
     ranges_m_.push_back(median_range_m(*scan.cloud));
     if (ranges_m_.size() > kRanges) ranges_m_.pop_front();
   }
   if (steps.far) registrations_ += static_cast<std::uint64_t>(steps.far->registrations);
-  for (const fit::ScanStep& step : steps.near) {
-    registrations_ += static_cast<std::uint64_t>(step.registrations);
-    if (!stands(step, odometry_)) steps_.push_back(step);
-  }
-  forget_old(scans.back().stamp);
-  compare(drift);
+  keep(steps.near, fit::Witness::scans);
+  keep(steps.by_images, fit::Witness::images);
+  forget_old();
+  compare(steps.still_m, drift);
 }
 
-void FitWatch::forget_old(Timestamp newest) {
-  if (steps_.size() > kMostSteps) steps_.erase(steps_.begin(), steps_.end() - kMostSteps);
-  const Timestamp oldest = (steps_.empty() ? newest : steps_.front().from) - fit::kMostOffset_s;
-  const auto kept = std::ranges::lower_bound(odometry_, oldest, {}, &StampedPose::stamp);
+void FitWatch::keep(std::span<const fit::ScanStep> steps, fit::Witness by) {
+  std::vector<fit::ScanStep>& kept = steps_[static_cast<std::size_t>(by)];
+  for (const fit::ScanStep& step : steps) {
+    registrations_ += static_cast<std::uint64_t>(step.registrations);
+    if (!stands(step, odometry_)) kept.push_back(step);
+  }
+  if (kept.size() > kMostSteps) kept.erase(kept.begin(), kept.end() - kMostSteps);
+}
+
+void FitWatch::forget_old() {
+  if (odometry_.empty()) return;
+  Timestamp oldest = odometry_.back().stamp;
+  for (const auto& steps : steps_)
+    if (!steps.empty()) oldest = std::min(oldest, steps.front().from);
+  const auto kept = std::ranges::lower_bound(odometry_, oldest - fit::kMostOffset_s, {}, &StampedPose::stamp);
   odometry_.erase(odometry_.begin(), kept);
 }
 
-void FitWatch::compare(const fit::SteadyDrift& drift) {
-  const std::vector<fit::Misfit> before = std::exchange(misfits_, fit::fit_odometry(steps_, odometry_).misfits);
+void FitWatch::compare(double still_m, const fit::SteadyDrift& drift) {
+  const std::vector<fit::Misfit> before = std::exchange(misfits_, {});
+  for (const fit::Witness by : {fit::Witness::scans, fit::Witness::images})
+    for (fit::Misfit& misfit : fit::fit_odometry(steps_[static_cast<std::size_t>(by)], odometry_).misfits) {
+      misfit.by = by;
+      misfits_.push_back(std::move(misfit));
+    }
+  if (still_m > 0.0) misfits_.push_back({.kind = fit::MisfitKind::scans_stand_still, .value = still_m});
   std::vector<double> ranges(ranges_m_.begin(), ranges_m_.end());
-  std::ranges::nth_element(ranges, ranges.begin() + static_cast<std::ptrdiff_t>(ranges.size() / 2));
-  if (const double median = ranges[ranges.size() / 2]; ranges.size() == kRanges && median > kFarthest_m)
-    misfits_.push_back({.kind = fit::MisfitKind::far_points, .value = median});
+  std::ranges::nth_element(ranges, ranges.begin() + std::ssize(ranges) / 2);
+  if (ranges.size() == kRanges && ranges[kRanges / 2] > kFarthest_m)
+    misfits_.push_back({.kind = fit::MisfitKind::far_points, .value = ranges[kRanges / 2]});
+  const auto& scans = steps_[static_cast<std::size_t>(fit::Witness::scans)];
   if (const double turn = drift.to_take_out(); std::abs(turn) >= kLeastDrift && drift.count > kSaidAfter)
     misfits_.push_back({.kind = fit::MisfitKind::drift,
                         .value = turn / kRadPerDeg,
                         .sigma = drift.estimate()->sigma / kRadPerDeg,
-                        .from = steps_.empty() ? Timestamp{} : steps_.front().from,
-                        .to = steps_.empty() ? Timestamp{} : steps_.back().to});
+                        .from = scans.empty() ? Timestamp{} : scans.front().from,
+                        .to = scans.empty() ? Timestamp{} : scans.back().to});
   const auto is_in = [](const fit::Misfit& misfit, const std::vector<fit::Misfit>& list) {
     return std::ranges::any_of(list, [&](const fit::Misfit& other) { return is_same(other, misfit); });
   };
@@ -101,7 +117,8 @@ void FitWatch::compare(const fit::SteadyDrift& drift) {
     const bool is_standstill = misfit.kind == fit::MisfitKind::stood_still;
     const bool is_at_once = is_standstill || misfit.kind == fit::MisfitKind::scans_stand_still;
     if (is_in(misfit, said_) || (!is_at_once && !is_in(misfit, before))) continue;
-    if (!is_standstill) std::erase_if(said_, [&](const fit::Misfit& said) { return said.kind == misfit.kind; });
+    if (!is_standstill)
+      std::erase_if(said_, [&](const fit::Misfit& said) { return said.kind == misfit.kind && said.by == misfit.by; });
     said_.push_back(misfit);
     news_.push_back(misfit);
   }

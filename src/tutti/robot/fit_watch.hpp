@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -12,22 +13,22 @@
 #include "tutti/perception/fit/misfit.hpp"
 #include "tutti/perception/fit/scan_step.hpp"
 #include "tutti/perception/fit/steady_drift.hpp"
-#include "tutti/perception/lidar/voxel_filter.hpp"
 #include "tutti/robot/mend_submap.hpp"
 #include "tutti/robot/submap_builder.hpp"
 
 namespace tutti::robot {
 
-/// Watches whether a robot fits itself: whether its scans show the motion that odometry says (fit::fit_odometry()).
-/// It remembers the newest kMostSteps steps, in memory alone: a robot that starts again begins anew.
+/// Watches whether a robot fits itself: whether its scans and images show the motion that odometry says
+/// (fit::fit_odometry()), each alone. It remembers the newest kMostSteps steps of each, in memory alone: a robot that
+/// starts again begins anew.
 class FitWatch {
  public:
   explicit FitWatch(const FitConfig& config) : is_on_(config.scans != "off") {}
 
   /// A sample of raw odometry; stamps increase. A jump forgets all before it.
   void add_odometry(const StampedPose& T_odom_body, bool is_jump);
-  /// The scans of a submap that has ended with the motions between them, and odometry's drift as far as it is known.
-  void add_scans(std::span<const lidar::PosedCloud> scans, const SubmapSteps& steps, const fit::SteadyDrift& drift);
+  /// A submap that has ended with the motions within it, and odometry's drift as far as it is known.
+  void add(const FinishedSubmap& submap, const SubmapSteps& steps, const fit::SteadyDrift& drift);
 
   /// What contradicts since the last call, as two submaps in a row say, that was not said before or is of quite another
   /// size than was said. Odometry that stood still is said at once.
@@ -40,13 +41,14 @@ class FitWatch {
   static constexpr std::size_t kMostSteps = 200;
 
  private:
-  void forget_old(Timestamp newest);
-  void compare(const fit::SteadyDrift& drift);
+  void keep(std::span<const fit::ScanStep> steps, fit::Witness by);
+  void forget_old();
+  void compare(double still_m, const fit::SteadyDrift& drift);
 
   bool is_on_;
   Trajectory odometry_;
-  std::vector<fit::ScanStep> steps_;
-  std::deque<double> ranges_m_;  // medians of the newest scans
+  std::array<std::vector<fit::ScanStep>, 2> steps_;  ///< By Witness.
+  std::deque<double> ranges_m_;                      // medians of the newest scans
   std::vector<fit::Misfit> misfits_, said_, news_;
   std::uint64_t registrations_ = 0;
 };

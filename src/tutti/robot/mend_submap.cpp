@@ -9,13 +9,15 @@
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/model/trajectory.hpp"
+#include "tutti/perception/fit/image_step.hpp"
+#include "tutti/perception/fit/sparse_scans.hpp"
 #include "tutti/perception/fit/standstill.hpp"
 #include "tutti/perception/fit/steady_drift.hpp"
 
 namespace tutti::robot {
 namespace {
 
-constexpr double kLongestStep_s = 3.0;  // between two scans
+constexpr double kLongestStep_s = 3.0;  // between two scans, or two images
 constexpr double kNearTimes = 4.0;      // of its variance that a step from scan to scan may miss odometry by
 
 const Pose3* at(const Trajectory& poses, Timestamp stamp) {
@@ -89,10 +91,7 @@ void add_far_step(const fit::FitScan& first, const fit::FitScan& last, const Tra
     out.far = fit::step_between(first, last, T_by_steps, out.T_far_by_odometry);
 }
 
-}  // namespace
-
-SubmapSteps scan_steps(const FinishedSubmap& finished, double min_range_m) {
-  SubmapSteps out;
+void add_scan_steps(const FinishedSubmap& finished, double min_range_m, SubmapSteps& out) {
   std::optional<fit::FitScan> first, middle, last;
   Pose3 T_submap_last;
   const auto add = [&](const lidar::PosedCloud& scan) {
@@ -110,16 +109,31 @@ SubmapSteps scan_steps(const FinishedSubmap& finished, double min_range_m) {
   };
   for (const lidar::PosedCloud& scan : finished.scans) add(scan);
   if (finished.scan_after) add(*finished.scan_after);
-  if (out.near.size() < 2) return out;
+  if (out.near.size() < 2) {
+    out.still_m = fit::moved_while_still(finished.scans);
+    return;
+  }
   const Trajectory poses = poses_of(finished);
   add_far_step(*first, *last, poses, out);
   if (!out.far && middle) add_far_step(*first, *middle, poses, out);  // round a corner nothing is seen of both
+}
+
+}  // namespace
+
+SubmapSteps steps_of(const FinishedSubmap& finished, double min_range_m) {
+  SubmapSteps out;
+  add_scan_steps(finished, min_range_m, out);
+  for (std::size_t k = 1; k < finished.images.size(); ++k) {
+    const TrackedImages &from = finished.images[k - 1], &to = finished.images[k];
+    if (to.stamp - from.stamp > kLongestStep_s) continue;
+    if (const auto step = fit::step_between(from, to)) out.by_images.push_back(*step);
+  }
   return out;
 }
 
 std::optional<Pose3> mend(const SubmapSteps& steps, double drift, FinishedSubmap& finished) {
   const Trajectory poses = poses_of(finished);
-  const auto still = still_steps(steps.near, poses);
+  const auto still = still_steps(steps.best(), poses);
   if (still.empty() && drift == 0.0) return std::nullopt;
   const Trajectory right = mended(poses, still, drift);
   for (lidar::PosedCloud& scan : finished.scans) scan.T_submap_body = *at(right, scan.stamp);

@@ -28,11 +28,11 @@ struct FitConfig {
   template <class V>
   void describe(V& v) {
     v.field("scans", scans, one_of({"off", "say", "use", "correct"}),
-            "say: the motion from scan to scan is compared with odometry, and what they contradict each other in is a "
-            "warning with its cause and size: clocks, the LiDAR's pose, axes, drift, odometry that stood still. use: "
-            "and submaps have the scans' motion where odometry stood still, and no steady drift of yaw. correct: and "
-            "tutti run sets clock and pose of the LiDAR of a bag to what its "
-            "scans say, and begins again; live as use. off: nothing is "
+            "say: the motion from scan to scan, and of two cameras or one with depth from image to image, is compared "
+            "with odometry, and what they contradict each other in is a warning with its cause and size: clocks, the "
+            "sensor's pose, axes, scale, drift, odometry that stood still. use: and submaps have the sensors' motion "
+            "where odometry stood still, and no steady drift of yaw by the scans. correct: and tutti run sets clock "
+            "and pose of the LiDAR of a bag to what its scans say, and begins again; live as use. off: nothing is "
             "registered, which saves a robot some 5 ms a keyframe.");
   }
 };

@@ -25,8 +25,38 @@ std::string in_degrees(const Eigen::Quaterniond& R) {
   return fmt::format("({:.1f}, {:.1f}, {:.1f}) degrees about the body's x, y, z", deg.x(), deg.y(), deg.z());
 }
 
-std::string read_otherwise(const char* as_what) {
-  return fmt::format("its odometry fits the scans when it is read as {}", as_what);
+/// What a sensor gives, how it is mounted, and what to set.
+struct Words {
+  const char *seen, *is, *sits, *hangs, *pose, *offset, *signs, *lie, *why_still, *mend_still, *mend_scale;
+};
+constexpr std::array<Words, 2> kWords{{
+    {.seen = "scans",
+     .is = "its LiDAR is",
+     .sits = "its LiDAR sits",
+     .hangs = "the LiDAR hangs head down",
+     .pose = "T_body_lidar",
+     .offset = "scan_time_offset_s",
+     .signs = ", or the points' y has the wrong sign",
+     .lie = "lie on each other as they are",
+     .why_still = "they are in the world's frame already, or are all one scan",
+     .mend_still = "take the cloud in the LiDAR's or body's frame (FAST-LIO: /cloud_registered_body)",
+     .mend_scale = "check wheel radius, or the camera's baseline or scale"},
+    {.seen = "images",
+     .is = "its cameras are",
+     .sits = "its cameras sit",
+     .hangs = "the cameras hang head down",
+     .pose = "T_body_camera",
+     .offset = "images.time_offset_s",
+     .signs = "",
+     .lie = "show no motion",
+     .why_still = "they are all one image",
+     .mend_still = "look at what takes the images",
+     .mend_scale = "check the baseline between the cameras, the unit of depth images, or odometry's scale"},
+}};
+const Words& words(const Misfit& misfit) { return kWords[static_cast<std::size_t>(misfit.by)]; }
+
+std::string read_otherwise(const Misfit& misfit, const char* as_what) {
+  return fmt::format("its odometry fits the {} when it is read as {}", words(misfit).seen, as_what);
 }
 
 std::string mend_bridge(const Misfit&) {
@@ -36,61 +66,57 @@ std::string mend_bridge(const Misfit&) {
 const std::array<Row, 15> kRows{{
     {MisfitKind::clock, "clock",
      [](const Misfit& m) {
-       return fmt::format("its scans are stamped {:.3f} s {} by its odometry (sigma {:.3f} s)", std::abs(m.value),
-                          m.value < 0.0 ? "late" : "early", m.sigma);
+       return fmt::format("its {} are stamped {:.3f} s {} by its odometry (sigma {:.3f} s)", words(m).seen,
+                          std::abs(m.value), m.value < 0.0 ? "late" : "early", m.sigma);
      },
-     [](const Misfit& m) { return fmt::format("add {:.3f} to scan_time_offset_s", m.value); }},
+     [](const Misfit& m) { return fmt::format("add {:.3f} to {}", m.value, words(m).offset); }},
     {MisfitKind::turned, "turned",
      [](const Misfit& m) {
-       return fmt::format("its LiDAR is turned by {:.1f} degrees (sigma {:.1f}) against T_body_lidar as stated",
-                          m.value, m.sigma);
+       return fmt::format("{} turned by {:.1f} degrees (sigma {:.1f}) against {} as stated", words(m).is, m.value,
+                          m.sigma, words(m).pose);
      },
-     [](const Misfit& m) { return fmt::format("turn T_body_lidar by {}", in_degrees(m.T_correction.rotation)); }},
+     [](const Misfit& m) { return fmt::format("turn {} by {}", words(m).pose, in_degrees(m.T_correction.rotation)); }},
     {MisfitKind::upside_down, "upside_down",
-     [](const Misfit&) {
-       return std::string(
-           "its scans and odometry are upside down or mirrored to each other: the LiDAR hangs head down, "
-           "odometry is of NED axes or a body of x forward, y right, z down, or the points' y has the "
-           "wrong sign");
-     },
      [](const Misfit& m) {
        return fmt::format(
-           "if the LiDAR hangs head down, turn T_body_lidar by {}; else mend what writes the odometry or "
-           "the cloud",
-           in_degrees(m.T_correction.rotation));
+           "its {} and odometry are upside down or mirrored to each other: {}, odometry is of NED axes or a body of x "
+           "forward, y right, z down{}",
+           words(m).seen, words(m).hangs, words(m).signs);
+     },
+     [](const Misfit& m) {
+       return fmt::format("if {}, turn {} by {}; else mend what writes the odometry or the {}", words(m).hangs,
+                          words(m).pose, in_degrees(m.T_correction.rotation), words(m).seen);
      }},
     {MisfitKind::displaced, "displaced",
      [](const Misfit& m) {
-       return fmt::format("its LiDAR sits {:.2f} m (sigma {:.2f} m) off from where T_body_lidar states it", m.value,
-                          m.sigma);
+       return fmt::format("{} {:.2f} m (sigma {:.2f} m) off from where {} states it", words(m).sits, m.value, m.sigma,
+                          words(m).pose);
      },
      [](const Misfit& m) {
        const Eigen::Vector3d& t = m.T_correction.translation;
-       return fmt::format("add ({:.2f}, {:.2f}, {:.2f}) m to T_body_lidar's translation", t.x(), t.y(), t.z());
+       return fmt::format("add ({:.2f}, {:.2f}, {:.2f}) m to {}'s translation", t.x(), t.y(), t.z(), words(m).pose);
      }},
     {MisfitKind::positions_ned, "positions_ned",
-     [](const Misfit&) { return read_otherwise("positions north, east, down beside attitudes of x forward, z up"); },
+     [](const Misfit& m) {
+       return read_otherwise(m, "positions north, east, down beside attitudes of x forward, z up");
+     },
      mend_bridge},
     {MisfitKind::inverse_poses, "inverse_poses",
-     [](const Misfit&) { return read_otherwise("the inverse of every pose"); }, mend_bridge},
+     [](const Misfit& m) { return read_otherwise(m, "the inverse of every pose"); }, mend_bridge},
     {MisfitKind::inverse_attitudes, "inverse_attitudes",
-     [](const Misfit&) { return read_otherwise("positions with inverse rotations"); }, mend_bridge},
+     [](const Misfit& m) { return read_otherwise(m, "positions with inverse rotations"); }, mend_bridge},
     {MisfitKind::w_first, "w_first",
-     [](const Misfit&) { return read_otherwise("quaternions that were written w first"); },
+     [](const Misfit& m) { return read_otherwise(m, "quaternions that were written w first"); },
      [](const Misfit&) { return std::string("write quaternions as x, y, z, w"); }},
     {MisfitKind::w_last, "w_last",
-     [](const Misfit&) { return read_otherwise("quaternions that were written w last and are sent w first"); },
+     [](const Misfit& m) { return read_otherwise(m, "quaternions that were written w last and are sent w first"); },
      [](const Misfit&) { return std::string("write quaternions as x, y, z, w"); }},
     {MisfitKind::scans_stand_still, "scans_stand_still",
      [](const Misfit& m) {
-       return fmt::format(
-           "its scans lie on each other as they are while odometry moves by {:.0f} m: they are in the "
-           "world's frame already, or are all one scan, or odometry runs away",
-           m.value);
+       return fmt::format("its {} {} while odometry moves by {:.0f} m: {}, or odometry runs away", words(m).seen,
+                          words(m).lie, m.value, words(m).why_still);
      },
-     [](const Misfit&) {
-       return std::string("take the cloud in the LiDAR's or body's frame (FAST-LIO: /cloud_registered_body)");
-     }},
+     [](const Misfit& m) { return std::string(words(m).mend_still); }},
     {MisfitKind::far_points, "far_points",
      [](const Misfit& m) {
        return fmt::format("half of its points are more than {:.0f} m away: not in metres", m.value);
@@ -98,10 +124,10 @@ const std::array<Row, 15> kRows{{
      [](const Misfit&) { return std::string("write points in metres"); }},
     {MisfitKind::scale, "scale",
      [](const Misfit& m) {
-       return fmt::format("its odometry's distances are {:.3f} times those of its scans (sigma {:.3f})", 1.0 / m.value,
-                          m.sigma);
+       return fmt::format("its odometry's distances are {:.3f} times those of its {} (sigma {:.3f})", 1.0 / m.value,
+                          words(m).seen, m.sigma);
      },
-     [](const Misfit&) { return std::string("check wheel radius, or the camera's baseline or scale"); }},
+     [](const Misfit& m) { return std::string(words(m).mend_scale); }},
     {MisfitKind::drift, "drift",
      [](const Misfit& m) {
        return fmt::format("its odometry turns {:.2f} degrees too far to the {} with every metre (sigma {:.2f})",
@@ -110,19 +136,19 @@ const std::array<Row, 15> kRows{{
      [](const Misfit&) { return std::string("check the gyroscope's bias, or the wheels' track width and radii"); }},
     {MisfitKind::stood_still, "stood_still",
      [](const Misfit& m) {
-       return fmt::format("its odometry stood still for {:.1f} s while its scans moved by {:.1f} m and {:.0f} degrees",
-                          m.to - m.from, m.value, m.angle_deg);
+       return fmt::format("its odometry stood still for {:.1f} s while its {} moved by {:.1f} m and {:.0f} degrees",
+                          m.to - m.from, words(m).seen, m.value, m.angle_deg);
      },
      [](const Misfit&) { return std::string("look at what makes the odometry at that time"); }},
     {MisfitKind::unexplained, "unexplained",
      [](const Misfit& m) {
        return fmt::format(
-           "its scans contradict its odometry in {:.0f} % of the steps, and no mistake that is looked for "
-           "explains it",
-           100.0 * m.value);
+           "its {} contradict its odometry in {:.0f} % of the steps, and no mistake that is looked for explains it",
+           words(m).seen, 100.0 * m.value);
      },
-     [](const Misfit&) {
-       return std::string("check stamps, axes and units of odometry and cloud, and that both are of one robot");
+     [](const Misfit& m) {
+       return fmt::format("check stamps, axes and units of odometry and {}, and that both are of one robot",
+                          words(m).seen);
      }},
 }};
 
@@ -136,6 +162,7 @@ std::optional<MisfitKind> misfit_kind(std::string_view name) {
     if (row.name == name) return row.kind;
   return std::nullopt;
 }
+std::string_view to_string(Witness witness) { return kWords[static_cast<std::size_t>(witness)].seen; }
 std::string to_string(const Misfit& misfit) { return row_of(misfit.kind).says(misfit); }
 std::string way_on(const Misfit& misfit) { return row_of(misfit.kind).way_on(misfit); }
 

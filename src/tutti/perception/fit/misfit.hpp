@@ -12,7 +12,7 @@
 
 namespace tutti::fit {
 
-/// The ways in which a robot's scans can contradict its odometry.
+/// The ways in which a robot's scans or images can contradict its odometry.
 enum class MisfitKind : std::uint8_t {
   clock,              ///< Scans and odometry are stamped by clocks that differ.
   turned,             ///< The LiDAR is turned against the pose that is stated for it.
@@ -31,7 +31,10 @@ enum class MisfitKind : std::uint8_t {
   unexplained,        ///< Most steps contradict, and none of the above explains it.
 };
 
-/// One such contradiction, with its size.
+/// Whose motion contradicts odometry's.
+enum class Witness : std::uint8_t { scans, images };
+
+/// One such contradiction, with its size. What is said of scans and the LiDAR holds for images and cameras alike.
 struct Misfit {
   MisfitKind kind = MisfitKind::clock;
   /// clock: added to the scans' stamps it gives odometry's time, s. turned: angle, degrees. displaced: m. scale: factor
@@ -44,6 +47,7 @@ struct Misfit {
   Pose3 T_correction;
   double angle_deg = 0.0;  ///< stood_still: rotation of the scans.
   Timestamp from, to;      ///< The steps that say so.
+  Witness by = Witness::scans;
   template <class V>
   void describe(V& v) {
     v.field(1, "kind", kind);
@@ -53,12 +57,14 @@ struct Misfit {
     v.field(5, "angle_deg", angle_deg);
     v.field(6, "from", from);
     v.field(7, "to", to);
+    v.field(8, "by", by);
   }
 };
 
 /// Its name in logs and JSON, as "clock"; and back, nothing for what is none.
 std::string_view to_string(MisfitKind kind);
 std::optional<MisfitKind> misfit_kind(std::string_view name);
+std::string_view to_string(Witness witness);
 /// Says what is wrong and by how much, as a sentence's end: "its scans are stamped 0.598 s late by its odometry (sigma
 /// ..)".
 std::string to_string(const Misfit& misfit);

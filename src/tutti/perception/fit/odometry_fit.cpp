@@ -186,35 +186,41 @@ std::vector<Misfit> joined(std::vector<Misfit> misfits) {
   return misfits;
 }
 
-/// The cost that is left when these blocks are as stated and everything else is solved for.
-double cost_without(std::span<const Block* const> blocks, const WeighedSteps& weighed, const Solved& solved) {
+/// The solution in which these blocks are as stated.
+Solution solve_without(std::span<const Block* const> blocks, const WeighedSteps& weighed, const Solved& solved) {
   Parameters begin = as_parameters(solved.solution.model), fixed = Parameters::Zero();
   for (const Block* block : blocks) {
     begin.segment(block->first, block->size).setZero();
     fixed.segment(block->first, block->size).setOnes();
   }
-  return solve(weighed, solved.odometry, as_model(begin), fixed).cost.mean;
+  return solve(weighed, solved.odometry, as_model(begin), fixed);
 }
 
-/// The fewest blocks that explain the contradiction, the one without which most is left first.
+/// The fewest blocks that explain the contradiction, the one without which most is left first. Those that are not known
+/// are as stated: on a circle a displacement that nobody knows of would take the place of a scale that is known.
 std::vector<Misfit> misfits_of(const WeighedSteps& weighed, const Solved& solved, double before) {
   const double after = solved.solution.cost.mean;
   if (after > before || (before >= kGross && after > std::max(kGood, kMostLeft * before))) return {};
   std::vector<std::pair<double, const Block*>> candidates;  // what is left without the block
+  std::vector<const Block*> unknown;
   for (const Block& block : kBlocks) {
     const auto part = known_part(block, solved.solution);
     const std::array<const Block*, 1> alone{&block};
     if (part && halves_agree(block, *part, weighed, solved))
-      candidates.emplace_back(cost_without(alone, weighed, solved), &block);
+      candidates.emplace_back(solve_without(alone, weighed, solved).cost.mean, &block);
+    else
+      unknown.push_back(&block);
   }
   std::ranges::sort(candidates, std::greater{});
+  const Solution by_known = solve_without(unknown, weighed, solved);
   std::vector<Misfit> out;
   for (std::size_t k = 0; k < candidates.size(); ++k) {
-    std::vector<const Block*> rest;
+    std::vector<const Block*> rest = unknown;
     for (std::size_t i = k; i < candidates.size(); ++i) rest.push_back(candidates[i].second);
-    const double least = (out.empty() ? kLeastShare : kLeastFurtherShare) * std::max(before - after, 1e-6);
-    if (cost_without(rest, weighed, solved) - after < least) break;
-    out.push_back(misfit_of(*rest.front(), *known_part(*rest.front(), solved.solution), solved.solution));
+    const double least = (out.empty() ? kLeastShare : kLeastFurtherShare) * std::max(before - by_known.cost.mean, 1e-6);
+    if (solve_without(rest, weighed, solved).cost.mean - by_known.cost.mean < least) break;
+    const Block& block = *candidates[k].second;
+    if (const auto part = known_part(block, by_known)) out.push_back(misfit_of(block, *part, by_known));
   }
   return joined(std::move(out));
 }
