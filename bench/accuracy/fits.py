@@ -13,6 +13,13 @@ SMALL = ["simulation.world.network={rows: 2, columns: 2, block_m: 10.0, jitter_m
          "simulation.robots.0.walk.duration_s=120", "simulation.robots.1.walk.duration_s=120"]
 MISTAKES = ["scans_late", "lidar_ahead", "lidar_turned", "lidar_head_down", "mirrored", "millimetres", "world_cloud",
             "ned_positions", "ned", "inverse_poses", "w_first", "frozen", "drift", "scale"]
+# What a mistake of `times: 1` puts in, and which kind of contradiction it should be; reported is the report's value.
+SIZES = [("scans_late", "clock", -0.6, "s", [0.1, 0.25, 0.5, 1, 3]),
+         ("lidar_turned", "turned", 5.0, "degrees", [0.1, 0.25, 0.5, 1, 3]),
+         ("lidar_ahead", "displaced", 4.0, "m", [0.025, 0.05, 0.25, 1]),
+         ("drift", "drift", 0.2, "degrees a metre", [0.5, 1, 2.5, -1]),
+         ("scale", "scale", 0.05, "of the distance", [0.4, 0.8, 1, 2, -1])]
+BASELINES = [0.5, 0.75, 1, 1.25, -1]
 HONEST = [("hku_two_sessions, real", "hku_two_sessions", []),
           ("demo", "demo", []),
           ("demo, 64 beams", "demo", SMALL + ["simulation.lidar.model=64-beam"]),
@@ -21,7 +28,10 @@ HONEST = [("hku_two_sessions, real", "hku_two_sessions", []),
           ("demo, tunnels without features", "demo", SMALL + ["simulation.world.featureless_share=1.0"]),
           ("terrace, odometry fails on the roof", "terrace", ["closures.verifier=lidar"]),
           ("degenerate", "degenerate", ["simulation.sensors=lidar"]),
-          ("hall_mixed", "hall_mixed", [])]
+          ("hall_mixed", "hall_mixed", []),
+          ("hall, two cameras", "hall", ["hall.cameras=2"]),
+          ("hall, a camera with depth", "hall", ["hall.depth=true"]),
+          ("euroc_mh_images, real", "euroc_mh_images", [])]
 
 
 def run(arguments, mission, assignments):
@@ -41,8 +51,7 @@ def metres(value):
 
 def map_of(report):
     server = report["server"]
-    return (f"{server['components']}", f"{server['closures_accepted_inter']}",
-            metres(max((robot["server_rmse_m"] or 0.0) for robot in report["robots"])))
+    return (f"{server['components']}", f"{server['closures_accepted_inter']}", worst(report))
 
 
 def mistakes(arguments):
@@ -55,6 +64,38 @@ def mistakes(arguments):
         lines.append(row(f"`{kind}`", said(report) or "**nothing**", *map_of(report)))
     report = run(arguments, "demo", SMALL + ["mistakes=[{robot: bravo, kind: frozen}]", "agent.submap.fit.scans=say"])
     lines.append(row("`frozen`, `agent.submap.fit.scans=say`", said(report) or "**nothing**", *map_of(report)))
+    return lines
+
+
+def worst(report):
+    return metres(max((robot["server_rmse_m"] or 0.0) for robot in report["robots"]))
+
+
+def sizes(arguments):
+    lines = [row("mistake", "put in", "reported", "sigma"), row("---", "---:", "---:", "---:")]
+    for name, kind, unit_size, unit, all_times in SIZES:
+        for times in all_times:
+            report = run(arguments, "demo", SMALL + [f"mistakes=[{{robot: bravo, kind: {name}, times: {times}}}]"])
+            found = [m for robot in report["robots"] if robot["name"] == "bravo" for m in robot["misfits"]]
+            of_kind = [m for m in found if m["kind"] == kind]
+            put_in = times * unit_size
+            value = of_kind[-1]["value"] if of_kind else None
+            if kind == "scale" and value:
+                value = 1.0 / value - 1.0
+            others = ", ".join(m["kind"] for m in found if m["kind"] != kind)
+            lines.append(row(f"`{name}`", f"{put_in:.3g} {unit}",
+                             (f"{value:.3f}" if of_kind else "nothing") + (f"; {others}" if others else ""),
+                             f"{of_kind[-1]['sigma']:.3f}" if of_kind else "-"))
+    return lines
+
+
+def baselines(arguments):
+    lines = [row("bravo's baseline", "reported", "worst robot in the server's map, m"), row("---", "---", "---:")]
+    report = run(arguments, "hall", ["hall.cameras=2"])
+    lines.append(row("right", said(report) or "nothing", worst(report)))
+    for times in BASELINES:
+        report = run(arguments, "hall", ["hall.cameras=2", f"mistakes=[{{robot: bravo, kind: baseline, times: {times}}}]"])
+        lines.append(row(f"{4 * times:+g} %", said(report) or "nothing", worst(report)))
     return lines
 
 
@@ -81,6 +122,13 @@ def main():
         "tunnel of 2 x 2 blocks of 10 m, 120 s, two robots with 16 beams, seed 1; bravo is set up wrongly (`docs/simulation.md`).",
         "Nothing is corrected of the mistakes of setting up: the warning has what to type. Where odometry stood still (`frozen`),",
         "submaps have the scans' motion, and a steady drift of yaw (`drift`) is taken out of them.", "",
+        "## Sizes", "",
+        "The same mission, by how large the mistake is. Reported is what the report has of this kind at the end, and what else it has.", "",
+        *sizes(arguments), "",
+        "## Cameras", "",
+        "Of two cameras, or one with depth, the motion from keyframe to keyframe is that of the points that both see. `missions/hall.yaml`",
+        "(simulated images); the distance between bravo's cameras is stated wrongly.", "",
+        *baselines(arguments), "",
         "## Honest recordings", "",
         "Simulated but for the first. What is reported of these is no mistake of setting up, but must be true.", "",
         *honest(arguments))

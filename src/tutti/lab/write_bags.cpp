@@ -98,7 +98,8 @@ class RobotWriter {
     return recording_.scans ? stamp_at(recording_, recording_.scan_stamps, i) : std::nullopt;
   }
   [[nodiscard]] std::optional<Timestamp> image_stamp(std::size_t i) const {
-    return i < robot_.images.stamps.size() ? std::optional(robot_.images.stamps[i]) : std::nullopt;
+    return recording_.images && i < recording_.images->stamps.size() ? std::optional(recording_.images->stamps[i])
+                                                                     : std::nullopt;
   }
 
   [[nodiscard]] Timestamp shifted(Timestamp stamp) const { return Timestamp{stamp.ns + offset_ns_}; }
@@ -119,8 +120,8 @@ class RobotWriter {
     const Timestamp stamp = recording_.odometry.front().stamp;
     std::vector<bags::RosTransform> still;
     if (recording_.scans) still.push_back(transform(stamp, "base_link", "lidar", robot_.T_body_lidar));
-    for (std::size_t i = 0; i < robot_.images.cameras.size(); ++i)
-      still.push_back(transform(stamp, "base_link", camera_name(i), robot_.images.cameras[i].T_body_camera));
+    for (std::size_t i = 0; recording_.images && i < recording_.images->cameras.size(); ++i)
+      still.push_back(transform(stamp, "base_link", camera_name(i), recording_.images->cameras[i].T_body_camera));
     if (!recording_.fixes.empty())
       still.push_back(transform(stamp, "base_link", "gnss",
                                 {Eigen::Quaterniond::Identity(), recording_.fixes.front().p_body_antenna}));
@@ -193,7 +194,7 @@ class RobotWriter {
   }
 
   Status images(std::size_t i) {
-    const ImageStream& stream = robot_.images;
+    const ImageStream& stream = *recording_.images;
     const Timestamp stamp = stream.stamps[i];
     for (std::size_t camera = 0; camera < stream.cameras.size(); ++camera) {
       const auto image = stream.load(i, camera);
@@ -244,8 +245,7 @@ Result<std::vector<RobotToWrite>> walking_robots(const MissionConfig& config, st
   if (!world) return tl::unexpected(world.error());
   std::vector<RobotToWrite> out;
   for (Recording& recording : world->recordings)
-    out.push_back(
-        {.recording = std::move(recording), .images = {}, .T_body_lidar = config.simulation.lidar.config().pose()});
+    out.push_back({std::move(recording), config.simulation.lidar.config().pose()});
   return out;
 }
 
@@ -253,10 +253,10 @@ Result<std::vector<RobotToWrite>> flying_robots(const MissionConfig& config, std
   auto hall = simulation::simulate_hall(config.hall, Timestamp{0}, seed);
   if (!hall) return tl::unexpected(hall.error());
   std::vector<RobotToWrite> out;
-  for (auto& [recording, images] : hall->robots)
-    out.push_back({.recording = std::move(recording),
-                   .images = std::move(images),
-                   .T_body_lidar = config.hall.lidar.config().pose()});
+  for (auto& [recording, images] : hall->robots) {
+    recording.images = std::make_shared<const ImageStream>(std::move(images));
+    out.push_back({std::move(recording), config.hall.lidar.config().pose()});
+  }
   return out;
 }
 
@@ -269,7 +269,7 @@ Result<std::vector<RobotToWrite>> simulated_robots(const MissionConfig& config, 
   if (auto ok = add_fixes(config, seed, recordings); !ok) return tl::unexpected(ok.error());
   if (auto ok = make_mistakes(config.mistakes, recordings); !ok) return tl::unexpected(ok.error());
   if (config.odometry_hz <= 0.0) return robots;
-  for (auto& [recording, images, T_body_lidar] : *robots) {
+  for (auto& [recording, T_body_lidar] : *robots) {
     Rng rng = Rng(seed).fork("odometry/" + recording.name);
     const auto ok = mission::resample(recording, config.odometry_hz, rng.uniform(0.0, 1.0 / config.odometry_hz));
     if (!ok) return in_context("robot " + recording.name, ok.error());

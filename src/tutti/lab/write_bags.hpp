@@ -9,7 +9,6 @@
 #include "tutti/base/result.hpp"
 #include "tutti/geometry/pose3.hpp"
 #include "tutti/lab/mission_config.hpp"
-#include "tutti/model/image_stream.hpp"
 #include "tutti/model/recording.hpp"
 
 /// Writes recordings as robots would have recorded them: one rosbag2 folder for each robot.
@@ -18,7 +17,6 @@ namespace tutti::lab {
 /// A robot to be written. Its frames and topics begin with its name: alpha/base_link, /alpha/odom.
 struct RobotToWrite {
   Recording recording;
-  ImageStream images;  ///< Without stamps when there is no camera.
   Pose3 T_body_lidar;
 };
 
