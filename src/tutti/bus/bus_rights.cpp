@@ -21,6 +21,7 @@ constexpr BusRole kRobotUser = BusRole::robot, kWorkerUser = BusRole::worker, kV
 
 constexpr const char* kAskLease = "$JS.API.DIRECT.GET.KV_TUTTI_SERVERS.$KV.TUTTI_SERVERS.{mission}";
 constexpr const char* kAskStatus = "$JS.API.DIRECT.GET.KV_GRAPH_{mission}.$KV.GRAPH_{mission}.viewer.0.mission_status";
+constexpr const char* kAskMap = "$JS.API.DIRECT.GET.MAPS_{mission}.mission.{mission}.map.*.*";
 constexpr const char* kOwnInbox = "answers to what it asks";
 constexpr const char* kLease = "whether the mission has a server";
 constexpr const char* kStreams = "makes and watches the mission's streams";
@@ -33,6 +34,7 @@ constexpr std::array kRights{
     publishes(kRobotUser, "$JS.API.DIRECT.GET.KV_GRAPH_{mission}.$KV.GRAPH_{mission}.robot.{number}.*",
               "asks for its last graph and receipt"),
     publishes(kRobotUser, kAskLease, kLease),
+    publishes(kRobotUser, kAskMap, "asks for the map that is published"),
     listens(kRobotUser, "$KV.GRAPH_{mission}.robot.{number}.*", "its own graphs and receipts"),
     listens(kRobotUser, "_INBOX.robot.{number}.>", kOwnInbox),
 
@@ -57,6 +59,8 @@ constexpr std::array kRights{
               "decisions, under the name that the key proves"),
     publishes(kOperatorUser, kAskStatus, "asks for the mission's last status"),
     publishes(kOperatorUser, kAskLease, kLease),
+    publishes(kOperatorUser, kAskMap, "asks for the map that is published"),
+    publishes(kOperatorUser, "mission.{mission}.map.*.*", "publishes a map, under its signature"),
     listens(kOperatorUser, "$KV.GRAPH_{mission}.viewer.0.*", "the mission's status"),
     listens(kOperatorUser, "_INBOX.operator.{number}.>", kOwnInbox),
 
@@ -64,6 +68,7 @@ constexpr std::array kRights{
     publishes(kServerUser, "$JS.API.STREAM.*.SUBMAPS_{mission}", kStreams),
     publishes(kServerUser, "$JS.API.STREAM.*.VERDICTS_{mission}", kStreams),
     publishes(kServerUser, "$JS.API.STREAM.*.JOBS_{mission}", kStreams),
+    publishes(kServerUser, "$JS.API.STREAM.*.MAPS_{mission}", kStreams),
     publishes(kServerUser, "$JS.API.STREAM.MSG.*.JOBS_{mission}", "removes jobs that are not its own"),
     publishes(kServerUser, "$JS.API.STREAM.*.KV_GRAPH_{mission}", kStreams),
     publishes(kServerUser, "$JS.API.STREAM.*.KV_TUTTI_SERVERS", kStreams),

@@ -30,7 +30,8 @@ TEST(BusRightsTest, ARobotWritesAsItselfAndReadsWhatIsItsOwn) {
   EXPECT_FALSE(may(kAlpha, BusRight::To::publish, submap(8)));
   for (const BusRight::To to : {BusRight::To::publish, BusRight::To::subscribe})
     for (const std::string& subject : subjects_of(kAlpha, to)) {
-      const bool is_own = subject.find("robot.7.") != std::string::npos || subject.ends_with("TUTTI_SERVERS.cave");
+      const bool is_own = subject.find("robot.7.") != std::string::npos || subject.ends_with("TUTTI_SERVERS.cave") ||
+                          subject == "$JS.API.DIRECT.GET.MAPS_cave.mission.cave.map.*.*";
       EXPECT_TRUE(is_own) << subject;
     }
 }
@@ -58,6 +59,13 @@ TEST(BusRightsTest, OnlyTheServerChangesStreams) {
     EXPECT_FALSE(right.to == BusRight::To::publish && subject.starts_with("$KV.")) << subject;
     EXPECT_FALSE(subject == ">" || subject == "_INBOX.>") << subject;
   }
+}
+
+TEST(BusRightsTest, OnlyOperatorsPublishMaps) {
+  for (const BusRight& right : bus_rights())
+    EXPECT_TRUE(!std::string(right.subject).starts_with("mission.{mission}.map.") || right.role == BusRole::operates)
+        << right.subject;
+  EXPECT_TRUE(may(kAnna, BusRight::To::publish, "mission.cave.map.*.*"));
 }
 
 TEST(BusRightsTest, TheConfigurationNamesEveryUserAndSubject) {

@@ -22,10 +22,11 @@ struct Lease {
 };
 
 struct MemoryBus {
-  std::mutex mutex;                        ///< Guards what follows.
-  std::map<std::string, Broker> missions;  ///< By name.
-  std::map<std::string, Lease> leases;     ///< By mission.
-  std::uint64_t revision = 0;              ///< The last one.
+  std::mutex mutex;                                                ///< Guards what follows.
+  std::map<std::string, Broker> missions;                          ///< By name.
+  std::map<std::string, Lease> leases;                             ///< By mission.
+  std::map<std::string, std::map<std::string, std::string>> maps;  ///< Published ones, by mission.
+  std::uint64_t revision = 0;                                      ///< The last one.
 };
 
 /// A bus outlives the ports, as its messages do.
@@ -148,6 +149,28 @@ class MemoryLeases final : public LeaseBoard {
   const std::shared_ptr<MemoryBus> bus_;
 };
 
+class MemoryMaps final : public MapBoard {
+ public:
+  MemoryMaps(std::shared_ptr<MemoryBus> bus, std::string mission)
+      : bus_(std::move(bus)), mission_(std::move(mission)) {}
+
+  Result<std::optional<std::string>> read(const std::string& key) override {
+    const std::scoped_lock guard(bus_->mutex);
+    const auto& values = bus_->maps[mission_];
+    const auto found = values.find(key);
+    return found == values.end() ? std::nullopt : std::optional(found->second);
+  }
+  Status write(const std::string& key, std::string_view bytes) override {
+    const std::scoped_lock guard(bus_->mutex);
+    bus_->maps[mission_].insert_or_assign(key, std::string(bytes));
+    return {};
+  }
+
+ private:
+  const std::shared_ptr<MemoryBus> bus_;
+  const std::string mission_;
+};
+
 }  // namespace
 
 std::unique_ptr<Port> open_memory_port(Endpoint endpoint, const BusOptions& options) {
@@ -156,6 +179,10 @@ std::unique_ptr<Port> open_memory_port(Endpoint endpoint, const BusOptions& opti
 
 std::unique_ptr<LeaseBoard> open_memory_leases(const BusOptions& options) {
   return std::make_unique<MemoryLeases>(bus_at(options.url));
+}
+
+std::unique_ptr<MapBoard> open_memory_maps(const BusOptions& options) {
+  return std::make_unique<MemoryMaps>(bus_at(options.url), options.mission);
 }
 
 }  // namespace tutti::bus

@@ -45,6 +45,7 @@ bool is_of_another_subject(natsMsg* message, const std::string& subject) {
 std::string submap_stream(const std::string& mission) { return "SUBMAPS_" + mission; }
 std::string verdict_stream(const std::string& mission) { return "VERDICTS_" + mission; }
 std::string job_stream(const std::string& mission) { return "JOBS_" + mission; }
+std::string map_stream(const std::string& mission) { return "MAPS_" + mission; }
 std::string retained_bucket(const std::string& mission) { return "GRAPH_" + mission; }
 std::string retained_stream(const std::string& mission) { return "KV_" + retained_bucket(mission); }
 
@@ -119,7 +120,7 @@ Status NatsConnection::add_stream(jsStreamConfig& stream) const {
     return fail(ErrorCode::io,
                 "{}: the bus has no {} MB for stream {} beside what other missions have set aside: give it more "
                 "(max_file in the jetstream block of nats-server's configuration), or remove what a mission M that is "
-                "over has left (nats stream rm, of SUBMAPS_M, VERDICTS_M, JOBS_M and KV_GRAPH_M)",
+                "over has left (nats stream rm, of SUBMAPS_M, VERDICTS_M, JOBS_M, MAPS_M and KV_GRAPH_M)",
                 url_, stream.MaxBytes >> 20, stream.Name);
   if (status != NATS_OK) return failure(status, fmt::format("stream {}", stream.Name), code);
   return {};
@@ -128,24 +129,36 @@ Status NatsConnection::add_stream(jsStreamConfig& stream) const {
 Status NatsConnection::prepare(const BusOptions& options) const {
   const std::string& mission = options.mission;
   const auto most = static_cast<std::int64_t>(options.max_stream_bytes);
-  const std::array<std::vector<std::string>, 3> subjects{
-      {{fmt::format("mission.{}.robot.*.submap", mission)},
-       {fmt::format("mission.{}.worker.*.verdicts", mission), fmt::format("mission.{}.worker.*.refinement", mission),
-        fmt::format("mission.{}.viewer.*.decision", mission), fmt::format("mission.{}.operator.*.decision", mission)},
-       {fmt::format("mission.{}.jobs.loop", mission)}}};
-  const std::array names{submap_stream(mission), verdict_stream(mission), job_stream(mission)};
-  for (std::size_t i = 0; i < names.size(); ++i) {
+  struct Row {
+    std::string name;
+    std::vector<std::string> subjects;
+    std::int64_t most_bytes;
+    bool keeps_last =
+        false;  ///< One of each subject stays, until there is another; else what is acknowledged takes no room.
+  };
+  for (const auto& [name, subjects, most_bytes, keeps_last] :
+       std::array<Row, 4>{{{submap_stream(mission), {fmt::format("mission.{}.robot.*.submap", mission)}, most},
+                           {verdict_stream(mission),
+                            {fmt::format("mission.{}.worker.*.verdicts", mission),
+                             fmt::format("mission.{}.worker.*.refinement", mission),
+                             fmt::format("mission.{}.viewer.*.decision", mission),
+                             fmt::format("mission.{}.operator.*.decision", mission)},
+                            most / 8},
+                           {job_stream(mission), {fmt::format("mission.{}.jobs.loop", mission)}, most / 8},
+                           {map_stream(mission), {fmt::format("mission.{}.map.*.*", mission)}, most / 2, true}}}) {
     jsStreamConfig stream;
     jsStreamConfig_Init(&stream);
-    stream.Name = names[i].c_str();
+    stream.Name = name.c_str();
     std::vector<const char*> of_stream;
-    for (const std::string& subject : subjects[i]) of_stream.push_back(subject.c_str());
+    for (const std::string& subject : subjects) of_stream.push_back(subject.c_str());
     stream.Subjects = of_stream.data();
     stream.SubjectsLen = static_cast<int>(of_stream.size());
-    stream.Retention = js_WorkQueuePolicy;  // what is acknowledged takes no room
+    stream.Retention = keeps_last ? js_LimitsPolicy : js_WorkQueuePolicy;
+    stream.MaxMsgsPerSubject = keeps_last ? 1 : -1;
+    stream.AllowDirect = keeps_last;
     stream.Storage = js_FileStorage;
     stream.Discard = js_DiscardNew;
-    stream.MaxBytes = i == 0 ? most : most / 8;
+    stream.MaxBytes = most_bytes;
     stream.MaxMsgSize = 8U << 20U;
     stream.Duplicates = kSameId_ns;
     if (const Status done = add_stream(stream); !done) return done;
@@ -204,18 +217,34 @@ Result<natsSubscription*> NatsConnection::subscribe(const std::string& subject) 
   return subscriptions_.emplace_back(subscription).get();
 }
 
-Result<std::optional<std::string>> NatsConnection::retained(const std::string& bucket,
+Result<std::optional<std::string>> NatsConnection::retained(const std::string& stream,
                                                             const std::string& subject) const {
   jsDirectGetMsgOptions newest;
   jsDirectGetMsgOptions_Init(&newest);
   newest.LastBySubject = subject.c_str();
   natsMsg* found = nullptr;
-  const natsStatus status = js_DirectGetMsg(&found, streams_, ("KV_" + bucket).c_str(), nullptr, &newest);
+  const natsStatus status = js_DirectGetMsg(&found, streams_, stream.c_str(), nullptr, &newest);
   const NatsOwned<natsMsg> message(found);
   if (status == NATS_NOT_FOUND) return std::nullopt;
   if (status != NATS_OK) return failure(status, "asking for " + subject);
   if (is_of_another_subject(found, subject)) return std::nullopt;
   return std::string(bytes_of(found));
+}
+
+Status NatsConnection::store(const std::string& subject, std::string_view bytes) const {
+  jsErrCode code{};
+  const natsStatus status =
+      js_Publish(nullptr, streams_, subject.c_str(), bytes.data(), static_cast<int>(bytes.size()), nullptr, &code);
+  return status == NATS_OK ? Status() : failure(status, "storing " + subject, code);
+}
+
+Status NatsLink::connect() {
+  if (connection_ && !connection_->connected() && connection_->is_outdated()) connection_.reset();
+  if (connection_ && !connection_->closed()) return {};
+  auto opened = NatsConnection::open(where_, name_);
+  if (!opened) return tl::unexpected(opened.error());
+  connection_ = std::move(*opened);
+  return {};
 }
 
 Result<NatsOwned<kvStore>> NatsConnection::bucket(const std::string& name, std::optional<double> lasts_s) const {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+// What a bus keeps for those who ask: the leases of servers, and the maps that are published to robots.
 #include <fmt/format.h>
 
 #include <memory>
@@ -28,13 +29,13 @@ std::optional<LeaseBoard::Value> value_of(kvStore* bucket, const std::string& mi
 
 class NatsLeases final : public LeaseBoard {
  public:
-  explicit NatsLeases(BusOptions where) : where_(std::move(where)) {}
+  explicit NatsLeases(const BusOptions& where) : link_(where, "lease_" + where.mission) {}
 
   /// Who has a credential and is no server may read the lease of its mission alone, and without the bucket.
   Result<std::optional<Value>> read(const std::string& mission) override {
     if (is_member()) {
-      if (Status done = connect(); !done) return tl::unexpected(done.error());
-      auto text = connection_->retained(kBucket, fmt::format("$KV.{}.{}", kBucket, mission));
+      if (Status done = link_.connect(); !done) return tl::unexpected(done.error());
+      auto text = link_.connection().retained(std::string("KV_") + kBucket, fmt::format("$KV.{}.{}", kBucket, mission));
       if (!text) return tl::unexpected(text.error());
       return *text ? std::optional(Value{std::move(**text), 1}) : std::nullopt;
     }
@@ -65,33 +66,45 @@ class NatsLeases final : public LeaseBoard {
             ? kvStore_CreateString(&revision, there->get(), mission.c_str(), value.text.c_str())
             : kvStore_UpdateString(&revision, there->get(), mission.c_str(), value.text.c_str(), value.revision);
     return status == NATS_OK ? Status()
-                             : connection_->failure(status, fmt::format("the lease of mission '{}'", mission));
+                             : link_.connection().failure(status, fmt::format("the lease of mission '{}'", mission));
   }
 
   void remove(const std::string& mission) override {
-    if (!connection_ || !connection_->connected()) return;
+    if (!link_.connected()) return;
     if (const auto there = bucket(std::nullopt); there && *there) kvStore_Delete(there->get(), mission.c_str());
   }
 
  private:
   [[nodiscard]] bool is_member() const {
-    return where_.credentials.known && where_.credentials.known->role != BusRole::server;
-  }
-  Status connect() {
-    if (connection_ && !connection_->connected() && connection_->is_outdated()) connection_.reset();
-    if (connection_ && !connection_->closed()) return {};
-    auto opened = NatsConnection::open(where_, "lease_" + where_.mission);
-    if (!opened) return tl::unexpected(opened.error());
-    connection_ = std::move(*opened);
-    return {};
+    return link_.where().credentials.known && link_.where().credentials.known->role != BusRole::server;
   }
   Result<NatsOwned<kvStore>> bucket(std::optional<double> lasts_s) {
-    if (Status done = connect(); !done) return tl::unexpected(done.error());
-    return connection_->bucket(kBucket, lasts_s);
+    if (Status done = link_.connect(); !done) return tl::unexpected(done.error());
+    return link_.connection().bucket(kBucket, lasts_s);
   }
 
-  const BusOptions where_;
-  std::shared_ptr<NatsConnection> connection_;
+  NatsLink link_;
+};
+
+class NatsMaps final : public MapBoard {
+ public:
+  explicit NatsMaps(const BusOptions& where) : link_(where, "maps_" + where.mission) {}
+
+  Result<std::optional<std::string>> read(const std::string& key) override {
+    if (Status done = link_.connect(); !done) return tl::unexpected(done.error());
+    return link_.connection().retained(map_stream(link_.where().mission), subject(key));
+  }
+  Status write(const std::string& key, std::string_view bytes) override {
+    if (Status done = link_.connect(); !done) return done;
+    return link_.connection().store(subject(key), bytes);
+  }
+
+ private:
+  [[nodiscard]] std::string subject(const std::string& key) const {
+    return fmt::format("mission.{}.map.{}", link_.where().mission, key);
+  }
+
+  NatsLink link_;
 };
 
 }  // namespace
@@ -99,5 +112,7 @@ class NatsLeases final : public LeaseBoard {
 std::unique_ptr<LeaseBoard> open_nats_leases(const BusOptions& options) {
   return std::make_unique<NatsLeases>(options);
 }
+
+std::unique_ptr<MapBoard> open_nats_maps(const BusOptions& options) { return std::make_unique<NatsMaps>(options); }
 
 }  // namespace tutti::bus

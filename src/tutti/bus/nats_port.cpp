@@ -246,8 +246,8 @@ void JetStreamPort::make_stream_anew(const NatsConnection& connection) {
   const std::string& mission = options_.mission;
   Status done;
   std::vector<std::string> lost;
-  for (const std::string& stream :
-       {submap_stream(mission), verdict_stream(mission), job_stream(mission), retained_stream(mission)}) {
+  for (const std::string& stream : {submap_stream(mission), verdict_stream(mission), job_stream(mission),
+                                    map_stream(mission), retained_stream(mission)}) {
     const auto there = stream == stranded ? Result<bool>(false) : connection.has_stream(stream);
     if (!there) done = tl::unexpected(there.error());
     if (there && !*there) lost.push_back(stream);

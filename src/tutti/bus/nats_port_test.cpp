@@ -185,7 +185,7 @@ TEST_F(NatsPortTest, ABusThatIsFullTakesTheRestWhenThereIsRoom) {
 }
 
 TEST_F(NatsPortTest, AMissionForWhichTheBusHasNoRoomLearnsWhatToDo) {
-  NatsNetwork network;  // 256 MB, of which mission "test" has set 176 aside
+  NatsNetwork network;  // 256 MB, of which mission "test" has set 240 aside
   BusOptions options = network.options(kServer);
   options.mission = "other";
   {
@@ -197,9 +197,9 @@ TEST_F(NatsPortTest, AMissionForWhichTheBusHasNoRoomLearnsWhatToDo) {
           << expected << " in " << (*refused)->state().last_error;
     EXPECT_FALSE((*refused)->state().connected);
   }
-  options.max_stream_bytes = 32U << 20U;
+  options.max_stream_bytes = 4U << 20U;
   test::prepare(options);
-  EXPECT_GE(NatsChildOptions{}.max_store_bytes, 5 * 11 * BusOptions{}.max_stream_bytes / 8);  // five missions
+  EXPECT_GE(NatsChildOptions{}.max_store_bytes, 4 * 15 * BusOptions{}.max_stream_bytes / 8);  // four missions
 }
 
 TEST_F(NatsPortTest, HoldsNoMoreThanItMayAndTheRestStaysOnTheBus) {

@@ -188,7 +188,8 @@ void JetStreamPort::watch() {
            check_stream(submap_stream(options_.mission), "server", *present.connection);
            check_stream(verdict_stream(options_.mission), "server", *present.connection);
            check_stream(jobs, "workers", *present.connection);
-           is_there(retained_stream(options_.mission), *present.connection);
+           for (const auto& values : {retained_stream(options_.mission), map_stream(options_.mission)})
+             is_there(values, *present.connection);
          }
          return pause(std::chrono::duration<double>(options_.stranded_s / 4));
        });
@@ -297,7 +298,7 @@ void JetStreamPort::hear_best_effort(const std::string& subject) {
 
 /// Values come as they are sent; what was sent when nobody listened is asked for after each connection.
 void JetStreamPort::hear_retained() {
-  const std::string bucket = retained_bucket(options_.mission);
+  const std::string stream = retained_stream(options_.mission);
   std::vector<MessageKind> kinds{MessageKind::proxy_graph, MessageKind::proxy_graph_delta, MessageKind::receipt};
   if (self_.role == Endpoint::Role::viewer) kinds = {MessageKind::mission_status};
   const auto subject = [&](MessageKind kind) {
@@ -312,7 +313,7 @@ void JetStreamPort::hear_retained() {
          if (cuts != asked && present.connection->connected()) {
            drop_all(subscription);  // from before the cut, and older than what is asked for
            for (const MessageKind kind : kinds) {
-             auto value = present.connection->retained(bucket, subject(kind));
+             auto value = present.connection->retained(stream, subject(kind));
              if (!value) {
                note(value.error().message);
                return pause(kTryAgain);

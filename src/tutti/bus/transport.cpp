@@ -30,9 +30,11 @@ bool is_for(const BusUser& user, Endpoint end) {
 
 const std::vector<Transport>& transports() {
   static const std::vector<Transport> rows{
-      {"nats", "nats://HOST:PORT", "a nats-server", &check_nats, &open_nats_port, &open_nats_leases},
-      {"tls", "tls://HOST:PORT", "a nats-server that asks for TLS", &check_nats, &open_nats_port, &open_nats_leases},
-      {"memory", "memory://NAME", "within one process", nullptr, &open_memory_port, &open_memory_leases},
+      {"nats", "nats://HOST:PORT", "a nats-server", &check_nats, &open_nats_port, &open_nats_leases, &open_nats_maps},
+      {"tls", "tls://HOST:PORT", "a nats-server that asks for TLS", &check_nats, &open_nats_port, &open_nats_leases,
+       &open_nats_maps},
+      {"memory", "memory://NAME", "within one process", nullptr, &open_memory_port, &open_memory_leases,
+       &open_memory_maps},
   };
   return rows;
 }
@@ -71,6 +73,10 @@ Result<std::unique_ptr<Port>> open_port(Endpoint endpoint, const BusOptions& opt
     return fail(ErrorCode::configuration, "the credential of {} (number {}) does not let this program be {} {}",
                 to_string(*known), known->number, name(endpoint.role), endpoint.number);
   return (*transport)->open_port(endpoint, options);
+}
+
+Result<std::unique_ptr<MapBoard>> open_maps(const BusOptions& options) {
+  return transport_of(options).map([&](const Transport* transport) { return transport->open_maps(options); });
 }
 
 }  // namespace tutti::bus

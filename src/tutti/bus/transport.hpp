@@ -11,6 +11,7 @@
 #include "tutti/base/result.hpp"
 #include "tutti/bus/bus_address.hpp"
 #include "tutti/bus/lease_board.hpp"
+#include "tutti/bus/map_board.hpp"
 #include "tutti/bus/port.hpp"
 
 namespace tutti::bus {
@@ -27,8 +28,8 @@ struct BusOptions {
   std::uint64_t max_waiting_bytes = std::uint64_t{64} << 20U;
   /// Messages received and not acknowledged; then the rest stays on the bus.
   std::uint64_t max_held_bytes = std::uint64_t{64} << 20U;
-  /// Submaps on the bus, which sets that room aside for the mission; then it takes no more. An eighth each for
-  /// verdicts, jobs and retained values.
+  /// Submaps on the bus, which sets that room aside for the mission; then it takes no more. Half of it for published
+  /// maps, and an eighth each for verdicts, jobs and retained values.
   std::uint64_t max_stream_bytes = std::uint64_t{512} << 20U;
   /// Messages that the bus has and gives to nobody for so long, as after a power failure, are dropped with their
   /// stream, which is made anew: who sent them sends them again. A worker's job that has ended five workers is removed.
@@ -48,6 +49,7 @@ struct Transport {
   /// Neither waits for the bus.
   std::unique_ptr<Port> (*open_port)(Endpoint endpoint, const BusOptions& options);
   std::unique_ptr<LeaseBoard> (*open_leases)(const BusOptions& options);
+  std::unique_ptr<MapBoard> (*open_maps)(const BusOptions& options);
 };
 const std::vector<Transport>& transports();
 /// "nats://HOST:PORT (a nats-server), ..", for help texts.
@@ -59,5 +61,7 @@ Status check_mission_name(const std::string& name);
 Result<const Transport*> transport_of(const BusOptions& options);
 /// Opens the endpoint's port without waiting for the bus. Errors are those of the options.
 Result<std::unique_ptr<Port>> open_port(Endpoint endpoint, const BusOptions& options);
+/// Opens the mission's published maps, likewise.
+Result<std::unique_ptr<MapBoard>> open_maps(const BusOptions& options);
 
 }  // namespace tutti::bus

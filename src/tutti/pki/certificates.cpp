@@ -19,6 +19,7 @@
 #include <utility>
 
 #include "tutti/base/plain_text.hpp"
+#include "tutti/pki/proof.hpp"
 
 namespace tutti::pki {
 namespace {
@@ -29,6 +30,9 @@ struct OpenSslFree {
   void operator()(X509_EXTENSION* extension) const { X509_EXTENSION_free(extension); }
   void operator()(BIO* text) const { BIO_free(text); }
   void operator()(BIGNUM* number) const { BN_free(number); }
+  void operator()(EVP_MD_CTX* digest) const { EVP_MD_CTX_free(digest); }
+  void operator()(X509_STORE* store) const { X509_STORE_free(store); }
+  void operator()(X509_STORE_CTX* check) const { X509_STORE_CTX_free(check); }
 };
 template <class T>
 using Owned = std::unique_ptr<T, OpenSslFree>;
@@ -85,6 +89,17 @@ bool add_extension(X509* made, X509* issuer, int kind, const std::string& value)
 
 Owned<EVP_PKEY> key_of(const std::string& text) {
   return Owned<EVP_PKEY>(PEM_read_bio_PrivateKey(reader_of(text).get(), nullptr, nullptr, nullptr));
+}
+
+const unsigned char* bytes_in(std::string_view text) { return reinterpret_cast<const unsigned char*>(text.data()); }
+
+bool is_certified(X509* certificate, X509* authority) {
+  const Owned<X509_STORE> store(X509_STORE_new());
+  const Owned<X509_STORE_CTX> check(X509_STORE_CTX_new());
+  return store && check && X509_STORE_add_cert(store.get(), authority) == 1 &&
+         X509_STORE_set_flags(store.get(), X509_V_FLAG_NO_CHECK_TIME) == 1 &&
+         X509_STORE_CTX_init(check.get(), store.get(), certificate, nullptr) == 1 &&
+         X509_STORE_CTX_set_purpose(check.get(), X509_PURPOSE_SSL_CLIENT) == 1 && X509_verify_cert(check.get()) == 1;
 }
 
 /// `issuer` null: the certificate signs itself. `old_key` empty: a new one.
@@ -159,11 +174,9 @@ Result<std::string> key_hash_of(const std::string& certificate) {
   unsigned char* made = nullptr;
   const int size = from ? i2d_X509_PUBKEY(X509_get_X509_PUBKEY(from.get()), &made) : 0;
   if (size <= 0) return failure("a certificate");
-  std::array<unsigned char, 32> hash{};
-  const bool done = EVP_Digest(made, static_cast<std::size_t>(size), hash.data(), nullptr, EVP_sha256(), nullptr) == 1;
+  std::string hash = sha256({reinterpret_cast<const char*>(made), static_cast<std::size_t>(size)});
   OPENSSL_free(made);
-  if (!done) return failure("a certificate");
-  return fmt::format("{:02x}", fmt::join(hash, ""));
+  return hash;
 }
 
 Result<std::vector<std::string>> names_of(const std::string& certificate) {
@@ -198,6 +211,34 @@ Result<CertificateHolder> holder_of(const X509* certificate) {
   return CertificateHolder{name.data(),
                            fmt::format("{:04}-{:02}-{:02} {:02}:{:02}:{:02} UTC", time.tm_year + 1900, time.tm_mon + 1,
                                        time.tm_mday, time.tm_hour, time.tm_min, time.tm_sec)};
+}
+
+Result<std::string> signature_of(std::string_view message, const bus::Certificate& by) {
+  const Owned<EVP_PKEY> key = key_of(by.key);
+  const Owned<EVP_MD_CTX> digest(EVP_MD_CTX_new());
+  std::size_t size = 0;
+  if (!key || !digest || EVP_DigestSignInit(digest.get(), nullptr, EVP_sha256(), nullptr, key.get()) != 1 ||
+      EVP_DigestSign(digest.get(), nullptr, &size, bytes_in(message), message.size()) != 1)
+    return failure("signing");
+  std::string made(size, '\0');
+  if (EVP_DigestSign(digest.get(), reinterpret_cast<unsigned char*>(made.data()), &size, bytes_in(message),
+                     message.size()) != 1)
+    return failure("signing");
+  made.resize(size);
+  return made;
+}
+
+Result<std::string> signer_of(std::string_view message, std::string_view signature, const std::string& certificate,
+                              const std::string& authority) {
+  const Owned<X509> own = certificate_of(certificate), issuer = certificate_of(authority);
+  if (!own || !issuer) return failure("a certificate");
+  if (!is_certified(own.get(), issuer.get()))
+    return fail(ErrorCode::invalid, "the certificate of who has signed it is not of this mission's authority");
+  const Owned<EVP_MD_CTX> digest(EVP_MD_CTX_new());
+  if (!digest || EVP_DigestVerifyInit(digest.get(), nullptr, EVP_sha256(), nullptr, X509_get0_pubkey(own.get())) != 1 ||
+      EVP_DigestVerify(digest.get(), bytes_in(signature), signature.size(), bytes_in(message), message.size()) != 1)
+    return fail(ErrorCode::invalid, "its signature is not that of its certificate's key");
+  return holder_of(own.get()).map(&CertificateHolder::name);
 }
 
 }  // namespace tutti::pki

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tutti/base/result.hpp"
@@ -37,5 +38,12 @@ struct CertificateHolder {
 };
 /// `certificate`: OpenSSL's X509; it may be null.
 Result<CertificateHolder> holder_of(const x509_st* certificate);
+
+/// Signs a message with a certificate's key (ECDSA, SHA-256).
+Result<std::string> signature_of(std::string_view message, const bus::Certificate& by);
+/// Whose certificate it is, once `authority` has signed it, and its key `message`. Until when it is valid does not
+/// count: who may still use a bus is for the bus to know, and the clock of who asks may be wrong.
+Result<std::string> signer_of(std::string_view message, std::string_view signature, const std::string& certificate,
+                              const std::string& authority);
 
 }  // namespace tutti::pki

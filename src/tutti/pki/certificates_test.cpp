@@ -46,6 +46,25 @@ kxawPe70uqECIHvIapziUKO010SM9XeWsC5Bgzdfz5eOWW6Me/Tk0MDm
             "c8f3989ca0d6c787e3285f21c31cff11a935f17d6499c7ee13d519334796b240");
 }
 
+TEST(CertificatesTest, WhoHasSignedIsTheNameInACertificateOfTheAuthority) {
+  const auto authority = make_authority("authority", 10).value(), other = make_authority("authority", 10).value();
+  const auto anna = make_certificate(authority, "operator anna", false, 1).value();
+  const auto late = make_certificate(authority, "operator late", false, -1).value();
+  const auto bus = make_certificate(authority, "bus.tutti", true, 1).value();
+  const auto signer = [](const bus::Certificate& who, const bus::Certificate& by) {
+    return signer_of("message", signature_of("message", who).value(), who.text, by.text);
+  };
+  EXPECT_EQ(signer(anna, authority).value(), "operator anna");
+  EXPECT_EQ(signer(late, authority).value(), "operator late");  // its bus knows that it has expired
+  EXPECT_FALSE(signer(anna, other).has_value());
+  EXPECT_FALSE(signer(bus, authority).has_value());  // of nobody who connects
+  EXPECT_FALSE(signer({anna.text, bus.key}, authority).has_value());
+  const std::string signature = signature_of("message", anna).value();
+  EXPECT_FALSE(signer_of("another", signature, anna.text, authority.text).has_value());
+  EXPECT_FALSE(signer_of("message", "", anna.text, authority.text).has_value());
+  EXPECT_FALSE(signer_of("message", signature, "", authority.text).has_value());
+}
+
 TEST(CertificatesTest, ARenewedOneHasTheKeyOfTheOneBefore) {
   const auto authority = make_authority("authority", 10).value();
   const auto one = make_certificate(authority, "robot alpha", false, 1).value();

@@ -170,6 +170,23 @@ TEST_F(Intruders, NobodyButTheServerTouchesStreamsReceiptsAndTheLease) {
   expect_all_is_well();
 }
 
+/// Nor does an answer of the bus become one, which whoever asks can have sent anywhere.
+TEST_F(Intruders, NobodyButAnOperatorPublishesAMap) {
+  const std::string head = "mission.cave.map.0.head";
+  for (const auto* who : {&alpha_, &worker_, &vera_}) expect_refused(*who, "publish", {head, "mission.cave.map.1.17"});
+  const auto desk = bus::open_maps(options(anna_)).value(), robot = bus::open_maps(options(alpha_)).value();
+  EXPECT_EQ(robot->read("0.head").value(), std::nullopt);
+  ASSERT_TRUE(desk->write("0.head", "signed").has_value());
+  EXPECT_EQ(robot->read("0.head").value(), "signed");
+  const auto connection = connect(alpha_);
+  for (const char* key : {"0.head", "0.nothing"})
+    ASSERT_TRUE(connection->publish("$JS.API.DIRECT.GET.MAPS_cave.mission.cave.map." + std::string(key), head, "", ""));
+  connection->flush();
+  expect_all_is_well();
+  EXPECT_EQ(robot->read("0.head").value(), "signed");
+  EXPECT_TRUE(rights_refused().empty());
+}
+
 TEST_F(Intruders, NobodyReadsWhatIsOthers) {
   for (const auto* who : {&alpha_, &worker_, &anna_, &vera_})
     expect_refused(
@@ -213,7 +230,7 @@ TEST_F(Intruders, WhatTheBusAnswersIsNobodysMessage) {
   const auto connection = connect(alpha_);
   const std::string value = "$KV.GRAPH_cave.robot.3.", ask = "$JS.API.DIRECT.GET.KV_GRAPH_cave." + value;
   ASSERT_TRUE(within(10.0, [&] {
-    const auto own = connection->retained("GRAPH_cave", value + "proxy_graph");
+    const auto own = connection->retained("KV_GRAPH_cave", value + "proxy_graph");
     return own && *own;
   }));
   ASSERT_TRUE(connection->publish(ask + "proxy_graph", "$KV.GRAPH_cave.robot.4.proxy_graph", "", ""));

@@ -6,6 +6,7 @@
 
 #include <memory>
 
+#include "tutti/base/file.hpp"
 #include "tutti/pki/nats_key.hpp"
 
 namespace tutti::pki {
@@ -51,6 +52,17 @@ TEST(Proof, TakesNoOtherTextForAKey) {
   damaged[10] = damaged[10] == 'A' ? 'B' : 'A';
   for (const std::string& key : {damaged, std::string(), std::string("U"), anna.key + "A", "S" + anna.key.substr(1)})
     EXPECT_FALSE(is_signed(key, "nonce", signature)) << key;
+}
+
+TEST(Proof, HashesAsSha256sumDoes) {
+  const std::string abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+  EXPECT_EQ(sha256("abc"), abc);
+  const std::string file = ::testing::TempDir() + "/proof_test_abc", large(std::size_t{3} << 20U, 'a');
+  for (const std::string& text : {std::string("abc"), std::string(), large, large + "abc"}) {
+    ASSERT_TRUE(write_file(file, text).has_value());
+    EXPECT_EQ(sha256_of_file(file).value(), sha256(text));
+  }
+  EXPECT_FALSE(sha256_of_file(file + "_none").has_value());
 }
 
 TEST(Proof, TokensDiffer) {

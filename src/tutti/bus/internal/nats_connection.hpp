@@ -113,9 +113,11 @@ class NatsConnection {
   /// A bucket of values that are gone so many seconds after they were put, made if it is missing; without a number:
   /// null then.
   [[nodiscard]] Result<NatsOwned<kvStore>> bucket(const std::string& name, std::optional<double> lasts_s) const;
-  /// The value retained at this subject; nothing if there is none, or one that is_of_another_subject().
-  [[nodiscard]] Result<std::optional<std::string>> retained(const std::string& bucket,
+  /// The last value of a stream at this subject; nothing if there is none, or one that is_of_another_subject().
+  [[nodiscard]] Result<std::optional<std::string>> retained(const std::string& stream,
                                                             const std::string& subject) const;
+  /// Waits until a stream has stored it.
+  [[nodiscard]] Status store(const std::string& subject, std::string_view bytes) const;
   /// The message is acknowledged, and the bus has confirmed it. `reply`: reply_of() it.
   [[nodiscard]] Status acknowledge(const std::string& reply) const;
   /// Says of a message: "+WPI", work on it goes on; "+ACK", "-NAK", "+TERM". Waits for nothing.
@@ -141,6 +143,23 @@ class NatsConnection {
   std::vector<NatsOwned<natsSubscription>> subscriptions_;
 };
 
+/// A connection that is made when it is first asked for, and again when it is gone, with what the credentials' file has
+/// by then.
+class NatsLink {
+ public:
+  NatsLink(BusOptions where, std::string name) : where_(std::move(where)), name_(std::move(name)) {}
+  [[nodiscard]] Status connect();
+  [[nodiscard]] const BusOptions& where() const { return where_; }
+  /// After connect().
+  [[nodiscard]] const NatsConnection& connection() const { return *connection_; }
+  [[nodiscard]] bool connected() const { return connection_ && connection_->connected(); }
+
+ private:
+  const BusOptions where_;
+  const std::string name_;
+  std::shared_ptr<NatsConnection> connection_;
+};
+
 std::string_view bytes_of(const natsMsg* message);
 /// Where a message is settled: its reply, or for one with a secret "SETTLE_AT SECRET REPLY".
 std::string reply_of(natsMsg* message, const std::string& settle_at);
@@ -151,6 +170,7 @@ bool is_of_another_subject(natsMsg* message, const std::string& subject);
 std::string submap_stream(const std::string& mission);
 std::string verdict_stream(const std::string& mission);
 std::string job_stream(const std::string& mission);
+std::string map_stream(const std::string& mission);
 std::string retained_bucket(const std::string& mission);
 std::string retained_stream(const std::string& mission);  ///< In which the bucket is kept.
 

@@ -16,6 +16,8 @@ namespace tutti::bus {
 std::unique_ptr<Port> open_nats_port(Endpoint endpoint, const BusOptions& options);
 /// Values of a bucket.
 std::unique_ptr<LeaseBoard> open_nats_leases(const BusOptions& options);
+/// Values of a stream, which has the last one of each subject.
+std::unique_ptr<MapBoard> open_nats_maps(const BusOptions& options);
 Status check_nats(const BusOptions& options, const BusUrl& url);
 
 /// A port to a bus of this process, which lasts as long as the process. A sender may have max_waiting_bytes on it that
@@ -23,5 +25,6 @@ Status check_nats(const BusOptions& options, const BusUrl& url);
 /// is one for each receiver. The other limits of BusOptions do not apply.
 std::unique_ptr<Port> open_memory_port(Endpoint endpoint, const BusOptions& options);
 std::unique_ptr<LeaseBoard> open_memory_leases(const BusOptions& options);
+std::unique_ptr<MapBoard> open_memory_maps(const BusOptions& options);
 
 }  // namespace tutti::bus
