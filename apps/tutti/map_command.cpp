@@ -255,9 +255,8 @@ int tell_why(const WhyOptions& options) {
 
 void add_map_command(CLI::App& app, int& exit_code) {
   CLI::App* map = app.add_subcommand("map",
-                                     "Look into maps, export and merge them, and decide which closures are right. On "
-                                     "files that no server has open, but "
-                                     "for 'export'.");
+                                     "Look into maps, export, merge and publish them, and decide which closures are "
+                                     "right. On files that no server has open, but for 'export' and 'publish'.");
   map->require_subcommand(1);
 
   const auto folder = std::make_shared<std::string>(".");
@@ -307,6 +306,7 @@ void add_map_command(CLI::App& app, int& exit_code) {
   salvage->callback([damaged, whole, &exit_code] { exit_code = salvage_map(*damaged, *whole); });
 
   add_map_versions_commands(*map, exit_code);
+  add_map_publish_command(*map, exit_code);
   add_map_closure_command(*map, exit_code);
 }
 

@@ -11,5 +11,6 @@ namespace tutti::app {
 void add_map_closure_command(CLI::App& map, int& exit_code);
 /// Adds `log`, `diff` and `revert`.
 void add_map_versions_commands(CLI::App& map, int& exit_code);
+void add_map_publish_command(CLI::App& map, int& exit_code);
 
 }  // namespace tutti::app

@@ -137,14 +137,11 @@ void add_robot_command(CLI::App& app, int& exit_code) {
   const auto localise = std::make_shared<bool>(false);
   CLI::Option* const map_option =
       command->add_option("--map", *map, "The map's file that --localise is about")->type_name("MAP");
-  CLI::Option* const localise_option =
-      command
-          ->add_flag(
-              "--localise", *localise,
-              "Find its place in MAP, which does not move, and follow it there; without --bus alone, and nothing\n"
-              "is kept for a server. Its state is in STATE/status.json, its poses are answered as ever "
-              "(docs/localise.md)")
-          ->needs(map_option);
+  CLI::Option* const localise_option = command->add_flag(
+      "--localise", *localise,
+      "Find its place in MAP, which does not move, and follow it there; without --map in the map that is\n"
+      "published to its mission (tutti map publish); without --bus alone, and nothing is kept for a server.\n"
+      "Its state is in STATE/status.json, its poses are answered as ever (docs/localise.md)");
   map_option->needs(localise_option);
   add_state_option(*command, options->state,
                    "Folder of this robot: what it knows, and what is not sent yet; made if missing");
@@ -191,7 +188,8 @@ void add_robot_command(CLI::App& app, int& exit_code) {
   add_program_options(*command, *common);
   command->callback([options, common, ros, bus, map, localise, &exit_code] {
     options->is_alone = bus->count() == 0;
-    if (options->is_alone && !*localise && !common->print_config) throw CLI::RequiredError("--bus");
+    if (options->is_alone && map->empty() && !common->print_config)
+      throw CLI::RequiredError(*localise ? "--map or --bus" : "--bus");
     if (options->is_alone) options->bus.url = "memory://" + options->name;
     if (common->print_config) {
       exit_code = run_program("robot", *common, options->console, [&]() -> Status {
@@ -207,7 +205,11 @@ void add_robot_command(CLI::App& app, int& exit_code) {
     }
     exit_code = run_program("robot", *common, options->console, [&]() -> Status {
       if (Status ok = lab::fill_robot_options(common->mission, *options); !ok) return ok;
-      if (*localise) {
+      if (*localise && map->empty())
+        options->open_map = [common](const std::filesystem::path& file) {
+          return lab::localise_setup(common->mission, file);
+        };
+      if (!map->empty()) {
         auto setup = lab::localise_setup(common->mission, *map);
         if (!setup) return tl::unexpected(setup.error());
         options->localise = std::move(*setup);

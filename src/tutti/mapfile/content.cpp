@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "tutti/base/file.hpp"
 #include "tutti/mapfile/check_map_file.hpp"
 #include "tutti/node/decisions.hpp"
 #include "tutti/node/submap_frames.hpp"
@@ -108,6 +109,22 @@ Status read_meta(const storage::TableStore& map, Content& content) {
   });
 }
 
+/// What `use` makes of a copy of a map's file, in a folder of its own that is gone then.
+template <class Use>
+auto with_copy(const std::filesystem::path& file, Use use) -> decltype(use(file)) {
+  namespace fs = std::filesystem;
+  if (const Status is_map = check_map_file(file); !is_map) return tl::unexpected(is_map.error());
+  std::error_code failure;
+  std::string folder = (fs::temp_directory_path(failure) / "tutti_map_XXXXXX").string();
+  if (::mkdtemp(folder.data()) == nullptr)
+    return fail(ErrorCode::io, "{}: cannot be made: {}", folder, std::generic_category().message(errno));
+  const fs::path copy = fs::path(folder) / "map.tutti";
+  const Status copied = storage::copy_sqlite_store(file, copy);
+  auto made = copied ? use(copy) : tl::unexpected(copied.error());
+  fs::remove_all(folder, failure);  // an open file stays until it is closed
+  return made;
+}
+
 }  // namespace
 
 std::set<ChainId> Content::chains() const {
@@ -138,17 +155,15 @@ Result<std::unique_ptr<storage::TableStore>> open(const std::filesystem::path& f
 }
 
 Result<std::unique_ptr<storage::TableStore>> open_copy(const std::filesystem::path& file) {
-  namespace fs = std::filesystem;
-  if (const Status is_map = check_map_file(file); !is_map) return tl::unexpected(is_map.error());
-  std::error_code failure;
-  std::string folder = (fs::temp_directory_path(failure) / "tutti_map_XXXXXX").string();
-  if (::mkdtemp(folder.data()) == nullptr)
-    return fail(ErrorCode::io, "{}: cannot be made: {}", folder, std::generic_category().message(errno));
-  const fs::path copy = fs::path(folder) / "map.tutti";
-  const Status copied = storage::copy_sqlite_store(file, copy);
-  auto map = copied ? open(copy) : tl::unexpected(copied.error());
-  fs::remove_all(folder, failure);  // an open file stays until it is closed
-  return map;
+  return with_copy(file, open);
+}
+
+/// Closing a store writes its log into the file.
+Result<std::string> read_copy(const std::filesystem::path& file) {
+  return with_copy(file, [](const std::filesystem::path& copy) -> Result<std::string> {
+    if (const auto opened = open(copy); !opened) return tl::unexpected(opened.error());
+    return read_file(copy.string());
+  });
 }
 
 Status put_decision(storage::TableStore& map, const ClosureDecision& decision) {

@@ -63,6 +63,9 @@ Result<std::unique_ptr<storage::TableStore>> open(const std::filesystem::path& f
 /// file, it is no map, or it cannot be copied.
 Result<std::unique_ptr<storage::TableStore>> open_copy(const std::filesystem::path& file);
 
+/// The bytes of such a copy.
+Result<std::string> read_copy(const std::filesystem::path& file);
+
 /// Stores an operator's decision, which the server that opens the map next follows. On an error nothing is stored: the
 /// closure's name or submaps are unknown, there is no closure to accept, or there is a later decision.
 Status put_decision(storage::TableStore& map, const ClosureDecision& decision);

@@ -81,6 +81,13 @@ Answer HostedRobot::work(Timestamp now) {
 NodeStatus HostedRobot::node_status(Timestamp now) const {
   NodeStatus status = driver_->node().status(now);
   status.version = options_.version;
+  if (maps_ != nullptr) {
+    if (status.in_map.state.empty()) status.in_map.state = "no map";
+    const char* const next = maps_->has_news() ? "another map is here, which it changes to when it stands" : "";
+    for (const std::string& more : {maps_->state(), std::string(next)})
+      if (!more.empty())
+        status.in_map.why = plain_text(status.in_map.why + (status.in_map.why.empty() ? "" : "; ") + more);
+  }
   if (feed_) status.health = feed_->front().health();
   if (const std::string refused = feed_ ? feed_->front().odometry_trouble() : ""; !refused.empty())
     status.trouble = plain_text(refused);

@@ -23,7 +23,7 @@ class HostedRobot final : public Hosted {
   static constexpr double kWaitsForMap_s = 60.0;
 
   HostedRobot(std::unique_ptr<RobotDriver> driver, double duration_s, const RobotOptions& options, const Clock& clock,
-              const bus::Port& port, EventLog& log, const std::string& alone)
+              const bus::Port& port, EventLog& log, const std::string& alone, const MapFetcher* maps)
       : driver_(std::move(driver)),
         duration_s_(duration_s),
         options_(options),
@@ -31,6 +31,7 @@ class HostedRobot final : public Hosted {
         port_(port),
         log_(log),
         alone_(alone),
+        maps_(maps),
         begin_s_(clock.wall_s()) {}
   /// From now on samples come from the clients of `feed`; `robot` is this robot's driver.
   void feed_live(LiveFeed& feed, LiveRobot& robot, Host& host, RobotView view) {
@@ -55,6 +56,11 @@ class HostedRobot final : public Hosted {
   [[nodiscard]] bool finished() const override;
   [[nodiscard]] Json status(Timestamp now) const override;
   [[nodiscard]] bool is_whole_in_map() const { return driver_->node().is_whole_in_map(); }
+  /// To be called when the node is to be made anew: nothing that it heard is lost.
+  [[nodiscard]] node::Step store_all() {
+    driver_->store_all();
+    return driver_->take_step();
+  }
   /// Why this program must end: another program is this robot. Nothing when it need not.
   [[nodiscard]] const std::optional<std::string>& refused() const { return refused_; }
 
@@ -79,6 +85,7 @@ class HostedRobot final : public Hosted {
   const bus::Port& port_;
   EventLog& log_;
   const std::string& alone_;  // why it hears no server
+  const MapFetcher* maps_;    // null: it does not localise in published maps
   double begin_s_;
   LiveFeed* feed_ = nullptr;     // null: it replays a recording
   std::optional<FedRobot> fed_;  // the robot's end of that feed

@@ -10,6 +10,7 @@
 
 #include "tutti/base/plain_name.hpp"
 #include "tutti/bus/mission_lease.hpp"
+#include "tutti/geometry/so3.hpp"
 #include "tutti/program/feed/live_feed.hpp"
 #include "tutti/program/field_json.hpp"
 #include "tutti/program/host.hpp"
@@ -70,6 +71,7 @@ class RobotProgram {
   Status open_feed(const node::RobotNode& node);
   void tell_alone();
   void tell_feed();
+  void follow_maps();
 
   const RobotOptions& options_;
   const std::uint32_t incarnation_ = any_incarnation();
@@ -80,10 +82,13 @@ class RobotProgram {
   std::unique_ptr<bus::MissionLease> lease_;  // not its own: it finds the server's
   std::string alone_;                         // as it was reported last
   std::optional<Clock> clock_;
-  std::unique_ptr<LiveFeed> feed_;  // null: it replays
-  std::shared_ptr<void> feeder_;    // RobotOptions::beside_feed
-  FeedFront::Load load_;            // as it was reported last
-  bool odometry_refused_ = false;   // as it was reported last
+  std::unique_ptr<LiveFeed> feed_;                  // null: it replays
+  std::shared_ptr<void> feeder_;                    // RobotOptions::beside_feed
+  std::unique_ptr<MapFetcher> maps_;                // null: it does not localise in published maps
+  LocaliseSetup localise_;                          // null: it has no map to localise in
+  std::optional<std::pair<Pose3, double>> stands_;  // where, and since when
+  FeedFront::Load load_;                            // as it was reported last
+  bool odometry_refused_ = false;                   // as it was reported last
   std::optional<Host> host_;
 };
 
@@ -101,7 +106,7 @@ Result<std::unique_ptr<RobotDriver>> RobotProgram::open_driver() {
                                .incarnation = incarnation_,
                                .uplink = {.bytes_per_s = options_.uplink_bytes_per_s},
                                .max_archive_bytes = options_.max_archive_bytes,
-                               .localise = options_.localise};
+                               .localise = localise_};
   config.keeps_state = !options_.is_alone;
   if (feed_) {
     const auto sensors = feed_->front().sensors();
@@ -119,8 +124,8 @@ Result<std::unique_ptr<Hosted>> RobotProgram::open_node(bus::Port& port) {
   auto driver = open_driver();
   if (!driver) return in_context((folder_->path() / kRobotFile).string(), driver.error());
   auto* const live = dynamic_cast<LiveRobot*>(driver->get());
-  auto robot =
-      std::make_unique<HostedRobot>(std::move(*driver), options_.duration_s, options_, *clock_, port, *log_, alone_);
+  auto robot = std::make_unique<HostedRobot>(std::move(*driver), options_.duration_s, options_, *clock_, port, *log_,
+                                             alone_, maps_.get());
   if (feed_) robot->feed_live(*feed_, *live, *host_, view());
   return robot;
 }
@@ -168,6 +173,24 @@ void RobotProgram::tell_feed() {
                           before.scans_left_out, before.images_left_out, before.samples_joined));
 }
 
+/// Once a second: another map is taken when the robot has stood for a while, the first one at once. The node is made
+/// anew with it: the robot's own trajectory goes on, and its last place is tried first.
+void RobotProgram::follow_maps() {
+  constexpr double kStands_s = 3.0, kMoved_m = 0.05, kTurned_rad = 0.03;
+  auto* const robot = dynamic_cast<HostedRobot*>(host_->hosted());
+  if (!maps_ || robot == nullptr) return;
+  const Pose3 now = robot->node_status(clock_->now()).T_odom_body;
+  const Pose3 moved = stands_ ? stands_->first.inverse() * now : Pose3{};
+  const bool has_moved = moved.translation.norm() > kMoved_m || so3_log(moved.rotation).norm() > kTurned_rad;
+  if (!stands_ || has_moved) stands_ = {now, clock_->wall_s()};
+  if (!maps_->has_news() || (localise_ && clock_->wall_s() < stands_->second + kStands_s)) return;
+  if (!host_->carry_out(robot->store_all())) return;  // the disk is full: later
+  localise_ = maps_->take();
+  log_->say(Level::info,
+            fmt::format("localises in version {} of map {} from now on", localise_->map->revision, localise_->map->id));
+  host_->start_anew();
+}
+
 /// A recording is replayed from where it stood; for a robot that is fed, time has passed.
 double RobotProgram::begin_s(const RobotDriver& driver) const {
   if (!options_.feed.empty()) return options_.rate * folder_->age_s();
@@ -188,11 +211,19 @@ Status RobotProgram::start() {
   if (!stored) return tl::unexpected(stored.error());
   store_ = std::move(stored->store);
   if (!stored->damage.empty()) log_->say(Level::error, stored->damage);
+  bus::BusOptions where = options_.bus;
+  where.mission = options_.settings.mission;
+  localise_ = options_.localise;
+  if (options_.open_map) {
+    auto board = bus::open_maps(where);
+    if (!board) return tl::unexpected(board.error());
+    maps_ = std::make_unique<MapFetcher>(
+        std::move(*board), publishing::KeptMaps(folder_->path() / "maps", where.credentials), options_.open_map, *log_);
+    localise_ = maps_->take();
+  }
   const auto driver = open_driver();  // where the recording stood
   if (!driver) return in_context((folder_->path() / kRobotFile).string(), driver.error());
   clock_.emplace(options_.rate, begin_s(**driver));
-  bus::BusOptions where = options_.bus;
-  where.mission = options_.settings.mission;
   auto lease = bus::MissionLease::open(where, std::nullopt);
   if (!lease) return tl::unexpected(lease.error());
   lease_ = std::move(*lease);
@@ -203,6 +234,7 @@ Status RobotProgram::start() {
                                 [this] {
                                   tell_alone();
                                   tell_feed();
+                                  follow_maps();
                                 },
                             .status_file = folder_->path() / kStatusFile,
                             .table_aside = "meta",

@@ -14,10 +14,10 @@
 #include "tutti/base/result.hpp"
 #include "tutti/bus/transport.hpp"
 #include "tutti/intake/sensor_intake.hpp"
-#include "tutti/localise/localiser.hpp"
 #include "tutti/perception/visual/frontend/tracking_source.hpp"
 #include "tutti/program/event_log.hpp"
 #include "tutti/program/feed/live_feed.hpp"
+#include "tutti/program/map_fetcher.hpp"
 #include "tutti/program/robot_driver.hpp"
 #include "tutti/program/robot_store.hpp"
 #include "tutti/robot/agent.hpp"
@@ -58,8 +58,8 @@ struct RobotOptions {
   double uplink_bytes_per_s = 0.0;                            ///< Per second of mission time, for submaps; 0: no limit.
   std::uint64_t max_archive_bytes = std::uint64_t{1} << 30U;  ///< Size of the archive of submaps that the server has.
   bool stay = false;                                          ///< Go on after the recording, to hear later maps.
-  /// Null: it does not localise in a map.
-  std::shared_ptr<const localise::Localiser::Setup> localise;
+  LocaliseSetup localise;                ///< Null: it does not localise in a map from its start on.
+  OpenMap open_map;                      ///< It localises in the map that is published last; empty: in none of these.
   bool is_alone = false;                 ///< There is no server: nothing is kept for one.
   std::optional<std::uint64_t> session;  ///< Nothing: the time when the state folder was made.
   Level console = Level::warning;
