@@ -30,8 +30,7 @@ HONEST = [("hku_two_sessions, real", "hku_two_sessions", []),
           ("degenerate", "degenerate", ["simulation.sensors=lidar"]),
           ("hall_mixed", "hall_mixed", []),
           ("hall, two cameras", "hall", ["hall.cameras=2"]),
-          ("hall, a camera with depth", "hall", ["hall.depth=true"]),
-          ("euroc_mh_images, real", "euroc_mh_images", [])]
+          ("hall, a camera with depth", "hall", ["hall.depth=true"])]
 
 
 def run(arguments, mission, assignments):

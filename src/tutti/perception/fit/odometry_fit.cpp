@@ -148,15 +148,26 @@ Misfit misfit_of(const Block& block, const Eigen::Vector3d& part, const Solution
 
 constexpr double kLargeTurn = 45.0 * kRadPerDeg;
 
+/// The solution in which these blocks are as stated.
+Solution solve_without(std::span<const Block* const> blocks, const WeighedSteps& weighed, const Solved& solved) {
+  Parameters begin = as_parameters(solved.solution.model), fixed = Parameters::Zero();
+  for (const Block* block : blocks) {
+    begin.segment(block->first, block->size).setZero();
+    fixed.segment(block->first, block->size).setOnes();
+  }
+  return solve(weighed, solved.odometry, as_model(begin), fixed);
+}
+
 /// Whether both halves of the steps say the same of the block's largest parameter.
-bool halves_agree(const Block& block, const Eigen::Vector3d& part, const WeighedSteps& weighed, const Solved& solved) {
+bool halves_agree(const Block& block, const Eigen::Vector3d& part, const WeighedSteps& weighed, const Solved& solved,
+                  std::span<const Block* const> as_stated) {
   Eigen::Index largest = 0;
   part.cwiseAbs().maxCoeff(&largest);
   const auto p = block.first + static_cast<int>(largest);
   const std::span<const ScanStep> all = weighed.steps;
   const std::size_t half = all.size() / 2;
   return std::ranges::all_of(std::array{all.first(half), all.subspan(half)}, [&](std::span<const ScanStep> steps) {
-    const Solution by_half = solve(weigh(steps), solved.odometry, solved.solution.model);
+    const Solution by_half = solve_without(as_stated, weigh(steps), solved);
     if (block.kind == MisfitKind::turned && part.norm() > kLargeTurn)  // whose axis may come out with either sign
       return rotation_angle(by_half.model.E.inverse() * solved.solution.model.E) < 0.5 * kLargeTurn;
     const double value = as_parameters(by_half.model)[p];
@@ -186,41 +197,55 @@ std::vector<Misfit> joined(std::vector<Misfit> misfits) {
   return misfits;
 }
 
-/// The solution in which these blocks are as stated.
-Solution solve_without(std::span<const Block* const> blocks, const WeighedSteps& weighed, const Solved& solved) {
-  Parameters begin = as_parameters(solved.solution.model), fixed = Parameters::Zero();
-  for (const Block* block : blocks) {
-    begin.segment(block->first, block->size).setZero();
-    fixed.segment(block->first, block->size).setOnes();
-  }
-  return solve(weighed, solved.odometry, as_model(begin), fixed);
+double sigmas_of(const Block& block, const Solution& solution) {
+  const Parameters value = as_parameters(solution.model);
+  double out = 0.0;
+  for (int p = block.first; p < block.first + block.size; ++p)
+    out = std::max(out, std::abs(value[p]) / solution.sigma[p]);
+  return out;
 }
 
-/// The fewest blocks that explain the contradiction, the one without which most is left first. Those that are not known
-/// are as stated: on a circle a displacement that nobody knows of would take the place of a scale that is known.
+/// The solution in which only blocks that are surely not as stated are solved for; the least sure is left out first. On
+/// a circle a displacement, a clock's offset and a scale look alike, and together none of them would be known.
+Solution surest_solution(const WeighedSteps& weighed, const Solved& solved, std::vector<const Block*>& as_stated) {
+  Solution out = solved.solution;
+  while (true) {
+    const Block* least = nullptr;
+    for (const Block& block : kBlocks)
+      if (std::ranges::find(as_stated, &block) == as_stated.end() &&
+          (least == nullptr || sigmas_of(block, out) < sigmas_of(*least, out)))
+        least = &block;
+    if (least == nullptr || sigmas_of(*least, out) >= kSigmas) return out;
+    as_stated.push_back(least);
+    out = solve_without(as_stated, weighed, solved);
+  }
+}
+
+/// The fewest blocks that explain the contradiction, the one without which most is left first.
 std::vector<Misfit> misfits_of(const WeighedSteps& weighed, const Solved& solved, double before) {
   const double after = solved.solution.cost.mean;
   if (after > before || (before >= kGross && after > std::max(kGood, kMostLeft * before))) return {};
+  std::vector<const Block*> as_stated;
+  const Solution solution = surest_solution(weighed, solved, as_stated);
   std::vector<std::pair<double, const Block*>> candidates;  // what is left without the block
-  std::vector<const Block*> unknown;
   for (const Block& block : kBlocks) {
-    const auto part = known_part(block, solved.solution);
-    const std::array<const Block*, 1> alone{&block};
-    if (part && halves_agree(block, *part, weighed, solved))
-      candidates.emplace_back(solve_without(alone, weighed, solved).cost.mean, &block);
-    else
-      unknown.push_back(&block);
+    const bool is_solved_for = std::ranges::find(as_stated, &block) == as_stated.end();
+    const auto part = is_solved_for ? known_part(block, solution) : std::nullopt;
+    if (!part || !halves_agree(block, *part, weighed, {solved.reading, solved.odometry, solution}, as_stated)) continue;
+    std::vector<const Block*> without = as_stated;
+    without.push_back(&block);
+    candidates.emplace_back(solve_without(without, weighed, solved).cost.mean, &block);
   }
   std::ranges::sort(candidates, std::greater{});
-  const Solution by_known = solve_without(unknown, weighed, solved);
   std::vector<Misfit> out;
   for (std::size_t k = 0; k < candidates.size(); ++k) {
-    std::vector<const Block*> rest = unknown;
+    std::vector<const Block*> rest = as_stated;
     for (std::size_t i = k; i < candidates.size(); ++i) rest.push_back(candidates[i].second);
-    const double least = (out.empty() ? kLeastShare : kLeastFurtherShare) * std::max(before - by_known.cost.mean, 1e-6);
-    if (solve_without(rest, weighed, solved).cost.mean - by_known.cost.mean < least) break;
+    const double explained = std::max(before - solution.cost.mean, 1e-6);
+    const double least = (out.empty() ? kLeastShare : kLeastFurtherShare) * explained;
+    if (solve_without(rest, weighed, solved).cost.mean - solution.cost.mean < least) break;
     const Block& block = *candidates[k].second;
-    if (const auto part = known_part(block, by_known)) out.push_back(misfit_of(block, *part, by_known));
+    out.push_back(misfit_of(block, *known_part(block, solution), solution));
   }
   return joined(std::move(out));
 }
