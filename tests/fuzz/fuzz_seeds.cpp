@@ -17,6 +17,7 @@
 #include "tutti/formats/image_file.hpp"
 #include "tutti/formats/ply.hpp"
 #include "tutti/node/journal.hpp"
+#include "tutti/publishing/publication.hpp"
 #include "tutti/wire/agent_state/agent_state.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
@@ -167,6 +168,14 @@ std::map<std::string, std::vector<std::string>> seeds() {
   out["lease"] = {bus::lease_text({"base", 17, "/var/lib/a", 1'700'000'000'000'000'000, "boot 5 /var/lib/a",
                                    "pid:[4026531836] 123 00c0ffee"}),
                   "base\n17\n/a\n5\nseat\n"};
+  out["publication"] = {publishing::seal({.map = "00c0ffee00c0ffee",
+                                          .version = 3,
+                                          .bytes = 1'000'000,
+                                          .hash = std::string(publishing::kHashDigits, 'a'),
+                                          .list_hash = std::string(publishing::kHashDigits, 'b'),
+                                          .published_ns = 1'700'000'000'000'000'000},
+                                         {})
+                            .value()};
   out["job"] = both(MessageKind::job, wire::encode(Job{"1/7", any_pairs(rng, 5)}));
   out["cloud"] = both(MessageKind::cloud, wire::encode(*any_submap(rng, 1, 40).submap.cloud));
   out["decision"] = both(MessageKind::decision, wire::encode(any_decision(rng)));

@@ -42,6 +42,7 @@
 #include "tutti/node/journal.hpp"
 #include "tutti/program/feed/feed_frames.hpp"
 #include "tutti/program/feed/ros_grid.hpp"
+#include "tutti/publishing/publication.hpp"
 #include "tutti/server/map_server.hpp"
 #include "tutti/wire/agent_state/agent_state.hpp"
 #include "tutti/wire/codec.hpp"
@@ -275,6 +276,13 @@ void lease(std::string_view bytes) {
   static_cast<void>(bus::to_string(*holder));
 }
 
+void publication(std::string_view bytes) {
+  const auto read = publishing::unseal(bytes, {});
+  if (!read) return;
+  const auto again = publishing::unseal(publishing::seal(*read, {}).value(), {});
+  TUTTI_CHECK(again && *again == *read, "a published map's head that was read is not read again");
+}
+
 void bus_url(std::string_view bytes) {
   static_cast<void>(bus::without_credentials(bytes));
   const auto url = bus::parse_bus_url(bytes);
@@ -330,6 +338,7 @@ const std::map<std::string, Target>& targets() {
       {"proxy_graph", proxy_graph},
       {"proxy_graph_delta", proxy_graph_delta},
       {"pyfg", pyfg},
+      {"publication", publication},
       {"receipt", receipt},
       {"refinement", refinement},
       {"refinement_job", refinement_job},
