@@ -50,5 +50,14 @@ TEST(StatusText, SaysWhenNobodyIsThere) {
             "Nobody is there: no robot and no worker.\n");
 }
 
+TEST(StatusText, OfAFleetInAMapItShowsWhoIsOnWhichVersion) {
+  MissionStatus status;
+  status.robots.push_back({.robot = {}, .last_seen = Timestamp{}, .status = {.name = "alpha"}});
+  status.robots[0].status.in_map = {.map = "00c0ffee", .version = 3, .state = "localised"};
+  const std::string text = mission_status_text(status, 0.0);
+  EXPECT_NE(text.find("in version 3 of map 00c0ffee"), std::string::npos) << text;
+  EXPECT_NE(text.find("localised"), std::string::npos) << text;
+}
+
 }  // namespace status_text_test
 }  // namespace tutti::node
