@@ -62,7 +62,7 @@ class OverNats final : public PortNetwork {
       const bus::LinkState state = port->state();
       return state.connected && state.waiting_messages == 0 && state.waiting_acknowledgements == 0;
     };
-    EXPECT_TRUE(cut_ || within(10.0, [&] { return std::ranges::all_of(ports_, idle); }));
+    EXPECT_TRUE(cut_ || within(60.0, [&] { return std::ranges::all_of(ports_, idle); }));
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
   }
   void cut() override { network_.relay().hold(cut_ = true); }
