@@ -72,8 +72,8 @@ void check_robot(const MissionStatus& status, const MissionStatus::Robot& robot,
     out.push_back(robot_alert(robot, "backlog", "warning",
                               fmt::format("{} submaps are not on the server yet", own.backlog_submaps),
                               "Bring it nearer to the base, or wait: the newest come first."));
-  const bool is_behind = own.heard_revision < status.revision;
-  if (is_heard && !own.finished && robot.submaps > 0 && is_behind &&
+  const bool is_behind = own.heard_epoch != status.epoch || own.heard_revision < status.revision;
+  if (is_heard && !own.finished && robot.submaps > 0 && status.revision > 0 && is_behind &&
       (!robot.last_update || status.time - *robot.last_update > longest_without_update_s(status)))
     out.push_back(robot_alert(robot, "uncorrected", "warning", "does not use the map",
                               "The way down may be cut: it hears no proxy graph."));

@@ -101,6 +101,9 @@ TEST(Alerts, WhoUsesTheNewestMapIsNotBlamedForItsAge) {
   status.robots.front().last_update = status.time - 400.0;
   status.robots.front().status.heard_revision = status.revision;
   EXPECT_TRUE(Alerts().of_status(status).empty()) << "nothing has come since";
+  status.robots.front().status.heard_epoch = status.epoch + 1;  // of a server with another map
+  EXPECT_EQ(Alerts().of_status(status).front().id, "robot/4/uncorrected");
+  status.robots.front().status.heard_epoch = status.epoch;
   status.has_news = true;
   const auto found = Alerts().of_status(status);
   ASSERT_EQ(found.size(), 1U);
