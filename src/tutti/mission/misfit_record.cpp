@@ -56,11 +56,7 @@ std::string warning_of(const std::string& robot, const MisfitRecord& misfit) {
 }
 
 void note_misfit(const fit::Misfit& misfit, std::vector<fit::Misfit>& all) {
-  std::erase_if(all, [&](const fit::Misfit& before) {
-    if (before.kind != misfit.kind) return false;
-    if (misfit.kind == fit::MisfitKind::stood_still) return before.from <= misfit.to && misfit.from <= before.to;
-    return before.by == misfit.by;
-  });
+  std::erase_if(all, [&](const fit::Misfit& before) { return are_one(before, misfit); });
   all.push_back(misfit);
 }
 

@@ -38,11 +38,7 @@ struct Flight {
   void fly() {
     const auto room = visual::test::textured_room(900, Rng(1));
     const auto cameras = visual::test::stereo_cameras();
-    auto stated = cameras;
-    stated[1].T_body_camera.translation =
-        cameras[0].T_body_camera.translation +
-        baseline * (cameras[1].T_body_camera.translation - cameras[0].T_body_camera.translation);
-    const auto said_cameras = std::make_shared<const std::vector<Camera>>(stated);
+    const auto stated = std::make_shared<const std::vector<Camera>>(visual::test::stereo_cameras(baseline));
     AgentConfig config;
     config.submap.has_images = true;
     config.submap.fit.scans = fit;
@@ -53,7 +49,7 @@ struct Flight {
       const double t = k * kStep_s;
       ASSERT_TRUE(agent.add(OdometrySample{kStart + t, odometry_at(t), covariance}));
       if (k % every == 0 && agent.wants_images(kStart + t)) {
-        TrackedImages seen{.stamp = kStart + t, .cameras = said_cameras, .images = {}, .imu = {}, .imu_noise = {}};
+        TrackedImages seen{.stamp = kStart + t, .cameras = stated, .images = {}, .imu = {}, .imu_noise = {}};
         Rng rng = Rng(2).fork(static_cast<std::uint64_t>(k));
         for (std::uint32_t c = 0; c < 2; ++c)
           seen.images.push_back(visual::test::look(room, cameras[c], c, truth_at(t), {.pixel_noise_px = 0.3}, rng));

@@ -38,9 +38,8 @@ double median_range_m(const PointCloud& cloud) {
 }
 
 bool is_same(const fit::Misfit& a, const fit::Misfit& b) {
-  if (a.kind != b.kind) return false;
-  if (a.kind == fit::MisfitKind::stood_still) return a.from <= b.to && b.from <= a.to;  // whoever says so
-  if (a.by != b.by) return false;
+  if (!are_one(a, b)) return false;
+  if (a.kind == fit::MisfitKind::stood_still) return true;
   return std::abs(a.value - b.value) <= kOtherSize * std::max(std::abs(a.value), std::abs(b.value));
 }
 
@@ -117,8 +116,7 @@ void FitWatch::compare(double still_m, const fit::SteadyDrift& drift) {
     const bool is_standstill = misfit.kind == fit::MisfitKind::stood_still;
     const bool is_at_once = is_standstill || misfit.kind == fit::MisfitKind::scans_stand_still;
     if (is_in(misfit, said_) || (!is_at_once && !is_in(misfit, before))) continue;
-    if (!is_standstill)
-      std::erase_if(said_, [&](const fit::Misfit& said) { return said.kind == misfit.kind && said.by == misfit.by; });
+    if (!is_standstill) std::erase_if(said_, [&](const fit::Misfit& said) { return are_one(said, misfit); });
     said_.push_back(misfit);
     news_.push_back(misfit);
   }

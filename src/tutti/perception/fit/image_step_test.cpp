@@ -16,21 +16,13 @@ using visual::test::stereo_cameras;
 
 constexpr double kBaselineFactor = 1.04;
 
-std::vector<Camera> too_wide() {
-  std::vector<Camera> out = stereo_cameras();
-  Eigen::Vector3d& second = out[1].T_body_camera.translation;
-  const Eigen::Vector3d& first = out[0].T_body_camera.translation;
-  second = first + kBaselineFactor * (second - first);
-  return out;
-}
-
 /// Looks along a wall at 2 m, round and round in the room.
 Pose3 truth_at(double t) {
   const double u = 0.2 * t;
   return {so3_exp({0, 0, u + 0.3 * std::sin(0.7 * t)}), {4.0 + 2.0 * std::cos(u), 3.0 + 1.2 * std::sin(u), 1.4}};
 }
 
-/// What the cameras see, and what is stated of them.
+/// A robot whose cameras are stated rightly or not.
 struct Robot {
   std::vector<visual::test::RoomPoint> room = visual::test::textured_room(900, Rng(1));
   std::shared_ptr<const std::vector<Camera>> stated = std::make_shared<const std::vector<Camera>>(stereo_cameras());
@@ -98,7 +90,7 @@ OdometryFit fit_of(const Robot& robot) {
 TEST(ImageStep, ABaselineThatIsStatedTooWideIsAScaleAndARightOneIsNothing) {
   Robot robot;
   for (const Misfit& misfit : fit_of(robot).misfits) ADD_FAILURE() << to_string(misfit);
-  robot.stated = std::make_shared<const std::vector<Camera>>(too_wide());
+  robot.stated = std::make_shared<const std::vector<Camera>>(stereo_cameras(kBaselineFactor));
   const auto misfits = fit_of(robot).misfits;
   ASSERT_EQ(misfits.size(), 1U);
   EXPECT_EQ(misfits[0].kind, MisfitKind::scale);

@@ -25,7 +25,7 @@ std::string in_degrees(const Eigen::Quaterniond& R) {
   return fmt::format("({:.1f}, {:.1f}, {:.1f}) degrees about the body's x, y, z", deg.x(), deg.y(), deg.z());
 }
 
-/// What a sensor gives, how it is mounted, and what to set.
+/// The words for a sensor: its data, its mounting, and the settings that are about it.
 struct Words {
   const char *seen, *is, *sits, *hangs, *pose, *offset, *signs, *lie, *why_still, *mend_still, *mend_scale;
 };
@@ -155,6 +155,11 @@ const std::array<Row, 15> kRows{{
 const Row& row_of(MisfitKind kind) { return kRows[static_cast<std::size_t>(kind)]; }
 
 }  // namespace
+
+bool are_one(const Misfit& a, const Misfit& b) {
+  if (a.kind != b.kind) return false;
+  return a.kind == MisfitKind::stood_still ? a.from <= b.to && b.from <= a.to : a.by == b.by;
+}
 
 std::string_view to_string(MisfitKind kind) { return row_of(kind).name; }
 std::optional<MisfitKind> misfit_kind(std::string_view name) {

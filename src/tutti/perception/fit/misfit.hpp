@@ -61,6 +61,10 @@ struct Misfit {
   }
 };
 
+/// Whether both are about one mistake, of whatever size: of one kind and by one witness. Odometry that stood still is
+/// one where the times meet, whoever says so.
+bool are_one(const Misfit& a, const Misfit& b);
+
 /// Its name in logs and JSON, as "clock"; and back, nothing for what is none.
 std::string_view to_string(MisfitKind kind);
 std::optional<MisfitKind> misfit_kind(std::string_view name);

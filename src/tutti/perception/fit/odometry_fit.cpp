@@ -111,17 +111,24 @@ Solved best_solution(const WeighedSteps& weighed, const Trajectory& odometry, co
   return best;
 }
 
-/// The parameters of a block that are known; nothing when the block is none to report.
-std::optional<Eigen::Vector3d> known_part(const Block& block, const Solution& solution) {
+/// By how many standard deviations a parameter is not as stated.
+double sigmas_of(int parameter, const Solution& solution) {
+  return std::abs(as_parameters(solution.model)[parameter]) / solution.sigma[parameter];
+}
+
+/// The same of the block's surest parameter.
+double sigmas_of(const Block& block, const Solution& solution) {
+  double out = 0.0;
+  for (int p = block.first; p < block.first + block.size; ++p) out = std::max(out, sigmas_of(p, solution));
+  return out;
+}
+
+/// The parameters of a block that are known; the others are zero.
+Eigen::Vector3d known_part(const Block& block, const Solution& solution) {
   const Parameters value = as_parameters(solution.model);
   Eigen::Vector3d out = Eigen::Vector3d::Zero();
-  bool is_sure = false;
-  for (int k = 0; k < block.size; ++k) {
-    const double sigmas = std::abs(value[block.first + k]) / solution.sigma[block.first + k];
-    if (sigmas >= kUsedSigmas) out[k] = value[block.first + k];
-    is_sure = is_sure || sigmas >= kSigmas;
-  }
-  if (!is_sure || out.norm() < block.least) return std::nullopt;
+  for (int k = 0; k < block.size; ++k)
+    if (sigmas_of(block.first + k, solution) >= kUsedSigmas) out[k] = value[block.first + k];
   return out;
 }
 
@@ -148,28 +155,53 @@ Misfit misfit_of(const Block& block, const Eigen::Vector3d& part, const Solution
 
 constexpr double kLargeTurn = 45.0 * kRadPerDeg;
 
-/// The solution in which these blocks are as stated.
-Solution solve_without(std::span<const Block* const> blocks, const WeighedSteps& weighed, const Solved& solved) {
-  Parameters begin = as_parameters(solved.solution.model), fixed = Parameters::Zero();
+using Blocks = std::vector<const Block*>;
+
+/// The solution in which these blocks are as stated, begun at another one.
+Solution solve_without(const Blocks& blocks, const WeighedSteps& weighed, const Trajectory& odometry,
+                       const Solution& from) {
+  Parameters begin = as_parameters(from.model), fixed = Parameters::Zero();
   for (const Block* block : blocks) {
     begin.segment(block->first, block->size).setZero();
     fixed.segment(block->first, block->size).setOnes();
   }
-  return solve(weighed, solved.odometry, as_model(begin), fixed);
+  return solve(weighed, odometry, as_model(begin), fixed);
+}
+
+/// A solution in which only blocks that are surely not as stated are solved for.
+struct Surest {
+  Blocks as_stated;
+  Solution solution;
+  [[nodiscard]] bool has(const Block& block) const { return std::ranges::find(as_stated, &block) == as_stated.end(); }
+};
+
+/// The least sure block is left out first. On a circle a displacement, a clock's offset and a scale look alike, and
+/// together none of them would be known.
+Surest surest_of(const WeighedSteps& weighed, const Solved& solved) {
+  Surest out{{}, solved.solution};
+  while (true) {
+    const Block* least = nullptr;
+    for (const Block& block : kBlocks)
+      if (out.has(block) && (least == nullptr || sigmas_of(block, out.solution) < sigmas_of(*least, out.solution)))
+        least = &block;
+    if (least == nullptr || sigmas_of(*least, out.solution) >= kSigmas) return out;
+    out.as_stated.push_back(least);
+    out.solution = solve_without(out.as_stated, weighed, solved.odometry, solved.solution);
+  }
 }
 
 /// Whether both halves of the steps say the same of the block's largest parameter.
-bool halves_agree(const Block& block, const Eigen::Vector3d& part, const WeighedSteps& weighed, const Solved& solved,
-                  std::span<const Block* const> as_stated) {
+bool halves_agree(const Block& block, const Eigen::Vector3d& part, const WeighedSteps& weighed,
+                  const Trajectory& odometry, const Surest& surest) {
   Eigen::Index largest = 0;
   part.cwiseAbs().maxCoeff(&largest);
   const auto p = block.first + static_cast<int>(largest);
   const std::span<const ScanStep> all = weighed.steps;
   const std::size_t half = all.size() / 2;
   return std::ranges::all_of(std::array{all.first(half), all.subspan(half)}, [&](std::span<const ScanStep> steps) {
-    const Solution by_half = solve_without(as_stated, weigh(steps), solved);
+    const Solution by_half = solve_without(surest.as_stated, weigh(steps), odometry, surest.solution);
     if (block.kind == MisfitKind::turned && part.norm() > kLargeTurn)  // whose axis may come out with either sign
-      return rotation_angle(by_half.model.E.inverse() * solved.solution.model.E) < 0.5 * kLargeTurn;
+      return rotation_angle(by_half.model.E.inverse() * surest.solution.model.E) < 0.5 * kLargeTurn;
     const double value = as_parameters(by_half.model)[p];
     return value * part[largest] > 0.0 && std::abs(value) > kHalfSigmas * by_half.sigma[p];
   });
@@ -197,55 +229,36 @@ std::vector<Misfit> joined(std::vector<Misfit> misfits) {
   return misfits;
 }
 
-double sigmas_of(const Block& block, const Solution& solution) {
-  const Parameters value = as_parameters(solution.model);
-  double out = 0.0;
-  for (int p = block.first; p < block.first + block.size; ++p)
-    out = std::max(out, std::abs(value[p]) / solution.sigma[p]);
-  return out;
-}
-
-/// The solution in which only blocks that are surely not as stated are solved for; the least sure is left out first. On
-/// a circle a displacement, a clock's offset and a scale look alike, and together none of them would be known.
-Solution surest_solution(const WeighedSteps& weighed, const Solved& solved, std::vector<const Block*>& as_stated) {
-  Solution out = solved.solution;
-  while (true) {
-    const Block* least = nullptr;
-    for (const Block& block : kBlocks)
-      if (std::ranges::find(as_stated, &block) == as_stated.end() &&
-          (least == nullptr || sigmas_of(block, out) < sigmas_of(*least, out)))
-        least = &block;
-    if (least == nullptr || sigmas_of(*least, out) >= kSigmas) return out;
-    as_stated.push_back(least);
-    out = solve_without(as_stated, weighed, solved);
-  }
-}
-
 /// The fewest blocks that explain the contradiction, the one without which most is left first.
 std::vector<Misfit> misfits_of(const WeighedSteps& weighed, const Solved& solved, double before) {
   const double after = solved.solution.cost.mean;
   if (after > before || (before >= kGross && after > std::max(kGood, kMostLeft * before))) return {};
-  std::vector<const Block*> as_stated;
-  const Solution solution = surest_solution(weighed, solved, as_stated);
-  std::vector<std::pair<double, const Block*>> candidates;  // what is left without the block
+  const Surest surest = surest_of(weighed, solved);
+  const double left = surest.solution.cost.mean;
+  const auto left_without = [&](Blocks blocks) {
+    blocks.insert(blocks.begin(), surest.as_stated.begin(), surest.as_stated.end());
+    return solve_without(blocks, weighed, solved.odometry, solved.solution).cost.mean;
+  };
+  struct Candidate {
+    const Block* block;
+    Eigen::Vector3d part;
+    double left;  ///< Without the block.
+  };
+  std::vector<Candidate> candidates;
   for (const Block& block : kBlocks) {
-    const bool is_solved_for = std::ranges::find(as_stated, &block) == as_stated.end();
-    const auto part = is_solved_for ? known_part(block, solution) : std::nullopt;
-    if (!part || !halves_agree(block, *part, weighed, {solved.reading, solved.odometry, solution}, as_stated)) continue;
-    std::vector<const Block*> without = as_stated;
-    without.push_back(&block);
-    candidates.emplace_back(solve_without(without, weighed, solved).cost.mean, &block);
+    const Eigen::Vector3d part = known_part(block, surest.solution);
+    if (surest.has(block) && part.norm() >= block.least && halves_agree(block, part, weighed, solved.odometry, surest))
+      candidates.push_back({&block, part, left_without({&block})});
   }
-  std::ranges::sort(candidates, std::greater{});
+  std::ranges::sort(candidates, std::greater{}, &Candidate::left);
+  Blocks rest;
+  for (const Candidate& candidate : candidates) rest.push_back(candidate.block);
   std::vector<Misfit> out;
-  for (std::size_t k = 0; k < candidates.size(); ++k) {
-    std::vector<const Block*> rest = as_stated;
-    for (std::size_t i = k; i < candidates.size(); ++i) rest.push_back(candidates[i].second);
-    const double explained = std::max(before - solution.cost.mean, 1e-6);
-    const double least = (out.empty() ? kLeastShare : kLeastFurtherShare) * explained;
-    if (solve_without(rest, weighed, solved).cost.mean - solution.cost.mean < least) break;
-    const Block& block = *candidates[k].second;
-    out.push_back(misfit_of(block, *known_part(block, solution), solution));
+  for (const Candidate& candidate : candidates) {
+    const double least = (out.empty() ? kLeastShare : kLeastFurtherShare) * std::max(before - left, 1e-6);
+    if ((rest.size() == 1 ? candidate.left : left_without(rest)) - left < least) break;
+    out.push_back(misfit_of(*candidate.block, candidate.part, surest.solution));
+    rest.erase(rest.begin());
   }
   return joined(std::move(out));
 }

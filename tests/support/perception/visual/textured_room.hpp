@@ -17,8 +17,9 @@
 /// would give of them, with known truth.
 namespace tutti::visual::test {
 
-/// Like EuRoC's cam0 and cam1; x of the body looks forward, y to the left.
-inline std::vector<Camera> stereo_cameras() {
+/// Like EuRoC's cam0 and cam1; x of the body looks forward, y to the left. The second is `baseline` times as far from
+/// the first as EuRoC's.
+inline std::vector<Camera> stereo_cameras(double baseline = 1.0) {
   const CameraModel model{.kind = CameraKind::pinhole,
                           .width_px = 752,
                           .height_px = 480,
@@ -30,7 +31,7 @@ inline std::vector<Camera> stereo_cameras() {
   Eigen::Matrix3d R_body_camera;
   R_body_camera << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   const Eigen::Quaterniond q(R_body_camera);
-  return {{model, {q, {0.05, 0.055, 0.0}}}, {model, {q, {0.05, -0.055, 0.0}}}};
+  return {{model, {q, {0.05, 0.055, 0.0}}}, {model, {q, {0.05, 0.055 - 2.0 * 0.055 * baseline, 0.0}}}};
 }
 
 inline constexpr std::uint32_t kWords = 6;
