@@ -19,6 +19,7 @@
 #include "support/bus/nats_server.hpp"
 #include "support/lab/ros_programs.hpp"
 #include "support/program/ros/loopback.hpp"
+#include "support/program/ros/tf_buffer.hpp"
 #include "tutti/bags/bag_reader.hpp"
 #include "tutti/bags/bag_writer.hpp"
 #include "tutti/bags/ros_encode.hpp"
@@ -32,7 +33,7 @@ namespace tutti {
 namespace ros_fleet_test {
 
 namespace fs = std::filesystem;
-using ros::test::join_loopback, ros::test::kKeepAll, ros::test::taken, test::within;
+using ros::test::join_loopback, ros::test::kKeepAll, ros::test::taken, ros::test::TfBuffer, test::within;
 
 constexpr double kPatience_s = 120.0;
 constexpr const char *kTf = "tf2_msgs/msg/TFMessage", *kGrid = "nav_msgs/msg/OccupancyGrid";
@@ -48,40 +49,6 @@ simulation:
 odometry_hz: 20
 closures: {verifier: lidar}
 )";
-
-/// The newest transform to each frame, as tf2's buffer has them; "latest" is all that is asked of it.
-class Buffer {
- public:
-  void take(ros::Reader& reader) {
-    for (const std::string& cdr : taken(reader)) {
-      const auto transforms = bags::decode_tf(cdr).value();
-      for (const bags::RosTransform& one : transforms)
-        newest_[one.child_frame_id] = {one.header.frame_id, {one.rotation, one.translation}};
-    }
-  }
-  /// Nothing when `child` is not below `root`.
-  [[nodiscard]] std::optional<Pose3> find(const std::string& root, std::string child) const {
-    Pose3 out;
-    for (int i = 0; i < 10; ++i) {
-      if (child == root) return out;
-      const auto at = newest_.find(child);
-      if (at == newest_.end()) return std::nullopt;
-      out = at->second.second * out;
-      child = at->second.first;
-    }
-    return std::nullopt;
-  }
-
-  /// Which frame is the parent of which, for messages.
-  [[nodiscard]] std::string text() const {
-    std::string out;
-    for (const auto& [child, parent] : newest_) out += parent.first + " -> " + child + "\n";
-    return out;
-  }
-
- private:
-  std::map<std::string, std::pair<std::string, Pose3>> newest_;
-};
 
 /// A bag of a simulated robot, whose frames have its name, as one of a robot in Nav2's layout.
 void write_as_nav2(const fs::path& from, const fs::path& to, const std::string& robot) {
@@ -192,7 +159,7 @@ TEST_P(RosFleet, EveryPoseOfARobotIsOnAFreeCellOfItsGridAndInOneTree) {
   const auto participant = join_loopback();
   std::map<std::string, Stack> stacks;
   std::map<std::string, std::unique_ptr<ros::Reader>> tf;
-  std::map<std::string, Buffer> buffers;
+  std::map<std::string, TfBuffer> buffers;
   std::vector<std::string> play{"bag", "play"};
   start("server", {"server", "--ros", "--map-period", "1", "--state", (folder_ / "server").string()});
   const std::string bus = bus_of("server");
@@ -230,7 +197,7 @@ TEST_P(RosFleet, EveryPoseOfARobotIsOnAFreeCellOfItsGridAndInOneTree) {
   for (const auto& [name, stack] : stacks) {
     fmt::print("{}: {} of {} poses are on free cells{}\n", name, stack.free, stack.poses, stack.others);
     EXPECT_EQ(stack.free, stack.poses) << name;
-    const Buffer& buffer = buffers.at(is_nav2 ? "/" + name + "/tf" : "/tf");
+    const TfBuffer& buffer = buffers.at(is_nav2 ? "/" + name + "/tf" : "/tf");
     EXPECT_TRUE(buffer.find("world", stack.prefix + "base_link")) << name << output_of(name) << buffer.text();
     if (!is_nav2) {
       EXPECT_TRUE(buffer.find("world", "alpha/base_link") && buffer.find("world", "bravo/base_link"));

@@ -4,13 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "support/lab/ros_programs.hpp"
 #include "support/program/ros/loopback.hpp"
+#include "support/program/ros/tf_buffer.hpp"
 #include "tutti/bags/bag_reader.hpp"
 #include "tutti/bags/ros_encode.hpp"
 #include "tutti/bags/ros_messages.hpp"
@@ -88,19 +88,15 @@ TEST_F(RosLocalise, APoseInTheMapIsPublishedWhereTheRobotIsAndNowhereElse) {
                     "--localise", "--rate", "3", "--stay", "--state", (folder_ / "of_charlie").string()});
   start("play", {"bag", "play", (folder_ / "charlie").string(), "--rate", "3", "--wait-for", "/charlie/points",
                  "--wait-for", "/charlie/odom", "--wait-for", "/tf"});
-  std::map<std::string, std::pair<std::string, Pose3>> frames;  // by child
+  ros::test::TfBuffer frames;
   std::size_t told = 0;
   double worst_m = 0.0;
   std::optional<Timestamp> first, last;
   bool has_started = false;
   const auto look = [&] {
     participant->wait(0.05);
-    for (const std::string& cdr : taken(*tf)) {
-      const auto transforms = bags::decode_tf(cdr).value();
-      for (const bags::RosTransform& one : transforms)
-        frames[one.child_frame_id] = {one.header.frame_id, {one.rotation, one.translation}};
-    }
-    if (!has_started && frames.contains("charlie/odom")) {  // a start pose of where the robot is not
+    frames.take(*tf);
+    if (!has_started && frames.find("charlie/map", "charlie/odom")) {  // a start pose of where the robot is not
       const Pose3 wrong =
           T_truth_world.inverse() * pose_at(truth, Timestamp{truth.front().stamp.ns + 40'000'000'000}).value();
       bags::RosPoseWithCovariance message{.header = {{}, "world"}, .pose = bags::to_ros(wrong)};
@@ -128,12 +124,12 @@ TEST_F(RosLocalise, APoseInTheMapIsPublishedWhereTheRobotIsAndNowhereElse) {
   EXPECT_LT(worst_m, 0.5);
   EXPECT_LT(*first - truth.front().stamp, 40.0);
   EXPECT_GT(told, 50U);
-  ASSERT_TRUE(frames.contains("charlie/map") && frames.contains("charlie/odom") &&
-              frames.contains("charlie/base_link"));
-  EXPECT_EQ(frames["charlie/map"].first, "world");
-  const Pose3 T_world_body =
-      frames["charlie/map"].second * frames["charlie/odom"].second * frames["charlie/base_link"].second;
-  EXPECT_LT(((T_truth_world * T_world_body).translation - truth.back().pose.translation).norm(), 0.7);
+  for (const char* line :
+       {"world -> charlie/map\n", "charlie/map -> charlie/odom\n", "charlie/odom -> charlie/base_link\n"})
+    EXPECT_NE(frames.text().find(line), std::string::npos) << frames.text();
+  const auto T_world_body = frames.find("world", "charlie/base_link");
+  ASSERT_TRUE(T_world_body) << frames.text();
+  EXPECT_LT(((T_truth_world * *T_world_body).translation - truth.back().pose.translation).norm(), 0.7);
 }
 
 }  // namespace ros_localise_test
