@@ -28,8 +28,7 @@ struct PublishOptions {
 
 void say_looking(const std::string& what) { fmt::print(stderr, "tutti {}: {}\n", kPublish, what); }
 
-Result<publishing::Publication> publish_file(const PublishOptions& options, bus::MapBoard& board) {
-  const auto now_ns = static_cast<std::int64_t>(program::wall_clock_ns());
+Result<publishing::Publication> publish_file(const PublishOptions& options, bus::MapBoard& board, std::int64_t now_ns) {
   const auto bytes = mapfile::read_copy(options.map);
   if (!bytes) return tl::unexpected(bytes.error());
   const auto opened = mapfile::open_known_map(options.map);
@@ -48,9 +47,9 @@ int publish(const PublishOptions& options) {
   where.mission = std::move(*mission);
   const auto board = bus::open_maps(where);
   if (!board) return complain(kPublish, board.error().message, 2);
-  const auto done = options.revert ? publishing::publish_older(**board, where.credentials,
-                                                               static_cast<std::int64_t>(program::wall_clock_ns()))
-                                   : publish_file(options, **board);
+  const auto now_ns = static_cast<std::int64_t>(program::wall_clock_ns());
+  const auto done = options.revert ? publishing::publish_older(**board, where.credentials, now_ns)
+                                   : publish_file(options, **board, now_ns);
   if (!done) return complain(kPublish, done.error().message, done.error().code == ErrorCode::configuration ? 2 : 1);
   const auto& known = where.credentials.known;
   fmt::print(

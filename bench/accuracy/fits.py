@@ -13,7 +13,7 @@ SMALL = ["simulation.world.network={rows: 2, columns: 2, block_m: 10.0, jitter_m
          "simulation.robots.0.walk.duration_s=120", "simulation.robots.1.walk.duration_s=120"]
 MISTAKES = ["scans_late", "lidar_ahead", "lidar_turned", "lidar_head_down", "mirrored", "millimetres", "world_cloud",
             "ned_positions", "ned", "inverse_poses", "w_first", "frozen", "drift", "scale"]
-# What a mistake of `times: 1` puts in, and which kind of contradiction it should be; reported is the report's value.
+# Each mistake: the kind that should be reported, how much `times: 1` puts in, and the times.
 SIZES = [("scans_late", "clock", -0.6, "s", [0.1, 0.25, 0.5, 1, 3]),
          ("lidar_turned", "turned", 5.0, "degrees", [0.1, 0.25, 0.5, 1, 3]),
          ("lidar_ahead", "displaced", 4.0, "m", [0.025, 0.05, 0.25, 1]),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a bus keeps for those who ask: the leases of servers, and the maps that are published to robots.
+// A bus keeps the leases of servers and the maps that are published to robots, for those who ask.
 #include <fmt/format.h>
 
 #include <memory>

@@ -11,7 +11,7 @@
 
 namespace tutti::mapfile {
 
-/// What stands in the place of a row; none: the row is left out.
+/// These rows stand in the place of a row; without any it is left out.
 using NewRows = std::vector<storage::Write>;
 struct ChangedTable {
   const char* table;

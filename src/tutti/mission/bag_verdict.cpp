@@ -58,7 +58,7 @@ MissionConfig mission_of(const std::vector<RobotConfig>& robots, const std::stri
   return config;
 }
 
-/// What is known of a robot in which nothing contradicts.
+/// Says what is known of a robot in which nothing contradicts.
 std::string compared(const Recording& recording, std::uint64_t steps) {
   if (!recording.scans && !recording.visual) return "no scans or images to compare its odometry with";
   const std::string seen = recording.scans ? "scans" : "images";

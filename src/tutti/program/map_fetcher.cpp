@@ -92,10 +92,12 @@ Status MapFetcher::fetch(const publishing::Offer::Entry& entry) {
   if (!std::filesystem::exists(kept_.file_of(map))) {
     auto fetching = kept_.begin(*board_, entry);
     if (!fetching) return tl::unexpected(fetching.error());
-    log_.say(Level::info,
-             fmt::format("fetches {}: {} of {} pieces are missing", name_of(map), fetching->missing(), map.pieces()));
+    const auto fetches = [&] {
+      return fmt::format("fetches {}: {} of {} pieces are missing", name_of(map), fetching->missing(), map.pieces());
+    };
+    log_.say(Level::info, fetches());
     while (fetching->missing() > 0) {
-      say(fmt::format("fetches {}: {} of {} pieces are missing", name_of(map), fetching->missing(), map.pieces()));
+      say(fetches());
       const double begin_s = Clock::steady_s();
       if (Status done = fetching->step(*board_); !done) return done;
       if (!pause(std::max(kLeastPause_s, Clock::steady_s() - begin_s))) return {};

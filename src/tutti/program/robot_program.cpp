@@ -10,7 +10,7 @@
 
 #include "tutti/base/plain_name.hpp"
 #include "tutti/bus/mission_lease.hpp"
-#include "tutti/geometry/so3.hpp"
+#include "tutti/geometry/pose3.hpp"
 #include "tutti/program/feed/live_feed.hpp"
 #include "tutti/program/field_json.hpp"
 #include "tutti/program/host.hpp"
@@ -181,7 +181,7 @@ void RobotProgram::follow_maps() {
   if (!maps_ || robot == nullptr) return;
   const Pose3 now = robot->node_status(clock_->now()).T_odom_body;
   const Pose3 moved = stands_ ? stands_->first.inverse() * now : Pose3{};
-  const bool has_moved = moved.translation.norm() > kMoved_m || so3_log(moved.rotation).norm() > kTurned_rad;
+  const bool has_moved = moved.translation.norm() > kMoved_m || rotation_angle(moved) > kTurned_rad;
   if (!stands_ || has_moved) stands_ = {now, clock_->wall_s()};
   if (!maps_->has_news() || (localise_ && clock_->wall_s() < stands_->second + kStands_s)) return;
   if (!host_->carry_out(robot->store_all())) return;  // the disk is full: later
