@@ -57,6 +57,7 @@ Result<std::string> SignIn::open(const std::string& key, const std::string& nonc
   const auto asked = nonces_.extract(nonce);  // good once
   if (asked.empty() || asked.mapped() < now_s)
     return fail(ErrorCode::invalid, "the page was open for too long before signing in: try again");
+  looked_s_.reset();  // whoever was added a moment ago is let in
   const pki::Member* const known = member(key, now_s);
   if (known == nullptr || !pki::is_signed(key, nonce, signature))
     return fail(ErrorCode::invalid,

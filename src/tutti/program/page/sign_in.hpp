@@ -52,7 +52,7 @@ class SignIn {
     std::string key;
     double until_s = 0.0;
   };
-  /// Members with this key who are not revoked, as in the folder within the last second.
+  /// The member with this key who is not revoked; nullptr: none, as in the folder within the last kLookAgain_s.
   const pki::Member* member(const std::string& key, double now_s);
   void refresh(double now_s);
 

@@ -70,6 +70,13 @@ TEST_F(SignInTest, RevokingEndsASession) {
   EXPECT_FALSE(open("vera", 0.0).value().empty());
 }
 
+TEST_F(SignInTest, WhoWasAddedAMomentAgoLogsIn) {
+  ASSERT_TRUE(open("anna", 0.0)) << "the folder is read";
+  ASSERT_TRUE(pki_->add(bus::BusRole::views, "nora", std::nullopt));
+  const auto nora = open("nora", 0.1);
+  EXPECT_TRUE(nora) << nora.error().message;
+}
+
 TEST_F(SignInTest, ASessionEndsByItselfAndWhenItIsClosed) {
   const auto anna = open("anna", 0.0), again = open("anna", 0.0);
   at_->close(*again);
