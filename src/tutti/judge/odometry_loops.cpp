@@ -33,9 +33,9 @@ class SegmentIndex {
     const auto after = segments_.upper_bound(std::min(a, b));
     if (after == segments_.begin()) return std::nullopt;
     const auto& [first, segment] = *std::prev(after);
-    const std::size_t from = a.index - first.index, to = b.index - first.index;
-    if (first.chain != a.chain || first.chain != b.chain || std::max(from, to) >= segment.covariance.size())
-      return std::nullopt;
+    if (first.chain != a.chain || first.chain != b.chain) return std::nullopt;
+    const std::size_t from = position(*segment.odometry, a.index), to = position(*segment.odometry, b.index);
+    if (std::max(from, to) >= segment.covariance.size()) return std::nullopt;
     const Pose3 T_first_b = T_first_body(*segment.odometry, to);
     const Matrix6d to_b = adjoint(T_first_b.inverse());
     const double sign = from < to ? 1.0 : -1.0;
@@ -48,6 +48,13 @@ class SegmentIndex {
     const OdometrySegment* odometry = nullptr;
     std::vector<Matrix6d> covariance;  ///< Each pose's, in the frame of the first.
   };
+  /// Beyond the last one where the segment has no such keyframe.
+  static std::size_t position(const OdometrySegment& odometry, std::uint32_t index) {
+    if (odometry.index.empty()) return index - odometry.first_index;
+    const auto found = std::ranges::lower_bound(odometry.index, index);
+    const bool is_there = found != odometry.index.end() && *found == index;
+    return is_there ? static_cast<std::size_t>(found - odometry.index.begin()) : odometry.index.size();
+  }
   static Pose3 T_first_body(const OdometrySegment& odometry, std::size_t k) {
     return odometry.T_odom_body.front().inverse() * odometry.T_odom_body[k];
   }

@@ -102,6 +102,23 @@ TEST(OdometryLoops, NotOverAGap) {
   EXPECT_NEAR(loops.at(kOne).front().odometry(5, 5), 15 * 0.002 * 0.002, 1e-9);
 }
 
+TEST(OdometryLoops, OverAStepThatLeavesKeyframesOut) {
+  Rng rng(3);
+  Walk walk(0.0, 0.0, rng);
+  const std::vector<LoopClosure> closures{walk.closure({kOne, 5}, {kOne, 45}, 0, 0, rng),
+                                          walk.closure({kOne, 25}, {kOne, 50}, 0, 0, rng)};
+  OdometrySegment& all = walk.segments.front();
+  const Matrix6d nine = 9 * all.step_covariance[20];
+  for (std::uint32_t k = 0; k < kKeyframes; ++k) all.index.push_back(k);
+  all.index.erase(all.index.begin() + 21, all.index.begin() + 29);  // from 20 to 29 in one step
+  all.T_odom_body.erase(all.T_odom_body.begin() + 21, all.T_odom_body.begin() + 29);
+  all.step_covariance.erase(all.step_covariance.begin() + 21, all.step_covariance.begin() + 29);
+  all.step_covariance[20] = nine;
+  const auto loops = odometry_loops(walk.segments, closures);
+  ASSERT_EQ(loops.at(kOne).size(), 1U) << "no keyframe 25 is there";
+  EXPECT_LT(loops.at(kOne).front().missed.norm(), 1e-9);
+}
+
 /// A covariance between two keyframes is the difference of two that have grown along the whole trajectory: 0.08 % are
 /// lost here.
 TEST(OdometryLoops, AreAsCertainAfterADayByCarAsAtItsBegin) {

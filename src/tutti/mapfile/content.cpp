@@ -12,8 +12,8 @@
 #include "tutti/mapfile/check_map_file.hpp"
 #include "tutti/node/decisions.hpp"
 #include "tutti/node/submap_frames.hpp"
+#include "tutti/server/known_ground.hpp"
 #include "tutti/server/map_job.hpp"
-#include "tutti/server/refuted_closures.hpp"
 #include "tutti/storage/map_tables.hpp"
 #include "tutti/storage/sqlite_copy.hpp"
 #include "tutti/storage/sqlite_store.hpp"
@@ -96,6 +96,9 @@ Status read_meta(const storage::TableStore& map, Content& content) {
   auto held = node::read_held_poses(map);
   if (!held) return tl::unexpected(held.error());
   content.held = std::move(*held);
+  auto retired = node::read_retired(map);
+  if (!retired) return tl::unexpected(retired.error());
+  content.retired = std::move(*retired);
   const auto places = node::read_places(map);
   if (!places) return tl::unexpected(places.error());
   content.candidates = server::restored(*places, static_cast<std::size_t>(content.settings.candidates_per_submap));
@@ -145,8 +148,9 @@ Result<Content> read(const storage::TableStore& map) {
 server::MapEstimate estimate(const Content& content) {
   const server::MapConfig& config = content.settings.map;
   const server::VerdictSet verdicts = server::of_candidates(content.verdicts, content.candidates, content.decisions);
-  return server::finished_map(server::estimate_map_with_fixes(content.submaps, verdicts, config, content.decisions),
-                              content.submaps, content.refinements, content.held, config);
+  return server::finished_map(
+      server::estimate_known_map(content.submaps, content.retired, verdicts, config, content.decisions),
+      content.submaps, content.refinements, content.held, config);
 }
 
 Result<std::unique_ptr<storage::TableStore>> open(const std::filesystem::path& file) {

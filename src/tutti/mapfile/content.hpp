@@ -28,6 +28,7 @@ struct Content {
   DecisionSet decisions;
   server::Refinements refinements;
   server::HeldPoses held;             ///< The poses of a map that does not move.
+  std::set<SubmapId> retired;         ///< Submaps that show known ground.
   server::CandidatePairs candidates;  ///< Verdicts of other pairs are not in the map.
   std::map<RobotId, std::string> names;
   std::map<MethodId, std::size_t> refused;  ///< Refused pairs, by the verifier that refused them.

@@ -111,11 +111,11 @@ node::RobotRow renamed(node::RobotRow row, RobotId robot, const Chains& chains) 
 
 Result<NewRows> renamed_meta(std::string_view key, std::string_view bytes, const Chains& chains) {
   if (key.starts_with(node::kRefusedPrefix)) return NewRows();  // written anew, by refusals
-  if (key.starts_with(node::kHeldPrefix)) {
-    const auto id = node::submap_of_key(key.substr(node::kHeldPrefix.size()));
+  for (const std::string_view prefix : {node::kHeldPrefix, node::kRetiredPrefix}) {
+    if (!key.starts_with(prefix)) continue;
+    const auto id = node::submap_of_key(key.substr(prefix.size()));
     if (!id) return fail(ErrorCode::parse, "the row '{}' of table 'meta' is damaged", key);
-    return NewRows{
-        {map_tables::kMeta, std::string(node::kHeldPrefix) + node::key_of(renamed(*id, chains)), std::string(bytes)}};
+    return NewRows{{map_tables::kMeta, std::string(prefix) + node::key_of(renamed(*id, chains)), std::string(bytes)}};
   }
   if (const auto robot = node::RobotRegistry::robot_of(key)) {
     const auto row = node::decode_robot(bytes);

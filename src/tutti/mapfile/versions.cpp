@@ -69,8 +69,9 @@ NewRows meta_without(std::string_view key, std::string_view bytes, const Without
   if (key == node::kCountsKey || key == node::kLastUpdateKey) return {};
   if (key.starts_with(node::kVersionPrefix)) return same_if(number_of(key).value_or(until) < until);
   if (const auto robot = node::RobotRegistry::robot_of(key)) return same_if(stays.contains(*robot));
-  if (key.starts_with(node::kHeldPrefix)) {
-    const auto id = node::submap_of_key(key.substr(node::kHeldPrefix.size()));
+  for (const std::string_view prefix : {node::kHeldPrefix, node::kRetiredPrefix}) {
+    if (!key.starts_with(prefix)) continue;
+    const auto id = node::submap_of_key(key.substr(prefix.size()));
     return same_if(id && without.has(*id));
   }
   if (auto place = node::place_of_row(key, bytes)) {

@@ -211,6 +211,7 @@ struct MissionStatus {
   std::string why_waiting;          ///< and what the last worker that tried reported.
   std::vector<Decision> decisions;  ///< The latest decisions.
   std::vector<Radio> radio;         ///< Sorted by robot, direction and kind.
+  std::uint64_t retired = 0;        ///< Those of the submaps that show known ground (server/known_ground.hpp).
   template <class V>
   void describe(V& v) {
     v.field(1, "time", time);
@@ -234,6 +235,7 @@ struct MissionStatus {
     v.field(23, "why_waiting", why_waiting);
     v.field(24, "decisions", decisions);
     v.field(25, "radio", radio, {.at_most = 20 * kMostRobots});
+    v.field(26, "retired", retired);
   }
   [[nodiscard]] Status check() const;  ///< Lists have the order that is promised above.
   friend bool operator==(const MissionStatus&, const MissionStatus&) = default;

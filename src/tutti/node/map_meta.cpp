@@ -179,6 +179,25 @@ Result<server::HeldPoses> read_held_poses(const storage::TableStore& map) {
   return held;
 }
 
+storage::Write retired_row(SubmapId id) { return {map_tables::kMeta, std::string(kRetiredPrefix) + key_of(id), ""}; }
+
+Result<std::set<SubmapId>> read_retired(const storage::TableStore& map) {
+  std::set<SubmapId> out;
+  Status ok;
+  const auto scanned = map.scan(map_tables::kMeta, kRetiredPrefix, [&](std::string_view key, std::string_view) {
+    if (!key.starts_with(kRetiredPrefix)) return false;
+    const auto id = submap_of_key(key.substr(kRetiredPrefix.size()));
+    if (id)
+      out.insert(*id);
+    else
+      ok = fail(ErrorCode::parse, "the row '{}' of table 'meta' is damaged, expected a submap's numbers", key);
+    return ok.has_value();
+  });
+  if (!scanned) return tl::unexpected(scanned.error());
+  if (!ok) return tl::unexpected(ok.error());
+  return out;
+}
+
 std::string encode(const RobotRow& row) {
   std::string bytes = storage::key_of({row.session, row.former.size(), row.rivals.size()});
   for (const auto* sessions : {&row.former, &row.rivals})

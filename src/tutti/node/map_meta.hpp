@@ -75,6 +75,11 @@ storage::Write to_row(SubmapId id, const std::vector<std::pair<std::uint32_t, Po
 /// All of them; empty for a map whose poses may all move. Fails when a row is damaged: the map could move unseen.
 Result<server::HeldPoses> read_held_poses(const storage::TableStore& map);
 
+/// A row `retired/SUBMAP` of a submap that is retired (server/known_ground.hpp); it has no bytes.
+storage::Write retired_row(SubmapId id);
+/// All of them. Fails when a row is damaged: the map would be another one.
+Result<std::set<SubmapId>> read_retired(const storage::TableStore& map);
+
 /// A row `robot/NUMBER` (RobotRegistry::key()): a robot's name and its sessions. It is encoded as numbers of 8 bytes
 /// (the session, the number of former sessions, the number of rivals, then those sessions), followed by the name.
 struct RobotRow {

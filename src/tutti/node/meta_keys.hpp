@@ -12,6 +12,8 @@ inline constexpr std::string_view kRefinementPrefix = "refinement/";  ///< refin
 inline constexpr std::string_view kPlacePrefix = "place/";            ///< place_of_row()
 /// Followed by a submap's key; the poses of its keyframes in a map that does not move.
 inline constexpr std::string_view kHeldPrefix = "held/";
+/// Followed by a submap's key, without bytes: the submap is retired (server/known_ground.hpp).
+inline constexpr std::string_view kRetiredPrefix = "retired/";
 /// Followed by a number; the sessions that this version of a map added (mapfile/versions.hpp).
 inline constexpr std::string_view kVersionPrefix = "version/";
 /// Followed by a robot's number; its submaps that are refused for good.

@@ -4,7 +4,11 @@
 #include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/node/map_meta.hpp"
 #include "tutti/node/server_node.hpp"
+#include "tutti/node/submap_frames.hpp"
+#include "tutti/storage/map_tables.hpp"
+#include "tutti/wire/codec.hpp"
 
 namespace tutti::node {
 
@@ -48,6 +52,7 @@ Step ServerNode::end_map(MapOfTask made, Timestamp now) {
   Step step = std::move(made.step);
   const std::size_t submaps = made.made.job.submaps.size();
   server_.finish(std::move(made.made), may_refine(now));
+  keep_retired(now, step);
   broadcast_ = std::move(made.broadcast);
   last_broadcast_ = broadcast_.last();
   if (made.is_update) {
@@ -78,6 +83,24 @@ Step ServerNode::end_map(MapOfTask made, Timestamp now) {
                             .degrees_of_freedom = map.degrees_of_freedom,
                             .from_measurements = map.from_measurements});
   return step;
+}
+
+void ServerNode::keep_retired(Timestamp now, Step& step) {
+  const server::Retired retired = server_.take_retired();
+  for (const SubmapPair& pair : retired.dropped)
+    step.writes.push_back({map_tables::kVerdicts, key_of(pair), std::nullopt});
+  for (const SubmapId& id : retired.submaps) {
+    step.writes.push_back(retired_row(id));
+    step.writes.push_back({map_tables::kMeta, place_key(id), std::nullopt});
+    const auto frame = frames_->find(id);
+    auto message = frame && *frame ? wire::decode_submap(**frame) : tl::unexpected(Error{ErrorCode::io, "not stored"});
+    if (!message) {  // it stays as it is: larger than it need be
+      step.emit(now, MessageRefused{bus::Endpoint::server(), bus::MessageKind::submap, message.error().message});
+      continue;
+    }
+    message->submap = without_payloads(std::move(message->submap));
+    step.writes.push_back({map_tables::kSubmaps, key_of(id), wire::encode(*message)});
+  }
 }
 
 Step ServerNode::on_timer(Timestamp now) {

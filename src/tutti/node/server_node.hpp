@@ -133,6 +133,8 @@ class ServerNode {
   Status take_submap(const bus::Envelope& envelope, Timestamp now, Step& step);
   /// Stores what is new of submaps' places.
   void keep_places(Step& step);
+  /// Stores which submaps were retired, without their payloads.
+  void keep_retired(Timestamp now, Step& step);
   /// Refuses a submap for good: the robot need not send it again.
   void note_refused(SubmapId id, const bus::Envelope& envelope, const std::string& why, Timestamp now, Step& step);
   /// Receipts::of_anybody()

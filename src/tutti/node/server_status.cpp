@@ -130,6 +130,7 @@ MissionStatus ServerNode::mission_status(Timestamp now) const {
                     .has_news = server_.has_news()};
   out.verifier = to_string(state.verifier);
   out.former_pairs = server_.former_pairs();
+  out.retired = state.retired.size();
   out.waiting = waiting;
   if (waiting > 0) out.why_waiting = why_waiting_;
   std::set<RobotId> robots = robots_;

@@ -84,6 +84,9 @@ std::string mission_status_text(const MissionStatus& status, double silent_s) {
   if (!status.verifier.empty()) say("closures are found by {}\n", status.verifier);
   if (status.former_pairs > 0)
     say("between {} pairs of submaps they are another verifier's, until this one has answered\n", status.former_pairs);
+  if (status.retired > 0)
+    say("{} submaps show known ground and are retired; the map is made of {}\n", status.retired,
+        status.submaps - std::min(status.submaps, status.retired));
   if (status.waiting > 0)
     say("{} pairs of submaps or refinements wait for a worker that can: {}\n", status.waiting, status.why_waiting);
   if (status.robots.empty() && status.workers.empty()) say("Nobody is there: no robot and no worker.\n");

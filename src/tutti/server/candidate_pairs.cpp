@@ -62,6 +62,21 @@ std::vector<Alike> CandidatePairs::add(SubmapId id, const std::vector<Alike>& ot
   return candidates;
 }
 
+/// Those of the same robot that are less similar are one turn earlier now; all others stay in their order.
+void CandidatePairs::remove(SubmapId id) {
+  most_alike_.erase(id);
+  for (auto& [other, lists] : most_alike_)
+    for (List& list : lists) {
+      const auto found = std::ranges::find(list, id, [](const Ranked& ranked) { return ranked.alike.submap; });
+      if (found == list.end()) continue;
+      const std::size_t turn = found->turn;
+      list.erase(found);
+      for (Ranked& ranked : list)
+        if (ranked.alike.submap.chain.robot == id.chain.robot && ranked.turn > turn) --ranked.turn;
+      std::ranges::sort(list, comes_first);
+    }
+}
+
 CandidatePairs::CandidatePairs(std::size_t most, const PlaceSet& places) : most_(most) {
   most_alike_.reserve(places.size());
   for (const auto& [id, place] : places)

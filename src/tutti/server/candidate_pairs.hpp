@@ -48,6 +48,8 @@ class CandidatePairs {
   /// Compares a new submap with earlier ones, of which each may be in it once for every sensor. Returns those with
   /// which it is a candidate now, smallest first.
   std::vector<Alike> add(SubmapId id, const std::vector<Alike>& others);
+  /// Forgets a submap: it is nobody's candidate any more, and others have its room.
+  void remove(SubmapId id);
   /// True if the submap was added.
   [[nodiscard]] bool has(SubmapId id) const { return most_alike_.contains(id); }
   /// True if both were added and are no candidate.

@@ -237,5 +237,21 @@ TEST(CandidatePairs, KeepTheVerdictsThatAnOperatorHasSpokenOf) {
   EXPECT_FALSE(left.contains(excluded.back()));
 }
 
+TEST(CandidatePairs, WhatIsRemovedLeavesItsRoomToOthers) {
+  const auto likeness = any_likeness(12);
+  Filled all = filled(numbers(12), 20, likeness);
+  std::vector<std::size_t> others = numbers(12);
+  std::erase(others, std::size_t{4});
+  const Filled without = filled(others, 20, likeness);
+  all.pairs.remove(submap(4));
+  EXPECT_FALSE(all.pairs.has(submap(4)));
+  all.places.erase(submap(4));
+  auto lists = all.pairs.all(), expected = without.pairs.all();
+  for (auto* some : {&lists, &expected})
+    for (auto& [id, list] : *some) std::ranges::sort(list);
+  EXPECT_EQ(lists, expected);
+  EXPECT_EQ(CandidatePairs(20, all.places).all().size(), 11U) << "whoever is not there is nobody's candidate";
+}
+
 }  // namespace candidate_pairs_test
 }  // namespace tutti::server

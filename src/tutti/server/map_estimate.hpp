@@ -92,6 +92,21 @@ struct MapEstimate {
   bool converged = false;          ///< False: no closure is accepted, and every robot's odometry stands alone.
 };
 
+/// When submaps are retired (known_ground.hpp).
+struct KnownGroundConfig {
+  int visits = 0;
+  double reach_m = 2.0;
+  template <class V>
+  void describe(V& v) {
+    v.field(
+        "visits", visits, at_least(0),
+        "A place that this many submaps of the map have shown needs no more: a later submap that shows nothing else "
+        "is retired. Its robot is localised by it, and its cloud and images are dropped. 0: nothing is retired.");
+    v.field("reach_m", reach_m, greater_than(0.0),
+            "How near a submap's keyframes are to those of others that show the same place.");
+  }
+};
+
 /// How the joint map is made.
 struct MapConfig {
   judge::OutlierRejectionConfig outlier_rejection;
@@ -102,6 +117,7 @@ struct MapConfig {
   int most_closed_pairs = 40;
   int most_pairs_in_all = 12000;
   GeoreferenceConfig georeference;
+  KnownGroundConfig known_ground;
   template <class V>
   void describe(V& v) {
     v.field("outlier_rejection", outlier_rejection, formerly("who_is_wrong"));
@@ -116,6 +132,7 @@ struct MapConfig {
         "A map with more closed pairs than this does not have all judged: of each submap fewer the more there are, at "
         "least five, robots taking turns.");
     v.field("georeference", georeference);
+    v.field("known_ground", known_ground);
   }
 };
 

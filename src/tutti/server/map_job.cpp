@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "tutti/server/georeference.hpp"
-#include "tutti/server/refuted_closures.hpp"
+#include "tutti/server/known_ground.hpp"
 
 namespace tutti::server {
 
@@ -17,8 +17,8 @@ MapEstimate finished_map(const MapEstimate& estimate, const SubmapSet& submaps, 
 MadeMap make_map(MapJob job) {
   MadeMap out{.job = {}, .estimate = job.estimate, .map = {}, .message = {}, .search = {}, .monitor = {}};
   if (out.estimate == nullptr) {
-    out.estimate =
-        std::make_shared<const MapEstimate>(estimate_map_with_fixes(job.submaps, job.verdicts, job.map, job.decisions));
+    out.estimate = std::make_shared<const MapEstimate>(
+        estimate_known_map(job.submaps, job.retired, job.verdicts, job.map, job.decisions));
     out.search = out.estimate->work;
   }
   out.map = finished_map(*out.estimate, job.submaps, job.refinements, job.held ? *job.held : HeldPoses(), job.map);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <set>
 #include <vector>
 
 #include "tutti/consistency/proxy_graph_builder.hpp"
@@ -32,6 +33,7 @@ struct MapJob {
   std::shared_ptr<const MapEstimate> estimate;
   bool keeps_estimate = false;                 ///< It is asked for again, to refine the map.
   std::shared_ptr<const HeldPoses> held = {};  ///< The poses of a map that does not move; null: every pose may.
+  std::set<SubmapId> retired = {};             ///< Submaps that show known ground (known_ground.hpp).
   std::vector<ChainId> owners = {};            ///< The sessions that own robots' numbers: these hear of the map.
 };
 

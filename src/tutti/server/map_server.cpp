@@ -131,6 +131,8 @@ MapServer::MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureVeri
   former_pairs_ = static_cast<std::size_t>(
       std::ranges::count_if(state_.verdicts, [&](const auto& entry) { return entry.second.verifier != who; }));
   for (const auto& [id, submap] : state_.submaps) state_.answered.add_submap(id);
+  for (const SubmapId& id : state_.retired)
+    if (state_.submaps.contains(id)) state_.answered.insert_all_but(id, {});
   restore_candidates();
   plan_open_verifications();
   news_ = !state_.submaps.empty();
@@ -361,7 +363,8 @@ MapJob MapServer::begin(std::uint64_t revision) {
              .revision = revision,
              .estimate = estimate_,
              .keeps_estimate = refiner_ != nullptr,
-             .held = state_.held};
+             .held = state_.held,
+             .retired = state_.retired};
   if (job.keeps_estimate) job.payload_sizes = state_.payload_sizes;
   return job;
 }
@@ -376,6 +379,7 @@ void MapServer::finish(MadeMap made, bool refines) {
   work_.search += made.search;
   work_.monitor += made.monitor;
   map_ = std::move(made.map);
+  retire(map_, made.job);
   if (made.estimate && refines)
     plan_refinement(*made.estimate, made.job.submaps, made.job.payload_sizes, made.job.verdicts, false);
   if (!graph_is_new_) estimate_ = std::move(made.estimate);

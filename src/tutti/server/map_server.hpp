@@ -91,8 +91,16 @@ struct MapServerState {
   RefusalCounts refused;   ///< Refusals by `verifier`.
   Refinements refinements;
   std::shared_ptr<const HeldPoses> held;  ///< The poses of a map that does not move; null: every pose may.
-  std::uint64_t epoch = 0;                ///< Epoch of the server whose state this is.
+  /// Submaps that show known ground (known_ground.hpp): without payloads, and of their verdicts only what ties them.
+  std::set<SubmapId> retired;
+  std::uint64_t epoch = 0;  ///< Epoch of the server whose state this is.
   std::uint64_t revision = 0;
+};
+
+/// Submaps that were retired, and the pairs whose verdicts were dropped.
+struct Retired {
+  std::vector<SubmapId> submaps;
+  std::vector<SubmapPair> dropped;
 };
 
 /// Work done since the server started. The figures are deterministic, so that tests can bound the cost.
@@ -155,6 +163,8 @@ class MapServer {
   /// The submaps whose places were described, compared or dropped since the last call; MapServerState::places has those
   /// that were not dropped.
   std::vector<SubmapId> take_places() { return std::exchange(new_places_, {}); }
+  /// What was retired since the last call; the submaps' payloads and places go with it.
+  Retired take_retired() { return std::exchange(new_retired_, {}); }
   /// The verifications to be done; each is handed out once.
   std::vector<VerificationJob> take_jobs();
   /// Returns a job that failed; the next take_jobs() hands it out again if it is still needed.
@@ -222,6 +232,8 @@ class MapServer {
   /// Notes that something has come that changes the pose graph.
   void note_news();
   [[nodiscard]] MapJob begin(std::uint64_t revision);
+  /// Retires the submaps that show known ground, on the map that was made of this.
+  void retire(const MapEstimate& map, const MapJob& job);
   void refine(bool settle);
   /// Makes a refinement job for the present map, which was made of this, if one is due.
   void plan_refinement(const MapEstimate& estimate, const SubmapSet& submaps,
@@ -236,6 +248,7 @@ class MapServer {
   MapServerState state_;
   CandidatePairs candidates_;
   std::vector<SubmapId> new_places_;
+  Retired new_retired_;
   std::vector<VerificationJob> jobs_;
   std::vector<ClosureVerdict> waiting_;  // not in the state: their pairs are verified again when the submaps come
   std::vector<Error> late_errors_;

@@ -41,7 +41,7 @@ void MapServer::compare_place(SubmapId id) {
   std::vector<SubmapId> others;
   std::vector<std::string_view> appearances;
   for_each_comparable(
-      state_, *verifier_, id, [&](SubmapId other) { return candidates_.has(other); },
+      state_, *verifier_, id, [&](SubmapId other) { return candidates_.has(other) && !state_.retired.contains(other); },
       [&](const auto& other) {
         others.push_back(other.first);
         appearances.push_back(state_.places.at(other.first).looks);
@@ -60,7 +60,8 @@ void MapServer::compare_place(SubmapId id) {
 
 void MapServer::plan_verification(const SubmapPair& pair) {
   ++work_.pairs_looked_at;
-  if (!is_answered(pair) && is_asked(pair))
+  const bool is_retired = state_.retired.contains(pair.first) || state_.retired.contains(pair.second);
+  if (!is_retired && !is_answered(pair) && is_asked(pair))
     return jobs_.push_back({pair, state_.submaps.at(pair.first), state_.submaps.at(pair.second)});
   state_.answered.insert(pair);  // what an earlier verifier has found there stays
 }
@@ -77,7 +78,7 @@ void MapServer::plan_verifications(SubmapId id) {
   const std::shared_ptr<const Submap>& own = state_.submaps.at(id);
   const auto is_open = [&](SubmapId other) {
     const SubmapPair pair = ordered(id, other);
-    if (candidates_.excludes(pair)) return false;
+    if (state_.retired.contains(other) || candidates_.excludes(pair)) return false;
     ++work_.pairs_looked_at;
     return !any_answered || !is_answered(pair);
   };
@@ -103,7 +104,7 @@ void MapServer::restore_candidates() {
     if (!place.is_ranked) compare_place(id);
   std::vector<SubmapId> unknown;
   for (const auto& [id, submap] : state_.submaps)
-    if (!candidates_.has(id)) unknown.push_back(id);
+    if (!candidates_.has(id) && !state_.retired.contains(id)) unknown.push_back(id);
   auto all = candidates_.all();
   for (auto& [id, open] : all) {
     open.insert(open.end(), unknown.begin(), unknown.end());

@@ -123,6 +123,9 @@ Result<OpenedMap> OpenedMap::from(const storage::TableStore& store, MethodId ver
   auto held = read_held_poses(store);
   if (!held) return tl::unexpected(held.error());
   if (!held->empty()) opened.state.held = std::make_shared<const server::HeldPoses>(std::move(*held));
+  auto retired = read_retired(store);
+  if (!retired) return tl::unexpected(retired.error());
+  opened.state.retired = std::move(*retired);
   const auto leave_submap = [&](std::string_view key, const std::string& why) {  // it is in the map all the same
     if (const auto id = submap_of_key(key)) opened.note_stored(*id);
     opened.leave(map_tables::kSubmaps, why);
