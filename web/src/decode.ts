@@ -85,6 +85,8 @@ function robot_status(value: unknown, what: string): s.RobotStatus {
     battery_percent: maybe(f.battery_percent, "battery_percent"),
     localisation: f.localisation === undefined ? "" : words(f.localisation, "localisation"),
     localisation_why: f.localisation_why === undefined ? "" : words(f.localisation_why, "localisation_why"),
+    map_id: f.map_id === undefined ? "" : words(f.map_id, "map_id"),
+    map_version: f.map_version === undefined ? 0 : count(f.map_version, "map_version"),
   };
 }
 

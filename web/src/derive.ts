@@ -34,6 +34,19 @@ export interface Drain {
   seconds: number | null;
 }
 
+/** The maps in which robots say that they localise, most robots first. */
+export function maps_in_use(robots: RobotView[]): { map: { map_id: string; map_version: number }; names: string[] }[] {
+  const used = new Map<string, { map: { map_id: string; map_version: number }; names: string[] }>();
+  for (const { name, status } of robots) {
+    if (!status?.localisation) continue;
+    const { map_id, map_version } = status;
+    const key = `${map_version} ${map_id}`;
+    if (!used.has(key)) used.set(key, { map: { map_id, map_version }, names: [] });
+    used.get(key)!.names.push(name);
+  }
+  return [...used.values()].sort((a, b) => b.names.length - a.names.length);
+}
+
 /** All robots that a message names, by number. */
 export function robots_at(store: Store, t: number, now: number): RobotView[] {
   const track = store.track("status");

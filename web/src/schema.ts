@@ -52,6 +52,8 @@ export interface RobotStatus {
   battery_percent: number | null;
   localisation: string; // in a map that does not move; "": it does not localise
   localisation_why: string;
+  map_id: string; // of that map
+  map_version: number;
 }
 
 export interface WorkerStatus {

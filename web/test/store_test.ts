@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { correction_at, drain_of, robots_at } from "../src/derive";
+import { correction_at, drain_of, maps_in_use, robots_at } from "../src/derive";
 import { unknown_at } from "../src/history";
 import { LIMITS, REACH_M } from "../src/limits";
 import { POSE_ROW } from "../src/schema";
@@ -41,6 +41,27 @@ test("what was before is put among what is here, and changes nothing of that", (
   assert.equal(store.get("alerts")!.length, alerts, "a time that is known keeps its value");
   assert.equal(store.get("mark", 25, "old")?.text, "gone");
   assert.equal(store.get("mark", Infinity, "old"), null);
+});
+
+test("who is in which version of a map that does not move", () => {
+  const mission = new FakeMission();
+  const store = filled(mission);
+  assert.deepEqual(maps_in_use(robots_at(store, Infinity, mission.time)), [], "nobody localises");
+  const raw = (mission.everything() as Message[]).find((m) => m.key === "status")!;
+  const robots = (raw.value as { robots: Record<string, unknown>[] }).robots.map((robot, i) => ({
+    ...robot,
+    ...(i < 3 ? { localisation: "localised", map_id: "5d", map_version: i === 0 ? 6 : 7 } : {}),
+  }));
+  store.apply({ key: "status", t: mission.time + 1, value: { ...(raw.value as object), robots } });
+  assert.deepEqual(store.unread, { count: 0, last: "" });
+  const used = maps_in_use(robots_at(store, Infinity, mission.time + 1));
+  assert.deepEqual(
+    used.map(({ map, names }) => [map.map_id, map.map_version, names.length]),
+    [
+      ["5d", 7, 2],
+      ["5d", 6, 1],
+    ],
+  );
 });
 
 test("of which times nothing is known", () => {

@@ -2,7 +2,7 @@
 /** One card per robot: is it there, what can it do now, what does it still keep. */
 import type { App } from "../app";
 import { css, robot_rgb } from "../colours";
-import { silent_after } from "../derive";
+import { maps_in_use, silent_after } from "../derive";
 import type { RobotView } from "../derive";
 import { bytes, many, metres, span } from "../format";
 import { LIMITS, TIMES } from "../limits";
@@ -40,10 +40,27 @@ export function robots_panel(app: App, view: View): HTMLElement {
       found.length > LIMITS.rows
         ? h("p", { class: "empty" }, `and ${found.length - LIMITS.rows} more: search to see them`)
         : null,
+      maps(app.robots),
       workers(app),
     ];
   });
   return h("div", { class: "robots" }, heading, search, list);
+}
+
+const map_name = ({ map_id, map_version }: { map_id: string; map_version: number }): string =>
+  map_id ? `version ${map_version} of map ${map_id}` : "no map yet";
+
+/** Who is on which map that does not move: said where they are not all on one. */
+function maps(robots: RobotView[]): Child {
+  const used = maps_in_use(robots);
+  if (used.length < 2) return null;
+  return h(
+    "p",
+    { class: "maps" },
+    used.map(({ map, names }) =>
+      h("span", { class: "detail", title: names.join(", ") }, `${many(names.length, "robot")} in ${map_name(map)}`),
+    ),
+  );
 }
 
 const is_away = (robot: RobotView): boolean => robot.presence === "silent" || robot.presence === "lost";
@@ -251,7 +268,7 @@ function details(app: App, robot: RobotView): Child[] {
     );
   if (status?.localisation)
     line(
-      `In its map: ${status.localisation}, ${status.localisation_why}`,
+      `In ${map_name(status)}: ${status.localisation}, ${status.localisation_why}`,
       status.localisation === "localised" || status.localisation === "searching" ? "" : "warn",
     );
   if (status?.conflict) line(status.conflict, "bad");
