@@ -152,7 +152,7 @@ void bind_reading(py::module_& m) {
           "decode", [](const Message& x) { return decode(x.channel, x.data); },
           R"(A dict with the names of ROS's own fields.
 
-Of Odometry, TFMessage, PointCloud2, Livox's CustomMsg, Imu, Image, CompressedImage, CameraInfo, NavSatFix, BatteryState and PoseStamped. Headers are
+Of Odometry, TFMessage, PointCloud2, Livox's CustomMsg, Imu, Image, CompressedImage, CameraInfo, NavSatFix, BatteryState, Range and PoseStamped. Headers are
 'stamp', seconds, and 'frame_id'; positions (3,), orientations (4,) in the order x y z w; poses are 'T' (4, 4) where they
 are rigid, else None; PointCloud2's finite points (n, 3) float32, and its 'times' (n,), if it has any, as they stand there.
 ValueError: another type, or bytes that are none of it.)")

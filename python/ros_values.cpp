@@ -123,6 +123,15 @@ py::dict dict_of(const RosBatteryState& m) {
   return out;
 }
 
+py::dict dict_of(const RosRange& m) {
+  py::dict out = begin(m.header);
+  out["min_range_m"] = m.min_range_m;
+  out["max_range_m"] = m.max_range_m;
+  out["range_m"] = m.range_m;
+  out["variance"] = m.variance;
+  return out;
+}
+
 py::dict dict_of(const RosPoseStamped& m) {
   py::dict out = begin(m.header);
   put_pose(out, m.pose.position, m.pose.orientation);

@@ -234,7 +234,7 @@ TEST(BagInfo, ABagOfAllTypesIsDecoded) {
     EXPECT_EQ(topic.problem, "") << topic.topic;
     known += topic.use != Use::nothing ? 1 : 0;
   }
-  EXPECT_EQ(known, 10U);
+  EXPECT_EQ(known, 11U);
 }
 
 }  // namespace bag_info_test

@@ -167,6 +167,16 @@ std::string encode(const RosNavSatFix& message) {
   return out.numbers(message.position_covariance).number(message.position_covariance_type).done();
 }
 
+std::string encode(const RosRange& message) {
+  Cdr out;
+  out.header(message.header).number<std::uint8_t>(0).number(0.0F);  // radiation and field of view
+  return out.number(message.min_range_m)
+      .number(message.max_range_m)
+      .number(message.range_m)
+      .number(message.variance)
+      .done();
+}
+
 std::string encode(const RosPoseStamped& message) { return Cdr().header(message.header).pose(message.pose).done(); }
 
 std::string encode(const RosPoseWithCovariance& message) {

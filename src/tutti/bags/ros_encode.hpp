@@ -26,6 +26,7 @@ std::string encode(const RosImage& message);
 std::string encode(const RosCompressedImage& message);
 std::string encode(const RosCameraInfo& message);
 std::string encode(const RosNavSatFix& message);
+std::string encode(const RosRange& message);
 std::string encode(const RosPoseStamped& message);
 std::string encode(const RosOccupancyGrid& message);
 

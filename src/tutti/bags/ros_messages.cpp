@@ -280,6 +280,20 @@ Result<RosNavSatFix> decode_nav_sat_fix(std::string_view bytes, RosEncoding enco
   });
 }
 
+Result<RosRange> decode_range(std::string_view bytes, RosEncoding encoding) {
+  return decode(bytes, encoding, "sensor_msgs/msg/Range", [](Cursor& in) {
+    RosRange out;
+    out.header = header(in);
+    in.number<std::uint8_t>("radiation_type");
+    in.number<float>("field_of_view");
+    out.min_range_m = in.number<float>("min_range");
+    out.max_range_m = in.number<float>("max_range");
+    out.range_m = in.number<float>("range");
+    if (in.left() >= sizeof(float)) out.variance = in.number<float>("variance");
+    return out;
+  });
+}
+
 Result<RosBatteryState> decode_battery_state(std::string_view bytes, RosEncoding encoding) {
   return decode(bytes, encoding, "sensor_msgs/msg/BatteryState", [](Cursor& in) {
     RosBatteryState out;

@@ -128,6 +128,13 @@ struct RosBatteryState {
   float percentage = 0.0F;  ///< 0 to 1.
 };
 
+/// What Tutti reads of sensor_msgs/Range.
+struct RosRange {
+  RosHeader header;
+  float min_range_m = 0.0F, max_range_m = 0.0F, range_m = 0.0F;
+  float variance = 0.0F;  ///< m^2; 0: unknown, as before ROS 2 Jazzy, whose messages do not have it.
+};
+
 struct RosPoseStamped {
   RosHeader header;
   RosPose pose;
@@ -150,6 +157,7 @@ Result<RosImage> decode_image(std::string_view bytes, RosEncoding encoding = Ros
 Result<RosCompressedImage> decode_compressed_image(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
 Result<RosCameraInfo> decode_camera_info(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
 Result<RosNavSatFix> decode_nav_sat_fix(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
+Result<RosRange> decode_range(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
 Result<RosBatteryState> decode_battery_state(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
 /// Decodes geometry_msgs/msg/PoseWithCovarianceStamped.
 Result<RosPoseWithCovariance> decode_pose_with_covariance(std::string_view bytes,

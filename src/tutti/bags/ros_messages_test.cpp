@@ -188,6 +188,10 @@ TEST_P(BothOrders, SensorsAreReadFieldByField) {
   EXPECT_EQ(camera.p[11], 41.0);
   EXPECT_EQ(camera.binning_y, 2U);
 
+  const auto ranged = decode_range(range(12.5F, 0.01F, GetParam())).value();
+  EXPECT_EQ(ranged.range_m, 12.5F);
+  EXPECT_EQ(ranged.max_range_m, 50.0F);
+  EXPECT_EQ(ranged.variance, 0.01F);
   const auto battery = decode_battery_state(battery_state(24.5F, 0.5F, GetParam())).value();
   EXPECT_EQ(battery.voltage_v, 24.5F);
   EXPECT_EQ(battery.percentage, 0.5F);

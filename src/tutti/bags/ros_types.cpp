@@ -23,6 +23,7 @@ constexpr RosType kRosTypes[] = {
     {kImuType, Use::imu, decoded<decode_imu>},
     {kFixType, Use::fixes, decoded<decode_nav_sat_fix>},
     {kBatteryType, Use::battery, decoded<decode_battery_state>},
+    {kRangeType, Use::ranges, decoded<decode_range>},
     {kScanTypes[0].name, Use::scans, decoded<kScanTypes[0].decode>},
     {kScanTypes[1].name, Use::scans, decoded<kScanTypes[1].decode>},
     {kScanTypes[2].name, Use::scans, decoded<kScanTypes[2].decode>},

@@ -17,13 +17,14 @@ inline constexpr const char *kOdometryType = "nav_msgs/msg/Odometry", *kPoseType
                             *kTfType = "tf2_msgs/msg/TFMessage", *kImageType = "sensor_msgs/msg/Image",
                             *kCompressedType = "sensor_msgs/msg/CompressedImage",
                             *kCameraInfoType = "sensor_msgs/msg/CameraInfo", *kImuType = "sensor_msgs/msg/Imu",
-                            *kFixType = "sensor_msgs/msg/NavSatFix", *kBatteryType = "sensor_msgs/msg/BatteryState";
+                            *kFixType = "sensor_msgs/msg/NavSatFix", *kBatteryType = "sensor_msgs/msg/BatteryState",
+                            *kRangeType = "sensor_msgs/msg/Range";
 
 /// What Tutti can use a topic for, by its message type alone.
-enum class Use { nothing, odometry, scans, images, calibration, imu, fixes, poses, transforms, battery };
+enum class Use { nothing, odometry, scans, images, calibration, imu, fixes, poses, transforms, battery, ranges };
 
 using RosMessage = std::variant<RosOdometry, RosPoseStamped, std::vector<RosTransform>, RosPointCloud, RosImage,
-                                RosCompressedImage, RosCameraInfo, RosImu, RosNavSatFix, RosBatteryState>;
+                                RosCompressedImage, RosCameraInfo, RosImu, RosNavSatFix, RosBatteryState, RosRange>;
 
 struct RosType {
   std::string_view name;

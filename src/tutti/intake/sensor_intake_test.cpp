@@ -15,12 +15,13 @@ constexpr const char *kOdometry = "nav_msgs/msg/Odometry", *kTf = "tf2_msgs/msg/
                      *kPoints = "sensor_msgs/msg/PointCloud2", *kFix = "sensor_msgs/msg/NavSatFix",
                      *kBattery = "sensor_msgs/msg/BatteryState";
 
-/// What comes out, one letter each: odometry, scan, pictures, imu, fix, health; '!' for an error.
+/// What comes out, one letter each: odometry, scan, pictures, imu, fix, range, health; '!' for an error.
 struct Letters {
   std::string out;
   std::vector<std::string> errors;
   std::vector<OdometrySample> samples;
   std::vector<EncodedImages> images;
+  std::vector<RobotRange> ranges;
   void operator()(const OdometrySample& sample) { out += 'o', samples.push_back(sample); }
   void operator()(const Scan&) { out += 's'; }
   void operator()(const EncodedImages& images_then) { out += 'p', images.push_back(images_then); }
@@ -29,6 +30,7 @@ struct Letters {
   void operator()(const PositionFix&) { out += 'f'; }
   void operator()(const Health&) { out += 'h'; }
   void operator()(const StartPose&) { out += 'a'; }
+  void operator()(const RobotRange& range) { out += 'r', ranges.push_back(range); }
 };
 
 class SensorIntakeTest : public testing::Test {
@@ -231,6 +233,28 @@ TEST(NamedTopics, AreThoseOfOneCameraOrTwo) {
   for (const ImagesConfig& wrong :
        {ImagesConfig{.images = {"a/i", "b/i", "c/i"}}, {.images = {"a/i", "a/j"}}, {.depth = "d"}, {.imu = "imu"}})
     EXPECT_FALSE(named_topics(wrong));
+}
+
+TEST_F(SensorIntakeTest, RangesAreToTheRobotThatTheirTopicNames) {
+  const char* const kRange = "sensor_msgs/msg/Range";
+  EXPECT_EQ(add("/tf_static", kTf, transform(0, "base_link", "uwb", {Eigen::Quaterniond::Identity(), {1, 2, 3}})), "");
+  EXPECT_EQ(odometry_at(0), "");
+  EXPECT_EQ(add("sonar", kRange, range(kStart, 1.0F, "uwb")), "") << "to a wall";
+  EXPECT_EQ(add("range_to/bravo", kRange, range(kStart + kPeriod, 5.0F, "uwb")), "");
+  EXPECT_EQ(add("range_to/charlie", kRange, range(kStart + kPeriod, 6.0F, "nowhere")), "");
+  EXPECT_NE(add("range_to/bravo", kRange, range(kStart + kPeriod, -1.0F, "uwb", 0.0F)), "");
+  EXPECT_EQ(due(), "o");
+  EXPECT_EQ(odometry_at(1), "");
+  EXPECT_EQ(due(), "orr");
+  ASSERT_EQ(last_.ranges.size(), 2U);
+  EXPECT_EQ(last_.ranges[0].name, "bravo");
+  EXPECT_EQ(last_.ranges[0].distance_m, 5.0);
+  EXPECT_EQ(last_.ranges[0].p_body_antenna, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(last_.ranges[1].name, "charlie");
+  EXPECT_EQ(last_.ranges[1].p_body_antenna, Eigen::Vector3d(0, 0, 0));
+  const auto notes = intake_.take_notes();
+  ASSERT_EQ(notes.size(), 1U);
+  EXPECT_NE(notes[0].find("no transform from 'nowhere' to 'base_link'"), std::string::npos) << notes[0];
 }
 
 }  // namespace sensor_intake_test

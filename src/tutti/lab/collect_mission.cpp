@@ -55,7 +55,7 @@ class Troubles {
 
  private:
   static constexpr std::pair<const char*, const char*> kKinds[] = {
-      {"sample_refused", "odometry samples refused"},
+      {"sample_refused", "samples refused"},
       {"odometry_jumped", "steps of odometry that no body makes"},
       {"session_begun", "times another session had to begin"},
       {"scan_refused", "wanted scans that are not there or no good"},

@@ -33,6 +33,12 @@ ChainId renamed(const ChainId& chain, const Chains& chains) {
 SubmapId renamed(const SubmapId& id, const Chains& chains) { return {renamed(id.chain, chains), id.index}; }
 KeyframeId renamed(const KeyframeId& id, const Chains& chains) { return {renamed(id.chain, chains), id.index}; }
 
+/// A robot's number once its sessions are renamed.
+RobotId renamed(RobotId robot, const Chains& chains) {
+  const auto found = chains.lower_bound(robot);
+  return found != chains.end() && found->first.robot == robot ? found->second.robot : robot;
+}
+
 /// A closure between the same two keyframes; turned round when their submaps change places.
 LoopClosure renamed(LoopClosure closure, const Chains& chains, bool is_turned) {
   closure.from = renamed(closure.from, chains);
@@ -51,7 +57,10 @@ Result<NewRows> renamed_submap(std::string_view bytes, const Chains& chains) {
   auto message = wire::decode_submap(bytes);
   if (!message) return tl::unexpected(message.error());
   SubmapId& id = message->submap.id;
-  if (!chains.contains(id.chain)) return NewRows{{map_tables::kSubmaps, node::key_of(id), std::string(bytes)}};
+  std::vector<RobotRange>& ranges = message->submap.ranges;
+  if (!chains.contains(id.chain) && ranges.empty())
+    return NewRows{{map_tables::kSubmaps, node::key_of(id), std::string(bytes)}};
+  for (RobotRange& range : ranges) range.to = renamed(range.to, chains);
   id = renamed(id, chains);
   message->header.robot = id.chain.robot;
   message->header.session = id.chain.session;

@@ -14,6 +14,7 @@
 #include "tutti/bags/robot_namespace.hpp"
 #include "tutti/bags/ros_fix.hpp"
 #include "tutti/bags/ros_messages.hpp"
+#include "tutti/bags/ros_range.hpp"
 #include "tutti/bags/ros_types.hpp"
 
 namespace tutti::mission {
@@ -89,6 +90,8 @@ class Indexer {
         return take_scan(index.scans[topic], message);
       case bags::Use::fixes:
         return take_fix(index.fixes[topic], message);
+      case bags::Use::ranges:
+        return take_range(topic, message);
       default:
         if (with_images_) take_sight(message);
         return;
@@ -217,6 +220,22 @@ class Indexer {
     track.arrivals.push_back({fix.stamp, message.log_time, track.messages});
   }
 
+  /// Those to walls are none.
+  void take_range(const std::string& topic, const BagMessage& message) {
+    const std::string_view robot = bags::ranged_robot(topic);
+    if (robot.empty()) return;
+    RangeTrack& track = index.ranges[topic];
+    ++track.messages;
+    const auto heard = bags::decode_range(message.data, encoding_of(message));
+    if (!heard) return track.refused.add(track.messages, heard.error().message);
+    const auto range = bags::to_range(*heard, robot);
+    if (!range) return track.refused.add(track.messages, range.error().message);
+    if (!*range) return;
+    if (track.ranges.empty()) track.frame = bags::frame_name(heard->header.frame_id);
+    track.ranges.push_back(**range);
+    track.arrivals.push_back({(*range)->stamp, message.log_time, track.messages});
+  }
+
   void take_sight(const BagMessage& message) {
     const std::string& topic = message.channel->topic;
     const bags::RosEncoding encoding = encoding_of(message);
@@ -316,6 +335,7 @@ void order_sensors(BagIndex& index, const OdometryTrack& odometry) {
   for (auto& [topic, track] : index.images) order(topic, track.images, track);
   for (auto& [topic, track] : index.imu) order(topic, track.samples, track);
   for (auto& [topic, track] : index.fixes) order(topic, track.fixes, track);
+  for (auto& [topic, track] : index.ranges) order(topic, track.ranges, track);
 }
 
 void keep_robot(BagIndex& index, const RobotConfig& robot) {
@@ -337,6 +357,7 @@ void keep_robot(BagIndex& index, const RobotConfig& robot) {
   if (topics.depth.empty()) keep(topics.images, index.images);
   keep(topics.imu, index.imu);
   keep(topics.fixes, index.fixes);
+  names.keep(index.ranges);
 
   const auto own = index.trees.find(names.own);
   if (own != index.trees.end()) index.tree = own->second;

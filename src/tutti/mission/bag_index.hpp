@@ -86,6 +86,15 @@ struct FixTrack {
   Refusals refused;
 };
 
+/// The ranges to one other robot.
+struct RangeTrack {
+  std::vector<RobotRange> ranges;
+  std::vector<bags::Arrival> arrivals;
+  std::string frame;  ///< The antenna's.
+  std::uint64_t messages = 0;
+  Refusals refused;
+};
+
 /// What a mission needs to know of a bag before it reads scans one by one. It has the poses of all topics that may be
 /// odometry, and of /tf the frames that are odometry by their name.
 struct BagIndex {
@@ -99,6 +108,7 @@ struct BagIndex {
   std::map<std::string, ImageTrack> images;
   std::map<std::string, ImuTrack> imu;
   std::map<std::string, FixTrack> fixes;
+  std::map<std::string, RangeTrack> ranges;
   std::map<std::string, bags::TransformTree> trees;  ///< By namespace: of "/alpha/tf" and "/alpha/tf_static".
   bags::TransformTree tree;                          ///< The robot's (keep_robot()).
   Refusals bad_records;

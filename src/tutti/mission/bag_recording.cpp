@@ -276,6 +276,24 @@ Status take_fixes(const BagIndex& index, const std::string& body, const RobotCon
   return {};
 }
 
+void take_ranges(const BagIndex& index, const std::string& body, BagRecording& out) {
+  for (const auto& [topic, track] : index.ranges) {
+    if (track.refused.count > 0) out.notes.push_back(note_of(topic, track.refused, track.messages));
+    if (track.ranges.empty()) continue;
+    const auto antenna = track.frame == body ? std::optional(Pose3{}) : index.tree.find(body, track.frame);
+    const Eigen::Vector3d p_body_antenna = antenna.value_or(Pose3{}).translation;
+    out.notes.push_back(fmt::format(
+        "{} ranges of {}, antenna at [{:.2f} {:.2f} {:.2f}] m of the body{}", track.ranges.size(), topic,
+        p_body_antenna.x(), p_body_antenna.y(), p_body_antenna.z(),
+        antenna ? "" : fmt::format(", which is a guess: no transform from '{}' to '{}'", track.frame, body)));
+    for (RobotRange range : track.ranges) {
+      range.p_body_antenna = p_body_antenna;
+      out.ranges.push_back(std::move(range));
+    }
+  }
+  std::ranges::stable_sort(out.ranges, {}, &RobotRange::stamp);
+}
+
 /// By the odometry's clock (`robot.scan_time_offset_s`), without those that are by another one all the same.
 Status take_scans(const OdometryTrack& odometry, const std::string& topic, ScanTrack seen, const RobotConfig& robot,
                   BagRecording& out) {
@@ -350,6 +368,7 @@ Result<BagRecording> read_bag(const fs::path& data, const RobotConfig& robot, bo
   std::string what = fmt::format("{}: odometry of {} ({})", out.file, source, in_words(track));
   note_odometry(source, track, out.notes);
   if (auto ok = take_fixes(index, track.body, robot, out); !ok) return in_context(out.file, ok.error());
+  take_ranges(index, track.body, out);
   if (with_images) take_cameras(index, track.body, robot, out);
   if (*scans == nullptr) {
     if (robot.topics.scans.empty() && index.scans.empty())

@@ -44,6 +44,7 @@ struct BagRecording {
   std::vector<ImuSample> imu;       ///< In the body frame.
   std::string fix_topic, fix_note;  ///< Empty: the bag has no fixes; and remarks on them.
   std::vector<PositionFix> fixes;
+  std::vector<RobotRange> ranges;     ///< Stamps do not decrease; the other robots are named, not numbered.
   std::vector<std::string> notes;     ///< What was used, what was refused and why, for the report.
   std::vector<std::string> warnings;  ///< much_left_out()
 };

@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <map>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "tutti/base/random.hpp"
@@ -244,6 +246,7 @@ Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, 
   if (bag)
     if (auto ok = take_bag(*bag, raw, robot, tracking, out); !ok) return tl::unexpected(ok.error());
   if (auto ok = take_fixes(robot, data, bag ? &*bag : nullptr, raw, out); !ok) return tl::unexpected(ok.error());
+  if (bag) out.recording.ranges = bag->ranges;
   if (robot.images.is_given()) {
     auto images =
         maplab ? listed_images(*maplab, robot.images, data, raw, from) : open_images(robot.images, data, raw, tracking);
@@ -264,6 +267,24 @@ std::string with_name(std::string text, const std::string& robot) {
   return text;
 }
 
+/// Bags name the robots to which ranges are; those to robots that are not in the mission are left out.
+void number_ranges(std::vector<MissionRecording>& robots) {
+  for (MissionRecording& robot : robots) {
+    std::map<std::string, std::size_t> strangers;
+    std::erase_if(robot.recording.ranges, [&](RobotRange& range) {
+      const auto to = std::ranges::find(robots, range.name, [](const auto& other) { return other.recording.name; });
+      if (to == robots.end()) ++strangers[range.name];
+      if (to == robots.end() || &*to == &robot) return true;
+      range.to = to->recording.robot;
+      range.name.clear();
+      return false;
+    });
+    for (const auto& [name, count] : strangers)
+      robot.notes.push_back(fmt::format("{}: {} ranges to {} are left out: no robot of the mission is called so",
+                                        robot.recording.name, count, name));
+  }
+}
+
 Result<std::vector<MissionRecording>> replay_all(const MissionConfig& config, const fs::path& data,
                                                  const std::vector<ChangeOdometry>& changes) {
   std::vector<MissionRecording> out;
@@ -280,6 +301,7 @@ Result<std::vector<MissionRecording>> replay_all(const MissionConfig& config, co
     loaded->score_against_reference = robot.score_against_reference && !loaded->recording.reference.empty();
     out.push_back(std::move(*loaded));
   }
+  number_ranges(out);
   align_starts(out);
   return out;
 }

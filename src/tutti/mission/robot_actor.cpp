@@ -65,8 +65,12 @@ Result<std::unique_ptr<RobotActor>> RobotActor::open(const MissionRecording& rec
     };
     skip(from.scan_stamps, actor->next_scan_);
     skip(from.image_stamps, actor->next_images_);
-    actor->next_fix_ = static_cast<std::size_t>(std::ranges::lower_bound(from.fixes, settled, {}, &PositionFix::stamp) -
-                                                from.fixes.begin());
+    const auto first_of = [&](const auto& samples) {
+      const auto stamp_of = [](const auto& sample) { return sample.stamp; };
+      return static_cast<std::size_t>(std::ranges::lower_bound(samples, settled, {}, stamp_of) - samples.begin());
+    };
+    actor->next_fix_ = first_of(from.fixes);
+    actor->next_range_ = first_of(from.ranges);
   }
   return actor;
 }
@@ -105,7 +109,7 @@ void RobotActor::take(node::Step step) {
 }
 
 void RobotActor::note_event(const node::Event& event) {
-  if (const auto* sample = std::get_if<node::SampleRefused>(&event.what)) note(refused_odometry_, sample->why);
+  if (const auto* sample = std::get_if<node::SampleRefused>(&event.what)) note(refused_samples_, sample->why);
   if (const auto* jumped = std::get_if<node::OdometryJumped>(&event.what)) note(jumps_, to_string(jumped->jump));
   if (const auto* found = std::get_if<node::MisfitFound>(&event.what)) note_misfit(found->misfit, misfits_);
   if (const auto* scan = std::get_if<node::ScanRefused>(&event.what)) note(refused_scans_, scan->why);
@@ -117,17 +121,17 @@ void RobotActor::note_event(const node::Event& event) {
   if (const auto* update = std::get_if<node::RobotUpdated>(&event.what)) note_update(*update, event.time);
 }
 
-void RobotActor::feed_fixes(Timestamp now) {
-  const Recording& recording = recording_.recording;
-  for (; next_fix_ < recording.fixes.size() && recording.fixes[next_fix_].stamp <= recording.odometry[next_ - 1].stamp;
-       ++next_fix_)
-    if (recording.fixes[next_fix_].stamp >= recording.odometry.front().stamp)
-      take(node_->add(recording.fixes[next_fix_], now));
+template <class Sample>
+void RobotActor::feed_until_now(const std::vector<Sample>& samples, std::size_t& next, Timestamp now) {
+  const Trajectory& odometry = recording_.recording.odometry;
+  for (; next < samples.size() && samples[next].stamp <= odometry[next_ - 1].stamp; ++next)
+    if (samples[next].stamp >= odometry.front().stamp) take(node_->add(samples[next], now));
 }
 
 void RobotActor::feed_sensors(Timestamp now) {
-  feed_fixes(now);
   const Recording& recording = recording_.recording;
+  feed_until_now(recording.fixes, next_fix_, now);
+  feed_until_now(recording.ranges, next_range_, now);
   const Timestamp newest = recording.odometry[next_ - 1].stamp;
   while (true) {
     const auto scan = recording.scans ? stamp_at(recording, recording.scan_stamps, next_scan_) : std::nullopt;
@@ -278,7 +282,7 @@ std::vector<std::string> RobotActor::troubles() const {
       out.push_back(fmt::format("{}: {} {}, the first because: {}", recording_.recording.name, trouble.count, what,
                                 trouble.first));
   };
-  add(refused_odometry_, "odometry samples refused");
+  add(refused_samples_, "samples refused");
   add(jumps_, "steps of odometry that no body makes");
   add(refused_scans_, "wanted scans that are not there or no good");
   add(refused_images_, "times images refused");

@@ -12,6 +12,7 @@
 #include "tutti/geometry/pose3.hpp"
 #include "tutti/model/point_cloud.hpp"
 #include "tutti/model/position_fix.hpp"
+#include "tutti/model/robot_range.hpp"
 #include "tutti/model/sensors.hpp"
 #include "tutti/model/start_pose.hpp"
 #include "tutti/model/status.hpp"
@@ -32,8 +33,8 @@ using ImuSamples = std::vector<ImuSample>;
 
 /// Whoever feeds a robot gives encoded images and IMU samples; its program makes tracked images of them, which its
 /// agent takes.
-using Input =
-    std::variant<OdometrySample, Scan, EncodedImages, TrackedImages, ImuSamples, PositionFix, Health, StartPose>;
+using Input = std::variant<OdometrySample, Scan, EncodedImages, TrackedImages, ImuSamples, PositionFix, Health,
+                           StartPose, RobotRange>;
 
 /// What has no stamp: it holds from when it comes.
 template <class Sample>
@@ -75,6 +76,7 @@ inline constexpr std::array<InputKind, std::variant_size_v<Input>> kInputKinds{{
     {"fix", Needs::odometry},
     {"health", Needs::nothing, std::numeric_limits<double>::infinity()},
     {"start pose", Needs::nothing, std::numeric_limits<double>::infinity()},
+    {"range", Needs::odometry},
 }};
 /// Where a kind is in the table.
 template <class Sample, std::size_t kAt = 0>

@@ -13,6 +13,7 @@
 #include "tutti/model/image_stream.hpp"
 #include "tutti/model/point_cloud.hpp"
 #include "tutti/model/position_fix.hpp"
+#include "tutti/model/robot_range.hpp"
 #include "tutti/model/trajectory.hpp"
 #include "tutti/model/visual.hpp"
 
@@ -66,6 +67,7 @@ struct Recording {
   std::vector<ImuSample> imu;  ///< Increasing stamps; empty when there is no IMU.
   ImuNoise imu_noise;
   std::vector<PositionFix> fixes;          ///< Increasing stamps; empty when there is no receiver.
+  std::vector<RobotRange> ranges;          ///< Increasing stamps, to several robots equal ones; empty without a radio.
   std::vector<DriftOrigin> drift_origins;  ///< In time order; empty when unknown.
 };
 

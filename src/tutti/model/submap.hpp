@@ -11,6 +11,7 @@
 #include "tutti/model/point_cloud.hpp"
 #include "tutti/model/position_fix.hpp"
 #include "tutti/model/relative_pose.hpp"
+#include "tutti/model/robot_range.hpp"
 #include "tutti/model/visual.hpp"
 
 namespace tutti {
@@ -31,6 +32,7 @@ struct Submap {
   std::vector<Keyframe> keyframes;     ///< Consecutive indices, increasing stamps, at least one.
   std::vector<RelativePose> odometry;  ///< Raw odometry from keyframe k to k + 1; one fewer than keyframes.
   std::vector<SubmapFix> fixes;        ///< Position fixes; none without a receiver.
+  std::vector<RobotRange> ranges;      ///< Ranges to other robots; none without a radio.
   /// In the submap frame, voxel-downsampled; null or empty without a range sensor.
   std::shared_ptr<const PointCloud> cloud;
   std::shared_ptr<const VisualPayload> visual;  ///< Null without a camera.
@@ -45,7 +47,7 @@ struct PayloadSize {
 
 PayloadSize payload_size(const Submap& submap);
 
-/// The submap with its keyframes, odometry and fixes alone.
+/// The submap with its keyframes, odometry, fixes and ranges alone.
 Submap without_payloads(Submap submap);
 
 }  // namespace tutti

@@ -105,7 +105,7 @@ struct SubmapsForgotten {
   RobotId robot;
   std::size_t submaps = 0;
 };
-/// Reported by a robot: an odometry sample was refused.
+/// Reported by a robot: a sample of odometry, a range or a start pose was refused.
 struct SampleRefused {
   RobotId robot;
   std::string why;

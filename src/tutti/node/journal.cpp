@@ -66,7 +66,7 @@ class Bytes {
 constexpr char kOdometry = 1;           // all 36 numbers of any matrix
 constexpr char kDiagonalOdometry = 2;   // the 6 of a diagonal one
 constexpr char kSymmetricOdometry = 3;  // the 21 of a symmetric one
-constexpr char kScan = 4, kGraph = 5, kImages = 6, kFix = 7;
+constexpr char kScan = 4, kGraph = 5, kImages = 6, kFix = 7, kRange = 8;
 
 bool is_same(double a, double b) { return std::memcmp(&a, &b, sizeof a) == 0; }  // to the bit
 
@@ -154,6 +154,22 @@ void read(Bytes& in, PositionFix& fix) {
   in.take_all(fix.p_body_antenna.data(), 3);
 }
 
+void write(const RobotRange& range, std::string& out) {
+  out += kRange;
+  put(out, range.stamp.ns);
+  put(out, range.to.value);
+  put(out, range.distance_m);
+  put(out, range.sigma_m);
+  put_all(out, range.p_body_antenna.data(), 3);
+}
+void read(Bytes& in, RobotRange& range) {
+  range.stamp.ns = in.take<std::int64_t>();
+  range.to.value = in.take<std::uint32_t>();
+  range.distance_m = in.take<double>();
+  range.sigma_m = in.take<double>();
+  in.take_all(range.p_body_antenna.data(), 3);
+}
+
 void write(const FedOnly auto& sample, std::string& /*out*/) {
   TUTTI_CHECK(false, "{} in a journal, which has what agents take", kind_of(sample).name);
 }
@@ -192,6 +208,8 @@ Result<JournalEntry> decode_entry(std::string_view bytes) {
       return JournalEntry(HeardGraph{std::string(bytes.substr(1))});
     case kFix:
       return read_entry<PositionFix>(rest);
+    case kRange:
+      return read_entry<RobotRange>(rest);
     case kImages: {
       auto images = wire::decode_tracked_images(bytes.substr(1));
       if (!images) return tl::unexpected(images.error());

@@ -19,6 +19,13 @@ JournalEntry any_entry(Rng& rng) {
                        .antenna = {rng.normal(), rng.normal(), rng.normal()},
                        .covariance = rng.normal() * Eigen::Matrix3d::Ones(),
                        .p_body_antenna = {rng.normal(), 2.0, 3.0}};
+  if (rng.bernoulli(0.1))
+    return RobotRange{.stamp = {6},
+                      .to = RobotId{7},
+                      .distance_m = rng.normal(),
+                      .sigma_m = rng.normal(),
+                      .p_body_antenna = {rng.normal(), 2.0, 3.0},
+                      .name = {}};
   if (rng.bernoulli(0.5)) {
     OdometrySample sample{.stamp = {static_cast<std::int64_t>(rng.index(1'000'000))}};
     for (double& x : sample.T_odom_body.rotation.coeffs()) x = rng.normal();

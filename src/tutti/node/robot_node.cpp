@@ -27,6 +27,7 @@ struct Refuse {
   What operator()(const Scan& /*scan*/) const { return ScanRefused{robot, why}; }
   What operator()(const TrackedImages& /*images*/) const { return ImagesRefused{robot, why}; }
   What operator()(const PositionFix& /*fix*/) const { return FixRefused{robot, why}; }
+  What operator()(const RobotRange& /*range*/) const { return SampleRefused{robot, why}; }
   What operator()(const OdometrySample& /*sample*/) const { return SampleRefused{robot, why}; }
   What operator()(const FedOnly auto& /*sample*/) const { return SampleRefused{robot, why}; }
 };

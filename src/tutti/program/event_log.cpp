@@ -205,7 +205,7 @@ EventReport report_of(const node::SubmapsForgotten& forgotten) {
 }
 EventReport report_of(const node::SampleRefused& refused) {
   return {{{"event", "sample_refused"}, {"robot", refused.robot.value}, {"why", refused.why}},
-          "an odometry sample was refused: " + refused.why,
+          "a sample was refused: " + refused.why,
           Level::warning};
 }
 EventReport report_of(const node::OdometryJumped& jumped) {

@@ -49,6 +49,12 @@ void FedRobot::end() {
 
 void FedRobot::hear(const Input& input, Timestamp now) {
   if (const auto* images = std::get_if<EncodedImages>(&input)) return see(*images, now);
+  if (const auto* range = std::get_if<RobotRange>(&input); range != nullptr && !range->name.empty()) {
+    RobotRange numbered = *range;
+    numbered.to = view_.number_of(range->name);
+    numbered.name.clear();
+    return robot_.add(std::move(numbered), now);
+  }
   const robot::RobotAgent& agent = robot_.node().agent();
   const auto* scan = std::get_if<Scan>(&input);  // received before anybody knew whether it shows anything new
   const localise::Localiser* localiser = robot_.node().localiser();

@@ -50,13 +50,6 @@ Status check_robot_name(const std::string& name) {
               kLongest);
 }
 
-/// FNV-1a of 32 bits, with the highest set.
-RobotId robot_id_of(const std::string& name) {
-  std::uint32_t hash = 2'166'136'261U;
-  for (const char letter : name) hash = (hash ^ static_cast<unsigned char>(letter)) * 16'777'619U;
-  return RobotId{hash | 0x8000'0000U};
-}
-
 class RobotProgram {
  public:
   explicit RobotProgram(const RobotOptions& options) : options_(options) {}

@@ -79,7 +79,9 @@ void SubmapBuilder::drop_between(Timestamp before, Timestamp after, const std::s
                                            chain_.robot.value, sample.stamp.ns, before.ns, after.ns, why)});
     return is_between;
   });
-  std::erase_if(state_.waiting_fixes, [&](const PositionFix& fix) { return fix.stamp > before && fix.stamp < after; });
+  const auto is_between = [&](const auto& sample) { return sample.stamp > before && sample.stamp < after; };
+  std::erase_if(state_.waiting_fixes, is_between);
+  std::erase_if(state_.ranges, is_between);
 }
 
 Status SubmapBuilder::add(const Input& input) {
@@ -330,7 +332,8 @@ bool SubmapBuilder::is_full() const {
 }
 
 void SubmapBuilder::close_submap() {
-  Submap submap{{chain_, state_.next_submap++}, state_.keyframes, state_.odometry, take_fixes(), nullptr, nullptr};
+  Submap submap{
+      {chain_, state_.next_submap++}, state_.keyframes, state_.odometry, take_fixes(), take_ranges(), nullptr, nullptr};
   state_.finished.push_back(
       {.submap = std::move(submap), .scans = std::move(state_.scans), .images = std::move(state_.images)});
 }

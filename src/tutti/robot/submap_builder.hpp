@@ -126,6 +126,7 @@ struct SubmapBuilderState {
   std::vector<PositionFix> waiting_fixes;      ///< Increasing stamps, all after recent.back().
   std::vector<PlacedFix> fixes;                ///< Fixes that no finished submap has.
   std::optional<Timestamp> heard_fix;          ///< Stamp of the newest one that was kept.
+  std::vector<RobotRange> ranges;              ///< Ranges that no finished submap has, as they came.
 };
 
 /// Turns raw odometry and sensor data into keyframes and overlapping submaps. It never gets corrections, so a submap
@@ -157,6 +158,8 @@ class SubmapBuilder {
   /// - A fix belongs to the submap that is open at its stamp, or to the one open now if it arrives up to kHistory_s
   ///   late. One less than kFinestFix_s after the previous one, or older, is skipped, because the errors of
   ///   neighbouring fixes are the same.
+  /// - A range belongs to the first submap that ends at its stamp or later. One less than kFinestRange_s after the
+  ///   previous one to the same robot, or older, is skipped.
   Status add(const Input& input);
   /// As a sample of odometry. A jump is bridged by a submap of its own, from the previous sample to this one, in which
   /// no sensor sees anything.
@@ -206,6 +209,9 @@ class SubmapBuilder {
   /// A little less than 0.5 s, so that a receiver of 2 Hz whose clock is fast loses none.
   static constexpr double kFinestFix_s = 0.45;
   static constexpr std::size_t kMostFixes = 200;  ///< Per submap; when there are more, some are dropped.
+  /// A little less than 1 s, so that a radio of 1 Hz whose clock is fast loses none.
+  static constexpr double kFinestRange_s = 0.95;
+  static constexpr std::size_t kMostRanges = 1000;  ///< Per submap; further ones are skipped.
   static constexpr double kLongestGap_s = 1.0;  ///< Over longer gaps between samples nobody knows how the robot moved.
 
   [[nodiscard]] const SubmapBuilderState& state() const { return state_; }
@@ -222,8 +228,9 @@ class SubmapBuilder {
   Status hear(const Scan& scan);
   Status hear(const TrackedImages& images);
   Status hear(const PositionFix& fix);
+  Status hear(const RobotRange& range);
   Status hear(const FedOnly auto& sample) {
-    return fail(ErrorCode::unsupported, "robot {}: {}, expected odometry, a scan, tracked images or a fix",
+    return fail(ErrorCode::unsupported, "robot {}: {}, expected odometry, a scan, tracked images, a fix or a range",
                 chain_.robot.value, kind_of(sample).name);
   }
   void advance();
@@ -235,6 +242,7 @@ class SubmapBuilder {
   void keep(const TrackedImages& images);
   void place_fixes();
   [[nodiscard]] std::vector<SubmapFix> take_fixes();
+  [[nodiscard]] std::vector<RobotRange> take_ranges();
   void remember(Timestamp stamp, const Pose3& T_odom_body);
   void start_submap(const Keyframe& first);
   [[nodiscard]] bool is_keyframe(Timestamp stamp, const Pose3& T_odom_body) const;

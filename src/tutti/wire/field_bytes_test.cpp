@@ -117,6 +117,7 @@ TEST(FieldBytes, TheFilesForOtherLanguagesHaveTheSameFields) {
   expect_in_proto<SubmapId>("status.proto", "SubmapId");
   expect_in_proto<Health>("status.proto", "Health");
   expect_in_proto<Health>("feed.proto", "Health");
+  expect_in_proto<RobotRange>("messages.proto", "Ranges", "repeated ");
   expect_in_proto<MethodId>("messages.proto", "Method");
   expect_in_proto<LoopClosure>("messages.proto", "LoopClosure");
   expect_in_proto<ClosureVerdict>("messages.proto", "Verdict");

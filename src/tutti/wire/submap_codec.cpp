@@ -7,6 +7,7 @@
 #include "tutti/v1/messages.pb.h"
 #include "tutti/v1/outline.pb.h"
 #include "tutti/wire/codec.hpp"
+#include "tutti/wire/field_columns.hpp"
 #include "tutti/wire/frame.hpp"
 #include "tutti/wire/internal/cloud_codec.hpp"
 #include "tutti/wire/internal/columns.hpp"
@@ -131,6 +132,21 @@ Status read_fixes(const v1::Fixes& in, Submap& submap) {
   return {};
 }
 
+std::string ranges_bytes(const std::vector<RobotRange>& ranges) {
+  FieldColumnWriter columns(0);
+  for (const RobotRange& range : ranges) visit_fields(range, columns);
+  std::string out;
+  columns.finish(out);
+  return out;
+}
+
+/// Checks how many there are; their values are checked with the message.
+Status read_ranges(const std::string& bytes, std::vector<RobotRange>& ranges) {
+  const auto fields = split_fields(bytes);
+  if (!fields) return tl::unexpected(fields.error());
+  return FieldColumnReader(*fields, 0, kMaxRanges).read(ranges);
+}
+
 /// All but the payloads.
 template <class In>
 Result<SubmapMessage> read_trajectory_message(const In& in) {
@@ -142,6 +158,8 @@ Result<SubmapMessage> read_trajectory_message(const In& in) {
   if (auto ok = read_keyframes(in, message.submap); !ok) return in_context(where, ok.error());
   if (auto ok = read_odometry(in, message.submap); !ok) return in_context(where, ok.error());
   if (auto ok = read_fixes(in.fixes(), message.submap); !ok) return in_context(where, ok.error());
+  if (auto ok = read_ranges(in.ranges().SerializeAsString(), message.submap.ranges); !ok)
+    return in_context(where + ": ranges", ok.error());
   return message;
 }
 
@@ -167,6 +185,7 @@ std::string encode(const SubmapMessage& message, const CloudCodec& cloud) {
   write_columns(poses, *out.mutable_pose());
   write_odometry(submap, out);
   if (!submap.fixes.empty()) write_fixes(submap, *out.mutable_fixes());
+  if (!submap.ranges.empty()) TUTTI_CHECK(out.mutable_ranges()->ParseFromString(ranges_bytes(submap.ranges)), "ranges");
   if (submap.cloud && !submap.cloud->points.empty()) encode_cloud(*submap.cloud, cloud, *out.mutable_cloud());
   if (submap.visual) encode_visual(*submap.visual, submap.keyframes.front().index, *out.mutable_visual());
   return pack_frame(MessageKind::submap, out.SerializeAsString());

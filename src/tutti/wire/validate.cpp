@@ -51,6 +51,9 @@ Status check_submap(const Submap& submap) {
     if (auto ok = check_fix(fix.antenna, fix.covariance, fix.p_keyframe_antenna); !ok)
       return in_context("fix " + std::to_string(i), ok.error());
   }
+  if (auto ok = at_most(submap.ranges.size(), kMaxRanges, "ranges"); !ok) return ok;
+  for (std::size_t i = 0; i < submap.ranges.size(); ++i)
+    if (auto ok = check_range(submap.ranges[i]); !ok) return in_context("range " + std::to_string(i), ok.error());
   if (submap.visual != nullptr)
     if (auto ok = check_visual(submap); !ok) return in_context("visual", ok.error());
   return submap.cloud == nullptr ? Status() : validate(*submap.cloud);

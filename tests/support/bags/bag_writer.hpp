@@ -237,6 +237,18 @@ inline std::string nav_sat_fix(int how = 0) {
       .number(std::uint8_t{2})
       .done();
 }
+/// As of ROS 2 Jazzy; before there was no variance.
+inline std::string range(float range_m, float variance, int how = 0) {
+  return CdrWriter(how)
+      .header("uwb")
+      .number(std::uint8_t{0})
+      .number(0.1F)
+      .number(0.2F)
+      .number(50.0F)
+      .number(range_m)
+      .number(variance)
+      .done();
+}
 inline std::string battery_state(float voltage_v, float percentage, int how = 0) {
   return CdrWriter(how)
       .header("base_link")

@@ -57,6 +57,12 @@ inline std::string fix(std::int64_t ns, const std::string& frame = "base_link", 
   out.position_covariance_type = 2;
   return bags::encode(out);
 }
+/// As of a radio; with limits where `most_m` is not 0.
+inline std::string range(std::int64_t ns, float range_m, const std::string& frame, float most_m = 50.0F) {
+  bags::test::CdrWriter out;
+  out.header(frame, static_cast<std::int32_t>(ns / kSecond), static_cast<std::uint32_t>(ns % kSecond));
+  return out.number(std::uint8_t{0}).number(0.1F).number(0.0F).number(most_m).number(range_m).number(0.01F).done();
+}
 /// A grey image of 4 x 3 pixels, and the calibration of its camera.
 inline bags::RosImage grey_image(std::int64_t ns, const std::string& frame = "camera") {
   bags::RosImage out{.header = {{ns}, frame}, .height = 3, .width = 4, .encoding = "mono8", .step = 4};

@@ -210,6 +210,14 @@ FromClient read(const v1::Feed::Health& in) {
   return *health;
 }
 
+/// Its values are checked where it is taken (check_range()).
+FromClient read(const v1::Feed::Range& in) {
+  auto range = wire::read_fields<RobotRange>(in.SerializeAsString());
+  if (!range) return BadSample{{in.stamp_ns()}, range.error().message};
+  range->name = in.name();
+  return Input(std::move(*range));
+}
+
 FromClient read(v1::Feed::Raw& in) {
   return FeedRaw{std::move(*in.mutable_topic()), std::move(*in.mutable_type()), std::move(*in.mutable_encoding()),
                  std::move(*in.mutable_data())};
@@ -276,6 +284,8 @@ Result<FromClient> decode_from_client(std::string_view payload) {
       return read(message.imu());
     case v1::Feed::kFix:
       return read(message.fix());
+    case v1::Feed::kRange:
+      return read(message.range());
     case v1::Feed::kHealth:
       return read(message.health());
     case v1::Feed::kRaw:

@@ -27,7 +27,7 @@ inline constexpr std::size_t kMaxFeedBytes = 16U << 20U;
 inline constexpr std::size_t kMaxHelloBytes = 64U << 10U;
 /// Names of the messages a client may send; the index is the message's number in the protocol minus one.
 inline constexpr const char* kFromClient[] = {"hello", "odometry", "scan", "end_of_recording", "images", "imu", "time",
-                                              "fix",   "health",   "raw",  "start_pose"};
+                                              "fix",   "health",   "raw",  "start_pose",       "range"};
 
 /// Assembles frames from bytes as they arrive. Keeps at most one incomplete frame.
 class FrameReader {

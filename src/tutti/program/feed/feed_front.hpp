@@ -127,6 +127,7 @@ class FeedFront final : public FeedTarget {
   Status hear(TrackedImages& images);
   Status hear(ImuSamples& samples);
   Status hear(PositionFix& fix) { return hear_sensor(fix); }
+  Status hear(RobotRange& range) { return hear_sensor(std::move(range)); }
   Status hear(Health& health);
   Status hear(StartPose& start);
   Status hear_sensor(Input input);

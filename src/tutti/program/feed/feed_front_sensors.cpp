@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What is fed beside odometry and scans: images, IMU samples and position fixes.
+// What is fed beside odometry and scans: images, IMU samples, position fixes and ranges.
 #include <fmt/format.h>
 
 #include <utility>
@@ -39,8 +39,12 @@ Status FeedFront::may_wait(const Input& input) const {
   if (const auto* fix = std::get_if<PositionFix>(&input))
     if (auto ok = check_fix(fix->antenna, fix->covariance, fix->p_body_antenna); !ok)
       return in_context(where(), ok.error());
+  const auto* range = std::get_if<RobotRange>(&input);
+  if (range != nullptr)
+    if (auto ok = check_range(*range); !ok) return in_context(where(), ok.error());
   const std::optional<Timestamp>& newest = newest_[input.index()];
-  if (scan == nullptr && newest && stamp <= *newest)
+  const bool may_share = range != nullptr && newest && stamp == *newest;  // ranges to several robots at once
+  if (scan == nullptr && newest && stamp <= *newest && !may_share)
     return fail(ErrorCode::invalid, "{}: there was one at {} ns, stamps must increase", where(), newest->ns);
   if (scan == nullptr && is_ahead(stamp, kind))
     return fail(ErrorCode::invalid, "{}: no odometry within {} s before", where(), kind.ahead_s);

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "tutti/consistency/alerts.hpp"
@@ -105,6 +106,17 @@ FeedState RobotView::state(const node::RobotNode& node) const {
     out.team_mates.push_back({other.robot, std::move(name), other.stamp, other.T_map_body});
   }
   return out;
+}
+
+RobotId robot_id_of(const std::string& name) {
+  std::uint32_t hash = 2'166'136'261U;
+  for (const char letter : name) hash = (hash ^ static_cast<unsigned char>(letter)) * 16'777'619U;
+  return RobotId{hash | 0x8000'0000U};
+}
+
+RobotId RobotView::number_of(const std::string& name) const {
+  const auto found = std::ranges::find(names_, name, [](const auto& entry) { return entry.second; });
+  return found == names_.end() ? robot_id_of(name) : found->first;
 }
 
 Status taken(const node::Step& step) {

@@ -22,6 +22,8 @@ class RobotView {
   /// To be called with every event of the node's steps.
   void note(const node::Event& event, const node::RobotNode& node);
   [[nodiscard]] FeedState state(const node::RobotNode& node) const;
+  /// The number of the robot of this name; of one that is in no mission the number that is made from it.
+  [[nodiscard]] RobotId number_of(const std::string& name) const;
 
  private:
   std::string name_;
@@ -34,6 +36,9 @@ class RobotView {
   Timestamp disputed_;                        ///< The newest sample when RobotNode::dispute() began.
   std::string begun_;                         ///< Why the session has begun; empty: it is the first.
 };
+
+/// The number of a robot that no mission gives one, made from its name: FNV-1a of 32 bits, with the highest set.
+RobotId robot_id_of(const std::string& name);
 
 /// An error when the node refused the sample or scan that this step was about.
 Status taken(const node::Step& step);

@@ -6,11 +6,13 @@
 #include <algorithm>
 #include <chrono>
 #include <exception>
+#include <map>
 #include <optional>
 #include <thread>
 #include <utility>
 
 #include "tutti/bags/ros_definitions.hpp"
+#include "tutti/bags/ros_range.hpp"
 #include "tutti/bags/ros_types.hpp"
 #include "tutti/program/clock.hpp"
 #include "tutti/program/feed/local_client.hpp"
@@ -53,6 +55,7 @@ class Robot final : public RosRobot {
   [[nodiscard]] bool by_tf() const { return !options_.odometry_frames.empty(); }
   Status subscribe();
   Status subscribe_points();
+  Status subscribe_ranges();
   void run(const std::stop_token& stop);
   void turn();
   bool join();
@@ -90,6 +93,7 @@ class Robot final : public RosRobot {
   program::LiveFeed* feed_ = nullptr;
   std::unique_ptr<Reader> odometry_, points_, fixes_, battery_, grid_, start_pose_, tf_, tf_static_, own_tf_,
       own_tf_static_;
+  std::map<std::string, std::unique_ptr<Reader>> ranges_;  ///< By topic.
   std::unique_ptr<LocalClient> client_;
   program::FeedSituation situation_;
   intake::RosIntake::Counts counts_;
@@ -190,6 +194,24 @@ Status Robot::subscribe_points() {
   return {};
 }
 
+/// To whichever robots somebody publishes ranges: sensor_msgs/Range on range_to/NAME.
+Status Robot::subscribe_ranges() {
+  constexpr int kDepth = 100;
+  constexpr std::size_t kMost = 100;
+  const std::string own = resolve("range_to", options_.name_space).value() + "/";
+  for (const Publication& publication : participant_->publications()) {
+    const std::string& topic = publication.topic;
+    if (publication.type != bags::kRangeType || !topic.starts_with(own) || bags::ranged_robot(topic).empty() ||
+        ranges_.contains(topic) || ranges_.size() >= kMost)
+      continue;
+    auto made = participant_->reader(topic, bags::kRangeType, in_qos(options_.lossless, kDepth),
+                                     bags::ros_type_hash(bags::kRangeType));
+    if (!made) return tl::unexpected(made.error());
+    ranges_[topic] = std::move(*made);
+  }
+  return {};
+}
+
 void Robot::run(const std::stop_token& stop) {
   while (!stop.stop_requested()) try {
       turn();
@@ -209,6 +231,7 @@ void Robot::turn() {
   } else {
     participant_->wait(kWait_s);
     complaints_.add(options_.points, subscribe_points());
+    complaints_.add("range_to", subscribe_ranges());
     if (images_) images_->check_topics(*client_);
     take_messages();
     end_recording();
@@ -248,6 +271,7 @@ void Robot::take_messages() {
     options_.say(Level::info, fmt::format("transforms come on {}: map -> odom is published there", own_tf_->topic()));
   for (const auto* reader : {&tf_static_, &own_tf_static_, &points_, &fixes_, &battery_, &grid_, &start_pose_})
     take(reader->get());
+  for (const auto& [topic, reader] : ranges_) take(reader.get());
   if (images_) images_->take([this](Reader& reader) { take(&reader); });
   for (const auto* reader : {&tf_, &own_tf_, &odometry_}) take(reader->get());
   release_odometry();

@@ -43,6 +43,7 @@ struct Mission {
   robot::AgentConfig config;
   Trajectory odometry = robot::test::drifting_odometry(70);
   std::uint64_t seed = 0;
+  bool has_radio = false;
   double sensors_after_s = 0.0;  ///< The samples: at, before or after their stamps.
 
   [[nodiscard]] RobotAgent start() const { return {kRobot, 7, config}; }
@@ -68,6 +69,10 @@ struct Mission {
         EXPECT_TRUE(
             agent.add(PositionFix{.stamp = stamp, .antenna = {46.5, 7.9, 1.0 * static_cast<double>(i)}}).has_value());
       }
+      if (has_radio) {
+        EXPECT_TRUE(agent.add(RobotRange{.stamp = stamp, .to = RobotId{9}, .distance_m = 1.0 + rng.uniform(0.0, 1.0)})
+                        .has_value());
+      }
       if (rng.bernoulli(0.05)) {
         ProxyGraphMessage message = robot::test::broadcast(agent, i, robot::test::kWorld);
         for (ProxyNode& node : message.graph.nodes) node.T_world_body.translation.x() += 0.05 * rng.normal();
@@ -87,6 +92,7 @@ Mission any_mission() {
   mission.config.policy.name = *rc::gen::element<std::string>("adaptive", "spectral", "every_node");
   mission.config.submap.duration_s = 6.0;
   mission.sensors_after_s = *rc::gen::element(0.0, -0.2, 0.1);
+  mission.has_radio = *rc::gen::element(false, true);
   return mission;
 }
 
@@ -107,6 +113,7 @@ RC_GTEST_PROP(AgentState, ComesBackToTheBit, ()) {
   RC_ASSERT(back.keyframes == state.keyframes);
   RC_ASSERT(back.node_odometry == state.node_odometry);
   RC_ASSERT(back.submaps.recent == state.submaps.recent);
+  RC_ASSERT(back.submaps.ranges == state.submaps.ranges);
   RC_ASSERT(back.submaps.finished.size() == state.submaps.finished.size());
   RC_ASSERT(back.whereabouts.size() == state.whereabouts.size());
   RC_ASSERT(std::ranges::equal(back.whereabouts, state.whereabouts, {}, &robot::Whereabouts::name,
@@ -190,7 +197,7 @@ TEST(AgentState, RowsThatDoNotBelongTogetherAreRefused) {
 }
 
 TEST(AgentState, TheMissionsOfTheseTestsHaveEverythingInThem) {
-  Mission mission{.seed = 3};
+  Mission mission{.seed = 3, .has_radio = true};
   RobotAgent agent = mission.start();
   mission.live(agent, 0, 70);
   const robot::AgentState state = agent.state();
@@ -199,6 +206,7 @@ TEST(AgentState, TheMissionsOfTheseTestsHaveEverythingInThem) {
   EXPECT_EQ(state.whereabouts.size(), 1U);
   EXPECT_GT(state.comparisons, 2U);
   EXPECT_GT(state.submaps.fixes.size(), 0U);
+  EXPECT_GT(state.submaps.ranges.size(), 0U);
 }
 
 TEST(AgentState, AnyChangeOfTheNumbersIsRefusedOrMakesAStateToGoOnFrom) {

@@ -56,6 +56,11 @@ void write(const PositionFix& fix, v1::Feed& message) {
   for (const double x : fix.p_body_antenna) out.add_p_body_antenna(x);
 }
 
+void write(const RobotRange& range, v1::Feed& message) {
+  TUTTI_CHECK(message.mutable_range()->ParseFromString(wire::field_bytes(range)), "range");
+  message.mutable_range()->set_name(range.name);
+}
+
 void write(const Health& health, v1::Feed& message) {
   TUTTI_CHECK(message.mutable_health()->ParseFromString(wire::field_bytes(health)), "health");
 }

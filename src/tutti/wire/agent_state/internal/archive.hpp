@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -28,6 +29,8 @@ class Writer {
     out_.add_integer(list.size());
     return list.size();
   }
+  /// Whether more follows.
+  [[nodiscard]] bool has_more(bool is_there) const { return is_there; }
 
  private:
   v1::AgentState& out_;
@@ -50,6 +53,7 @@ class Reader {
     list.resize(short_ ? 0 : static_cast<std::size_t>(count));
     return list.size();
   }
+  [[nodiscard]] bool has_more(bool /*is_there*/) const { return integers_ < in_.integer_size(); }
   [[nodiscard]] bool is_complete() const {
     return !short_ && integers_ == in_.integer_size() && numbers_ == in_.number_size() &&
            coordinates_ == in_.coordinate_size();
@@ -339,6 +343,22 @@ void pass_fixes(A& a, robot::SubmapBuilderState& builder) {
   pass(a, builder.heard_fix);
   for (robot::FinishedSubmap& finished : builder.finished) pass(a, finished.submap.fixes);
 }
+template <class A>
+void pass(A& a, RobotRange& range) {
+  pass(a, range.stamp);
+  pass(a, range.to.value);
+  pass(a, range.distance_m);
+  pass(a, range.sigma_m);
+  pass(a, range.p_body_antenna);
+}
+/// The last of all, and only where there are any: states without are those of before there were ranges.
+template <class A>
+void pass_ranges(A& a, robot::SubmapBuilderState& builder) {
+  const auto has_some = [](const robot::FinishedSubmap& finished) { return !finished.submap.ranges.empty(); };
+  if (!a.has_more(!builder.ranges.empty() || std::ranges::any_of(builder.finished, has_some))) return;
+  pass(a, builder.ranges);
+  for (robot::FinishedSubmap& finished : builder.finished) pass(a, finished.submap.ranges);
+}
 /// Team-mates' names.
 template <class A>
 void pass_names(A& a, AgentState& state) {
@@ -376,6 +396,7 @@ void pass(A& a, AgentState& state) {
   pass_watch(a, state);
   pass_fixes(a, state.submaps);
   pass_names(a, state);
+  pass_ranges(a, state.submaps);
 }
 
 }  // namespace tutti::wire::archive

@@ -26,6 +26,7 @@ bool is_sound(const SubmapFix& fix) {
   return check_fix(fix.antenna, fix.covariance, fix.p_keyframe_antenna).has_value();
 }
 bool is_sound(const PositionFix& fix) { return check_fix(fix.antenna, fix.covariance, fix.p_body_antenna).has_value(); }
+bool is_sound(const RobotRange& range) { return check_range(range).has_value(); }
 bool is_sound(const robot::PlacedFix& fix) {
   return check_fix(fix.antenna, fix.covariance, Eigen::Vector3d::Zero()).has_value() && fix.p_odom_antenna.allFinite();
 }
@@ -76,7 +77,7 @@ bool is_sound(const robot::SubmapBuilderState& builder) {
   const auto is_whole = [](const robot::FinishedSubmap& finished) {
     return !finished.submap.keyframes.empty() && is_chain(finished.submap.keyframes, finished.submap.odometry) &&
            all_sound(finished.scans) && (!finished.scan_after || is_sound(*finished.scan_after)) &&
-           all_sound(finished.images) && all_sound(finished.submap.fixes);
+           all_sound(finished.images) && all_sound(finished.submap.fixes) && all_sound(finished.submap.ranges);
   };
   const auto follows = [](const StampedPose& a, const StampedPose& b) { return a.stamp >= b.stamp; };
   return is_chain(builder.keyframes, builder.odometry) && is_sound(builder.T_mended_odom) && is_sound(builder.drift) &&
@@ -86,7 +87,7 @@ bool is_sound(const robot::SubmapBuilderState& builder) {
          std::ranges::adjacent_find(builder.recent, follows) == builder.recent.end() &&
          builder.keyframes.empty() == builder.recent.empty() && std::isfinite(builder.distance_m) &&
          std::isfinite(builder.representative_distance_m) && is_sound(builder.waiting, builder.recent) &&
-         is_in_order(builder.waiting_fixes) && is_in_order(builder.fixes);
+         is_in_order(builder.waiting_fixes) && is_in_order(builder.fixes) && all_sound(builder.ranges);
 }
 
 bool is_sound(const robot::OdometryWatch::State& watch) {
