@@ -193,6 +193,12 @@ int show_map(const fs::path& file) {
         earth->origin.latitude_deg, earth->origin.longitude_deg, earth->origin.height_m,
         std::ranges::count(estimate.fixes.judged, server::FixObjection::none, &server::JudgedFixes::objection),
         estimate.fixes.judged.size());
+  std::size_t ranges = 0, used = 0;
+  for (const server::JudgedRanges& judged : estimate.ranges.judged) {
+    ranges += judged.ranges;
+    used += judged.used;
+  }
+  if (ranges > 0) fmt::print("ranges       {} of {} between robots count\n", used, ranges);
   print_robots(*content, estimate);
   return 0;
 }

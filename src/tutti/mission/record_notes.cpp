@@ -79,6 +79,29 @@ void note_inconsistent_closures(const server::MapEstimate& map, MissionRecord& r
   }
 }
 
+void note_ranges(const server::MapEstimate& map, MissionRecord& record) {
+  std::map<RobotId, std::size_t> to_strangers;  // a robot may name any number
+  for (const server::JudgedRanges& judged : map.ranges.judged) {
+    if (std::ranges::find(record.robots, judged.to, &RobotRecord::id) == record.robots.end()) {
+      to_strangers[judged.from.robot] += judged.ranges;
+      continue;
+    }
+    const std::size_t placed = judged.ranges - judged.unplaced;
+    std::string note = fmt::format("{} to {}: {} of {} ranges count", name_of(judged.from.robot, record),
+                                   name_of(judged.to, record), judged.used, judged.ranges);
+    if (judged.unplaced > 0)
+      note += fmt::format("; for {} the map does not have both robots at that time and in one part", judged.unplaced);
+    if (judged.objection != server::RangeObjection::none)
+      note += fmt::format("; none of the other {} is used: {}", placed, server::why_none(judged));
+    else if (placed > judged.used)
+      note += fmt::format("; {} contradict the map", placed - judged.used);
+    record.notes.push_back(std::move(note));
+  }
+  for (const auto& [robot, count] : to_strangers)
+    record.notes.push_back(
+        fmt::format("{}: {} ranges are to robots that the mission does not have", name_of(robot, record), count));
+}
+
 /// Why robots that closures would join are in maps of their own.
 void note_separate_maps(const server::MapEstimate& map, MissionRecord& record) {
   const auto component = server::choose_components(map).of_robot;
@@ -204,6 +227,7 @@ void note_what_the_map_lacks(const server::MapEstimate& map, MissionRecord& reco
   note_understated_closures(map, record);
   note_inconsistent_closures(map, record);
   note_separate_maps(map, record);
+  note_ranges(map, record);
   if (map.spare_pairs > 0)
     record.notes.push_back(
         fmt::format("{} pairs of submaps have closures that the map does not need and that were not judged "

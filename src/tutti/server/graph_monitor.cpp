@@ -76,7 +76,7 @@ struct Hinges {
 
 Hinges hinges_of(const MapEstimate& map, const PoseGraph& on_earth, const std::vector<std::size_t>& nodes,
                  std::size_t count) {
-  std::vector<std::size_t> closures(map.graph.edges.size() - map.odometry_edges);
+  std::vector<std::size_t> closures(map.graph.edges.size() - map.odometry_edges - map.ranges.edges);
   std::iota(closures.begin(), closures.end(), map.odometry_edges);
   const auto groups = judge::closure_groups(map.nodes, map.graph.edges, closures);
   std::vector<estimation::Influence> influences;

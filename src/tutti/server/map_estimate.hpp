@@ -22,6 +22,7 @@
 #include "tutti/model/proxy_graph.hpp"
 #include "tutti/model/submap.hpp"
 #include "tutti/server/fixes.hpp"
+#include "tutti/server/ranges.hpp"
 
 namespace tutti::server {
 
@@ -58,10 +59,10 @@ struct FailedOdometry {
 
 /// The joint map of all robots.
 struct MapEstimate {
-  std::vector<MapNode> nodes;           ///< Sorted by id.
-  PoseGraph graph;                      ///< Nodes in the order of `nodes`; edges: odometry, then the accepted closures.
-  std::size_t odometry_edges = 0;       ///< graph.edges[0 .. odometry_edges) are odometry.
-  std::vector<JudgedClosure> closures;  ///< Sorted by (from, to).
+  std::vector<MapNode> nodes;      ///< Sorted by id.
+  PoseGraph graph;                 ///< Nodes in the order of `nodes`; edges: odometry, the accepted closures, ranges.
+  std::size_t odometry_edges = 0;  ///< graph.edges[0 .. odometry_edges) are odometry.
+  std::vector<JudgedClosure> closures;          ///< Sorted by (from, to).
   std::vector<FailedOdometry> failed_odometry;  ///< Sorted by (chain, from).
   /// Factor on the variances of the closures between two chains, where these err by more than they say
   /// (closure_honesty.hpp). It is applied in `graph` but not in `closures`.
@@ -83,6 +84,7 @@ struct MapEstimate {
   /// Number of pairs of submaps whose closures were not judged (MapConfig::most_closed_pairs).
   std::size_t spare_pairs = 0;
   Fixes fixes;             ///< What became of position fixes, and where on the earth the map lies.
+  Ranges ranges;           ///< What became of ranges between robots.
   judge::SearchWork work;  ///< The cost of judging the closures.
   /// The sum of r^T Omega r over all edges of the graph as it was solved, and by how many degrees of freedom: about as
   /// many where everything errs by what it states.
@@ -118,6 +120,7 @@ struct MapConfig {
   int most_pairs_in_all = 12000;
   GeoreferenceConfig georeference;
   KnownGroundConfig known_ground;
+  bool use_ranges = true;
   template <class V>
   void describe(V& v) {
     v.field("outlier_rejection", outlier_rejection, formerly("who_is_wrong"));
@@ -133,6 +136,7 @@ struct MapConfig {
         "least five, robots taking turns.");
     v.field("georeference", georeference);
     v.field("known_ground", known_ground);
+    v.field("use_ranges", use_ranges, any(), "The map follows the ranges between robots (UWB) that agree with it.");
   }
 };
 

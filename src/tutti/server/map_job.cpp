@@ -5,13 +5,15 @@
 
 #include "tutti/server/georeference.hpp"
 #include "tutti/server/known_ground.hpp"
+#include "tutti/server/range_factors.hpp"
 
 namespace tutti::server {
 
 MapEstimate finished_map(const MapEstimate& estimate, const SubmapSet& submaps, const Refinements& refinements,
                          const HeldPoses& held, const MapConfig& config) {
-  return hold(georeferenced(refined(estimate, submaps, refinements), submaps, config.georeference, config.gnc), held,
-              config.gnc.solver);
+  MapEstimate map = refined(estimate, submaps, refinements);
+  if (config.use_ranges) map = with_ranges(std::move(map), submaps, config.gnc);
+  return hold(georeferenced(std::move(map), submaps, config.georeference, config.gnc), held, config.gnc.solver);
 }
 
 MadeMap make_map(MapJob job) {
