@@ -50,7 +50,8 @@ class Player {
   Status hear_until(const std::atomic<bool>& stop, const IsIt& is_it);
   Status say_sample(std::size_t i, const std::atomic<bool>& stop);
   Status say_sensors(Timestamp now);
-  Status say_fixes(Timestamp now, bool is_known);
+  template <class Sample>
+  Status say_until_now(const std::vector<Sample>& samples, std::size_t& next, Timestamp now, bool is_known);
   Status say_images(Timestamp now);
   Status say(const Input& input, Timestamp now);
   void note_stored(const std::optional<Timestamp>& stored);
@@ -68,7 +69,7 @@ class Player {
   bool wants_scan_ = false;
   std::deque<std::pair<Timestamp, std::size_t>> said_;  // stamps and bytes of what the robot has not stored yet
   std::size_t said_bytes_ = 0;
-  std::size_t imu_ = 0, scan_ = 0, images_ = 0, fix_ = 0;
+  std::size_t imu_ = 0, scan_ = 0, images_ = 0, fix_ = 0, range_ = 0;
 };
 
 Status Player::connect(const std::atomic<bool>& stop) {
@@ -159,7 +160,8 @@ Status Player::say_sensors(Timestamp now) {
     samples.push_back(recording.imu[imu_++]);
   if (recording.images && !samples.empty() && !is_known)
     if (Status ok = client_->say(samples); !ok) return ok;
-  if (Status ok = say_fixes(now, is_known); !ok) return ok;
+  if (Status ok = say_until_now(recording.fixes, fix_, now, is_known); !ok) return ok;
+  if (Status ok = say_until_now(recording.ranges, range_, now, is_known); !ok) return ok;
   const auto is_due = [&] { return stamp_at(recording, recording.scan_stamps, scan_).value_or(kLastTimestamp) <= now; };
   for (; recording.scans && is_due(); ++scan_) {
     if (!wants_scan_ || is_known) continue;
@@ -172,12 +174,11 @@ Status Player::say_sensors(Timestamp now) {
 }
 
 /// As RobotActor does: none from before the first odometry.
-Status Player::say_fixes(Timestamp now, bool is_known) {
-  const Recording& recording = robot_.recording;
-  for (; fix_ < recording.fixes.size() && recording.fixes[fix_].stamp <= now; ++fix_) {
-    const PositionFix& fix = recording.fixes[fix_];
-    if (is_known || fix.stamp < recording.odometry.front().stamp) continue;
-    if (Status ok = say(fix, now); !ok) return ok;
+template <class Sample>
+Status Player::say_until_now(const std::vector<Sample>& samples, std::size_t& next, Timestamp now, bool is_known) {
+  for (; next < samples.size() && samples[next].stamp <= now; ++next) {
+    if (is_known || samples[next].stamp < robot_.recording.odometry.front().stamp) continue;
+    if (Status ok = say(samples[next], now); !ok) return ok;
   }
   return {};
 }

@@ -20,9 +20,9 @@ struct FeedPlayerOptions {
 };
 
 /// Plays a simulated or recorded robot of a mission over the live feed of its program, as its driver would: odometry
-/// when it is due, with it IMU samples, fixes and images, and the scans that the robot wants. With `scores` it then
-/// listens to the robot's corrections until `stop`; otherwise it returns when the end of the recording is stored. Fails
-/// when the connection ends earlier.
+/// when it is due, with it IMU samples, fixes, ranges and images, and the scans that the robot wants. With `scores` it
+/// then listens to the robot's corrections until `stop`; otherwise it returns when the end of the recording is stored.
+/// Fails when the connection ends earlier.
 Status play_feed(const FeedPlayerOptions& options, const std::atomic<bool>& stop);
 
 }  // namespace tutti::lab

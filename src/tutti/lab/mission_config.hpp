@@ -16,6 +16,7 @@
 #include "tutti/mission/mission_config.hpp"
 #include "tutti/simulation/degrade.hpp"
 #include "tutti/simulation/hall_recordings.hpp"
+#include "tutti/simulation/ranging.hpp"
 #include "tutti/simulation/receiver.hpp"
 #include "tutti/simulation/recordings.hpp"
 #include "tutti/simulation/reference_closures.hpp"
@@ -84,6 +85,7 @@ struct MissionConfig : mission::MissionConfig {
   std::vector<RobotChanges> robot_changes;  ///< For `robots`, by position; those beyond its end are not changed.
   ClosureChanges closure_changes;           ///< If these are not made up, `closures` says how closures are found.
   std::vector<simulation::ReceiverConfig> receivers;
+  simulation::RangingConfig ranging;
   std::vector<MistakeConfig> mistakes;
   std::vector<std::string> compare_policies;  ///< In addition to the one that the robots follow.
 
@@ -97,6 +99,7 @@ struct MissionConfig : mission::MissionConfig {
     v.field("robots", robot_changes, any(), "The robots whose recordings are replayed.");
     v.field("closures", closure_changes);
     v.field("receivers", receivers, any(), "Simulated receivers of robots whose true poses are known.");
+    v.field("ranging", ranging);
     v.field("mistakes", mistakes, any(),
             "Robots that are set up wrongly, or whose odometry fails, to see what is said.");
     v.field("compare_policies", compare_policies, any(),

@@ -98,6 +98,17 @@ Status add_fixes(const MissionConfig& config, std::uint64_t seed, const std::vec
   return {};
 }
 
+Status add_ranges(const MissionConfig& config, std::uint64_t seed, const std::vector<Recording*>& robots) {
+  if (config.ranging.every_s == 0.0) return {};
+  for (const Recording* robot : robots)
+    if (robot->reference.empty())
+      return fail(ErrorCode::configuration, "ranging: robot {} has no reference to make ranges of", robot->name);
+  for (Recording* robot : robots)
+    robot->ranges =
+        simulation::simulate_ranges(*robot, robots, config.ranging, Rng(seed).fork("ranging/" + robot->name));
+  return {};
+}
+
 Result<mission::MissionInput> load_input(const MissionConfig& config, const std::filesystem::path& data,
                                          std::uint64_t seed) {
   const bool is_replayed = config.source == "recordings";
@@ -110,6 +121,7 @@ Result<mission::MissionInput> load_input(const MissionConfig& config, const std:
   std::vector<Recording*> recordings;
   for (mission::MissionRecording& robot : input->robots) recordings.push_back(&robot.recording);
   if (auto ok = add_fixes(config, seed, recordings); !ok) return tl::unexpected(ok.error());
+  if (auto ok = add_ranges(config, seed, recordings); !ok) return tl::unexpected(ok.error());
   if (auto ok = make_mistakes(config.mistakes, recordings); !ok) return tl::unexpected(ok.error());
   if (auto ok = check_planted(config, input->robots); !ok) return tl::unexpected(ok.error());
   return input;

@@ -21,4 +21,8 @@ Result<mission::MissionInput> load_input(const MissionConfig& config, const std:
 /// has no reference, or a receiver names no robot.
 Status add_fixes(const MissionConfig& config, std::uint64_t seed, const std::vector<Recording*>& robots);
 
+/// Adds the ranges that the mission's simulated radios measure between `robots`, whose references are in one frame and
+/// by one clock. Fails when a robot has no reference.
+Status add_ranges(const MissionConfig& config, std::uint64_t seed, const std::vector<Recording*>& robots);
+
 }  // namespace tutti::lab

@@ -53,10 +53,11 @@ class RobotWriter {
     Timestamp last = begin();
     double told = 0.0;
     // In the order of which comes first at one stamp: who has a scan has the odometry up to it.
-    std::array<Stream, 6> streams{{
+    std::array<Stream, 7> streams{{
         {[&](std::size_t i) { return stamp_of(recording_.odometry, i); }, [&](std::size_t i) { return odometry(i); }},
         {[&](std::size_t i) { return stamp_of(recording_.imu, i); }, [&](std::size_t i) { return imu(i); }},
         {[&](std::size_t i) { return stamp_of(recording_.fixes, i); }, [&](std::size_t i) { return fix(i); }},
+        {[&](std::size_t i) { return stamp_of(recording_.ranges, i); }, [&](std::size_t i) { return range(i); }},
         {[&](std::size_t i) { return image_stamp(i); }, [&](std::size_t i) { return images(i); }},
         {[&](std::size_t i) { return scan_stamp(i); }, [&](std::size_t i) { return scan(i); }},
         {[&](std::size_t i) { return stamp_of(recording_.reference, i); }, [&](std::size_t i) { return truth(i); }},
@@ -125,6 +126,9 @@ class RobotWriter {
     if (!recording_.fixes.empty())
       still.push_back(transform(stamp, "base_link", "gnss",
                                 {Eigen::Quaterniond::Identity(), recording_.fixes.front().p_body_antenna}));
+    if (!recording_.ranges.empty())
+      still.push_back(transform(stamp, "base_link", "uwb",
+                                {Eigen::Quaterniond::Identity(), recording_.ranges.front().p_body_antenna}));
     if (still.empty()) return {};
     return bag_.write("/tf_static", bags::kTfType, shifted(stamp), encode(still), Durability::latched);
   }
@@ -191,6 +195,14 @@ class RobotWriter {
     for (int k = 0; k < 9; ++k) out.position_covariance[static_cast<std::size_t>(k)] = fix.covariance(k / 3, k % 3);
     out.position_covariance_type = 3;  // known
     return put("fix", bags::kFixType, fix.stamp, encode(out));
+  }
+
+  Status range(std::size_t i) {
+    const RobotRange& range = recording_.ranges[i];
+    const bags::RosRange out{.header = header(range.stamp, "uwb"),
+                             .range_m = static_cast<float>(range.distance_m),
+                             .variance = static_cast<float>(range.sigma_m * range.sigma_m)};
+    return put("range_to/" + range.name, bags::kRangeType, range.stamp, encode(out));
   }
 
   Status images(std::size_t i) {
@@ -267,6 +279,7 @@ Result<std::vector<RobotToWrite>> simulated_robots(const MissionConfig& config, 
   std::vector<Recording*> recordings;
   for (RobotToWrite& robot : *robots) recordings.push_back(&robot.recording);
   if (auto ok = add_fixes(config, seed, recordings); !ok) return tl::unexpected(ok.error());
+  if (auto ok = add_ranges(config, seed, recordings); !ok) return tl::unexpected(ok.error());
   if (auto ok = make_mistakes(config.mistakes, recordings); !ok) return tl::unexpected(ok.error());
   if (config.odometry_hz <= 0.0) return robots;
   for (auto& [recording, T_body_lidar] : *robots) {
