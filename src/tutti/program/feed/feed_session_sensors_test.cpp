@@ -182,10 +182,10 @@ TEST_F(FeedSessionSensors, FixesComeAsTheyWereSent) {
 
 TEST_F(FeedSessionSensors, AMessageOfANewerProtocolIsRefusedByItsNumber) {
   join(1);
-  const std::string newer("\x0a\x00\x00\x00\x62\x08\x12\x06 later", 14);  // field 12
+  const std::string newer("\x0a\x00\x00\x00\x6a\x08\x12\x06 later", 14);  // field 13
   const auto answer = say(1, newer);
   ASSERT_EQ(answer.size(), 1U);
-  EXPECT_NE(answer[0].refused().why().find("number 12"), std::string::npos) << answer[0].refused().why();
+  EXPECT_NE(answer[0].refused().why().find("number 13"), std::string::npos) << answer[0].refused().why();
   EXPECT_NE(answer[0].refused().why().find("images"), std::string::npos);
   EXPECT_EQ(say(1, sample(20)).size(), 1U);
 }
