@@ -34,6 +34,7 @@ void MapServer::retire(const MapEstimate& map, const MapJob& job) {
     state_.verdicts.erase(verdict);
     new_retired_.dropped.push_back(pair);
   }
+  note_news();  // the map was made with what is dropped
   new_retired_.submaps.insert(new_retired_.submaps.end(), chosen.begin(), chosen.end());
 }
 
