@@ -3,7 +3,7 @@
 import { LOST_ROBOT, REACH_M, SLOWEST_MPS, TIMES } from "./limits";
 import { compose, distance, inverse } from "./pose";
 import { POSE_ROW } from "./schema";
-import type { Pose, Poses, RobotStatus, Submap, SubmapId } from "./schema";
+import type { MapVersion, Pose, Poses, RobotStatus, Submap, SubmapId } from "./schema";
 import type { Store } from "./store";
 
 export type Presence = "here" | "silent" | "lost" | "finished" | "unknown";
@@ -35,8 +35,8 @@ export interface Drain {
 }
 
 /** The maps in which robots say that they localise, most robots first. */
-export function maps_in_use(robots: RobotView[]): { map: { map_id: string; map_version: number }; names: string[] }[] {
-  const used = new Map<string, { map: { map_id: string; map_version: number }; names: string[] }>();
+export function maps_in_use(robots: RobotView[]): { map: MapVersion; names: string[] }[] {
+  const used = new Map<string, { map: MapVersion; names: string[] }>();
   for (const { name, status } of robots) {
     if (!status?.localisation) continue;
     const { map_id, map_version } = status;

@@ -56,6 +56,9 @@ export interface RobotStatus {
   map_version: number;
 }
 
+/** A map that does not move, as a robot names it. */
+export type MapVersion = Pick<RobotStatus, "map_id" | "map_version">;
+
 export interface WorkerStatus {
   number: number;
   name: string;

@@ -92,8 +92,8 @@ void ServerNode::keep_retired(Timestamp now, Step& step) {
   for (const SubmapId& id : retired.submaps) {
     step.writes.push_back(retired_row(id));
     step.writes.push_back({map_tables::kMeta, place_key(id), std::nullopt});
-    const auto frame = frames_->find(id);
-    auto message = frame && *frame ? wire::decode_submap(**frame) : tl::unexpected(Error{ErrorCode::io, "not stored"});
+    const auto frame = frames_->frame(id);
+    auto message = frame ? wire::decode_submap(*frame) : tl::unexpected(frame.error());
     if (!message) {  // it stays as it is: larger than it need be
       step.emit(now, MessageRefused{bus::Endpoint::server(), bus::MessageKind::submap, message.error().message});
       continue;

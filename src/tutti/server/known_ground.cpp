@@ -98,15 +98,23 @@ class Choice {
            end_of(partner) < end_of(id);
   }
 
-  bool is_shown_by_others(SubmapId id) const {
+  using Positions = std::optional<std::vector<Eigen::Vector3d>>;
+  /// A submap is asked for as often as it has closures.
+  const Positions& positions(SubmapId id) {
+    const auto [found, is_new] = positions_.try_emplace(id);
+    if (is_new) found->second = positions_of(*submaps_.at(id), map_);
+    return found->second;
+  }
+
+  bool is_shown_by_others(SubmapId id) {
     const auto partners = partners_.find(id);
     if (partners == partners_.end()) return false;
-    const auto own = positions_of(*submaps_.at(id), map_);
+    const Positions& own = positions(id);
     if (!own) return false;
     std::vector<int> visits(own->size(), 0);
     for (const SubmapId& partner : partners->second) {
       if (!counts(partner, id)) continue;
-      const auto others = positions_of(*submaps_.at(partner), map_);
+      const Positions& others = positions(partner);
       if (!others) continue;
       for (std::size_t k = 0; k < own->size(); ++k)
         visits[k] += std::ranges::any_of(
@@ -121,6 +129,7 @@ class Choice {
   const KnownGroundConfig& config_;
   const std::function<bool(SubmapId)>& is_verified_;
   Partners partners_;
+  std::map<SubmapId, Positions> positions_;
   std::map<SubmapId, bool> known_;
   std::set<SubmapId> chosen_;
 };

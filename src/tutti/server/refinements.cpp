@@ -12,6 +12,7 @@
 #include "tutti/estimation/termination.hpp"
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/judge/judge_closures.hpp"
+#include "tutti/server/known_ground.hpp"
 
 namespace tutti::server {
 namespace {
@@ -176,14 +177,10 @@ RefinementScope refinable(const MapEstimate& map, const SubmapSet& submaps,
     if (refiner.can_refine(size) && std::ranges::find(map.left_out, id) == map.left_out.end() &&
         has_all(map, *submaps.at(id)))
       out.submaps.insert(id);
-  std::set<std::pair<KeyframeId, KeyframeId>> accepted;
-  for (const JudgedClosure& judged : map.closures)
-    if (judged.accepted) accepted.insert({judged.closure.from, judged.closure.to});
-  const auto is_accepted = [&](const LoopClosure& c) { return accepted.contains({c.from, c.to}); };
-  for (const auto& [pair, verdict] : verdicts)
-    if (out.submaps.contains(pair.first) && out.submaps.contains(pair.second) &&
-        std::ranges::any_of(verdict.closures, is_accepted))
-      out.closed.insert(pair);
+  out.closed = accepted_pairs(map, verdicts);
+  std::erase_if(out.closed, [&](const SubmapPair& pair) {
+    return !out.submaps.contains(pair.first) || !out.submaps.contains(pair.second);
+  });
   return out;
 }
 

@@ -6,6 +6,7 @@ import { maps_in_use, silent_after } from "../derive";
 import type { RobotView } from "../derive";
 import { bytes, many, metres, span } from "../format";
 import { LIMITS, TIMES } from "../limits";
+import type { MapVersion } from "../schema";
 import type { View } from "../scene/view";
 import { position_of } from "../scene/where";
 import { button, h, held, icon, panel, swatch } from "./dom";
@@ -47,7 +48,7 @@ export function robots_panel(app: App, view: View): HTMLElement {
   return h("div", { class: "robots" }, heading, search, list);
 }
 
-const map_name = ({ map_id, map_version }: { map_id: string; map_version: number }): string =>
+const map_name = ({ map_id, map_version }: MapVersion): string =>
   map_id ? `version ${map_version} of map ${map_id}` : "no map yet";
 
 /** Who is on which map that does not move: said where they are not all on one. */
