@@ -91,12 +91,12 @@ Status localise(const lab::MissionConfig& config, const MissionArguments& argume
   if (!input) return tl::unexpected(input.error());
   ProgressLine progress;
   const auto stop = announced_stop("what is there is reported");
-  const auto robots =
-      mission::localise_mission(config, *input, *map, verifiers::make_verifier(config.closures), arguments.restart_s,
-                                [&](const std::string& robot, double share) {
-                                  progress.show(share, fmt::format("{}: {:4.0f} %", robot, 100.0 * share));
-                                  return stop();
-                                });
+  const auto robots = mission::localise_mission(
+      config, *input, *map, [&] { return verifiers::make_verifier(config.closures); }, arguments.restart_s,
+      [&](const std::string& robot, double share) {
+        progress.show(share, fmt::format("{}: {:4.0f} %", robot, 100.0 * share));
+        return stop();
+      });
   progress.close();
   if (!robots) return tl::unexpected(robots.error());
   if (auto ok = mission::write_localised(*robots, *map->known, arguments.out); !ok) return ok;

@@ -155,7 +155,7 @@ Result<std::shared_ptr<const localise::Localiser::Setup>> localise_setup(const M
   auto opened = mapfile::open_known_map(map);
   if (!opened) return in_context("--map", opened.error());
   return mission::localise_setup(*config, config->agent.submap, std::move(opened->known),
-                                 verifiers::make_verifier(config->closures));
+                                 [closures = config->closures] { return verifiers::make_verifier(closures); });
 }
 
 Status fill_robot_options(const MissionSource& source, program::RobotOptions& options) {

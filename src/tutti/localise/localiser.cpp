@@ -50,7 +50,8 @@ RelativePose carried_to(const Pose3& T_odom_body, const Hypothesis& place) {
 }
 
 /// Submaps have the odometry that scans are registered from, whatever scans show of it.
-Localiser::Setup of_raw_odometry(Localiser::Setup setup) {
+Localiser::Setup checked(Localiser::Setup setup) {
+  TUTTI_CHECK(setup.map != nullptr && setup.make_verifier != nullptr, "no map or no verifier");
   setup.submap.fit.scans = "off";
   return setup;
 }
@@ -58,11 +59,12 @@ Localiser::Setup of_raw_odometry(Localiser::Setup setup) {
 }  // namespace
 
 Localiser::Localiser(Setup setup)
-    : setup_(of_raw_odometry(std::move(setup))),
+    : setup_(checked(std::move(setup))),
+      verifier_(setup_.make_verifier()),
       local_maps_(setup_.map, setup_.lidar),
       chain_(setup_.map->free_robot()),
       submaps_(chain_, setup_.submap) {
-  TUTTI_CHECK(setup_.map != nullptr && setup_.verifier != nullptr, "no map or no verifier");
+  TUTTI_CHECK(verifier_ != nullptr, "no verifier");
 }
 
 Status Localiser::add(const Input& input) {
@@ -272,8 +274,8 @@ void Localiser::consider(const Submap& submap) {
   if (payload_size(submap) == PayloadSize()) return;
   if (track_ && has_scans() && state_ == State::localised) return;  // scans follow it
   const auto candidates =
-      most_alike(*setup_.map, *setup_.verifier, submap, static_cast<std::size_t>(setup_.config.candidates));
-  auto found = search(*setup_.map, *setup_.verifier, submap, candidates);
+      most_alike(*setup_.map, *verifier_, submap, static_cast<std::size_t>(setup_.config.candidates));
+  auto found = search(*setup_.map, *verifier_, submap, candidates);
   if (!found) {
     why_ = found.error().message;
     return;

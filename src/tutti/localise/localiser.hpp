@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -43,9 +44,11 @@ struct LocaliserWork {
 class Localiser {
  public:
   struct Setup {
-    std::shared_ptr<const KnownMap> map;                      ///< Not null.
-    std::shared_ptr<const server::ClosureVerifier> verifier;  ///< Not null.
-    lidar::LidarClosureConfig lidar;                          ///< How clouds of submaps are read.
+    std::shared_ptr<const KnownMap> map;  ///< Not null.
+    /// Not null, nor what it returns. A verifier keeps what it has computed by the ids of submaps, and two robots in
+    /// one map give theirs the same ids: each has a verifier of its own.
+    std::function<std::shared_ptr<const server::ClosureVerifier>()> make_verifier;
+    lidar::LidarClosureConfig lidar;  ///< How clouds of submaps are read.
     robot::SubmapConfig submap;
     LocaliserConfig config;
   };
@@ -104,6 +107,7 @@ class Localiser {
   [[nodiscard]] bool has_scans() const { return last_scan_.has_value(); }
 
   Setup setup_;
+  std::shared_ptr<const server::ClosureVerifier> verifier_;
   LocalMaps local_maps_;
   ChainId chain_;
   robot::SubmapBuilder submaps_;

@@ -22,11 +22,12 @@ const World& world() {
   return made;
 }
 
-Localiser localiser(std::shared_ptr<const KnownMap> map) {
+Localiser::Setup setup_in(std::shared_ptr<const KnownMap> map) {
   robot::SubmapConfig submap;
   submap.has_scans = true;
-  return Localiser({.map = std::move(map), .verifier = verifier(), .submap = submap});
+  return {.map = std::move(map), .make_verifier = verifier, .submap = submap};
 }
+Localiser localiser(std::shared_ptr<const KnownMap> map) { return Localiser(setup_in(std::move(map))); }
 
 /// Counts what is published, and measures what it is wrong by.
 struct Judged {
@@ -70,6 +71,19 @@ TEST(Localiser, TheSameInputsGiveTheSamePosesToTheBit) {
   }
   EXPECT_FALSE(poses[0].empty());
   EXPECT_TRUE(poses[0] == poses[1]);
+}
+
+/// Robots of one program share a setup, and number their submaps alike.
+TEST(Localiser, WhatOneRobotSawIsNotTakenForWhatAnotherSees) {
+  const Recording& robot = world().robots[2];
+  const Localiser::Setup shared = setup_in(world().map);
+  const auto drive = [&](Localiser one, std::size_t from, std::size_t to) {
+    std::vector<std::string> said;
+    feed(robot, robot.odometry, from, to, one, [&] { said.push_back(one.located().why); });
+    return said;
+  };
+  (void)drive(Localiser(shared), 0, 120);
+  EXPECT_EQ(drive(Localiser(shared), 250, 370), drive(localiser(world().map), 250, 370));
 }
 
 /// The robot is carried to where it will be a minute later; its odometry notices nothing.

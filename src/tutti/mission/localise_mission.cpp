@@ -137,24 +137,25 @@ double LocalisedRobot::share(localise::State state) const {
 
 std::shared_ptr<const localise::Localiser::Setup> localise_setup(
     const MissionConfig& config, const robot::SubmapConfig& submap, std::shared_ptr<const localise::KnownMap> map,
-    std::shared_ptr<const server::ClosureVerifier> verifier) {
-  return std::make_shared<const localise::Localiser::Setup>(localise::Localiser::Setup{.map = std::move(map),
-                                                                                       .verifier = std::move(verifier),
-                                                                                       .lidar = config.closures.lidar,
-                                                                                       .submap = submap,
-                                                                                       .config = config.localise});
+    std::function<std::shared_ptr<const server::ClosureVerifier>()> make_verifier) {
+  return std::make_shared<const localise::Localiser::Setup>(
+      localise::Localiser::Setup{.map = std::move(map),
+                                 .make_verifier = std::move(make_verifier),
+                                 .lidar = config.closures.lidar,
+                                 .submap = submap,
+                                 .config = config.localise});
 }
 
 Result<std::vector<LocalisedRobot>> localise_mission(
     const MissionConfig& config, const MissionInput& input, const mapfile::OpenedMap& map,
-    std::shared_ptr<const server::ClosureVerifier> verifier, double restart_s,
+    const std::function<std::shared_ptr<const server::ClosureVerifier>()>& make_verifier, double restart_s,
     const std::function<bool(const std::string&, double share)>& stop) {
   const auto T_world_reference = reference_in(map, input, config.association);
   std::vector<LocalisedRobot> out;
   for (const MissionRecording& robot : input.robots) {
     const Recording& recording = robot.recording;
     if (recording.odometry.empty() || overlaps(poses_in(map, recording.name), recording.odometry)) continue;
-    auto setup = localise_setup(config, with_sensors(config.agent, recording).submap, map.known, verifier);
+    auto setup = localise_setup(config, with_sensors(config.agent, recording).submap, map.known, make_verifier);
     out.push_back(replay(robot, config, std::move(setup), restart_s, stop));
     if (T_world_reference && !recording.reference.empty())
       out.back().score = score_of(out.back().course, recording.reference, *T_world_reference, config.association);

@@ -51,15 +51,14 @@ struct LocalisedRobot {
 /// What a robot with these submaps needs to localise in a map; none of the pointers may be null.
 std::shared_ptr<const localise::Localiser::Setup> localise_setup(
     const MissionConfig& config, const robot::SubmapConfig& submap, std::shared_ptr<const localise::KnownMap> map,
-    std::shared_ptr<const server::ClosureVerifier> verifier);
+    std::function<std::shared_ptr<const server::ClosureVerifier>()> make_verifier);
 
 /// Replays every robot of the mission that did not make the map alone, without a server. Every `restart_s`, unless it
 /// is 0, it forgets where it is, so that there are many starts. `stop` is asked between samples. An error names a
 /// recording that cannot be read.
-Result<std::vector<LocalisedRobot>> localise_mission(const MissionConfig& config, const MissionInput& input,
-                                                     const mapfile::OpenedMap& map,
-                                                     std::shared_ptr<const server::ClosureVerifier> verifier,
-                                                     double restart_s,
-                                                     const std::function<bool(const std::string&, double share)>& stop);
+Result<std::vector<LocalisedRobot>> localise_mission(
+    const MissionConfig& config, const MissionInput& input, const mapfile::OpenedMap& map,
+    const std::function<std::shared_ptr<const server::ClosureVerifier>()>& make_verifier, double restart_s,
+    const std::function<bool(const std::string&, double share)>& stop);
 
 }  // namespace tutti::mission

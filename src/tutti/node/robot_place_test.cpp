@@ -25,7 +25,7 @@ struct Robot {
     config.agent.submap.has_scans = true;
     if (map)
       config.localise = std::make_shared<const localise::Localiser::Setup>(localise::Localiser::Setup{
-          .map = std::move(map), .verifier = localise::test::verifier(), .submap = config.agent.submap});
+          .map = std::move(map), .make_verifier = localise::test::verifier, .submap = config.agent.submap});
     node = RobotNode::open(kRobot, 1, config, store).value();
     done(node->resume({}));
   }

@@ -23,7 +23,7 @@ TEST(RobotView, TellsAClientWhereTheRobotIsInItsMapAndAsksForTheScansThatThisTak
   node::RobotNodeConfig config;
   config.agent.submap.has_scans = true;
   config.localise = std::make_shared<const localise::Localiser::Setup>(localise::Localiser::Setup{
-      .map = world.map, .verifier = localise::test::verifier(), .submap = config.agent.submap});
+      .map = world.map, .make_verifier = localise::test::verifier, .submap = config.agent.submap});
   test::NodeTarget robot(RobotId{7}, config);
   Fed fed{robot};
   std::size_t localised = 0, with_pose = 0;
