@@ -174,8 +174,6 @@ void Localiser::search_anew(const std::string& why) {
   start_.reset();
   pending_.clear();
   places_.clear();
-  against_since_ = nothing_since_ = std::nullopt;
-  against_ = 0;
   state_ = State::searching;
   why_ = why;
   begin_submaps();
@@ -225,8 +223,8 @@ void Localiser::follow(const Scan& scan) {
 
 void Localiser::confirm(const ScanMatch& match) {
   correct(match.T_world_body);
-  against_since_ = nothing_since_ = std::nullopt;
-  against_ = 0;
+  track_->against_since = track_->nothing_since = std::nullopt;
+  track_->against = 0;
   track_->confirmed = track_->at.stamp;
   track_->overlap = match.overlap;
   if (track_->to_confirm > 0 && --track_->to_confirm > 0) return;
@@ -248,15 +246,15 @@ void Localiser::doubt(const Assessment& assessment, Timestamp stamp) {
     return;
   }
   if (assessment.evidence == Evidence::against) {
-    ++against_;
-    if (!against_since_) against_since_ = stamp;
-    if (stamp - *against_since_ < setup_.config.lost_after_s || against_ < 3) return;
+    ++track_->against;
+    if (!track_->against_since) track_->against_since = stamp;
+    if (stamp - *track_->against_since < setup_.config.lost_after_s || track_->against < 3) return;
     search_anew(assessment.why);
     state_ = State::lost;
     return;
   }
-  if (!nothing_since_) nothing_since_ = stamp;
-  if (stamp - *nothing_since_ < setup_.config.off_map_after_s) return;
+  if (!track_->nothing_since) track_->nothing_since = stamp;
+  if (stamp - *track_->nothing_since < setup_.config.off_map_after_s) return;
   state_ = State::off_map;
   why_ = assessment.why;
 }
@@ -329,8 +327,6 @@ void Localiser::begin_track(const Hypothesis& place, const GuessGate& gate) {
                  .confirmed = now.stamp,
                  .to_confirm = has_scans() ? kConfirmations : 0,
                  .gate = gate};
-  against_since_ = nothing_since_ = std::nullopt;
-  against_ = 0;
   if (has_scans()) {
     state_ = State::searching;
     why_ = "a place was found, which scans are to confirm";

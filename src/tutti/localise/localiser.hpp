@@ -77,6 +77,8 @@ class Localiser {
     int to_confirm = 0;             ///< Scans that are still to confirm it before it counts,
     GuessGate gate;                 ///< and what these must show.
     std::optional<double> overlap;  ///< ScanMatch::overlap of that scan.
+    std::optional<Timestamp> against_since, nothing_since;
+    std::size_t against = 0;  ///< Scans in a row.
   };
 
   Status hear(const OdometrySample& sample);
@@ -124,8 +126,6 @@ class Localiser {
   };
   std::optional<Start> start_;
   std::vector<Hypothesis> pending_;  // of earlier submaps, not decided
-  std::optional<Timestamp> against_since_, nothing_since_;
-  std::size_t against_ = 0;  // scans in a row
   State state_ = State::searching;
   std::string why_ = "it has not seen enough yet";
   std::vector<PlaceFound> places_;

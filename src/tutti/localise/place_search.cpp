@@ -35,17 +35,19 @@ const Keyframe* keyframe_of(const Submap& submap, const KeyframeId& id) {
   return found == submap.keyframes.end() ? nullptr : &*found;
 }
 
-/// How well clouds that were aligned lie on each other, as the LiDAR's verifier has it; without such evidence 1 where
-/// the verifier accepts.
+/// How well clouds that were aligned lie on each other; without such evidence 1 where the verifier accepts. Where
+/// things look alike as much of them overlaps as at the right place, but not as closely: each point counts by 1 - (r /
+/// kClose)^2 for its distance r from the other cloud's surface.
 double quality_of(const std::vector<Refusal>& evidence, bool accepted) {
-  double overlap = -1.0, contradiction = 0.0, misfit = 1.0;
+  constexpr double kClose_m = 0.15;
+  double overlap = -1.0, contradiction = 0.0, rmse_m = 0.0;
   for (const Refusal& measured : evidence) {
     if (measured.reason == RefusalReason::overlap) overlap = measured.value;
     if (measured.reason == RefusalReason::contradicted) contradiction = measured.value;
-    if (measured.reason == RefusalReason::misfit) misfit = std::max(1.0, measured.value);
+    if (measured.reason == RefusalReason::plane_rmse) rmse_m = measured.value;
   }
   if (overlap < 0.0) return accepted ? 1.0 : 0.0;
-  return overlap * (1.0 - contradiction) / misfit;
+  return overlap * (1.0 - contradiction) * std::max(0.0, 1.0 - rmse_m * rmse_m / (kClose_m * kClose_m));
 }
 
 /// Where the robot was by one alignment with a submap of the map; nothing where the closure names unknown keyframes.
