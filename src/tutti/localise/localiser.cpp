@@ -28,8 +28,7 @@ constexpr double kStep_m = 0.002;
 constexpr double kMap_m = 0.02, kMap_rad = 0.1 * kRadPerDeg;
 // Registrations of one stretch err alike: so much more than they say.
 constexpr double kAlike = 4.0;
-constexpr std::size_t kLeastAgreeing = 2;  // submaps of the map, or of the robot, that have the same place
-constexpr double kCameraAge_s = 25.0;      // a camera's submap is due before
+constexpr double kCameraAge_s = 25.0;  // a camera's submap is due before
 
 Matrix6d diagonal(double metres, double radians) {
   Vector6d d;
@@ -126,12 +125,19 @@ Status Localiser::hear(const StartPose& start) {
   return {};
 }
 
-std::optional<Localiser::ReadyScan> Localiser::ready(const Scan& scan, Timestamp not_before) const {
+std::optional<ReadyScan> Localiser::ready(const Scan& scan, Timestamp not_before) const {
   const auto T_odom_body = pose_at(recent_, scan.stamp);
   const auto undistorted = lidar::undistort(scan, recent_);
   if (!T_odom_body || !undistorted || scan.stamp < not_before) return std::nullopt;
   return ReadyScan{{scan.stamp, *T_odom_body},
                    fit::make_fit_scan(scan.stamp, *undistorted->cloud, setup_.submap.min_range_m)};
+}
+
+/// Keeps some of the scans, to ask them all about the places that are found.
+void Localiser::remember(const Scan& scan) {
+  const auto at = pose_at(recent_, scan.stamp);
+  if (!at || !stretch_.wants({scan.stamp, *at})) return;
+  if (auto usable = ready(scan, scan.stamp)) stretch_.add(std::move(*usable));
 }
 
 /// Registers a scan from all poses that the start pose stands for. The place that fits best is followed, unless another
@@ -146,11 +152,8 @@ void Localiser::try_start(const Scan& scan) {
       add_fits(*local, usable->scan, level, fits);
     }
   if (fits.size() == 1) {
-    track_ = Track{.T_world_body = fits.front().prior,
-                   .at = usable->at,
-                   .confirmed = scan.stamp,
-                   .to_confirm = kConfirmations,
-                   .gate = kAgreedGate};
+    track_ = Track{
+        .T_world_body = fits.front().prior, .at = usable->at, .confirmed = scan.stamp, .to_confirm = kConfirmations};
     fits.front().match.T_world_body.covariance *= kAlike;
     correct(fits.front().match.T_world_body);
     why_ = "the start pose fits, which more scans are to confirm";
@@ -174,6 +177,7 @@ void Localiser::search_anew(const std::string& why) {
   start_.reset();
   pending_.clear();
   places_.clear();
+  stretch_.clear();
   state_ = State::searching;
   why_ = why;
   begin_submaps();
@@ -204,6 +208,7 @@ void Localiser::correct(const RelativePose& measured) {
 void Localiser::follow(const Scan& scan) {
   last_match_ = scan.stamp;
   if (start_ && !track_) return try_start(scan);
+  if (!track_ || state_ == State::off_map) remember(scan);
   if (!track_) return;
   const auto usable = ready(scan, track_->at.stamp);
   if (!usable) return;
@@ -213,8 +218,8 @@ void Localiser::follow(const Scan& scan) {
   ScanMatch match = match_scan(*local, usable->scan, track_->T_world_body.T_a_b);
   ++work_.registered;
   match.T_world_body.covariance *= kAlike;
-  const Assessment assessment = track_->to_confirm > 0 ? assess_guess(match, track_->T_world_body, track_->gate)
-                                                       : assess(match, track_->T_world_body);
+  const Assessment assessment =
+      track_->to_confirm > 0 ? assess_guess(match, track_->T_world_body) : assess(match, track_->T_world_body);
   if (assessment.evidence == Evidence::confirms)
     confirm(match);
   else
@@ -286,8 +291,13 @@ void Localiser::consider(const Submap& submap) {
 }
 
 void Localiser::decide(SearchResult found, const Submap& submap) {
+  if (has_scans()) {
+    const auto scans = stretch_.scans();
+    found.places = scans.size() < Stretch::kLeast ? std::vector<Hypothesis>()
+                                                  : all_proven(local_maps_, scans, std::move(found.places));
+  }
   const bool knows = track_ && track_->to_confirm == 0;  // it has left the map, say
-  if (found.places.empty() || found.places.front().accepted == 0) {
+  if (found.places.empty() || found.places.front().shown == Shown::no) {
     if (!knows && state_ != State::lost)
       why_ = fmt::format("none of the {} submaps of the map that look most alike shows what it saw", found.compared);
     if (!knows) places_.clear();
@@ -302,14 +312,14 @@ void Localiser::decide(SearchResult found, const Submap& submap) {
   std::vector<Hypothesis> rivals = found.rivals();
   const bool is_known = was_seen(best);
   if (is_known) std::erase_if(rivals, [&](const Hypothesis& rival) { return !was_seen(rival); });
-  if (rivals.empty() && (is_known || best.accepted >= kLeastAgreeing)) {
+  if (rivals.empty() && (is_known || best.shown == Shown::surely)) {
     pending_.assign(1, best);  // should scans not confirm it, the next submap may
-    return begin_track(best, is_known ? kAgreedGate : kAloneGate);
+    return begin_track(best);
   }
   if (!knows) {
     places_.clear();
     state_ = rivals.empty() ? State::searching : State::ambiguous;
-    why_ = rivals.empty() ? "one submap of the map shows what it saw, and a second one is to agree"
+    why_ = rivals.empty() ? "it may be in one place, and its next submap is to show the same"
                           : fmt::format("{} places fit what it saw", rivals.size() + 1);
     if (!rivals.empty()) places_.push_back({best.submap, best.T_world_odom() * T_odom_body});
     for (const Hypothesis& rival : rivals) places_.push_back({rival.submap, rival.T_world_odom() * T_odom_body});
@@ -320,13 +330,12 @@ void Localiser::decide(SearchResult found, const Submap& submap) {
 }
 
 /// Goes on from a place that was found, which scans have to confirm; without scans it counts.
-void Localiser::begin_track(const Hypothesis& place, const GuessGate& gate) {
+void Localiser::begin_track(const Hypothesis& place) {
   const StampedPose& now = recent_.back();
   track_ = Track{.T_world_body = carried_to(now.pose, place),
                  .at = now,
                  .confirmed = now.stamp,
-                 .to_confirm = has_scans() ? kConfirmations : 0,
-                 .gate = gate};
+                 .to_confirm = has_scans() ? kConfirmations : 0};
   if (has_scans()) {
     state_ = State::searching;
     why_ = "a place was found, which scans are to confirm";
@@ -343,9 +352,9 @@ void Localiser::follow_submap(const SearchResult& found) {
   predict_to(recent_.back());
   const Hypothesis here{.T_world_body = track_->T_world_body, .at = track_->at};
   for (const Hypothesis& place : found.places) {
-    if (place.accepted == 0) break;
+    if (place.shown == Shown::no) break;
     if (!is_same_place(here, place, track_->at.pose)) {
-      if (place.accepted < kLeastAgreeing || !found.rivals().empty()) continue;
+      if (place.shown != Shown::surely || !found.rivals().empty()) continue;
       search_anew(fmt::format("{} submaps of the map show it elsewhere", place.accepted));
       state_ = State::lost;
       return;

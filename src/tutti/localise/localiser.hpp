@@ -13,6 +13,7 @@
 #include "tutti/localise/config.hpp"
 #include "tutti/localise/known_map.hpp"
 #include "tutti/localise/local_map.hpp"
+#include "tutti/localise/place_proof.hpp"
 #include "tutti/localise/place_search.hpp"
 #include "tutti/localise/scan_match.hpp"
 #include "tutti/localise/start_tries.hpp"
@@ -32,13 +33,14 @@ struct LocaliserWork {
 };
 
 /// Finds where one robot is in a map that does not move, and follows it there. While it does not know, each submap of
-/// the robot is compared with those of the map that look most alike, by the verifier that a server has. A place counts
-/// when no other fits nearly as well, two submaps of the map or two of the robot agree on it, and the next scans lie on
-/// the map there. Then every scan is registered on the nearest submaps from where odometry says that the robot is; a
-/// Kalman filter of the pose weighs odometry and scans by their covariances. Scans that contradict the map for a second
-/// end that.
+/// the robot is compared with those of the map that look most alike, by the verifier that a server has. The scans of
+/// the last 12 s are registered on the map at the places that are found so. A place counts when they lie on the map
+/// there, and no other fits nearly as well. Then every scan is registered on the nearest submaps from where odometry
+/// says that the robot is; a Kalman filter of the pose weighs odometry and scans by their covariances. Scans that
+/// contradict the map for a second end that.
 ///
-/// A robot with a camera alone is followed by its submaps instead. Odometry's frame never jumps: only the pose in the
+/// For a robot with a camera alone a place counts when two submaps of the map, or two of its own, agree on it; its
+/// submaps follow it. Odometry's frame never jumps: only the pose in the
 /// map does. It has no threads, sockets or clocks; the same inputs give the same poses to the bit. Not for several
 /// threads at a time.
 class Localiser {
@@ -74,8 +76,7 @@ class Localiser {
     RelativePose T_world_body;      ///< At `at`; right tangent, without what the map itself errs by.
     StampedPose at;                 ///< By odometry.
     Timestamp confirmed;            ///< When a scan last lay on the map.
-    int to_confirm = 0;             ///< Scans that are still to confirm it before it counts,
-    GuessGate gate;                 ///< and what these must show.
+    int to_confirm = 0;             ///< Scans that are still to confirm it before it counts.
     std::optional<double> overlap;  ///< ScanMatch::overlap of that scan.
     std::optional<Timestamp> against_since, nothing_since;
     std::size_t against = 0;  ///< Scans in a row.
@@ -86,14 +87,10 @@ class Localiser {
   Status hear(const TrackedImages& images) { return submaps_.add(images); }
   Status hear(const StartPose& start);
   Status hear(const auto&) { return {}; }
-  /// A scan as it is registered, and where odometry was then.
-  struct ReadyScan {
-    StampedPose at;
-    fit::FitScan scan;
-  };
   /// Nothing for a scan that is older, or that odometry does not reach.
   [[nodiscard]] std::optional<ReadyScan> ready(const Scan& scan, Timestamp not_before) const;
   void try_start(const Scan& scan);
+  void remember(const Scan& scan);
   void begin_submaps();
   void advance();
   void follow(const Scan& scan);
@@ -104,7 +101,7 @@ class Localiser {
   void take_submaps();
   void consider(const Submap& submap);
   void decide(SearchResult found, const Submap& submap);
-  void begin_track(const Hypothesis& place, const GuessGate& gate);
+  void begin_track(const Hypothesis& place);
   void follow_submap(const SearchResult& found);
   [[nodiscard]] bool has_scans() const { return last_scan_.has_value(); }
 
@@ -125,6 +122,7 @@ class Localiser {
     int scans = 0;   ///< That were tried.
   };
   std::optional<Start> start_;
+  Stretch stretch_;                  // while it does not know where it is
   std::vector<Hypothesis> pending_;  // of earlier submaps, not decided
   State state_ = State::searching;
   std::string why_ = "it has not seen enough yet";

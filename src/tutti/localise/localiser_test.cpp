@@ -46,17 +46,17 @@ struct Judged {
   }
 };
 
-TEST(Localiser, FindsItsPlaceInTwoSubmapsAndFollowsTheMap) {
+TEST(Localiser, FindsItsPlaceInOneSubmapAndFollowsTheMap) {
   const Recording& robot = world().robots[2];
   Localiser one = localiser(world().map);
   Judged judged;
   feed(robot, robot.odometry, 0, robot.odometry.size(), one, [&] { judged.add(one.located(), robot.reference); });
   ASSERT_TRUE(judged.first_fix_s.has_value()) << one.located().why;
-  EXPECT_LT(*judged.first_fix_s, 25.0);
+  EXPECT_LT(*judged.first_fix_s, 12.5);
   EXPECT_EQ(judged.wrong, 0U);
   EXPECT_LT(judged.worst_m, 0.3);
   EXPECT_GT(judged.published, 400U);
-  EXPECT_LE(one.work().compared, 4U * 12U);
+  EXPECT_LE(one.work().compared, 12U);
   EXPECT_GT(one.work().registered, 300U);
 }
 

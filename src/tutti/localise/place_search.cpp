@@ -35,11 +35,8 @@ const Keyframe* keyframe_of(const Submap& submap, const KeyframeId& id) {
   return found == submap.keyframes.end() ? nullptr : &*found;
 }
 
-/// How well clouds that were aligned lie on each other; without such evidence 1 where the verifier accepts. Where
-/// things look alike as much of them overlaps as at the right place, but not as closely: each point counts by 1 - (r /
-/// kClose)^2 for its distance r from the other cloud's surface.
+/// fit_quality() as the LiDAR's verifier has it; without such evidence 1 where the verifier accepts.
 double quality_of(const std::vector<Refusal>& evidence, bool accepted) {
-  constexpr double kClose_m = 0.15;
   double overlap = -1.0, contradiction = 0.0, rmse_m = 0.0;
   for (const Refusal& measured : evidence) {
     if (measured.reason == RefusalReason::overlap) overlap = measured.value;
@@ -47,7 +44,7 @@ double quality_of(const std::vector<Refusal>& evidence, bool accepted) {
     if (measured.reason == RefusalReason::plane_rmse) rmse_m = measured.value;
   }
   if (overlap < 0.0) return accepted ? 1.0 : 0.0;
-  return overlap * (1.0 - contradiction) * std::max(0.0, 1.0 - rmse_m * rmse_m / (kClose_m * kClose_m));
+  return fit_quality(overlap, contradiction, rmse_m);
 }
 
 /// Where the robot was by one alignment with a submap of the map; nothing where the closure names unknown keyframes.
@@ -78,6 +75,10 @@ void add(Hypothesis one, std::vector<Hypothesis>& places) {
 }
 
 }  // namespace
+
+double fit_quality(double overlap, double contradiction, double plane_rmse_m) {
+  return overlap * (1.0 - contradiction) * std::max(0.0, 1.0 - plane_rmse_m * plane_rmse_m / (kClose_m * kClose_m));
+}
 
 bool is_same_place(const Hypothesis& a, const Hypothesis& b, const Pose3& T_odom_body) {
   const Pose3 difference = (a.T_world_odom() * T_odom_body).inverse() * (b.T_world_odom() * T_odom_body);
@@ -142,6 +143,8 @@ Result<SearchResult> search(const KnownMap& map, const server::ClosureVerifier& 
     hypothesis->quality = quality_of(seen->evidence, hypothesis->accepted > 0);
     add(std::move(*hypothesis), out.places);
   }
+  for (Hypothesis& place : out.places)
+    place.shown = place.accepted == 0 ? Shown::no : place.accepted == 1 ? Shown::by_one : Shown::surely;
   std::ranges::stable_sort(out.places, [](const Hypothesis& a, const Hypothesis& b) {
     return std::pair(a.accepted > 0, a.quality) > std::pair(b.accepted > 0, b.quality);
   });

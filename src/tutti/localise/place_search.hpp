@@ -13,13 +13,26 @@
 
 namespace tutti::localise {
 
+/// How well clouds lie on each other, in [0, 1]. Where things look alike as much of them overlaps as at the right
+/// place, but not as closely: each point counts by 1 - (r / kClose_m)^2 for its distance r from the other's surface.
+double fit_quality(double overlap, double contradiction, double plane_rmse_m);
+inline constexpr double kClose_m = 0.15;
+
+/// Whether a place is shown to be the robot's.
+enum class Shown {
+  no,
+  by_one,  ///< A second submap of the robot is to agree.
+  surely   ///< If nothing else fits nearly as well.
+};
+
 /// A place of the map that what a robot saw fits.
 struct Hypothesis {
   SubmapId submap;            ///< The map's submap that fits best there.
   RelativePose T_world_body;  ///< At `at`; right tangent.
   StampedPose at;             ///< By odometry: T_odom_body.
   double quality = 0.0;       ///< How well it fits, in [0, 1].
-  std::size_t accepted = 0;   ///< Submaps of the map that the verifier accepts there.
+  std::size_t accepted = 0;   ///< Submaps of the map that the verifier accepts there; two show it surely.
+  Shown shown = Shown::no;
   [[nodiscard]] Pose3 T_world_odom() const { return T_world_body.T_a_b * at.pose.inverse(); }
 };
 
@@ -31,7 +44,7 @@ inline constexpr double kSamePlace_m = 2.0, kSamePlace_deg = 12.0;
 inline constexpr double kRival = 0.75;
 
 struct SearchResult {
-  std::vector<Hypothesis> places;  ///< Distinct ones; the accepted first, the best of them first.
+  std::vector<Hypothesis> places;  ///< Distinct ones, best first; of search(), the accepted before all others.
   std::size_t compared = 0;        ///< Submaps of the map that were verified.
   /// The places that fit nearly as well as the first, which must be there.
   [[nodiscard]] std::vector<Hypothesis> rivals() const;

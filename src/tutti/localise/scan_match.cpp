@@ -83,15 +83,15 @@ Assessment assess(const ScanMatch& match, const RelativePose& predicted) {
   return {Evidence::confirms, {}};
 }
 
-Assessment assess_guess(const ScanMatch& match, const RelativePose& predicted, const GuessGate& gate) {
+Assessment assess_guess(const ScanMatch& match, const RelativePose& predicted) {
   const Assessment out = assess(match, predicted);
   if (out.evidence != Evidence::confirms) return out;
-  if (match.overlap >= gate.least_overlap && match.contradiction <= gate.most_contradiction) return out;
+  if (match.overlap >= kAgreedGate.least_overlap && match.contradiction <= kAgreedGate.most_contradiction) return out;
   return {Evidence::nothing,
           fmt::format("{:.0f} % of the scan lies on the map and {:.0f} % contradicts it, expected {:.0f} "
                       "and {:.0f} % to begin with",
-                      100.0 * match.overlap, 100.0 * match.contradiction, 100.0 * gate.least_overlap,
-                      100.0 * gate.most_contradiction)};
+                      100.0 * match.overlap, 100.0 * match.contradiction, 100.0 * kAgreedGate.least_overlap,
+                      100.0 * kAgreedGate.most_contradiction)};
 }
 
 namespace {
@@ -108,7 +108,7 @@ bool is_one(const RelativePose& a, const RelativePose& b) {
 void add_fits(const LocalMap& map, const fit::FitScan& scan, const StartTries& tries, std::vector<StartFit>& fits) {
   for (const Pose3& from : tries.from) {
     StartFit fit{tries.T_world_body, match_scan(map, scan, from)};
-    if (assess_guess(fit.match, fit.prior, kAgreedGate).evidence != Evidence::confirms) continue;
+    if (assess_guess(fit.match, fit.prior).evidence != Evidence::confirms) continue;
     const auto same = std::ranges::find_if(
         fits, [&](const StartFit& other) { return is_one(other.match.T_world_body, fit.match.T_world_body); });
     if (same == fits.end())

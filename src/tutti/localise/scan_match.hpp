@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tutti/localise/local_map.hpp"
+#include "tutti/localise/place_search.hpp"
 #include "tutti/localise/start_tries.hpp"
 #include "tutti/model/relative_pose.hpp"
 #include "tutti/perception/fit/scan_step.hpp"
@@ -19,6 +20,7 @@ struct ScanMatch {
   double plane_rmse_m = 0.0;   ///< Point to plane, over these.
   double contradiction = 0.0;  ///< Share of the points in view that stand where the other side looked through.
   int in_view = 0;             ///< Points of either side that the other looked at.
+  [[nodiscard]] double quality() const { return fit_quality(overlap, contradiction, plane_rmse_m); }
 };
 
 /// Registers a scan on a local map (lidar::register_clouds()) from `T_world_body`, and counts what contradicts it both
@@ -37,22 +39,19 @@ struct Assessment {
 };
 /// `predicted` is where the robot should be with its covariance, `match` begun there.
 Assessment assess(const ScanMatch& match, const RelativePose& predicted);
-/// What a scan must show where a place was found and is not confirmed yet: shares of it.
+/// What a scan must show where a place was found, or a start pose given, and is not confirmed yet: shares of it.
 struct GuessGate {
   double least_overlap = 0.0, most_contradiction = 1.0;
 };
-/// Where two submaps of the robot, or somebody who gives a start pose, say so,
 inline constexpr GuessGate kAgreedGate{.least_overlap = 0.6, .most_contradiction = 0.15};
-/// and where one submap does: three quarters of a scan lie on the wrong one of two corridors that look alike.
-inline constexpr GuessGate kAloneGate{.least_overlap = 0.82, .most_contradiction = 0.06};
-/// As assess(), and only what passes the gate confirms.
-Assessment assess_guess(const ScanMatch& match, const RelativePose& predicted, const GuessGate& gate);
+/// As assess(), and only what passes kAgreedGate confirms.
+Assessment assess_guess(const ScanMatch& match, const RelativePose& predicted);
 
 /// A place that a scan fits, of those that a start pose stands for.
 struct StartFit {
   RelativePose prior;  ///< StartTries::T_world_body
   ScanMatch match;
-  [[nodiscard]] double quality() const { return match.overlap * (1.0 - match.contradiction); }
+  [[nodiscard]] double quality() const { return match.quality(); }
 };
 /// Adds the places where a scan confirms that it was taken, from all poses of `tries`. The best of those that are one
 /// place stays; those that fit less than kRival times as well as the best of all go.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "tutti/evaluation/association.hpp"
@@ -85,6 +86,25 @@ LocaliseScore score_of(const std::vector<localise::Located>& course, const Traje
   return out;
 }
 
+void measure_starts(const localise::KnownMap& map, const Trajectory& reference, const Pose3& T_world_reference,
+                    LocalisedRobot& robot) {
+  std::vector<Eigen::Vector3d> seen_from;
+  for (const auto& [id, entry] : map.submaps)
+    for (const Keyframe& keyframe : entry.submap->keyframes)
+      seen_from.push_back(entry.T_world_submap *
+                          (entry.submap->keyframes.front().T_odom_body.inverse() * keyframe.T_odom_body.translation));
+  const Timestamp begin = robot.course.empty() ? reference.front().stamp : robot.course.front().stamp;
+  for (LocalisedRobot::Start& start : robot.starts)
+    for (const StampedPose& pose : reference) {
+      const double since_s = pose.stamp - begin - start.at_s;
+      if (since_s < 0.0 || since_s > LocalisedRobot::kOneSubmap_s) continue;
+      const Eigen::Vector3d p_world = T_world_reference * pose.pose.translation;
+      double nearest_m = std::numeric_limits<double>::infinity();
+      for (const Eigen::Vector3d& p : seen_from) nearest_m = std::min(nearest_m, (p - p_world).norm());
+      start.from_map_m = std::max(start.from_map_m.value_or(0.0), nearest_m);
+    }
+}
+
 /// Replays one recording alone.
 LocalisedRobot replay(const MissionRecording& recording, const MissionConfig& config,
                       std::shared_ptr<const localise::Localiser::Setup> setup, double restart_s,
@@ -157,8 +177,9 @@ Result<std::vector<LocalisedRobot>> localise_mission(
     if (recording.odometry.empty() || overlaps(poses_in(map, recording.name), recording.odometry)) continue;
     auto setup = localise_setup(config, with_sensors(config.agent, recording).submap, map.known, make_verifier);
     out.push_back(replay(robot, config, std::move(setup), restart_s, stop));
-    if (T_world_reference && !recording.reference.empty())
-      out.back().score = score_of(out.back().course, recording.reference, *T_world_reference, config.association);
+    if (!T_world_reference || recording.reference.empty()) continue;
+    out.back().score = score_of(out.back().course, recording.reference, *T_world_reference, config.association);
+    measure_starts(*map.known, recording.reference, *T_world_reference, out.back());
   }
   if (out.empty())
     return fail(ErrorCode::invalid, "every robot of the mission has made this map, expected one to be localised in it");

@@ -36,9 +36,13 @@ struct LocalisedRobot {
   struct Start {
     double at_s = 0.0;  ///< Since its first sample.
     std::optional<double> fix_after_s;
+    /// The farthest that the robot was from where a robot of the map has been, in the kOneSubmap_s after it; nothing
+    /// without a reference.
+    std::optional<double> from_map_m;
   };
-  std::vector<Start> starts;     ///< The first at its first sample.
-  double first_fix_cpu_s = 0.0;  ///< CPU until the first one was localised.
+  static constexpr double kOneSubmap_s = 12.0;  ///< A submap's 10 s, and scans that confirm what it shows.
+  std::vector<Start> starts;                    ///< The first at its first sample.
+  double first_fix_cpu_s = 0.0;                 ///< CPU until the first one was localised.
   localise::LocaliserWork work;
   double cpu_s = 0.0;
   std::vector<double> scan_ms;  ///< CPU of each scan that was registered.

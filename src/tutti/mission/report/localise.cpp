@@ -31,7 +31,9 @@ double quantile(std::vector<double> values, double share) {
 Json json_of(const LocalisedRobot& robot) {
   Json shares, score, starts = Json::array();
   for (const LocalisedRobot::Start& start : robot.starts)
-    starts.push_back({{"at_s", number(start.at_s)}, {"fix_after_s", number(start.fix_after_s)}});
+    starts.push_back({{"at_s", number(start.at_s)},
+                      {"fix_after_s", number(start.fix_after_s)},
+                      {"from_map_m", number(start.from_map_m)}});
   for (const State state : kStates) shares[std::string(to_string(state))] = number(robot.share(state));
   if (robot.score)
     score = {{"scored", robot.score->scored},

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/localise/place_proof.hpp"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "support/localise/tunnel.hpp"
+#include "tutti/geometry/so3.hpp"
+#include "tutti/perception/lidar/undistort.hpp"
+
+namespace tutti::localise {
+namespace place_proof_test {
+
+StampedPose at(double stamp_s, double x_m) {
+  return {Timestamp{} + stamp_s, {Eigen::Quaterniond::Identity(), {x_m, 0.0, 0.0}}};
+}
+
+TEST(Stretch, KeepsFewScansAndNoneThatIsOld) {
+  Stretch stretch;
+  for (int k = 0; k < 400; ++k) {  // at 10 Hz, standing at first, then at 20 m/s
+    const StampedPose now = at(0.1 * k, k < 200 ? 0.0 : 2.0 * (k - 200));
+    if (stretch.wants(now)) stretch.add({now, {}});
+    ASSERT_FALSE(stretch.scans().empty());
+    ASSERT_LE(stretch.scans().size(), Stretch::kMost);
+    ASSERT_LE(now.stamp - stretch.scans().front().at.stamp, Stretch::kLength_s + Stretch::kStep_s);
+    if (k == 199) {
+      EXPECT_GE(stretch.scans().size(), Stretch::kLeast);
+    }
+  }
+  EXPECT_LE(stretch.scans().back().at.stamp - stretch.scans().front().at.stamp, 2.0);  // 20 m of driving
+  stretch.clear();
+  EXPECT_TRUE(stretch.wants(at(100.0, 0.0)));
+}
+
+/// A place half a metre and some degrees from where the robot was is shown; where it was not, or looking another way,
+/// it is not, although it was found first.
+TEST(PlaceProof, ScansShowTheRightPlaceAndNoOther) {
+  const test::World world = test::make_world(3);
+  const Recording& robot = world.robots[2];
+  LocalMaps maps(world.map, {});
+  std::size_t shown = 0;
+  for (const std::size_t from : {50, 200, 350}) {
+    Stretch stretch;
+    for (std::size_t k = from; k < from + 50; ++k) {
+      const StampedPose& now = robot.odometry[k];
+      if (!stretch.wants(now)) continue;
+      const auto scan = robot.scans->scan(k);
+      ASSERT_TRUE(scan && *scan);
+      const auto cloud = lidar::undistort(**scan, robot.odometry);
+      ASSERT_TRUE(cloud.has_value());
+      stretch.add({now, fit::make_fit_scan(now.stamp, *cloud->cloud, 0.5)});
+    }
+    ASSERT_GE(stretch.scans().size(), Stretch::kLeast);
+    const auto place = [&](const Pose3& T_true_found, std::size_t of) {
+      return Hypothesis{.T_world_body = {robot.reference[of].pose * T_true_found, Matrix6d::Identity()},
+                        .at = robot.odometry[from + 25],
+                        .quality = 0.9};
+    };
+    const Pose3 near{so3_exp({0.0, 0.0, 3.0 * kRadPerDeg}), {0.4, -0.3, 0.05}};
+    const Pose3 about{so3_exp({0.0, 0.0, std::numbers::pi}), {0.0, 0.0, 0.0}};
+    Hypothesis right = place(near, from + 25);
+    right.quality = 0.3;
+    const auto proven = all_proven(maps, stretch.scans(), {place(about, from + 25), place({}, from + 150), right});
+    ASSERT_FALSE(proven.empty());
+    const Hypothesis& best = proven.front();
+    EXPECT_EQ(best.at, stretch.scans().back().at);
+    const auto newest = std::ranges::find(robot.odometry, best.at.stamp, &StampedPose::stamp) - robot.odometry.begin();
+    const Pose3& truth = robot.reference[static_cast<std::size_t>(newest)].pose;
+    EXPECT_LT((best.T_world_body.T_a_b.translation - truth.translation).norm(), 0.2);
+    EXPECT_LT(rotation_angle(best.T_world_body.T_a_b.inverse() * truth), 1.5 * kRadPerDeg);
+    shown += best.shown == Shown::surely ? 1 : 0;
+    for (std::size_t k = 1; k < proven.size(); ++k) EXPECT_LT(proven[k].quality, kRival * best.quality);
+  }
+  EXPECT_EQ(shown, 3U);
+}
+
+}  // namespace place_proof_test
+}  // namespace tutti::localise
