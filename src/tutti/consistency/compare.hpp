@@ -19,8 +19,8 @@ namespace tutti::consistency {
 struct CompareConfig {
   int scales = 7;
   std::string signal = "distance";
-  double tolerance_m = 1e-3;
-  bool exact = false;
+  double tolerance_m = 1e-3;  ///< Largest error of a disagreement against the exact transform.
+  bool exact = false;         ///< Full eigendecomposition instead of Chebyshev polynomials: slow, cubic in the nodes.
 
   template <class V>
   void describe(V& v) {
@@ -28,10 +28,6 @@ struct CompareConfig {
     v.field("signal", signal, one_of({"distance", "pose", "relative_motion"}),
             "What is compared: 'distance' to the first node (the paper), 'pose' seen from the first node, or "
             "'relative_motion' from node to node.");
-    v.field("tolerance_m", tolerance_m, greater_than(0.0),
-            "Largest error of a disagreement against the exact transform.");
-    v.field("exact", exact, any(),
-            "Full eigendecomposition instead of Chebyshev polynomials: slow, cubic in the nodes.");
   }
 };
 

@@ -71,10 +71,10 @@ struct PolicyConfig {
   double threshold_large_m = 0.25;
   double threshold_mid_m = 0.5;
   double threshold_small_m = 0.2;
-  int top_count = 10;
-  double top_threshold_m = 0.07;
-  int mid_hops = 5;         ///< Mid-scale links go this many nodes back and forth in time.
-  int nearest_submaps = 4;  ///< Large-scale links go to this many submaps.
+  int top_count = 10;             ///< classifier top: nodes labelled per update,
+  double top_threshold_m = 0.07;  ///< and only above this.
+  int mid_hops = 5;               ///< Mid-scale links go this many nodes back and forth in time.
+  int nearest_submaps = 4;        ///< Large-scale links go to this many submaps.
   double adaptive_error_share = 0.25;
 
   template <class V>
@@ -89,8 +89,6 @@ struct PolicyConfig {
             "spectral: summed disagreement of scales 2-3 above which a node gets links mid_hops away.");
     v.field("threshold_small_m", threshold_small_m, at_least(0.0),
             "spectral: summed disagreement of the other scales above which a node gets links to its neighbours.");
-    v.field("top_count", top_count, at_least(1.0), "spectral, classifier top: nodes labelled per update.");
-    v.field("top_threshold_m", top_threshold_m, at_least(0.0), "spectral, classifier top: and only above this.");
     v.field("adaptive_error_share", adaptive_error_share, greater_than(0.0),
             "adaptive: once robot and map disagree, links are split until every node is this close to the map, as a "
             "share of what the map itself is unsure of there.");

@@ -12,11 +12,6 @@ struct GncConfig {
   SolverConfig solver;       ///< Its loss is not used.
   double confidence = 0.99;  ///< Edges are truncated at this quantile of chi-square (6 degrees of freedom), below which
                              ///< an inlier's r^T Omega r lies with this probability.
-
-  template <class V>
-  void describe(V& v) {
-    v.field("solver", solver, {}, "The weighted least-squares solver inside; its loss is not used.");
-  }
 };
 
 struct GncResult {

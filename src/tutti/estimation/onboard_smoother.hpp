@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <vector>
 
-#include "tutti/base/config.hpp"
 #include "tutti/estimation/pose_graph_solver.hpp"
 #include "tutti/model/long_list.hpp"
 #include "tutti/model/relative_pose.hpp"
@@ -17,13 +16,8 @@ class GraphEquations;
 struct OnboardSmootherConfig {
   int max_iterations = 20;                ///< Limit on the Gauss-Newton steps on the reduced graph.
   double relative_cost_tolerance = 1e-6;  ///< Converged when a step can lower the cost by less than this share of it.
+  /// Limit on the Gauss-Newton steps on the full graph after the reduced one; none that raises its cost is taken.
   int polishing_steps = 0;
-
-  template <class V>
-  void describe(V& v) {
-    v.field("polishing_steps", polishing_steps, between(0, 10),
-            "Gauss-Newton steps on the full graph after the reduced one, at most; none that raises its cost.");
-  }
 };
 
 /// A relative pose between two nodes of the chain, positions as returned by append().

@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "tutti/base/config.hpp"
 #include "tutti/estimation/robust_loss.hpp"
 #include "tutti/estimation/termination.hpp"
 #include "tutti/model/pose_graph.hpp"
@@ -14,16 +13,10 @@
 namespace tutti::estimation {
 
 struct SolverConfig {
-  int max_iterations = 50;                ///< Limit on the Gauss-Newton steps; 0 only initialises.
-  double relative_cost_tolerance = 1e-9;  ///< Converged when a step can lower the cost by less than this share of it.
-  std::string initialisation = "chordal";
-  RobustLoss loss;  ///< On the robust edges, in standard deviations.
-
-  template <class V>
-  void describe(V& v) {
-    v.field("initialisation", initialisation, one_of({"chordal", "given"}),
-            "Where to start: from the measurements alone, or from the given poses.");
-  }
+  int max_iterations = 50;                 ///< Limit on the Gauss-Newton steps; 0 only initialises.
+  double relative_cost_tolerance = 1e-9;   ///< Converged when a step can lower the cost by less than this share of it.
+  std::string initialisation = "chordal";  ///< Start from the measurements alone; "given": from the given poses.
+  RobustLoss loss;                         ///< On the robust edges, in standard deviations.
 };
 
 /// Whether an edge may be wrong: `trusted` edges (odometry) never get a robust loss.

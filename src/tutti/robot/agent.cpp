@@ -17,6 +17,9 @@
 namespace tutti::robot {
 namespace {
 
+/// One polishing step, because few constraints over long runs leave millimetres without it.
+const estimation::OnboardSmootherConfig kSmoother{.polishing_steps = 1};
+
 std::unique_ptr<const consistency::ConstraintPolicy> known_policy(const AgentConfig& config) {
   auto policy = consistency::make_policy(config.policy, config.compare);
   TUTTI_CHECK(policy.has_value(), "{}", policy.error().message);
@@ -38,7 +41,7 @@ RobotAgent::RobotAgent(RobotId robot, const AgentConfig& config,
       config_(config),
       policy_(std::move(policy)),
       submaps_(chain_, config.submap, std::move(state.submaps)),
-      smoother_(config.smoother, std::move(state.smoother)),
+      smoother_(kSmoother, std::move(state.smoother)),
       state_(std::move(state)),
       fit_(config.submap.fit) {}
 RobotAgent::~RobotAgent() = default;

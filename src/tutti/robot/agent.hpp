@@ -30,19 +30,13 @@ struct AgentConfig {
   consistency::CompareConfig compare;
   consistency::DisagreementConfig disagreement;
   consistency::PolicyConfig policy;
-  /// One polishing step, because few constraints over long runs leave millimetres without it.
-  estimation::OnboardSmootherConfig smoother{.polishing_steps = 1};
-  bool explain = true;
-  OdometryWatchConfig jumps;
+  bool explain = true;  ///< States after every update where and when odometry and map part.
   template <class V>
   void describe(V& v) {
     v.field("submap", submap);
     v.field("compare", compare);
     v.field("disagreement", disagreement);
     v.field("policy", policy);
-    v.field("smoother", smoother);
-    v.field("jumps", jumps);
-    v.field("explain", explain, any(), "Say after every update where and when odometry and map part.");
   }
 };
 
@@ -199,7 +193,7 @@ class RobotAgent {
   [[nodiscard]] const Pose3& T_map_odom() const { return state_.T_map_odom; }
   /// The newest sample in the frame of the first one, whatever has jumped since.
   [[nodiscard]] const Pose3& T_odom_body() const { return state_.T_odom_body; }
-  [[nodiscard]] OdometryWatch watch() const { return {config_.jumps, state_.watch}; }
+  [[nodiscard]] OdometryWatch watch() const { return OdometryWatch(state_.watch); }
   /// The newest sample as it was fed (before jumps are removed).
   [[nodiscard]] const std::optional<StampedPose>& newest_fed() const { return state_.watch.newest; }
   /// Maps the frame of what is fed now, which is another one after each jump, to `odom`; the identity before the first

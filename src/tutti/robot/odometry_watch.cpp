@@ -10,6 +10,9 @@
 namespace tutti::robot {
 namespace {
 
+// No robot moves faster: a front end that says so began anew, or lost itself.
+constexpr double kMostSpeed_mps = 100.0, kMostTurnRate_radps = 2000.0 * kRadPerDeg;
+
 /// One kind of motion: of translation or rotation.
 struct Bound {
   double slack = 0.0;         // m, rad
@@ -43,8 +46,8 @@ OdometryWatch::Step OdometryWatch::take(const StampedPose& fed) {
   const auto [before, T_before] = *state_.newest;
   const double dt_s = fed.stamp - before;
   if (dt_s <= 0.0) return {in_odom(fed.pose), std::nullopt};
-  const Bound translation{1.0, 10.0, config_.max_speed_mps};
-  const Bound rotation{30.0 * kRadPerDeg, 50.0, config_.max_turn_rate_dps * kRadPerDeg};
+  const Bound translation{1.0, 10.0, kMostSpeed_mps};
+  const Bound rotation{30.0 * kRadPerDeg, 50.0, kMostTurnRate_radps};
   const Pose3 step = T_before.inverse() * fed.pose;
   const double metres = step.translation.norm(), radians = rotation_angle(step);
   std::optional<OdometryJump> jump;

@@ -4,24 +4,9 @@
 #include <optional>
 #include <string>
 
-#include "tutti/base/config.hpp"
 #include "tutti/model/trajectory.hpp"
 
 namespace tutti::robot {
-
-/// The fastest motion that any robot can make; faster steps are jumps of its odometry.
-struct OdometryWatchConfig {
-  double max_speed_mps = 100.0;
-  double max_turn_rate_dps = 2000.0;
-  template <class V>
-  void describe(V& v) {
-    v.field(
-        "max_speed_mps", max_speed_mps, greater_than(0.0),
-        "Odometry that moves faster has jumped: its front end began anew, or lost itself. So has a step that is ten "
-        "times as fast as any before.");
-    v.field("max_turn_rate_dps", max_turn_rate_dps, greater_than(0.0), "The same of turning.");
-  }
-};
 
 /// A step that no body can make: the odometry's front end started again, or lost track. How the robot really moved is
 /// unknown.
@@ -39,8 +24,8 @@ std::string to_string(const OdometryJump& jump);
 ///
 /// What a body can do in a step of dt: a slack (1 m, 30 degrees: noise, and corrections by the front end), plus dt
 /// times the allowed speed. This is ten times the greatest speed so far, plus what an acceleration of 10 m/s^2 (50
-/// rad/s^2) adds within dt, but at most what the settings allow; for the first step only the settings count. A step
-/// raises the greatest speed only as far as that acceleration allows.
+/// rad/s^2) adds within dt, but at most 100 m/s (2000 degrees/s); for the first step only these count. A step raises
+/// the greatest speed only as far as that acceleration allows.
 class OdometryWatch {
  public:
   /// All that the watch remembers.
@@ -56,7 +41,7 @@ class OdometryWatch {
     friend bool operator==(const State&, const State&) = default;
   };
   OdometryWatch() = default;
-  OdometryWatch(const OdometryWatchConfig& config, const State& state) : config_(config), state_(state) {}
+  explicit OdometryWatch(const State& state) : state_(state) {}
 
   struct Step {
     Pose3 T_odom_body;
@@ -69,13 +54,10 @@ class OdometryWatch {
   /// Maps the frame of what is fed now to `odom`; the identity before the first jump.
   [[nodiscard]] Pose3 T_odom_fed() const;
   [[nodiscard]] const State& state() const { return state_; }
-  /// One with the same settings that has seen no sample.
-  [[nodiscard]] OdometryWatch anew() const { return {config_, {}}; }
 
  private:
   [[nodiscard]] Pose3 in_odom(const Pose3& T_fed_body) const;
 
-  OdometryWatchConfig config_;
   State state_;
 };
 

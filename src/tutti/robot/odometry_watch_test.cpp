@@ -136,7 +136,7 @@ RC_GTEST_PROP(OdometryWatch, WhatComesOutNeverJumps, ()) {
     RC_ASSERT(local(watch.T_odom_fed() * fed, step.T_odom_body).norm() < 1e-6);
     RC_ASSERT(watch.T_odom_body() == step.T_odom_body);
     last = step.T_odom_body;
-    if (rng.bernoulli(0.1)) watch = OdometryWatch({}, watch.state());
+    if (rng.bernoulli(0.1)) watch = OdometryWatch(watch.state());
   }
   // A jump may by chance lead where the robot is.
   RC_ASSERT(reported <= made);

@@ -124,7 +124,6 @@ struct MapConfig {
   template <class V>
   void describe(V& v) {
     v.field("outlier_rejection", outlier_rejection, formerly("who_is_wrong"));
-    v.field("gnc", gnc);
     v.field("judge_odometry", judge_odometry, any(),
             "Odometry that turns better than it says, or is far worse, counts as the closures show (off: as it says).");
     v.field("most_closed_pairs", most_closed_pairs, at_least(1),

@@ -80,7 +80,6 @@ void FeedFront::begin_anew(std::string why) {
   anew.name = robot_.name;
   anew.next_keyframe = robot_.next_keyframe;
   anew.next_keyframe.last.reset();
-  anew.watch = robot_.watch.anew();
   robot_ = std::move(anew);
   carried_ = CarriedPose(robot_.chain.robot);
   carried_.correct(robot_.watch, robot_.covariance);
