@@ -4,22 +4,16 @@
 #include <span>
 #include <vector>
 
-#include "tutti/base/config.hpp"
 #include "tutti/estimation/bundle/landmark_merge.hpp"
 #include "tutti/model/loop_closure.hpp"
 
 namespace tutti::bundle {
 
 struct GuidedMatchConfig {
-  double radius_px = 40.0;  ///< Search radius around the pixel that the map's poses project a landmark to.
-  double max_hamming = 0.16;
+  double radius_px = 40.0;    ///< Search radius around the pixel that the map's poses project a landmark to.
+  double max_hamming = 0.16;  ///< Largest Hamming distance of a match, as a share of the bits.
   /// Ratio test: Hamming distance of a match over that of the nearest descriptor of another landmark.
   double max_hamming_ratio = 0.9;
-
-  template <class V>
-  void describe(V& v) {
-    v.field("max_hamming", max_hamming, between(0.0, 1.0), "Bits in which a match may differ, as a share of all.");
-  }
 };
 
 /// Finds landmarks that two submaps have in common, where a loop closure ties the submaps together and the poses

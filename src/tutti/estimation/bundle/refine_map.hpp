@@ -20,7 +20,6 @@ struct RefinementConfig {
   StereoConfig stereo;
   template <class V>
   void describe(V& v) {
-    v.field("matching", matching);
     v.field("merge", merge);
     v.field("bundle", bundle);
     v.field("stereo", stereo);

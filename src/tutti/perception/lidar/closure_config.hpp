@@ -12,10 +12,6 @@ struct NormalConfig {
   double max_radius_m = 1.0;  ///< Neighbours farther than this are not used.
   /// Ratio of the smallest to the middle eigenvalue of their scatter above which a point gets no normal.
   double max_surface_ratio = 0.2;
-  template <class V>
-  void describe(V& v) {
-    v.field("neighbours", neighbours, between(4, 64), "Points of the plane fit.");
-  }
 };
 
 /// One stage of the registration.
@@ -40,10 +36,6 @@ struct CandidateConfig {
   /// Wall directions of each submap; each of one is laid on each of the other, in either direction.
   int wall_directions = 2;
   int max_guesses = 3;  ///< Limit on the rough alignments that are registered.
-  template <class V>
-  void describe(V& v) {
-    v.field("cell_m", cell_m, greater_than(0.0), "Cell of the 64 x 64 view from above.");
-  }
 };
 
 /// Settings of LiDAR closures, from two submap clouds to a loop closure or a refusal. Every gate is a physical
@@ -77,17 +69,11 @@ struct LidarClosureConfig {
             "Submaps shorter than this and than min_distance_m are not used.");
     v.field("min_distance_m", min_distance_m, at_least(0.0), "Longer ones may take less than min_duration_s.");
     v.field("min_points", min_points, at_least(10), "Submaps with fewer points are not used.");
-    v.field("voxel_m", voxel_m, greater_than(0.0), "Clouds are thinned to voxels of this edge.");
-    v.field("normals", normals, any(), "Surface normals.");
-    v.field("candidates", candidates, any(), "Rough alignment.");
     v.field("min_overlap", min_overlap, between(0.0, 1.0), "Mean overlap of both directions.");
     v.field("max_viewpoint_distance_m", max_viewpoint_distance_m, greater_than(0.0),
             "Between the middles of the two trajectories; closures from farther apart are not looked for. In a network "
             "that is "
             "walked for an hour a few metres leave more than enough closures.");
-    v.field(
-        "sure_eigenvalue", sure_eigenvalue, between(0.0, 0.34),
-        "Below this eigenvalue max_misfit shrinks in proportion towards 1: little evidence must fit all the better.");
   }
 };
 

@@ -14,7 +14,7 @@ namespace tutti::visual {
 struct DescriptorConfig {
   std::string kind = "brisk";
   int keypoints = 600;
-  int threshold = 20;
+  int threshold = 20;   ///< Grey values by which a corner differs from what is round it, over all scales.
   int cell_px = 40;     ///< Keypoints are spread evenly over cells of this size.
   int distance_px = 4;  ///< Keypoints are at least this far from each other.
   template <class V>
@@ -22,8 +22,6 @@ struct DescriptorConfig {
     v.field("kind", kind, one_of({"brisk", "orb"}),
             "brisk (Leutenegger et al. 2011), or orb (Rublee et al. 2011): faster, finds fewer revisits.");
     v.field("keypoints", keypoints, between(10, 5000), "Most keypoints of an image that are described.");
-    v.field("threshold", threshold, between(1, 255),
-            "Grey values by which a corner differs from what is round it, over all scales.");
   }
 };
 

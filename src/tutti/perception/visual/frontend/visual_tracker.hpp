@@ -21,11 +21,11 @@ class Pyramid;
 struct TrackerConfig {
   int features = 200;
   double enough_share = 0.9;  ///< New points are looked for when fewer than this share of `features` is left.
-  int threshold = 12;
-  int cell_px = 40;      ///< New corners are spread evenly over cells of this size.
-  int distance_px = 16;  ///< New corners are at least this far from any other.
-  int window_px = 15;    ///< Side of the window by which a point is followed.
-  int levels = 3;
+  int threshold = 12;         ///< Grey values by which a new corner differs from what is round it.
+  int cell_px = 40;           ///< New corners are spread evenly over cells of this size.
+  int distance_px = 16;       ///< New corners are at least this far from any other.
+  int window_px = 15;         ///< Side of the window by which a point is followed.
+  int levels = 3;             ///< How often the image is halved: how far a point may move at once.
   double agreement_px = 0.7;  ///< A point followed to the next image and back again must return within this distance.
   double epipolar_px = 2.0;   ///< Stereo: largest epipolar error of the two views of a point.
   double sigma_px = 0.5;      ///< Standard deviation that followed points are given.
@@ -33,9 +33,6 @@ struct TrackerConfig {
   template <class V>
   void describe(V& v) {
     v.field("features", features, between(10, 5000), "Points followed at a time, in every image.");
-    v.field("threshold", threshold, between(1, 255),
-            "Grey values by which a new corner differs from what is round it.");
-    v.field("levels", levels, between(0, 6), "How often the image is halved: how far a point may move at once.");
     v.field("descriptors", descriptors, any(), "How keyframes are described.");
   }
 };
