@@ -28,7 +28,10 @@ constexpr double kStep_m = 0.002;
 constexpr double kMap_m = 0.02, kMap_rad = 0.1 * kRadPerDeg;
 // Registrations of one stretch err alike: so much more than they say.
 constexpr double kAlike = 4.0;
-constexpr double kCameraAge_s = 25.0;  // a camera's submap is due before
+constexpr double kCameraAge_s = 25.0;   // a camera's submap is due before
+constexpr double kLostAfter_s = 1.0;    // of scans that contradict the map; then it searches again
+constexpr double kOffMapAfter_s = 2.0;  // of scans that show nothing of the map, without contradicting it
+constexpr double kScanSilence_s = 2.0;  // without a registered scan the pose is stale
 
 Matrix6d diagonal(double metres, double radians) {
   Vector6d d;
@@ -244,7 +247,7 @@ void Localiser::confirm(const ScanMatch& match) {
 void Localiser::doubt(const Assessment& assessment, Timestamp stamp) {
   if (track_->to_confirm > 0) {  // it was a guess
     track_->to_confirm = kConfirmations;
-    if (assessment.evidence == Evidence::against || stamp - track_->confirmed > setup_.config.off_map_after_s) {
+    if (assessment.evidence == Evidence::against || stamp - track_->confirmed > kOffMapAfter_s) {
       track_.reset();
       why_ = "a place that was found is not confirmed: " + assessment.why;
     }
@@ -253,13 +256,13 @@ void Localiser::doubt(const Assessment& assessment, Timestamp stamp) {
   if (assessment.evidence == Evidence::against) {
     ++track_->against;
     if (!track_->against_since) track_->against_since = stamp;
-    if (stamp - *track_->against_since < setup_.config.lost_after_s || track_->against < 3) return;
+    if (stamp - *track_->against_since < kLostAfter_s || track_->against < 3) return;
     search_anew(assessment.why);
     state_ = State::lost;
     return;
   }
   if (!track_->nothing_since) track_->nothing_since = stamp;
-  if (stamp - *track_->nothing_since < setup_.config.off_map_after_s) return;
+  if (stamp - *track_->nothing_since < kOffMapAfter_s) return;
   state_ = State::off_map;
   why_ = assessment.why;
 }
@@ -370,8 +373,7 @@ void Localiser::follow_submap(const SearchResult& found) {
 }
 
 State Localiser::state() const {
-  const bool is_silent =
-      has_scans() && !recent_.empty() && recent_.back().stamp - *last_scan_ > setup_.config.scan_silence_s;
+  const bool is_silent = has_scans() && !recent_.empty() && recent_.back().stamp - *last_scan_ > kScanSilence_s;
   return state_ == State::localised && is_silent ? State::stale : state_;
 }
 
