@@ -37,11 +37,11 @@ struct LinkConfig {
   double latency_s = 0.02;
   double jitter_s = 0.0;
   double loss = 0.0;
-  double retransmit_s = 0.5;
-  double duplicate = 0.0;
-  bool in_order = false;
+  double retransmit_s = 0.5;  ///< A lost transmission is repeated after this time, once there is contact.
+  double duplicate = 0.0;     ///< Share of messages that arrive twice.
+  bool in_order = false;      ///< Messages of one direction never overtake each other.
   double bandwidth_bytes_per_s = 0.0;
-  int queue_messages = 10000;
+  int queue_messages = 10000;  ///< Messages that wait for contact or bandwidth; then the oldest is dropped.
   std::vector<Outage> outages;
   template <class V>
   void describe(V& v) {
@@ -50,13 +50,7 @@ struct LinkConfig {
             "Up to this much later, at random; larger than the spacing = reordered.");
     v.field("loss", loss, between(0.0, 0.95),
             "Share of transmissions lost; all but deltas of proxy graphs are sent again.");
-    v.field("retransmit_s", retransmit_s, between(0.0, kLongestLinkTime_s),
-            "A lost transmission is repeated after this time, once there is contact.");
-    v.field("duplicate", duplicate, between(0.0, 1.0), "Share of messages that arrive twice.");
-    v.field("in_order", in_order, any(), "Messages of one direction never overtake each other.");
     v.field("bandwidth_bytes_per_s", bandwidth_bytes_per_s, between(0.0, 1e12), "0 = unlimited.");
-    v.field("queue_messages", queue_messages, at_least(1),
-            "Messages that wait for contact or bandwidth; then the oldest is dropped.");
     v.field("outages", outages, any(), "Times out of range; messages wait, also one that is half sent.");
   }
 };

@@ -289,7 +289,7 @@ TEST(SimulatedRadio, WhatArrivesAfterTheEndOfTimeNeverArrives) {
 }
 
 TEST(SimulatedRadio, TimesThatNoRadioTakesAreRefused) {
-  for (const std::string setting : {"latency_s", "jitter_s", "retransmit_s", "bandwidth_bytes_per_s"}) {
+  for (const std::string setting : {"latency_s", "jitter_s", "bandwidth_bytes_per_s"}) {
     const auto node = parse_yaml(setting + ": .inf", "link");
     ASSERT_TRUE(node.has_value());
     LinkConfig link;
