@@ -13,6 +13,7 @@
 #include "tutti/mapfile/changed_tables.hpp"
 #include "tutti/mapfile/make_map.hpp"
 #include "tutti/node/decisions.hpp"
+#include "tutti/node/map_meta.hpp"
 #include "tutti/node/meta_keys.hpp"
 #include "tutti/node/robot_registry.hpp"
 #include "tutti/node/submap_frames.hpp"
@@ -126,17 +127,14 @@ storage::Write to_row(const Version& version) {
 
 Result<std::vector<Version>> versions(const TableStore& map) {
   std::vector<Version> out;
-  Status ok;
-  const auto scanned = map.scan(map_tables::kMeta, node::kVersionPrefix, [&](std::string_view key, auto bytes) {
-    if (!key.starts_with(node::kVersionPrefix)) return false;
+  const Status ok = node::each_row_of(map, node::kVersionPrefix, [&](std::string_view key, auto bytes) -> Status {
     auto version = version_of(key, bytes);
-    if (version)
-      out.push_back(std::move(*version));
-    else
-      ok = fail(ErrorCode::parse, "the row '{}' of table 'meta' is damaged, expected a version's sessions", key);
-    return ok.has_value();
+    if (!version)
+      return fail(ErrorCode::parse, "the row '{}' of table 'meta' is damaged, expected a version's sessions", key);
+    out.push_back(std::move(*version));
+    return {};
   });
-  if (!scanned || !ok) return tl::unexpected(scanned ? ok.error() : scanned.error());
+  if (!ok) return tl::unexpected(ok.error());
   std::ranges::sort(out, {}, &Version::number);
   Version newest{.number = out.empty() ? 1 : out.back().number + 1};
   const auto sized = map.sizes(map_tables::kSubmaps, [&](std::string_view key, std::size_t) {

@@ -20,6 +20,17 @@ constexpr const char* kSettings = "settings";
 
 }  // namespace
 
+Status each_row_of(const storage::TableStore& map, std::string_view prefix,
+                   const std::function<Status(std::string_view key, std::string_view bytes)>& visit) {
+  Status ok;
+  const auto scanned = map.scan(map_tables::kMeta, prefix, [&](std::string_view key, std::string_view bytes) {
+    if (!key.starts_with(prefix)) return false;
+    ok = visit(key, bytes);
+    return ok.has_value();
+  });
+  return scanned ? ok : scanned;
+}
+
 storage::Write to_row(const MapMeta& meta) {
   return {map_tables::kMeta, kMap, storage::key_of({meta.epoch, meta.revision, meta.news ? 1U : 0U, meta.start})};
 }
@@ -84,13 +95,11 @@ std::string refinement_key(std::uint64_t revision) { return fmt::format("{}{:020
 
 Result<server::Refinements> read_refinements(const storage::TableStore& map) {
   server::Refinements refinements;
-  const auto scanned =
-      map.scan(map_tables::kMeta, kRefinementPrefix, [&](std::string_view key, std::string_view bytes) {
-        if (!key.starts_with(kRefinementPrefix)) return false;
-        if (auto refinement = wire::decode_refinement(bytes)) refinements.add(std::move(*refinement));
-        return true;
-      });
-  if (!scanned) return tl::unexpected(scanned.error());
+  const Status ok = each_row_of(map, kRefinementPrefix, [&](std::string_view, std::string_view bytes) {
+    if (auto refinement = wire::decode_refinement(bytes)) refinements.add(std::move(*refinement));
+    return Status();
+  });
+  if (!ok) return tl::unexpected(ok.error());
   return refinements;
 }
 
@@ -131,12 +140,11 @@ std::optional<std::pair<SubmapId, server::Place>> place_of_row(std::string_view 
 
 Result<server::PlaceSet> read_places(const storage::TableStore& map) {
   server::PlaceSet places;
-  const auto scanned = map.scan(map_tables::kMeta, kPlacePrefix, [&](std::string_view key, std::string_view bytes) {
-    if (!key.starts_with(kPlacePrefix)) return false;
+  const Status ok = each_row_of(map, kPlacePrefix, [&](std::string_view key, std::string_view bytes) {
     if (auto place = place_of_row(key, bytes)) places.insert(std::move(*place));
-    return true;
+    return Status();
   });
-  if (!scanned) return tl::unexpected(scanned.error());
+  if (!ok) return tl::unexpected(ok.error());
   return places;
 }
 
@@ -155,26 +163,21 @@ storage::Write to_row(SubmapId id, const std::vector<std::pair<std::uint32_t, Po
 Result<server::HeldPoses> read_held_poses(const storage::TableStore& map) {
   constexpr std::size_t kNumbers = 8;
   server::HeldPoses held;
-  Status ok;
-  const auto scanned = map.scan(map_tables::kMeta, kHeldPrefix, [&](std::string_view key, std::string_view bytes) {
-    if (!key.starts_with(kHeldPrefix)) return false;
+  const Status ok = each_row_of(map, kHeldPrefix, [&](std::string_view key, std::string_view bytes) -> Status {
     const auto id = submap_of_key(key.substr(kHeldPrefix.size()));
     const std::size_t poses = bytes.size() / (8 * kNumbers);
     const auto numbers = storage::numbers_of(bytes, kNumbers * poses);
-    if (!id || !numbers) {
-      ok = fail(ErrorCode::parse, "the row '{}' of table 'meta' is damaged, expected poses that are held", key);
-      return false;
-    }
+    if (!id || !numbers)
+      return fail(ErrorCode::parse, "the row '{}' of table 'meta' is damaged, expected poses that are held", key);
     const auto value = [&](std::size_t at) { return std::bit_cast<double>((*numbers)[at]); };
     for (std::size_t at = 0; at < numbers->size(); at += kNumbers) {
       const Pose3 pose{{value(at + 7), value(at + 4), value(at + 5), value(at + 6)},
                        {value(at + 1), value(at + 2), value(at + 3)}};
-      if (!is_valid(pose)) ok = fail(ErrorCode::parse, "the row '{}' of table 'meta' has no valid poses", key);
+      if (!is_valid(pose)) return fail(ErrorCode::parse, "the row '{}' of table 'meta' has no valid poses", key);
       held.emplace(KeyframeId{id->chain, static_cast<std::uint32_t>((*numbers)[at])}, pose);
     }
-    return ok.has_value();
+    return {};
   });
-  if (!scanned) return tl::unexpected(scanned.error());
   if (!ok) return tl::unexpected(ok.error());
   return held;
 }
@@ -183,17 +186,12 @@ storage::Write retired_row(SubmapId id) { return {map_tables::kMeta, std::string
 
 Result<std::set<SubmapId>> read_retired(const storage::TableStore& map) {
   std::set<SubmapId> out;
-  Status ok;
-  const auto scanned = map.scan(map_tables::kMeta, kRetiredPrefix, [&](std::string_view key, std::string_view) {
-    if (!key.starts_with(kRetiredPrefix)) return false;
+  const Status ok = each_row_of(map, kRetiredPrefix, [&](std::string_view key, std::string_view) -> Status {
     const auto id = submap_of_key(key.substr(kRetiredPrefix.size()));
-    if (id)
-      out.insert(*id);
-    else
-      ok = fail(ErrorCode::parse, "the row '{}' of table 'meta' is damaged, expected a submap's numbers", key);
-    return ok.has_value();
+    if (!id) return fail(ErrorCode::parse, "the row '{}' of table 'meta' is damaged, expected a submap's numbers", key);
+    out.insert(*id);
+    return {};
   });
-  if (!scanned) return tl::unexpected(scanned.error());
   if (!ok) return tl::unexpected(ok.error());
   return out;
 }

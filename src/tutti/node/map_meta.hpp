@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -16,6 +17,10 @@
 
 /// The rows of table `meta` in a map's store.
 namespace tutti::node {
+
+/// Visits the rows whose keys begin with `prefix`, in the order of their keys, until a visit fails.
+Status each_row_of(const storage::TableStore& map, std::string_view prefix,
+                   const std::function<Status(std::string_view key, std::string_view bytes)>& visit);
 
 /// The row `map`: the server's own counters.
 struct MapMeta {

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <utility>
 
+#include "tutti/node/map_meta.hpp"
 #include "tutti/node/picture.hpp"
 #include "tutti/storage/map_tables.hpp"
 #include "tutti/wire/field_bytes.hpp"
@@ -41,14 +42,13 @@ Status check(const MapMark& mark, const std::string& photo, std::size_t known) {
 
 Result<MarkSet> read_marks(const storage::TableStore& map) {
   MarkSet out;
-  const auto scanned = map.scan(map_tables::kMeta, kMark, [&](std::string_view key, std::string_view bytes) {
-    if (!key.starts_with(kMark)) return false;
+  const Status ok = each_row_of(map, kMark, [&](std::string_view key, std::string_view bytes) {
     const auto number = number_of(key, kMark);
     auto mark = wire::read_fields<MapMark>(bytes);
     if (number && mark && wire::check_fields(*mark)) out.emplace(*number, std::move(*mark));
-    return true;
+    return Status();
   });
-  if (!scanned) return tl::unexpected(scanned.error());
+  if (!ok) return tl::unexpected(ok.error());
   return out;
 }
 
