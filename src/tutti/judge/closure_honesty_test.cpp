@@ -28,10 +28,10 @@ struct Case {
 };
 
 OdometrySegment chain_of(RobotId robot, const Case& c, Rng& rng, std::vector<Pose3>& truth) {
-  OdometrySegment chain{.id = robot};
+  OdometrySegment chain{.id = robot, .index = {0}, .T_odom_body = {Pose3{}}};
   truth.assign(1, {});
-  chain.T_odom_body.resize(1);
   for (std::uint32_t k = 1; k < kLength; ++k) {
+    chain.index.push_back(k);
     const Pose3 step{so3_exp(Eigen::Vector3d(0, 0, 0.1)), Eigen::Vector3d(c.scale, 0, 0)};
     truth.push_back(truth.back() * step);
     chain.T_odom_body.push_back(chain.T_odom_body.back() *

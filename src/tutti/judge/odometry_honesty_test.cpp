@@ -29,10 +29,10 @@ struct Case {
 
 OdometryHonesty honesty(const Case& c, std::uint64_t seed) {
   Rng rng(seed);
-  OdometrySegment chain{.id = kRobot};
+  OdometrySegment chain{.id = kRobot, .index = {0}, .T_odom_body = {Pose3{}}};
   std::vector<Pose3> truth(1);
-  chain.T_odom_body.resize(1);
   for (std::uint32_t k = 1; k < kKeyframes; ++k) {
+    chain.index.push_back(k);
     const Pose3 step{so3_exp(Eigen::Vector3d(0, 0, 0.1)), Eigen::Vector3d(1, 0, 0)};
     Pose3 measured = retract(step, test::draw(rng, kStep_m, kStep_rad));
     measured.translation *= c.scale;

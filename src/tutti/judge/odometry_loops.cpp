@@ -18,7 +18,7 @@ class SegmentIndex {
  public:
   explicit SegmentIndex(std::span<const OdometrySegment> segments) {
     for (const OdometrySegment& odometry : segments) {
-      Segment& segment = segments_[{odometry.id, odometry.first_index}];
+      Segment& segment = segments_[{odometry.id, odometry.index.front()}];
       segment.odometry = &odometry;
       segment.covariance.push_back(Matrix6d::Zero());
       for (std::size_t k = 0; k < odometry.step_covariance.size(); ++k) {
@@ -50,7 +50,6 @@ class SegmentIndex {
   };
   /// Beyond the last one where the segment has no such keyframe.
   static std::size_t position(const OdometrySegment& odometry, std::uint32_t index) {
-    if (odometry.index.empty()) return index - odometry.first_index;
     const auto found = std::ranges::lower_bound(odometry.index, index);
     const bool is_there = found != odometry.index.end() && *found == index;
     return is_there ? static_cast<std::size_t>(found - odometry.index.begin()) : odometry.index.size();

@@ -17,9 +17,8 @@ namespace tutti::judge {
 /// overlap.
 struct OdometrySegment {
   ChainId id;
-  std::uint32_t first_index = 0;          ///< KeyframeId::index of T_odom_body[0].
-  std::vector<std::uint32_t> index;       ///< ... and of all, which grow; empty: they count up from the first.
-  std::vector<Pose3> T_odom_body;         ///< Raw odometry.
+  std::vector<std::uint32_t> index;       ///< KeyframeId::index of each keyframe, growing; one at least.
+  std::vector<Pose3> T_odom_body;         ///< Raw odometry at each.
   std::vector<Matrix6d> step_covariance;  ///< From keyframe k to k + 1 (right tangent); one fewer than poses.
 };
 

@@ -207,7 +207,7 @@ std::vector<judge::OdometrySegment> odometry_segments(const std::vector<MapNode>
     if (step_to[i])
       segments.back().step_covariance.push_back(*step_to[i]);
     else
-      segments.push_back({.id = nodes[i].id.chain, .first_index = nodes[i].id.index});
+      segments.push_back({.id = nodes[i].id.chain});
     segments.back().index.push_back(nodes[i].id.index);
     segments.back().T_odom_body.push_back(nodes[i].T_odom_body);
   }
