@@ -8,10 +8,10 @@
 #include <map>
 #include <utility>
 
+#include "tutti/bags/antenna_sample.hpp"
 #include "tutti/bags/camera.hpp"
 #include "tutti/bags/rgbd.hpp"
 #include "tutti/bags/robot_namespace.hpp"
-#include "tutti/bags/ros_fix.hpp"
 #include "tutti/bags/ros_messages.hpp"
 
 namespace tutti::bags {
@@ -51,7 +51,7 @@ void note_first(TopicInfo& topic, const BagMessage& message) {
 void note_fix(TopicInfo& topic, const BagMessage& message) {
   const auto encoding = to_encoding(message.channel->message_encoding);
   const auto decoded = encoding ? decode_nav_sat_fix(message.data, *encoding).and_then(&to_fix)
-                                : Result<std::optional<ReceivedFix>>(tl::unexpected(encoding.error()));
+                                : Result<std::optional<AntennaSample>>(tl::unexpected(encoding.error()));
   topic.has_fix = decoded && decoded->has_value();
   if (!decoded && topic.refused_fix.empty())
     topic.refused_fix = fmt::format("message {}: {}", topic.count, decoded.error().message);

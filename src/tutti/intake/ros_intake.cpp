@@ -24,6 +24,10 @@ Matrix6d unseen() {
 /// Names are anybody's, and go to a terminal.
 std::string plain(const std::string& name) { return plain_text(name, 80); }
 
+std::string source_of(const bags::AntennaSample& sample) {
+  return sample.range() == nullptr ? std::string() : sample.range()->name;
+}
+
 using Verdict = robot::StampWatch::Verdict;
 
 Status check_increases(Timestamp stamp, const std::optional<Timestamp>& before) {
@@ -52,7 +56,10 @@ Status RosIntake::add_odometry(std::string_view bytes, Encoding encoding) {
 Status RosIntake::add_points(std::string_view bytes, std::string_view type, Encoding encoding) {
   return counted(take_points(bytes, type, encoding));
 }
-Status RosIntake::add_fix(std::string_view bytes, Encoding encoding) { return counted(take_fix(bytes, encoding)); }
+Status RosIntake::add_antenna(std::string_view topic, std::string_view type, std::string_view bytes,
+                              Encoding encoding) {
+  return counted(take_antenna(topic, type, bytes, encoding));
+}
 
 Status RosIntake::take_odometry(std::string_view bytes, Encoding encoding) {
   const auto message = bags::decode_odometry(bytes, encoding);
@@ -129,7 +136,7 @@ void RosIntake::begin_anew() {
   known_.reset();
   scans_.clear();
   held_since_.reset();
-  fixes_.clear();
+  antennas_.clear();
 }
 
 Status RosIntake::add_tf(std::string_view bytes, bool is_static, TfOf of, Encoding encoding) {
@@ -179,20 +186,24 @@ Status RosIntake::check_follows(Timestamp stamp, const std::optional<Timestamp>&
   return was_wrong ? Status() : check_increases(stamp, before);
 }
 
-Status RosIntake::take_fix(std::string_view bytes, Encoding encoding) {
-  const auto message = bags::decode_nav_sat_fix(bytes, encoding);
-  if (!message) return tl::unexpected(message.error());
-  const Timestamp stamp = message->header.stamp;
-  if (known_ && stamp <= *known_) return {};
-  auto received = bags::to_fix(*message);
-  if (!received) return tl::unexpected(received.error());
-  if (!*received) return {};
-  if (Status ok = check_stamp(stamp, newest_fix_); !ok) return ok;
-  drop_from(stamp, fixes_, [](const bags::ReceivedFix& waiting) { return waiting.fix.stamp; });
-  if (fixes_.size() >= kMostFixes) fixes_.pop_front();  // odometry has ended
-  newest_fix_ = stamp;
-  fixes_.push_back(std::move(**received));
-  ++counts_.fixes;
+Status RosIntake::take_antenna(std::string_view topic, std::string_view type, std::string_view bytes,
+                               Encoding encoding) {
+  auto sample = bags::read_antenna_sample(topic, type, bytes, encoding);
+  if (!sample) return tl::unexpected(sample.error());
+  if (!*sample || (known_ && (*sample)->stamp() <= *known_)) return {};
+  const Timestamp stamp = (*sample)->stamp();
+  const std::string source = source_of(**sample);
+  const auto known = newest_antenna_.find(source);
+  const auto newest = known == newest_antenna_.end() ? std::nullopt : std::optional(known->second);
+  if (Status ok = check_stamp(stamp, newest); !ok) return ok;
+  if (newest && *newest >= stamp)
+    std::erase_if(antennas_,
+                  [&](const auto& waiting) { return waiting.stamp() >= stamp && source_of(waiting) == source; });
+  if (!newest && newest_antenna_.size() >= kMostAntennas) newest_antenna_.clear();  // of strangers
+  newest_antenna_[source] = stamp;
+  if (antennas_.size() >= kMostAntennas) antennas_.pop_front();  // odometry has ended
+  antennas_.insert(std::ranges::upper_bound(antennas_, stamp, {}, &bags::AntennaSample::stamp), std::move(**sample));
+  counts_.fixes += source.empty() ? 1 : 0;
   return {};
 }
 
@@ -313,36 +324,19 @@ Result<std::optional<Scan>> RosIntake::next_scan(bool is_wanted) {
   return std::optional<Scan>{};
 }
 
-std::optional<Eigen::Vector3d> RosIntake::antenna_of(const std::string& frame) const {
-  if (config_.p_body_antenna) return config_.p_body_antenna;
-  const auto T_body_antenna = pose_on_body(frame);
-  return T_body_antenna ? std::optional(T_body_antenna->translation) : std::nullopt;
-}
-
-std::optional<PositionFix> RosIntake::next_fix() {
-  while (!fixes_.empty() && last_ && last_->stamp >= fixes_.front().fix.stamp) {
-    bags::ReceivedFix received = std::move(fixes_.front());
-    fixes_.pop_front();
-    PositionFix& fix = received.fix;
-    if (is_before_all(fix.stamp)) continue;
-    const auto p_body_antenna = antenna_of(received.frame);
-    fix.p_body_antenna = p_body_antenna.value_or(Eigen::Vector3d::Zero());
-    is_unsure_ = is_unsure_ || !received.is_stated;
-    std::string how =
-        p_body_antenna ? fmt::format("fixes are of an antenna at [{:.2f} {:.2f} {:.2f}] m of the body",
-                                     fix.p_body_antenna.x(), fix.p_body_antenna.y(), fix.p_body_antenna.z())
-                       : fmt::format(
-                             "fixes are taken as of an antenna at the body's origin: no transform from '{}' to '{}' on "
-                             "/tf_static; a mission file's robots[].antenna_m may say where it is",
-                             plain(received.frame), plain(frames_->body));
-    if (const std::string doubt = bags::doubt_of_place({Eigen::Quaterniond::Identity(), fix.p_body_antenna});
-        !doubt.empty())
-      how += "; the antenna is " + doubt;
-    if (is_unsure_)
+std::optional<Input> RosIntake::next_antenna() {
+  constexpr std::size_t kMostSaid = 16;  // a stranger may send any number of frames
+  while (!antennas_.empty() && last_ && last_->stamp >= antennas_.front().stamp()) {
+    bags::AntennaSample sample = std::move(antennas_.front());
+    antennas_.pop_front();
+    if (is_before_all(sample.stamp())) continue;
+    std::string how = fmt::format("{} are of {}", sample.range() == nullptr ? "fixes" : "ranges",
+                                  bags::place_antenna(sample, config_.p_body_antenna, pose_on_body(sample.frame)));
+    if (!sample.is_stated)
       how += fmt::format("; those that do not say how sure they are count as {:g} m and {:g} m up", kUnknownFix_m,
                          kUnknownFixUp_m);
-    if (how != how_fixed_) note_ = how_fixed_ = std::move(how);
-    return fix;
+    if (said_of_antennas_.size() < kMostSaid && said_of_antennas_.insert(how).second) note_ = std::move(how);
+    return std::visit([](auto& of) { return Input(std::move(of)); }, sample.measured);
   }
   return std::nullopt;
 }

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "tutti/bags/ros_fix.hpp"
+#include "tutti/bags/antenna_sample.hpp"
 #include "tutti/bags/ros_messages.hpp"
 #include "tutti/bags/sensor_clock.hpp"
 #include "tutti/bags/transform_tree.hpp"
@@ -34,8 +34,7 @@ struct IntakeConfig {
   double scan_offset_s = 0.0;         ///< Added to scans' stamps gives the odometry's time.
   std::string body_frame;             ///< Empty: the child frame of odometry.
   std::optional<Pose3> T_body_lidar;  ///< Nothing: taken from /tf_static, and from frames of /tf that never move.
-  std::optional<Eigen::Vector3d> p_body_antenna;  ///< In the body frame, m. Nothing: taken from /tf_static like
-                                                  ///< T_body_lidar, or else the body's origin.
+  std::optional<Eigen::Vector3d> p_body_antenna;  ///< The receiver's; nothing: as bags::place_antenna() has it.
 };
 
 /// Removes what waits and is not before `stamp` (RosIntake::check_stamp()).
@@ -49,17 +48,17 @@ struct OdometryFrames {
 };
 
 /// Turns messages of ROS 2 into inputs of a robot's live feed: odometry samples with the covariance of their
-/// increments, scans in the body frame with the motion of their sweeps removed, and position fixes with their antenna's
-/// place, as from a bag (mission/bag_recording.hpp). It needs neither a clock nor DDS. Bytes are untrusted: an error
-/// states what is wrong with a message, which then has no effect.
+/// increments, scans in the body frame with the motion of their sweeps removed, and position fixes and ranges with
+/// their antenna's place, as from a bag (mission/bag_recording.hpp). It needs neither a clock nor DDS. Bytes are
+/// untrusted: an error states what is wrong with a message, which then has no effect.
 class RosIntake {
  public:
   using Encoding = bags::RosEncoding;
-  static constexpr double kHistory_s = 2.0;          ///< How long fed odometry is kept, to undistort sweeps.
-  static constexpr std::size_t kMostScans = 40;      ///< Scans that wait for odometry; beyond it the oldest is dropped.
-  static constexpr std::size_t kMostFixes = 200;     ///< Fixes that wait for odometry; beyond it the oldest is dropped.
-  static constexpr std::size_t kMostRefused = 8000;  ///< Samples that are kept until it is known whether they count.
-  static constexpr std::size_t kMostFrames = 1000;   ///< Limit on the frames of /tf.
+  static constexpr double kHistory_s = 2.0;      ///< How long fed odometry is kept, to undistort sweeps.
+  static constexpr std::size_t kMostScans = 40;  ///< Scans that wait for odometry; beyond it the oldest is dropped.
+  static constexpr std::size_t kMostAntennas = 1000;  ///< The same of fixes and ranges together.
+  static constexpr std::size_t kMostRefused = 8000;   ///< Samples that are kept until it is known whether they count.
+  static constexpr std::size_t kMostFrames = 1000;    ///< Limit on the frames of /tf.
   explicit RosIntake(IntakeConfig config) : config_(std::move(config)) {}
 
   /// The robot already has everything up to `newest` (FeedWelcome::newest): samples that wait and are older are
@@ -73,8 +72,9 @@ class RosIntake {
   /// `type`: one of bags::kScanTypes.
   Status add_points(std::string_view bytes, std::string_view type = bags::kScanTypes.front().name,
                     Encoding encoding = Encoding::cdr);
-  /// Adds a fix; ignores messages in which the receiver reports that it has none.
-  Status add_fix(std::string_view bytes, Encoding encoding = Encoding::cdr);
+  /// Adds a position fix or a range to a robot; ignores messages that report none (bags::read_antenna_sample()).
+  Status add_antenna(std::string_view topic, std::string_view type, std::string_view bytes,
+                     Encoding encoding = Encoding::cdr);
   /// Whose transforms a topic has: everybody's (/tf), or those of this robot alone (/alpha/tf), which count first.
   enum class TfOf { all, robot };
   /// Adds the transforms of one message, and returns the first of their errors.
@@ -89,9 +89,9 @@ class RosIntake {
   /// which costs nothing.
   Result<std::optional<Scan>> next_scan(bool is_wanted);
 
-  /// The next fix whose stamp next_odometry() has reached; nothing when there is none. Where the antenna's pose is
-  /// unknown, the fix is taken as of the body's origin, and take_note() reports it.
-  std::optional<PositionFix> next_fix();
+  /// The next fix or range whose stamp next_odometry() has reached; nothing when there is none. Its antenna is where
+  /// bags::place_antenna() has it, which take_note() reports.
+  std::optional<Input> next_antenna();
 
   /// Nothing is to be waited for any more.
   void end() { is_placed_ = true; }
@@ -112,8 +112,8 @@ class RosIntake {
   [[nodiscard]] std::optional<std::pair<Timestamp, Timestamp>> waiting() const {
     return samples_.empty() ? std::nullopt : std::optional(std::pair(samples_.front().stamp, samples_.back().stamp));
   }
-  /// How points' times ("scans are ..") and the antenna's place ("fixes are ..") are obtained, once after each change;
-  /// else empty.
+  /// How points' times ("scans are ..", after each change) and antennas' places ("fixes are ..", each once) are
+  /// obtained; else empty.
   std::string take_note() { return std::exchange(note_, {}); }
   struct Counts {
     std::uint64_t odometry = 0, scans = 0, fixes = 0, refused = 0;
@@ -128,8 +128,7 @@ class RosIntake {
   void begin_anew();
   Status take_odometry(std::string_view bytes, Encoding encoding);
   Status take_points(std::string_view bytes, std::string_view type, Encoding encoding);
-  Status take_fix(std::string_view bytes, Encoding encoding);
-  [[nodiscard]] std::optional<Eigen::Vector3d> antenna_of(const std::string& frame) const;
+  Status take_antenna(std::string_view topic, std::string_view type, std::string_view bytes, Encoding encoding);
   Status take_transform(const bags::RosTransform& transform, bool is_static, TfOf of);
   [[nodiscard]] bags::TransformTree tree() const;
   Status counted(Status taken);
@@ -158,12 +157,13 @@ class RosIntake {
   bool is_placed_ = false;  ///< A scan's LiDAR was placed, or was waited for in vain.
   std::optional<Timestamp> held_since_;
   bags::SensorClock scan_clock_{"robots[].scan_time_offset_s"};
-  std::deque<bags::ReceivedFix> fixes_;
-  std::optional<Timestamp> newest_scan_, newest_fix_, known_;
+  std::deque<bags::AntennaSample> antennas_;         ///< By their stamps.
+  std::map<std::string, Timestamp> newest_antenna_;  ///< By the robot to which ranges are; of fixes by "".
+  std::set<std::string> said_of_antennas_;
+  std::optional<Timestamp> newest_scan_, known_;
   std::optional<StampedPose> last_;  ///< The sample fed last.
   bool unseen_ = false;              ///< Nobody has observed the motion to the next sample.
-  bool is_unsure_ = false;           ///< A fix came without covariance.
-  std::string how_, how_fixed_, note_;
+  std::string how_, note_;
   MissedCount missed_, missed_scans_;
   Counts counts_;
 };

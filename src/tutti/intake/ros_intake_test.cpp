@@ -6,6 +6,7 @@
 #include <random>
 
 #include "support/intake/messages.hpp"
+#include "tutti/bags/ros_types.hpp"
 #include "tutti/node/odometry_gate.hpp"
 
 namespace tutti::intake {
@@ -15,6 +16,12 @@ using test::fix, test::kAtOnce, test::kPeriod, test::kStart, test::kSweepAfter, 
     test::points, test::transform;
 
 std::string why(const Status& status) { return status ? "" : status.error().message; }
+
+Status add_fix(RosIntake& intake, const std::string& bytes) { return intake.add_antenna("fix", bags::kFixType, bytes); }
+std::optional<PositionFix> next_fix(RosIntake& intake) {
+  auto input = intake.next_antenna();
+  return input ? std::optional(std::get<PositionFix>(std::move(*input))) : std::nullopt;
+}
 
 /// All that is ready, one after the other as the robot gets it.
 struct Fed {
@@ -178,42 +185,42 @@ TEST(RosIntake, TransformsOfTheRobotAloneCountBeforeThoseOfAll) {
 
 TEST(RosIntake, FixesWaitForTheirOdometryAndTheirAntennaIsWhereStaticTransformsSay) {
   RosIntake intake({});
-  ASSERT_TRUE(intake.add_fix(fix(kStart - kPeriod, "gnss")));
-  ASSERT_TRUE(intake.add_fix(fix(kStart + kPeriod / 2, "gnss")));
-  EXPECT_FALSE(intake.next_fix());
+  ASSERT_TRUE(add_fix(intake, fix(kStart - kPeriod, "gnss")));
+  ASSERT_TRUE(add_fix(intake, fix(kStart + kPeriod / 2, "gnss")));
+  EXPECT_FALSE(next_fix(intake));
   ASSERT_TRUE(intake.add_odometry(odometry(kStart)));
   feed(intake);
-  EXPECT_FALSE(intake.next_fix());  // the first is from before all odometry
+  EXPECT_FALSE(next_fix(intake));  // the first is from before all odometry
   ASSERT_TRUE(intake.add_odometry(odometry(kStart + kPeriod)));
   feed(intake);
-  const auto early = intake.next_fix();
+  const auto early = next_fix(intake);
   ASSERT_TRUE(early);
   EXPECT_EQ(early->stamp.ns, kStart + kPeriod / 2);
   EXPECT_EQ(early->antenna, (Geodetic{46.5, 7.9, 600.0}));
   EXPECT_EQ(early->covariance, Eigen::Matrix3d::Identity());
   EXPECT_EQ(early->p_body_antenna, Eigen::Vector3d::Zero());
   EXPECT_NE(intake.take_note().find("no transform from 'gnss' to 'base_link' on /tf_static"), std::string::npos);
-  EXPECT_FALSE(intake.next_fix());
+  EXPECT_FALSE(next_fix(intake));
 
   const Pose3 T_base_gnss{Eigen::Quaterniond::Identity(), {0.5, 0.1, 1.2}};
   ASSERT_TRUE(intake.add_tf(transform(0, "base_link", "gnss", T_base_gnss), true));
   for (int i = 2; i < 4; ++i) {
-    ASSERT_TRUE(intake.add_fix(fix(kStart + i * kPeriod, "/gnss")));
+    ASSERT_TRUE(add_fix(intake, fix(kStart + i * kPeriod, "/gnss")));
     ASSERT_TRUE(intake.add_odometry(odometry(kStart + i * kPeriod)));
   }
   feed(intake);
-  for (int i = 2; i < 4; ++i) EXPECT_EQ(intake.next_fix()->p_body_antenna, T_base_gnss.translation);
+  for (int i = 2; i < 4; ++i) EXPECT_EQ(next_fix(intake)->p_body_antenna, T_base_gnss.translation);
   EXPECT_EQ(intake.take_note(), "fixes are of an antenna at [0.50 0.10 1.20] m of the body");
   bags::RosNavSatFix unsure = bags::to_ros({{kStart + 4 * kPeriod}, "gnss"}, {46.5, 7.9, 600.0});
-  ASSERT_TRUE(intake.add_fix(bags::encode(unsure)));
+  ASSERT_TRUE(add_fix(intake, bags::encode(unsure)));
   unsure.header.stamp.ns += kPeriod / 2;
   unsure.status = -1;
-  ASSERT_TRUE(intake.add_fix(bags::encode(unsure)));  // none
+  ASSERT_TRUE(add_fix(intake, bags::encode(unsure)));  // none
   ASSERT_TRUE(intake.add_odometry(odometry(kStart + 5 * kPeriod)));
   feed(intake);
-  EXPECT_EQ(intake.next_fix()->covariance, unknown_fix_covariance());
+  EXPECT_EQ(next_fix(intake)->covariance, unknown_fix_covariance());
   EXPECT_NE(intake.take_note().find("count as 5 m and 10 m up"), std::string::npos);
-  EXPECT_FALSE(intake.next_fix());
+  EXPECT_FALSE(next_fix(intake));
   EXPECT_EQ(intake.counts().fixes, 5U);
 }
 
@@ -240,9 +247,9 @@ TEST(RosIntake, AMissionMaySayWhereTheAntennaIs) {
                     .T_body_lidar = {},
                     .p_body_antenna = Eigen::Vector3d(1, 2, 3)});
   ASSERT_TRUE(intake.add_odometry(odometry(kStart)));
-  ASSERT_TRUE(intake.add_fix(fix(kStart, "gnss")));
+  ASSERT_TRUE(add_fix(intake, fix(kStart, "gnss")));
   feed(intake);
-  EXPECT_EQ(intake.next_fix()->p_body_antenna, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(next_fix(intake)->p_body_antenna, Eigen::Vector3d(1, 2, 3));
 }
 
 TEST(RosIntake, OdometryMayBeTwoFramesOfTf) {
@@ -289,7 +296,7 @@ TEST(RosIntake, OneStampInTheFutureShutsOutNothing) {
   constexpr std::int64_t kHour = 3'600'000'000'000;
   RosIntake intake({});
   ASSERT_TRUE(intake.add_points(points(kStart + kHour, kAtOnce)));  // nobody can know that it is wrong
-  ASSERT_TRUE(intake.add_fix(fix(kStart + kHour)));
+  ASSERT_TRUE(add_fix(intake, fix(kStart + kHour)));
   ASSERT_TRUE(intake.add_odometry(odometry(kStart)));
   EXPECT_NE(why(intake.add_odometry(odometry(kStart + kHour))).find("3600 s ahead"), std::string::npos);
   std::size_t scans = 0, fixes = 0, samples = 0;
@@ -298,12 +305,12 @@ TEST(RosIntake, OneStampInTheFutureShutsOutNothing) {
     if (i == 5) {
       ASSERT_TRUE(intake.add_points(points(kStart + i * kPeriod + 5'000'000'000, kAtOnce)));
     }
-    ASSERT_TRUE(intake.add_fix(fix(kStart + i * kPeriod)));
+    ASSERT_TRUE(add_fix(intake, fix(kStart + i * kPeriod)));
     ASSERT_TRUE(intake.add_odometry(odometry(kStart + i * kPeriod)));
     const Fed fed = feed(intake);
     samples += fed.samples.size();
     scans += fed.scans.size();
-    while (intake.next_fix()) ++fixes;
+    while (next_fix(intake)) ++fixes;
   }
   EXPECT_EQ(samples, 20U);
   EXPECT_EQ(scans, 19U);
@@ -405,11 +412,11 @@ TEST(RosIntake, WhatIsWrongIsReported) {
   expect(why(intake.add_odometry("")), "nav_msgs/msg/Odometry");
   ASSERT_TRUE(intake.add_points(points(kStart, kAtOnce)));
   expect(why(intake.add_points(points(kStart, kAtOnce))), "two publishers");
-  expect(why(intake.add_fix(fix(kStart, "gnss", 91.0))), "latitude 91 degrees, expected -90 to 90");
-  expect(why(intake.add_fix(fix(kStart - 20'000'000'000))), "are they by another clock?");
-  expect(why(intake.add_fix(odometry(kStart))), "sensor_msgs/msg/NavSatFix: ");
-  ASSERT_TRUE(intake.add_fix(fix(kStart)));
-  expect(why(intake.add_fix(fix(kStart - 1))), "two publishers");
+  expect(why(add_fix(intake, fix(kStart, "gnss", 91.0))), "latitude 91 degrees, expected -90 to 90");
+  expect(why(add_fix(intake, fix(kStart - 20'000'000'000))), "are they by another clock?");
+  expect(why(add_fix(intake, odometry(kStart))), "sensor_msgs/msg/NavSatFix: ");
+  ASSERT_TRUE(add_fix(intake, fix(kStart)));
+  expect(why(add_fix(intake, fix(kStart - 1))), "two publishers");
   EXPECT_EQ(intake.counts().refused, 13U);
   EXPECT_EQ(intake.counts().odometry, 1U);
 }
@@ -424,14 +431,14 @@ TEST(RosIntake, FramesOfStrangersHaveAnEnd) {
 
 TEST(RosIntake, ScansAndFixesWithoutOdometryHaveAnEnd) {
   RosIntake intake({});
-  for (std::size_t i = 0; i < 2 * RosIntake::kMostFixes; ++i)
-    ASSERT_TRUE(intake.add_fix(fix(kStart + static_cast<std::int64_t>(i))));
+  for (std::size_t i = 0; i < 2 * RosIntake::kMostAntennas; ++i)
+    ASSERT_TRUE(add_fix(intake, fix(kStart + static_cast<std::int64_t>(i))));
   for (int i = 0; i < 100; ++i) ASSERT_TRUE(intake.add_points(points(kStart + i * kPeriod, kAtOnce)));
   for (int i = 0; i < 2; ++i) ASSERT_TRUE(intake.add_odometry(odometry(kStart + (99 * i) * kPeriod)));
   EXPECT_EQ(feed(intake).scans.size(), RosIntake::kMostScans);
   std::size_t fixes = 0;
-  while (intake.next_fix()) ++fixes;
-  EXPECT_EQ(fixes, RosIntake::kMostFixes);
+  while (next_fix(intake)) ++fixes;
+  EXPECT_EQ(fixes, RosIntake::kMostAntennas);
 }
 
 /// Any byte of any message may be wrong, and any message cut.
@@ -448,11 +455,11 @@ TEST(RosIntake, BytesOfStrangersDoNoHarm) {
     const std::size_t kind = rng() % 4;
     const Status taken = kind == 0   ? intake.add_odometry(bytes)
                          : kind == 1 ? intake.add_points(bytes)
-                         : kind == 2 ? intake.add_fix(bytes)
+                         : kind == 2 ? add_fix(intake, bytes)
                                      : intake.add_tf(bytes, i % 2 == 0);
     refused += taken ? 0 : 1;
     if (i % 10 == 0) feed(intake);
-    while (intake.next_fix()) continue;
+    while (next_fix(intake)) continue;
   }
   EXPECT_GT(refused, 15'000U);
 }

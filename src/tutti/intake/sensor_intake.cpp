@@ -10,16 +10,13 @@
 
 #include "tutti/bags/camera.hpp"
 #include "tutti/bags/robot_namespace.hpp"
-#include "tutti/bags/ros_range.hpp"
 #include "tutti/bags/transform_tree.hpp"
 #include "tutti/base/plain_text.hpp"
 
 namespace tutti::intake {
 namespace {
 
-constexpr std::size_t kMostRanges = 1000;  // that wait for odometry
-constexpr std::size_t kMostUnplaced = 8;   // antennas of which is said that nobody knows where they are
-constexpr double kCheck_s = 0.5;           // between two checks for what is missing, by odometry's time
+constexpr double kCheck_s = 0.5;  // between two checks for what is missing, by odometry's time
 
 bool is_compressed(const std::string& topic) {
   return topic.ends_with("/compressed") || topic.ends_with("/compressedDepth");  // as image_transport names them
@@ -63,6 +60,9 @@ struct SensorIntake::Row {
 std::span<const SensorIntake::Row> SensorIntake::rows() {
   using Self = SensorIntake;
   using bags::RosEncoding, bags::Use;
+  static constexpr auto kTakeAntenna = [](Self& to, const RawMessage& in, RosEncoding encoding) {
+    return to.ros_.add_antenna(in.topic, in.type, in.bytes, encoding);
+  };
   static constexpr std::array kRows{
       Row{Use::odometry, [](Self& to, const RawMessage& in,
                             RosEncoding encoding) { return to.ros_.add_odometry(in.bytes, encoding); }},
@@ -73,12 +73,10 @@ std::span<const SensorIntake::Row> SensorIntake::rows() {
                                   is_of_all ? RosIntake::TfOf::all : RosIntake::TfOf::robot, encoding);
           },
           true},
-      Row{Use::fixes,
-          [](Self& to, const RawMessage& in, RosEncoding encoding) { return to.ros_.add_fix(in.bytes, encoding); }},
+      Row{Use::fixes, kTakeAntenna},
+      Row{Use::ranges, kTakeAntenna},
       Row{Use::battery,
           [](Self& to, const RawMessage& in, RosEncoding encoding) { return to.take_battery(in.bytes, encoding); }},
-      Row{Use::ranges, [](Self& to, const RawMessage& in,
-                          RosEncoding encoding) { return to.take_range(in.topic, in.bytes, encoding); }},
       Row{Use::imu,
           [](Self& to, const RawMessage& in, RosEncoding encoding) {
             return to.images_ && in.topic == to.imu_ ? to.images_->add_imu(in.bytes, encoding) : Status();
@@ -149,38 +147,6 @@ Status SensorIntake::take_battery(std::string_view bytes, bags::RosEncoding enco
   return {};
 }
 
-Status SensorIntake::take_range(std::string_view topic, std::string_view bytes, bags::RosEncoding encoding) {
-  const std::string_view robot = bags::ranged_robot(topic);
-  if (robot.empty()) return {};  // to a wall
-  const auto message = bags::decode_range(bytes, encoding);
-  if (!message) return tl::unexpected(message.error());
-  auto range = bags::to_range(*message, robot);
-  if (!range) return tl::unexpected(range.error());
-  if (!*range) return {};
-  const Timestamp stamp = (*range)->stamp;
-  if (Status ok = ros_.check_stamp(stamp, std::nullopt); !ok) return ok;
-  if (ranges_.size() >= kMostRanges) ranges_.pop_front();  // odometry has ended
-  const auto later =
-      std::ranges::upper_bound(ranges_, stamp, {}, [](const WaitingRange& of) { return of.range.stamp; });
-  ranges_.insert(later, {std::move(**range), bags::frame_name(message->header.frame_id)});
-  return {};
-}
-
-/// The next that odometry has reached.
-std::optional<RobotRange> SensorIntake::next_range() {
-  while (!ranges_.empty() && fed_ && ranges_.front().range.stamp <= *fed_) {
-    auto [range, frame] = std::move(ranges_.front());
-    ranges_.pop_front();
-    if (ros_.is_before_all(range.stamp)) continue;
-    if (const auto T_body_antenna = ros_.pose_on_body(frame))
-      range.p_body_antenna = T_body_antenna->translation;
-    else if (unplaced_.size() < kMostUnplaced && unplaced_.insert(frame).second)
-      note(fmt::format("ranges are taken as of an antenna at the body's origin: {}", T_body_antenna.error().message));
-    return range;
-  }
-  return std::nullopt;
-}
-
 /// What can be known of cameras and IMU now; while nothing new is to be expected, not at every message.
 void SensorIntake::check_missing(bool is_new) {
   if (!images_) return;
@@ -238,8 +204,7 @@ bool SensorIntake::wants(std::string_view topic) const {
 /// What odometry has reached.
 Result<std::optional<Input>> SensorIntake::next_beside(bool wants_scan) {
   if (health_) return std::optional<Input>(*std::exchange(health_, std::nullopt));
-  if (const auto fix = ros_.next_fix()) return std::optional<Input>(*fix);
-  if (auto range = next_range()) return std::optional<Input>(std::move(*range));
+  if (auto sample = ros_.next_antenna()) return sample;
   if (images_ && fed_ && !sensors_.cameras.empty()) {
     if (sensors_.imu)
       if (auto samples = images_->next_imu(*fed_); !samples.empty()) return std::optional<Input>(std::move(samples));

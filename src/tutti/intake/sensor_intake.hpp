@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <deque>
 #include <optional>
-#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -85,8 +83,6 @@ class SensorIntake {
   struct Row;
   static std::span<const Row> rows();
   Status take_camera(std::string_view topic, std::string_view bytes, bags::RosEncoding encoding, bool is_info);
-  Status take_range(std::string_view topic, std::string_view bytes, bags::RosEncoding encoding);
-  std::optional<RobotRange> next_range();
   Status take_battery(std::string_view bytes, bags::RosEncoding encoding);
   void check_missing(bool is_new);
   void choose();
@@ -98,13 +94,7 @@ class SensorIntake {
   std::vector<CameraTopics> topics_;
   std::string imu_, points_;  ///< Topics.
   std::optional<Health> health_;
-  struct WaitingRange {
-    RobotRange range;
-    std::string frame;  ///< The antenna's.
-  };
-  std::deque<WaitingRange> ranges_;  ///< In the order of their stamps.
-  std::set<std::string> unplaced_;   ///< Frames of antennas of which was said that nobody knows where they are.
-  std::optional<Timestamp> fed_;     ///< Odometry's newest that next() returned.
+  std::optional<Timestamp> fed_;                   ///< Odometry's newest that next() returned.
   std::optional<Timestamp> first_image_, looked_;  ///< By odometry's time.
   bool is_last_ = false, holds_for_scans_ = false, holds_for_images_ = false;
   Sensors sensors_;

@@ -45,6 +45,9 @@ class SensorIntakeTest : public testing::Test {
     return taken ? "" : taken.error().message;
   }
   std::string odometry_at(int i) { return add("odom", kOdometry, odometry(kStart + i * kPeriod, 0.1 * i)); }
+  std::string range_at(const std::string& to, std::int64_t stamp) {
+    return add(("range_to/" + to).c_str(), bags::kRangeType, range(stamp, 5.0F, "base_link"));
+  }
   void place() {
     for (const char* frame : {"camera", "imu", "lidar"})
       EXPECT_EQ(add("/tf_static", kTf, transform(0, "base_link", frame, {})), "");
@@ -253,8 +256,37 @@ TEST_F(SensorIntakeTest, RangesAreToTheRobotThatTheirTopicNames) {
   EXPECT_EQ(last_.ranges[1].name, "charlie");
   EXPECT_EQ(last_.ranges[1].p_body_antenna, Eigen::Vector3d(0, 0, 0));
   const auto notes = intake_.take_notes();
-  ASSERT_EQ(notes.size(), 1U);
-  EXPECT_NE(notes[0].find("no transform from 'nowhere' to 'base_link'"), std::string::npos) << notes[0];
+  ASSERT_EQ(notes.size(), 2U);
+  EXPECT_EQ(notes[0], "ranges are of an antenna at [1.00 2.00 3.00] m of the body");
+  EXPECT_NE(notes[1].find("at the body's origin: no transform from 'nowhere' to 'base_link'"), std::string::npos)
+      << notes[1];
+}
+
+TEST_F(SensorIntakeTest, FixesAndRangesWaitForOdometryByTheSameRules) {
+  constexpr std::int64_t kHour = 3'600'000'000'000;
+  EXPECT_EQ(range_at("bravo", kStart + kHour), "") << "nobody can know that it is wrong";
+  EXPECT_EQ(odometry_at(0), "");
+  expect(range_at("charlie", kStart + kHour), "range_to/charlie: stamp 1700003600000000000 ns is 3600.0 s from");
+  EXPECT_EQ(range_at("bravo", kStart + 40), "");
+  expect(range_at("bravo", kStart + 40), "two publishers");
+  EXPECT_EQ(range_at("charlie", kStart + 20), "");
+  EXPECT_EQ(add("fix", kFix, fix(kStart + 30)), "");
+  EXPECT_EQ(range_at("delta", kStart - 10), "") << "before odometry begins, it is passed over";
+  EXPECT_EQ(due(), "o");
+  EXPECT_EQ(odometry_at(1), "");
+  EXPECT_EQ(due(), "orfr") << "by their stamps";
+  ASSERT_EQ(last_.ranges.size(), 2U);
+  EXPECT_EQ(last_.ranges[0].name, "charlie");
+  EXPECT_EQ(last_.ranges[1].name, "bravo");
+  EXPECT_EQ(intake_.odometry().counts().refused, 2U);
+}
+
+TEST_F(SensorIntakeTest, RangesThatTheRobotHasArePassedOver) {
+  intake_.odometry().begin_behind(Timestamp{kStart + kPeriod});
+  EXPECT_EQ(range_at("bravo", kStart + kPeriod), "");
+  EXPECT_EQ(range_at("bravo", kStart + 2 * kPeriod), "");
+  for (int i = 2; i < 4; ++i) EXPECT_EQ(odometry_at(i), "");
+  EXPECT_EQ(due(), "oro");
 }
 
 }  // namespace sensor_intake_test

@@ -122,7 +122,7 @@ Status fill_sensors(const MissionConfig& config, program::RobotOptions& options)
   odometry.covariance = robot->covariance;
   odometry.scan_times = robot->scan_times_config();
   odometry.scan_offset_s = robot->scan_time_offset_s;
-  if (!robot->antenna_m.empty()) odometry.p_body_antenna = Eigen::Vector3d(robot->antenna_m.data());
+  odometry.p_body_antenna = robot->p_body_antenna();
   if (!mission::is_given(robot->T_body_lidar)) return {};
   const auto T_body_lidar = mission::to_pose(robot->T_body_lidar);
   if (!T_body_lidar) return in_context("robot " + robot->name, T_body_lidar.error());

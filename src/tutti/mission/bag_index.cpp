@@ -12,9 +12,7 @@
 #include "tutti/bags/near_types.hpp"
 #include "tutti/bags/picture.hpp"
 #include "tutti/bags/robot_namespace.hpp"
-#include "tutti/bags/ros_fix.hpp"
 #include "tutti/bags/ros_messages.hpp"
-#include "tutti/bags/ros_range.hpp"
 #include "tutti/bags/ros_types.hpp"
 
 namespace tutti::mission {
@@ -89,9 +87,10 @@ class Indexer {
       case bags::Use::scans:
         return take_scan(index.scans[topic], message);
       case bags::Use::fixes:
-        return take_fix(index.fixes[topic], message);
+        return take_antenna(index.fixes[topic], message);
       case bags::Use::ranges:
-        return take_range(topic, message);
+        if (!bags::ranged_robot(topic).empty()) take_antenna(index.ranges[topic], message);  // others are to walls
+        return;
       default:
         if (with_images_) take_sight(message);
         return;
@@ -202,38 +201,19 @@ class Indexer {
   }
 
   /// A receiver without a fix, or one without a covariance, is none that fails.
-  static void take_fix(FixTrack& track, const BagMessage& message) {
+  static void take_antenna(AntennaTrack& track, const BagMessage& message) {
     ++track.messages;
-    const auto heard = bags::decode_nav_sat_fix(message.data, encoding_of(message));
-    if (!heard) return track.refused.add(track.messages, heard.error().message);
-    const auto decoded = bags::to_fix(*heard);
-    if (!decoded) return track.refused.add(track.messages, decoded.error().message);
-    if (!*decoded) {
+    auto sample =
+        bags::read_antenna_sample(message.channel->topic, message.channel->type, message.data, encoding_of(message));
+    if (!sample) return track.refused.add(track.messages, sample.error().message);
+    if (!*sample) {
       ++track.without;
       return;
     }
-    const auto& [fix, frame, is_stated, is_flat] = **decoded;
-    if (track.fixes.empty()) track.frame = frame;
-    track.unsure += is_stated ? 0 : 1;
-    track.flat += is_flat ? 1 : 0;
-    track.fixes.push_back(fix);
-    track.arrivals.push_back({fix.stamp, message.log_time, track.messages});
-  }
-
-  /// Those to walls are none.
-  void take_range(const std::string& topic, const BagMessage& message) {
-    const std::string_view robot = bags::ranged_robot(topic);
-    if (robot.empty()) return;
-    RangeTrack& track = index.ranges[topic];
-    ++track.messages;
-    const auto heard = bags::decode_range(message.data, encoding_of(message));
-    if (!heard) return track.refused.add(track.messages, heard.error().message);
-    const auto range = bags::to_range(*heard, robot);
-    if (!range) return track.refused.add(track.messages, range.error().message);
-    if (!*range) return;
-    if (track.ranges.empty()) track.frame = bags::frame_name(heard->header.frame_id);
-    track.ranges.push_back(**range);
-    track.arrivals.push_back({(*range)->stamp, message.log_time, track.messages});
+    track.unsure += (*sample)->is_stated ? 0 : 1;
+    track.flat += (*sample)->is_flat ? 1 : 0;
+    track.arrivals.push_back({(*sample)->stamp(), message.log_time, track.messages});
+    track.samples.push_back(std::move(**sample));
   }
 
   void take_sight(const BagMessage& message) {
@@ -334,8 +314,8 @@ void order_sensors(BagIndex& index, const OdometryTrack& odometry) {
   for (auto& [topic, track] : index.scans) order(topic, track.scans, track);
   for (auto& [topic, track] : index.images) order(topic, track.images, track);
   for (auto& [topic, track] : index.imu) order(topic, track.samples, track);
-  for (auto& [topic, track] : index.fixes) order(topic, track.fixes, track);
-  for (auto& [topic, track] : index.ranges) order(topic, track.ranges, track);
+  for (auto& [topic, track] : index.fixes) order(topic, track.samples, track);
+  for (auto& [topic, track] : index.ranges) order(topic, track.samples, track);
 }
 
 void keep_robot(BagIndex& index, const RobotConfig& robot) {

@@ -9,13 +9,13 @@
 #include <utility>
 #include <vector>
 
+#include "tutti/bags/antenna_sample.hpp"
 #include "tutti/bags/bag_reader.hpp"
 #include "tutti/bags/image_topic.hpp"
 #include "tutti/bags/stamp_order.hpp"
 #include "tutti/bags/transform_tree.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/mission/mission_config.hpp"
-#include "tutti/model/position_fix.hpp"
 #include "tutti/model/trajectory.hpp"
 #include "tutti/model/visual.hpp"
 
@@ -74,24 +74,14 @@ struct ImuTrack {
   Refusals refused;
 };
 
-/// The position fixes of one receiver.
-struct FixTrack {
-  std::vector<PositionFix> fixes;
+/// The position fixes of one receiver, or the ranges to one other robot.
+struct AntennaTrack {
+  std::vector<bags::AntennaSample> samples;
   std::vector<bags::Arrival> arrivals;
-  std::string frame;
   std::uint64_t messages = 0;
-  std::uint64_t without = 0;  ///< Messages that report no fix.
+  std::uint64_t without = 0;  ///< Messages that report none.
   std::uint64_t flat = 0;     ///< Fixes without an altitude.
   std::uint64_t unsure = 0;   ///< Fixes that do not state their uncertainty.
-  Refusals refused;
-};
-
-/// The ranges to one other robot.
-struct RangeTrack {
-  std::vector<RobotRange> ranges;
-  std::vector<bags::Arrival> arrivals;
-  std::string frame;  ///< The antenna's.
-  std::uint64_t messages = 0;
   Refusals refused;
 };
 
@@ -107,8 +97,7 @@ struct BagIndex {
   std::map<std::string, ScanTrack> scans;
   std::map<std::string, ImageTrack> images;
   std::map<std::string, ImuTrack> imu;
-  std::map<std::string, FixTrack> fixes;
-  std::map<std::string, RangeTrack> ranges;
+  std::map<std::string, AntennaTrack> fixes, ranges;
   std::map<std::string, bags::TransformTree> trees;  ///< By namespace: of "/alpha/tf" and "/alpha/tf_static".
   bags::TransformTree tree;                          ///< The robot's (keep_robot()).
   Refusals bad_records;

@@ -194,12 +194,13 @@ void warn_of_blind(const BagIndex& index, const Trajectory& odometry, const std:
                   blind.begin_s, blind.end_s, blind.all_s - blind.begin_s - blind.end_s, type));
 }
 
-void warn_of_fixes(const BagIndex& index, std::vector<std::string>& out) {
-  for (const auto& [topic, track] : index.fixes)
+void warn_of_antennas(const char* what, const std::map<std::string, AntennaTrack>& tracks,
+                      std::vector<std::string>& out) {
+  for (const auto& [topic, track] : tracks)
     if (share_of(track.refused.count, track.messages) > kMuchLeftOut)
-      out.push_back(fmt::format("{} of the fixes of {} ({} of {}) are refused, the first because: {}",
-                                percent(share_of(track.refused.count, track.messages)), topic, track.refused.count,
-                                track.messages, track.refused.first));
+      out.push_back(fmt::format("{} of the {} of {} ({} of {}) are refused, the first because: {}",
+                                percent(share_of(track.refused.count, track.messages)), what, topic,
+                                track.refused.count, track.messages, track.refused.first));
 }
 
 }  // namespace
@@ -223,7 +224,8 @@ std::vector<std::string> much_left_out(const BagIndex& index, const TakenOdometr
   }
   for (const Sensor& sensor : sensors) warn_of_sensor(index, odometry, sensor, robot, out);
   warn_of_blind(index, bag.odometry, sensors, robot, out);
-  warn_of_fixes(index, out);
+  warn_of_antennas("fixes", index.fixes, out);
+  warn_of_antennas("ranges", index.ranges, out);
   return out;
 }
 

@@ -228,72 +228,6 @@ void doubt_place(const std::string& topic, const Pose3& T_body_sensor, std::vect
     notes.push_back(fmt::format("{}: the sensor is {}", topic, doubt));
 }
 
-/// Receivers of which not one message can be used.
-void note_no_fixes(const BagIndex& index, std::vector<std::string>& notes) {
-  for (const auto& [topic, track] : index.fixes) {
-    if (track.refused.count > 0) notes.push_back(note_of(topic, track.refused, track.messages));
-    if (track.without > 0)
-      notes.push_back(fmt::format("{}: {} of {} messages are without a fix (status -1, or 0 degrees north and 0 east)",
-                                  topic, track.without, track.messages));
-  }
-}
-
-/// When several topics have fixes, the user has to choose one: mostly all but one are made of that one.
-Status take_fixes(const BagIndex& index, const std::string& body, const RobotConfig& robot, BagRecording& out) {
-  const std::string& wanted = robot.topics.fixes;
-  std::vector<std::string> topics;
-  for (const auto& [topic, track] : index.fixes)
-    if (wanted.empty() ? !track.fixes.empty() : topic == wanted) topics.push_back(topic);
-  if (topics.empty() && wanted.empty()) {
-    note_no_fixes(index, out.notes);
-    return {};
-  }
-  if (topics.empty())
-    return fail(ErrorCode::invalid, "topics.fixes: '{}' is not in the bag, or no sensor_msgs/NavSatFix", wanted);
-  if (topics.size() > 1) {
-    out.notes.push_back(fmt::format("no fixes are used: several topics have some, {}; say which: {}",
-                                    fmt::join(topics, ", "), flag(robot, "fixes", topics.front())));
-    return {};
-  }
-  const FixTrack& track = index.fixes.at(topics.front());
-  out.fix_topic = topics.front();
-  out.fixes = track.fixes;
-  if (track.refused.count > 0) out.notes.push_back(note_of(out.fix_topic, track.refused, track.messages));
-  if (track.without > 0) out.fix_note += fmt::format("; {} messages without a fix", track.without);
-  if (track.flat > 0) out.fix_note += fmt::format("; {} have no altitude and count in the plane", track.flat);
-  if (track.unsure > 0)
-    out.fix_note += fmt::format("; {} do not say how sure they are, taken as {:g} m and {:g} m up", track.unsure,
-                                kUnknownFix_m, kUnknownFixUp_m);
-  if (!robot.antenna_m.empty() || track.frame == body) return {};
-  const auto antenna = body.empty() ? std::nullopt : index.tree.find(body, track.frame);
-  if (antenna) {
-    for (PositionFix& fix : out.fixes) fix.p_body_antenna = antenna->translation;
-    doubt_place(out.fix_topic, *antenna, out.notes);
-  } else {
-    out.fix_note += fmt::format(
-        "; where the antenna is is not known (no transform from '{}' to '{}'): robots[].antenna_m", track.frame, body);
-  }
-  return {};
-}
-
-void take_ranges(const BagIndex& index, const std::string& body, BagRecording& out) {
-  for (const auto& [topic, track] : index.ranges) {
-    if (track.refused.count > 0) out.notes.push_back(note_of(topic, track.refused, track.messages));
-    if (track.ranges.empty()) continue;
-    const auto antenna = track.frame == body ? std::optional(Pose3{}) : index.tree.find(body, track.frame);
-    const Eigen::Vector3d p_body_antenna = antenna.value_or(Pose3{}).translation;
-    out.notes.push_back(fmt::format(
-        "{} ranges of {}, antenna at [{:.2f} {:.2f} {:.2f}] m of the body{}", track.ranges.size(), topic,
-        p_body_antenna.x(), p_body_antenna.y(), p_body_antenna.z(),
-        antenna ? "" : fmt::format(", which is a guess: no transform from '{}' to '{}'", track.frame, body)));
-    for (RobotRange range : track.ranges) {
-      range.p_body_antenna = p_body_antenna;
-      out.ranges.push_back(std::move(range));
-    }
-  }
-  std::ranges::stable_sort(out.ranges, {}, &RobotRange::stamp);
-}
-
 /// By the odometry's clock (`robot.scan_time_offset_s`), without those that are by another one all the same.
 Status take_scans(const OdometryTrack& odometry, const std::string& topic, ScanTrack seen, const RobotConfig& robot,
                   BagRecording& out) {
@@ -367,8 +301,7 @@ Result<BagRecording> read_bag(const fs::path& data, const RobotConfig& robot, bo
   out.odometry = track.poses;
   std::string what = fmt::format("{}: odometry of {} ({})", out.file, source, in_words(track));
   note_odometry(source, track, out.notes);
-  if (auto ok = take_fixes(index, track.body, robot, out); !ok) return in_context(out.file, ok.error());
-  take_ranges(index, track.body, out);
+  if (auto ok = take_antennas(index, track, robot, out); !ok) return in_context(out.file, ok.error());
   if (with_images) take_cameras(index, track.body, robot, out);
   if (*scans == nullptr) {
     if (robot.topics.scans.empty() && index.scans.empty())

@@ -42,7 +42,7 @@ struct BagRecording {
   std::optional<BagDepth> depth;    ///< Registered to the only camera.
   std::string no_images;            ///< Why there are no cameras.
   std::vector<ImuSample> imu;       ///< In the body frame.
-  std::string fix_topic, fix_note;  ///< Empty: the bag has no fixes; and remarks on them.
+  std::string fix_topic, fix_note;  ///< Empty: the bag has no fixes; and where the antenna is, and more.
   std::vector<PositionFix> fixes;
   std::vector<RobotRange> ranges;     ///< Stamps do not decrease; the other robots are named, not numbered.
   std::vector<std::string> notes;     ///< What was used, what was refused and why, for the report.
@@ -68,6 +68,11 @@ Result<std::shared_ptr<const ScanSource>> open_scans(const BagRecording& bag, co
 /// Points tracked through the bag's images, each read when it is needed; for bags with cameras.
 Result<RobotImages> open_images(const BagRecording& bag, const Trajectory& odometry, const RobotConfig& robot,
                                 const visual::TrackingConfig& tracking);
+
+/// The part of read_bag() that deals with position fixes and ranges (bag_antennas.cpp): their antennas are where
+/// bags::place_antenna() has them, and what is by another clock than odometry's is refused, as of a live topic. It
+/// counts as refused in the index.
+Status take_antennas(BagIndex& index, const OdometryTrack& odometry, const RobotConfig& robot, BagRecording& out);
 
 /// The part of read_bag() that deals with cameras and IMU (bag_cameras.cpp).
 void take_cameras(const BagIndex& index, const std::string& body, const RobotConfig& robot, BagRecording& out);

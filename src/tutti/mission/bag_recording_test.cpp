@@ -221,8 +221,9 @@ TEST_F(Bags, FixesAreTakenWithTheirAntenna) {
   EXPECT_EQ(fixes[0].covariance.diagonal(), Eigen::Vector3d(4, 4, 9));
   EXPECT_EQ(fixes.back().covariance, unknown_fix_covariance());
   EXPECT_EQ(fixes.back().antenna, (Geodetic{46.5, 7.9, 19}));
-  for (const char* const noted : {"18 fixes of /gnss/fix, antenna at [0.50 0.10 1.20] m", "1 messages without a fix",
-                                  "10 do not say how sure", "/gnss/fix: 1 of 20 messages refused"})
+  for (const char* const noted :
+       {"18 fixes of /gnss/fix, of an antenna at [0.50 0.10 1.20] m", "1 messages are without one",
+        "10 do not say how sure", "/gnss/fix: 1 of 20 messages refused"})
     EXPECT_NE(notes_of(*input).find(noted), std::string::npos) << noted << "\n" << notes_of(*input);
 
   write(samples_with({"/gnss/fix", "/gnss/filtered"}));
@@ -234,6 +235,27 @@ TEST_F(Bags, FixesAreTakenWithTheirAntenna) {
   EXPECT_NE(problem({"alpha.fixes=/nothing"}).find("'/nothing' is not in the bag"), std::string::npos);
   const auto given = load({"alpha.fixes=/gnss/fix"}, {"robots.0.antenna_m=[1,2,3]"});
   EXPECT_EQ(given->robots.front().recording.fixes[0].p_body_antenna, Eigen::Vector3d(1, 2, 3));
+}
+
+/// As of a live topic, one by one.
+TEST_F(Bags, FixesAndRangesByAnotherClockAreRefused) {
+  std::vector<Sample> samples = robot({});
+  for (int i = 0; i < 20; ++i) {
+    const Timestamp logged = kStart + 0.2 * i, stamp = i < 5 ? logged : logged + 37.0;
+    samples.push_back(sample_of("/fix", "sensor_msgs/msg/NavSatFix", logged,
+                                bags::encode(bags::to_ros({stamp, "base_link"}, {46.5, 7.9, 600.0}))));
+    const bags::RosRange range{.header = {stamp, "base_link"}, .range_m = 5.0F};
+    samples.push_back(sample_of("/range_to/bravo", "sensor_msgs/msg/Range", logged, bags::encode(range)));
+  }
+  std::ranges::stable_sort(samples, {}, &Sample::ns);
+  write(samples);
+  const auto input = load();
+  ASSERT_TRUE(input) << input.error().message;
+  EXPECT_EQ(input->robots.front().recording.fixes.size(), 5U);
+  for (const char* const noted :
+       {"/fix: 15 of 20 messages refused, the first because: message 6: stamp", "/range_to/bravo: 15 of 20 messages",
+        "37.0 s from odometry's newest", "5 ranges of /range_to/bravo, of an antenna at [0.00 0.00 0.00] m"})
+    EXPECT_NE(notes_of(*input).find(noted), std::string::npos) << noted << "\n" << notes_of(*input);
 }
 
 /// A file of fixes instead; of another clock it is refused.

@@ -187,6 +187,10 @@ struct RobotConfig {
   [[nodiscard]] lidar::ScanTimesConfig scan_times_config() const {
     return {scans_deskewed, scan_time_unit, scan_pose_at};
   }
+  /// `antenna_m`, if it is given.
+  [[nodiscard]] std::optional<Eigen::Vector3d> p_body_antenna() const {
+    return antenna_m.empty() ? std::nullopt : std::optional(Eigen::Vector3d(antenna_m.data()));
+  }
   template <class V>
   void describe(V& v) {
     v.field("name", name, any(), "Unique name.");

@@ -21,28 +21,29 @@ bool is_by_this_clock(const std::vector<PositionFix>& fixes, const Trajectory& o
 Status take_fixes(const RobotConfig& robot, const std::filesystem::path& data, const BagRecording* bag,
                   const Trajectory& odometry, MissionRecording& out) {
   std::vector<PositionFix>& fixes = out.recording.fixes;
-  std::string source;
+  std::string source, how;
   if (!robot.fixes.empty()) {
     source = (data / robot.fixes).string();
     auto read = formats::read_fixes(source);
     if (!read) return tl::unexpected(read.error());
     fixes = std::move(*read);
+    for (PositionFix& fix : fixes) {
+      bags::AntennaSample sample{.measured = fix};
+      how = ", of " + bags::place_antenna(sample, robot.p_body_antenna(), Pose3{});
+      fix = std::get<PositionFix>(sample.measured);
+    }
   } else if (bag != nullptr) {
     source = bag->fix_topic;
+    how = bag->fix_note;
     fixes = bag->fixes;
   }
   if (fixes.empty()) return {};
-  if (robot.antenna_m.size() == 3)
-    for (PositionFix& fix : fixes) fix.p_body_antenna = Eigen::Vector3d(robot.antenna_m.data());
   const bool fits = is_by_this_clock(fixes, odometry);
   const std::string stamps = fmt::format(
       "of its {} stamps, {} to {} ns, none is within the odometry's, {} to {} ns: are they by another clock?",
       fixes.size(), fixes.front().stamp.ns, fixes.back().stamp.ns, odometry.front().stamp.ns, odometry.back().stamp.ns);
   if (!fits && !robot.fixes.empty()) return fail(ErrorCode::invalid, "{}: {}", source, stamps);
-  const Eigen::Vector3d& antenna = fixes.front().p_body_antenna;
-  out.notes.push_back(fits ? fmt::format("{}: {} fixes of {}, antenna at [{:.2f} {:.2f} {:.2f}] m of the body{}",
-                                         robot.name, fixes.size(), source, antenna.x(), antenna.y(), antenna.z(),
-                                         bag != nullptr && robot.fixes.empty() ? bag->fix_note : "")
+  out.notes.push_back(fits ? fmt::format("{}: {} fixes of {}{}", robot.name, fixes.size(), source, how)
                            : fmt::format("{}: no fixes of {}: {}", robot.name, source, stamps));
   if (!fits) fixes.clear();
   return {};

@@ -11,8 +11,8 @@
 #include <thread>
 #include <utility>
 
+#include "tutti/bags/antenna_sample.hpp"
 #include "tutti/bags/ros_definitions.hpp"
-#include "tutti/bags/ros_range.hpp"
 #include "tutti/bags/ros_types.hpp"
 #include "tutti/program/clock.hpp"
 #include "tutti/program/feed/local_client.hpp"
