@@ -12,28 +12,6 @@ namespace {
 
 constexpr std::uint32_t kEnoughRays = 3;
 
-/// `visit(cube)` with the cube and the 26 around it, until it returns true; whether it did.
-template <class Visit>
-bool any_around(const Cube& at, const Visit& visit) {
-  for (int x = at[0] - 1; x <= at[0] + 1; ++x)
-    for (int y = at[1] - 1; y <= at[1] + 1; ++y)
-      for (int z = at[2] - 1; z <= at[2] + 1; ++z)
-        if (visit(Cube{x, y, z})) return true;
-  return false;
-}
-
-/// Takes all cubes that touch `first`, one after another, out of `cubes`.
-std::vector<Cube> take_group(const Cube& first, std::set<Cube>& cubes) {
-  std::vector<Cube> group{first};
-  cubes.erase(first);
-  for (std::size_t i = 0; i < group.size(); ++i)
-    any_around(Cube(group[i]), [&](const Cube& beside) {
-      if (cubes.erase(beside) > 0) group.push_back(beside);
-      return false;
-    });
-  return group;
-}
-
 ChangedThing thing_of(const std::vector<Cube>& group, bool appeared, double voxel_m) {
   Eigen::Vector3d low = middle_of(group.front(), voxel_m), high = low;
   for (const Cube& cube : group) {
@@ -44,15 +22,6 @@ ChangedThing thing_of(const std::vector<Cube>& group, bool appeared, double voxe
 }
 
 }  // namespace
-
-Cube cube_of(const Eigen::Vector3d& point, double voxel_m) {
-  const Eigen::Array3d at = (point.array() / voxel_m).floor();
-  return {static_cast<int>(at.x()), static_cast<int>(at.y()), static_cast<int>(at.z())};
-}
-
-Eigen::Vector3d middle_of(const Cube& at, double voxel_m) {
-  return voxel_m * Eigen::Vector3d(at[0] + 0.5, at[1] + 0.5, at[2] + 0.5);
-}
 
 /// Every cube on the way but the last, as long as `visit` returns true.
 template <class Visit>
@@ -126,7 +95,7 @@ Changes find_changes(const SeenSpace& before, const SeenSpace& now) {
         ++out.same;
     }
     while (!changed.empty()) {
-      const std::vector<Cube> group = take_group(Cube(*changed.begin()), changed);
+      const std::vector<Cube> group = take_group(changed);
       const bool is_sure = group.size() >= kLeastCubes;
       if (is_sure) out.things.push_back(thing_of(group, appeared, voxel_m));
       for (const Cube& cube : group)

@@ -2,12 +2,12 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <map>
 #include <vector>
 
+#include "tutti/geometry/cubes.hpp"
 #include "tutti/grids/grid_builder.hpp"
 
 namespace tutti::grids {
@@ -17,11 +17,6 @@ struct ChangeConfig {
   double range_m = 10.0;  ///< Points farther from the nearest pose of their submap are not used.
   double mate_m = 0.7;    ///< As GridConfig::mate_m.
 };
-
-/// A cube of space, by its place among those of one size: that of 0, 0, 0 has a corner in the origin.
-using Cube = std::array<int, 3>;
-Cube cube_of(const Eigen::Vector3d& point, double voxel_m);
-Eigen::Vector3d middle_of(const Cube& at, double voxel_m);
 
 /// The cubes of space in which submaps saw something, or through which they saw. A ray goes from the nearest pose of
 /// the submap to a point, and ends where the same submap has another one.
