@@ -440,8 +440,12 @@ class CommandLine(unittest.TestCase):
         self.expect(tutti("run", mission, *short, "--map-in", self.path / "text", "--frozen", "--out", out), 1, "not an SQLite")
         self.expect(tutti("run", mission, *short, "--map-in", site, "--frozen", "--out", out), 0, "charlie", "delta", "localised")
         self.assertEqual(site.read_bytes(), before)
-        robots = json.loads((out / "localise.json").read_text())["robots"]
+        localised = json.loads((out / "localise.json").read_text())
+        robots = localised["robots"]
         self.assertEqual([robot["robot"] for robot in robots], ["charlie", "delta"])
+        self.assertGreater(len(localised["places"]), localised["submaps"] // 3)
+        for place in localised["places"]:  # nothing has changed
+            self.assertEqual((place["missing"], place["appeared"], place["trust"]), (0, 0, 1), place)
         for robot in robots:
             self.assertEqual(robot["score"]["wrong"], 0)
             self.assertGreater(robot["share_of_time"]["localised"], 0.3)

@@ -178,6 +178,7 @@ void Localiser::begin_submaps() {
 void Localiser::search_anew(const std::string& why) {
   track_.reset();
   start_.reset();
+  map_fit_.doubt();
   pending_.clear();
   places_.clear();
   stretch_.clear();
@@ -223,10 +224,9 @@ void Localiser::follow(const Scan& scan) {
   match.T_world_body.covariance *= kAlike;
   const Assessment assessment =
       track_->to_confirm > 0 ? assess_guess(match, track_->T_world_body) : assess(match, track_->T_world_body);
-  if (assessment.evidence == Evidence::confirms)
-    confirm(match);
-  else
-    doubt(assessment, scan.stamp);
+  if (assessment.evidence != Evidence::confirms) return doubt(assessment, scan.stamp);
+  confirm(match);
+  if (track_->to_confirm == 0) map_fit_.see(*local, usable->scan, track_->T_world_body.T_a_b);
 }
 
 void Localiser::confirm(const ScanMatch& match) {

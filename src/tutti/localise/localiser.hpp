@@ -13,6 +13,7 @@
 #include "tutti/localise/config.hpp"
 #include "tutti/localise/known_map.hpp"
 #include "tutti/localise/local_map.hpp"
+#include "tutti/localise/map_fit.hpp"
 #include "tutti/localise/place_proof.hpp"
 #include "tutti/localise/place_search.hpp"
 #include "tutti/localise/scan_match.hpp"
@@ -69,6 +70,8 @@ class Localiser {
   /// True for a scan of this stamp if it will be used.
   [[nodiscard]] bool wants_scan(Timestamp stamp) const;
   [[nodiscard]] const KnownMap& map() const { return *setup_.map; }
+  /// Where the map does not fit what the robot has seen of it with scans.
+  [[nodiscard]] const MapFit& map_fit() const { return map_fit_; }
   [[nodiscard]] LocaliserWork work() const;
 
  private:
@@ -116,6 +119,7 @@ class Localiser {
   std::optional<Timestamp> last_scan_;   // the newest heard
   std::optional<Timestamp> last_match_;  // the newest registered
   std::optional<Track> track_;
+  MapFit map_fit_;
   struct Start {
     std::vector<StartTries> levels;
     Timestamp said;  ///< By odometry.

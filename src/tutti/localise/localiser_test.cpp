@@ -58,6 +58,11 @@ TEST(Localiser, FindsItsPlaceInOneSubmapAndFollowsTheMap) {
   EXPECT_GT(judged.published, 400U);
   EXPECT_LE(one.work().compared, 12U);
   EXPECT_GT(one.work().registered, 300U);
+  EXPECT_GE(one.map_fit().fits().size(), 5U);
+  for (const auto& [submap, fit] : one.map_fit().fits()) {  // as nothing has changed
+    EXPECT_EQ(fit.missing, 0U) << to_string(submap);
+    EXPECT_EQ(fit.appeared, 0U) << to_string(submap);
+  }
 }
 
 TEST(Localiser, TheSameInputsGiveTheSamePosesToTheBit) {
@@ -119,6 +124,8 @@ TEST(Localiser, KidnappedItSaysThatItIsLostWithinTwoSecondsAndFindsItselfAgain) 
   EXPECT_LE(*lost_s, 2.0);
   ASSERT_TRUE(found_s.has_value());
   EXPECT_LE(*found_s, 35.0);
+  for (const auto& [submap, fit] : one.map_fit().fits())  // nothing that it saw where it was not counts
+    EXPECT_FALSE(fit.has_changed()) << to_string(submap);
   EXPECT_EQ(judged.wrong, 0U);
 }
 

@@ -140,6 +140,7 @@ LocalisedRobot replay(const MissionRecording& recording, const MissionConfig& co
       out.course.push_back(std::move(now));
   }
   out.work = localiser.work();
+  out.map_fit = localiser.map_fit().fits();
   out.cpu_s = robot.cpu_s();
   out.troubles = robot.troubles();
   if (!out.course.empty()) out.duration_s = out.course.back().stamp - begin;
@@ -153,6 +154,13 @@ double LocalisedRobot::share(localise::State state) const {
   for (std::size_t k = 0; k + 1 < course.size(); ++k)
     if (course[k].state == state) in_state_s += course[k + 1].stamp - course[k].stamp;
   return duration_s > 0.0 ? in_state_s / duration_s : 0.0;
+}
+
+std::map<SubmapId, localise::PlaceTrust> trust_of(const std::vector<LocalisedRobot>& robots) {
+  std::map<SubmapId, localise::PlaceTrust> out;
+  for (const LocalisedRobot& robot : robots)
+    for (const auto& [submap, fit] : robot.map_fit) out[submap].add(fit);
+  return out;
 }
 
 std::shared_ptr<const localise::Localiser::Setup> localise_setup(

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -47,10 +48,14 @@ struct LocalisedRobot {
   double cpu_s = 0.0;
   std::vector<double> scan_ms;  ///< CPU of each scan that was registered.
   std::optional<LocaliseScore> score;
-  std::vector<std::string> troubles;  ///< RobotActor::troubles()
+  std::map<SubmapId, localise::SubmapFit> map_fit;  ///< Where the map does not fit what the robot saw of it.
+  std::vector<std::string> troubles;                ///< RobotActor::troubles()
   /// Share of the time in this state.
   [[nodiscard]] double share(localise::State state) const;
 };
+
+/// What the robots have found of each submap of the map that any of them saw.
+std::map<SubmapId, localise::PlaceTrust> trust_of(const std::vector<LocalisedRobot>& robots);
 
 /// What a robot with these submaps needs to localise in a map; none of the pointers may be null.
 std::shared_ptr<const localise::Localiser::Setup> localise_setup(

@@ -61,6 +61,35 @@ Json json_of(const LocalisedRobot& robot) {
             {"scan_ms_p99", number(quantile(robot.scan_ms, 0.99))}}}};
 }
 
+Json places_json(const std::map<SubmapId, localise::PlaceTrust>& places, const localise::KnownMap& map) {
+  Json out = Json::array();
+  for (const auto& [submap, place] : places)
+    out.push_back({{"submap", map.names.of(submap)},
+                   {"trust", number(place.trust())},
+                   {"matched", place.fit.matched},
+                   {"missing", place.fit.missing},
+                   {"appeared", place.fit.appeared},
+                   {"robots", place.robots},
+                   {"scans", place.fit.scans},
+                   {"last_seen_s", number(static_cast<double>(place.fit.seen.ns) * 1e-9)}});
+  return out;
+}
+
+std::string places_text(const std::map<SubmapId, localise::PlaceTrust>& places, const localise::KnownMap& map) {
+  std::string changed;
+  std::size_t count = 0;
+  for (const auto& [submap, place] : places) {
+    if (!place.fit.has_changed()) continue;
+    if (++count > kMostChanges) continue;
+    changed += fmt::format("{}{} ({} cubes gone, {} new, {:.1f} % fits)", count > 1 ? ", " : "", map.names.of(submap),
+                           place.fit.missing, place.fit.appeared, 100.0 * place.trust());
+  }
+  if (count > kMostChanges) changed += fmt::format(" and {} more", count - kMostChanges);
+  return wrap(fmt::format("{} of the map's {} submaps were seen, {}{}", places.size(), map.submaps.size(),
+                          count == 0 ? "and none has changed" : "and something has changed in ", changed),
+              "");
+}
+
 std::string states_csv(const LocalisedRobot& robot) {
   std::string out = "stamp_s,state,age_s,x_m,y_m,z_m,qx,qy,qz,qw,sigma_x_m,sigma_y_m,sigma_z_m,sigma_yaw_rad,why\n";
   for (const Located& located : robot.course) {
@@ -106,6 +135,7 @@ Status write_localised(const std::vector<LocalisedRobot>& robots, const localise
                        const std::filesystem::path& out_dir) {
   if (auto made = make_folder(out_dir.string()); !made) return made;
   Json json{{"map", map.id}, {"version", map.revision}, {"submaps", map.submaps.size()}, {"robots", Json::array()}};
+  json["places"] = places_json(trust_of(robots), map);
   for (const LocalisedRobot& robot : robots) {
     json["robots"].push_back(json_of(robot));
     Trajectory published;
@@ -148,6 +178,7 @@ std::string localised_text(const std::vector<LocalisedRobot>& robots, const loca
                           LocaliseScore::kWrong_m, LocaliseScore::kWrong_deg),
               "") +
          "\n\n";
+  if (const auto places = trust_of(robots); !places.empty()) out += places_text(places, map) + "\n\n";
   for (const LocalisedRobot& robot : robots) {
     out += changes_of(robot, map);
     for (const std::string& trouble : robot.troubles) out += wrap(trouble, "  " + robot.name + ": ");
