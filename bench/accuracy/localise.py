@@ -109,7 +109,7 @@ def main():
         "",
         "Where corridors look the same, a robot says so and names the places; it does not guess.",
         "",
-        "Not measured yet: ten thousand starts, KITTI, EuRoC and KAIST, cameras, moved furniture, a lift, PCL's NDT and GICP beside it. A",
+        "Not measured yet: ten thousand starts ([starts.md](starts.md) has hundreds), KITTI, EuRoC and KAIST, cameras, moved furniture, a lift, PCL's NDT and GICP beside it. A",
         "robot that is carried elsewhere is lost within 2 s and found again within a submap after the next (test `localise/localiser`).",
     ))
 

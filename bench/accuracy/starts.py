@@ -76,7 +76,7 @@ def main():
         ["Asked was how often a robot that knows nothing of where it is finds its place in somebody else's map, and whether it is",
          "ever published in a wrong one."],
         table,
-        [f"bench/accuracy/starts.py build/ci/apps/tutti/tutti --starts {arguments.starts}"],
+        [f"bench/accuracy/starts.py build/ci/apps/tutti/tutti --starts {arguments.starts} --jobs {arguments.jobs}"],
         f"All simulated, seeds {arguments.first_seed} to {seed - 1}; nothing was tuned on these. Robots other than those that made the map forget",
         f"every {EVERY_S} s where they are. *on mapped ground*: for {ONE_SUBMAP_S} s from the start they are within {MAPPED_M:.0f} m of where a robot of the map",
         f"has been. *a fix in one submap*: within {ONE_SUBMAP_S} s: 10 s of driving, and scans that confirm what it shows. *ambiguous*: share of",
