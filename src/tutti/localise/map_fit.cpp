@@ -181,11 +181,14 @@ void MapFit::see(const LocalMap& map, const fit::FitScan& scan, const Pose3& T_w
 }
 
 SubmapVotes& MapFit::votes_of(const std::shared_ptr<const lidar::SubmapFeatures>& features) {
-  if (votes_.size() >= kMostVoted && !votes_.contains(features->id))
-    votes_.erase(std::ranges::min_element(votes_, {}, [](const auto& kept) { return kept.second.used; }));
-  Kept& kept = votes_.try_emplace(features->id, Kept{SubmapVotes(features)}).first->second;
-  kept.used = ++uses_;
-  return kept.votes;
+  auto kept = votes_.find(features->id);
+  if (kept == votes_.end()) {
+    if (votes_.size() >= kMostVoted)
+      votes_.erase(std::ranges::min_element(votes_, {}, [](const auto& other) { return other.second.used; }));
+    kept = votes_.emplace(features->id, Kept{SubmapVotes(features)}).first;
+  }
+  kept->second.used = ++uses_;
+  return kept->second.votes;
 }
 
 void MapFit::count(const Seen& seen) {
