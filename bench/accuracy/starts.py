@@ -11,12 +11,11 @@ import os
 import pathlib
 import tempfile
 
-from localise import percent, run
+from localise import ONE_SUBMAP_S, percent, run
 from runs import mission_file, page, row, write_results
 
 EVERY_S = 15
 MAPPED_M = 5.0
-ONE_SUBMAP_S = 12
 # A name, the mission, and what is set: who maps comes first, robots that search begin when these have long ended
 WORLDS = [
     ("a tunnel", "next_day", ["simulation.robots.2.copies=8"]),
