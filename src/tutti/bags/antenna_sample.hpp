@@ -15,7 +15,7 @@
 
 namespace tutti::bags {
 
-/// What a device on the robot measured at its antenna, as its message states it: a receiver's position fix, or a
+/// A device on the robot measured this at its antenna, as its message states it: a receiver's position fix, or a
 /// radio's range to another robot. Topics and bags have the same rules for both.
 struct AntennaSample {
   /// With the antenna at the body's origin until place_antenna(): no message has where it is mounted.
@@ -45,7 +45,7 @@ std::string_view ranged_robot(std::string_view topic);
 /// greatest. Fails as check_range() does.
 Result<std::optional<AntennaSample>> to_range(const RosRange& message, std::string_view to);
 
-/// What a message of kFixType or kRangeType has; nothing also where the topic's ranges are not to a robot.
+/// Reads a message of kFixType or kRangeType; nothing also where the topic's ranges are not to a robot.
 Result<std::optional<AntennaSample>> read_antenna_sample(std::string_view topic, std::string_view type,
                                                          std::string_view bytes, RosEncoding encoding);
 

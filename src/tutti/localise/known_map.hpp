@@ -23,6 +23,10 @@ struct KnownMap {
     Eigen::Vector3d middle = Eigen::Vector3d::Zero();  ///< Middle of its trajectory, in the map's frame, m.
     std::string place;                                 ///< ClosureVerifier::place_of(); empty when it is unknown.
     PayloadSize size;
+    /// The frame of the keyframes' T_odom_body, as the map has it here.
+    [[nodiscard]] Pose3 T_world_odom() const {
+      return T_world_submap * submap->keyframes.front().T_odom_body.inverse();
+    }
   };
   std::string id;                      ///< The same for all versions of the map.
   std::uint64_t revision = 0;          ///< The map's.

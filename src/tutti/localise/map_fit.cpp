@@ -61,6 +61,13 @@ std::vector<std::uint32_t> free_cubes_of(const lidar::SubmapFeatures& features) 
   return out;
 }
 
+/// The newer fit takes the older one's place, unless it is of a visit that has only begun.
+void add_fit(SubmapId id, const SubmapFit& fit, std::map<SubmapId, SubmapFit>& fits) {
+  if (fit.scans == 0) return;
+  SubmapFit& kept = fits[id];
+  if (fit.scans >= kLeastVotes || fit.scans >= kept.scans) kept = fit;
+}
+
 }  // namespace
 
 void PlaceTrust::add(const SubmapFit& of_robot) {
@@ -180,11 +187,20 @@ void MapFit::see(const LocalMap& map, const fit::FitScan& scan, const Pose3& T_w
   }
 }
 
+std::map<SubmapId, SubmapFit> MapFit::fits() const {
+  std::map<SubmapId, SubmapFit> out = fits_;
+  for (const auto& [id, kept] : votes_) add_fit(id, kept.votes.fit(), out);
+  return out;
+}
+
 SubmapVotes& MapFit::votes_of(const std::shared_ptr<const lidar::SubmapFeatures>& features) {
   auto kept = votes_.find(features->id);
   if (kept == votes_.end()) {
-    if (votes_.size() >= kMostVoted)
-      votes_.erase(std::ranges::min_element(votes_, {}, [](const auto& other) { return other.second.used; }));
+    if (votes_.size() >= kMostVoted) {
+      const auto oldest = std::ranges::min_element(votes_, {}, [](const auto& other) { return other.second.used; });
+      add_fit(oldest->first, oldest->second.votes.fit(), fits_);
+      votes_.erase(oldest);
+    }
     kept = votes_.emplace(features->id, Kept{SubmapVotes(features)}).first;
   }
   kept->second.used = ++uses_;
@@ -204,12 +220,7 @@ void MapFit::count(const Seen& seen) {
   for (const auto& [T_submap_local, features] : seen.map.viewers) {
     std::vector<Eigen::Vector3f> in_submap;
     for (const Eigen::Vector3f& p : strange) in_submap.push_back((T_submap_local * p.cast<double>()).cast<float>());
-    SubmapVotes& votes = votes_of(features);
-    votes.add(view, in_submap, T_submap_local * T_local_body, seen.scan.stamp);
-    const SubmapFit fit = votes.fit();
-    if (fit.scans == 0) continue;
-    SubmapFit& kept = fits_[features->id];
-    if (fit.scans >= kLeastVotes || fit.scans >= kept.scans) kept = fit;  // of a visit that has begun little is known
+    votes_of(features).add(view, in_submap, T_submap_local * T_local_body, seen.scan.stamp);
   }
 }
 

@@ -29,7 +29,7 @@ struct SubmapFit {
 };
 inline constexpr double kFitCube_m = 0.3;
 
-/// What robots have found of one submap, together.
+/// Robots have found this of one submap, together.
 struct PlaceTrust {
   SubmapFit fit;           ///< Their sums, and the latest stamp.
   std::size_t robots = 0;  ///< That saw any of it.
@@ -52,7 +52,7 @@ inline constexpr std::uint16_t kLeastVotes = 3;
 std::uint32_t sure_of(std::set<Cube> cubes);
 inline constexpr std::size_t kLeastFitCubes = 6;
 
-/// What one scan saw in the cubes around the body: its points, and where its rays went, from the body's origin.
+/// One scan's view of the cubes around the body: its points, and where its rays went, from the body's origin.
 class ScanView {
  public:
   explicit ScanView(const lidar::OrientedCloud& scan);
@@ -97,7 +97,7 @@ class MapFit {
   void see(const LocalMap& map, const fit::FitScan& scan, const Pose3& T_world_body);
   /// The robot is lost: where it was lately, it may have been mistaken in.
   void doubt() { waiting_.clear(); }
-  [[nodiscard]] const std::map<SubmapId, SubmapFit>& fits() const { return fits_; }
+  [[nodiscard]] std::map<SubmapId, SubmapFit> fits() const;
 
   static constexpr double kDoubted_s = 3.0, kApart_m = 0.3, kApart_s = 5.0;
   static constexpr std::size_t kMostVoted = 48;
@@ -118,7 +118,7 @@ class MapFit {
   };
   std::map<SubmapId, Kept> votes_;
   std::uint64_t uses_ = 0;
-  std::map<SubmapId, SubmapFit> fits_;
+  std::map<SubmapId, SubmapFit> fits_;  // of those whose votes are not kept any more
 };
 
 }  // namespace tutti::localise

@@ -20,7 +20,7 @@ struct Crate {
   [[nodiscard]] bool has(const Vector3d& p) const { return ((p - middle).array().abs() <= 0.5 * size.array()).all(); }
 };
 
-/// What a LiDAR sees in a hall of 16 x 10 x 3 m with a wall across it at x = 3, with errors of 2 cm. Points in the body
+/// A LiDAR's scan in a hall of 16 x 10 x 3 m with a wall across it at x = 3, with errors of 2 cm. Points in the body
 /// frame.
 PointCloud look(const std::vector<Crate>& crates, const Pose3& T_world_body, Rng& rng) {
   const Crate wall{{3.0, 0.0, 1.5}, {0.2, 10.0, 3.0}};

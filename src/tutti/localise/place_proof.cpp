@@ -18,11 +18,8 @@ constexpr GuessGate kAloneGate{.least_overlap = 0.75, .most_contradiction = 0.06
 constexpr double kAloneQuality = 0.7;
 
 Shown shown_by(double overlap, double contradiction, double quality) {
-  const auto passes = [&](const GuessGate& gate) {
-    return overlap >= gate.least_overlap && contradiction <= gate.most_contradiction;
-  };
-  if (passes(kAloneGate) && quality >= kAloneQuality) return Shown::surely;
-  return passes(kAgreedGate) ? Shown::by_one : Shown::no;
+  if (kAloneGate.passes(overlap, contradiction) && quality >= kAloneQuality) return Shown::surely;
+  return kAgreedGate.passes(overlap, contradiction) ? Shown::by_one : Shown::no;
 }
 
 std::vector<Hypothesis> turned(const Hypothesis& place) {

@@ -33,10 +33,10 @@ class Stretch {
   std::vector<ReadyScan> scans_;
 };
 
-/// What the scans, of which there is one at least, show of a place: they are registered oldest first on the map about
-/// it, each from where the one before was. The place at the newest scan, with the mean of ScanMatch::quality(), and
-/// Hypothesis::shown by the means of overlap and contradiction. Nothing where the map shows nothing there, or the scans
-/// lie on it only farther off than is_same_place() allows.
+/// Registers the scans, of which there is one at least, oldest first on the map about a place, each from where the one
+/// before was. Returns the place at the newest scan, with the mean of ScanMatch::quality(), and Hypothesis::shown by
+/// the means of overlap and contradiction. Nothing where the map shows nothing there, or the scans lie on it only
+/// farther off than is_same_place() allows.
 std::optional<Hypothesis> proven(LocalMaps& maps, std::span<const ReadyScan> scans, const Hypothesis& place);
 
 /// The best kMostProven of the places that were found, and the best one with the robot turned by 90, 180 and 270

@@ -86,7 +86,7 @@ Assessment assess(const ScanMatch& match, const RelativePose& predicted) {
 Assessment assess_guess(const ScanMatch& match, const RelativePose& predicted) {
   const Assessment out = assess(match, predicted);
   if (out.evidence != Evidence::confirms) return out;
-  if (match.overlap >= kAgreedGate.least_overlap && match.contradiction <= kAgreedGate.most_contradiction) return out;
+  if (kAgreedGate.passes(match.overlap, match.contradiction)) return out;
   return {Evidence::nothing,
           fmt::format("{:.0f} % of the scan lies on the map and {:.0f} % contradicts it, expected {:.0f} "
                       "and {:.0f} % to begin with",

@@ -42,6 +42,9 @@ Assessment assess(const ScanMatch& match, const RelativePose& predicted);
 /// What a scan must show where a place was found, or a start pose given, and is not confirmed yet: shares of it.
 struct GuessGate {
   double least_overlap = 0.0, most_contradiction = 1.0;
+  [[nodiscard]] bool passes(double overlap, double contradiction) const {
+    return overlap >= least_overlap && contradiction <= most_contradiction;
+  }
 };
 inline constexpr GuessGate kAgreedGate{.least_overlap = 0.6, .most_contradiction = 0.15};
 /// As assess(), and only what passes kAgreedGate confirms.

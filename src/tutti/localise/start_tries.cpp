@@ -34,7 +34,7 @@ int steps_to(double sigma, double step) {
 std::vector<Pose3> nearest_on_levels(const KnownMap& map, const Eigen::Vector2d& at) {
   std::vector<std::pair<double, Pose3>> near;
   for (const auto& [id, entry] : map.submaps) {
-    const Pose3 T_world_odom = entry.T_world_submap * entry.submap->keyframes.front().T_odom_body.inverse();
+    const Pose3 T_world_odom = entry.T_world_odom();
     for (const Keyframe& keyframe : entry.submap->keyframes) {
       const Pose3 pose = T_world_odom * keyframe.T_odom_body;
       const double away_m = (pose.translation.head<2>() - at).norm();

@@ -91,8 +91,7 @@ void measure_starts(const localise::KnownMap& map, const Trajectory& reference, 
   std::vector<Eigen::Vector3d> seen_from;
   for (const auto& [id, entry] : map.submaps)
     for (const Keyframe& keyframe : entry.submap->keyframes)
-      seen_from.push_back(entry.T_world_submap *
-                          (entry.submap->keyframes.front().T_odom_body.inverse() * keyframe.T_odom_body.translation));
+      seen_from.push_back(entry.T_world_odom() * keyframe.T_odom_body.translation);
   const Timestamp begin = robot.course.empty() ? reference.front().stamp : robot.course.front().stamp;
   for (LocalisedRobot::Start& start : robot.starts)
     for (const StampedPose& pose : reference) {
