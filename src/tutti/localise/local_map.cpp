@@ -12,14 +12,21 @@ constexpr double kStays_m = 4.0;
 
 }  // namespace
 
-std::shared_ptr<const lidar::SubmapFeatures> LocalMaps::features_of(SubmapId id) {
-  if (const auto kept = features_.find(id); kept != features_.end()) return kept->second;
-  if (features_.size() >= kMostKept) features_.clear();  // it was elsewhere
+Result<LocalMaps::Features> LocalMaps::features_of(SubmapId id) {
+  if (const auto kept = features_.find(id); kept != features_.end()) {
+    kept->second.used = ++uses_;
+    return kept->second.features;
+  }
+  auto cloud = map_->payloads->cloud(id);
+  if (!cloud) return tl::unexpected(cloud.error());
   Submap submap = *map_->submaps.at(id).submap;
-  if (auto cloud = map_->payloads->cloud(id)) submap.cloud = std::move(*cloud);  // without it nothing is shown there
+  submap.cloud = std::move(*cloud);
+  if (features_.size() >= kMostKept)
+    features_.erase(std::ranges::min_element(features_, {}, [](const auto& kept) { return kept.second.used; }));
   ++extracted_;
-  return features_[id] =
-             std::make_shared<const lidar::SubmapFeatures>(lidar::extract_features(std::move(submap), config_));
+  auto features = std::make_shared<const lidar::SubmapFeatures>(lidar::extract_features(submap, config_));
+  features_[id] = {features, ++uses_};
+  return features;
 }
 
 const LocalMap* LocalMaps::about(const Eigen::Vector3d& p_world) {
@@ -33,10 +40,10 @@ const LocalMap* LocalMaps::about(const Eigen::Vector3d& p_world) {
   std::vector<lidar::PosedOriented> parts;
   for (const SubmapId& id : local_.submaps) {
     const auto features = features_of(id);
-    if (!features->usable) continue;
+    if (!features || !(*features)->usable) continue;  // nothing is shown there
     const Pose3 T_local_submap = T_world_local.inverse() * map_->submaps.at(id).T_world_submap;
-    local_.viewers.push_back({T_local_submap.inverse(), features});
-    parts.push_back({T_local_submap, &features->cloud});
+    local_.viewers.push_back({T_local_submap.inverse(), *features});
+    parts.push_back({T_local_submap, &(*features)->cloud});
   }
   if (parts.empty()) return nullptr;
   ++made_;

@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "tutti/base/result.hpp"
 #include "tutti/localise/known_map.hpp"
 #include "tutti/perception/lidar/closure_config.hpp"
 #include "tutti/perception/lidar/submap_features.hpp"
@@ -33,19 +34,26 @@ class LocalMaps {
 
   /// The local map about a point; null where the map has no cloud within kReach_m.
   const LocalMap* about(const Eigen::Vector3d& p_world);
+  using Features = std::shared_ptr<const lidar::SubmapFeatures>;
+  /// Those of a submap of the map, never null; computed once while they are kept. An error: its cloud cannot be read.
+  Result<Features> features_of(SubmapId id);
+  [[nodiscard]] const lidar::LidarClosureConfig& config() const { return config_; }
   static constexpr double kReach_m = 25.0;
   static constexpr std::size_t kMostSubmaps = 6;
-  static constexpr std::size_t kMostKept = 48;  ///< Features of submaps.
+  static constexpr std::size_t kMostKept = 64;  ///< Features of submaps, those used last.
 
   [[nodiscard]] std::size_t made() const { return made_; }            ///< Local maps.
   [[nodiscard]] std::size_t extracted() const { return extracted_; }  ///< Submaps whose features were computed.
 
  private:
-  std::shared_ptr<const lidar::SubmapFeatures> features_of(SubmapId id);
-
   std::shared_ptr<const KnownMap> map_;
   lidar::LidarClosureConfig config_;
-  std::map<SubmapId, std::shared_ptr<const lidar::SubmapFeatures>> features_;
+  struct Kept {
+    Features features;
+    std::size_t used = 0;  ///< The last of so many uses.
+  };
+  std::map<SubmapId, Kept> features_;
+  std::size_t uses_ = 0;
   LocalMap local_;
   std::size_t made_ = 0, extracted_ = 0;
 };

@@ -5,6 +5,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "tutti/base/check.hpp"
@@ -275,13 +276,26 @@ void Localiser::take_submaps() {
   submaps_.take_image_errors();
 }
 
+/// Those that a submap fits. Scans prove what clouds fit roughly; the verifier is asked about images.
+Result<SearchResult> Localiser::find_places(const Submap& submap) {
+  const KnownMap& map = *setup_.map;
+  auto alike = most_alike(map, *verifier_, submap, static_cast<std::size_t>(setup_.config.candidates));
+  const auto with_clouds = std::ranges::stable_partition(
+      alike, [&](SubmapId id) { return submap.cloud == nullptr || map.submaps.at(id).size.points == 0; });
+  auto found = search(map, *verifier_, submap, {alike.begin(), with_clouds.begin()});
+  if (!found || with_clouds.empty()) return found;
+  auto rough = rough_places(map, local_maps_, submap, {with_clouds.begin(), with_clouds.end()});
+  if (!rough) return rough;
+  std::ranges::move(rough->places, std::back_inserter(found->places));
+  found->compared += rough->compared;
+  return found;
+}
+
 /// Compares a submap with the map, where that may tell something.
 void Localiser::consider(const Submap& submap) {
   if (payload_size(submap) == PayloadSize()) return;
   if (track_ && has_scans() && state_ == State::localised) return;  // scans follow it
-  const auto candidates =
-      most_alike(*setup_.map, *verifier_, submap, static_cast<std::size_t>(setup_.config.candidates));
-  auto found = search(*setup_.map, *verifier_, submap, candidates);
+  auto found = find_places(submap);
   if (!found) {
     why_ = found.error().message;
     return;
@@ -296,8 +310,9 @@ void Localiser::consider(const Submap& submap) {
 void Localiser::decide(SearchResult found, const Submap& submap) {
   if (has_scans()) {
     const auto scans = stretch_.scans();
-    found.places = scans.size() < Stretch::kLeast ? std::vector<Hypothesis>()
-                                                  : all_proven(local_maps_, scans, std::move(found.places));
+    found.places = scans.size() < Stretch::kLeast
+                       ? std::vector<Hypothesis>()
+                       : all_proven(local_maps_, scans, std::move(found.places), work_.registered);
   }
   const bool knows = track_ && track_->to_confirm == 0;  // it has left the map, say
   if (found.places.empty() || found.places.front().shown == Shown::no) {

@@ -102,6 +102,7 @@ class Localiser {
   void confirm(const ScanMatch& match);
   void doubt(const Assessment& assessment, Timestamp stamp);
   void take_submaps();
+  Result<SearchResult> find_places(const Submap& submap);
   void consider(const Submap& submap);
   void decide(SearchResult found, const Submap& submap);
   void begin_track(const Hypothesis& place);

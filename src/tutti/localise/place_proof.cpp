@@ -48,8 +48,11 @@ void Stretch::add(ReadyScan scan) {
   scans_.push_back(std::move(scan));
 }
 
-std::optional<Hypothesis> proven(LocalMaps& maps, std::span<const ReadyScan> scans, const Hypothesis& place) {
+std::optional<Hypothesis> proven(LocalMaps& maps, std::span<const ReadyScan> scans, const Hypothesis& place,
+                                 double least_quality, std::size_t& registered) {
   TUTTI_CHECK(!scans.empty(), "no scans");
+  const auto count = static_cast<double>(scans.size());
+  double left = count;  // at most, of the sum of qualities
   Hypothesis out = place;
   double quality = 0.0, overlap = 0.0, contradiction = 0.0;
   for (const ReadyScan& seen : scans) {
@@ -57,26 +60,28 @@ std::optional<Hypothesis> proven(LocalMaps& maps, std::span<const ReadyScan> sca
     const LocalMap* local = maps.about(T_world_body.translation);
     if (local == nullptr) return std::nullopt;
     ScanMatch match = match_scan(*local, seen.scan, T_world_body);
+    ++registered;
     quality += match.quality();
     overlap += match.overlap;
     contradiction += match.contradiction;
+    if (quality + --left < least_quality * count) return std::nullopt;
     out.T_world_body = std::move(match.T_world_body);
     out.at = seen.at;
   }
   if (!is_same_place(out, place, scans.back().at.pose)) return std::nullopt;
-  const auto count = static_cast<double>(scans.size());
   out.quality = quality / count;
   out.shown = shown_by(overlap / count, contradiction / count, out.quality);
   return out;
 }
 
-std::vector<Hypothesis> all_proven(LocalMaps& maps, std::span<const ReadyScan> scans, std::vector<Hypothesis> found) {
+std::vector<Hypothesis> all_proven(LocalMaps& maps, std::span<const ReadyScan> scans, std::vector<Hypothesis> found,
+                                   std::size_t& registered) {
   std::ranges::stable_sort(found, is_better);
   if (found.size() > kMostProven) found.resize(kMostProven);
   std::vector<Hypothesis> out;
   const auto prove = [&](const std::vector<Hypothesis>& places) {
     for (const Hypothesis& place : places) {
-      auto one = proven(maps, scans, place);
+      auto one = proven(maps, scans, place, out.empty() ? 0.0 : kRival * out.front().quality, registered);
       if (!one) continue;
       const auto same = std::ranges::find_if(
           out, [&](const Hypothesis& other) { return is_same_place(other, *one, scans.back().at.pose); });
@@ -84,8 +89,8 @@ std::vector<Hypothesis> all_proven(LocalMaps& maps, std::span<const ReadyScan> s
         out.push_back(std::move(*one));
       else if (is_better(*one, *same))
         *same = std::move(*one);
+      std::ranges::stable_sort(out, is_better);
     }
-    std::ranges::stable_sort(out, is_better);
   };
   prove(found);
   if (!out.empty()) prove(turned(out.front()));

@@ -39,7 +39,7 @@ TEST(PlaceProof, ScansShowTheRightPlaceAndNoOther) {
   const test::World world = test::make_world(3);
   const Recording& robot = world.robots[2];
   LocalMaps maps(world.map, {});
-  std::size_t shown = 0;
+  std::size_t shown = 0, registered = 0, most = 0;
   for (const std::size_t from : {50, 200, 350}) {
     Stretch stretch;
     for (std::size_t k = from; k < from + 50; ++k) {
@@ -61,7 +61,9 @@ TEST(PlaceProof, ScansShowTheRightPlaceAndNoOther) {
     const Pose3 about{so3_exp({0.0, 0.0, std::numbers::pi}), {0.0, 0.0, 0.0}};
     Hypothesis right = place(near, from + 25);
     right.quality = 0.3;
-    const auto proven = all_proven(maps, stretch.scans(), {place(about, from + 25), place({}, from + 150), right});
+    const auto proven =
+        all_proven(maps, stretch.scans(), {place(about, from + 25), place({}, from + 150), right}, registered);
+    most += 6 * stretch.scans().size();  // the three and three turns
     ASSERT_FALSE(proven.empty());
     const Hypothesis& best = proven.front();
     EXPECT_EQ(best.at, stretch.scans().back().at);
@@ -73,6 +75,7 @@ TEST(PlaceProof, ScansShowTheRightPlaceAndNoOther) {
     for (std::size_t k = 1; k < proven.size(); ++k) EXPECT_LT(proven[k].quality, kRival * best.quality);
   }
   EXPECT_EQ(shown, 3U);
+  EXPECT_LT(5 * registered, 4 * most);  // what cannot be a rival any more is given up
 }
 
 }  // namespace place_proof_test

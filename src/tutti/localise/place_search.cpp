@@ -9,6 +9,8 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/perception/lidar/submap_features.hpp"
+#include "tutti/perception/lidar/verify.hpp"
 
 namespace tutti::localise {
 namespace {
@@ -33,18 +35,6 @@ class WithOwn final : public server::PayloadStore {
 const Keyframe* keyframe_of(const Submap& submap, const KeyframeId& id) {
   const auto found = std::ranges::find(submap.keyframes, id.index, &Keyframe::index);
   return found == submap.keyframes.end() ? nullptr : &*found;
-}
-
-/// fit_quality() as the LiDAR's verifier has it; without such evidence 1 where the verifier accepts.
-double quality_of(const std::vector<Refusal>& evidence, bool accepted) {
-  double overlap = -1.0, contradiction = 0.0, rmse_m = 0.0;
-  for (const Refusal& measured : evidence) {
-    if (measured.reason == RefusalReason::overlap) overlap = measured.value;
-    if (measured.reason == RefusalReason::contradicted) contradiction = measured.value;
-    if (measured.reason == RefusalReason::plane_rmse) rmse_m = measured.value;
-  }
-  if (overlap < 0.0) return accepted ? 1.0 : 0.0;
-  return fit_quality(overlap, contradiction, rmse_m);
 }
 
 /// Where the robot was by one alignment with a submap of the map; nothing where the closure names unknown keyframes.
@@ -75,10 +65,6 @@ void add(Hypothesis one, std::vector<Hypothesis>& places) {
 }
 
 }  // namespace
-
-double fit_quality(double overlap, double contradiction, double plane_rmse_m) {
-  return overlap * (1.0 - contradiction) * std::max(0.0, 1.0 - plane_rmse_m * plane_rmse_m / (kClose_m * kClose_m));
-}
 
 bool is_same_place(const Hypothesis& a, const Hypothesis& b, const Pose3& T_odom_body) {
   const Pose3 difference = (a.T_world_odom() * T_odom_body).inverse() * (b.T_world_odom() * T_odom_body);
@@ -125,6 +111,28 @@ std::vector<SubmapId> most_alike(const KnownMap& map, const server::ClosureVerif
   return out;
 }
 
+Result<SearchResult> rough_places(const KnownMap& map, LocalMaps& maps, const Submap& own,
+                                  const std::vector<SubmapId>& candidates) {
+  const lidar::SubmapFeatures seen = lidar::extract_features(own, maps.config());
+  const Keyframe &first = own.keyframes.front(), &middle = own.keyframes[own.keyframes.size() / 2];
+  const Pose3 T_own_middle = first.T_odom_body.inverse() * middle.T_odom_body;
+  SearchResult out;
+  for (const SubmapId& id : candidates) {
+    const auto features = maps.features_of(id);
+    if (!features) return tl::unexpected(features.error());
+    ++out.compared;
+    const Pose3& T_world_submap = map.submaps.at(id).T_world_submap;
+    const auto rough = lidar::rough_alignments(**features, seen, maps.config());
+    if (rough.empty()) continue;
+    add({.submap = id,
+         .T_world_body = {T_world_submap * rough.front().T_a_b * T_own_middle, Matrix6d::Identity()},
+         .at = {middle.stamp, middle.T_odom_body},
+         .quality = rough.front().quality},
+        out.places);
+  }
+  return out;
+}
+
 Result<SearchResult> search(const KnownMap& map, const server::ClosureVerifier& verifier, const Submap& own,
                             const std::vector<SubmapId>& candidates) {
   TUTTI_CHECK(map.submaps.empty() || map.submaps.rbegin()->first < own.id, "the map has the robot's chain");
@@ -140,7 +148,7 @@ Result<SearchResult> search(const KnownMap& map, const server::ClosureVerifier& 
     auto hypothesis = hypothesis_of(entry, own, *seen->best);
     if (!hypothesis) continue;
     hypothesis->accepted = seen->refusal ? 0 : 1;
-    hypothesis->quality = quality_of(seen->evidence, hypothesis->accepted > 0);
+    hypothesis->quality = seen->refusal ? 0.0 : 1.0;
     add(std::move(*hypothesis), out.places);
   }
   for (Hypothesis& place : out.places)

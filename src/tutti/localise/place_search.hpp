@@ -7,16 +7,12 @@
 
 #include "tutti/base/result.hpp"
 #include "tutti/localise/known_map.hpp"
+#include "tutti/localise/local_map.hpp"
 #include "tutti/model/relative_pose.hpp"
 #include "tutti/model/trajectory.hpp"
 #include "tutti/server/closure_verifier.hpp"
 
 namespace tutti::localise {
-
-/// How well clouds lie on each other, in [0, 1]. Where things look alike as much of them overlaps as at the right
-/// place, but not as closely: each point counts by 1 - (r / kClose_m)^2 for its distance r from the other's surface.
-double fit_quality(double overlap, double contradiction, double plane_rmse_m);
-inline constexpr double kClose_m = 0.15;
 
 /// Whether a place is shown to be the robot's.
 enum class Shown {
@@ -54,6 +50,11 @@ struct SearchResult {
 /// places are unknown, the first ones.
 std::vector<SubmapId> most_alike(const KnownMap& map, const server::ClosureVerifier& verifier, const Submap& own,
                                  std::size_t candidates);
+
+/// Where a submap of the robot may be, whose cloud lies roughly on those of the candidates: nothing of it is shown
+/// until scans prove it (place_proof.hpp). An error: a cloud could not be read.
+Result<SearchResult> rough_places(const KnownMap& map, LocalMaps& maps, const Submap& own,
+                                  const std::vector<SubmapId>& candidates);
 
 /// Compares a submap of the robot, whose chain the map does not have and comes after all of its, with submaps of the
 /// map by the same verifier as a server does. An error: a payload could not be read.

@@ -51,6 +51,10 @@ void count_contradictions(const LocalMap& map, const fit::FitScan& scan, const P
 
 }  // namespace
 
+double ScanMatch::quality() const {
+  return overlap * (1.0 - contradiction) * std::max(0.0, 1.0 - plane_rmse_m * plane_rmse_m / (kClose_m * kClose_m));
+}
+
 ScanMatch match_scan(const LocalMap& map, const fit::FitScan& scan, const Pose3& T_world_body) {
   const Pose3 T_local_begun = map.T_world_local.inverse() * T_world_body;
   const auto found = lidar::register_clouds(map.cloud, scan.cloud, T_local_begun, registration_config());

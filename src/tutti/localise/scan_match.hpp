@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "tutti/localise/local_map.hpp"
-#include "tutti/localise/place_search.hpp"
 #include "tutti/localise/start_tries.hpp"
 #include "tutti/model/relative_pose.hpp"
 #include "tutti/perception/fit/scan_step.hpp"
@@ -20,7 +19,10 @@ struct ScanMatch {
   double plane_rmse_m = 0.0;   ///< Point to plane, over these.
   double contradiction = 0.0;  ///< Share of the points in view that stand where the other side looked through.
   int in_view = 0;             ///< Points of either side that the other looked at.
-  [[nodiscard]] double quality() const { return fit_quality(overlap, contradiction, plane_rmse_m); }
+  /// How well it fits, in [0, 1]. Where things look alike as much of a scan overlaps as at the right place, but not as
+  /// closely: each point counts by 1 - (r / kClose_m)^2 for its distance r from the map's surface.
+  [[nodiscard]] double quality() const;
+  static constexpr double kClose_m = 0.15;
 };
 
 /// Registers a scan on a local map (lidar::register_clouds()) from `T_world_body`, and counts what contradicts it both

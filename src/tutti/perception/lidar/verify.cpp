@@ -36,13 +36,6 @@ double contradiction(const SubmapFeatures& a, const SubmapFeatures& b, const Pos
   return in_view > 0 ? static_cast<double>(against) / in_view : 1.0;
 }
 
-/// An alignment after the coarse levels.
-struct Contender {
-  Pose3 T_a_b;
-  double quality = 0.0;  ///< Overlap that nothing contradicts, less where it does not fit.
-  double score = 0.0;
-};
-
 RegistrationConfig with_levels(RegistrationConfig config, std::vector<RegistrationLevel> levels) {
   config.levels = std::move(levels);
   return config;
@@ -71,40 +64,18 @@ RegistrationConfig coarse_levels(RegistrationConfig config) {
 }
 
 /// The coarse registration of a start, if anything comes of it.
-std::optional<Contender> contend(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_init, double score,
-                                 const LidarClosureConfig& config) {
+std::optional<RoughAlignment> contend(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_init,
+                                      double score, const LidarClosureConfig& config) {
   const auto result = register_clouds(a.cloud, b.cloud, T_init, coarse_levels(config.registration));
   if (is_hopeless(result, kCoarseMisfit, config)) return std::nullopt;
   const double clear = 1.0 - contradiction(a, b, result.T_target_source);
-  return Contender{result.T_target_source, result.overlap * clear / std::max(1.0, result.misfit), score};
+  return RoughAlignment{result.T_target_source, result.overlap * clear / std::max(1.0, result.misfit), score};
 }
 
 bool is_same(const Pose3& T, const Pose3& other, const SubmapFeatures& b, double distance_m) {
   const Pose3 difference = other.inverse() * T;
   return rotation_angle(difference) * kDegPerRad < kDistinct_deg &&
          (difference * b.middle - b.middle).norm() < distance_m;
-}
-
-/// Coarsely registered guesses, best first; of those that ended in the same place, the best.
-std::vector<Contender> contenders(const SubmapFeatures& a, const SubmapFeatures& b, const LidarClosureConfig& config) {
-  // One within reach is worth nothing without knowing what the others are worth; without one neither are they.
-  const auto guesses = propose_alignments(a, b, config);
-  const double reach = config.max_viewpoint_distance_m + kDistinct_m;
-  std::vector<Contender> all;
-  for (const bool near : {true, false}) {
-    for (const auto& guess : guesses)
-      if ((viewpoint_distance(a, b, guess.T_a_b) <= reach) == near)
-        if (const auto T_init = screen(a, b, guess.T_a_b, config))
-          if (const auto contender = contend(a, b, *T_init, guess.score, config)) all.push_back(*contender);
-    if (all.empty()) return {};
-  }
-  std::stable_sort(all.begin(), all.end(), [](const auto& p, const auto& q) { return p.quality > q.quality; });
-  std::vector<Contender> distinct;
-  for (const auto& one : all)
-    if (std::none_of(distinct.begin(), distinct.end(),
-                     [&](const Contender& other) { return is_same(one.T_a_b, other.T_a_b, b, kDistinct_m); }))
-      distinct.push_back(one);
-  return distinct;
 }
 
 /// Along a corridor that looks the same everywhere every place fits nearly as well: the best quality that is reached
@@ -193,7 +164,7 @@ void add_bend_and_evidence(const SubmapFeatures& a, const SubmapFeatures& b, con
 }
 
 /// The best of the alignments, as far as the gates let it.
-PairVerification verify_best(const SubmapFeatures& a, const SubmapFeatures& b, std::span<const Contender> ranked,
+PairVerification verify_best(const SubmapFeatures& a, const SubmapFeatures& b, std::span<const RoughAlignment> ranked,
                              const LidarClosureConfig& config) {
   PairVerification out;
   if (ranked.empty()) {
@@ -237,17 +208,40 @@ PairVerification inverse(PairVerification v) {
   return v;
 }
 
+std::vector<RoughAlignment> rough_alignments(const SubmapFeatures& a, const SubmapFeatures& b,
+                                             const LidarClosureConfig& config) {
+  if (!a.usable || !b.usable) return {};
+  // One within reach is worth nothing without knowing what the others are worth; without one neither are they.
+  const auto guesses = propose_alignments(a, b, config);
+  const double reach = config.max_viewpoint_distance_m + kDistinct_m;
+  std::vector<RoughAlignment> all;
+  for (const bool near : {true, false}) {
+    for (const auto& guess : guesses)
+      if ((viewpoint_distance(a, b, guess.T_a_b) <= reach) == near)
+        if (const auto T_init = screen(a, b, guess.T_a_b, config))
+          if (const auto contender = contend(a, b, *T_init, guess.score, config)) all.push_back(*contender);
+    if (all.empty()) return {};
+  }
+  std::stable_sort(all.begin(), all.end(), [](const auto& p, const auto& q) { return p.quality > q.quality; });
+  std::vector<RoughAlignment> distinct;
+  for (const auto& one : all)
+    if (std::none_of(distinct.begin(), distinct.end(),
+                     [&](const RoughAlignment& other) { return is_same(one.T_a_b, other.T_a_b, b, kDistinct_m); }))
+      distinct.push_back(one);
+  return distinct;
+}
+
 PairVerification verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, const LidarClosureConfig& config) {
   TUTTI_CHECK(!config.registration.levels.empty(), "a registration needs at least one level");
   if (!a.usable || !b.usable) return {.refusal = (a.usable ? b : a).refusal};
   if (b.id < a.id) return inverse(verify_pair(b, a, config));
-  const auto ranked = contenders(a, b, config);
+  const auto ranked = rough_alignments(a, b, config);
   PairVerification upright = verify_best(a, b, ranked, config);
   // Alignments differ by yaw and a shift. Where one robot's odometry takes up for down, the mirror image of a plain
   // hall passes all gates, and only half a turn about a horizontal axis fits better.
   if (a.id.chain.robot == b.id.chain.robot || !(upright.accepted || is_sample(a.id, b.id))) return upright;
   const SubmapFeatures over = turned_over(b, config);
-  const auto ranked_over = contenders(a, over, config);
+  const auto ranked_over = rough_alignments(a, over, config);
   if (ranked_over.empty()) return upright;
   if (!ranked.empty() && ranked.front().quality > config.max_rival_ratio * ranked_over.front().quality) return upright;
   PairVerification turned = verify_best(a, over, ranked_over, config);

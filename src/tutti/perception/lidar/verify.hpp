@@ -39,6 +39,18 @@ struct PairVerification {
   std::vector<Refusal> evidence;  ///< Every gate's value and limit, when accepted.
 };
 
+/// Where `b` may lie on `a`, by the coarse levels of the registration.
+struct RoughAlignment {
+  Pose3 T_a_b;           ///< Between the submap frames.
+  double quality = 0.0;  ///< In [0, 1]: overlap that nothing contradicts, less where it does not fit.
+  double score = 0.0;    ///< Correlation of the views from above.
+};
+
+/// Distinct alignments, best first, upright and without the gates of verify_pair(); for less than half of its cost.
+/// None for unusable submaps. config.registration.levels must not be empty.
+std::vector<RoughAlignment> rough_alignments(const SubmapFeatures& a, const SubmapFeatures& b,
+                                             const LidarClosureConfig& config);
+
 /// Decides from the two submaps alone whether they show the same place. Those of two robots may be upside down to each
 /// other. Computed in the order of the submap ids, so
 /// verify_pair(b, a) is exactly the inverse. config.registration.levels must not be empty.
