@@ -37,8 +37,8 @@ std::string take_antenna(const BagIndex& index, const OdometryTrack& odometry, c
   constexpr std::size_t kMostPlaces = 4;
   const bags::OdometryArrivals arrivals(odometry.arrivals);
   std::set<std::string> places;  // mostly one
-  for (std::size_t i = 0; i < track.samples.size(); ++i) {
-    bags::AntennaSample& sample = track.samples[i];
+  for (std::size_t i = 0; i < track.items.size(); ++i) {
+    bags::AntennaSample& sample = track.items[i];
     const bags::Arrival& arrival = track.arrivals[i];
     if (const Status ok = bags::check_clock(arrival.stamp, arrivals.newest_at(arrival.logged)); !ok) {
       track.refused.add(arrival.message, ok.error().message);
@@ -67,7 +67,7 @@ Status choose_fixes(BagIndex& index, const OdometryTrack& odometry, const RobotC
   const std::string& wanted = robot.topics.fixes;
   std::vector<std::string> topics;
   for (const auto& [topic, track] : index.fixes)
-    if (wanted.empty() ? !track.samples.empty() : topic == wanted) topics.push_back(topic);
+    if (wanted.empty() ? !track.items.empty() : topic == wanted) topics.push_back(topic);
   if (topics.empty() && wanted.empty()) {
     note_no_fixes(index, out.notes);
     return {};

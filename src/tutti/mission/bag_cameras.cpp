@@ -25,7 +25,7 @@ Result<BagCamera> camera_of(const BagIndex& index, const ImageTrack& track, cons
   const auto T_body_camera = index.tree.find(body, seen.first->frame);
   if (!T_body_camera)
     return fail(ErrorCode::invalid, "{}: no transform from '{}' to '{}'", seen.topic, seen.first->frame, body);
-  return BagCamera{seen.topic, {*model, *T_body_camera}, track.images, seen.is_compressed};
+  return BagCamera{seen.topic, {*model, *T_body_camera}, track.items, seen.is_compressed};
 }
 
 bool is_wanted(const std::string& topic, const std::string& list) {
@@ -46,7 +46,7 @@ void take_imu(const BagIndex& index, const std::string& body, const RobotConfig&
   if (!T_body_imu) return without_imu(fmt::format("{}: no transform from '{}' to '{}'", topic, track.frame, body));
   if (const Status ok = bags::check_imu_place(*T_body_imu); !ok)
     return without_imu(fmt::format("{}: {}", topic, ok.error().message));
-  out.imu = track.samples;
+  out.imu = track.items;
   for (ImuSample& sample : out.imu) sample = bags::in_body(sample, *T_body_imu);
   out.notes.push_back(fmt::format("IMU of {} ({} samples, {} refused)", topic, out.imu.size(), track.refused.count));
 }
@@ -66,7 +66,7 @@ std::vector<bags::ImageTopic> depths_of(const BagIndex& index, const RobotConfig
     if (!track.seen.shows_depth()) continue;
     names += (names.empty() ? "" : ", ") + topic;
     if (!wanted.empty() && topic != wanted) continue;
-    if (track.images.empty())
+    if (track.items.empty())
       because(note_of(topic, track.refused, track.messages));
     else if (!track.seen.info && wanted.empty())
       because(fmt::format("{}: no sensor_msgs/CameraInfo beside it; if its frame and size are the camera's: {}{}",
@@ -100,7 +100,7 @@ void take_choice(const BagIndex& index, const bags::CameraChoice& choice, std::v
     const std::string& topic = depths[*choice.depth].topic;
     const ImageTrack& track = take(topic);
     used += fmt::format(", depth of {} ({})", topic, track.seen.first->encoding);
-    out.depth = BagDepth{topic, track.images, track.seen.is_compressed};
+    out.depth = BagDepth{topic, track.items, track.seen.is_compressed};
   }
   out.notes.push_back("images of " + used);
   out.notes.insert(out.notes.end(), refused.begin(), refused.end());

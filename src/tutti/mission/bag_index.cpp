@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 
 #include "tutti/bags/camera.hpp"
@@ -22,53 +23,61 @@ using bags::BagMessage;
 
 void take_pose(OdometryTrack& track, const BagMessage& message, Timestamp stamp, const Eigen::Vector3d& position,
                const Eigen::Quaterniond& q) {
-  ++track.messages;
   const auto pose = bags::to_pose(position, q);
-  if (!pose) return track.refused.add(track.messages, pose.error().message);
+  if (!pose) return track.refuse(pose.error().message);
   track.scaled += bags::is_scaled(q) ? 1 : 0;
-  track.poses.push_back({stamp, *pose});
-  track.arrivals.push_back({stamp, message.log_time, track.messages});
+  track.add({stamp, *pose}, stamp, message.log_time);
 }
 
-/// Puts items and arrivals, which are one for one, into the order in which they were logged, if the file has another.
+/// First into the order in which they were logged, if the file has another, then by their stamps.
 template <class Item>
-void put_in_log_order(std::vector<Item>& items, std::vector<bags::Arrival>& arrivals) {
-  const std::vector<std::size_t> order = bags::log_order(arrivals);
-  if (std::ranges::is_sorted(order)) return;
-  std::vector<Item> sorted;
-  std::vector<bags::Arrival> sorted_arrivals;
-  for (const std::size_t at : order) {
-    sorted.push_back(std::move(items[at]));
-    sorted_arrivals.push_back(arrivals[at]);
-  }
-  items = std::move(sorted);
-  arrivals = std::move(sorted_arrivals);
-}
-
-/// Items and arrivals are one for one.
-template <class Item>
-bags::StampOrder put_in_order(std::vector<Item>& items, std::vector<bags::Arrival>& arrivals, Refusals& refused) {
-  put_in_log_order(items, arrivals);
-  bags::StampOrder order = bags::order_by_stamp(arrivals);
-  for (const auto& [at, why] : order.refused) refused.add(arrivals[at].message, why);
-  std::vector<Item> sorted;
-  std::vector<bags::Arrival> sorted_arrivals;
-  sorted.reserve(order.used.size());
-  sorted_arrivals.reserve(order.used.size());
-  for (const std::size_t at : order.used) {
-    sorted.push_back(std::move(items[at]));
-    sorted_arrivals.push_back(arrivals[at]);
-  }
-  items = std::move(sorted);
-  arrivals = std::move(sorted_arrivals);
+bags::StampOrder put_in_order(Track<Item>& track) {
+  if (const auto logged = bags::log_order(track.arrivals); !std::ranges::is_sorted(logged)) track.select(logged);
+  bags::StampOrder order = bags::order_by_stamp(track.arrivals);
+  for (const auto& [at, why] : order.refused) track.refused.add(track.arrivals[at].message, why);
+  track.select(order.used);
   return order;
 }
 
-void refuse(OdometryTrack& track, const Error& error) { track.refused.add(++track.messages, error.message); }
+/// What messages say of their frames: of the odometry's, and of its body's.
+using FramePair = std::pair<std::string, std::string>;
+bool is_like(const std::string& frame, const std::string& most) { return frame == most; }
+bool is_like(const FramePair& frames, const FramePair& most) {
+  const auto is_of = [](const std::string& name, const std::string& topic) { return name.empty() || name == topic; };
+  return is_of(frames.first, most.first) && is_of(frames.second, most.second);
+}
+std::string in_quotes(const std::string& frame) { return fmt::format("'{:.80}'", frame); }
+std::string in_quotes(const FramePair& frames) { return in_quotes(frames.first) + " -> " + in_quotes(frames.second); }
+
+/// The frames that most messages name are the topic's, wherever the first ones were in; messages that name others are
+/// of something else. `frames` are those of each item.
+template <class Item, class Frames>
+Frames keep_most(Track<Item>& track, const std::vector<Frames>& frames, const char* what) {
+  std::map<Frames, std::size_t> counts;
+  for (const Frames& of_item : frames)
+    if (!std::is_same_v<Frames, FramePair> || of_item != Frames()) ++counts[of_item];  // a pose may name none
+  if (counts.empty()) return {};
+  const Frames most = std::ranges::max_element(counts, {}, [](const auto& entry) { return entry.second; })->first;
+  std::vector<std::size_t> kept;
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    if (is_like(frames[i], most))
+      kept.push_back(i);
+    else
+      track.refused.add(track.arrivals[i].message,
+                        fmt::format("{} {}, expected {} as of most", what, in_quotes(frames[i]), in_quotes(most)));
+  track.select(kept);
+  return most;
+}
 
 /// An encoding that is not ROS's counts as CDR: then decoding reports what it found instead.
 bags::RosEncoding encoding_of(const BagMessage& message) {
   return bags::to_encoding(message.channel->message_encoding).value_or(bags::RosEncoding::cdr);
+}
+
+template <class Of>
+Of& counted(Of& track) {
+  ++track.messages;
+  return track;
 }
 
 class Indexer {
@@ -79,18 +88,18 @@ class Indexer {
     const std::string& topic = message.channel->topic;
     switch (bags::use_of(message.channel->type)) {
       case bags::Use::odometry:
-        return take_odometry(index.odometry[topic], message);
+        return take_odometry(counted(index.odometry[topic]), message);
       case bags::Use::poses:
-        return take_pose_stamped(index.poses[topic], message);
+        return take_pose_stamped(counted(index.poses[topic]), message);
       case bags::Use::transforms:
         return take_transforms(message, bags::is_static_tf(topic));
       case bags::Use::scans:
-        return take_scan(index.scans[topic], message);
+        return take_scan(counted(index.scans[topic]), message);
       case bags::Use::fixes:
-        return take_antenna(index.fixes[topic], message);
+        return take_antenna(counted(index.fixes[topic]), message);
       case bags::Use::ranges:
-        if (!bags::ranged_robot(topic).empty()) take_antenna(index.ranges[topic], message);  // others are to walls
-        return;
+        if (!bags::ranged_robot(topic).empty()) take_antenna(counted(index.ranges[topic]), message);
+        return;  // others are to walls
       default:
         if (with_images_) take_sight(message);
         return;
@@ -99,8 +108,9 @@ class Indexer {
 
   /// Gives topics of images what is beside them.
   void end() {
-    for (auto& [topic, track] : index.scans) keep_frame(track, scan_frames_[topic]);
-    for (auto& [topic, track] : index.odometry) keep_body(track, odometry_frames_[topic]);
+    for (auto& [topic, track] : index.scans) track.frame = keep_most(track, scan_frames_[topic], "frame");
+    for (auto& [topic, track] : index.odometry)
+      std::tie(track.frame, track.body) = keep_most(track, odometry_frames_[topic], "frames");
     for (auto& [topic, track] : index.images)
       if (const auto at = infos_.find(bags::camera_info_topic(topic, track.seen.is_compressed)); at != infos_.end())
         track.seen.info = at->second;
@@ -111,62 +121,18 @@ class Indexer {
  private:
   void take_odometry(OdometryTrack& track, const BagMessage& message) {
     const auto odometry = bags::decode_odometry(message.data, encoding_of(message));
-    if (!odometry) return refuse(track, odometry.error());
+    if (!odometry) return track.refuse(odometry.error().message);
     take_pose(track, message, odometry->header.stamp, odometry->pose.position, odometry->pose.orientation);
     auto& frames = odometry_frames_[message.channel->topic];
-    if (track.poses.size() > frames.size())
+    if (track.items.size() > frames.size())
       frames.emplace_back(bags::frame_name(odometry->header.frame_id), bags::frame_name(odometry->child_frame_id));
-  }
-
-  /// The frames that most poses name are the topic's; those that name others are of something else.
-  static void keep_body(OdometryTrack& track, const std::vector<std::pair<std::string, std::string>>& frames) {
-    std::map<std::pair<std::string, std::string>, std::size_t> counts;
-    for (const auto& of_pose : frames)
-      if (of_pose != std::pair<std::string, std::string>()) ++counts[of_pose];
-    if (counts.empty()) return;
-    std::tie(track.frame, track.body) =
-        std::ranges::max_element(counts, {}, [](const auto& entry) { return entry.second; })->first;
-    const auto is_of = [](const std::string& name, const std::string& topic) { return name.empty() || name == topic; };
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < frames.size(); ++i) {
-      if (!is_of(frames[i].first, track.frame) || !is_of(frames[i].second, track.body)) {
-        track.refused.add(track.arrivals[i].message,
-                          fmt::format("frames '{:.80}' -> '{:.80}', expected '{:.80}' -> '{:.80}' as of most",
-                                      frames[i].first, frames[i].second, track.frame, track.body));
-        continue;
-      }
-      track.poses[kept] = track.poses[i];
-      track.arrivals[kept++] = track.arrivals[i];
-    }
-    track.poses.resize(kept);
-    track.arrivals.resize(kept);
   }
 
   static void take_pose_stamped(OdometryTrack& track, const BagMessage& message) {
     const auto pose = bags::decode_pose_stamped(message.data, encoding_of(message));
-    if (!pose) return refuse(track, pose.error());
+    if (!pose) return track.refuse(pose.error().message);
     if (track.frame.empty()) track.frame = bags::frame_name(pose->header.frame_id);
     take_pose(track, message, pose->header.stamp, pose->pose.position, pose->pose.orientation);
-  }
-
-  /// The frame that most scans have is the topic's, wherever the first ones were in.
-  static void keep_frame(ScanTrack& track, const std::vector<std::string>& frames) {
-    std::map<std::string, std::size_t> counts;
-    for (const std::string& frame : frames) ++counts[frame];
-    if (counts.empty()) return;
-    track.frame = std::ranges::max_element(counts, {}, [](const auto& entry) { return entry.second; })->first;
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < frames.size(); ++i) {
-      if (frames[i] != track.frame) {
-        track.refused.add(track.scans[i].message,
-                          fmt::format("frame '{:.80}', expected '{:.80}' as of most", frames[i], track.frame));
-        continue;
-      }
-      track.scans[kept] = track.scans[i];
-      track.arrivals[kept++] = track.arrivals[i];
-    }
-    track.scans.resize(kept);
-    track.arrivals.resize(kept);
   }
 
   void take_transforms(const BagMessage& message, bool is_static) {
@@ -183,7 +149,7 @@ class Indexer {
       const bool is_odometry = bags::is_odometry_frame(parent) || pair == pair_ || key == pair_;
       if (!is_static && !is_odometry) index.other_transforms.insert(key);
       if (is_static || !is_odometry) continue;
-      OdometryTrack& track = index.transforms[key];
+      OdometryTrack& track = counted(index.transforms[key]);
       track.frame = parent;
       track.body = child;
       take_pose(track, message, transform.header.stamp, transform.translation, transform.rotation);
@@ -191,29 +157,29 @@ class Indexer {
   }
 
   void take_scan(ScanTrack& track, const BagMessage& message) {
-    ++track.messages;
     const auto cloud = bags::decode_scan(message.channel->type, message.data, encoding_of(message));
-    if (!cloud) return track.refused.add(track.messages, cloud.error().message);
-    const std::string frame = bags::frame_name(cloud->header.frame_id);
-    scan_frames_[message.channel->topic].push_back(frame);
-    track.scans.push_back({cloud->header.stamp, message.position, track.messages});
-    track.arrivals.push_back({cloud->header.stamp, message.log_time, track.messages});
+    if (!cloud) return track.refuse(cloud.error().message);
+    scan_frames_[message.channel->topic].push_back(bags::frame_name(cloud->header.frame_id));
+    add_place(track, message, cloud->header.stamp);
+  }
+
+  static void add_place(Track<ScanPlace>& track, const BagMessage& message, Timestamp stamp) {
+    track.add({stamp, message.position, track.messages}, stamp, message.log_time);
   }
 
   /// A receiver without a fix, or one without a covariance, is none that fails.
   static void take_antenna(AntennaTrack& track, const BagMessage& message) {
-    ++track.messages;
     auto sample =
         bags::read_antenna_sample(message.channel->topic, message.channel->type, message.data, encoding_of(message));
-    if (!sample) return track.refused.add(track.messages, sample.error().message);
+    if (!sample) return track.refuse(sample.error().message);
     if (!*sample) {
       ++track.without;
       return;
     }
     track.unsure += (*sample)->is_stated ? 0 : 1;
     track.flat += (*sample)->is_flat ? 1 : 0;
-    track.arrivals.push_back({(*sample)->stamp(), message.log_time, track.messages});
-    track.samples.push_back(std::move(**sample));
+    const Timestamp stamp = (*sample)->stamp();
+    track.add(std::move(**sample), stamp, message.log_time);
   }
 
   void take_sight(const BagMessage& message) {
@@ -225,9 +191,9 @@ class Indexer {
       if (known != infos_.end() && known->second.k[0] > 0.0) return;
       if (auto info = bags::decode_camera_info(message.data, encoding)) infos_[topic] = std::move(*info);
     } else if (use == bags::Use::imu) {
-      take_imu(index.imu[topic], message);
+      take_imu(counted(index.imu[topic]), message);
     } else if (use == bags::Use::images) {
-      ImageTrack& track = index.images[topic];
+      ImageTrack& track = counted(index.images[topic]);
       track.seen.topic = topic;
       track.seen.is_compressed = message.channel->type == bags::kCompressedType;
       if (track.seen.is_compressed)
@@ -239,14 +205,11 @@ class Indexer {
 
   template <class Message>
   static void take_image(ImageTrack& track, const BagMessage& message, const Result<Message>& image) {
-    ++track.messages;
-    if (!image) return track.refused.add(track.messages, image.error().message);
-    const Timestamp stamp = image->header.stamp;
-    if (track.images.empty()) track.seen.first = bags::layout_of(*image);
+    if (!image) return track.refuse(image.error().message);
+    if (track.items.empty()) track.seen.first = bags::layout_of(*image);
     if (track.seen.shows_depth())
-      if (auto ok = check_depth(track, *image); !ok) return track.refused.add(track.messages, ok.error().message);
-    track.images.push_back({stamp, message.position, track.messages});
-    track.arrivals.push_back({stamp, message.log_time, track.messages});
+      if (auto ok = check_depth(track, *image); !ok) return track.refuse(ok.error().message);
+    add_place(track, message, image->header.stamp);
   }
 
   /// What can be known without decoding it.
@@ -258,22 +221,20 @@ class Indexer {
     return bags::check_like_first(bags::layout_of(image), *track.seen.first);
   }
 
-  static void take_imu(ImuTrack& track, const BagMessage& message) {
-    ++track.messages;
+  static void take_imu(Track<ImuSample>& track, const BagMessage& message) {
     const auto imu = bags::decode_imu(message.data, encoding_of(message));
-    if (!imu) return track.refused.add(track.messages, imu.error().message);
-    if (track.samples.empty()) track.frame = bags::frame_name(imu->header.frame_id);
+    if (!imu) return track.refuse(imu.error().message);
+    if (track.items.empty()) track.frame = bags::frame_name(imu->header.frame_id);
     const auto sample = bags::to_imu_sample(*imu);
-    if (!sample) return track.refused.add(track.messages, sample.error().message);
-    track.samples.push_back(*sample);
-    track.arrivals.push_back({sample->stamp, message.log_time, track.messages});
+    if (!sample) return track.refuse(sample.error().message);
+    track.add(*sample, sample->stamp, message.log_time);
   }
 
   const std::string& pair_;
   bool with_images_;
-  std::map<std::string, bags::RosCameraInfo> infos_;             // of each topic the first that is calibrated
-  std::map<std::string, std::vector<std::string>> scan_frames_;  // of each scan of a topic
-  std::map<std::string, std::vector<std::pair<std::string, std::string>>> odometry_frames_;  // and of each pose
+  std::map<std::string, bags::RosCameraInfo> infos_;               // of each topic the first that is calibrated
+  std::map<std::string, std::vector<std::string>> scan_frames_;    // of each scan of a topic
+  std::map<std::string, std::vector<FramePair>> odometry_frames_;  // and of each pose
 };
 
 }  // namespace
@@ -291,31 +252,26 @@ std::string note_of(const std::string& topic, const Refusals& refused, std::uint
 void order_sensors(BagIndex& index, const OdometryTrack& odometry) {
   constexpr double kApart_s = 1.0;  // by which a sensor's message may be recorded before or after odometry
   const auto [from, to] = std::ranges::minmax(odometry.arrivals, {}, &bags::Arrival::logged);
-  const auto order = [&, first = from.logged - kApart_s, last = to.logged + kApart_s](const std::string& topic,
-                                                                                      auto& items, auto& track) {
-    std::size_t kept = 0, left_out = 0;
-    for (std::size_t i = 0; i < items.size() && !odometry.restarts.empty(); ++i) {
-      const bags::Arrival arrival = track.arrivals[i];
-      if (arrival.logged < first || last < arrival.logged) {
-        ++left_out;
-        continue;
+  const auto order = [&, first = from.logged - kApart_s, last = to.logged + kApart_s](auto& tracks) {
+    for (auto& [topic, track] : tracks) {
+      std::vector<std::size_t> kept;
+      for (std::size_t i = 0; i < track.items.size(); ++i)
+        if (odometry.restarts.empty() || (first <= track.arrivals[i].logged && track.arrivals[i].logged <= last))
+          kept.push_back(i);
+      if (const std::size_t left_out = track.items.size() - kept.size(); left_out > 0) {
+        track.select(kept);
+        index.notes.push_back(
+            fmt::format("{}: {} messages were recorded with odometry that is left out, and are, too", topic, left_out));
       }
-      items[kept] = std::move(items[i]);
-      track.arrivals[kept++] = arrival;
+      if (const auto put = put_in_order(track); put.runs.size() > 1)
+        index.notes.push_back(fmt::format("{}: {}", topic, put.in_words()));
     }
-    items.resize(items.size() - left_out);
-    track.arrivals.resize(items.size());
-    if (left_out > 0)
-      index.notes.push_back(
-          fmt::format("{}: {} messages were recorded with odometry that is left out, and are, too", topic, left_out));
-    if (const auto put = put_in_order(items, track.arrivals, track.refused); put.runs.size() > 1)
-      index.notes.push_back(fmt::format("{}: {}", topic, put.in_words()));
   };
-  for (auto& [topic, track] : index.scans) order(topic, track.scans, track);
-  for (auto& [topic, track] : index.images) order(topic, track.images, track);
-  for (auto& [topic, track] : index.imu) order(topic, track.samples, track);
-  for (auto& [topic, track] : index.fixes) order(topic, track.samples, track);
-  for (auto& [topic, track] : index.ranges) order(topic, track.samples, track);
+  order(index.scans);
+  order(index.images);
+  order(index.imu);
+  order(index.fixes);
+  order(index.ranges);
 }
 
 void keep_robot(BagIndex& index, const RobotConfig& robot) {
@@ -374,7 +330,7 @@ BagIndex index_bag(bags::BagReader& bag, const std::string& pair, bool with_imag
   }
   for (auto* tracks : {&index.odometry, &index.poses, &index.transforms})
     for (auto& [topic, track] : *tracks) {
-      const bags::StampOrder order = put_in_order(track.poses, track.arrivals, track.refused);
+      const bags::StampOrder order = put_in_order(track);
       track.late = order.late;
       track.restarts = order.in_words();
     }

@@ -30,16 +30,38 @@ struct Refusals {
 /// "/odom: 4 of 250 messages refused, the first because: .."
 std::string note_of(const std::string& topic, const Refusals& refused, std::uint64_t of);
 
-/// The poses of one topic, or of one pair of frames of /tf.
-struct OdometryTrack {
-  Trajectory poses;  ///< Stamps increase: as bags::order_by_stamp() orders them.
-  std::vector<bags::Arrival> arrivals;
-  std::string frame, body;
+/// The messages of one topic that can be used, as `items`.
+template <class Item>
+struct Track {
+  std::vector<Item> items;
+  std::vector<bags::Arrival> arrivals;  ///< One for one.
+  std::string frame;                    ///< The items', where their kind has one.
+  std::uint64_t messages = 0;           ///< All that the topic has.
+  Refusals refused;
+  /// For the message that was counted last.
+  void add(Item item, Timestamp stamp, Timestamp logged) {
+    items.push_back(std::move(item));
+    arrivals.push_back({stamp, logged, messages});
+  }
+  void refuse(const std::string& why) { refused.add(messages, why); }
+  /// Leaves the items at these positions, in this order.
+  void select(const std::vector<std::size_t>& positions) {
+    Track out;
+    for (const std::size_t at : positions) {
+      out.items.push_back(std::move(items[at]));
+      out.arrivals.push_back(arrivals[at]);
+    }
+    items = std::move(out.items);
+    arrivals = std::move(out.arrivals);
+  }
+};
+
+/// The poses of one topic, or of one pair of frames of /tf. Stamps increase: as bags::order_by_stamp() orders them.
+struct OdometryTrack : Track<StampedPose> {
+  std::string body;
   std::uint64_t late = 0;    ///< Poses that were sorted in.
   std::uint64_t scaled = 0;  ///< Poses whose quaternion had to be normalised.
   std::string restarts;      ///< What of the topic is used, where its clock starts again.
-  std::uint64_t messages = 0;
-  Refusals refused;
 };
 
 /// Where one scan or image is in the bag.
@@ -49,40 +71,16 @@ struct ScanPlace {
   std::uint64_t message = 0;  ///< Number in its topic, from 1.
 };
 /// The scans of one topic: only their places in the bag are kept, 72 bytes each.
-struct ScanTrack {
-  std::vector<ScanPlace> scans;
-  std::vector<bags::Arrival> arrivals;
-  std::string frame;
-  std::uint64_t messages = 0;
-  Refusals refused;
-};
-
+using ScanTrack = Track<ScanPlace>;
 /// The images of one topic, by their places in the bag.
-struct ImageTrack {
-  std::vector<ScanPlace> images;
-  std::vector<bags::Arrival> arrivals;
+struct ImageTrack : Track<ScanPlace> {
   bags::ImageTopic seen;  ///< If it shows depth, all messages are like the first.
-  std::uint64_t messages = 0;
-  Refusals refused;
 };
-/// The samples of one IMU.
-struct ImuTrack {
-  std::vector<ImuSample> samples;  ///< In the frame `frame`.
-  std::vector<bags::Arrival> arrivals;
-  std::string frame;
-  std::uint64_t messages = 0;
-  Refusals refused;
-};
-
 /// The position fixes of one receiver, or the ranges to one other robot.
-struct AntennaTrack {
-  std::vector<bags::AntennaSample> samples;
-  std::vector<bags::Arrival> arrivals;
-  std::uint64_t messages = 0;
+struct AntennaTrack : Track<bags::AntennaSample> {
   std::uint64_t without = 0;  ///< Messages that report none.
   std::uint64_t flat = 0;     ///< Fixes without an altitude.
   std::uint64_t unsure = 0;   ///< Fixes that do not state their uncertainty.
-  Refusals refused;
 };
 
 /// What a mission needs to know of a bag before it reads scans one by one. It has the poses of all topics that may be
@@ -96,7 +94,7 @@ struct BagIndex {
   std::string near_odometry, near_scans;   ///< "; near: .." what is nearly of use, and what makes it so.
   std::map<std::string, ScanTrack> scans;
   std::map<std::string, ImageTrack> images;
-  std::map<std::string, ImuTrack> imu;
+  std::map<std::string, Track<ImuSample>> imu;
   std::map<std::string, AntennaTrack> fixes, ranges;
   std::map<std::string, bags::TransformTree> trees;  ///< By namespace: of "/alpha/tf" and "/alpha/tf_static".
   bags::TransformTree tree;                          ///< The robot's (keep_robot()).

@@ -49,8 +49,8 @@ std::string better_odometry(const BagIndex& index, const Stamps& stamps, std::si
   std::string best;
   for (const auto* tracks : {&index.odometry, &index.transforms, &index.poses})
     for (const auto& [topic, track] : *tracks) {
-      if (track.poses.size() < 2) continue;
-      const std::size_t misses = uncovered(track.poses, stamps).all();
+      if (track.items.size() < 2) continue;
+      const std::size_t misses = uncovered(track.items, stamps).all();
       if (share_of(missed, stamps.size()) - share_of(misses, stamps.size()) < kMuchLeftOut) continue;
       missed = misses;
       best = fmt::format("--topic '{}.odometry={}' covers {}", robot.name, topic,
@@ -71,7 +71,7 @@ struct Sensor {
 
 void warn_of_sensor(const BagIndex& index, const TakenOdometry& odometry, const Sensor& sensor,
                     const RobotConfig& robot, std::vector<std::string>& out) {
-  const Uncovered missed = uncovered(odometry.track.poses, sensor.stamps);
+  const Uncovered missed = uncovered(odometry.track.items, sensor.stamps);
   const std::uint64_t usable = sensor.stamps.size() + sensor.refused.count;
   const std::uint64_t elsewhere = sensor.messages > usable ? sensor.messages - usable : 0;
   const std::size_t all = missed.all() + sensor.refused.count + elsewhere;
@@ -123,7 +123,7 @@ std::string cut(const OdometryTrack& track, const std::string& file) {
 
 void warn_of_odometry(const TakenOdometry& odometry, const BagRecording& bag, std::vector<std::string>& out) {
   const OdometryTrack& track = odometry.track;
-  const std::uint64_t left_out = track.messages - std::min<std::uint64_t>(track.messages, track.poses.size());
+  const std::uint64_t left_out = track.messages - std::min<std::uint64_t>(track.messages, track.items.size());
   if (share_of(left_out, track.messages) <= kMuchLeftOut) return;
   std::vector<std::string> why;
   if (track.refused.count > 0)
@@ -181,8 +181,8 @@ void warn_of_blind(const BagIndex& index, const Trajectory& odometry, const std:
   std::string type = "let the sensor's driver run as long as odometry does";
   double best_s = blind.all_s - kMuchLeftOut * duration_s;
   for (const auto& [topic, track] : index.scans) {
-    const double other_s = blind_times(odometry, stamps_of(track.scans)).all_s;
-    if (other_s >= best_s || track.scans.empty()) continue;
+    const double other_s = blind_times(odometry, stamps_of(track.items)).all_s;
+    if (other_s >= best_s || track.items.empty()) continue;
     best_s = other_s;
     type = fmt::format("--topic {}.scans={} leaves {}", robot.name, topic, percent(share_of(other_s, duration_s)));
   }

@@ -24,11 +24,11 @@ const std::string kOfTransforms = "->";
 
 std::string in_words(const OdometryTrack& track) {
   return fmt::format("{} -> {}, {} poses", track.frame.empty() ? "?" : track.frame,
-                     track.body.empty() ? "?" : track.body, track.poses.size());
+                     track.body.empty() ? "?" : track.body, track.items.size());
 }
-std::string in_words(const ScanTrack& track) { return fmt::format("{}, {} scans", track.frame, track.scans.size()); }
-bool has_any(const OdometryTrack& track) { return track.poses.size() > 1; }
-bool has_any(const ScanTrack& track) { return !track.scans.empty(); }
+std::string in_words(const ScanTrack& track) { return fmt::format("{}, {} scans", track.frame, track.items.size()); }
+bool has_any(const OdometryTrack& track) { return track.items.size() > 1; }
+bool has_any(const ScanTrack& track) { return !track.items.empty(); }
 
 /// "/a (odom -> base, 12 poses); /b (no messages)"
 template <class Tracks>
@@ -233,8 +233,8 @@ Status take_scans(const OdometryTrack& odometry, const std::string& topic, ScanT
                   BagRecording& out) {
   const bags::OdometryArrivals arrivals(odometry.arrivals);
   bags::SensorClock clock("robots[].scan_time_offset_s");
-  for (std::size_t i = 0; i < seen.scans.size(); ++i) {
-    ScanPlace place = seen.scans[i];
+  for (std::size_t i = 0; i < seen.items.size(); ++i) {
+    ScanPlace place = seen.items[i];
     place.stamp = place.stamp + robot.scan_time_offset_s;
     if (const Status ok = clock.check(place.stamp, arrivals.newest_at(seen.arrivals[i].logged)); ok)
       out.scans.push_back(place);
@@ -248,16 +248,16 @@ Status take_scans(const OdometryTrack& odometry, const std::string& topic, ScanT
     out.notes.push_back(fmt::format("{}: {}", topic, doubt));
   if (out.scans.empty()) return fail(ErrorCode::invalid, "{}", note_of(topic, seen.refused, seen.messages));
   const auto inside = [&](const ScanPlace& scan) {
-    return odometry.poses.front().stamp <= scan.stamp && scan.stamp <= odometry.poses.back().stamp;
+    return odometry.items.front().stamp <= scan.stamp && scan.stamp <= odometry.items.back().stamp;
   };
   if (std::ranges::any_of(out.scans, inside)) return {};
   // A bag whose log times are the stamps does not record when a scan came: then the two's beginnings are compared.
-  const double ahead_s = out.scans.front().stamp - odometry.poses.front().stamp;
+  const double ahead_s = out.scans.front().stamp - odometry.items.front().stamp;
   return fail(ErrorCode::invalid,
               "{}: of its {} stamps, {} to {} ns, none is within the odometry's, {} to {} ns, which begin {:.1f} s "
               "{}: are they by another clock? robots[].scan_time_offset_s aligns them",
               topic, out.scans.size(), out.scans.front().stamp.ns, out.scans.back().stamp.ns,
-              odometry.poses.front().stamp.ns, odometry.poses.back().stamp.ns, std::abs(ahead_s),
+              odometry.items.front().stamp.ns, odometry.items.back().stamp.ns, std::abs(ahead_s),
               ahead_s > 0.0 ? "earlier" : "later");
 }
 
@@ -298,7 +298,7 @@ Result<BagRecording> read_bag(const fs::path& data, const RobotConfig& robot, bo
     find_body(index, (*scans)->second.frame, track, out.notes);
   else if (const auto frame = frame_of_images(index))
     find_body(index, *frame, track, out.notes);
-  out.odometry = track.poses;
+  out.odometry = track.items;
   std::string what = fmt::format("{}: odometry of {} ({})", out.file, source, in_words(track));
   note_odometry(source, track, out.notes);
   if (auto ok = take_antennas(index, track, robot, out); !ok) return in_context(out.file, ok.error());
