@@ -58,7 +58,7 @@ void note_fix(TopicInfo& topic, const BagMessage& message) {
 }
 
 void note_message(TopicInfo& topic, const BagMessage& message) {
-  const bool is_uncalibrated = topic.use == Use::calibration && !(topic.calibration && topic.calibration->k[0] > 0.0);
+  const bool is_uncalibrated = topic.use == Use::calibration && !(topic.calibration && to_camera(*topic.calibration));
   if ((topic.count++ == 0 && topic.use != Use::nothing) || is_uncalibrated) note_first(topic, message);
   if (topic.use == Use::fixes && !topic.has_fix) note_fix(topic, message);
   topic.first = std::min(topic.first, message.log_time);

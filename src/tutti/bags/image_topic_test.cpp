@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
+
 namespace tutti::bags {
 namespace image_topic_test {
 
@@ -28,6 +30,40 @@ TEST(ImageTopic, ShowsWhatItsFirstMessageDoes) {
   EXPECT_FALSE(topic("/depth/image", "mono16").shows_picture());
   EXPECT_EQ(topic("/video", "h264 (neither JPEG nor PNG)", true).check_picture().error().message,
             "/video: encoding 'h264 (neither JPEG nor PNG)' is no picture that is read, expected JPEG or PNG");
+}
+
+std::string why(const Status& status) { return status ? "" : status.error().message; }
+
+TEST(ImageTopic, MessagesOfWhichNoImageCanBeMadeAreRefused) {
+  const std::string bytes(32, 'x');
+  const auto image = [&](const char* encoding, std::uint32_t width, std::size_t size, const char* frame = "camera") {
+    RosImage out{.header = {{5}, frame}, .height = 4, .width = width};
+    out.encoding = encoding;
+    out.step = 8;
+    out.data = std::string_view(bytes).substr(0, size);
+    return out;
+  };
+  ImageTopic camera{"/image"};
+  EXPECT_EQ(why(camera.add(image("mono8", 8, 31))), "8 x 4 pixels of 1 bytes, rows of 8 bytes, 31 bytes in all");
+  EXPECT_TRUE(camera.shows_picture());  // but which comes first is not known yet
+  EXPECT_EQ(why(camera.add(image("mono16", 4, 32))), "");
+  EXPECT_EQ(camera.first->encoding, "mono16");
+  EXPECT_EQ(why(camera.add(image("mono8", 8, 32, "other"))), "");
+  EXPECT_EQ(camera.first->encoding, "mono16");
+
+  ImageTopic depth{"/depth"};
+  EXPECT_EQ(why(depth.add(image("16UC1", 5, 32))), "5 x 4 pixels of 2 bytes, rows of 8 bytes, 32 bytes in all");
+  EXPECT_EQ(why(depth.add(image("16UC1", 4, 32))), "");
+  EXPECT_EQ(why(depth.add(image("16UC1", 3, 32))), "3 x 4 pixels, expected 4 x 4 as of the first");
+  EXPECT_EQ(why(depth.add(image("mono8", 4, 32))), "encoding 'mono8', expected '16UC1' as of the first");
+  EXPECT_EQ(why(depth.add(image("16UC1", 4, 32, "other"))), "frame 'other', expected 'camera' as of the first");
+
+  ImageTopic files{"/image/compressed", true}, packed{"/depth/compressedDepth", true};
+  RosCompressedImage file{.header = {{5}, "camera"}, .format = "jpeg", .data = {}};
+  EXPECT_EQ(why(files.add(file)), "an image of no bytes, expected a PNG or JPEG file");
+  file.data = "\xff\xd8";
+  EXPECT_EQ(why(files.add(file)), "");
+  EXPECT_EQ(why(packed.add(file)), "format 'jpeg', expected a PNG image as compressedDepth has");
 }
 
 TEST(ImageTopic, ACameraIsCalibratedBesideItsPictures) {

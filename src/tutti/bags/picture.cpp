@@ -99,7 +99,10 @@ void make_grey(const RosImage& message, const PixelLayout& layout, Sample* to) {
 
 }  // namespace
 
-bool is_picture(std::string_view encoding) { return pixel_layout_of(encoding) != nullptr; }
+std::uint32_t picture_bytes(std::string_view encoding) {
+  const PixelLayout* const layout = pixel_layout_of(encoding);
+  return layout == nullptr ? 0 : layout->samples * (layout->is_deep ? 2 : 1);
+}
 
 Status check_rows(const RosImage& message, std::uint32_t pixel_bytes) {
   const std::uint64_t row = std::uint64_t{message.width} * pixel_bytes;
@@ -114,8 +117,7 @@ Result<Image> to_image(const RosImage& message) {
   const PixelLayout* const layout = pixel_layout_of(message.encoding);
   if (layout == nullptr)
     return fail(ErrorCode::unsupported, "encoding '{:.40}', expected {}", message.encoding, kPictures);
-  if (auto ok = check_rows(message, layout->samples * (layout->is_deep ? 2 : 1)); !ok)
-    return tl::unexpected(ok.error());
+  if (auto ok = check_rows(message, picture_bytes(message.encoding)); !ok) return tl::unexpected(ok.error());
   const auto width_px = static_cast<int>(message.width), height_px = static_cast<int>(message.height);
   if (!layout->is_deep) {
     Image out(width_px, height_px);

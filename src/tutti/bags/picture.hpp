@@ -19,8 +19,8 @@ inline constexpr std::string_view kPictures =
 /// in a Bayer pattern each pixel becomes the mean of a square of two by two. 16 bits become 8 by in_8_bits(). Rows may
 /// be padded, 16 bits be in either order. Other encodings are an error that names them.
 Result<Image> to_image(const RosImage& message);
-/// True for the encodings that to_image() takes.
-bool is_picture(std::string_view encoding);
+/// Bytes of a pixel of an encoding that to_image() takes; 0 of others.
+std::uint32_t picture_bytes(std::string_view encoding);
 
 /// Fails unless the message has as many bytes as its size, its step and so many bytes a pixel want.
 Status check_rows(const RosImage& message, std::uint32_t pixel_bytes);

@@ -40,7 +40,7 @@ TEST(BagPicture, ColoursBecomeGrey) {
   EXPECT_FALSE(image("mono8", 0xffffffff, 0xffffffff, 0xffffffff, "abcd"));
   EXPECT_NE(image("16UC1", 1, 1, 2, "ab").error().message.find("encoding '16UC1', expected mono8, "),
             std::string::npos);
-  EXPECT_FALSE(is_picture("32FC1"));
+  EXPECT_EQ(picture_bytes("32FC1"), 0U);
 }
 
 TEST(BagPicture, OfYuvTheLumaIsTaken) {

@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "tutti/bags/camera.hpp"
-#include "tutti/bags/picture.hpp"
 #include "tutti/bags/rgbd.hpp"
 #include "tutti/bags/transform_tree.hpp"
 #include "tutti/model/nearest_stamp.hpp"
@@ -26,6 +25,19 @@ std::string to_bytes(const DepthImage& depth) {
     out.push_back(static_cast<char>(value >> 8U));
   }
   return out;
+}
+
+/// As the feed has them: raw images are grey, raw depth has millimetres; files stay as they are.
+Result<EncodedImage> encoded(const bags::ImageMessage& message, bool of_depth) {
+  if (const auto* const file = std::get_if<bags::RosCompressedImage>(&message))
+    return EncodedImage{0, false, std::string(file->data)};
+  if (of_depth)
+    return bags::to_depth(message, {}).map([](const DepthImage& depth) {
+      return EncodedImage{0, true, to_bytes(depth)};
+    });
+  return bags::to_image(message).map([](const Image& image) {
+    return EncodedImage{0, true, std::string(image.grey.begin(), image.grey.end())};
+  });
 }
 
 }  // namespace
@@ -79,68 +91,29 @@ Status ImagesIntake::add_info(std::size_t topic, std::string_view bytes, Encodin
 
 Status ImagesIntake::add_image(std::size_t topic, std::string_view bytes, Encoding encoding) {
   OneTopic& of = topics_[topic];
-  if (of.topics.is_compressed) {
-    const auto message = bags::decode_compressed_image(bytes, encoding);
-    if (!message) return tl::unexpected(message.error());
-    if (message->data.empty()) return fail(ErrorCode::invalid, "an image of no bytes, expected a PNG or JPEG file");
-    const bags::ImageLayout appearance = bags::layout_of(*message);
-    if (bags::is_depth(of.topics.images, of.seen.first.value_or(appearance).encoding))
-      return add_depth(of, appearance, *message);
-    if (!of.seen.first) of.seen.first = appearance;
-    return push(of, message->header, {{}, {0, false, std::string(message->data)}});
-  }
-  const auto message = bags::decode_image(bytes, encoding);
+  const auto message = bags::decode_image_message(of.topics.is_compressed, bytes, encoding);
   if (!message) return tl::unexpected(message.error());
-  const bags::ImageLayout appearance = bags::layout_of(*message);
-  if (bags::is_depth(of.topics.images, of.seen.first.value_or(appearance).encoding))
-    return add_depth(of, appearance, *message);
-  const auto image = bags::to_image(*message);
-  if (!of.seen.first && (image || !bags::is_picture(appearance.encoding))) of.seen.first = appearance;
+  if (Status ok = of.seen.add(*message); !ok)
+    return of.seen.shows_depth()
+               ? in_context(fmt::format("depth at {} ns", bags::header_of(*message).stamp.ns), ok.error())
+               : ok;
+  auto image = encoded(*message, of.seen.shows_depth());
   if (!image) return tl::unexpected(image.error());
-  return push(of, message->header,
-              {{}, {0, true, std::string(image->grey.begin(), image->grey.end())}, message->width, message->height});
-}
-
-Status ImagesIntake::add_depth(OneTopic& topic, const bags::ImageLayout& appearance, const bags::RosImage& message) {
-  const auto named = [&](const Error& error) {
-    return in_context(fmt::format("depth at {} ns", message.header.stamp.ns), error);
-  };
-  if (auto ok = bags::check_like_first(appearance, topic.seen.first.value_or(appearance)); !ok)
-    return named(ok.error());
-  const auto depth = bags::to_depth(message);
-  if (!depth) return named(depth.error());
-  if (!topic.seen.first) topic.seen.first = appearance;
-  return push(topic, message.header, {{}, {0, true, to_bytes(*depth)}, appearance.width_px, appearance.height_px});
-}
-
-/// The file, which depth_of() or the robot decodes, once its size is known to be a camera's.
-Status ImagesIntake::add_depth(OneTopic& topic, const bags::ImageLayout& appearance,
-                               const bags::RosCompressedImage& message) {
-  const auto named = [&](const Error& error) {
-    return in_context(fmt::format("depth at {} ns", message.header.stamp.ns), error);
-  };
-  if (auto ok = bags::check_like_first(appearance, topic.seen.first.value_or(appearance)); !ok)
-    return named(ok.error());
-  if (bags::png_of(message.data).empty())
-    return named({ErrorCode::unsupported,
-                  fmt::format("format '{:.60}', expected a PNG image as compressedDepth has", message.format)});
-  if (!topic.seen.first) topic.seen.first = appearance;
-  return push(topic, message.header,
-              {{}, {0, false, std::string(message.data)}, appearance.width_px, appearance.height_px});
-}
-
-Status ImagesIntake::push(OneTopic& topic, const bags::RosHeader& header, Waiting waiting) {
-  waiting.stamp = header.stamp + config_.time_offset_s;
-  if (Status ok = check_size(topic, waiting); !ok) return ok;
-  if (Status ok = odometry_.check_stamp(waiting.stamp, topic.newest); !ok) return ok;
-  while (!topic.waiting.empty() && topic.waiting.back().stamp >= waiting.stamp) {
-    topic.bytes -= topic.waiting.back().image.bytes.size();
-    topic.waiting.pop_back();
+  Waiting waiting{bags::header_of(*message).stamp + config_.time_offset_s, std::move(*image)};
+  if (const auto* const raw = std::get_if<bags::RosImage>(&*message)) {
+    waiting.width = raw->width;
+    waiting.height = raw->height;
   }
-  topic.newest = waiting.stamp;
-  topic.bytes += waiting.image.bytes.size();
-  topic.waiting.push_back(std::move(waiting));
-  while (topic.bytes > most_bytes()) topic.pop();
+  if (Status ok = check_size(of, waiting); !ok) return ok;
+  if (Status ok = odometry_.check_stamp(waiting.stamp, of.newest); !ok) return ok;
+  while (!of.waiting.empty() && of.waiting.back().stamp >= waiting.stamp) {
+    of.bytes -= of.waiting.back().image.bytes.size();
+    of.waiting.pop_back();
+  }
+  of.newest = waiting.stamp;
+  of.bytes += waiting.image.bytes.size();
+  of.waiting.push_back(std::move(waiting));
+  while (of.bytes > most_bytes()) of.pop();
   return {};
 }
 

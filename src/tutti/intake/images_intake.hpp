@@ -90,10 +90,7 @@ class ImagesIntake {
     void drop_before(Timestamp stamp);
   };
   using Numbers = std::vector<std::size_t>;
-  Status push(OneTopic& topic, const bags::RosHeader& header, Waiting waiting);
   [[nodiscard]] std::size_t most_bytes() const;  ///< That a topic's images may take.
-  Status add_depth(OneTopic& topic, const bags::ImageLayout& appearance, const bags::RosImage& message);
-  Status add_depth(OneTopic& topic, const bags::ImageLayout& appearance, const bags::RosCompressedImage& message);
   static Status check_size(const OneTopic& topic, const Waiting& waiting);
   /// Nothing while a topic must be waited for.
   Result<std::optional<std::pair<Numbers, Numbers>>> cameras_and_depths(bool is_late) const;

@@ -6,9 +6,7 @@
 #include <utility>
 
 #include "tutti/bags/camera.hpp"
-#include "tutti/bags/picture.hpp"
 #include "tutti/bags/rgbd.hpp"
-#include "tutti/formats/image_file.hpp"
 #include "tutti/mission/bag_messages.hpp"
 #include "tutti/mission/bag_recording.hpp"
 #include "tutti/model/nearest_stamp.hpp"
@@ -25,7 +23,7 @@ Result<BagCamera> camera_of(const BagIndex& index, const ImageTrack& track, cons
   const auto T_body_camera = index.tree.find(body, seen.first->frame);
   if (!T_body_camera)
     return fail(ErrorCode::invalid, "{}: no transform from '{}' to '{}'", seen.topic, seen.first->frame, body);
-  return BagCamera{seen.topic, {*model, *T_body_camera}, track.items, seen.is_compressed};
+  return BagCamera{{seen.topic, track.items, seen.is_compressed}, {*model, *T_body_camera}};
 }
 
 bool is_wanted(const std::string& topic, const std::string& list) {
@@ -100,41 +98,22 @@ void take_choice(const BagIndex& index, const bags::CameraChoice& choice, std::v
     const std::string& topic = depths[*choice.depth].topic;
     const ImageTrack& track = take(topic);
     used += fmt::format(", depth of {} ({})", topic, track.seen.first->encoding);
-    out.depth = BagDepth{topic, track.items, track.seen.is_compressed};
+    out.depth = BagImages{topic, track.items, track.seen.is_compressed};
   }
   out.notes.push_back("images of " + used);
   out.notes.insert(out.notes.end(), refused.begin(), refused.end());
 }
 
-/// Decodes a message as what it is, and converts it.
-template <class Message, class Convert>
-auto converted(const Result<Message>& message, const Convert& convert) -> decltype(convert(*message)) {
-  if (!message) return tl::unexpected(message.error());
-  return convert(*message);
-}
-
-Result<Image> read_image(BagMessages& messages, const BagCamera& camera, const ScanPlace& place) {
-  return messages.read(camera.topic, place, [&](const bags::BagMessage& message, bags::RosEncoding encoding) {
-    if (!camera.is_compressed) return converted(bags::decode_image(message.data, encoding), bags::to_image);
-    return converted(bags::decode_compressed_image(message.data, encoding), [](const bags::RosCompressedImage& packed) {
-      return formats::decode_image(packed.data, "the image");
-    });
-  });
-}
-
-Result<DepthImage> read_depth(BagMessages& messages, const BagDepth& depth, const ScanPlace& place,
-                              formats::ExpectedSize expected) {
-  return messages.read(depth.topic, place, [&](const bags::BagMessage& message, bags::RosEncoding encoding) {
-    if (!depth.is_compressed)
-      return converted(bags::decode_image(message.data, encoding),
-                       [](const bags::RosImage& raw) { return bags::to_depth(raw); });
-    return converted(bags::decode_compressed_image(message.data, encoding),
-                     [&](const bags::RosCompressedImage& packed) { return bags::to_depth(packed, expected); });
+/// What `convert` makes of a message of a topic of images.
+template <class Convert>
+auto read(BagMessages& messages, const BagImages& of, const ScanPlace& place, const Convert& convert) {
+  return messages.read(of.topic, place, [&](const bags::BagMessage& message, bags::RosEncoding encoding) {
+    return bags::decode_image_message(of.is_compressed, message.data, encoding).and_then(convert);
   });
 }
 
 /// The note on it. Depth by another clock is not used.
-Result<std::string> add_depth(const BagDepth& depth, const std::shared_ptr<BagMessages>& messages,
+Result<std::string> add_depth(const BagImages& depth, const std::shared_ptr<BagMessages>& messages,
                               const ImagesConfig& config, ImageStream& stream) {
   const auto sensor = depth_sensor(config.depth, bags::kDepthUnit_m);
   if (!sensor) return tl::unexpected(sensor.error());
@@ -143,7 +122,8 @@ Result<std::string> add_depth(const BagDepth& depth, const std::shared_ptr<BagMe
   const CameraModel& camera = stream.cameras.front().model;
   const formats::ExpectedSize size{camera.width_px, camera.height_px};
   const auto load = [messages, depth, size](std::size_t number) {
-    return read_depth(*messages, depth, depth.images.at(number), size);
+    return read(*messages, depth, depth.images.at(number),
+                [&](const bags::ImageMessage& image) { return bags::to_depth(image, size); });
   };
   const std::size_t found = formats::add_depth(stream, stamps, load, *sensor, config.depth.max_difference_s);
   if (const auto ok = check_depth_stamps(stream.stamps, stamps, found, config.depth.max_difference_s); !ok) {
@@ -208,7 +188,8 @@ Result<RobotImages> open_images(const BagRecording& bag, const Trajectory& odome
     const std::vector<ScanPlace>& places = cameras.at(camera).images;
     const auto place = nearest_in_time(places, stamp, most_s, &ScanPlace::stamp);
     if (place == places.end()) return Image();
-    return read_image(*messages, cameras[camera], *place);
+    return read(*messages, cameras[camera], *place,
+                [](const bags::ImageMessage& image) { return bags::to_image(image); });
   };
   std::string note;
   if (bag.depth) {

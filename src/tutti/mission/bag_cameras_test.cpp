@@ -273,6 +273,28 @@ TEST_F(BagCameras, WrongDepthImagesAreLeftOutOneByOne) {
       "pixels of 2 bytes, rows of 10 bytes, 38400 bytes in all");
 }
 
+/// Before the mission runs, as of a live topic.
+TEST_F(BagCameras, ImagesOfTooFewBytesAreRefused) {
+  const Depth camera{.name = "/second", .encoding = "mono8", .change = [](int i, bags::RosImage& image) {
+                       if (i == 2) image.data.remove_suffix(1);
+                     }};
+  ASSERT_NE(load({camera}, {"alpha.images=/second/image_raw"}).images, nullptr) << notes_;
+  expect_note(
+      "/second/image_raw: 1 of 20 messages refused, the first because: message 3: 160 x 120 pixels of 1 bytes, rows "
+      "of 160 bytes, 19199 bytes in all");
+}
+
+/// As of a live topic.
+TEST_F(BagCameras, TheFirstCalibrationThatIsValidCounts) {
+  std::vector<Sample> samples = robot();
+  bags::RosCameraInfo binned{.header = {kStart, "camera"}, .height = kHeight, .width = kWidth};
+  binned.k = {100, 0, 80, 0, 100, 60, 0, 0, 1};
+  binned.binning_x = 2;
+  samples.insert(samples.begin(),
+                 sample_of("/camera/camera_info", "sensor_msgs/msg/CameraInfo", kStart, bags::encode(binned)));
+  EXPECT_NE(load_samples(std::move(samples)).images, nullptr) << notes_;
+}
+
 /// A range that is none would make every depth unknown.
 TEST_F(BagCameras, ARangeThatIsNoneIsRefused) {
   std::vector<Sample> samples = robot();

@@ -11,7 +11,6 @@
 
 #include "tutti/bags/camera.hpp"
 #include "tutti/bags/near_types.hpp"
-#include "tutti/bags/picture.hpp"
 #include "tutti/bags/robot_namespace.hpp"
 #include "tutti/bags/ros_messages.hpp"
 #include "tutti/bags/ros_types.hpp"
@@ -188,7 +187,7 @@ class Indexer {
     const bags::Use use = bags::use_of(message.channel->type);
     if (use == bags::Use::calibration) {
       const auto known = infos_.find(topic);
-      if (known != infos_.end() && known->second.k[0] > 0.0) return;
+      if (known != infos_.end() && bags::to_camera(known->second)) return;  // as of a live topic
       if (auto info = bags::decode_camera_info(message.data, encoding)) infos_[topic] = std::move(*info);
     } else if (use == bags::Use::imu) {
       take_imu(counted(index.imu[topic]), message);
@@ -196,29 +195,11 @@ class Indexer {
       ImageTrack& track = counted(index.images[topic]);
       track.seen.topic = topic;
       track.seen.is_compressed = message.channel->type == bags::kCompressedType;
-      if (track.seen.is_compressed)
-        take_image(track, message, bags::decode_compressed_image(message.data, encoding));
-      else
-        take_image(track, message, bags::decode_image(message.data, encoding));
+      const auto image = bags::decode_image_message(track.seen.is_compressed, message.data, encoding);
+      if (!image) return track.refuse(image.error().message);
+      if (const Status ok = track.seen.add(*image); !ok) return track.refuse(ok.error().message);
+      add_place(track, message, bags::header_of(*image).stamp);
     }
-  }
-
-  template <class Message>
-  static void take_image(ImageTrack& track, const BagMessage& message, const Result<Message>& image) {
-    if (!image) return track.refuse(image.error().message);
-    if (track.items.empty()) track.seen.first = bags::layout_of(*image);
-    if (track.seen.shows_depth())
-      if (auto ok = check_depth(track, *image); !ok) return track.refuse(ok.error().message);
-    add_place(track, message, image->header.stamp);
-  }
-
-  /// What can be known without decoding it.
-  static Status check_depth(const ImageTrack& track, const bags::RosImage& image) {
-    if (auto ok = bags::check_like_first(bags::layout_of(image), *track.seen.first); !ok) return ok;
-    return bags::check_rows(image, bags::depth_bytes(image.encoding));
-  }
-  static Status check_depth(const ImageTrack& track, const bags::RosCompressedImage& image) {
-    return bags::check_like_first(bags::layout_of(image), *track.seen.first);
   }
 
   static void take_imu(Track<ImuSample>& track, const BagMessage& message) {
@@ -232,7 +213,7 @@ class Indexer {
 
   const std::string& pair_;
   bool with_images_;
-  std::map<std::string, bags::RosCameraInfo> infos_;               // of each topic the first that is calibrated
+  std::map<std::string, bags::RosCameraInfo> infos_;               // of each topic the first that is valid
   std::map<std::string, std::vector<std::string>> scan_frames_;    // of each scan of a topic
   std::map<std::string, std::vector<FramePair>> odometry_frames_;  // and of each pose
 };

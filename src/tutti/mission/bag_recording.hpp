@@ -15,19 +15,14 @@
 
 namespace tutti::mission {
 
-/// A camera in a bag, with its images.
-struct BagCamera {
+/// The images of one topic.
+struct BagImages {
   std::string topic;
-  Camera camera;
   std::vector<ScanPlace> images;
   bool is_compressed = false;
 };
-
-/// The depth images of the one camera.
-struct BagDepth {
-  std::string topic;
-  std::vector<ScanPlace> images;
-  bool is_compressed = false;
+struct BagCamera : BagImages {
+  Camera camera;
 };
 
 /// What a mission uses of a bag.
@@ -39,7 +34,7 @@ struct BagRecording {
   Refusals refused_scans;
   Pose3 T_body_lidar;
   std::vector<BagCamera> cameras;   ///< None, one or two.
-  std::optional<BagDepth> depth;    ///< Registered to the only camera.
+  std::optional<BagImages> depth;   ///< Registered to the only camera.
   std::string no_images;            ///< Why there are no cameras.
   std::vector<ImuSample> imu;       ///< In the body frame.
   std::string fix_topic, fix_note;  ///< Empty: the bag has no fixes; and where the antenna is, and more.
