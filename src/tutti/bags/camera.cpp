@@ -80,11 +80,11 @@ ImuSample in_body(const ImuSample& sample, const Pose3& T_body_imu) {
   return {sample.stamp, T_body_imu.rotation * sample.gyro, T_body_imu.rotation * sample.accelerometer};
 }
 
-Status check_imu_place(const Pose3& T_body_imu) {
+Result<Pose3> check_imu_place(const Pose3& T_body_imu) {
   constexpr double kSamePlace_m = 1e-3;
   if (const double away_m = T_body_imu.translation.norm(); away_m > kSamePlace_m)
     return fail(ErrorCode::unsupported, "is {:.3f} m from the body's origin, expected 0", away_m);
-  return {};
+  return T_body_imu;
 }
 
 }  // namespace tutti::bags

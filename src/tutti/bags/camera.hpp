@@ -27,6 +27,6 @@ Result<ImuSample> to_imu_sample(const RosImu& message);
 /// The same sample in the axes of the body, about whose origin it was measured.
 ImuSample in_body(const ImuSample& sample, const Pose3& T_body_imu);
 /// Fails unless the IMU is in the body's origin within 1 mm: elsewhere it measures other accelerations.
-Status check_imu_place(const Pose3& T_body_imu);
+Result<Pose3> check_imu_place(const Pose3& T_body_imu);
 
 }  // namespace tutti::bags

@@ -125,6 +125,13 @@ std::optional<Pose3> TransformTree::find(const std::string& to, const std::strin
   return std::nullopt;
 }
 
+Result<Pose3> TransformTree::pose(const std::string& to, const std::string& from, const char* where) const {
+  if (const auto found = find(to, from)) return *found;
+  const std::string all = frames();
+  return fail(ErrorCode::invalid, "no transform from '{:.80}' to '{:.80}'{}, frames that do not move are: {:.500}",
+              frame_name(from), frame_name(to), where, all.empty() ? "none" : all);
+}
+
 std::string TransformTree::root_of(const std::string& frame) const { return ancestors(frame_name(frame)).back().first; }
 
 std::string TransformTree::frames() const {

@@ -43,6 +43,8 @@ class TransformTree {
   void add_problem(const std::string& problem, std::uint64_t count = 1);
   /// T_to_from, or no value when no chain of transforms that do not move joins the two frames.
   [[nodiscard]] std::optional<Pose3> find(const std::string& to, const std::string& from) const;
+  /// The same; the error has both frames and those that do not move. `where` is what has the transforms: " on /tf".
+  [[nodiscard]] Result<Pose3> pose(const std::string& to, const std::string& from, const char* where = "") const;
   /// The frame at the end of the chain of transforms that do not move, from `frame` up; `frame` itself if it has none.
   [[nodiscard]] std::string root_of(const std::string& frame) const;
   /// All frames that do not move, "base_link, lidar", for messages.

@@ -47,6 +47,9 @@ TEST(TransformTree, ChainsLeadUpAndDown) {
   expect("camera", "lidar", T_base_camera.inverse() * T_base_mast * T_mast_lidar);
   expect("elsewhere", "elsewhere", Pose3{});
   EXPECT_FALSE(tree.find("base", "elsewhere"));
+  EXPECT_LT(local(*tree.find("base", "lidar"), *tree.pose("/base", "/lidar")).norm(), 1e-9);
+  EXPECT_EQ(tree.pose("base", "/elsewhere", " on /tf").error().message,
+            "no transform from 'elsewhere' to 'base' on /tf, frames that do not move are: base, camera, lidar, mast");
   EXPECT_EQ(tree.frames(), "base, camera, lidar, mast");
 }
 

@@ -150,10 +150,8 @@ Result<Camera> ImagesIntake::place(const OneTopic& camera) const {
 
 Result<Pose3> ImagesIntake::imu_place() const {
   if (!imu_frame_) return fail(ErrorCode::invalid, "{}: no sample", imu_);
-  auto T_body_imu = odometry_.pose_on_body(*imu_frame_);
-  if (!T_body_imu) return in_context(imu_, T_body_imu.error());
-  if (const Status ok = bags::check_imu_place(*T_body_imu); !ok) return in_context(imu_, ok.error());
-  return T_body_imu;
+  const auto T_body_imu = odometry_.pose_on_body(*imu_frame_).and_then(&bags::check_imu_place);
+  return T_body_imu ? T_body_imu : in_context(imu_, T_body_imu.error());
 }
 
 bool ImagesIntake::has_any_image() const {

@@ -263,16 +263,12 @@ std::optional<OdometrySample> RosIntake::next_odometry(bool wait_for_scans) {
 Result<Pose3> RosIntake::pose_on_body(const std::string& frame) const {
   if (!frames_) return fail(ErrorCode::invalid, "no odometry has shown yet which frame is the body");
   const std::string from = bags::frame_name(frame), &body = frames_->body;
-  if (from == body) return Pose3{};
   if (const auto found = own_tree_.find(body, from)) return *found;
   if (own_frames_.empty())
     if (const auto found = tree_.find(body, from)) return *found;
-  const bags::TransformTree all = tree();
-  if (const auto found = all.find(body, from)) return *found;
-  const std::string frames = all.frames();
-  return fail(ErrorCode::invalid, "no transform from '{}' to '{}' on {}, frames that do not move are: {}", plain(from),
-              plain(body), own_frames_.empty() ? "/tf_static" : "tf_static of its namespace or /tf_static",
-              frames.empty() ? "none" : frames.substr(0, 500));
+  const auto found =
+      tree().pose(body, from, own_frames_.empty() ? " on /tf_static" : " on tf_static of its namespace or /tf_static");
+  return found ? found : fail(found.error().code, "{}", plain_text(found.error().message));
 }
 
 /// Whether the first scans wait for a transform that may still come.

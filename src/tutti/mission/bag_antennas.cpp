@@ -13,13 +13,6 @@
 namespace tutti::mission {
 namespace {
 
-/// T_body_frame by transforms that do not move.
-Result<Pose3> pose_on_body(const BagIndex& index, const std::string& body, const std::string& frame) {
-  if (frame == body) return Pose3{};
-  if (const auto found = body.empty() ? std::nullopt : index.tree.find(body, frame)) return *found;
-  return fail(ErrorCode::invalid, "no transform from '{}' to '{}'", frame, body);
-}
-
 /// Receivers of which not one message can be used.
 void note_no_fixes(const BagIndex& index, std::vector<std::string>& notes) {
   for (const auto& [topic, track] : index.fixes) {
@@ -45,7 +38,7 @@ std::string take_antenna(const BagIndex& index, const OdometryTrack& odometry, c
       continue;
     }
     std::string place =
-        bags::place_antenna(sample, robot.p_body_antenna(), pose_on_body(index, odometry.body, sample.frame));
+        bags::place_antenna(sample, robot.p_body_antenna(), index.tree.pose(odometry.body, sample.frame));
     if (places.size() < kMostPlaces) places.insert(std::move(place));
     if (sample.range() == nullptr)
       out.fixes.push_back(std::get<PositionFix>(sample.measured));

@@ -20,9 +20,8 @@ Result<BagCamera> camera_of(const BagIndex& index, const ImageTrack& track, cons
   const bags::ImageTopic& seen = track.seen;
   const auto model = seen.camera();
   if (!model) return tl::unexpected(model.error());
-  const auto T_body_camera = index.tree.find(body, seen.first->frame);
-  if (!T_body_camera)
-    return fail(ErrorCode::invalid, "{}: no transform from '{}' to '{}'", seen.topic, seen.first->frame, body);
+  const auto T_body_camera = index.tree.pose(body, seen.first->frame);
+  if (!T_body_camera) return in_context(seen.topic, T_body_camera.error());
   return BagCamera{{seen.topic, track.items, seen.is_compressed}, {*model, *T_body_camera}};
 }
 
@@ -40,10 +39,8 @@ void take_imu(const BagIndex& index, const std::string& body, const RobotConfig&
   const auto at = wanted.empty() ? index.imu.begin() : index.imu.find(wanted);
   if (at == index.imu.end()) return without_imu(fmt::format("'{}' is not in the bag", wanted));
   const auto& [topic, track] = *at;
-  const auto T_body_imu = index.tree.find(body, track.frame);
-  if (!T_body_imu) return without_imu(fmt::format("{}: no transform from '{}' to '{}'", topic, track.frame, body));
-  if (const Status ok = bags::check_imu_place(*T_body_imu); !ok)
-    return without_imu(fmt::format("{}: {}", topic, ok.error().message));
+  const auto T_body_imu = index.tree.pose(body, track.frame).and_then(&bags::check_imu_place);
+  if (!T_body_imu) return without_imu(fmt::format("{}: {}", topic, T_body_imu.error().message));
   out.imu = track.items;
   for (ImuSample& sample : out.imu) sample = bags::in_body(sample, *T_body_imu);
   out.notes.push_back(fmt::format("IMU of {} ({} samples, {} refused)", topic, out.imu.size(), track.refused.count));

@@ -295,6 +295,16 @@ TEST_F(BagCameras, TheFirstCalibrationThatIsValidCounts) {
   EXPECT_NE(load_samples(std::move(samples)).images, nullptr) << notes_;
 }
 
+TEST_F(BagCameras, AnImuThatNoTransformLeadsToIsNotUsed) {
+  std::vector<Sample> samples = robot();
+  const bags::RosImu imu{.header = {kStart, "nowhere"}};
+  samples.push_back(sample_of("/imu", "sensor_msgs/msg/Imu", kStart, bags::encode(imu)));
+  EXPECT_TRUE(load_samples(std::move(samples)).imu.empty());
+  expect_note(
+      "no IMU is used: /imu: no transform from 'nowhere' to 'base_link', frames that do not move are: base_link, "
+      "camera");
+}
+
 /// A range that is none would make every depth unknown.
 TEST_F(BagCameras, ARangeThatIsNoneIsRefused) {
   std::vector<Sample> samples = robot();

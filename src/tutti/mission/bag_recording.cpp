@@ -176,18 +176,17 @@ Result<Pose3> find_lidar(const BagIndex& index, const OdometryTrack& odometry, c
     note = fmt::format("nothing says which body the odometry is of: taken as that of the scans, {}", lidar);
     return Pose3{};
   }
-  if (const auto found = index.tree.find(body, lidar)) {
+  const auto found = index.tree.pose(body, lidar);
+  if (found) {
     note = fmt::format("{} is in {} by the bag's transforms", lidar, body);
     return *found;
   }
   if (is_of_the_world(lidar))
     return tl::unexpected(in_world(index, lidar, "by its name a frame that no robot carries", robot));
-  const std::string frames = index.tree.frames();
   return fail(ErrorCode::invalid,
-              "where the LiDAR is on the robot is not known: no transform from '{}' to '{}', frames that do not move "
-              "are: {}{}; say it: --set robots.{}.T_body_lidar.translation_m=[x,y,z] (zeros where both "
-              "frames are one)",
-              lidar, body, frames.empty() ? "none" : frames, refused_transforms(index.tree), robot.name);
+              "where the LiDAR is on the robot is not known: {}{}; say it: --set "
+              "robots.{}.T_body_lidar.translation_m=[x,y,z] (zeros where both frames are one)",
+              found.error().message, refused_transforms(index.tree), robot.name);
 }
 
 /// Odometry that names no body, or its own frame as one, is of the root of the sensor's transforms.
