@@ -44,6 +44,7 @@ def generate_launch_description():
         "state": (["/tmp/tutti_", name], "folder that the robot keeps what it knows in"),
         "socket": ([value("state"), ".feed"], "of tutti robot --feed"),
         "params": (os.path.join(get_package_share_directory("tutti_ros"), "config", "robot.yaml"), "parameters"),
+        "autostart": ("true", "false: tutti_ros waits for a lifecycle manager"),
         "use_sim_time": ("false", "the clock of /clock"),
     }
     declared = [DeclareLaunchArgument(argument, default_value=default, description=text)
@@ -58,7 +59,7 @@ def generate_launch_description():
         package="tutti_ros", executable="tutti_ros", name="tutti_ros", namespace=value("namespace"), output="screen",
         respawn=True, respawn_delay=2.0,
         parameters=[{one: ParameterValue(value(one), value_type=str) for one in ("images", "depth", "imu")},
-                    value("params"), {"socket": value("socket"), "use_sim_time": value("use_sim_time")}],
+                    value("params"), {one: value(one) for one in ("socket", "use_sim_time", "autostart")}],
         remappings=[("odom", value("odom")), ("points", value("points")), ("fix", value("fix")),
                     ("/tf", value("tf")), ("/tf_static", value("tf_static"))])
     return LaunchDescription([*declared, ends_with(robot, "tutti robot"), ends_with(node, "tutti_ros"), robot, node])

@@ -55,6 +55,34 @@ class Programs(WithPrograms):
         self.assertEqual(ended.exception.code, 2)
         self.assertEqual(said.getvalue(), "tutti_ros: parameter 'socket' is empty, expected the SOCKET of tutti robot --feed SOCKET\n")
 
+    def test_a_manager_activates_it_and_deactivates_it(self):
+        self.start_robot("r1", "nats://127.0.0.1:1")
+        node = self.node("r1", autostart=False)
+        inactive = [("publisher", "/diagnostics"), ("timer", "publish_diagnostics")]
+        self.assertEqual((node.state, node.alive()), ("unconfigured", inactive))
+        self.assertEqual((node.trigger("configure"), node.alive()), ("success", inactive))
+        for time in 0, 1:
+            self.assertEqual((node.trigger("activate"), node.state), ("success", "active"))
+            self.wait_for(lambda: node.link.state == "feeding", "the robot")
+            node.callbacks["odom"](odometry((1 + 2 * time) * 10**9, pose_at(0.1)))
+            self.assertNotIn("inactive", self.diagnosis(node)[1])
+            thread = node.connection
+            self.assertEqual((node.trigger("deactivate"), node.state), ("success", "inactive"))
+            self.assertFalse(thread.is_alive())
+            node.callbacks["odom"](odometry((2 + 2 * time) * 10**9, pose_at(0.2)))  # it was on its way
+            self.assertEqual(node.alive(), inactive)
+            self.assertIn("inactive", self.diagnosis(node)[1])
+        self.assertEqual((node.trigger("cleanup"), node.trigger("shutdown")), ("success", "success"))
+
+    def test_what_fails_when_it_is_activated_is_undone(self):
+        node = self.node("r1", autostart=False)
+        before = node.alive()
+        node.trigger("configure")
+        node.create_service = None  # which _begin() calls
+        self.assertEqual((node.trigger("activate"), node.state, node.alive()), ("error", "unconfigured", before))
+        del node.create_service
+        self.assertEqual((node.trigger("configure"), node.trigger("activate")), ("success", "success"))
+
     def test_the_camera_info_is_beside_the_images(self):
         for images, expected in (("image", "camera_info"), ("left/image_raw", "left/camera_info"), ("/l/i", "/l/camera_info"),
                                  ("l/i/compressed", "l/camera_info"), ("l/i/compressedDepth", "l/camera_info")):

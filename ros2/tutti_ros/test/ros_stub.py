@@ -215,7 +215,8 @@ class Node:
 
     def __init__(self, name):
         self.name, self.made, self.callbacks, self.qos, self.raw = name, {}, {}, {}, {}
-        self.published, self.destroyed = {}, []  # {topic: types}, subscriptions
+        self.published = {}  # {topic: types}
+        self.live, self.destroyed = [], []  # (what, name, the thing) of what was made and is there, and what is no more
 
     def declare_parameter(self, name, value, descriptor=None):
         """As rclpy's: another type than the default's is refused, but where it may change."""
@@ -225,24 +226,36 @@ class Node:
 
     def create_publisher(self, kind, topic, qos):
         self.made[topic], self.qos[topic] = Publisher(kind), qos
-        return self.made[topic]
+        return self._live(self.made[topic], "publisher", topic)
 
     def create_subscription(self, kind, topic, callback, qos, raw=False):
         self.callbacks[topic], self.qos[topic], self.raw[topic] = callback, qos, raw
-        return Subscription((topic, kind))
+        return self._live(Subscription((topic, kind)), "subscription", topic)
 
-    def destroy_subscription(self, subscription):
-        self.destroyed.append(subscription)
+    def _live(self, one, what, name):
+        self.live.append((what, name, one))
+        return one
+
+    def alive(self):
+        return sorted((what, name) for what, name, _ in self.live)
+
+    def destroy_subscription(self, one):
+        place, = [i for i, (_, _, made) in enumerate(self.live) if made is one]  # once
+        self.destroyed.append(self.live.pop(place)[2])
+
+    destroy_publisher = destroy_service = destroy_timer = destroy_subscription
 
     def get_publishers_info_by_topic(self, topic):
         return [types.SimpleNamespace(topic_type=kind) for kind in self.published.get(topic, [])]
 
     def create_service(self, kind, name, callback):
         self.callbacks[name] = callback
+        return self._live(object(), "service", name)
 
     def create_timer(self, period_s, callback):
         assert isinstance(period_s, float)
         self.callbacks[callback.__name__] = callback
+        return self._live(object(), "timer", callback.__name__)
 
     def get_logger(self):
         return Logger()
@@ -257,6 +270,46 @@ class Node:
         pass
 
 
+class LifecycleNode(Node):
+    """As rclpy's: a transition from another state is an error, and so is what a callback throws, of which nothing is said."""
+
+    TRANSITIONS = {"configure": ("unconfigured", "inactive"), "activate": ("inactive", "active"),
+                   "deactivate": ("active", "inactive"), "cleanup": ("inactive", "unconfigured"), "shutdown": (None, "finalized")}
+    SUCCESS, FAILURE, ERROR = "success", "failure", "error"
+
+    def __init__(self, name):
+        super().__init__(name)
+        self.state = "unconfigured"
+
+    def trigger(self, transition):
+        begin, end = self.TRANSITIONS[transition]
+        if begin not in (None, self.state):
+            raise RuntimeError(f"RCLError: Transition is not registered: {transition} from {self.state}")
+
+        def called(callback):
+            try:
+                return callback(self.state)
+            except Exception:
+                return self.ERROR
+        said = called(getattr(self, "on_" + transition))
+        if said == self.SUCCESS:
+            self.state = end
+        elif said == self.ERROR:
+            self.state = "unconfigured" if called(self.on_error) == self.SUCCESS else "finalized"
+        return said
+
+    def on_configure(self, state):
+        return self.SUCCESS
+
+    on_activate = on_deactivate = on_cleanup = on_shutdown = on_error = on_configure
+
+    def trigger_configure(self):
+        return self.trigger("configure")
+
+    def trigger_activate(self):
+        return self.trigger("activate")
+
+
 def install():
     """Puts the modules that the node imports where it finds them."""
     def module(name, **has):
@@ -266,6 +319,7 @@ def install():
 
     executors = module("rclpy.executors", ExternalShutdownException=type("ExternalShutdownException", (Exception,), {}))
     module("rclpy.node", Node=Node)
+    module("rclpy.lifecycle", LifecycleNode=LifecycleNode, TransitionCallbackReturn=LifecycleNode)
     module("rclpy.qos", DurabilityPolicy=types.SimpleNamespace(TRANSIENT_LOCAL="transient local"),
            ReliabilityPolicy=types.SimpleNamespace(RELIABLE="reliable", BEST_EFFORT="best effort"),
            QoSProfile=lambda **what: what, qos_profile_sensor_data="sensor data")

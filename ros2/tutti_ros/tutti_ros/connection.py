@@ -28,7 +28,8 @@ class Connection(threading.Thread):
     def stop(self):
         self.ending.set()
         self.wake()
-        self.join(5.0)
+        if self.ident is not None:  # it was started
+            self.join(5.0)
         self.wakes.close()
         self.waker.close()
 

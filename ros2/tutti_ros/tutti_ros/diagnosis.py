@@ -4,6 +4,10 @@ OK, WARN, ERROR = 0, 1, 2  # diagnostic_msgs/DiagnosticStatus
 COUNTED = ("odometry", "odometry_missed", "scans", "scans_missed", "fixes", "images", "imu", "corrections", "refused", "jumps", "forgotten_while_away")
 
 
+def diagnosis_of_inactive():
+    return WARN, "inactive: nothing is heard or published until it is activated", {"connection": "inactive"}
+
+
 def diagnosis(link, correction, situation, trouble, is_alive=True):
     """(level, message, {key: value}). `correction`, `situation`: the robot's last, or None. `trouble`: what was not taken, newest
     last."""

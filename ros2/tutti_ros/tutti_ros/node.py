@@ -8,13 +8,13 @@ import struct
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.node import Node
+from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from rclpy.serialization import serialize_message
 from std_srvs.srv import Empty, Trigger
 
 from tutti_ros.connection import Connection
-from tutti_ros.diagnosis import diagnosis
+from tutti_ros.diagnosis import diagnosis, diagnosis_of_inactive
 from tutti_ros.feed_messages import Feed
 from tutti_ros.link import Link, stamp_ns, stamps_of_transforms
 from tutti_ros.ros_node import LATCHED, best_effort, diagnostics, parameter, run
@@ -38,6 +38,7 @@ PARAMETERS = {
     "transform_tolerance_s": 0.1,  # by which map -> odom is dated ahead
     "publish_tf": True,
     "path_period_s": 1.0,
+    "autostart": True,         # false: it waits for somebody to configure and activate it, as nav2's lifecycle manager does
 }
 # How much odometry is to be trusted, as robots[].covariance of a mission file. Variances add up along the trajectory.
 NOISE = {"translation_m_per_sqrt_m": 0.02, "translation_m_per_sqrt_deg": 0.001, "translation_m_per_sqrt_s": 0.003,
@@ -65,35 +66,90 @@ def camera_info_topic(images):
     return f"{folder[0]}{folder[1]}camera_info"
 
 
-class TuttiNode(Node):
+class TuttiNode(LifecycleNode):
+    """A managed node (design.ros2.org/articles/node_lifecycle.html): while it is active it is connected to the robot, subscribes
+    and publishes; otherwise it only says in /diagnostics that it is not. Parameters are read once, whatever its state."""
+
     def __init__(self):
         super().__init__("tutti_ros")
         for name, default in PARAMETERS.items():
             setattr(self, name, parameter(self, name, default))
         if not self.socket:
             raise ValueError("parameter 'socket' is empty, expected the SOCKET of tutti robot --feed SOCKET")
-        self.correction, self.situation, self.trouble = None, None, collections.deque(maxlen=5)
-        self.transform, self.transform_ns = None, -1  # the last map -> odom (and world -> map), and its stamp
-        self.link = Link(client_name=b"tutti_ros", sensors=Feed.Sensors(scans=self.use_scans), ros=self._settings())
+        self.settings = self._settings()
+        self.trouble = collections.deque(maxlen=5)
+        self.transform_ns = -1  # stamp of the last map -> odom (and world -> map)
+        self.link = self.connection = None  # while it is active
+        self.while_active = []  # what it subscribes, publishes and serves then, after how that is destroyed
+        self.diagnostics_publisher = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self.create_timer(1.0, self.publish_diagnostics)
+        if self.autostart and not self.trigger_configure() == self.trigger_activate() == TransitionCallbackReturn.SUCCESS:
+            raise RuntimeError("tutti_ros could not be activated: see its log")
+
+    # Its states.
+    def on_activate(self, state):
+        try:
+            self._begin()
+        except Exception as error:  # which rclpy would drop
+            self.get_logger().error(f"not activated: {error!r}")
+            raise
+        return super().on_activate(state)
+
+    def on_deactivate(self, state):
+        self._end()
+        return super().on_deactivate(state)
+
+    def on_shutdown(self, state):
+        self._end()
+        return super().on_shutdown(state)
+
+    def on_error(self, state):
+        self._end()
+        return super().on_error(state)
+
+    def destroy_node(self):
+        self._end()
+        return super().destroy_node()
+
+    def _begin(self):
+        self.correction, self.situation = None, None
+        self.transform = None  # the last one
+        self.link = Link(client_name=b"tutti_ros", sensors=Feed.Sensors(scans=self.use_scans), ros=self.settings)
         self.connection = Connection(self.socket, self.link, self.hear)
         self.outputs, self.topic_names = {}, {}  # publishers; subscribed topics, as ROS calls them
         for topic, kind, qos in (("/tf", TRANSFORMS, TF_QOS), ("corrected_path", PATH, LATCHED),
                                  ("corrected_pose", POSE, 10), ("localised_pose", POSE, 10),
                                  ("team_mates", "visualization_msgs/msg/MarkerArray", LATCHED)):
-            self.outputs[topic] = self.create_publisher(message_type(kind), topic, qos)
-        self.diagnostics_publisher = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+            self._advertise(topic, kind, qos)
         self._subscribe_all()
-        self.create_service(Trigger, "~/end_recording", self.end_recording)
-        self.create_service(Empty, "reinitialize_global_localization", self.search_anew)  # nav2's names
+        self._serve(Trigger, "~/end_recording", self.end_recording)
+        self._serve(Empty, "reinitialize_global_localization", self.search_anew)  # nav2's names
         with contextlib.suppress(ImportError):  # nav2_msgs are not everywhere
-            self.create_service(importlib.import_module("nav2_msgs.srv").SetInitialPose, "set_initial_pose", self.set_start_pose)
-        self.create_timer(self.path_period_s, self.ask_for_path)
-        self.create_timer(1.0, self.publish_diagnostics)
+            self._serve(importlib.import_module("nav2_msgs.srv").SetInitialPose, "set_initial_pose", self.set_start_pose)
+        self._every(self.path_period_s, self.ask_for_path)
         self.connection.start()
 
-    def destroy_node(self):
-        self.connection.stop()
-        return super().destroy_node()
+    def _end(self):
+        if self.connection is None:
+            return
+        self.connection.stop()  # nothing is published after it
+        for destroy, one in reversed(self.while_active):
+            destroy(one)
+        self.while_active.clear()
+        self.link = self.connection = None
+
+    def _keep(self, destroy, one):
+        self.while_active.append((destroy, one))
+        return one
+
+    def _advertise(self, topic, kind, qos):
+        self.outputs[topic] = self._keep(self.destroy_publisher, self.create_publisher(message_type(kind), topic, qos))
+
+    def _serve(self, kind, name, answer):
+        self._keep(self.destroy_service, self.create_service(kind, name, answer))
+
+    def _every(self, period_s, act):
+        self._keep(self.destroy_timer, self.create_timer(period_s, act))
 
     def _settings(self):
         """How the robot is to read the messages, and in which frames it answers."""
@@ -123,7 +179,8 @@ class TuttiNode(Node):
     # From ROS.
     def _subscribe(self, topic, kind, qos, add, *more):
         take = lambda cdr: self.take(add, topic, kind, bytes(cdr), *more)
-        subscription = self.create_subscription(message_type(kind), topic, take, qos, raw=True)
+        subscription = self._keep(self.destroy_subscription,
+                                  self.create_subscription(message_type(kind), topic, take, qos, raw=True))
         self.topic_names[topic] = subscription.topic_name  # as it is remapped
         return subscription
 
@@ -139,7 +196,7 @@ class TuttiNode(Node):
         self._subscribe("initialpose", POSE, 1, link.add_once)  # reliable, as RViz sends it
         if self.use_scans:
             self.scans = CLOUD, self._subscribe("points", CLOUD, sensor_qos, link.add, "scans")
-            self.create_timer(1.0, self.look_for_scans)
+            self._every(1.0, self.look_for_scans)
         if self.use_fixes:
             self._subscribe("fix", "sensor_msgs/msg/NavSatFix", sensor_qos, link.add, "fixes")
         for topic in [topic.decode() for topic in link.hello["ros"].images] + [self.depth] * bool(self.depth):
@@ -151,10 +208,16 @@ class TuttiNode(Node):
 
     def take(self, add, topic, *what):
         try:
-            with self.connection.lock:
-                add(topic, *what)
+            self._tell(add, topic, *what)
         except ValueError as error:
             self.complain(f"{self.topic_names.get(topic, topic)}: {error}")
+
+    def _tell(self, add, *what):
+        """Hands something to the link; nothing where the node was deactivated while it was on its way."""
+        if self.connection is None:
+            return
+        with self.connection.lock:
+            add(*what)
         self.connection.wake()
 
     def add_odometry(self, topic, kind, cdr):
@@ -177,20 +240,17 @@ class TuttiNode(Node):
         except ImportError as error:
             self.complain(f"points: they are {kind}, whose package is not sourced here ({error})")
             return
+        self.while_active.remove((self.destroy_subscription, subscription))
         self.destroy_subscription(subscription)
 
     def end_recording(self, request, response):
-        with self.connection.lock:
-            self.link.end_recording()
-        self.connection.wake()
+        self._tell(self.link.end_recording)
         response.success, response.message = True, "told the robot; it says when everything is stored"
         return response
 
     def search_anew(self, request, response):
         """A robot that localises in a map forgets where it is, and searches the whole map."""
-        with self.connection.lock:
-            self.link.add_search()
-        self.connection.wake()
+        self._tell(self.link.add_search)
         return response
 
     def set_start_pose(self, request, response):
@@ -221,7 +281,7 @@ class TuttiNode(Node):
             self.publish_transform(data)
             return
         if topic not in self.outputs:
-            self.outputs[topic] = self.create_publisher(message_type(kind), topic, LATCHED)
+            self._advertise(topic, kind, LATCHED)
         self.outputs[topic].publish(data)
 
     def publish_transform(self, data):
@@ -236,9 +296,12 @@ class TuttiNode(Node):
             self.take(self.link.add_once, "corrected_path", PATH)
 
     def publish_diagnostics(self):
-        with self.connection.lock:
-            level, text, values = diagnosis(self.link, self.correction, self.situation, list(self.trouble),
-                                            self.connection.is_alive())
+        if self.connection is None:
+            level, text, values = diagnosis_of_inactive()
+        else:
+            with self.connection.lock:
+                level, text, values = diagnosis(self.link, self.correction, self.situation, list(self.trouble),
+                                                self.connection.is_alive())
         self.trouble.clear()
         self.diagnostics_publisher.publish(diagnostics(self, "live feed", level, text, values))
 
