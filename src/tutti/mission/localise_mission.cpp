@@ -2,13 +2,11 @@
 #include "tutti/mission/localise_mission.hpp"
 
 #include <algorithm>
-#include <cmath>
+#include <iterator>
 #include <limits>
 #include <utility>
 
 #include "tutti/evaluation/association.hpp"
-#include "tutti/geometry/alignment.hpp"
-#include "tutti/geometry/so3.hpp"
 #include "tutti/mission/load_meter.hpp"
 #include "tutti/mission/robot_actor.hpp"
 
@@ -35,55 +33,16 @@ bool overlaps(const Trajectory& a, const Trajectory& b) {
   return !a.empty() && !b.empty() && a.front().stamp <= b.back().stamp && b.front().stamp <= a.back().stamp;
 }
 
-/// T_world_reference, by the robots that made the map; nothing when none of them has a reference.
-std::optional<Pose3> reference_in(const mapfile::OpenedMap& map, const MissionInput& input,
-                                  const evaluation::AssociationConfig& association) {
-  std::vector<Eigen::Vector3d> in_world, in_reference;
+/// By the robots that made the map; nothing when none of them has a reference.
+std::optional<MapReference> reference_of(const mapfile::OpenedMap& map, const MissionInput& input,
+                                         const evaluation::AssociationConfig& association) {
+  std::vector<evaluation::PosePair> pairs;
   for (const MissionRecording& robot : input.robots) {
     const Trajectory poses = poses_in(map, robot.recording.name);
     if (!overlaps(poses, robot.recording.reference)) continue;
-    for (const auto& pair : evaluation::associate(poses, robot.recording.reference, association)) {
-      in_world.push_back(pair.estimate.translation);
-      in_reference.push_back(pair.reference.translation);
-    }
+    std::ranges::move(evaluation::associate(poses, robot.recording.reference, association), std::back_inserter(pairs));
   }
-  if (in_world.size() < 3) return std::nullopt;
-  return align_points(in_world, in_reference);
-}
-
-LocaliseScore score_of(const std::vector<localise::Located>& course, const Trajectory& reference,
-                       const Pose3& T_world_reference, const evaluation::AssociationConfig& association) {
-  Trajectory published;
-  std::vector<const localise::Located*> of;
-  for (const auto& located : course)
-    if (located.state == localise::State::localised && located.T_world_body) {
-      published.push_back({located.stamp, located.T_world_body->T_a_b});
-      of.push_back(&located);
-    }
-  LocaliseScore out;
-  double squares = 0.0;
-  std::vector<double> degrees;
-  for (const auto& pair : evaluation::associate(published, reference, association)) {
-    const auto at = std::ranges::lower_bound(published, pair.stamp, {}, &StampedPose::stamp) - published.begin();
-    const Matrix6d& covariance = of[static_cast<std::size_t>(at)]->T_world_body->covariance;
-    const Vector6d error = local(pair.estimate, T_world_reference * pair.reference);
-    const double metres = error.head<3>().norm(), angle_deg = error.tail<3>().norm() / kRadPerDeg;
-    ++out.scored;
-    if (metres > LocaliseScore::kWrong_m || angle_deg > LocaliseScore::kWrong_deg) ++out.wrong;
-    squares += metres * metres;
-    out.max_m = std::max(out.max_m, metres);
-    degrees.push_back(angle_deg);
-    for (int axis = 0; axis < 3; ++axis)
-      for (int k = 0; k < 3; ++k)
-        if (std::abs(error[axis]) <= (k + 1) * std::sqrt(covariance(axis, axis))) out.within[k] += 1.0 / 3.0;
-  }
-  if (out.scored == 0) return out;
-  const auto count = static_cast<double>(out.scored);
-  out.rmse_m = std::sqrt(squares / count);
-  std::ranges::nth_element(degrees, degrees.begin() + static_cast<std::ptrdiff_t>(degrees.size() / 2));
-  out.median_deg = degrees[degrees.size() / 2];
-  for (double& share : out.within) share /= count;
-  return out;
+  return lay_on_map(pairs);
 }
 
 void measure_starts(const localise::KnownMap& map, const Trajectory& reference, const Pose3& T_world_reference,
@@ -177,16 +136,16 @@ Result<std::vector<LocalisedRobot>> localise_mission(
     const MissionConfig& config, const MissionInput& input, const mapfile::OpenedMap& map,
     const std::function<std::shared_ptr<const server::ClosureVerifier>()>& make_verifier, double restart_s,
     const std::function<bool(const std::string&, double share)>& stop) {
-  const auto T_world_reference = reference_in(map, input, config.association);
+  const auto reference = reference_of(map, input, config.association);
   std::vector<LocalisedRobot> out;
   for (const MissionRecording& robot : input.robots) {
     const Recording& recording = robot.recording;
     if (recording.odometry.empty() || overlaps(poses_in(map, recording.name), recording.odometry)) continue;
     auto setup = localise_setup(config, with_sensors(config.agent, recording).submap, map.known, make_verifier);
     out.push_back(replay(robot, config, std::move(setup), restart_s, stop));
-    if (!T_world_reference || recording.reference.empty()) continue;
-    out.back().score = score_of(out.back().course, recording.reference, *T_world_reference, config.association);
-    measure_starts(*map.known, recording.reference, *T_world_reference, out.back());
+    if (!reference || recording.reference.empty()) continue;
+    out.back().score = score_of(out.back().course, recording.reference, *reference, config.association);
+    measure_starts(*map.known, recording.reference, reference->T_world_reference, out.back());
   }
   if (out.empty())
     return fail(ErrorCode::invalid, "every robot of the mission has made this map, expected one to be localised in it");

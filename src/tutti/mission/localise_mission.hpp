@@ -12,21 +12,12 @@
 #include "tutti/base/result.hpp"
 #include "tutti/localise/localiser.hpp"
 #include "tutti/mapfile/known_map.hpp"
+#include "tutti/mission/localise_score.hpp"
 #include "tutti/mission/mission_config.hpp"
 #include "tutti/mission/recordings.hpp"
 #include "tutti/server/closure_verifier.hpp"
 
 namespace tutti::mission {
-
-/// How far published poses are from where the robot was, in the map's frame: the reference laid on the map by the
-/// robots that made it, and by nothing of the robot that is scored.
-struct LocaliseScore {
-  std::size_t scored = 0;  ///< Poses of state localised with a reference.
-  std::size_t wrong = 0;   ///< By more than kWrong_m or kWrong_deg; some of those.
-  static constexpr double kWrong_m = 1.0, kWrong_deg = 5.0;
-  double rmse_m = 0.0, max_m = 0.0, median_deg = 0.0;
-  double within[3] = {};  ///< Share of the errors along x, y and z within 1, 2 and 3 standard deviations.
-};
 
 /// What became of one robot that was replayed in a map that does not move.
 struct LocalisedRobot {

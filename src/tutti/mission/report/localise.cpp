@@ -41,6 +41,8 @@ Json json_of(const LocalisedRobot& robot) {
              {"rmse_m", number(robot.score->rmse_m)},
              {"max_m", number(robot.score->max_m)},
              {"median_deg", number(robot.score->median_deg)},
+             {"map_rmse_m", number(robot.score->map_rmse_m)},
+             {"in_map_rmse_m", number(robot.score->in_map_rmse_m)},
              {"within_sigma",
               {number(robot.score->within[0]), number(robot.score->within[1]), number(robot.score->within[2])}}};
   return {{"robot", robot.name},
