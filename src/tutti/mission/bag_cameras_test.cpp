@@ -298,11 +298,11 @@ TEST_F(BagCameras, TheFirstCalibrationThatIsValidCounts) {
 TEST_F(BagCameras, AnImuThatNoTransformLeadsToIsNotUsed) {
   std::vector<Sample> samples = robot();
   const bags::RosImu imu{.header = {kStart, "nowhere"}};
-  samples.push_back(sample_of("/imu", "sensor_msgs/msg/Imu", kStart, bags::encode(imu)));
-  EXPECT_TRUE(load_samples(std::move(samples)).imu.empty());
+  samples.push_back(sample_of("/other", "sensor_msgs/msg/Imu", kStart, bags::encode(imu)));
+  EXPECT_TRUE(load_samples(std::move(samples), {"alpha.imu=/other"}).imu.empty());
   expect_note(
-      "no IMU is used: /imu: no transform from 'nowhere' to 'base_link', frames that do not move are: base_link, "
-      "camera");
+      "no IMU is used: /other: no transform from 'nowhere' to 'base_link', frames that do not move are: base_link, "
+      "camera, imu");
 }
 
 /// A range that is none would make every depth unknown.

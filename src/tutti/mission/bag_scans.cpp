@@ -30,19 +30,9 @@ class BagScans final : public ScanSource {
     };
     const std::size_t first = std::min(from(odometry.front().stamp), places_.size() - 1);
     const std::size_t last = std::max(first + 1, from(odometry.back().stamp));
-    Result<std::optional<lidar::PointTimes>> found;
-    std::size_t tried = 0;
-    for (const std::size_t i : samples_to_try(last - first)) {
-      auto times = times_of(first + i, robot);
-      if (times || tried++ == 0) found = std::move(times);
-      if (found) break;
-    }
-    if (!found)
-      return in_context(fmt::format("not one of {} scans that were tried can be used, the first because", tried),
-                        found.error());
-    // At half of the odometry, a clock that starts with it at 0 can be distinguished from the time after the stamp.
-    const auto later = times_of(first + (last - first) / 2, robot);
-    times_ = later ? *later : *found;
+    auto times = mission::learn_times(last - first, [&](std::size_t i) { return times_of(first + i, robot); });
+    if (!times) return tl::unexpected(times.error());
+    times_ = std::move(*times);
     return lidar::in_words(times_);
   }
 

@@ -30,7 +30,35 @@ Result<formats::TimedCloud> read(const fs::path& file) {
   return scan;
 }
 
+std::vector<std::size_t> samples_to_try(std::size_t count) {
+  constexpr std::size_t kFirst = 5;
+  std::vector<std::size_t> out;
+  for (std::size_t i = 0, step = 1; i < count; i += step) {
+    out.push_back(i);
+    if (i >= kFirst) step *= 2;
+  }
+  if (count > 0 && out.back() + 1 != count) out.push_back(count - 1);
+  return out;
+}
+
 }  // namespace
+
+Result<std::optional<lidar::PointTimes>> learn_times(
+    std::size_t count, const std::function<Result<std::optional<lidar::PointTimes>>(std::size_t scan)>& times_of) {
+  Result<std::optional<lidar::PointTimes>> found;
+  std::size_t tried = 0;
+  for (const std::size_t i : samples_to_try(count)) {
+    auto times = times_of(i);
+    if (times || tried++ == 0) found = std::move(times);
+    if (found) break;
+  }
+  if (!found)
+    return in_context(fmt::format("not one of {} scans that were tried can be used, the first because", tried),
+                      found.error());
+  // In the middle, a clock that starts with odometry at 0 can be distinguished from the time since the sweep's begin.
+  const auto later = times_of(count / 2);
+  return later ? later : found;
+}
 
 ScanFolder::ScanFolder(fs::path folder, ScanStamps times, const Trajectory& odometry)
     : folder_(std::move(folder)), times_of_files_(std::move(times)) {
@@ -57,17 +85,6 @@ Result<std::shared_ptr<const ScanFolder>> ScanFolder::open(fs::path folder, Scan
   return scans;
 }
 
-std::vector<std::size_t> samples_to_try(std::size_t count) {
-  constexpr std::size_t kFirst = 5;
-  std::vector<std::size_t> out;
-  for (std::size_t i = 0, step = 1; i < count; i += step) {
-    out.push_back(i);
-    if (i >= kFirst) step *= 2;
-  }
-  if (count > 0 && out.back() + 1 != count) out.push_back(count - 1);
-  return out;
-}
-
 /// A file without a time: then nobody knows whose the others are. They may be numbered from 1, or be of another
 /// recording.
 Status ScanFolder::check_numbers() const {
@@ -91,25 +108,13 @@ Status ScanFolder::check_numbers() const {
 }
 
 Status ScanFolder::learn_times(const RobotConfig& robot) {
-  Result<std::optional<lidar::PointTimes>> found = no_scans();
   std::vector<std::size_t> there;
   for (std::size_t sample = 0; sample < times_of_files_.stamps.size(); ++sample)
     if (file_of(sample)) there.push_back(sample);
-  std::size_t tried = 0;
-  for (const std::size_t i : samples_to_try(there.size())) {
-    auto times = times_of(there[i], robot);
-    if (times || tried++ == 0) found = std::move(times);
-    if (found) break;
-  }
-  if (!found && tried > 0)
-    return in_context(
-        fmt::format("not one scan could be read: all {} that were tried failed, the first because", tried),
-        found.error());
-  if (!found) return tl::unexpected(found.error());
-  // At half of the odometry, a clock that starts with it at 0 can be distinguished from the time since the sweep's
-  // begin.
-  const auto later = times_of(times_of_files_.stamps.size() / 2, robot);
-  times_ = later ? *later : *found;
+  if (there.empty()) return no_scans();
+  auto times = mission::learn_times(there.size(), [&](std::size_t i) { return times_of(there[i], robot); });
+  if (!times) return tl::unexpected(times.error());
+  times_ = std::move(*times);
   return {};
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -21,16 +22,18 @@ struct ScanStamps {
   std::vector<Timestamp> stamps;  ///< Stamps of the files from 000000 on; empty: those of the odometry poses.
 };
 
-/// Which of `count` scans are tried until one shows how all are to be used: the first ones, and at doubling distances
-/// from there on up to the last, as a LiDAR that spins up, or a driver that waits for a fix, sends empty ones for long.
-std::vector<std::size_t> samples_to_try(std::size_t count);
+/// What the times of a recording's `count` scans mean, by what `times_of` finds of one: tried are the first ones, and
+/// at doubling distances from there on up to the last, as a LiDAR that spins up, or a driver that waits for a fix,
+/// sends empty ones for long. Fails with the first one's error where none can be used.
+Result<std::optional<lidar::PointTimes>> learn_times(
+    std::size_t count, const std::function<Result<std::optional<lidar::PointTimes>>(std::size_t scan)>& times_of);
 
 /// A folder with one scan per odometry pose or stamp, NNNNNN.pcd or KITTI's NNNNNN.bin, in the LiDAR's frame. Scans are
 /// returned in the body frame of their pose, deskewed by the odometry where points have times (docs/data.md).
 class ScanFolder final : public ScanSource {
  public:
   /// Opens the folder and reads its first scans. Fails when it has none of the files, or files beyond the stamps, so
-  /// that they cannot be assigned; or when none of samples_to_try() is usable, with the first one's error.
+  /// that they cannot be assigned; or as learn_times() does.
   static Result<std::shared_ptr<const ScanFolder>> open(std::filesystem::path folder, ScanStamps times,
                                                         const Trajectory& odometry, const RobotConfig& robot);
 
