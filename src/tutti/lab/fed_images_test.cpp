@@ -163,6 +163,7 @@ Submaps fed(const simulation::FlownRecording& flown, bool as_files) {
   const Recording& recording = flown.recording;
   Fed robot(sensors_of(flown));
   std::size_t imu = 0, scan = 0, images = 0, fix = 0;
+  const auto fixes = measured<PositionFix>(recording);
   for (std::size_t i = 0; i < recording.odometry.size(); ++i) {
     const Timestamp now = recording.odometry[i].stamp;
     robot.send(
@@ -171,8 +172,7 @@ Submaps fed(const simulation::FlownRecording& flown, bool as_files) {
     while (imu < recording.imu.size() && (imu == 0 || recording.imu[imu - 1].stamp < now))
       samples.push_back(recording.imu[imu++]);
     if (!samples.empty()) robot.send(test::imu(samples));
-    for (; fix < recording.fixes.size() && recording.fixes[fix].stamp <= now; ++fix)
-      robot.send(test::fix(recording.fixes[fix]));
+    for (; fix < fixes.size() && fixes[fix].stamp <= now; ++fix) robot.send(test::fix(fixes[fix]));
     const auto scan_is_due = [&] {
       return stamp_at(recording, recording.scan_stamps, scan).value_or(kLastTimestamp) <= now;
     };
@@ -215,7 +215,7 @@ TEST(FedImages, OfALidarAndAReceiverMakeTheSubmapsOfTheRecording) {
   simulation::ReceiverConfig receiver;
   receiver.rate_hz = 20.0;
   receiver.antenna_m = {0.1, 0.0, 0.3};
-  flown.recording.fixes = simulation::simulate_fixes(flown.recording.reference, receiver, {}, Rng(1));
+  set_measured(flown.recording, simulation::simulate_fixes(flown.recording.reference, receiver, {}, Rng(1)));
   expect_same(flown, false);
   std::size_t fixes = 0;
   for (const std::string& bytes : fed(flown, false)) fixes += wire::decode_submap(bytes)->submap.fixes.size();

@@ -50,8 +50,6 @@ class Player {
   Status hear_until(const std::atomic<bool>& stop, const IsIt& is_it);
   Status say_sample(std::size_t i, const std::atomic<bool>& stop);
   Status say_sensors(Timestamp now);
-  template <class Sample>
-  Status say_until_now(const std::vector<Sample>& samples, std::size_t& next, Timestamp now, bool is_known);
   Status say_images(Timestamp now);
   Status say(const Input& input, Timestamp now);
   void note_stored(const std::optional<Timestamp>& stored);
@@ -69,7 +67,7 @@ class Player {
   bool wants_scan_ = false;
   std::deque<std::pair<Timestamp, std::size_t>> said_;  // stamps and bytes of what the robot has not stored yet
   std::size_t said_bytes_ = 0;
-  std::size_t imu_ = 0, scan_ = 0, images_ = 0, fix_ = 0, range_ = 0;
+  std::size_t imu_ = 0, scan_ = 0, images_ = 0, measured_ = 0;
 };
 
 Status Player::connect(const std::atomic<bool>& stop) {
@@ -160,8 +158,12 @@ Status Player::say_sensors(Timestamp now) {
     samples.push_back(recording.imu[imu_++]);
   if (recording.images && !samples.empty() && !is_known)
     if (Status ok = client_->say(samples); !ok) return ok;
-  if (Status ok = say_until_now(recording.fixes, fix_, now, is_known); !ok) return ok;
-  if (Status ok = say_until_now(recording.ranges, range_, now, is_known); !ok) return ok;
+  for (; measured_ < recording.measured.size(); ++measured_) {
+    const Input& sample = recording.measured[measured_];
+    if (stamp_of(sample) > now) break;
+    if (is_known || stamp_of(sample) < recording.odometry.front().stamp) continue;  // as RobotActor does
+    if (Status ok = say(sample, now); !ok) return ok;
+  }
   const auto is_due = [&] { return stamp_at(recording, recording.scan_stamps, scan_).value_or(kLastTimestamp) <= now; };
   for (; recording.scans && is_due(); ++scan_) {
     if (!wants_scan_ || is_known) continue;
@@ -171,16 +173,6 @@ Status Player::say_sensors(Timestamp now) {
     if (Status ok = say(std::move(**scan), now); !ok) return ok;
   }
   return recording.images && !is_known ? say_images(now) : Status();
-}
-
-/// As RobotActor does: none from before the first odometry.
-template <class Sample>
-Status Player::say_until_now(const std::vector<Sample>& samples, std::size_t& next, Timestamp now, bool is_known) {
-  for (; next < samples.size() && samples[next].stamp <= now; ++next) {
-    if (is_known || samples[next].stamp < robot_.recording.odometry.front().stamp) continue;
-    if (Status ok = say(samples[next], now); !ok) return ok;
-  }
-  return {};
 }
 
 /// Images that are taken at odometry's samples have odometry's stamps (TrackingSource).

@@ -90,8 +90,8 @@ Status add_fixes(const MissionConfig& config, std::uint64_t seed, const std::vec
       any = true;
       if (robot->reference.empty())
         return fail(ErrorCode::configuration, "receivers: robot {} has no reference to make fixes of", robot->name);
-      robot->fixes = simulation::simulate_fixes(robot->reference, receiver, simulation::PlaceConfig{},
-                                                Rng(seed).fork("receiver/" + robot->name));
+      set_measured(*robot, simulation::simulate_fixes(robot->reference, receiver, simulation::PlaceConfig{},
+                                                      Rng(seed).fork("receiver/" + robot->name)));
     }
     if (!any) return fail(ErrorCode::configuration, "receivers: no robot is called '{}'", receiver.robot);
   }
@@ -104,8 +104,8 @@ Status add_ranges(const MissionConfig& config, std::uint64_t seed, const std::ve
     if (robot->reference.empty())
       return fail(ErrorCode::configuration, "ranging: robot {} has no reference to make ranges of", robot->name);
   for (Recording* robot : robots)
-    robot->ranges =
-        simulation::simulate_ranges(*robot, robots, config.ranging, Rng(seed).fork("ranging/" + robot->name));
+    set_measured(*robot,
+                 simulation::simulate_ranges(*robot, robots, config.ranging, Rng(seed).fork("ranging/" + robot->name)));
   return {};
 }
 

@@ -68,7 +68,8 @@ TEST(RangesMission, BagsHaveThem) {
   ASSERT_TRUE(read) << read.error().message;
   std::size_t all = 0;
   for (std::size_t r = 0; r < 2; ++r) {
-    const auto &in = simulated->robots[r].recording.ranges, &out = read->robots[r].recording.ranges;
+    const auto in = measured<RobotRange>(simulated->robots[r].recording),
+               out = measured<RobotRange>(read->robots[r].recording);
     ASSERT_EQ(in.size(), out.size());
     const Timestamp begin = simulated->robots[r].recording.odometry.front().stamp,
                     begin_of_bag = read->robots[r].recording.odometry.front().stamp;

@@ -53,11 +53,11 @@ class RobotWriter {
     Timestamp last = begin();
     double told = 0.0;
     // In the order of which comes first at one stamp: who has a scan has the odometry up to it.
-    std::array<Stream, 7> streams{{
+    std::array<Stream, 6> streams{{
         {[&](std::size_t i) { return stamp_of(recording_.odometry, i); }, [&](std::size_t i) { return odometry(i); }},
         {[&](std::size_t i) { return stamp_of(recording_.imu, i); }, [&](std::size_t i) { return imu(i); }},
-        {[&](std::size_t i) { return stamp_of(recording_.fixes, i); }, [&](std::size_t i) { return fix(i); }},
-        {[&](std::size_t i) { return stamp_of(recording_.ranges, i); }, [&](std::size_t i) { return range(i); }},
+        {[&](std::size_t i) { return stamp_of(recording_.measured, i); },
+         [&](std::size_t i) { return std::visit([&](const auto& of) { return put(of); }, recording_.measured[i]); }},
         {[&](std::size_t i) { return image_stamp(i); }, [&](std::size_t i) { return images(i); }},
         {[&](std::size_t i) { return scan_stamp(i); }, [&](std::size_t i) { return scan(i); }},
         {[&](std::size_t i) { return stamp_of(recording_.reference, i); }, [&](std::size_t i) { return truth(i); }},
@@ -95,6 +95,9 @@ class RobotWriter {
   static std::optional<Timestamp> stamp_of(const List& list, std::size_t i) {
     return i < list.size() ? std::optional(list[i].stamp) : std::nullopt;
   }
+  static std::optional<Timestamp> stamp_of(const std::vector<Input>& list, std::size_t i) {
+    return i < list.size() ? std::optional(tutti::stamp_of(list[i])) : std::nullopt;
+  }
   [[nodiscard]] std::optional<Timestamp> scan_stamp(std::size_t i) const {
     return recording_.scans ? stamp_at(recording_, recording_.scan_stamps, i) : std::nullopt;
   }
@@ -123,12 +126,13 @@ class RobotWriter {
     if (recording_.scans) still.push_back(transform(stamp, "base_link", "lidar", robot_.T_body_lidar));
     for (std::size_t i = 0; recording_.images && i < recording_.images->cameras.size(); ++i)
       still.push_back(transform(stamp, "base_link", camera_name(i), recording_.images->cameras[i].T_body_camera));
-    if (!recording_.fixes.empty())
-      still.push_back(transform(stamp, "base_link", "gnss",
-                                {Eigen::Quaterniond::Identity(), recording_.fixes.front().p_body_antenna}));
-    if (!recording_.ranges.empty())
-      still.push_back(transform(stamp, "base_link", "uwb",
-                                {Eigen::Quaterniond::Identity(), recording_.ranges.front().p_body_antenna}));
+    const auto add_antenna = [&](const char* name, const auto& samples) {
+      if (samples.empty()) return;
+      still.push_back(
+          transform(stamp, "base_link", name, {Eigen::Quaterniond::Identity(), samples.front().p_body_antenna}));
+    };
+    add_antenna("gnss", measured<PositionFix>(recording_));
+    add_antenna("uwb", measured<RobotRange>(recording_));
     if (still.empty()) return {};
     return bag_.write("/tf_static", bags::kTfType, shifted(stamp), encode(still), Durability::latched);
   }
@@ -188,8 +192,7 @@ class RobotWriter {
     return put("imu", bags::kImuType, sample.stamp, encode(out));
   }
 
-  Status fix(std::size_t i) {
-    const PositionFix& fix = recording_.fixes[i];
+  Status put(const PositionFix& fix) {
     bags::RosNavSatFix out = bags::to_ros(header(fix.stamp, "gnss"), fix.antenna);
     out.service = 1;  // GPS
     for (int k = 0; k < 9; ++k) out.position_covariance[static_cast<std::size_t>(k)] = fix.covariance(k / 3, k % 3);
@@ -197,8 +200,8 @@ class RobotWriter {
     return put("fix", bags::kFixType, fix.stamp, encode(out));
   }
 
-  Status range(std::size_t i) {
-    const RobotRange& range = recording_.ranges[i];
+  static Status put(const auto&) { return {}; }  // nothing else is in Recording::measured
+  Status put(const RobotRange& range) {
     const bags::RosRange out{.header = header(range.stamp, "uwb"),
                              .range_m = static_cast<float>(range.distance_m),
                              .variance = static_cast<float>(range.sigma_m * range.sigma_m)};

@@ -40,10 +40,7 @@ std::string take_antenna(const BagIndex& index, const OdometryTrack& odometry, c
     std::string place =
         bags::place_antenna(sample, robot.p_body_antenna(), index.tree.pose(odometry.body, sample.frame));
     if (places.size() < kMostPlaces) places.insert(std::move(place));
-    if (sample.range() == nullptr)
-      out.fixes.push_back(std::get<PositionFix>(sample.measured));
-    else
-      out.ranges.push_back(*sample.range());
+    std::visit([&](const auto& of) { out.measured.emplace_back(of); }, sample.measured);
   }
   if (track.refused.count > 0) out.notes.push_back(note_of(topic, track.refused, track.messages));
   std::string how = fmt::format(", of {}", fmt::join(places, " and of "));
@@ -84,12 +81,12 @@ Status choose_fixes(BagIndex& index, const OdometryTrack& odometry, const RobotC
 Status take_antennas(BagIndex& index, const OdometryTrack& odometry, const RobotConfig& robot, BagRecording& out) {
   if (Status ok = choose_fixes(index, odometry, robot, out); !ok) return ok;
   for (auto& [topic, track] : index.ranges) {
-    const std::size_t before = out.ranges.size();
+    const std::size_t before = out.measured.size();
     const std::string how = take_antenna(index, odometry, robot, topic, track, out);
-    if (const std::size_t count = out.ranges.size() - before; count > 0)
+    if (const std::size_t count = out.measured.size() - before; count > 0)
       out.notes.push_back(fmt::format("{} ranges of {}{}", count, topic, how));
   }
-  std::ranges::stable_sort(out.ranges, {}, &RobotRange::stamp);
+  std::ranges::stable_sort(out.measured, {}, stamp_of);
   return {};
 }
 

@@ -33,13 +33,12 @@ struct BagRecording {
   std::vector<ScanPlace> scans;  ///< Stamps increase.
   Refusals refused_scans;
   Pose3 T_body_lidar;
-  std::vector<BagCamera> cameras;   ///< None, one or two.
-  std::optional<BagImages> depth;   ///< Registered to the only camera.
-  std::string no_images;            ///< Why there are no cameras.
-  std::vector<ImuSample> imu;       ///< In the body frame.
-  std::string fix_topic, fix_note;  ///< Empty: the bag has no fixes; and where the antenna is, and more.
-  std::vector<PositionFix> fixes;
-  std::vector<RobotRange> ranges;     ///< Stamps do not decrease; the other robots are named, not numbered.
+  std::vector<BagCamera> cameras;     ///< None, one or two.
+  std::optional<BagImages> depth;     ///< Registered to the only camera.
+  std::string no_images;              ///< Why there are no cameras.
+  std::vector<ImuSample> imu;         ///< In the body frame.
+  std::string fix_topic, fix_note;    ///< Empty: the bag has no fixes; and where the antenna is, and more.
+  std::vector<Input> measured;        ///< Recording::measured, but the other robots are named, not numbered.
   std::vector<std::string> notes;     ///< What was used, what was refused and why, for the report.
   std::vector<std::string> warnings;  ///< much_left_out()
 };

@@ -31,6 +31,10 @@ namespace fs = std::filesystem;
 constexpr double kSweep_s = 0.1;
 constexpr std::size_t kScans = 40, kPoints = 200;
 
+std::vector<PositionFix> fixes_of(const Result<MissionInput>& input) {
+  return measured<PositionFix>(input->robots.front().recording);
+}
+
 const Pose3 kBodyLidar{so3_exp(Eigen::Vector3d(0.1, -0.2, 1.5)), {0.3, 0.0, 0.8}};
 
 Pose3 truth(double time_s) {
@@ -215,7 +219,7 @@ TEST_F(Bags, FixesAreTakenWithTheirAntenna) {
   write(samples_with({"/gnss/fix"}));
   const auto input = load();
   ASSERT_TRUE(input) << input.error().message;
-  const std::vector<PositionFix>& fixes = input->robots.front().recording.fixes;
+  const auto fixes = fixes_of(input);
   ASSERT_EQ(fixes.size(), 18U);
   EXPECT_EQ(fixes[0].p_body_antenna, Eigen::Vector3d(0.5, 0.1, 1.2));
   EXPECT_EQ(fixes[0].covariance.diagonal(), Eigen::Vector3d(4, 4, 9));
@@ -229,12 +233,12 @@ TEST_F(Bags, FixesAreTakenWithTheirAntenna) {
   write(samples_with({"/gnss/fix", "/gnss/filtered"}));
   const auto several = load();
   ASSERT_TRUE(several) << several.error().message;
-  EXPECT_TRUE(several->robots.front().recording.fixes.empty());
+  EXPECT_TRUE(fixes_of(several).empty());
   EXPECT_NE(notes_of(*several).find("--topic alpha.fixes=/gnss/filtered"), std::string::npos) << notes_of(*several);
-  EXPECT_EQ(load({"alpha.fixes=/gnss/fix"})->robots.front().recording.fixes.size(), 18U);
+  EXPECT_EQ(fixes_of(load({"alpha.fixes=/gnss/fix"})).size(), 18U);
   EXPECT_NE(problem({"alpha.fixes=/nothing"}).find("'/nothing' is not in the bag"), std::string::npos);
   const auto given = load({"alpha.fixes=/gnss/fix"}, {"robots.0.antenna_m=[1,2,3]"});
-  EXPECT_EQ(given->robots.front().recording.fixes[0].p_body_antenna, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(fixes_of(given).front().p_body_antenna, Eigen::Vector3d(1, 2, 3));
 }
 
 /// As of a live topic, one by one.
@@ -251,7 +255,7 @@ TEST_F(Bags, FixesAndRangesByAnotherClockAreRefused) {
   write(samples);
   const auto input = load();
   ASSERT_TRUE(input) << input.error().message;
-  EXPECT_EQ(input->robots.front().recording.fixes.size(), 5U);
+  EXPECT_EQ(fixes_of(input).size(), 5U);
   for (const char* const noted :
        {"/fix: 15 of 20 messages refused, the first because: message 6: stamp", "/range_to/bravo: 15 of 20 messages",
         "37.0 s from odometry's newest", "5 ranges of /range_to/bravo, of an antenna at [0.00 0.00 0.00] m"})
@@ -270,7 +274,7 @@ TEST_F(Bags, FixesOfAFileCountInsteadOfTheBags) {
   };
   const auto input = load_with(0.0);
   ASSERT_TRUE(input) << input.error().message;
-  EXPECT_EQ(input->robots.front().recording.fixes.size(), 5U);
+  EXPECT_EQ(fixes_of(input).size(), 5U);
   const auto wrong = load_with(3600.0);
   ASSERT_FALSE(wrong);
   EXPECT_NE(wrong.error().message.find("another clock"), std::string::npos) << wrong.error().message;

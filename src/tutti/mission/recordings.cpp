@@ -245,8 +245,7 @@ Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, 
   }
   if (bag)
     if (auto ok = take_bag(*bag, raw, robot, tracking, out); !ok) return tl::unexpected(ok.error());
-  if (auto ok = take_fixes(robot, data, bag ? &*bag : nullptr, raw, out); !ok) return tl::unexpected(ok.error());
-  if (bag) out.recording.ranges = bag->ranges;
+  if (auto ok = take_measured(robot, data, bag ? &*bag : nullptr, raw, out); !ok) return tl::unexpected(ok.error());
   if (robot.images.is_given()) {
     auto images =
         maplab ? listed_images(*maplab, robot.images, data, raw, from) : open_images(robot.images, data, raw, tracking);
@@ -271,12 +270,14 @@ std::string with_name(std::string text, const std::string& robot) {
 void number_ranges(std::vector<MissionRecording>& robots) {
   for (MissionRecording& robot : robots) {
     std::map<std::string, std::size_t> strangers;
-    std::erase_if(robot.recording.ranges, [&](RobotRange& range) {
-      const auto to = std::ranges::find(robots, range.name, [](const auto& other) { return other.recording.name; });
-      if (to == robots.end()) ++strangers[range.name];
+    std::erase_if(robot.recording.measured, [&](Input& input) {
+      auto* const range = std::get_if<RobotRange>(&input);
+      if (range == nullptr) return false;
+      const auto to = std::ranges::find(robots, range->name, [](const auto& other) { return other.recording.name; });
+      if (to == robots.end()) ++strangers[range->name];
       if (to == robots.end() || &*to == &robot) return true;
-      range.to = to->recording.robot;
-      range.name.clear();
+      range->to = to->recording.robot;
+      range->name.clear();
       return false;
     });
     for (const auto& [name, count] : strangers)

@@ -65,12 +65,8 @@ Result<std::unique_ptr<RobotActor>> RobotActor::open(const MissionRecording& rec
     };
     skip(from.scan_stamps, actor->next_scan_);
     skip(from.image_stamps, actor->next_images_);
-    const auto first_of = [&](const auto& samples) {
-      const auto stamp_of = [](const auto& sample) { return sample.stamp; };
-      return static_cast<std::size_t>(std::ranges::lower_bound(samples, settled, {}, stamp_of) - samples.begin());
-    };
-    actor->next_fix_ = first_of(from.fixes);
-    actor->next_range_ = first_of(from.ranges);
+    const auto first = std::ranges::lower_bound(from.measured, settled, {}, stamp_of);
+    actor->next_measured_ = static_cast<std::size_t>(first - from.measured.begin());
   }
   return actor;
 }
@@ -121,18 +117,14 @@ void RobotActor::note_event(const node::Event& event) {
   if (const auto* update = std::get_if<node::RobotUpdated>(&event.what)) note_update(*update, event.time);
 }
 
-template <class Sample>
-void RobotActor::feed_until_now(const std::vector<Sample>& samples, std::size_t& next, Timestamp now) {
-  const Trajectory& odometry = recording_.recording.odometry;
-  for (; next < samples.size() && samples[next].stamp <= odometry[next_ - 1].stamp; ++next)
-    if (samples[next].stamp >= odometry.front().stamp) take(node_->add(samples[next], now));
-}
-
 void RobotActor::feed_sensors(Timestamp now) {
   const Recording& recording = recording_.recording;
-  feed_until_now(recording.fixes, next_fix_, now);
-  feed_until_now(recording.ranges, next_range_, now);
   const Timestamp newest = recording.odometry[next_ - 1].stamp;
+  for (; next_measured_ < recording.measured.size(); ++next_measured_) {
+    const Input& sample = recording.measured[next_measured_];
+    if (stamp_of(sample) > newest) break;
+    if (stamp_of(sample) >= recording.odometry.front().stamp) take(node_->add(sample, now));
+  }
   while (true) {
     const auto scan = recording.scans ? stamp_at(recording, recording.scan_stamps, next_scan_) : std::nullopt;
     const auto images = recording.visual ? stamp_at(recording, recording.image_stamps, next_images_) : std::nullopt;

@@ -132,8 +132,6 @@ class RobotActor {
   void feed_at(Timestamp stamp, bool has_scan, bool has_images, Timestamp now);
   void feed_scan(Timestamp now);
   void feed_images(Timestamp stamp, bool keyframe, Timestamp now);
-  template <class Sample>
-  void feed_until_now(const std::vector<Sample>& samples, std::size_t& next, Timestamp now);
   void refuse_images(const std::vector<Error>& errors, Timestamp now);
   void report_refused(const std::string& why, Timestamp now);
   [[nodiscard]] std::vector<ImuSample> imu_since_keyframe(Timestamp stamp) const;
@@ -148,7 +146,7 @@ class RobotActor {
   std::string policy_;  // the node's
   PolicyTiming timing_;
   std::size_t next_ = 0;  // odometry sample
-  std::size_t next_scan_ = 0, next_images_ = 0, next_fix_ = 0, next_range_ = 0;
+  std::size_t next_scan_ = 0, next_images_ = 0, next_measured_ = 0;
   std::vector<UpdateRecord> updates_;
   std::optional<consistency::Explanation> explanation_;
   double cpu_s_ = 0.0;

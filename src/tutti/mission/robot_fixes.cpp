@@ -18,25 +18,26 @@ bool is_by_this_clock(const std::vector<PositionFix>& fixes, const Trajectory& o
 
 }  // namespace
 
-Status take_fixes(const RobotConfig& robot, const std::filesystem::path& data, const BagRecording* bag,
-                  const Trajectory& odometry, MissionRecording& out) {
-  std::vector<PositionFix>& fixes = out.recording.fixes;
+Status take_measured(const RobotConfig& robot, const std::filesystem::path& data, const BagRecording* bag,
+                     const Trajectory& odometry, MissionRecording& out) {
   std::string source, how;
+  if (bag != nullptr) {
+    source = bag->fix_topic;
+    how = bag->fix_note;
+    out.recording.measured = bag->measured;
+  }
   if (!robot.fixes.empty()) {
     source = (data / robot.fixes).string();
     auto read = formats::read_fixes(source);
     if (!read) return tl::unexpected(read.error());
-    fixes = std::move(*read);
-    for (PositionFix& fix : fixes) {
+    for (PositionFix& fix : *read) {
       bags::AntennaSample sample{.measured = fix};
       how = ", of " + bags::place_antenna(sample, robot.p_body_antenna(), Pose3{});
       fix = std::get<PositionFix>(sample.measured);
     }
-  } else if (bag != nullptr) {
-    source = bag->fix_topic;
-    how = bag->fix_note;
-    fixes = bag->fixes;
+    set_measured(out.recording, *read);
   }
+  const auto fixes = measured<PositionFix>(out.recording);
   if (fixes.empty()) return {};
   const bool fits = is_by_this_clock(fixes, odometry);
   const std::string stamps = fmt::format(
@@ -45,7 +46,7 @@ Status take_fixes(const RobotConfig& robot, const std::filesystem::path& data, c
   if (!fits && !robot.fixes.empty()) return fail(ErrorCode::invalid, "{}: {}", source, stamps);
   out.notes.push_back(fits ? fmt::format("{}: {} fixes of {}{}", robot.name, fixes.size(), source, how)
                            : fmt::format("{}: no fixes of {}: {}", robot.name, source, stamps));
-  if (!fits) fixes.clear();
+  if (!fits) set_measured<PositionFix>(out.recording, {});
   return {};
 }
 

@@ -13,9 +13,10 @@
 
 namespace tutti::mission {
 
-/// Adds the fixes of the robot's file, or else of its bag (`bag` may be null), to the recording, with a note on what
-/// was used. Fails when the file is invalid, or by another clock than the odometry.
-Status take_fixes(const RobotConfig& robot, const std::filesystem::path& data, const BagRecording* bag,
-                  const Trajectory& odometry, MissionRecording& out);
+/// Adds what the robot's bag has measured (`bag` may be null) to the recording, with the fixes of its file, where it
+/// has one, in the place of the bag's, and a note on which were used. Fails when the file is invalid, or by another
+/// clock than the odometry.
+Status take_measured(const RobotConfig& robot, const std::filesystem::path& data, const BagRecording* bag,
+                     const Trajectory& odometry, MissionRecording& out);
 
 }  // namespace tutti::mission

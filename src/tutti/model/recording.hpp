@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <memory>
 #include <optional>
@@ -11,9 +12,8 @@
 #include "tutti/base/result.hpp"
 #include "tutti/geometry/pose3.hpp"
 #include "tutti/model/image_stream.hpp"
+#include "tutti/model/input.hpp"
 #include "tutti/model/point_cloud.hpp"
-#include "tutti/model/position_fix.hpp"
-#include "tutti/model/robot_range.hpp"
 #include "tutti/model/trajectory.hpp"
 #include "tutti/model/visual.hpp"
 
@@ -66,10 +66,26 @@ struct Recording {
   std::vector<Timestamp> scan_stamps, image_stamps;
   std::vector<ImuSample> imu;  ///< Increasing stamps; empty when there is no IMU.
   ImuNoise imu_noise;
-  std::vector<PositionFix> fixes;          ///< Increasing stamps; empty when there is no receiver.
-  std::vector<RobotRange> ranges;          ///< Increasing stamps, to several robots equal ones; empty without a radio.
+  std::vector<Input> measured;             ///< Position fixes and ranges; stamps do not decrease.
   std::vector<DriftOrigin> drift_origins;  ///< In time order; empty when unknown.
 };
+
+/// Puts samples in the place of those of their kind.
+template <class Sample>
+void set_measured(Recording& recording, const std::vector<Sample>& samples) {
+  std::vector<Input>& all = recording.measured;
+  std::erase_if(all, [](const Input& input) { return std::holds_alternative<Sample>(input); });
+  all.insert(all.end(), samples.begin(), samples.end());
+  std::ranges::stable_sort(all, {}, stamp_of);
+}
+/// The samples of one kind.
+template <class Sample>
+std::vector<Sample> measured(const Recording& recording) {
+  std::vector<Sample> out;
+  for (const Input& input : recording.measured)
+    if (const auto* const sample = std::get_if<Sample>(&input)) out.push_back(*sample);
+  return out;
+}
 
 /// Stamp number `i` of scans or images (`stamps` is Recording::scan_stamps or image_stamps); nothing
 /// after the last.
