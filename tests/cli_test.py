@@ -451,6 +451,14 @@ class CommandLine(unittest.TestCase):
             self.assertGreater(robot["share_of_time"]["localised"], 0.3)
             self.assertLess(robot["score"]["rmse_m"], 0.3)
         self.assertTrue((out / "charlie_localised.tum").stat().st_size > 0)
+        brief = [word for i in (2, 3) for word in ("--set", f"simulation.robots.{i}.walk.duration_s=75")]
+        carried = ["run", mission, *short, *brief, "--map-in", site, "--frozen", "--out", out, "--kidnap-every"]
+        self.expect(tutti(*carried, 80), 1, "charlie", "kidnap")
+        self.expect(tutti(*carried, 20), 0, "carried elsewhere")
+        kidnaps = [kidnap for robot in json.loads((out / "localise.json").read_text())["robots"] for kidnap in robot["kidnaps"]]
+        self.assertGreater(len(kidnaps), 0)
+        for kidnap in kidnaps:
+            self.assertLess(kidnap["said_after_s"], 2.0)
         self.expect(tutti("map", "merge", site, self.path / "loc" / "none", "-o", self.path / "both"), 1)
         other = self.path / "other.tutti"
         self.expect(tutti("run", mission, *short, "--seed", "2", "--set", "duration_s=60", "--map", other, "--out",

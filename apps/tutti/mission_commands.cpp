@@ -50,7 +50,7 @@ void show(const mission::Progress& progress, ProgressLine& line) {
 struct MissionArguments {
   fs::path mission, out, map, map_in;
   bool frozen = false, extend = false;
-  double restart_s = 0.0;
+  mission::LocaliseTrial trial;
   mission::RunOptions run{.version = TUTTI_VERSION};
   std::vector<std::string> assignments;
   bool print_config = false;
@@ -92,7 +92,7 @@ Status localise(const lab::MissionConfig& config, const MissionArguments& argume
   ProgressLine progress;
   const auto stop = announced_stop("what is there is reported");
   const auto robots = mission::localise_mission(
-      config, *input, *map, [&] { return verifiers::make_verifier(config.closures); }, arguments.restart_s,
+      config, *input, *map, [&] { return verifiers::make_verifier(config.closures); }, arguments.trial,
       [&](const std::string& robot, double share) {
         progress.show(share, fmt::format("{}: {:4.0f} %", robot, 100.0 * share));
         return stop();
@@ -315,10 +315,16 @@ void add_run_command(CLI::App& app, int& exit_code) {
                  "ground; --map says where the map with it goes")
       ->needs(map_in)
       ->excludes("--frozen");
-  add_number(*command, "--restart-every", arguments->restart_s,
+  add_number(*command, "--restart-every", arguments->trial.restart_s,
              "With --frozen: robots forget where they are so often, to see how they find their places; 0: never", "S",
              within(0.0, 1e6))
       ->needs("--frozen");
+  add_number(*command, "--kidnap-every", arguments->trial.kidnap_s,
+             "With --frozen: robots with LiDAR are carried so often to where they would be 20 s later, and their\n"
+             "odometry does not notice; 0: never",
+             "S", within(0.0, 1e6))
+      ->needs("--frozen")
+      ->excludes("--restart-every");
   add_mission_options(*command, *arguments);
   command->callback([arguments, inputs, bags, topics, graph, &exit_code] {
     const auto run_text = [&](const fs::path& name, const char* option, const Result<std::string>& text) {

@@ -31,7 +31,8 @@ constexpr double kMap_m = 0.02, kMap_rad = 0.1 * kRadPerDeg;
 constexpr double kAlike = 4.0;
 constexpr double kCameraAge_s = 25.0;   // a camera's submap is due before
 constexpr double kLostAfter_s = 1.0;    // of scans that contradict the map; then it searches again
-constexpr double kOffMapAfter_s = 2.0;  // of scans that show nothing of the map, without contradicting it
+constexpr double kOffMapAfter_s = 1.5;  // of scans that show nothing of the map, without contradicting it
+constexpr double kGuessedFor_s = 2.0;   // of such scans; then a place that was found is none
 constexpr double kScanSilence_s = 2.0;  // without a registered scan the pose is stale
 
 Matrix6d diagonal(double metres, double radians) {
@@ -171,6 +172,7 @@ void Localiser::try_start(const Scan& scan) {
 
 void Localiser::begin_submaps() {
   ++chain_.session;  // nothing of before belongs to what comes
+  stretch_.clear();
   submaps_ = robot::SubmapBuilder(chain_, setup_.submap);
   if (!recent_.empty())
     (void)submaps_.add(OdometrySample{recent_.back().stamp, recent_.back().pose, recent_steps_.back()});
@@ -182,7 +184,6 @@ void Localiser::search_anew(const std::string& why) {
   map_fit_.doubt();
   pending_.clear();
   places_.clear();
-  stretch_.clear();
   state_ = State::searching;
   why_ = why;
   begin_submaps();
@@ -248,7 +249,7 @@ void Localiser::confirm(const ScanMatch& match) {
 void Localiser::doubt(const Assessment& assessment, Timestamp stamp) {
   if (track_->to_confirm > 0) {  // it was a guess
     track_->to_confirm = kConfirmations;
-    if (assessment.evidence == Evidence::against || stamp - track_->confirmed > kOffMapAfter_s) {
+    if (assessment.evidence == Evidence::against || stamp - track_->confirmed > kGuessedFor_s) {
       track_.reset();
       why_ = "a place that was found is not confirmed: " + assessment.why;
     }
@@ -264,6 +265,7 @@ void Localiser::doubt(const Assessment& assessment, Timestamp stamp) {
   }
   if (!track_->nothing_since) track_->nothing_since = stamp;
   if (stamp - *track_->nothing_since < kOffMapAfter_s) return;
+  if (state_ != State::off_map) begin_submaps();  // it may have been carried: what it saw before is elsewhere
   state_ = State::off_map;
   why_ = assessment.why;
 }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "tutti/evaluation/association.hpp"
+#include "tutti/mission/kidnapped.hpp"
 #include "tutti/mission/load_meter.hpp"
 #include "tutti/mission/robot_actor.hpp"
 
@@ -61,6 +62,25 @@ void measure_starts(const localise::KnownMap& map, const Trajectory& reference, 
       for (const Eigen::Vector3d& p : seen_from) nearest_m = std::min(nearest_m, (p - p_world).norm());
       start.from_map_m = std::max(start.from_map_m.value_or(0.0), nearest_m);
     }
+}
+
+/// What became of it at these times, where it was localised; and its course without what it published until it said so.
+std::vector<localise::Located> measure_kidnaps(const std::vector<Timestamp>& at, LocalisedRobot& robot) {
+  std::vector<localise::Located> rest = robot.course;
+  const Timestamp begin = rest.empty() ? Timestamp{} : rest.front().stamp;
+  const auto is_localised = [](const localise::Located& one) { return one.state == localise::State::localised; };
+  for (const Timestamp taken : at) {
+    const auto after = std::ranges::upper_bound(rest, taken, {}, &localise::Located::stamp);
+    if (after == rest.begin() || !is_localised(*std::prev(after))) continue;
+    const auto said = std::find_if_not(after, rest.end(), is_localised);
+    const auto found = std::find_if(said, rest.end(), is_localised);
+    LocalisedRobot::Kidnap kidnap{.at_s = taken - begin, .said_after_s = {}, .found_after_s = {}};
+    if (said != rest.end()) kidnap.said_after_s = said->stamp - taken;
+    if (found != rest.end()) kidnap.found_after_s = found->stamp - taken;
+    robot.kidnaps.push_back(kidnap);
+    rest.erase(after, said);
+  }
+  return rest;
 }
 
 /// Replays one recording alone.
@@ -134,17 +154,25 @@ std::shared_ptr<const localise::Localiser::Setup> localise_setup(
 
 Result<std::vector<LocalisedRobot>> localise_mission(
     const MissionConfig& config, const MissionInput& input, const mapfile::OpenedMap& map,
-    const std::function<std::shared_ptr<const server::ClosureVerifier>()>& make_verifier, double restart_s,
+    const std::function<std::shared_ptr<const server::ClosureVerifier>()>& make_verifier, const LocaliseTrial& trial,
     const std::function<bool(const std::string&, double share)>& stop) {
   const auto reference = reference_of(map, input, config.association);
   std::vector<LocalisedRobot> out;
-  for (const MissionRecording& robot : input.robots) {
-    const Recording& recording = robot.recording;
+  for (MissionRecording robot : input.robots) {
+    Recording& recording = robot.recording;
     if (recording.odometry.empty() || overlaps(poses_in(map, recording.name), recording.odometry)) continue;
+    std::vector<Timestamp> kidnapped_at;
+    if (trial.kidnap_s > 0.0) {
+      auto made = kidnapped(recording, trial.kidnap_s);
+      if (!made) return tl::unexpected(made.error());
+      recording = std::move(made->recording);
+      kidnapped_at = std::move(made->at);
+    }
     auto setup = localise_setup(config, with_sensors(config.agent, recording).submap, map.known, make_verifier);
-    out.push_back(replay(robot, config, std::move(setup), restart_s, stop));
+    out.push_back(replay(robot, config, std::move(setup), trial.restart_s, stop));
+    const auto course = measure_kidnaps(kidnapped_at, out.back());
     if (!reference || recording.reference.empty()) continue;
-    out.back().score = score_of(out.back().course, recording.reference, *reference, config.association);
+    out.back().score = score_of(course, recording.reference, *reference, config.association);
     measure_starts(*map.known, recording.reference, reference->T_world_reference, out.back());
   }
   if (out.empty())

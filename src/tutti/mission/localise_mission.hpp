@@ -32,13 +32,19 @@ struct LocalisedRobot {
     /// without a reference.
     std::optional<double> from_map_m;
   };
+  /// When it was carried elsewhere while it was localised, and after how long it was not any more, and was again.
+  struct Kidnap {
+    double at_s = 0.0;  ///< Since its first sample.
+    std::optional<double> said_after_s, found_after_s;
+  };
+  std::vector<Kidnap> kidnaps;
   static constexpr double kOneSubmap_s = 12.0;  ///< A submap's 10 s, and scans that confirm what it shows.
   std::vector<Start> starts;                    ///< The first at its first sample.
   double first_fix_cpu_s = 0.0;                 ///< CPU until the first one was localised.
   localise::LocaliserWork work;
   double cpu_s = 0.0;
-  std::vector<double> scan_ms;  ///< CPU of each scan that was registered.
-  std::optional<LocaliseScore> score;
+  std::vector<double> scan_ms;         ///< CPU of each scan that was registered.
+  std::optional<LocaliseScore> score;  ///< Without what was published between a kidnap and Kidnap::said_after_s.
   std::map<SubmapId, localise::SubmapFit> map_fit;  ///< Where the map does not fit what the robot saw of it.
   std::vector<std::string> troubles;                ///< RobotActor::troubles()
   /// Share of the time in this state.
@@ -53,12 +59,17 @@ std::shared_ptr<const localise::Localiser::Setup> localise_setup(
     const MissionConfig& config, const robot::SubmapConfig& submap, std::shared_ptr<const localise::KnownMap> map,
     std::function<std::shared_ptr<const server::ClosureVerifier>()> make_verifier);
 
-/// Replays every robot of the mission that did not make the map alone, without a server. Every `restart_s`, unless it
-/// is 0, it forgets where it is, so that there are many starts. `stop` is asked between samples. An error names a
-/// recording that cannot be read.
+/// What is done to robots to see how they find their places; 0: never.
+struct LocaliseTrial {
+  double restart_s = 0.0;  ///< So often they forget where they are.
+  double kidnap_s = 0.0;   ///< So often they are carried elsewhere (kidnapped.hpp).
+};
+
+/// Replays every robot of the mission that did not make the map alone, without a server. `stop` is asked between
+/// samples. An error names a recording that cannot be read, or not be kidnapped.
 Result<std::vector<LocalisedRobot>> localise_mission(
     const MissionConfig& config, const MissionInput& input, const mapfile::OpenedMap& map,
-    const std::function<std::shared_ptr<const server::ClosureVerifier>()>& make_verifier, double restart_s,
+    const std::function<std::shared_ptr<const server::ClosureVerifier>()>& make_verifier, const LocaliseTrial& trial,
     const std::function<bool(const std::string&, double share)>& stop);
 
 }  // namespace tutti::mission

@@ -34,6 +34,11 @@ Json json_of(const LocalisedRobot& robot) {
     starts.push_back({{"at_s", number(start.at_s)},
                       {"fix_after_s", number(start.fix_after_s)},
                       {"from_map_m", number(start.from_map_m)}});
+  Json kidnaps = Json::array();
+  for (const LocalisedRobot::Kidnap& kidnap : robot.kidnaps)
+    kidnaps.push_back({{"at_s", number(kidnap.at_s)},
+                       {"said_after_s", number(kidnap.said_after_s)},
+                       {"found_after_s", number(kidnap.found_after_s)}});
   for (const State state : kStates) shares[std::string(to_string(state))] = number(robot.share(state));
   if (robot.score)
     score = {{"scored", robot.score->scored},
@@ -48,6 +53,7 @@ Json json_of(const LocalisedRobot& robot) {
   return {{"robot", robot.name},
           {"duration_s", number(robot.duration_s)},
           {"starts", starts},
+          {"kidnaps", kidnaps},
           {"share_of_time", shares},
           {"score", score},
           {"work",
@@ -110,6 +116,24 @@ std::string states_csv(const LocalisedRobot& robot) {
     out += '"' + located.why + "\"\n";
   }
   return out;
+}
+
+/// By the worst of them.
+std::string kidnaps_text(const LocalisedRobot& robot) {
+  if (robot.kidnaps.empty()) return {};
+  std::size_t said = 0, found = 0;
+  double said_s = 0.0, found_s = 0.0;
+  for (const LocalisedRobot::Kidnap& kidnap : robot.kidnaps) {
+    said += kidnap.said_after_s ? 1 : 0;
+    found += kidnap.found_after_s ? 1 : 0;
+    said_s = std::max(said_s, kidnap.said_after_s.value_or(0.0));
+    found_s = std::max(found_s, kidnap.found_after_s.value_or(0.0));
+  }
+  return wrap(
+      fmt::format("carried elsewhere {} times while it was localised: it said so {} times, after {:.1f} s at most, "
+                  "and found itself again {} times, after {:.1f} s at most",
+                  robot.kidnaps.size(), said, said_s, found, found_s),
+      "  " + robot.name + ": ");
 }
 
 std::string changes_of(const LocalisedRobot& robot, const localise::KnownMap& map) {
@@ -182,6 +206,7 @@ std::string localised_text(const std::vector<LocalisedRobot>& robots, const loca
          "\n\n";
   if (const auto places = trust_of(robots); !places.empty()) out += places_text(places, map) + "\n\n";
   for (const LocalisedRobot& robot : robots) {
+    out += kidnaps_text(robot);
     out += changes_of(robot, map);
     for (const std::string& trouble : robot.troubles) out += wrap(trouble, "  " + robot.name + ": ");
   }
