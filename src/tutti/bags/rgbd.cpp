@@ -3,10 +3,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
+#include <set>
 
+#include "tutti/bags/camera.hpp"
 #include "tutti/base/check.hpp"
 
 namespace tutti::bags {
@@ -50,6 +52,15 @@ std::string list_of(std::span<const ImageTopic> topics, std::span<const std::siz
   return out;
 }
 
+std::string info_of(const ImageTopic& topic) { return camera_info_topic(topic.topic, topic.is_compressed); }
+
+/// The images that a raw topic has, too.
+bool is_double(std::span<const ImageTopic> topics, const ImageTopic& one) {
+  return one.is_compressed && std::ranges::any_of(topics, [&](const ImageTopic& other) {
+           return !other.is_compressed && info_of(other) == info_of(one);
+         });
+}
+
 class Chooser {
  public:
   Chooser(std::span<const ImageTopic> cameras, std::span<const ImageTopic> depths, const CameraWishes& wishes,
@@ -58,7 +69,7 @@ class Chooser {
     for (const ImageTopic& camera : cameras) {
       registered_.emplace_back();
       for (std::size_t i = 0; i < depths.size(); ++i)
-        if (check_registered(depths[i], camera, find)) registered_.back().push_back(i);
+        if (!is_double(depths, depths[i]) && check_registered(depths[i], camera, find)) registered_.back().push_back(i);
     }
     if (cameras.empty()) return;
     for (const ImageTopic& depth : depths)
@@ -68,8 +79,14 @@ class Chooser {
 
   [[nodiscard]] Result<CameraChoice> choose() const {
     CameraChoice out;
-    out.cameras.resize(cameras_.size());
-    std::iota(out.cameras.begin(), out.cameras.end(), std::size_t{0});
+    for (std::size_t i = 0; i < cameras_.size(); ++i)
+      if (wishes_.are_named || !is_double(cameras_, cameras_[i])) out.cameras.push_back(i);
+    std::set<std::string> infos;
+    for (const std::size_t i : out.cameras)
+      if (!infos.insert(info_of(cameras_[i])).second)
+        return fail(ErrorCode::invalid,
+                    "{} shows what {} calibrates, and another does too, expected one; say which: {}{}",
+                    cameras_[i].topic, info_of(cameras_[i]), wishes_.images_flag, cameras_[i].topic);
     if (out.cameras.size() == 2 && wishes_.most_cameras == 1) out.cameras.pop_back();
     if (!wishes_.are_named) {
       std::vector<std::size_t> with;

@@ -39,7 +39,8 @@ struct CameraChoice {
   std::string note;                  ///< Why no depth is used although there is some; else empty.
 };
 
-/// Uses one or two cameras; of all topics a first message has been seen. Where they were not named and a topic of depth
+/// Uses one or two cameras; of all topics a first message has been seen. What is there raw and compressed counts once;
+/// two topics that one CameraInfo calibrates are an error. Where they were not named and a topic of depth
 /// is registered to one of them alone, this one is used, with its depth; where to several, or where there are more than
 /// two cameras, the error lists them and the flag that decides. Depth is used with one camera, if exactly one
 /// topic is registered to it.

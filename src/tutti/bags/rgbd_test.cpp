@@ -70,6 +70,21 @@ TEST(Rgbd, DepthIsRegisteredBySizeMatrixAndPlace) {
       "links them)");
 }
 
+TEST(Rgbd, WhatIsThereRawAndCompressedCountsOnce) {
+  ImageTopic colour = kColour, depth = kAligned, rectified = kColour;
+  colour.topic += "/compressed";
+  depth.topic += "/compressedDepth";
+  colour.is_compressed = depth.is_compressed = true;
+  const auto choice = choose({kColour, colour}, {kAligned, depth}).value();
+  EXPECT_EQ(choice.cameras, std::vector<std::size_t>{0});
+  EXPECT_EQ(choice.depth, 0U);
+  EXPECT_EQ(choose({colour}, {depth})->depth, 0U);
+  rectified.topic = "/color/image_rect";
+  EXPECT_EQ(choose({kColour, rectified}, {}).error().message,
+            "/color/image_rect shows what /color/camera_info calibrates, and another does too, expected one; say "
+            "which: --images /color/image_rect");
+}
+
 TEST(Rgbd, OneCameraHasTheDepthThatIsRegisteredToIt) {
   const auto choice = choose({kColour}, {kAligned, kDepth}).value();
   EXPECT_EQ(choice.cameras, std::vector<std::size_t>{0});

@@ -178,9 +178,9 @@ TEST(DepthIntake, CamerasThatCannotBeChosenAreReported) {
          "3 cameras, expected one or two; say which: --images /r/left/image_raw,/r/right/image_raw,/r/up/image_raw");
   expect(problem({topics_of("/r/depth", Wish::camera)}, {.images = {"/r/depth/image_raw"}}, 1),
          "/r/depth/image_raw: encoding '16UC1' is no picture, but depth (a camera's own 16 bits are mono16): --depth");
-  CameraTopics same = kRight;
-  same.info = kLeft.info;
-  expect(problem({kLeft, same}, {}, 0), "/r/right/image_raw shows what /r/left/camera_info calibrates, and another");
+  CameraTopics same = kLeft;
+  same.images = "/r/left/image_rect";
+  expect(problem({kLeft, same}, {}, 0), "/r/left/image_rect shows what /r/left/camera_info calibrates, and another");
   expect(problem({kLeft, kRight, kDepth, topics_of("/r/depth2")}, {}, 0), "4 cameras, expected one or two");
 }
 

@@ -5,7 +5,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <set>
 #include <utility>
 
 #include "tutti/bags/camera.hpp"
@@ -203,15 +202,7 @@ Result<bool> ImagesIntake::choose(bool is_late) {
   if (!*found) return false;
   const auto& [cameras, depths] = **found;
   std::vector<bags::ImageTopic> of_cameras, of_depths;
-  std::set<std::string> infos;
-  for (const std::size_t i : cameras) {
-    of_cameras.push_back(topics_[i].seen);
-    if (!infos.insert(topics_[i].topics.info).second)
-      return fail(ErrorCode::invalid,
-                  "{} shows what {} calibrates, and another does too, expected one; say which: "
-                  "--images {}",
-                  topics_[i].topics.images, topics_[i].topics.info, topics_[i].topics.images);
-  }
+  for (const std::size_t i : cameras) of_cameras.push_back(topics_[i].seen);
   for (const std::size_t i : depths) of_depths.push_back(topics_[i].seen);
   const bags::CameraWishes wishes{.are_named = !config_.images.empty(),
                                   .most_cameras = config_.most_cameras,
