@@ -1,10 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/localise/known_map.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
+#include "tutti/base/content_hash.hpp"
+
 namespace tutti::localise {
+
+std::string map_id_of(std::string_view first_submap) { return fmt::format("{:016x}", content_hash(first_submap)); }
 
 RobotId KnownMap::free_robot() const { return {submaps.empty() ? 0 : submaps.rbegin()->first.chain.robot.value + 1}; }
 

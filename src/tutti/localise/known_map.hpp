@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tutti/base/ids.hpp"
@@ -14,6 +15,9 @@
 #include "tutti/server/payload_store.hpp"
 
 namespace tutti::localise {
+
+/// KnownMap::id of a map, by the bytes of its first submap as they are stored.
+std::string map_id_of(std::string_view first_submap);
 
 /// A map that does not move. Immutable; robots share it.
 struct KnownMap {

@@ -30,6 +30,26 @@ struct Health {
   friend bool operator==(const Health&, const Health&) = default;
 };
 
+/// How a submap of a map that does not move fits what a robot has seen of it lately, in cubes (localise::SubmapFit).
+struct SubmapReturn {
+  SubmapId submap;
+  std::uint32_t matched = 0, missing = 0, appeared = 0;
+  std::uint32_t age_s = 0;  ///< Since the robot saw any of it.
+  static constexpr std::uint32_t kMostCubes = 1'000'000;
+  using InColumns = void;
+  template <class V>
+  void describe(V& v) {
+    v.field(1, "robot", submap.chain.robot);
+    v.field(2, "session", submap.chain.session);
+    v.field(3, "index", submap.index);
+    v.field(4, "matched", matched, {.high = kMostCubes});
+    v.field(5, "missing", missing, {.high = kMostCubes});
+    v.field(6, "appeared", appeared, {.high = kMostCubes});
+    v.field(7, "age_s", age_s);
+  }
+  friend bool operator==(const SubmapReturn&, const SubmapReturn&) = default;
+};
+
 /// Where a robot is in a map that does not move, as it finds itself (localise::Located).
 struct InMap {
   std::string map;            ///< The map's id; empty: it does not localise.
@@ -39,8 +59,10 @@ struct InMap {
   Pose3 T_world_body;         ///< In the map's frame; the identity without `age_s`.
   /// Standard deviations of its position (all three directions together) and of its heading.
   std::optional<double> sigma_m, sigma_deg;
-  std::optional<double> age_s;    ///< Since the map last showed that it is there; nothing: it has no place.
-  std::optional<double> overlap;  ///< Share of the scan that showed it last which lay on the map.
+  std::optional<double> age_s;     ///< Since the map last showed that it is there; nothing: it has no place.
+  std::optional<double> overlap;   ///< Share of the scan that showed it last which lay on the map.
+  std::vector<SubmapReturn> fits;  ///< The map's submaps that it saw last, and some of the others in turn.
+  static constexpr std::size_t kMostFits = 8;
   template <class V>
   void describe(V& v) {
     v.field(1, "map_id", map);
@@ -52,6 +74,7 @@ struct InMap {
     v.field(7, "sigma_deg", sigma_deg, {.low = 0.0});
     v.field(8, "place_age_s", age_s, {.low = 0.0});
     v.field(9, "place_overlap", overlap, {.low = 0.0, .high = 1.0});
+    v.field(10, "map_fit", fits, {.at_most = kMostFits});
   }
   friend bool operator==(const InMap&, const InMap&) = default;
 };
@@ -187,6 +210,30 @@ struct MissionStatus {
     friend bool operator==(const Radio&, const Radio&) = default;
   };
 
+  /// What robots that localise in a map have found of one of its submaps, together (localise::PlaceTrust).
+  struct Place {
+    std::string submap;  ///< to_string(SubmapId); empty: another map's than the server's.
+    std::string name;    ///< For people.
+    std::uint64_t matched = 0, missing = 0, appeared = 0;
+    double trust = 1.0;
+    std::uint64_t age_s = 0;      ///< Since a robot saw any of it.
+    std::vector<RobotId> robots;  ///< Those that did, the last first; kMostSeers at most.
+    static constexpr std::size_t kMostSeers = 8;
+    template <class V>
+    void describe(V& v) {
+      v.field(1, "submap", submap);
+      v.field(2, "name", name);
+      v.field(3, "matched", matched);
+      v.field(4, "missing", missing);
+      v.field(5, "appeared", appeared);
+      v.field(6, "trust", trust, {.low = 0.0, .high = 1.0});
+      v.field(7, "age_s", age_s);
+      v.field(8, "robots", robots, {.at_most = kMostSeers});
+    }
+    friend bool operator==(const Place&, const Place&) = default;
+  };
+
+  static constexpr std::size_t kMostPlaces = 500;     ///< Those that are trusted least.
   static constexpr std::size_t kMostRobots = 10'000;  ///< Likewise workers.
 
   Timestamp time;
@@ -212,6 +259,9 @@ struct MissionStatus {
   std::vector<Decision> decisions;  ///< The latest decisions.
   std::vector<Radio> radio;         ///< Sorted by robot, direction and kind.
   std::uint64_t retired = 0;        ///< Those of the submaps that show known ground (server/known_ground.hpp).
+  std::string places_map;           ///< The id of the map that `places` are of, and its version; empty: there are none.
+  std::uint64_t places_version = 0;
+  std::vector<Place> places;  ///< Sorted by SubmapId.
   template <class V>
   void describe(V& v) {
     v.field(1, "time", time);
@@ -236,6 +286,9 @@ struct MissionStatus {
     v.field(24, "decisions", decisions);
     v.field(25, "radio", radio, {.at_most = 20 * kMostRobots});
     v.field(26, "retired", retired);
+    v.field(27, "places_map_id", places_map);
+    v.field(28, "places_map_version", places_version);
+    v.field(29, "places", places, {.at_most = kMostPlaces});
   }
   [[nodiscard]] Status check() const;  ///< Lists have the order that is promised above.
   friend bool operator==(const MissionStatus&, const MissionStatus&) = default;

@@ -18,5 +18,7 @@ inline constexpr std::string_view kRetiredPrefix = "retired/";
 inline constexpr std::string_view kVersionPrefix = "version/";
 /// Followed by a robot's number; its submaps that are refused for good.
 inline constexpr std::string_view kRefusedPrefix = "refused/";
+/// Followed by a robot's number; what it has returned of the map that it localises in (PlaceBook).
+inline constexpr std::string_view kReturnedPrefix = "returned/";
 
 }  // namespace tutti::node

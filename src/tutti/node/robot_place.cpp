@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "tutti/base/plain_text.hpp"
+#include "tutti/node/place_book.hpp"
 #include "tutti/node/robot_node.hpp"
 #include "tutti/node/robot_tables.hpp"
 #include "tutti/wire/codec.hpp"
@@ -75,7 +76,8 @@ InMap RobotNode::in_map() const {
             .sigma_m = {},
             .sigma_deg = {},
             .age_s = {},
-            .overlap = {}};
+            .overlap = {},
+            .fits = fits_to_return(localiser_->map_fit().fits(), located.stamp)};
   if (!located.T_world_body) return out;
   const Matrix6d& covariance = located.T_world_body->covariance;
   out.T_world_body = located.T_world_body->T_a_b;

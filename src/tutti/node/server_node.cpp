@@ -53,6 +53,12 @@ Result<std::unique_ptr<ServerNode>> ServerNode::open(std::set<RobotId> robots,
   std::unique_ptr<ServerNode> node(new ServerNode(std::move(robots), std::move(verifier), config, epoch,
                                                   SubmapFrames::of(store), std::move(*opened)));
   node->marks_ = std::move(*marks);
+  const Status returned = each_row_of(store, kReturnedPrefix, [&](std::string_view key, std::string_view row) {
+    node->place_book_.restore(key, row);
+    return Status();
+  });
+  if (!returned) return tl::unexpected(returned.error());
+  node->note_first_submap();
   return node;
 }
 

@@ -17,6 +17,7 @@
 #include "tutti/node/job_book.hpp"
 #include "tutti/node/map_meta.hpp"
 #include "tutti/node/map_task.hpp"
+#include "tutti/node/place_book.hpp"
 #include "tutti/node/receipts.hpp"
 #include "tutti/node/refinement_queue.hpp"
 #include "tutti/node/robot_registry.hpp"
@@ -129,7 +130,17 @@ class ServerNode {
   void refuse_robot(const bus::Envelope& envelope, const NodeStatus& status, const std::string& why, Timestamp now,
                     Step& step);
   [[nodiscard]] std::set<RobotId> strangers_there(Timestamp now) const;
-  void receive_status_of_robot(RobotId robot, const NodeStatus& status, Timestamp now, Step& step);
+  /// False when it is not that robot's.
+  bool receive_status_of_robot(RobotId robot, const NodeStatus& status, Timestamp now, Step& step);
+  /// Takes what a robot has found of the map that it localises in, if it has submaps in this one: others may be
+  /// anybody.
+  void note_returns(RobotId robot, const InMap& in_map, Timestamp now, Step& step);
+  /// Why it cannot be of this map; empty: it can.
+  [[nodiscard]] std::string objection_to(const SubmapReturn& one) const;
+  /// Sets map_id_.
+  void note_first_submap();
+  /// By a clock that goes on over restarts, if the host has one.
+  [[nodiscard]] std::int64_t clock_s(Timestamp now) const;
   Status take_submap(const bus::Envelope& envelope, Timestamp now, Step& step);
   /// Stores what is new of submaps' places.
   void keep_places(Step& step);
@@ -202,6 +213,9 @@ class ServerNode {
   MarkSet marks_;
   RobotRegistry registry_;
   std::map<std::string, UnreadRows> unread_rows_;  // by table, until they are reported
+  PlaceBook place_book_;
+  std::optional<SubmapId> first_submap_;
+  std::string map_id_;  // localise::KnownMap::id of this map: it follows from the first submap
   WorkerRoster workers_;
   std::map<std::pair<bus::Endpoint::Role, bus::MessageKind>, MissionStatus::Refusals> refusals_;
   std::uint64_t start_ = 0;  // number of starts on this store; part of jobs' names

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What a ServerNode knows of the others, and reports of the whole.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <functional>
 
 #include "tutti/base/plain_text.hpp"
+#include "tutti/localise/known_map.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/status_envelope.hpp"
 #include "tutti/wire/codec.hpp"
@@ -45,7 +48,7 @@ void ServerNode::note_refusal(bus::Endpoint::Role from, bus::MessageKind kind, c
 }
 
 void ServerNode::receive_status(const bus::Envelope& envelope, Timestamp now, Step& step) {
-  const auto status = wire::decode_status(*envelope.bytes);
+  auto status = wire::decode_status(*envelope.bytes);
   if (!status) return refuse(envelope, status.error().message, now, step);
   if (envelope.from.role == bus::Endpoint::Role::worker) {
     receive_status_of_worker(envelope.from.number, *status, now, step);
@@ -57,7 +60,45 @@ void ServerNode::receive_status(const bus::Envelope& envelope, Timestamp now, St
     return refuse_robot(envelope, *status, why, now, step);
   if (const std::string why = config_.name_objection ? config_.name_objection(*robot, status->name) : ""; !why.empty())
     return refuse_robot(envelope, *status, why, now, step);
-  receive_status_of_robot(*robot, *status, now, step);
+  InMap returned = status->in_map;
+  status->in_map.fits.clear();  // whoever watches has them from the place book
+  if (receive_status_of_robot(*robot, *status, now, step)) note_returns(*robot, returned, now, step);
+}
+
+std::int64_t ServerNode::clock_s(Timestamp now) const {
+  return (config_.wall_ns ? config_.wall_ns() : now.ns) / 1'000'000'000;
+}
+
+void ServerNode::note_returns(RobotId robot, const InMap& in_map, Timestamp now, Step& step) {
+  if (in_map.fits.empty() || !registry_.is_mapped(robot)) return;
+  note_first_submap();
+  const std::string why =
+      place_book_.hear(robot, in_map, clock_s(now), [this](const std::string& map, const SubmapReturn& one) {
+        return map == map_id_ ? objection_to(one) : std::string();
+      });
+  if (!why.empty()) note_refusal(bus::Endpoint::Role::robot, bus::MessageKind::status, why);
+  if (auto row = place_book_.row_if_due(robot, clock_s(now))) step.writes.push_back(std::move(*row));
+}
+
+std::string ServerNode::objection_to(const SubmapReturn& one) const {
+  const server::MapServerState& state = server_.state();
+  if (!state.submaps.contains(one.submap))
+    return fmt::format("how submap {} fits: the map has no such submap", to_string(one.submap));
+  const auto size = state.payload_sizes.find(one.submap);
+  const std::uint64_t points = size == state.payload_sizes.end() ? 0 : size->second.points;
+  if (std::uint64_t{one.matched} + one.missing > points)
+    return fmt::format("how submap {} fits: {} of its points matched and {} missing, it has {}", to_string(one.submap),
+                       one.matched, one.missing, points);
+  return {};
+}
+
+void ServerNode::note_first_submap() {
+  const auto& submaps = server_.state().submaps;
+  if (submaps.empty() || first_submap_ == submaps.begin()->first) return;
+  const auto frame = frames_->frame(submaps.begin()->first);
+  if (!frame) return;
+  first_submap_ = submaps.begin()->first;
+  map_id_ = localise::map_id_of(*frame);
 }
 
 void ServerNode::receive_status_of_worker(std::uint32_t number, const NodeStatus& status, Timestamp now, Step& step) {
@@ -78,12 +119,12 @@ void ServerNode::refuse_robot(const bus::Envelope& envelope, const NodeStatus& s
   send_receipt(*receipt, step);
 }
 
-void ServerNode::receive_status_of_robot(RobotId robot, const NodeStatus& status, Timestamp now, Step& step) {
+bool ServerNode::receive_status_of_robot(RobotId robot, const NodeStatus& status, Timestamp now, Step& step) {
   const auto before = registry_.owner(robot);
   const auto heard = registry_.hear(robot, status, now);
   if (heard.must_be_stored) step.writes.push_back({"meta", RobotRegistry::key(robot), registry_.row(robot)});
   Receipt* const known_receipt = receipt_of(robot, now);
-  if (known_receipt == nullptr) return;
+  if (known_receipt == nullptr) return false;
   Receipt& receipt = *known_receipt;
   const auto owner = registry_.owner(robot);
   const Receipt old = receipt;
@@ -100,6 +141,7 @@ void ServerNode::receive_status_of_robot(RobotId robot, const NodeStatus& status
   const bool is_due = heard.accepted && receipts_.waits_too_long(robot, status, now);
   if (receipt != old) ++changes_;
   if (receipt != old || is_due) send_receipt(receipt, step);
+  return heard.accepted;
 }
 
 /// The last heard of those without submaps, who are there.
@@ -161,6 +203,11 @@ MissionStatus ServerNode::mission_status(Timestamp now) const {
   for (const auto& [number, worker] : workers_.all()) out.workers.push_back(worker);
   for (const auto& [from, refusals] : refusals_) out.refusals.push_back(refusals);
   out.decisions = decisions_.all();
+  std::optional<server::ClosureNames> names;
+  place_book_.fill(out, clock_s(now), map_id_, [&](SubmapId submap) {
+    if (!names) names = closure_names();
+    return names->of(submap);
+  });
   return out;
 }
 

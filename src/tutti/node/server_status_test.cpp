@@ -8,6 +8,7 @@
 
 #include "support/node/submaps.hpp"
 #include "tutti/base/content_hash.hpp"
+#include "tutti/localise/known_map.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/status_envelope.hpp"
 #include "tutti/storage/memory_store.hpp"
@@ -383,6 +384,49 @@ TEST_F(ServerStatus, StrangersLockNobodyOut) {
   restart();
   EXPECT_EQ(node_->mission_status(now_).robots.size(), 2U);
   EXPECT_EQ(node_->mission_status(now_).robots[1].status.name, "real");
+}
+
+/// What a robot returns of the map that it localises in, if that is this server's.
+class ServerStatusPlaces : public ServerStatus {
+ protected:
+  ServerStatusPlaces() {
+    send(test::submap(kAlpha, 0), "0/0/0");
+    map_ = localise::map_id_of(*test::envelope(test::submap(kAlpha, 0)).bytes);
+  }
+  Step hear_returns(RobotId robot, std::vector<SubmapReturn> fits) {
+    NodeStatus status{.name = "r" + std::to_string(robot.value), .start = 2};
+    status.in_map = {.map = map_, .version = 1, .state = "localised"};
+    status.in_map.fits = std::move(fits);
+    return receive(to_server(Endpoint::of(robot), status));
+  }
+  std::string map_;
+};
+
+TEST_F(ServerStatusPlaces, WhatRobotsReturnIsKeptAndAfterARestartToo) {
+  hear_returns(kAlpha, {{{kAlpha, 0}, 0, 1, 7, 30}});
+  const MissionStatus status = node_->mission_status(now_);
+  EXPECT_EQ(status.places_map, map_);
+  ASSERT_EQ(status.places.size(), 1U);
+  EXPECT_EQ(status.places[0], (MissionStatus::Place{"0/0", "r0/0", 0, 1, 7, 0.0, 30, {kAlpha}}));
+  EXPECT_TRUE(status.robots.front().status.in_map.fits.empty()) << "they would be sent twice";
+  restart();
+  EXPECT_EQ(node_->mission_status(now_).places, status.places);
+}
+
+TEST_F(ServerStatusPlaces, WhatCannotBeOfTheMapIsRefusedByItsName) {
+  hear_returns(kAlpha, {{{kAlpha, 9}, 1, 0, 0, 0}});
+  EXPECT_EQ(node_->mission_status(now_).refusals.front().last_why, "how submap 0/9 fits: the map has no such submap");
+  hear_returns(kAlpha, {{{kAlpha, 0}, 1, 3, 0, 0}});
+  EXPECT_EQ(node_->mission_status(now_).refusals.front().last_why,
+            "how submap 0/0 fits: 1 of its points matched and 3 missing, it has 1");
+  EXPECT_TRUE(node_->mission_status(now_).places.empty());
+}
+
+TEST_F(ServerStatusPlaces, WhoHasNoSubmapsInTheMapIsNotBelieved) {
+  accepts_others_ = true;
+  restart();
+  hear_returns(kStranger, {{{kAlpha, 0}, 0, 1, 0, 0}});
+  EXPECT_TRUE(node_->mission_status(now_).places.empty());
 }
 
 }  // namespace server_status_test

@@ -68,6 +68,37 @@ std::string state(const MissionStatus::Robot& robot) {
   return state;
 }
 
+/// What robots have found of the map that they localise in.
+void append_places(const MissionStatus& status, std::string& out) {
+  constexpr std::size_t kMostShown = 20;
+  std::vector<const MissionStatus::Place*> changed;
+  std::uint64_t oldest_s = 0;
+  for (const MissionStatus::Place& place : status.places) {
+    oldest_s = std::max(oldest_s, place.age_s);
+    if (place.missing + place.appeared > 0) changed.push_back(&place);
+  }
+  const auto since = [](std::uint64_t s) { return duration(static_cast<double>(s)); };
+  out += fmt::format("map {}, version {}: {} of its submaps were seen, the first of them {} ago, and ",
+                     status.places_map, status.places_version, status.places.size(), since(oldest_s));
+  out += changed.empty() ? "none has changed\n" : "something has changed in\n";
+  if (changed.empty()) return;
+  std::ranges::stable_sort(changed, {}, &MissionStatus::Place::trust);
+  std::vector<Row> rows{{"submap", "cubes gone", "new", "fits", "seen last", "by"}};
+  for (const MissionStatus::Place* const place : changed) {
+    if (rows.size() > kMostShown) break;
+    std::string by;
+    for (const RobotId robot : place->robots) {
+      const auto known = std::ranges::find(status.robots, robot, &MissionStatus::Robot::robot);
+      by += (by.empty() ? "" : ", ") +
+            (known == status.robots.end() ? fmt::format("robot {}", robot.value) : known->status.name);
+    }
+    rows.push_back({place->name, std::to_string(place->missing), std::to_string(place->appeared),
+                    fmt::format("{:.1f} %", 100.0 * place->trust), since(place->age_s) + " ago", std::move(by)});
+  }
+  append_table(rows, out);
+  if (changed.size() >= rows.size()) out += fmt::format("and {} more\n", changed.size() + 1 - rows.size());
+}
+
 }  // namespace
 
 std::string mission_status_text(const MissionStatus& status, double silent_s) {
@@ -109,6 +140,7 @@ std::string mission_status_text(const MissionStatus& status, double silent_s) {
                       worker.status.trouble});
     append_table(rows, out);
   }
+  if (!status.places.empty()) append_places(status, out);
   for (const MissionStatus::Robot& robot : status.robots) {
     if (!robot.conflict.empty()) say("two robots: {}\n", robot.conflict);
     if (robot.refused > 0) say("{}: {} submaps are no good and not in the map\n", robot.status.name, robot.refused);

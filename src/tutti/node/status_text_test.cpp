@@ -59,5 +59,29 @@ TEST(StatusText, OfAFleetInAMapItShowsWhoIsOnWhichVersion) {
   EXPECT_NE(text.find("localised"), std::string::npos) << text;
 }
 
+TEST(StatusText, SaysWhereTheMapThatRobotsLocaliseInHasChanged) {
+  MissionStatus status;
+  status.robots.push_back({.robot = RobotId{2}, .last_seen = Timestamp{}, .status = {.name = "delta"}});
+  status.places_map = "00c0ffee";
+  status.places_version = 3;
+  status.places = {{"0/0", "alpha/0", 190, 10, 0, 0.95, 65, {RobotId{2}, RobotId{5}}},
+                   {"0/1", "alpha/1", 50, 0, 0, 1.0, 7'000, {RobotId{2}}},
+                   {"0/2", "alpha/2", 45, 0, 5, 0.9, 7, {RobotId{2}}}};
+  const std::string text = mission_status_text(status, 0.0);
+  EXPECT_NE(
+      text.find("map 00c0ffee, version 3: 3 of its submaps were seen, the first of them 117 min ago, and something "
+                "has changed in\n"
+                "submap   cubes gone  new  fits    seen last  by\n"
+                "alpha/2  0           5    90.0 %  7 s ago    delta\n"
+                "alpha/0  10          0    95.0 %  65 s ago   delta, robot 5\n"),
+      std::string::npos)
+      << text;
+  status.places = {status.places[1]};
+  EXPECT_NE(mission_status_text(status, 0.0)
+                .find("1 of its submaps were seen, the first of them 117 min ago, and none has "
+                      "changed\n"),
+            std::string::npos);
+}
+
 }  // namespace status_text_test
 }  // namespace tutti::node

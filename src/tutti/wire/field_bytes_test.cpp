@@ -111,6 +111,8 @@ TEST(FieldBytes, TheFilesForOtherLanguagesHaveTheSameFields) {
   expect_in_proto<MissionStatus::Refusals>("status.proto", "RefusedMessages");
   expect_in_proto<MissionStatus::Decision>("status.proto", "AnsweredDecision");
   expect_in_proto<MissionStatus::Radio>("status.proto", "RobotsRadio");
+  expect_in_proto<MissionStatus::Place>("status.proto", "MapPlace");
+  expect_in_proto<SubmapReturn>("status.proto", "SubmapReturns", "repeated ");
   expect_in_proto<ClosureDecision>("status.proto", "Decision");
   expect_in_proto<MarkOrder>("status.proto", "MarkOrder");
   expect_in_proto<MapMark>("status.proto", "Mark");

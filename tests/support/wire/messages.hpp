@@ -221,7 +221,8 @@ class AnyFields {
     } else if constexpr (std::is_same_v<T, bool>) {
       value = true;
     } else {
-      value = static_cast<T>(rng_.index(~std::uint64_t{0}));  // of any size, and below 0
+      constexpr std::uint64_t kAny = ~std::uint64_t{0};  // of any size, and below 0
+      value = static_cast<T>(rng_.index(rule.high < 1e18 ? static_cast<std::uint64_t>(rule.high) + 1 : kAny));
     }
   }
   Rng& rng_;
