@@ -3,13 +3,18 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <functional>
 #include <memory>
 #include <string>
 #include <variant>
 
 #include "support/localise/tunnel.hpp"
+#include "support/node/submaps.hpp"
 #include "tutti/model/pose_at.hpp"
 #include "tutti/node/robot_node.hpp"
+#include "tutti/node/server_node.hpp"
+#include "tutti/node/status_envelope.hpp"
+#include "tutti/node/status_text.hpp"
 #include "tutti/storage/memory_store.hpp"
 
 namespace tutti::node {
@@ -37,6 +42,8 @@ struct Robot {
   [[nodiscard]] bool wants_scan(Timestamp stamp) const { return node->wants_scan(stamp); }
   Status done(const Step& step) {
     EXPECT_TRUE(store.commit(step.writes).has_value());
+    for (const bus::Envelope& message : step.messages)
+      if (send && message.to == bus::Endpoint::server()) send(message);
     for (const Event& event : step.events) {
       if (const auto* refused = std::get_if<SampleRefused>(&event.what))
         return fail(ErrorCode::invalid, "{}", refused->why);
@@ -48,6 +55,7 @@ struct Robot {
   std::unique_ptr<RobotNode> node;
   Timestamp now;
   std::size_t updates = 0;
+  std::function<void(const bus::Envelope&)> send;
 };
 
 /// The root mean square of a trajectory's errors while it is seen from its first pose.
@@ -106,6 +114,88 @@ TEST(RobotPlace, AStartPoseForARobotWithoutAMapIsRefusedWithTheWayOn) {
   ASSERT_FALSE(refused.has_value());
   EXPECT_EQ(refused.error().message,
             "a start pose, and this robot does not localise in a map: start it with --map FILE --localise");
+}
+
+/// What a robot sees where a box was put up that the map does not have.
+class ScansOfABox final : public ScanSource {
+ public:
+  ScansOfABox(const Recording& robot, Eigen::Vector3d middle)
+      : scans_(robot.scans), truth_(robot.reference), middle_(std::move(middle)) {}
+  [[nodiscard]] Result<std::optional<Scan>> scan(std::size_t sample) const override {
+    auto scan = scans_->scan(sample);
+    const auto pose = scan && *scan ? pose_at(truth_, (*scan)->stamp) : std::nullopt;
+    if (!pose) return scan;
+    PointCloud cloud = *(*scan)->cloud;
+    for (Eigen::Vector3f& point : cloud.points)
+      point *= static_cast<float>(share_of(pose->translation, *pose * point.cast<double>()));
+    (*scan)->cloud = std::make_shared<const PointCloud>(std::move(cloud));
+    return scan;
+  }
+
+ private:
+  /// Of a ray, until it meets the box.
+  [[nodiscard]] double share_of(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const {
+    const Eigen::Array3d low = (middle_ - from).array() - 0.5 * kSide_m, high = low + kSide_m,
+                         way = (to - from).array();
+    const double enters = (low / way).min(high / way).maxCoeff(), leaves = (low / way).max(high / way).minCoeff();
+    return enters > 0.0 && enters < std::min(leaves, 1.0) ? enters : 1.0;
+  }
+  static constexpr double kSide_m = 0.8;
+  std::shared_ptr<const ScanSource> scans_;
+  Trajectory truth_;
+  Eigen::Vector3d middle_;
+};
+
+/// A server that has the map, and a robot that localises in it and whose messages it hears.
+MissionStatus drive_before_a_server(const localise::test::World& world, const Recording& recording) {
+  storage::MemoryStore store(storage::map_schema(), {});
+  const auto server = ServerNode::open({RobotId{0}, RobotId{1}}, std::make_shared<test::EvenVerifier>(),
+                                       {.accepts_others = true}, 1, store)
+                          .value();
+  auto map = std::make_shared<localise::KnownMap>(*world.map);
+  const auto to_the_server = [&](const bus::Envelope& message, Timestamp now) {
+    EXPECT_TRUE(store.commit(server->receive(message, now).writes).has_value());
+  };
+  EXPECT_TRUE(store.commit(server->resume({}).writes).has_value());
+  for (const auto& [id, entry] : map->submaps) {
+    SubmapMessage message{.header = {id.chain.robot, id.chain.session, id.index}, .submap = *entry.submap};
+    message.submap.cloud = map->payloads->cloud(id).value();
+    if (id == map->submaps.begin()->first) map->id = localise::map_id_of(*test::envelope(message).bytes);
+    to_the_server(test::envelope(message), {});
+  }
+  Robot robot(map);
+  robot.send = [&](const bus::Envelope& message) { to_the_server(message, robot.now); };
+  std::size_t samples = 0;
+  localise::test::feed(recording, recording.odometry, 0, recording.odometry.size(), robot, [&] {
+    if (++samples % 10 == 0)  // two seconds
+      to_the_server(to_server(bus::Endpoint::of(kRobot), robot.node->status(robot.now)), robot.now);
+  });
+  EXPECT_EQ(robot.node->localiser()->state(), localise::State::localised);
+  return server->mission_status(robot.now);
+}
+
+std::size_t changed_places(const MissionStatus& status) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(status.places, [](const auto& place) { return place.missing + place.appeared > 0; }));
+}
+
+TEST(RobotPlace, AServerSaysWhereTheMapOfARobotFitsNoMore) {
+  const auto world = localise::test::make_world(3);
+  Recording recording = world.robots[2];
+  const MissionStatus same = drive_before_a_server(world, recording);
+  EXPECT_GT(same.places.size(), 3U);
+  EXPECT_EQ(changed_places(same), 0U) << mission_status_text(same, 0.0);
+  EXPECT_TRUE(same.refusals.empty()) << mission_status_text(same, 0.0);
+
+  const Pose3& on_its_way = recording.reference[recording.reference.size() / 2].pose;
+  recording.scans = std::make_shared<const ScansOfABox>(recording, on_its_way * Eigen::Vector3d(0.0, 1.0, 0.0));
+  const MissionStatus changed = drive_before_a_server(world, recording);
+  EXPECT_GT(changed_places(changed), 0U) << mission_status_text(changed, 0.0);
+  for (const MissionStatus::Place& place : changed.places) {
+    EXPECT_EQ(place.missing, 0U) << place.name;
+    EXPECT_EQ(place.robots, std::vector<RobotId>{kRobot}) << place.name;
+    EXPECT_EQ(place.trust<1.0, place.appeared> 0) << place.name;
+  }
 }
 
 }  // namespace robot_place_test
