@@ -99,7 +99,7 @@ std::string PlaceBook::hear(RobotId robot, const InMap& in_map, std::int64_t now
   return why;
 }
 
-/// Of versions with equally many robots the lower one: nobody shows his own by naming a high one.
+/// The lower one of versions with equally many robots: nobody shows his own by naming a high one.
 std::optional<PlaceBook::Version> PlaceBook::version_to_show(std::int64_t now_s) const {
   std::map<Version, std::pair<std::size_t, std::size_t>> robots_in;  // lately, and ever
   for (const auto& [robot, returned] : robots_) {

@@ -133,7 +133,7 @@ class ScansOfABox final : public ScanSource {
   }
 
  private:
-  /// Of a ray, until it meets the box.
+  /// How far a ray comes, until it meets the box.
   [[nodiscard]] double share_of(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const {
     const Eigen::Array3d low = (middle_ - from).array() - 0.5 * kSide_m, high = low + kSide_m,
                          way = (to - from).array();
