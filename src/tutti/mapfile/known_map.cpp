@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/mapfile/known_map.hpp"
 
-#include <fmt/format.h>
-
 #include <utility>
 
-#include "tutti/base/content_hash.hpp"
 #include "tutti/mapfile/placement.hpp"
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/perception/lidar/submap_middle.hpp"
@@ -37,7 +34,7 @@ Result<std::string> id_of(const Content& content, const storage::TableStore& map
   if (content.submaps.empty()) return std::string();
   const auto first = map.read(map_tables::kSubmaps, node::key_of(content.submaps.begin()->first));
   if (!first) return tl::unexpected(first.error());
-  return fmt::format("{:016x}", content_hash(first->value_or("")));
+  return localise::map_id_of(first->value_or(""));
 }
 
 }  // namespace

@@ -26,13 +26,13 @@ using storage::TableStore, storage::Write;
 /// What becomes of a row of `b` when there is another one in `a`: the bytes that are taken.
 using Choose = std::function<Result<std::string>(std::string_view key, std::string a, std::string b)>;
 
-/// Rows that are about one map alone: what became of it, its versions and the poses that it holds, and refinements and
-/// places, which join_refinements() and join_places() put.
+/// Rows that are about one map alone: what became of it, its versions, the poses that it holds and what robots returned
+/// of it, and refinements and places, which join_refinements() and join_places() put.
 bool is_of_one_map(const std::string& table, std::string_view key) {
   return table == map_tables::kMeta &&
          (key == node::kCountsKey || key == node::kLastUpdateKey || key.starts_with(node::kRefinementPrefix) ||
           key.starts_with(node::kPlacePrefix) || key.starts_with(node::kHeldPrefix) ||
-          key.starts_with(node::kVersionPrefix));
+          key.starts_with(node::kVersionPrefix) || key.starts_with(node::kReturnedPrefix));
 }
 
 /// Rows of `a`, and those of `b`, into the table; counts the keys that are in both.

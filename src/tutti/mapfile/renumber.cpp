@@ -119,7 +119,8 @@ node::RobotRow renamed(node::RobotRow row, RobotId robot, const Chains& chains) 
 }
 
 Result<NewRows> renamed_meta(std::string_view key, std::string_view bytes, const Chains& chains) {
-  if (key.starts_with(node::kRefusedPrefix)) return NewRows();  // written anew, by refusals
+  if (key.starts_with(node::kRefusedPrefix)) return NewRows();   // written anew, by refusals
+  if (key.starts_with(node::kReturnedPrefix)) return NewRows();  // robots return it of the map that this becomes
   for (const std::string_view prefix : {node::kHeldPrefix, node::kRetiredPrefix}) {
     if (!key.starts_with(prefix)) continue;
     const auto id = node::submap_of_key(key.substr(prefix.size()));

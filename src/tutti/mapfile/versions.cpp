@@ -67,7 +67,7 @@ NewRows meta_without(std::string_view key, std::string_view bytes, const Without
   const auto same_if = [&](bool is_kept) {
     return is_kept ? NewRows{{map_tables::kMeta, std::string(key), std::string(bytes)}} : NewRows();
   };
-  if (key == node::kCountsKey || key == node::kLastUpdateKey) return {};
+  if (key == node::kCountsKey || key == node::kLastUpdateKey || key.starts_with(node::kReturnedPrefix)) return {};
   if (key.starts_with(node::kVersionPrefix)) return same_if(number_of(key).value_or(until) < until);
   if (const auto robot = node::RobotRegistry::robot_of(key)) return same_if(stays.contains(*robot));
   for (const std::string_view prefix : {node::kHeldPrefix, node::kRetiredPrefix}) {
