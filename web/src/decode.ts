@@ -326,6 +326,27 @@ function radio(value: unknown): Map<number, s.RadioBytes> {
   );
 }
 
+function places(value: unknown): s.Places {
+  const f = fields(value, "places");
+  return {
+    map_id: words(f.map_id, "map_id"),
+    map_version: count(f.map_version, "map_version"),
+    places: maybe_list(f.places, "places", (place, what) => {
+      const e = fields(place, what);
+      return {
+        submap: words(e.submap, "submap"),
+        name: text(e.name, "name"),
+        matched: count(e.matched, "matched"),
+        missing: count(e.missing, "missing"),
+        appeared: count(e.appeared, "appeared"),
+        trust: number(e.trust, "trust"),
+        seen_s: number(e.seen_s, "seen_s"),
+        robots: list(e.robots, "robots", number),
+      };
+    }),
+  };
+}
+
 function acknowledged(value: unknown): s.Acknowledged {
   const f = fields(value, "acknowledged");
   return { alert: text(f.alert, "alert"), by: words(f.by, "by") };
@@ -360,6 +381,7 @@ export const DECODERS: { [K in s.Kind]: (value: unknown, ids: IdTable) => s.Valu
     new Map(Object.entries(fields(fields(value, "odometry").submaps, "submaps")).map(([id, T]) => [id, pose(T, id)])),
   mark,
   held: (value) => list(value, "held", held),
+  places,
   radio,
   acknowledged,
   history,

@@ -20,6 +20,7 @@ export const LIMITS = {
     odometry: 1,
     mark: 8,
     held: 1,
+    places: 40,
     radio: 40,
     acknowledged: 8,
     history: 1,

@@ -8,6 +8,7 @@ export const COLOUR_MODES = {
   sigma: "uncertainty",
   held: "closures that hold it",
   disagreement: "disagreement with odometry",
+  trust: "how robots find that it fits",
   part: "component of the map",
   survey: "distance to the survey",
 } as const;

@@ -220,6 +220,25 @@ export interface Held {
   what: string;
 }
 
+/** What robots that localise in a map have found of one of its submaps, together; in cubes. */
+export interface Place {
+  /** "": it is of another map than the server's. */
+  submap: SubmapId;
+  name: string;
+  matched: number;
+  missing: number;
+  appeared: number;
+  /** The share that fits. */
+  trust: number;
+  /** When a robot saw any of it, s. */
+  seen_s: number;
+  /** Those that did, the last first. */
+  robots: number[];
+}
+export interface Places extends MapVersion {
+  places: Place[];
+}
+
 /** Bytes since the server's start, by kind of message. */
 export interface RadioBytes {
   up: Record<string, number>;
@@ -262,6 +281,7 @@ export interface Values {
   odometry: Map<SubmapId, Pose>;
   mark: Mark;
   held: Held[];
+  places: Places;
   radio: Map<number, RadioBytes>;
   /** By ID@SINCE of the alert. */
   acknowledged: Acknowledged;

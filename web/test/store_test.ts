@@ -64,6 +64,22 @@ test("who is in which version of a map that does not move", () => {
   );
 });
 
+test("where a map no longer fits what robots see", () => {
+  const store = filled();
+  const place = { name: "alpha/7", matched: 90, missing: 10, appeared: 0, trust: 0.9, robots: [2, 0], seen_s: 60 };
+  const value = {
+    map_id: "c0ffee",
+    map_version: 3,
+    places: [
+      { ...place, submap: "0/7" },
+      { ...place, submap: "" },
+    ],
+  };
+  store.apply({ key: "places", t: 100, value });
+  assert.deepEqual(store.unread, { count: 0, last: "" });
+  assert.deepEqual(store.get("places"), value);
+});
+
 test("of which times nothing is known", () => {
   const store = filled();
   assert.equal(unknown_at(store, 5), "");

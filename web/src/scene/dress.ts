@@ -20,6 +20,8 @@ export interface Dressing {
   robot_name: (robot: number) => string;
   /** The worst disagreement of a submap, over its threshold; null: none is known. */
   disagreement: (id: string) => number | null;
+  /** The share of a submap that fits what robots see that localise in it; null: none saw it. */
+  trust: (id: string) => number | null;
   /** The distance of a cloud's points to the survey, as places in a ramp; null: there is none. */
   distances: (id: string, cloud: Cloud, T: Pose) => Uint8Array | null;
   /** The time that is shown, s. */
@@ -41,6 +43,9 @@ const kHolding: { most: number; colour: Rgb; label: string }[] = [
   { most: 2, colour: [240, 180, 70], label: "2" },
   { most: Infinity, colour: [70, 200, 150], label: "3 or more" },
 ];
+
+/** What is trusted by so much less than wholly has the worst colour. */
+export const LEAST_TRUST = 0.3;
 
 /** Largest sigma of a submap, oldest age, worst disagreement in units of its threshold: the ends of scales. */
 interface Scales {
@@ -74,6 +79,10 @@ function colour_of(p: Placed, d: Dressing, s: Scales): Rgb {
     case "disagreement": {
       const x = d.disagreement(p.id);
       return x === null ? [130, 138, 150] : bad(share_of_disagreement(x, s.disagreement));
+    }
+    case "trust": {
+      const x = d.trust(p.id);
+      return x === null ? [130, 138, 150] : bad((1 - x) / LEAST_TRUST);
     }
     case "part":
       return robot_rgb(p.component, d.dark);
@@ -178,6 +187,13 @@ export function legend_of(world: World, d: Dressing): Legend {
       return scale("distance to the survey's nearest point", bad, "0", `${100 * SurveyDistance.most_m} cm or more`);
     case "disagreement":
       return scale("disagreement, times the threshold", bad, "0", figure(s.disagreement), "1");
+    case "trust":
+      return scale(
+        "share that fits what robots see now; grey: none saw it",
+        bad,
+        "100 %",
+        `${100 * (1 - LEAST_TRUST)} % or less`,
+      );
     case "held":
       return {
         title: "closures that hold it",

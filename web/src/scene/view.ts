@@ -95,12 +95,15 @@ export class View {
   dressing(): Dressing {
     const { app } = this;
     const worst = app.options.colour === "disagreement" ? worst_disagreement(app.store, app.at()) : null;
+    const places = app.options.colour === "trust" ? app.store.get("places", app.at()) : null;
+    const trust = places && new Map(places.places.map((place) => [place.submap, place.trust]));
     return {
       options: app.options,
       dark: app.dark,
       colour_index: (n) => app.robot_index(n),
       robot_name: (n) => app.robot_name(n),
       disagreement: (id) => worst?.get(id) ?? null,
+      trust: (id) => trust?.get(id) ?? null,
       distances: (id, cloud, T) => this.survey_distance()?.shades(id, cloud, T) ?? null,
       t: app.shown(),
       faint: (id) => app.selection?.kind === "robot" && app.world.placed.get(id)?.submap.robot !== app.selection.number,

@@ -13,6 +13,7 @@ import { disagreement_panel } from "./disagreement";
 import { button, h, panel } from "./dom";
 import { inspector_panel } from "./inspector";
 import { marks_panel } from "./marks";
+import { has_changed, places_panel } from "./places";
 import { report_panel } from "./report";
 import { robots_panel } from "./robots";
 import { why_panel } from "./why";
@@ -65,6 +66,15 @@ const TABS: Tab[] = [
     title: () => "Curves",
     offered: (app) => app.store.track("status") !== null,
     make: curves_panel,
+  },
+  {
+    name: "places",
+    title: (app) => {
+      const changed = app.store.get("places", app.at())?.places.filter(has_changed).length;
+      return `Places${changed ? ` ${changed}` : ""}`;
+    },
+    offered: (app) => app.store.get("places", app.at()) !== null,
+    make: places_panel,
   },
   {
     name: "marks",

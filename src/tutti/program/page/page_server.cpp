@@ -118,6 +118,7 @@ class ServedPage final : public Page {
     site_.board.put([&](Board& board) {
       board.put(held);
       board.put(radio_message(status));
+      if (!status.places.empty()) board.put(places_message(status));
       board.put(status_message(status));
       board.put(alerts_message(alerts, time_s));
     });

@@ -89,8 +89,10 @@ class Alerts {
 std::vector<Alert> joined(std::vector<Alert> alerts, const std::vector<Alert>& more);
 Message alerts_message(const std::vector<Alert>& alerts, double time_s);
 
-/// `status`, with times as seconds before it.
+/// `status`, with times as seconds before it, without what radio_message() and places_message() have.
 Message status_message(const MissionStatus& status);
+/// `places`: what robots have found of the map that they localise in, and when each place was seen, in mission time.
+Message places_message(const MissionStatus& status);
 
 /// What one map shows, to be put on a board with the prefixes below.
 struct MapMessages {

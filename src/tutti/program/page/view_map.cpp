@@ -22,6 +22,7 @@ namespace {
 
 using mapfile::ShownMap;
 
+constexpr double kPlacesStep_s = 10.0;  // else they would be sent anew with every status
 constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 /// To 0.1 mm (or the same of other units): what people and pictures need, in few characters.
@@ -223,8 +224,20 @@ Message mission_message(const Mission& mission) {
 
 Message status_message(const MissionStatus& status) {
   FieldJson out = json_of_fields(status, status.time);
-  out.erase("radio");  // radio_message()
+  for (const char* const apart : {"radio", "places_map_id", "places_map_version", "places"}) out.erase(apart);
   return {"status", status.time - Timestamp{}, text_of(out)};
+}
+
+Message places_message(const MissionStatus& status) {
+  const double time_s = status.time - Timestamp{};
+  FieldJson places = FieldJson::array();
+  for (const MissionStatus::Place& place : status.places) {
+    FieldJson& entry = places.emplace_back(json_of_fields(place));
+    entry.erase("age_s");
+    entry["seen_s"] = kPlacesStep_s * std::round((time_s - static_cast<double>(place.age_s)) / kPlacesStep_s);
+  }
+  return {"places", time_s,
+          text_of({{"map_id", status.places_map}, {"map_version", status.places_version}, {"places", places}})};
 }
 
 Message alerts_message(const std::vector<Alert>& alerts, double time_s) {

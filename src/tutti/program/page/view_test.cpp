@@ -134,5 +134,23 @@ TEST(StatusMessage, HasTimesBeforeIt) {
   EXPECT_TRUE(robot.at("last_update_s_ago").is_null());
 }
 
+/// The board takes no value twice, and a status comes every two seconds.
+TEST(PlacesMessage, IsTheSameUntilSomethingIsSeen) {
+  MissionStatus status{.time = Timestamp{} + 100.0};
+  status.places_map = "00c0ffee";
+  status.places_version = 3;
+  status.places = {{"0/7", "alpha/7", 90, 10, 0, 0.9, 40, {kBravo}}};
+  const Message message = places_message(status);
+  EXPECT_EQ(message.key, "places");
+  EXPECT_EQ(json::parse(message.value),
+            json::parse(R"({"map_id": "00c0ffee", "map_version": 3, "places": [{"submap": "0/7", "name": "alpha/7",
+                            "matched": 90, "missing": 10, "appeared": 0, "trust": 0.9, "robots": [1], "seen_s": 60}]})"))
+      << message.value;
+  status.time = Timestamp{} + 102.0;
+  status.places[0].age_s = 42;
+  EXPECT_EQ(places_message(status).value, message.value);
+  EXPECT_FALSE(json::parse(status_message(status).value).contains("places"));
+}
+
 }  // namespace view_test
 }  // namespace tutti::page
