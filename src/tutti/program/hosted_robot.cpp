@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
+#include <vector>
 
 #include "tutti/base/plain_text.hpp"
 #include "tutti/model/proxy_graph.hpp"
@@ -16,6 +18,26 @@ namespace {
 constexpr double kLongestWork_s = 0.05;  // then it listens again
 constexpr std::size_t kBehind = 1'000;   // samples and scans that wait: 5 s at 200 Hz
 constexpr double kStarts_s = 15.0;       // so long a second program of this robot ends when it learns so
+
+/// Where the map that it localises in no longer fits, the worst first.
+Json changed_places(const localise::Localiser& localiser, Timestamp now) {
+  constexpr std::size_t kMost = 100;
+  std::vector<std::pair<double, Json>> changed;
+  for (const auto& [submap, fit] : localiser.map_fit().fits()) {
+    if (!fit.has_changed()) continue;
+    localise::PlaceTrust place;
+    place.add(fit);
+    changed.emplace_back(place.trust(), Json{{"submap", localiser.map().names.of(submap)},
+                                             {"missing", fit.missing},
+                                             {"appeared", fit.appeared},
+                                             {"trust", place.trust()},
+                                             {"age_s", now - fit.seen}});
+  }
+  std::ranges::stable_sort(changed, {}, [](const auto& place) { return place.first; });
+  Json out = Json::array();
+  for (std::size_t i = 0; i < std::min(changed.size(), kMost); ++i) out.push_back(std::move(changed[i].second));
+  return out;
+}
 
 }  // namespace
 
@@ -148,6 +170,10 @@ Json HostedRobot::status(Timestamp now) const {
   const NodeStatus status = node_status(now);
   const bus::LinkState link = port_.state();
   const double time_s = now - Timestamp{};
+  const localise::Localiser* const localiser = driver_->node().localiser();
+  Json changed = localiser ? changed_places(*localiser, localiser->located().stamp) : Json::array();
+  std::string in_map = status.in_map.state.empty() ? "" : ", in its map: " + status.in_map.state;
+  if (!changed.empty()) in_map += fmt::format(", something has changed in {} submaps", changed.size());
   Json out = json_of_fields(status);
   out.update({{"program", "robot"},
               {"time_s", time_s},
@@ -159,10 +185,11 @@ Json HostedRobot::status(Timestamp now) const {
               {"refused", driver_->node().conflict().value_or("")},
               {"line", fmt::format("{}, {} keyframes, {} submaps not stored yet, heard map revision {}{}{}{}",
                                    progress(time_s), status.keyframes, status.backlog_submaps, status.heard_revision,
-                                   status.in_map.state.empty() ? "" : ", in its map: " + status.in_map.state,
-                                   link.connected ? "" : ", no link: " + link.last_error,
+                                   in_map, link.connected ? "" : ", no link: " + link.last_error,
                                    alone_.empty() ? "" : ", " + alone_)}});
   if (status.trouble.empty()) out.erase("trouble");
+  out.erase("map_fit");  // some of the places, in turn
+  if (localiser != nullptr) out["changed_places"] = std::move(changed);
   if (feed_) out["feed"] = feed_status();
   return out;
 }
