@@ -61,8 +61,6 @@ class Places(common.ProgramsTest):
         server.kill()
         server, bus = self.start_server()
         self.wait_for(lambda: self.changed(bus).keys() == changed.keys(), "the same of the server that was started again")
-        radio = {sum["kind"]: sum for sum in common.json.loads(self.said(bus, "--json")).get("radio", [])}
-        print(radio.get("status"))
         self.assertEqual(server.end()[0], 0)
 
 

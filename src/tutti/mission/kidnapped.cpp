@@ -29,8 +29,8 @@ std::optional<Timestamp> closed_up(Timestamp stamp, const std::vector<Gap>& gaps
 class RestOfScans final : public ScanSource {
  public:
   struct Which {
-    std::size_t sample = 0;  ///< Of the whole source.
-    Timestamp stamp;         ///< Of the rest.
+    std::size_t sample = 0;  ///< Its number in the whole source.
+    Timestamp stamp;         ///< In the rest.
   };
   RestOfScans(std::shared_ptr<const ScanSource> whole, std::vector<Which> rest)
       : whole_(std::move(whole)), rest_(std::move(rest)) {}

@@ -11,7 +11,7 @@ namespace tutti::mission {
 /// A recording of a robot that is carried now and then, which its odometry does not notice.
 struct KidnappedRecording {
   Recording recording;
-  std::vector<Timestamp> at;  ///< Of the last sample before each.
+  std::vector<Timestamp> at;  ///< Stamps of the last samples before each.
 };
 
 /// The recording without kCarried_s of every `every_s`, and without what it drove in them: odometry goes on from where

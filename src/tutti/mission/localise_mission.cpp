@@ -98,7 +98,7 @@ LocalisedRobot replay(const MissionRecording& recording, const MissionConfig& co
   while (std::isfinite(robot.next_time())) {
     const double time_s = robot.next_time();
     if (stop && stop(out.name, length_s > 0.0 ? (time_s - recording.start_s) / length_s : 1.0)) break;
-    const std::size_t registered = localiser.work().registered;
+    const localise::LocaliserWork before = localiser.work();
     const double cpu_s = robot.cpu_s();
     if (const double since_s = time_s - recording.start_s;
         restart_s > 0.0 && since_s >= restart_s * static_cast<double>(out.starts.size()) &&
@@ -108,7 +108,9 @@ LocalisedRobot replay(const MissionRecording& recording, const MissionConfig& co
     }
     robot.replay_next(kMissionStart + time_s);
     robot.take_step();
-    if (localiser.work().registered > registered) out.scan_ms.push_back(1e3 * (robot.cpu_s() - cpu_s));
+    const localise::LocaliserWork after = localiser.work();
+    if (after.registered > before.registered && after.compared == before.compared)  // else a submap was looked for
+      out.scan_ms.push_back(1e3 * (robot.cpu_s() - cpu_s));
     localise::Located now = localiser.located();
     if (now.state == localise::State::localised && !out.starts.back().fix_after_s) {
       out.starts.back().fix_after_s = now.stamp - begin - out.starts.back().at_s;

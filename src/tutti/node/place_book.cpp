@@ -135,11 +135,13 @@ void PlaceBook::fill(MissionStatus& out, std::int64_t now_s, const std::string& 
   }
 }
 
-std::optional<storage::Write> PlaceBook::row_if_due(RobotId robot, std::int64_t now_s) {
+std::optional<storage::Write> PlaceBook::row_if_due(RobotId robot, std::int64_t now_s, bool has_finished) {
   const auto found = robots_.find(robot);
   if (found == robots_.end() || !found->second.is_news) return std::nullopt;
   Returned& returned = found->second;
-  if (returned.stored_s && std::abs(now_s - *returned.stored_s) < kStored_s) return std::nullopt;
+  const bool is_last = has_finished && !returned.has_finished;
+  returned.has_finished = has_finished;
+  if (!is_last && returned.stored_s && std::abs(now_s - *returned.stored_s) < kStored_s) return std::nullopt;
   returned.stored_s = now_s;
   returned.is_news = false;
   ReturnedRow row{.map = returned.map, .version = returned.version, .at_s = now_s};

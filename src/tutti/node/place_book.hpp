@@ -40,8 +40,8 @@ class PlaceBook {
   /// another one, names are not known.
   void fill(MissionStatus& out, std::int64_t now_s, const std::string& own_map, const NameOf& name_of) const;
 
-  /// The row of what a robot has returned, when it is time to store it.
-  std::optional<storage::Write> row_if_due(RobotId robot, std::int64_t now_s);
+  /// The row of what a robot has returned, when it is time to store it: also once when the robot has finished.
+  std::optional<storage::Write> row_if_due(RobotId robot, std::int64_t now_s, bool has_finished);
   /// Takes a row back; one that cannot be read is none.
   void restore(std::string_view key, std::string_view bytes);
 
@@ -56,7 +56,7 @@ class PlaceBook {
     std::map<SubmapId, Kept> places;
     std::int64_t heard_s = 0;
     std::optional<std::int64_t> stored_s;
-    bool is_news = false;
+    bool is_news = false, has_finished = false;
   };
   using Version = std::pair<std::string, std::uint64_t>;
   [[nodiscard]] std::optional<Version> version_to_show(std::int64_t now_s) const;

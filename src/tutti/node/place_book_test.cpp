@@ -95,19 +95,19 @@ TEST(PlaceBook, WhoeverReturnsMoreAndMoreLosesHisOldestAndNobodyElseAny) {
     book.hear(3, {{submap(k), 1, SubmapReturn::kMostCubes, SubmapReturn::kMostCubes, k == 7 ? ~0U : 0}});
   EXPECT_EQ(book.shown().places.size(), MissionStatus::kMostPlaces);
   EXPECT_TRUE(std::ranges::none_of(book.shown().places, [](const auto& place) { return place.submap == "0/7"; }));
-  const auto row = book.book.row_if_due(RobotId{3}, kNow_s);
+  const auto row = book.book.row_if_due(RobotId{3}, kNow_s, false);
   ASSERT_TRUE(row.has_value());
   EXPECT_LT(row->bytes->size(), 20'000U);
   for (std::uint32_t k = 0; k < PlaceBook::kMostOfRobot; ++k) book.hear(3, {{submap(k), 1, 0, 0, 0}});
-  EXPECT_TRUE(book.book.row_if_due(RobotId{1}, kNow_s).has_value());
+  EXPECT_TRUE(book.book.row_if_due(RobotId{1}, kNow_s, false).has_value());
 }
 
 TEST(PlaceBook, ItGoesOnAfterARestart) {
   Book book, again;
   book.hear(4, {{submap(0), 90, 10, 2, 60}, {submap(1), 5, 0, 0, 0}});
-  const auto row = book.book.row_if_due(RobotId{4}, kNow_s);
+  const auto row = book.book.row_if_due(RobotId{4}, kNow_s, false);
   ASSERT_TRUE(row.has_value());
-  EXPECT_FALSE(book.book.row_if_due(RobotId{4}, kNow_s).has_value()) << "nothing is new";
+  EXPECT_FALSE(book.book.row_if_due(RobotId{4}, kNow_s, false).has_value()) << "nothing is new";
   again.book.restore(row->key, *row->bytes);
   EXPECT_EQ(again.shown(), book.shown());
   again.book.restore(row->key, "garbage");
@@ -115,8 +115,14 @@ TEST(PlaceBook, ItGoesOnAfterARestart) {
   again.book.restore("other", *row->bytes);
   EXPECT_EQ(again.shown(), book.shown());
   book.hear(4, {{submap(0), 91, 10, 2, 0}}, 3, kNow_s + 1);
-  EXPECT_FALSE(book.book.row_if_due(RobotId{4}, kNow_s + 1).has_value()) << "it was stored a second ago";
-  EXPECT_TRUE(book.book.row_if_due(RobotId{4}, kNow_s + PlaceBook::kStored_s).has_value());
+  EXPECT_FALSE(book.book.row_if_due(RobotId{4}, kNow_s + 1, false).has_value()) << "it was stored a second ago";
+  EXPECT_TRUE(book.book.row_if_due(RobotId{4}, kNow_s + PlaceBook::kStored_s, false).has_value());
+  const auto finished_after = [&](int s) {
+    book.hear(4, {{submap(0), 92, 10, 2, 0}}, 3, kNow_s + PlaceBook::kStored_s + s);
+    return book.book.row_if_due(RobotId{4}, kNow_s + PlaceBook::kStored_s + s, true).has_value();
+  };
+  EXPECT_TRUE(finished_after(2)) << "what it returned last may be its last word";
+  EXPECT_FALSE(finished_after(4)) << "which it repeats";
 }
 
 /// The bytes of a status in a map of a thousand submaps, on top of what it has without them.

@@ -134,7 +134,7 @@ class ServerNode {
   bool receive_status_of_robot(RobotId robot, const NodeStatus& status, Timestamp now, Step& step);
   /// Takes what a robot has found of the map that it localises in, if it has submaps in this one: others may be
   /// anybody.
-  void note_returns(RobotId robot, const InMap& in_map, Timestamp now, Step& step);
+  void note_returns(RobotId robot, const InMap& in_map, Timestamp now);
   /// Why it cannot be of this map; empty: it can.
   [[nodiscard]] std::string objection_to(const SubmapReturn& one) const;
   /// Sets map_id_.

@@ -62,14 +62,16 @@ void ServerNode::receive_status(const bus::Envelope& envelope, Timestamp now, St
     return refuse_robot(envelope, *status, why, now, step);
   InMap returned = status->in_map;
   status->in_map.fits.clear();  // whoever watches has them from the place book
-  if (receive_status_of_robot(*robot, *status, now, step)) note_returns(*robot, returned, now, step);
+  if (!receive_status_of_robot(*robot, *status, now, step)) return;
+  note_returns(*robot, returned, now);
+  if (auto row = place_book_.row_if_due(*robot, clock_s(now), status->finished)) step.writes.push_back(std::move(*row));
 }
 
 std::int64_t ServerNode::clock_s(Timestamp now) const {
   return (config_.wall_ns ? config_.wall_ns() : now.ns) / 1'000'000'000;
 }
 
-void ServerNode::note_returns(RobotId robot, const InMap& in_map, Timestamp now, Step& step) {
+void ServerNode::note_returns(RobotId robot, const InMap& in_map, Timestamp now) {
   if (in_map.fits.empty() || !registry_.is_mapped(robot)) return;
   note_first_submap();
   const std::string why =
@@ -77,7 +79,6 @@ void ServerNode::note_returns(RobotId robot, const InMap& in_map, Timestamp now,
         return map == map_id_ ? objection_to(one) : std::string();
       });
   if (!why.empty()) note_refusal(bus::Endpoint::Role::robot, bus::MessageKind::status, why);
-  if (auto row = place_book_.row_if_due(robot, clock_s(now))) step.writes.push_back(std::move(*row));
 }
 
 std::string ServerNode::objection_to(const SubmapReturn& one) const {
