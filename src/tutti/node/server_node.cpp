@@ -53,12 +53,14 @@ Result<std::unique_ptr<ServerNode>> ServerNode::open(std::set<RobotId> robots,
   std::unique_ptr<ServerNode> node(new ServerNode(std::move(robots), std::move(verifier), config, epoch,
                                                   SubmapFrames::of(store), std::move(*opened)));
   node->marks_ = std::move(*marks);
+  bool has_returns = false;
   const Status returned = each_row_of(store, kReturnedPrefix, [&](std::string_view key, std::string_view row) {
     node->place_book_.restore(key, row);
+    has_returns = true;
     return Status();
   });
   if (!returned) return tl::unexpected(returned.error());
-  node->note_first_submap();
+  if (has_returns) node->note_first_submap();  // else no submap's bytes are read
   return node;
 }
 
