@@ -378,7 +378,7 @@ class CommandLine(unittest.TestCase):
         self.assertEqual(int(note.split()[1]), 99, note)  # all from 000002 to 000100: 000001 shows nothing new
         self.assertIn("000002.pcd (or .bin): is not there", note)
         (self.path / "scans" / "000000.pcd").write_text("no point cloud")
-        self.expect(run(), 1, "robot a: not one scan could be read", "000000.pcd")
+        self.expect(run(), 1, "robot a: not one of 1 scans that were tried can be used, the first because", "000000.pcd")
 
     def test_settings_say_what_can_be_set(self):
         few = tutti("settings")
