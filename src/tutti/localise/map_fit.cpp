@@ -70,6 +70,11 @@ void add_fit(SubmapId id, const SubmapFit& fit, std::map<SubmapId, SubmapFit>& f
 
 }  // namespace
 
+double share_that_fits(std::uint64_t matched, std::uint64_t missing, std::uint64_t appeared) {
+  const std::uint64_t seen = matched + missing + appeared;
+  return seen > 0 ? static_cast<double>(matched) / static_cast<double>(seen) : 1.0;
+}
+
 void PlaceTrust::add(const SubmapFit& of_robot) {
   fit.matched += of_robot.matched;
   fit.missing += of_robot.missing;
@@ -77,11 +82,6 @@ void PlaceTrust::add(const SubmapFit& of_robot) {
   fit.scans += of_robot.scans;
   fit.seen = robots == 0 ? of_robot.seen : std::max(fit.seen, of_robot.seen);
   ++robots;
-}
-
-double PlaceTrust::trust() const {
-  const double seen = 0.0 + fit.matched + fit.missing + fit.appeared;
-  return seen > 0.0 ? fit.matched / seen : 1.0;
 }
 
 bool is_gone(const FitVotes& votes) { return votes.passes >= kLeastVotes && 4 * votes.hits <= votes.passes; }

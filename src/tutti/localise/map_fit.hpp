@@ -16,6 +16,9 @@
 
 namespace tutti::localise {
 
+/// A place is trusted by this share of its cubes that were seen; by 1 where none was.
+double share_that_fits(std::uint64_t matched, std::uint64_t missing, std::uint64_t appeared);
+
 /// How one submap of a map fits what a robot that is localised has seen of it lately, in cubes of kFitCube_m. What it
 /// did not see is in none of the counts.
 struct SubmapFit {
@@ -25,6 +28,7 @@ struct SubmapFit {
   std::uint32_t scans = 0;     ///< That saw any of it.
   Timestamp seen;              ///< The stamp of the last of them.
   [[nodiscard]] bool has_changed() const { return missing + appeared > 0; }
+  [[nodiscard]] double trust() const { return share_that_fits(matched, missing, appeared); }
   friend bool operator==(const SubmapFit&, const SubmapFit&) = default;
 };
 inline constexpr double kFitCube_m = 0.3;
@@ -34,8 +38,6 @@ struct PlaceTrust {
   SubmapFit fit;           ///< Their sums, and the latest stamp.
   std::size_t robots = 0;  ///< That saw any of it.
   void add(const SubmapFit& of_robot);
-  /// Share of the cubes seen that fit; 1 where none was.
-  [[nodiscard]] double trust() const;
 };
 
 /// Scans in which something was there, and in which one looked through it.

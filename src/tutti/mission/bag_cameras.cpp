@@ -101,7 +101,7 @@ void take_choice(const BagIndex& index, const bags::CameraChoice& choice, std::v
   out.notes.insert(out.notes.end(), refused.begin(), refused.end());
 }
 
-/// What `convert` makes of a message of a topic of images.
+/// Reads a message of a topic of images, and returns what `convert` makes of it.
 template <class Convert>
 auto read(BagMessages& messages, const BagImages& of, const ScanPlace& place, const Convert& convert) {
   return messages.read(of.topic, place, [&](const bags::BagMessage& message, bags::RosEncoding encoding) {

@@ -38,7 +38,7 @@ bags::StampOrder put_in_order(Track<Item>& track) {
   return order;
 }
 
-/// What messages say of their frames: of the odometry's, and of its body's.
+/// Messages name these frames: the odometry's, and its body's.
 using FramePair = std::pair<std::string, std::string>;
 bool is_like(const std::string& frame, const std::string& most) { return frame == most; }
 bool is_like(const FramePair& frames, const FramePair& most) {

@@ -9,7 +9,7 @@
 namespace tutti::mission {
 namespace {
 
-/// What is left out, by the recording's clock: from after `from` to before `to`.
+/// The robot is carried in it, by the recording's clock: what is after `from` and before `to` is left out.
 struct Gap {
   Timestamp from, to;
   [[nodiscard]] double length_s() const { return to - from; }
@@ -53,7 +53,7 @@ std::vector<Gap> find_gaps(const Trajectory& odometry, double every_s) {
     if (odometry[k].stamp - driven_since < every_s) continue;
     const auto after = std::ranges::lower_bound(odometry, odometry[k].stamp + kCarried_s, {}, &StampedPose::stamp);
     if (after == odometry.end()) break;
-    if ((after->pose.translation - odometry[k].pose.translation).norm() < kLeast_m) continue;
+    if ((after->pose.translation - odometry[k].pose.translation).norm() < kLeastCarried_m) continue;
     out.push_back({odometry[k].stamp, after->stamp});
     driven_since = after->stamp;
     k = static_cast<std::size_t>(after - odometry.begin());

@@ -15,10 +15,10 @@ struct KidnappedRecording {
 };
 
 /// The recording without kCarried_s of every `every_s`, and without what it drove in them: odometry goes on from where
-/// it was, the reference and scans are where they were. Where that would move the robot by less than kLeast_m it is
-/// carried later. Samples but odometry, the reference and scans are left out. Fails for a recording without scans, and
-/// for one that is too short for one kidnap.
+/// it was, the reference and scans are where they were. Where that would move the robot by less than kLeastCarried_m it
+/// is carried later. Samples but odometry, the reference and scans are left out. Fails for a recording without scans,
+/// and for one that is too short for one kidnap.
 Result<KidnappedRecording> kidnapped(const Recording& recording, double every_s);
-inline constexpr double kCarried_s = 20.0, kLeast_m = 5.0;
+inline constexpr double kCarried_s = 20.0, kLeastCarried_m = 5.0;
 
 }  // namespace tutti::mission

@@ -53,7 +53,7 @@ TEST(Kidnapped, OdometryNoticesNothingAndScansAreOfTheNewPlace) {
     EXPECT_LT((out.odometry[k].pose.translation - out.odometry[k - 1].pose.translation).norm(), 1.01 * kStep_s);
     const double moved_m = (out.reference[k].pose.translation - out.reference[k - 1].pose.translation).norm();
     const bool is_carried = std::ranges::find(made->at, out.odometry[k - 1].stamp) != made->at.end();
-    EXPECT_EQ(moved_m >= kLeast_m, is_carried) << k;
+    EXPECT_EQ(moved_m >= kLeastCarried_m, is_carried) << k;
     carried += is_carried;
     const auto scan = out.scans->scan(k);
     ASSERT_TRUE(scan && *scan);

@@ -64,7 +64,8 @@ void measure_starts(const localise::KnownMap& map, const Trajectory& reference, 
     }
 }
 
-/// What became of it at these times, where it was localised; and its course without what it published until it said so.
+/// Notes the kidnaps at these times at which it was localised. Returns its course without what it published until it
+/// said so.
 std::vector<localise::Located> measure_kidnaps(const std::vector<Timestamp>& at, LocalisedRobot& robot) {
   std::vector<localise::Located> rest = robot.course;
   const Timestamp begin = rest.empty() ? Timestamp{} : rest.front().stamp;

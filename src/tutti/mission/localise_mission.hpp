@@ -59,7 +59,7 @@ std::shared_ptr<const localise::Localiser::Setup> localise_setup(
     const MissionConfig& config, const robot::SubmapConfig& submap, std::shared_ptr<const localise::KnownMap> map,
     std::function<std::shared_ptr<const server::ClosureVerifier>()> make_verifier);
 
-/// What is done to robots to see how they find their places; 0: never.
+/// Robots are put to the test in this way, to see how they find their places; 0: never.
 struct LocaliseTrial {
   double restart_s = 0.0;  ///< So often they forget where they are.
   double kidnap_s = 0.0;   ///< So often they are carried elsewhere (kidnapped.hpp).

@@ -60,7 +60,7 @@ TEST(LocaliseScore, TheMapsOwnErrorIsNotTheRobots) {
   EXPECT_NEAR(score.within[1], 0.954, 0.03);
 }
 
-/// What is far off is wrong, whatever the map's error there.
+/// A pose that is far off is wrong, whatever the map's error there.
 TEST(LocaliseScore, WrongIsMeasuredAgainstTheReference) {
   const MapReference map = bent_map();
   Trajectory reference;

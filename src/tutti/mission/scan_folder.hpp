@@ -22,8 +22,8 @@ struct ScanStamps {
   std::vector<Timestamp> stamps;  ///< Stamps of the files from 000000 on; empty: those of the odometry poses.
 };
 
-/// What the times of a recording's `count` scans mean, by what `times_of` finds of one: tried are the first ones, and
-/// at doubling distances from there on up to the last, as a LiDAR that spins up, or a driver that waits for a fix,
+/// Learns what the times of a recording's `count` scans mean, by what `times_of` finds of one: tries the first ones,
+/// and at doubling distances from there on up to the last, as a LiDAR that spins up, or a driver that waits for a fix,
 /// sends empty ones for long. Fails with the first one's error where none can be used.
 Result<std::optional<lidar::PointTimes>> learn_times(
     std::size_t count, const std::function<Result<std::optional<lidar::PointTimes>>(std::size_t scan)>& times_of);

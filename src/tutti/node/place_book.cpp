@@ -50,8 +50,7 @@ MissionStatus::Place place_of(std::vector<std::tuple<std::int64_t, RobotId, cons
     out.appeared += fit->appeared;
     if (out.robots.size() < MissionStatus::Place::kMostSeers) out.robots.push_back(robot);
   }
-  const std::uint64_t cubes = out.matched + out.missing + out.appeared;
-  if (cubes > 0) out.trust = static_cast<double>(out.matched) / static_cast<double>(cubes);
+  out.trust = localise::share_that_fits(out.matched, out.missing, out.appeared);
   return out;
 }
 

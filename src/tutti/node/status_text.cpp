@@ -68,7 +68,7 @@ std::string state(const MissionStatus::Robot& robot) {
   return state;
 }
 
-/// What robots have found of the map that they localise in.
+/// Says where the map that robots localise in has changed, as they have found.
 void append_places(const MissionStatus& status, std::string& out) {
   constexpr std::size_t kMostShown = 20;
   std::vector<const MissionStatus::Place*> changed;

@@ -25,13 +25,11 @@ Json changed_places(const localise::Localiser& localiser, Timestamp now) {
   std::vector<std::pair<double, Json>> changed;
   for (const auto& [submap, fit] : localiser.map_fit().fits()) {
     if (!fit.has_changed()) continue;
-    localise::PlaceTrust place;
-    place.add(fit);
-    changed.emplace_back(place.trust(), Json{{"submap", localiser.map().names.of(submap)},
-                                             {"missing", fit.missing},
-                                             {"appeared", fit.appeared},
-                                             {"trust", place.trust()},
-                                             {"age_s", now - fit.seen}});
+    changed.emplace_back(fit.trust(), Json{{"submap", localiser.map().names.of(submap)},
+                                           {"missing", fit.missing},
+                                           {"appeared", fit.appeared},
+                                           {"trust", fit.trust()},
+                                           {"age_s", now - fit.seen}});
   }
   std::ranges::stable_sort(changed, {}, [](const auto& place) { return place.first; });
   Json out = Json::array();

@@ -73,7 +73,7 @@ Json places_json(const std::map<SubmapId, localise::PlaceTrust>& places, const l
   Json out = Json::array();
   for (const auto& [submap, place] : places)
     out.push_back({{"submap", map.names.of(submap)},
-                   {"trust", number(place.trust())},
+                   {"trust", number(place.fit.trust())},
                    {"matched", place.fit.matched},
                    {"missing", place.fit.missing},
                    {"appeared", place.fit.appeared},
@@ -90,7 +90,7 @@ std::string places_text(const std::map<SubmapId, localise::PlaceTrust>& places, 
     if (!place.fit.has_changed()) continue;
     if (++count > kMostChanges) continue;
     changed += fmt::format("{}{} ({} cubes gone, {} new, {:.1f} % fits)", count > 1 ? ", " : "", map.names.of(submap),
-                           place.fit.missing, place.fit.appeared, 100.0 * place.trust());
+                           place.fit.missing, place.fit.appeared, 100.0 * place.fit.trust());
   }
   if (count > kMostChanges) changed += fmt::format(" and {} more", count - kMostChanges);
   return wrap(fmt::format("{} of the map's {} submaps were seen, {}{}", places.size(), map.submaps.size(),
