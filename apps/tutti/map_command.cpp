@@ -4,6 +4,7 @@
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -20,10 +21,10 @@
 #include "commands.hpp"
 #include "options.hpp"
 #include "tutti/mapfile/closures.hpp"
+#include "tutti/mapfile/floors.hpp"
 #include "tutti/mapfile/merge.hpp"
 #include "tutti/mapfile/salvage.hpp"
 #include "tutti/mapfile/why.hpp"
-#include "tutti/server/map_components.hpp"
 
 namespace tutti::app {
 namespace {
@@ -121,9 +122,10 @@ void print_tables(const mapfile::Content& content) {
 
 void print_robots(const mapfile::Content& content, const server::MapEstimate& map) {
   const server::ClosureNames names = content.closure_names();
-  const server::MapComponents components = server::choose_components(map);
+  const mapfile::Floors floors = mapfile::Floors::of(content, map);
   struct Session {
     std::size_t submaps = 0, keyframes = 0;
+    std::set<std::uint32_t> floors;
     Timestamp first = kLastTimestamp, last = kFirstTimestamp;
   };
   std::map<ChainId, Session> sessions;
@@ -133,14 +135,24 @@ void print_robots(const mapfile::Content& content, const server::MapEstimate& ma
     session.first = std::min(session.first, submap->keyframes.front().stamp);
     session.last = std::max(session.last, submap->keyframes.back().stamp);
   }
-  for (const MapNode& node : map.nodes) ++sessions[node.id.chain].keyframes;
+  for (const MapNode& node : map.nodes) {
+    Session& session = sessions[node.id.chain];
+    ++session.keyframes;
+    if (const auto floor = floors.of_component(node.component)) session.floors.insert(*floor);
+  }
   fmt::print("\n{:<20} {:>10} {:>20} {:>8} {:>9} {:>8}  {}\n", "robot", "number", "session", "submaps", "keyframes",
-             "minutes", "in the joint map");
+             "minutes", "floor");
   for (const auto& [chain, session] : sessions) {
-    const auto component = components.of_chain.find(chain);
-    const bool joined = component != components.of_chain.end() && component->second == components.largest;
     fmt::print("{:<20} {:>10} {:>20} {:>8} {:>9} {:>8.1f}  {}\n", names.of(chain), chain.robot.value, chain.session,
-               session.submaps, session.keyframes, (session.last - session.first) / 60.0, joined ? "yes" : "no");
+               session.submaps, session.keyframes, (session.last - session.first) / 60.0,
+               session.floors.empty() ? "-" : fmt::format("{}", fmt::join(session.floors, ", ")));
+  }
+  for (const mapfile::Lift& lift : mapfile::lifts_of(floors, map)) {
+    const Eigen::Vector3d &from = lift.from.T_world_body.translation, &to = lift.to.T_world_body.translation;
+    fmt::print(
+        "lift         from floor {} at {:.2f}, {:.2f}, {:.2f} m ({}) to floor {} at {:.2f}, {:.2f}, {:.2f} m ({})\n",
+        lift.from.floor, from.x(), from.y(), from.z(), names.of(lift.from.chain), lift.to.floor, to.x(), to.y(), to.z(),
+        names.of(lift.to.chain));
   }
 }
 

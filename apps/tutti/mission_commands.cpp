@@ -325,6 +325,14 @@ void add_run_command(CLI::App& app, int& exit_code) {
              "S", within(0.0, 1e6))
       ->needs("--frozen")
       ->excludes("--restart-every");
+  command
+      ->add_flag(
+          "--lift", arguments->trial.lift,
+          "With --frozen: each robot with LiDAR drives half of its way, takes a lift for 20 s, which its odometry\n"
+          "does not notice, and drives the second half of the next robot's way, of the first's after the last's")
+      ->needs("--frozen")
+      ->excludes("--restart-every")
+      ->excludes("--kidnap-every");
   add_mission_options(*command, *arguments);
   command->callback([arguments, inputs, bags, topics, graph, &exit_code] {
     const auto run_text = [&](const fs::path& name, const char* option, const Result<std::string>& text) {

@@ -87,6 +87,7 @@ function robot_status(value: unknown, what: string): s.RobotStatus {
     localisation_why: f.localisation_why === undefined ? "" : words(f.localisation_why, "localisation_why"),
     map_id: f.map_id === undefined ? "" : words(f.map_id, "map_id"),
     map_version: f.map_version === undefined ? 0 : count(f.map_version, "map_version"),
+    floor: f.floor === undefined ? 1 : count(f.floor, "floor"),
   };
 }
 

@@ -54,6 +54,7 @@ export interface RobotStatus {
   localisation_why: string;
   map_id: string; // of that map
   map_version: number;
+  floor: number; // of that map
 }
 
 /** A map that does not move, as a robot names it. */

@@ -14,11 +14,12 @@ std::string map_id_of(std::string_view first_submap) { return fmt::format("{:016
 
 RobotId KnownMap::free_robot() const { return {submaps.empty() ? 0 : submaps.rbegin()->first.chain.robot.value + 1}; }
 
-std::vector<SubmapId> KnownMap::near(const Eigen::Vector3d& p_world, double radius_m, std::size_t most) const {
+std::vector<SubmapId> KnownMap::near(const OnFloor& p_world, double radius_m, std::size_t most) const {
   std::vector<std::pair<double, SubmapId>> within;
-  for (const auto& [submap, entry] : submaps)
-    if (const double distance_m = (entry.middle - p_world).norm(); distance_m <= radius_m)
-      within.emplace_back(distance_m, submap);
+  for (const auto& [submap, entry] : submaps) {
+    const double distance_m = (entry.middle - p_world.p).norm();
+    if (entry.floor == p_world.floor && distance_m <= radius_m) within.emplace_back(distance_m, submap);
+  }
   std::ranges::sort(within);
   std::vector<SubmapId> out;
   for (std::size_t k = 0; k < std::min(most, within.size()); ++k) out.push_back(within[k].second);

@@ -29,14 +29,15 @@ Result<LocalMaps::Features> LocalMaps::features_of(SubmapId id) {
   return features;
 }
 
-const LocalMap* LocalMaps::about(const Eigen::Vector3d& p_world) {
-  const bool stays = !local_.submaps.empty() && (local_.T_world_local.translation - p_world).norm() < kStays_m;
+const LocalMap* LocalMaps::about(const OnFloor& p_world) {
+  const bool stays = !local_.submaps.empty() && local_.floor == p_world.floor &&
+                     (local_.T_world_local.translation - p_world.p).norm() < kStays_m;
   if (stays) return local_.viewers.empty() ? nullptr : &local_;
   std::vector<SubmapId> submaps = map_->near(p_world, kReach_m, kMostSubmaps);
   std::ranges::sort(submaps);
   if (submaps == local_.submaps && !submaps.empty()) return local_.viewers.empty() ? nullptr : &local_;
-  const Pose3 T_world_local{Eigen::Quaterniond::Identity(), p_world};
-  local_ = {.submaps = std::move(submaps), .T_world_local = T_world_local};
+  const Pose3 T_world_local{Eigen::Quaterniond::Identity(), p_world.p};
+  local_ = {.submaps = std::move(submaps), .floor = p_world.floor, .T_world_local = T_world_local};
   std::vector<lidar::PosedOriented> parts;
   for (const SubmapId& id : local_.submaps) {
     const auto features = features_of(id);

@@ -16,7 +16,8 @@ namespace tutti::localise {
 /// The map around one place: the clouds of the nearest submaps as one.
 struct LocalMap {
   std::vector<SubmapId> submaps;  ///< By id.
-  Pose3 T_world_local;            ///< The frame of the cloud, near it, so that its coordinates are small.
+  std::uint32_t floor = 1;
+  Pose3 T_world_local;  ///< The frame of the cloud, near it, so that its coordinates are small.
   lidar::OrientedCloud cloud;
   struct Viewer {
     Pose3 T_submap_local;
@@ -32,8 +33,8 @@ class LocalMaps {
   LocalMaps(std::shared_ptr<const KnownMap> map, lidar::LidarClosureConfig config)
       : map_(std::move(map)), config_(std::move(config)) {}
 
-  /// The local map about a point; null where the map has no cloud within kReach_m.
-  const LocalMap* about(const Eigen::Vector3d& p_world);
+  /// The local map about a point; null where its floor has no cloud within kReach_m.
+  const LocalMap* about(const OnFloor& p_world);
   using Features = std::shared_ptr<const lidar::SubmapFeatures>;
   /// Those of a submap of the map, never null; computed once while they are kept. An error: its cloud cannot be read.
   Result<Features> features_of(SubmapId id);

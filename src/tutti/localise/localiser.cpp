@@ -152,13 +152,16 @@ void Localiser::try_start(const Scan& scan) {
   if (!usable) return;
   std::vector<StartFit> fits;
   for (const StartTries& level : start_->levels)
-    if (const LocalMap* local = local_maps_.about(level.T_world_body.T_a_b.translation)) {
+    if (const LocalMap* local = local_maps_.about({level.floor, level.T_world_body.T_a_b.translation})) {
       work_.registered += level.from.size();
       add_fits(*local, usable->scan, level, fits);
     }
   if (fits.size() == 1) {
-    track_ = Track{
-        .T_world_body = fits.front().prior, .at = usable->at, .confirmed = scan.stamp, .to_confirm = kConfirmations};
+    track_ = Track{.floor = fits.front().floor,
+                   .T_world_body = fits.front().prior,
+                   .at = usable->at,
+                   .confirmed = scan.stamp,
+                   .to_confirm = kConfirmations};
     fits.front().match.T_world_body.covariance *= kAlike;
     correct(fits.front().match.T_world_body);
     why_ = "the start pose fits, which more scans are to confirm";
@@ -189,6 +192,24 @@ void Localiser::search_anew(const std::string& why) {
   begin_submaps();
 }
 
+/// While it is shut in, nothing tells on which floor it is, and nothing is looked for.
+bool Localiser::is_shut_in(const Scan& scan) {
+  const auto at = pose_at(recent_, scan.stamp);
+  if (setup_.map->floors < 2 || !at) return false;
+  const bool was = shut_in_.is();
+  shut_in_.see(*scan.cloud, setup_.submap.min_range_m, {scan.stamp, *at});
+  if (shut_in_.is()) {
+    if (!was) search_anew({});
+    state_ = State::between;
+    why_ = fmt::format("it sees nothing farther than {:g} m, as in a lift", ShutIn::kReach_m);
+  } else if (was) {
+    begin_submaps();
+    state_ = State::searching;
+    why_ = "it has come out, and looks for its floor";
+  }
+  return shut_in_.is();
+}
+
 /// Moves the pose with odometry to a time after it.
 void Localiser::predict_to(const StampedPose& at) {
   const Pose3 step = track_->at.pose.inverse() * at.pose;
@@ -213,13 +234,14 @@ void Localiser::correct(const RelativePose& measured) {
 
 void Localiser::follow(const Scan& scan) {
   last_match_ = scan.stamp;
+  if (is_shut_in(scan)) return;
   if (start_ && !track_) return try_start(scan);
   if (!track_ || state_ == State::off_map) remember(scan);
   if (!track_) return;
   const auto usable = ready(scan, track_->at.stamp);
   if (!usable) return;
   predict_to(usable->at);
-  const LocalMap* local = local_maps_.about(track_->T_world_body.T_a_b.translation);
+  const LocalMap* local = local_maps_.about(position());
   if (local == nullptr) return doubt({Evidence::nothing, "the map shows nothing there"}, scan.stamp);
   ScanMatch match = match_scan(*local, usable->scan, track_->T_world_body.T_a_b);
   ++work_.registered;
@@ -233,7 +255,8 @@ void Localiser::follow(const Scan& scan) {
 
 void Localiser::confirm(const ScanMatch& match) {
   correct(match.T_world_body);
-  track_->against_since = track_->nothing_since = std::nullopt;
+  track_->against_since.reset();
+  track_->nothing_since.reset();
   track_->against = 0;
   track_->confirmed = track_->at.stamp;
   track_->overlap = match.overlap;
@@ -263,9 +286,12 @@ void Localiser::doubt(const Assessment& assessment, Timestamp stamp) {
     state_ = State::lost;
     return;
   }
-  if (!track_->nothing_since) track_->nothing_since = stamp;
-  if (stamp - *track_->nothing_since < kOffMapAfter_s) return;
+  if (!track_->nothing_since) track_->nothing_since = track_->at;
+  const StampedPose& since = *track_->nothing_since;
+  if (stamp - since.stamp < kOffMapAfter_s) return;
   if (state_ != State::off_map) begin_submaps();  // it may have been carried: what it saw before is elsewhere
+  const bool stands = (since.pose.translation - track_->at.pose.translation).norm() < ShutIn::kStands_m;
+  if (setup_.map->floors > 1 && stands && stamp - since.stamp >= ShutIn::kFor_s) search_anew(assessment.why);
   state_ = State::off_map;
   why_ = assessment.why;
 }
@@ -295,7 +321,7 @@ Result<SearchResult> Localiser::find_places(const Submap& submap) {
 
 /// Compares a submap with the map, where that may tell something.
 void Localiser::consider(const Submap& submap) {
-  if (payload_size(submap) == PayloadSize()) return;
+  if (payload_size(submap) == PayloadSize() || shut_in_.is()) return;
   if (track_ && has_scans() && state_ == State::localised) return;  // scans follow it
   auto found = find_places(submap);
   if (!found) {
@@ -341,8 +367,11 @@ void Localiser::decide(SearchResult found, const Submap& submap) {
     state_ = rivals.empty() ? State::searching : State::ambiguous;
     why_ = rivals.empty() ? "it may be in one place, and its next submap is to show the same"
                           : fmt::format("{} places fit what it saw", rivals.size() + 1);
-    if (!rivals.empty()) places_.push_back({best.submap, best.T_world_odom() * T_odom_body});
-    for (const Hypothesis& rival : rivals) places_.push_back({rival.submap, rival.T_world_odom() * T_odom_body});
+    const auto name = [&](const Hypothesis& place) {
+      places_.push_back({place.submap, place.floor, place.T_world_odom() * T_odom_body});
+    };
+    if (!rivals.empty()) name(best);
+    std::ranges::for_each(rivals, name);
   }
   pending_.assign(1, best);
   pending_.insert(pending_.end(), rivals.begin(), rivals.end());
@@ -352,7 +381,8 @@ void Localiser::decide(SearchResult found, const Submap& submap) {
 /// Goes on from a place that was found, which scans have to confirm; without scans it counts.
 void Localiser::begin_track(const Hypothesis& place) {
   const StampedPose& now = recent_.back();
-  track_ = Track{.T_world_body = carried_to(now.pose, place),
+  track_ = Track{.floor = place.floor,
+                 .T_world_body = carried_to(now.pose, place),
                  .at = now,
                  .confirmed = now.stamp,
                  .to_confirm = has_scans() ? kConfirmations : 0};
@@ -370,7 +400,7 @@ void Localiser::begin_track(const Hypothesis& place) {
 /// A robot without scans: its submaps say whether it is still where it should be.
 void Localiser::follow_submap(const SearchResult& found) {
   predict_to(recent_.back());
-  const Hypothesis here{.T_world_body = track_->T_world_body, .at = track_->at};
+  const Hypothesis here{.floor = track_->floor, .T_world_body = track_->T_world_body, .at = track_->at};
   for (const Hypothesis& place : found.places) {
     if (place.shown == Shown::no) break;
     if (!is_same_place(here, place, track_->at.pose)) {
@@ -399,6 +429,7 @@ Located Localiser::located() const {
   if (recent_.empty()) return out;
   out.stamp = recent_.back().stamp;
   if (!track_ || track_->to_confirm > 0) return out;
+  out.floor = track_->floor;
   RelativePose pose = carried_to(recent_.back().pose, {.T_world_body = track_->T_world_body, .at = track_->at});
   pose.covariance += diagonal(kMap_m, kMap_rad);
   out.age_s = out.stamp - track_->confirmed;

@@ -17,6 +17,7 @@
 #include "tutti/localise/place_proof.hpp"
 #include "tutti/localise/place_search.hpp"
 #include "tutti/localise/scan_match.hpp"
+#include "tutti/localise/shut_in.hpp"
 #include "tutti/localise/start_tries.hpp"
 #include "tutti/localise/state.hpp"
 #include "tutti/model/input.hpp"
@@ -39,6 +40,9 @@ struct LocaliserWork {
 /// there, and no other fits nearly as well. Then every scan is registered on the nearest submaps from where odometry
 /// says that the robot is; a Kalman filter of the pose weighs odometry and scans by their covariances. Scans that
 /// contradict the map for a second end that.
+///
+/// Odometry does not notice a lift. In a map with several floors a robot that is shut in is on none of them until it
+/// comes out and is found again, on whichever; so is one that stands while the map shows nothing of what it sees.
 ///
 /// For a robot with a camera alone a place counts when two submaps of the map, or two of its own, agree on it; its
 /// submaps follow it. Odometry's frame never jumps: only the pose in the
@@ -76,13 +80,15 @@ class Localiser {
 
  private:
   struct Track {
+    std::uint32_t floor = 1;        ///< In whose frame the pose is.
     RelativePose T_world_body;      ///< At `at`; right tangent, without what the map itself errs by.
     StampedPose at;                 ///< By odometry.
     Timestamp confirmed;            ///< When a scan last lay on the map.
     int to_confirm = 0;             ///< Scans that are still to confirm it before it counts.
     std::optional<double> overlap;  ///< ScanMatch::overlap of that scan.
-    std::optional<Timestamp> against_since, nothing_since;
-    std::size_t against = 0;  ///< Scans in a row.
+    std::optional<Timestamp> against_since;
+    std::optional<StampedPose> nothing_since;  ///< By odometry.
+    std::size_t against = 0;                   ///< Scans in a row.
   };
 
   Status hear(const OdometrySample& sample);
@@ -96,6 +102,7 @@ class Localiser {
   void remember(const Scan& scan);
   void begin_submaps();
   void advance();
+  bool is_shut_in(const Scan& scan);
   void follow(const Scan& scan);
   void predict_to(const StampedPose& at);
   void correct(const RelativePose& measured);
@@ -106,6 +113,7 @@ class Localiser {
   void consider(const Submap& submap);
   void decide(SearchResult found, const Submap& submap);
   void begin_track(const Hypothesis& place);
+  [[nodiscard]] OnFloor position() const { return {track_->floor, track_->T_world_body.T_a_b.translation}; }
   void follow_submap(const SearchResult& found);
   [[nodiscard]] bool has_scans() const { return last_scan_.has_value(); }
 
@@ -127,6 +135,7 @@ class Localiser {
     int scans = 0;   ///< That were tried.
   };
   std::optional<Start> start_;
+  ShutIn shut_in_;                   // in a map with several floors
   Stretch stretch_;                  // while it does not know where it is
   std::vector<Hypothesis> pending_;  // of earlier submaps, not decided
   State state_ = State::searching;

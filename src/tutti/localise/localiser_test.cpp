@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <map>
 #include <memory>
 #include <set>
 
@@ -15,7 +16,7 @@
 namespace tutti::localise {
 namespace localiser_test {
 
-using test::feed, test::make_world, test::verifier, test::World;
+using test::as_floors, test::feed, test::make_world, test::Ride, test::verifier, test::World;
 
 const World& world() {
   static const World made = make_world(3);
@@ -161,8 +162,74 @@ TEST(Localiser, TwoPlacesThatAreAlikeAreBothNamedAndNothingIsPublished) {
   EXPECT_GE(most_places, 2U);
 }
 
+const World& another_world() {
+  static const World made = make_world(77);
+  return made;
+}
+
+/// What a robot says on its way through a lift; on the other floor it is right, or says nothing.
+std::map<Ride, std::vector<Located>> ride(Localiser& one, const World& from, const World& to) {
+  std::map<Ride, std::vector<Located>> out;
+  test::ride(from, to, one, [&](Ride part, std::size_t k) {
+    const Located now = one.located();
+    out[part].push_back(now);
+    if (part != Ride::after || now.state != State::localised) return;
+    EXPECT_EQ(now.floor, 2U);
+    EXPECT_LT(local(now.T_world_body->T_a_b, to.robots[2].reference[k].pose).head<3>().norm(), 0.5);
+  });
+  return out;
+}
+
+TEST(Localiser, InALiftItIsBetweenFloorsAndOnTheOtherOneWhenItComesOut) {
+  Localiser one = localiser(as_floors(*world().map, *another_world().map));
+  const auto ridden = ride(one, world(), another_world());
+  EXPECT_EQ(ridden.at(Ride::before).back().state, State::localised);
+  EXPECT_EQ(ridden.at(Ride::before).back().floor, 1U);
+  const auto& in_lift = ridden.at(Ride::in_lift);
+  for (std::size_t k = 0; k < in_lift.size(); ++k) {  // 3 s and a scan after the doors have closed
+    if (k >= 17) {
+      EXPECT_EQ(in_lift[k].state, State::between) << in_lift[k].why;
+      EXPECT_FALSE(in_lift[k].T_world_body.has_value());
+    }
+    EXPECT_TRUE(in_lift[k].state != State::localised || in_lift[k].floor == 1);
+  }
+  const auto& after = ridden.at(Ride::after);
+  const auto found = std::ranges::find(after, State::localised, &Located::state);
+  ASSERT_NE(found, after.end()) << after.back().why;
+  EXPECT_LE(found->stamp - after.front().stamp, 25.0);
+}
+
+TEST(Localiser, FloorsThatAreAlikeAreBothNamedAndNothingIsPublished) {
+  Localiser one = localiser(as_floors(*world().map, *world().map));
+  const auto ridden = ride(one, world(), world());
+  std::set<std::uint32_t> named;
+  for (const auto& [part, all] : ridden)
+    for (const Located& located : all) {
+      EXPECT_NE(located.state, State::localised);
+      for (const PlaceFound& place : located.places) named.insert(place.floor);
+    }
+  EXPECT_EQ(named, (std::set<std::uint32_t>{1, 2}));
+}
+
+/// Somebody says on which floor it is; from then on it follows that one, and no longer when it may have left it.
+TEST(Localiser, OnAFloorThatIsLikeAnotherAStartPoseTellsWhich) {
+  Localiser one = localiser(as_floors(*world().map, *world().map));
+  const Recording& robot = world().robots[2];
+  feed(robot, robot.odometry, 0, 21, one);
+  const RelativePose here{robot.reference[20].pose, Matrix6d::Identity() * 0.01};
+  ASSERT_FALSE(one.add(StartPose{.T_world_body = here, .floor = 3}).has_value());
+  ASSERT_TRUE(one.add(StartPose{.T_world_body = here}).has_value());
+  feed(robot, robot.odometry, 21, 41, one);
+  EXPECT_NE(one.located().state, State::localised) << "on either floor";
+  ASSERT_TRUE(one.add(StartPose{.T_world_body = RelativePose{robot.reference[40].pose, here.covariance}, .floor = 2})
+                  .has_value());
+  feed(robot, robot.odometry, 41, 61, one);
+  EXPECT_EQ(one.located().state, State::localised) << one.located().why;
+  EXPECT_EQ(one.located().floor, 2U);
+}
+
 TEST(Localiser, InTheMapOfAnotherSiteNothingIsPublished) {
-  const World other = make_world(77);
+  const World& other = another_world();
   const Recording& robot = other.robots[2];
   Localiser one = localiser(world().map);
   Judged judged;

@@ -86,7 +86,7 @@ std::map<SubmapId, SubmapFit> drive(const std::shared_ptr<const KnownMap>& map, 
     for (const Pose3& pose : poses) {
       const auto scan = fit::make_fit_scan(Timestamp{} + (time_s += 0.5), look(crates, pose, rng), 0.3);
       const Pose3 error{so3_exp({0, 0, rng.normal(0.5 * kRadPerDeg)}), {rng.normal(0.03), rng.normal(0.03), 0.0}};
-      out.see(*local_maps.about(pose.translation), scan, pose * error);
+      out.see(*local_maps.about({1, pose.translation}), scan, pose * error);
     }
   return out.fits();
 }
@@ -132,14 +132,14 @@ TEST(MapFit, WhatWasSeenShortlyBeforeItIsLostDoesNotCount) {
   MapFit fit;
   for (int k = 0; k < 5; ++k) {
     const Pose3 pose = way(-5.0, 1.0)[static_cast<std::size_t>(k)];
-    fit.see(*local_maps.about(pose.translation), fit::make_fit_scan(Timestamp{} + 0.5 * k, look({}, pose, rng), 0.3),
-            pose);
+    fit.see(*local_maps.about({1, pose.translation}),
+            fit::make_fit_scan(Timestamp{} + 0.5 * k, look({}, pose, rng), 0.3), pose);
   }
   fit.doubt();
   const Pose3 pose = way(-5.0, 1.0)[8];
   for (const double time_s : {20.0, 30.0})
-    fit.see(*local_maps.about(pose.translation), fit::make_fit_scan(Timestamp{} + time_s, look({}, pose, rng), 0.3),
-            pose);
+    fit.see(*local_maps.about({1, pose.translation}),
+            fit::make_fit_scan(Timestamp{} + time_s, look({}, pose, rng), 0.3), pose);
   EXPECT_EQ(fit.fits().at(kBefore).scans, 1U);
 }
 
@@ -150,8 +150,8 @@ TEST(MapFit, ScansFromOneSpotAreOne) {
   MapFit fit;
   const Pose3 pose = way(-5.0, 1.0)[3];
   for (int k = 0; k <= 52; ++k)
-    fit.see(*local_maps.about(pose.translation), fit::make_fit_scan(Timestamp{} + 0.4 * k, look({}, pose, rng), 0.3),
-            pose);
+    fit.see(*local_maps.about({1, pose.translation}),
+            fit::make_fit_scan(Timestamp{} + 0.4 * k, look({}, pose, rng), 0.3), pose);
   EXPECT_EQ(fit.fits().at(kBefore).scans, 4U);
 }
 

@@ -59,7 +59,7 @@ std::optional<Hypothesis> proven(LocalMaps& maps, std::span<const ReadyScan> sca
   double quality = 0.0, overlap = 0.0, contradiction = 0.0;
   for (const ReadyScan& seen : scans) {
     const Pose3 T_world_body = out.T_world_odom() * seen.at.pose;
-    const LocalMap* local = maps.about(T_world_body.translation);
+    const LocalMap* local = maps.about({out.floor, T_world_body.translation});
     if (local == nullptr) return std::nullopt;
     ScanMatch match = match_scan(*local, seen.scan, T_world_body);
     ++registered;

@@ -44,6 +44,7 @@ std::optional<Hypothesis> hypothesis_of(const KnownMap::Entry& entry, const Subm
   if (from == nullptr || to == nullptr) return std::nullopt;
   const Pose3 T_submap_from = entry.submap->keyframes.front().T_odom_body.inverse() * from->T_odom_body;
   return Hypothesis{.submap = entry.submap->id,
+                    .floor = entry.floor,
                     .T_world_body = {entry.T_world_submap * T_submap_from * closure.measurement.T_a_b,
                                      closure.measurement.covariance},
                     .at = {to->stamp, to->T_odom_body}};
@@ -68,7 +69,8 @@ void add(Hypothesis one, std::vector<Hypothesis>& places) {
 
 bool is_same_place(const Hypothesis& a, const Hypothesis& b, const Pose3& T_odom_body) {
   const Pose3 difference = (a.T_world_odom() * T_odom_body).inverse() * (b.T_world_odom() * T_odom_body);
-  return difference.translation.norm() < kSamePlace_m && rotation_angle(difference) < kSamePlace_deg * kRadPerDeg;
+  return a.floor == b.floor && difference.translation.norm() < kSamePlace_m &&
+         rotation_angle(difference) < kSamePlace_deg * kRadPerDeg;
 }
 
 std::vector<Hypothesis> SearchResult::rivals() const {
@@ -102,9 +104,11 @@ std::vector<SubmapId> most_alike(const KnownMap& map, const server::ClosureVerif
   std::vector<SubmapId> out;
   for (const SubmapId& id : order) {
     if (out.size() >= candidates) break;
-    const Eigen::Vector3d& middle = map.submaps.at(id).middle;
-    const auto of_spot = std::ranges::count_if(
-        out, [&](const SubmapId& other) { return (map.submaps.at(other).middle - middle).norm() < kSpot_m; });
+    const KnownMap::Entry& entry = map.submaps.at(id);
+    const auto of_spot = std::ranges::count_if(out, [&](const SubmapId& other) {
+      const KnownMap::Entry& chosen = map.submaps.at(other);
+      return chosen.floor == entry.floor && (chosen.middle - entry.middle).norm() < kSpot_m;
+    });
     if (std::ranges::find(out, id) == out.end() && of_spot < static_cast<std::ptrdiff_t>(kMostOfOneSpot))
       out.push_back(id);
   }
@@ -121,11 +125,12 @@ Result<SearchResult> rough_places(const KnownMap& map, LocalMaps& maps, const Su
     const auto features = maps.features_of(id);
     if (!features) return tl::unexpected(features.error());
     ++out.compared;
-    const Pose3& T_world_submap = map.submaps.at(id).T_world_submap;
+    const KnownMap::Entry& entry = map.submaps.at(id);
     const auto rough = lidar::rough_alignments(**features, seen, maps.config());
     if (rough.empty()) continue;
     add({.submap = id,
-         .T_world_body = {T_world_submap * rough.front().T_a_b * T_own_middle, Matrix6d::Identity()},
+         .floor = entry.floor,
+         .T_world_body = {entry.T_world_submap * rough.front().T_a_b * T_own_middle, Matrix6d::Identity()},
          .at = {middle.stamp, middle.T_odom_body},
          .quality = rough.front().quality},
         out.places);

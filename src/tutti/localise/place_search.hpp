@@ -24,16 +24,21 @@ enum class Shown {
 /// A place of the map that what a robot saw fits.
 struct Hypothesis {
   SubmapId submap;            ///< The map's submap that fits best there.
+  std::uint32_t floor = 1;    ///< Its.
   RelativePose T_world_body;  ///< At `at`; right tangent.
   StampedPose at;             ///< By odometry: T_odom_body.
   double quality = 0.0;       ///< How well it fits, in [0, 1].
   std::size_t accepted = 0;   ///< Submaps of the map that the verifier accepts there; two show it surely.
   Shown shown = Shown::no;
   [[nodiscard]] Pose3 T_world_odom() const { return T_world_body.T_a_b * at.pose.inverse(); }
+  /// Where the robot is there when odometry has it at `T_odom_body`.
+  [[nodiscard]] OnFloor position(const Pose3& T_odom_body) const {
+    return {floor, (T_world_odom() * T_odom_body).translation};
+  }
 };
 
-/// Two hypotheses of one robot are one place when they have it within kSamePlace_m and kSamePlace_deg of each other
-/// where it was at `T_odom_body`.
+/// Two hypotheses of one robot are one place when they have it on one floor, within kSamePlace_m and kSamePlace_deg of
+/// each other where it was at `T_odom_body`.
 bool is_same_place(const Hypothesis& a, const Hypothesis& b, const Pose3& T_odom_body);
 inline constexpr double kSamePlace_m = 2.0, kSamePlace_deg = 12.0;
 /// Another place that fits this share of the best one's quality is a rival.

@@ -64,7 +64,7 @@ TEST(PlaceSearch, ACloudThatCannotBeReadIsSaid) {
   LocalMaps maps(map, {});
   const Submap own = submaps_of(world.robots[2], *map).front();
   EXPECT_FALSE(rough_places(*map, maps, own, std::vector<SubmapId>(1, map->submaps.begin()->first)).has_value());
-  EXPECT_EQ(maps.about(map->submaps.begin()->second.middle), nullptr);
+  EXPECT_EQ(maps.about({1, map->submaps.begin()->second.middle}), nullptr);
 }
 
 }  // namespace place_search_test

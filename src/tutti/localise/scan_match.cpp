@@ -111,10 +111,11 @@ bool is_one(const RelativePose& a, const RelativePose& b) {
 
 void add_fits(const LocalMap& map, const fit::FitScan& scan, const StartTries& tries, std::vector<StartFit>& fits) {
   for (const Pose3& from : tries.from) {
-    StartFit fit{tries.T_world_body, match_scan(map, scan, from)};
+    StartFit fit{tries.floor, tries.T_world_body, match_scan(map, scan, from)};
     if (assess_guess(fit.match, fit.prior).evidence != Evidence::confirms) continue;
-    const auto same = std::ranges::find_if(
-        fits, [&](const StartFit& other) { return is_one(other.match.T_world_body, fit.match.T_world_body); });
+    const auto same = std::ranges::find_if(fits, [&](const StartFit& other) {
+      return other.floor == fit.floor && is_one(other.match.T_world_body, fit.match.T_world_body);
+    });
     if (same == fits.end())
       fits.push_back(std::move(fit));
     else if (fit.quality() > same->quality())

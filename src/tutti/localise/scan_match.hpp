@@ -54,6 +54,7 @@ Assessment assess_guess(const ScanMatch& match, const RelativePose& predicted);
 
 /// A place that a scan fits, of those that a start pose stands for.
 struct StartFit {
+  std::uint32_t floor = 1;
   RelativePose prior;  ///< StartTries::T_world_body
   ScanMatch match;
   [[nodiscard]] double quality() const { return match.quality(); }

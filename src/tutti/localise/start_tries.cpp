@@ -30,23 +30,35 @@ int steps_to(double sigma, double step) {
   return std::max(0, static_cast<int>(std::ceil((kReach_sigma * sigma - step / 2.0) / step)));
 }
 
-/// The pose of the map's nearest keyframe in the plane, on each level; the nearest first.
-std::vector<Pose3> nearest_on_levels(const KnownMap& map, const Eigen::Vector2d& at) {
-  std::vector<std::pair<double, Pose3>> near;
+/// A level of a floor, and the pose of the nearest keyframe there, in the plane.
+struct Level {
+  std::uint32_t floor = 1;
+  Pose3 T_world_body;
+  double away_m = 0.0;
+};
+
+/// The nearest first, of one floor or all; where the start pose has a height, that floor's nearest alone.
+std::vector<Level> nearest_on_levels(const KnownMap& map, const StartPose& start) {
+  const Eigen::Vector2d at = start.T_world_body->T_a_b.translation.head<2>();
+  std::vector<Level> near;
   for (const auto& [id, entry] : map.submaps) {
+    if (start.floor && entry.floor != *start.floor) continue;
     const Pose3 T_world_odom = entry.T_world_odom();
     for (const Keyframe& keyframe : entry.submap->keyframes) {
       const Pose3 pose = T_world_odom * keyframe.T_odom_body;
       const double away_m = (pose.translation.head<2>() - at).norm();
-      if (away_m < kNearStart_m) near.emplace_back(away_m, pose);
+      if (away_m < kNearStart_m) near.push_back({entry.floor, pose, away_m});
     }
   }
-  std::ranges::stable_sort(near, [](const auto& a, const auto& b) { return a.first < b.first; });
-  std::vector<Pose3> out;
-  for (const auto& [away_m, pose] : near)
-    if (std::ranges::none_of(
-            out, [&](const Pose3& level) { return std::abs(level.translation.z() - pose.translation.z()) < kLevel_m; }))
-      out.push_back(pose);
+  std::ranges::stable_sort(near, {}, &Level::away_m);
+  std::vector<Level> out;
+  for (const Level& one : near) {
+    const auto is_same = [&](const Level& other) {
+      const double height_m = other.T_world_body.translation.z() - one.T_world_body.translation.z();
+      return other.floor == one.floor && (!start.is_planar || std::abs(height_m) < kLevel_m);
+    };
+    if (std::ranges::none_of(out, is_same)) out.push_back(one);
+  }
   return out;
 }
 
@@ -97,7 +109,9 @@ Result<std::vector<StartTries>> tries_of(const KnownMap& map, const StartPose& s
                 "a start pose with a standard deviation of {:.1f} m, expected {} m at most: without one the whole map "
                 "is searched",
                 sigma_m, kMostStartSigma_m);
-  std::vector<Pose3> levels = nearest_on_levels(map, at.head<2>());
+  if (start.floor && (*start.floor < 1 || *start.floor > map.floors))
+    return fail(ErrorCode::invalid, "a start pose on floor {}, expected 1 to {}", *start.floor, map.floors);
+  const std::vector<Level> levels = nearest_on_levels(map, start);
   if (levels.empty())
     return fail(ErrorCode::invalid,
                 "a start pose at {:.1f}, {:.1f} m, expected one within {} m of where the map's "
@@ -107,9 +121,10 @@ Result<std::vector<StartTries>> tries_of(const KnownMap& map, const StartPose& s
   least << Eigen::Vector3d::Constant(kLeastStart_m * kLeastStart_m),
       Eigen::Vector3d::Constant(kLeastStart_rad * kLeastStart_rad);
   std::vector<StartTries> out;
-  if (!start.is_planar) levels.resize(1);
-  for (const Pose3& level : levels) {
-    StartTries tries{.T_world_body = start.is_planar ? on_level(given, level) : given, .from = {}};
+  for (const Level& level : levels) {
+    StartTries tries{.floor = level.floor,
+                     .T_world_body = start.is_planar ? on_level(given, level.T_world_body) : given,
+                     .from = {}};
     tries.T_world_body.covariance += least.asDiagonal();
     tries.from = around(tries.T_world_body);
     out.push_back(std::move(tries));

@@ -21,15 +21,18 @@ enum class State : std::uint8_t {
   off_map,    ///< It has left what the map shows; odometry goes on from its last place.
   lost,       ///< What it sees contradicts where it was; it searches again.
   stale,      ///< Its sensors have shown nothing for some time.
+  between,    ///< It is shut in, in a map with several floors: it may be in a lift.
 };
 [[nodiscard]] constexpr std::string_view to_string(State state) {
-  constexpr std::string_view kWords[] = {"searching", "ambiguous", "localised", "off the map", "lost", "stale"};
+  constexpr std::string_view kWords[] = {"searching", "ambiguous", "localised",     "off the map",
+                                         "lost",      "stale",     "between floors"};
   return kWords[static_cast<std::size_t>(state)];
 }
 
 /// A place of the map, by the submap that shows it.
 struct PlaceFound {
   SubmapId submap;
+  std::uint32_t floor = 1;
   Pose3 T_world_body;
 };
 
@@ -37,7 +40,8 @@ struct PlaceFound {
 struct Located {
   Timestamp stamp;  ///< The pose's, by the robot's clock.
   State state = State::searching;
-  std::string why;  ///< What has led to the state, as a sentence's end.
+  std::string why;          ///< What has led to the state, as a sentence's end.
+  std::uint32_t floor = 1;  ///< KnownMap::Entry::floor of where T_world_body is.
   /// In the map's frame; nothing unless the state is localised, off_map or stale. Only when it is localised does the
   /// map show that the robot is there.
   std::optional<RelativePose> T_world_body;

@@ -48,22 +48,25 @@ Result<OpenedMap> open_known_map(const std::filesystem::path& file) {
   if (!places) return in_context(file.string(), places.error());
   OpenedMap out{.known = {}, .content = std::move(*content), .estimate = {}};
   out.estimate = estimate(out.content);
-  out.component = component_to_show(out.content, out.estimate);
+  out.floors = Floors::of(out.content, out.estimate);
   auto known = std::make_shared<localise::KnownMap>();
   const auto map_id = id_of(out.content, **store);
   if (!map_id) return in_context(file.string(), map_id.error());
   known->id = *map_id;
   known->revision = out.content.meta.revision;
   known->names = out.content.closure_names();
+  known->floors = out.floors.count();
   for (const auto& [id, submap] : out.content.submaps) {
     const auto size = out.content.payload_sizes.find(id);
     if (size == out.content.payload_sizes.end()) continue;
     const auto where = place(*submap, out.estimate);
-    if (!where || where->component != out.component) {
+    const auto floor = where ? out.floors.of_component(where->component) : std::nullopt;
+    if (!floor) {
       ++out.left_out;
       continue;
     }
-    localise::KnownMap::Entry entry{.submap = submap, .T_world_submap = where->T_world_submap, .size = size->second};
+    localise::KnownMap::Entry entry{
+        .submap = submap, .T_world_submap = where->T_world_submap, .size = size->second, .floor = *floor};
     entry.middle = where->T_world_submap * lidar::find_middle(*submap).T_submap_keyframe.translation;
     if (const auto looks = places->find(id); looks != places->end()) entry.place = looks->second.looks;
     known->submaps.emplace(id, std::move(entry));

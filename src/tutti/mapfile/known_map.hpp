@@ -7,6 +7,7 @@
 #include "tutti/base/result.hpp"
 #include "tutti/localise/known_map.hpp"
 #include "tutti/mapfile/content.hpp"
+#include "tutti/mapfile/floors.hpp"
 
 namespace tutti::mapfile {
 
@@ -15,11 +16,11 @@ struct OpenedMap {
   std::shared_ptr<const localise::KnownMap> known;
   Content content;
   server::MapEstimate estimate;
-  std::uint32_t component = 0;  ///< Which one `known` is of: component_to_show().
-  std::size_t left_out = 0;     ///< Submaps of other components, whose places in it are unknown.
+  Floors floors;             ///< As `known` has them.
+  std::size_t left_out = 0;  ///< Submaps that are on none.
 };
 
-/// Reads a copy of a map's file (open_copy()): its largest component, with poses as a server has them. Clouds and
+/// Reads a copy of a map's file (open_copy()): its floors, with poses as a server has them. Clouds and
 /// images stay in the file and are read when they are needed. Errors: as read(), and that the map has no submap with a
 /// cloud or images.
 Result<OpenedMap> open_known_map(const std::filesystem::path& file);

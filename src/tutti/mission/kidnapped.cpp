@@ -6,6 +6,8 @@
 #include <optional>
 #include <utility>
 
+#include "tutti/mission/chosen_scans.hpp"
+
 namespace tutti::mission {
 namespace {
 
@@ -25,26 +27,6 @@ std::optional<Timestamp> closed_up(Timestamp stamp, const std::vector<Gap>& gaps
   }
   return stamp - before_s;
 }
-
-class RestOfScans final : public ScanSource {
- public:
-  struct Which {
-    std::size_t sample = 0;  ///< Its number in the whole source.
-    Timestamp stamp;         ///< In the rest.
-  };
-  RestOfScans(std::shared_ptr<const ScanSource> whole, std::vector<Which> rest)
-      : whole_(std::move(whole)), rest_(std::move(rest)) {}
-  [[nodiscard]] Result<std::optional<Scan>> scan(std::size_t sample) const override {
-    if (sample >= rest_.size()) return std::optional<Scan>();
-    auto scan = whole_->scan(rest_[sample].sample);
-    if (scan && *scan) (*scan)->stamp = rest_[sample].stamp;
-    return scan;
-  }
-
- private:
-  std::shared_ptr<const ScanSource> whole_;
-  std::vector<Which> rest_;
-};
 
 std::vector<Gap> find_gaps(const Trajectory& odometry, double every_s) {
   std::vector<Gap> out;
@@ -99,11 +81,10 @@ Result<KidnappedRecording> kidnapped(const Recording& recording, double every_s)
   for (const Gap& gap : gaps) out.at.push_back(*closed_up(gap.from, gaps, step_s));
   for (const StampedPose& pose : recording.reference)
     if (const auto stamp = closed_up(pose.stamp, gaps, step_s)) out.recording.reference.push_back({*stamp, pose.pose});
-  std::vector<RestOfScans::Which> rest;
+  std::vector<ChosenScans::Which> rest;
   for (std::size_t k = 0; const auto stamp = stamp_at(recording, recording.scan_stamps, k); ++k)
-    if (const auto at = closed_up(*stamp, gaps, step_s)) rest.push_back({k, *at});
-  for (const auto& [sample, stamp] : rest) out.recording.scan_stamps.push_back(stamp);
-  out.recording.scans = std::make_shared<const RestOfScans>(recording.scans, std::move(rest));
+    if (const auto at = closed_up(*stamp, gaps, step_s)) rest.push_back({recording.scans, k, *at});
+  set_scans(std::move(rest), out.recording);
   return out;
 }
 

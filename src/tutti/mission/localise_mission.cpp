@@ -8,6 +8,7 @@
 
 #include "tutti/evaluation/association.hpp"
 #include "tutti/mission/kidnapped.hpp"
+#include "tutti/mission/lift_ride.hpp"
 #include "tutti/mission/load_meter.hpp"
 #include "tutti/mission/robot_actor.hpp"
 
@@ -16,12 +17,14 @@ namespace {
 
 constexpr double kCourse_s = 0.1;
 
-/// The poses of a robot in the map, of all its sessions.
-Trajectory poses_in(const mapfile::OpenedMap& map, const std::string& robot) {
+/// The poses of a robot on a floor of the map, or on all, of all its sessions.
+Trajectory poses_in(const mapfile::OpenedMap& map, const std::string& robot,
+                    std::optional<std::uint32_t> floor = std::nullopt) {
   Trajectory out;
   for (const MapNode& node : map.estimate.nodes) {
     const auto name = map.content.names.find(node.id.chain.robot);
-    if (node.component == map.component && name != map.content.names.end() && name->second == robot)
+    const auto on = map.floors.of_component(node.component);
+    if (on && (!floor || on == floor) && name != map.content.names.end() && name->second == robot)
       out.push_back({node.stamp, node.T_world_body});
   }
   std::ranges::sort(out, {}, &StampedPose::stamp);
@@ -34,32 +37,35 @@ bool overlaps(const Trajectory& a, const Trajectory& b) {
   return !a.empty() && !b.empty() && a.front().stamp <= b.back().stamp && b.front().stamp <= a.back().stamp;
 }
 
-/// By the robots that made the map; nothing when none of them has a reference.
-std::optional<MapReference> reference_of(const mapfile::OpenedMap& map, const MissionInput& input,
+/// A floor's, by the robots that made the map there; nothing when none of them has a reference.
+std::optional<MapReference> reference_of(const mapfile::OpenedMap& map, std::uint32_t floor, const MissionInput& input,
                                          const evaluation::AssociationConfig& association) {
   std::vector<evaluation::PosePair> pairs;
   for (const MissionRecording& robot : input.robots) {
-    const Trajectory poses = poses_in(map, robot.recording.name);
+    const Trajectory poses = poses_in(map, robot.recording.name, floor);
     if (!overlaps(poses, robot.recording.reference)) continue;
     std::ranges::move(evaluation::associate(poses, robot.recording.reference, association), std::back_inserter(pairs));
   }
   return lay_on_map(pairs);
 }
 
-void measure_starts(const localise::KnownMap& map, const Trajectory& reference, const Pose3& T_world_reference,
-                    LocalisedRobot& robot) {
-  std::vector<Eigen::Vector3d> seen_from;
-  for (const auto& [id, entry] : map.submaps)
+void measure_starts(const localise::KnownMap& map, const Trajectory& reference,
+                    const std::vector<std::optional<MapReference>>& floors, LocalisedRobot& robot) {
+  std::vector<Eigen::Vector3d> seen_from;  // in the reference's frame, in which floors can be compared
+  for (const auto& [id, entry] : map.submaps) {
+    const auto& floor = floors.at(entry.floor - 1);
+    if (!floor) continue;
     for (const Keyframe& keyframe : entry.submap->keyframes)
-      seen_from.push_back(entry.T_world_odom() * keyframe.T_odom_body.translation);
+      seen_from.push_back(floor->T_world_reference.inverse() *
+                          (entry.T_world_odom() * keyframe.T_odom_body.translation));
+  }
   const Timestamp begin = robot.course.empty() ? reference.front().stamp : robot.course.front().stamp;
   for (LocalisedRobot::Start& start : robot.starts)
     for (const StampedPose& pose : reference) {
       const double since_s = pose.stamp - begin - start.at_s;
       if (since_s < 0.0 || since_s > LocalisedRobot::kOneSubmap_s) continue;
-      const Eigen::Vector3d p_world = T_world_reference * pose.pose.translation;
       double nearest_m = std::numeric_limits<double>::infinity();
-      for (const Eigen::Vector3d& p : seen_from) nearest_m = std::min(nearest_m, (p - p_world).norm());
+      for (const Eigen::Vector3d& p : seen_from) nearest_m = std::min(nearest_m, (p - pose.pose.translation).norm());
       start.from_map_m = std::max(start.from_map_m.value_or(0.0), nearest_m);
     }
 }
@@ -82,6 +88,13 @@ std::vector<localise::Located> measure_kidnaps(const std::vector<Timestamp>& at,
     rest.erase(after, said);
   }
   return rest;
+}
+
+/// That of the robot after this one; of the first after the last.
+const Recording& next_of(const Recording& recording, const std::vector<const MissionRecording*>& robots) {
+  const auto at = std::ranges::find_if(
+      robots, [&](const MissionRecording* robot) { return robot->recording.robot == recording.robot; });
+  return (at + 1 == robots.end() ? robots.front() : *(at + 1))->recording;
 }
 
 /// Replays one recording alone.
@@ -159,14 +172,22 @@ Result<std::vector<LocalisedRobot>> localise_mission(
     const MissionConfig& config, const MissionInput& input, const mapfile::OpenedMap& map,
     const std::function<std::shared_ptr<const server::ClosureVerifier>()>& make_verifier, const LocaliseTrial& trial,
     const std::function<bool(const std::string&, double share)>& stop) {
-  const auto reference = reference_of(map, input, config.association);
+  std::vector<std::optional<MapReference>> floors;
+  for (std::uint32_t floor = 1; floor <= map.known->floors; ++floor)
+    floors.push_back(reference_of(map, floor, input, config.association));
+  const bool has_reference = std::ranges::any_of(floors, [](const auto& floor) { return floor.has_value(); });
+  std::vector<const MissionRecording*> driving;
+  for (const MissionRecording& robot : input.robots) {
+    const Trajectory& odometry = robot.recording.odometry;
+    if (!odometry.empty() && !overlaps(poses_in(map, robot.recording.name), odometry)) driving.push_back(&robot);
+  }
   std::vector<LocalisedRobot> out;
-  for (MissionRecording robot : input.robots) {
+  for (const MissionRecording* const drives : driving) {
+    MissionRecording robot = *drives;
     Recording& recording = robot.recording;
-    if (recording.odometry.empty() || overlaps(poses_in(map, recording.name), recording.odometry)) continue;
     std::vector<Timestamp> kidnapped_at;
-    if (trial.kidnap_s > 0.0) {
-      auto made = kidnapped(recording, trial.kidnap_s);
+    if (trial.kidnap_s > 0.0 || trial.lift) {
+      auto made = trial.lift ? ride_lift(recording, next_of(recording, driving)) : kidnapped(recording, trial.kidnap_s);
       if (!made) return tl::unexpected(made.error());
       recording = std::move(made->recording);
       kidnapped_at = std::move(made->at);
@@ -174,9 +195,9 @@ Result<std::vector<LocalisedRobot>> localise_mission(
     auto setup = localise_setup(config, with_sensors(config.agent, recording).submap, map.known, make_verifier);
     out.push_back(replay(robot, config, std::move(setup), trial.restart_s, stop));
     const auto course = measure_kidnaps(kidnapped_at, out.back());
-    if (!reference || recording.reference.empty()) continue;
-    out.back().score = score_of(course, recording.reference, *reference, config.association);
-    measure_starts(*map.known, recording.reference, reference->T_world_reference, out.back());
+    if (!has_reference || recording.reference.empty()) continue;
+    out.back().score = score_of(course, recording.reference, floors, config.association);
+    measure_starts(*map.known, recording.reference, floors, out.back());
   }
   if (out.empty())
     return fail(ErrorCode::invalid, "every robot of the mission has made this map, expected one to be localised in it");

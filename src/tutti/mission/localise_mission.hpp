@@ -63,6 +63,7 @@ std::shared_ptr<const localise::Localiser::Setup> localise_setup(
 struct LocaliseTrial {
   double restart_s = 0.0;  ///< So often they forget where they are.
   double kidnap_s = 0.0;   ///< So often they are carried elsewhere (kidnapped.hpp).
+  bool lift = false;       ///< Each takes a lift to where the next one drives (lift_ride.hpp).
 };
 
 /// Replays every robot of the mission that did not make the map alone, without a server. `stop` is asked between

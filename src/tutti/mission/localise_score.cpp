@@ -30,11 +30,12 @@ std::optional<MapReference> lay_on_map(const std::vector<evaluation::PosePair>& 
 }
 
 LocaliseScore score_of(const std::vector<localise::Located>& course, const Trajectory& reference,
-                       const MapReference& map, const evaluation::AssociationConfig& association) {
+                       const std::vector<std::optional<MapReference>>& floors,
+                       const evaluation::AssociationConfig& association) {
   Trajectory published;
   std::vector<const localise::Located*> of;
   for (const auto& located : course)
-    if (located.state == localise::State::localised && located.T_world_body) {
+    if (located.state == localise::State::localised && located.T_world_body && floors.at(located.floor - 1)) {
       published.push_back({located.stamp, located.T_world_body->T_a_b});
       of.push_back(&located);
     }
@@ -43,7 +44,9 @@ LocaliseScore score_of(const std::vector<localise::Located>& course, const Traje
   std::vector<double> degrees;
   for (const auto& pair : evaluation::associate(published, reference, association)) {
     const auto at = std::ranges::lower_bound(published, pair.stamp, {}, &StampedPose::stamp) - published.begin();
-    const Matrix6d& covariance = of[static_cast<std::size_t>(at)]->T_world_body->covariance;
+    const localise::Located& located = *of[static_cast<std::size_t>(at)];
+    const Matrix6d& covariance = located.T_world_body->covariance;
+    const MapReference& map = *floors[located.floor - 1];
     const Pose3 truth = map.T_world_reference * pair.reference;
     const Vector6d error = local(pair.estimate, truth);
     const Eigen::Vector3d& map_error = map.error_near(truth.translation);

@@ -36,7 +36,9 @@ struct LocaliseScore {
   double in_map_rmse_m = 0.0;  ///< Without these: how far off the robot is from what the map shows about it.
   double within[3] = {};       ///< Share of the latter along x, y and z within 1, 2 and 3 standard deviations.
 };
+/// `floors` has the reference of each floor of the map; poses on one that has none are not scored.
 LocaliseScore score_of(const std::vector<localise::Located>& course, const Trajectory& reference,
-                       const MapReference& map, const evaluation::AssociationConfig& association);
+                       const std::vector<std::optional<MapReference>>& floors,
+                       const evaluation::AssociationConfig& association);
 
 }  // namespace tutti::mission

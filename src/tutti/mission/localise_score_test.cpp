@@ -50,7 +50,7 @@ TEST(LocaliseScore, TheMapsOwnErrorIsNotTheRobots) {
                                         Matrix6d::Identity() * kSigma_m * kSigma_m};
     course.push_back(std::move(located));
   }
-  const LocaliseScore score = score_of(course, reference, map, {});
+  const LocaliseScore score = score_of(course, reference, {map}, {});
   EXPECT_EQ(score.scored, 1001U);
   EXPECT_EQ(score.wrong, 0U);
   EXPECT_NEAR(score.in_map_rmse_m, std::sqrt(3.0) * kSigma_m, 0.003);
@@ -74,7 +74,7 @@ TEST(LocaliseScore, WrongIsMeasuredAgainstTheReference) {
     located.state = k == 0 ? localise::State::lost : localise::State::localised;
     located.T_world_body = RelativePose{pose, Matrix6d::Identity()};
   }
-  const LocaliseScore score = score_of(course, reference, map, {});
+  const LocaliseScore score = score_of(course, reference, {map}, {});
   EXPECT_EQ(score.scored, 9U);
   EXPECT_EQ(score.wrong, 3U);
   EXPECT_FALSE(lay_on_map({}).has_value());

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <optional>
 
 #include "tutti/base/result.hpp"
@@ -16,6 +17,8 @@ struct StartPose {
   /// Only x, y and heading are meant, as where somebody has clicked on a plan; the rest is as the map's robots stood
   /// there. Then the covariance's other rows are not read.
   bool is_planar = false;
+  /// The floor of the map in whose frame the pose is; nothing: it may be any of them.
+  std::optional<std::uint32_t> floor;
 };
 
 /// Fails, saying which number is wrong, when pose or covariance are not finite or the covariance is none.

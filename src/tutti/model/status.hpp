@@ -56,7 +56,8 @@ struct InMap {
   std::uint64_t version = 0;  ///< The map's.
   std::string state;          ///< localise::to_string() of its state.
   std::string why;            ///< What has led to it, for people.
-  Pose3 T_world_body;         ///< In the map's frame; the identity without `age_s`.
+  std::uint32_t floor = 1;    ///< The floor of the map that it is on, which has a frame of its own.
+  Pose3 T_world_body;         ///< In that frame; the identity without `age_s`.
   /// Standard deviations of its position (all three directions together) and of its heading.
   std::optional<double> sigma_m, sigma_deg;
   std::optional<double> age_s;     ///< Since the map last showed that it is there; nothing: it has no place.
@@ -75,6 +76,7 @@ struct InMap {
     v.field(8, "place_age_s", age_s, {.low = 0.0});
     v.field(9, "place_overlap", overlap, {.low = 0.0, .high = 1.0});
     v.field(10, "map_fit", fits, {.at_most = kMostFits});
+    v.field(11, "floor", floor, {.low = 1.0});
   }
   friend bool operator==(const InMap&, const InMap&) = default;
 };

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "tutti/consistency/chain_uncertainty.hpp"
@@ -28,13 +29,16 @@ PoseSigma typical_sigma(const auto& places) {
 
 std::optional<StartPose> start_at(const StoredPlace& place, const localise::KnownMap& map) {
   constexpr double kSigma_m = 0.5, kSigma_rad = 10.0 * kRadPerDeg;
-  if (place.map != map.id) return std::nullopt;
+  const auto near = map.submaps.find(place.near);
+  if (place.map != map.id || near == map.submaps.end()) return std::nullopt;
   Vector6d variances;
   variances << Eigen::Vector3d::Constant(kSigma_m * kSigma_m), Eigen::Vector3d::Constant(kSigma_rad * kSigma_rad);
-  return StartPose{RelativePose{place.T_world_body, variances.asDiagonal()}};
+  return StartPose{.T_world_body = RelativePose{place.T_world_body, variances.asDiagonal()},
+                   .floor = near->second.floor};
 }
 
-void PlaceRecord::note(const robot::RobotAgent& agent, const localise::Located& located) {
+void PlaceRecord::note(const robot::RobotAgent& agent, const localise::Located& located,
+                       const localise::KnownMap& map) {
   constexpr double kRecent_s = 5.0;  // a keyframe may be made this long after its time
   if (located.state == localise::State::lost)
     std::erase_if(places_, [&](const Place& place) { return located.stamp - place.stamp < kDoubted_s; });
@@ -48,7 +52,9 @@ void PlaceRecord::note(const robot::RobotAgent& agent, const localise::Located& 
     if (!is_usable) continue;
     const Pose3 step = agent.T_odom_body().inverse() * keyframe.T_odom_body;
     const RelativePose& now = *located.T_world_body;
-    unstored_ = now.T_a_b;
+    const auto near = map.near({located.floor, now.T_a_b.translation}, std::numeric_limits<double>::infinity(), 1);
+    if (!near.empty()) unstored_ = StoredPlace{map.id, now.T_a_b, near.front()};
+    floor_ = located.floor;
     places_.push_back(
         {keyframe.stamp, {now.T_a_b * step, compound_covariance(step, now.covariance, Matrix6d::Zero())}});
   }
@@ -70,7 +76,8 @@ std::optional<ProxyGraphMessage> PlaceRecord::graph_if_due(const robot::RobotAge
   }
   const auto [epoch, revision] = agent.map_age();
   ProxyGraphMessage out{
-      .header = {}, .graph = consistency::build_proxy_graph(revision + 1, std::move(nodes), {{agent.chain(), 0}}, {})};
+      .header = {},
+      .graph = consistency::build_proxy_graph(revision + 1, std::move(nodes), {{agent.chain(), floor_ - 1}}, {})};
   out.graph.epoch = epoch;
   out.graph.uncertainties = {consistency::even_uncertainty(agent.chain(), places_.size(), typical_sigma(places_))};
   return out;

@@ -244,8 +244,8 @@ void RobotNode::write_journal(Step& step) {
   for (std::string& entry : unwritten_)
     step.writes.push_back({kJournal, storage::key_of({journal_++}), std::move(entry)});
   unwritten_.clear();
-  if (const auto T_world_body = places_.take_unstored(); T_world_body && config_.keeps_state)
-    step.writes.push_back({kMeta, kPlace, wire::field_bytes(StoredPlace{localiser_->map().id, *T_world_body})});
+  if (const auto place = places_.take_unstored(); place && config_.keeps_state)
+    step.writes.push_back({kMeta, kPlace, wire::field_bytes(*place)});
 }
 
 std::optional<Timestamp> RobotNode::next_timer() const {

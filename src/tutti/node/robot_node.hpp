@@ -129,6 +129,7 @@ class RobotNode {
   void hear(const StartPose& start, Timestamp now, Step& step);
   void tell_place(Timestamp now, Step& step);
   [[nodiscard]] InMap in_map() const;
+  void change_floor(std::uint32_t floor, Timestamp now, Step& step);
   void follow(const ProxyGraphMessage& graph, Timestamp now, Step& step);
   void begin_localising();
   Status begin_at_stored_place();

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Where a robot's node is in a map that does not move.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -40,10 +42,19 @@ void RobotNode::locate(const Input& input, Timestamp now, Step& step) {
   if (!localiser_) return;
   (void)localiser_->add(input);
   tell_place(now, step);
+  if (const localise::Located located = localiser_->located(); places_.is_elsewhere(located))
+    return change_floor(located.floor, now, step);
   if (base_ || !places_.wants(agent_, localiser_->state())) return;  // where there is a server, its map corrects it
-  places_.note(agent_, localiser_->located());
+  places_.note(agent_, localiser_->located(), localiser_->map());
   if (const auto graph = places_.graph_if_due(agent_))  // as it will be read again after a start
     follow(wire::decode_proxy_graph(wire::encode(*graph)).value(), now, step);
+}
+
+/// Nothing measures how it got there: what it sees from now on is a session of its own.
+void RobotNode::change_floor(std::uint32_t floor, Timestamp now, Step& step) {
+  agent_.finish();
+  settle(now, step);
+  change_session(fmt::format("it is on floor {} now", floor), now, step);
 }
 
 void RobotNode::hear(const StartPose& start, Timestamp now, Step& step) {
@@ -72,6 +83,7 @@ InMap RobotNode::in_map() const {
             .version = localiser_->map().revision,
             .state = std::string(to_string(located.state)),
             .why = plain_text(located.why),
+            .floor = located.floor,
             .T_world_body = {},
             .sigma_m = {},
             .sigma_deg = {},

@@ -12,10 +12,12 @@
 #include "support/node/submaps.hpp"
 #include "tutti/model/pose_at.hpp"
 #include "tutti/node/robot_node.hpp"
+#include "tutti/node/robot_tables.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/status_envelope.hpp"
 #include "tutti/node/status_text.hpp"
 #include "tutti/storage/memory_store.hpp"
+#include "tutti/wire/field_bytes.hpp"
 
 namespace tutti::node {
 namespace robot_place_test {
@@ -177,6 +179,39 @@ MissionStatus drive_before_a_server(const localise::test::World& world, const Re
 std::size_t changed_places(const MissionStatus& status) {
   return static_cast<std::size_t>(
       std::ranges::count_if(status.places, [](const auto& place) { return place.missing + place.appeared > 0; }));
+}
+
+/// Nothing measures a lift: what is seen on the other floor is a session of its own.
+TEST(RobotPlace, OnAnotherFloorAnotherSessionBegins) {
+  using localise::test::Ride;
+  const auto below = localise::test::make_world(3), above = localise::test::make_world(77);
+  Robot robot(localise::test::as_floors(*below.map, *above.map));
+  std::optional<std::size_t> updates;
+  localise::test::ride(below, above, robot, [&](Ride part, std::size_t) {
+    const NodeStatus status = robot.node->status(robot.now);
+    if (part != Ride::after) {
+      EXPECT_EQ(status.session, 1U);
+      EXPECT_EQ(status.in_map.floor, 1U);
+    } else if (status.in_map.state == "localised") {
+      EXPECT_EQ(status.in_map.floor, 2U);
+      if (!updates) updates = robot.updates;
+    }
+  });
+  EXPECT_EQ(robot.node->status(robot.now).session, 2U);
+  ASSERT_TRUE(updates.has_value());
+  EXPECT_GT(robot.updates, *updates) << "the second floor corrects its trajectory there";
+  EXPECT_EQ(robot.node->agent().component(), 1U);
+
+  // After a start it is looked for where it was last, on that floor.
+  (void)robot.done(robot.node->store_all());
+  const auto row = robot.store.read(robot_tables::kMeta, robot_tables::kPlace);
+  ASSERT_TRUE(row && *row);
+  const auto stored = wire::read_fields<StoredPlace>(**row);
+  ASSERT_TRUE(stored.has_value());
+  EXPECT_EQ(start_at(*stored, robot.node->localiser()->map())->floor, 2U);
+  localise::KnownMap without = robot.node->localiser()->map();
+  without.submaps.erase(stored->near);
+  EXPECT_FALSE(start_at(*stored, without).has_value());
 }
 
 TEST(RobotPlace, AServerSaysWhereTheMapOfARobotFitsNoMore) {

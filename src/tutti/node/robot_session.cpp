@@ -15,6 +15,7 @@ using namespace robot_tables;  // NOLINT
 Step RobotNode::begin_session(const std::string& why, Timestamp now) {
   Step step = finish(now);
   change_session(why, now, step);
+  begin_localising();
   return step;
 }
 
@@ -22,7 +23,7 @@ void RobotNode::change_session(const std::string& why, Timestamp now, Step& step
   const std::uint64_t session = agent_.chain().session + 1 + config_.incarnation;  // not what a copy would take
   agent_ = robot::RobotAgent(agent_.robot(), config_.agent, robot::AgentState{{.session = session}});
   gate_ = OdometryGate(agent_.robot());
-  begin_localising();
+  places_ = {};
   obsolete_.assign(rows_.begin(), rows_.end());
   stored_ = {};
   finished_ = false;
@@ -88,7 +89,9 @@ void RobotNode::leave(std::uint64_t session, const std::string& why, Timestamp n
   if (config_.keeps_state)
     step.writes.push_back({kMeta, std::string(kForeign) + storage::key_of({session}), std::string()});
   hold_foreign();
-  if (session == agent_.chain().session) change_session(why, now, step);
+  if (session != agent_.chain().session) return;
+  change_session(why, now, step);
+  begin_localising();
 }
 
 void RobotNode::hold_foreign() {

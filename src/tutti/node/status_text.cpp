@@ -62,7 +62,8 @@ void append_columns(const std::vector<MissionStatus::Robot>& robots, std::vector
 std::string state(const MissionStatus::Robot& robot) {
   std::string state = robot.status.finished ? "finished" : "maps";
   if (const InMap& in_map = robot.status.in_map; !in_map.map.empty() && !robot.status.finished)
-    state = fmt::format("in version {} of map {}", in_map.version, in_map.map);
+    state = fmt::format("in version {} of map {}{}", in_map.version, in_map.map,
+                        in_map.floor > 1 ? fmt::format(", floor {}", in_map.floor) : "");
   if (!robot.last_seen) state = "not seen since the server started";
   if (!robot.status.trouble.empty()) state += ": " + robot.status.trouble;
   return state;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "tutti/base/check.hpp"
@@ -107,14 +108,34 @@ CorridorWorld make_corridor_world(const CorridorWorldConfig& config, Rng rng) {
   return world;
 }
 
+std::vector<std::size_t> networks_of(const CorridorWorld& world) {
+  std::vector<std::size_t> out(world.junctions.size());
+  std::iota(out.begin(), out.end(), std::size_t{0});
+  for (bool is_changed = true; is_changed;) {
+    is_changed = false;
+    for (const Corridor& corridor : world.corridors) {
+      const std::size_t least = std::min(out[corridor.a], out[corridor.b]);
+      is_changed |= out[corridor.a] != least || out[corridor.b] != least;
+      out[corridor.a] = out[corridor.b] = least;
+    }
+  }
+  return out;
+}
+
 std::vector<std::size_t> spread_starts(const CorridorWorld& world, std::size_t count, Rng rng) {
+  const std::vector<std::size_t> network = networks_of(world);
   std::vector<std::size_t> starts;
   std::vector<double> distance(world.junctions.size(), std::numeric_limits<double>::infinity());
+  std::vector<std::ptrdiff_t> in_network(world.junctions.size(), 0);  // starts, by network
+  const auto is_better = [&](std::size_t a, std::size_t b) {
+    return std::pair(-in_network[network[a]], distance[a]) > std::pair(-in_network[network[b]], distance[b]);
+  };
   while (starts.size() < count) {
-    const std::size_t next = starts.empty()
-                                 ? rng.index(world.junctions.size())
-                                 : static_cast<std::size_t>(std::ranges::max_element(distance) - distance.begin());
+    std::size_t next = starts.empty() ? rng.index(world.junctions.size()) : 0;
+    for (std::size_t i = 1; !starts.empty() && i < distance.size(); ++i)
+      if (is_better(i, next)) next = i;
     starts.push_back(next);
+    ++in_network[network[next]];
     for (std::size_t i = 0; i < distance.size(); ++i)
       distance[i] = std::min(distance[i], (world.junctions[i] - world.junctions[next]).norm());
   }

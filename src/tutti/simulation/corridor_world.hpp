@@ -57,8 +57,11 @@ struct CorridorWorld {
 /// Makes a connected world in which every junction is on at least two corridors.
 CorridorWorld make_corridor_world(const CorridorWorldConfig& config, Rng rng);
 
+/// Per junction the number of the network that it is in, where corridors do not join all of them.
+std::vector<std::size_t> networks_of(const CorridorWorld& world);
+
 /// `count` junctions far from each other (greedy farthest points from a random first one); they repeat when `count`
-/// exceeds the junctions.
+/// exceeds the junctions. Where there are several networks each has as many, but for one.
 std::vector<std::size_t> spread_starts(const CorridorWorld& world, std::size_t count, Rng rng);
 
 }  // namespace tutti::simulation

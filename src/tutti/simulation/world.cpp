@@ -64,6 +64,18 @@ CorridorWorld make_tunnel(const WorldConfig& config, Rng rng) {
   return world;
 }
 
+CorridorWorld make_storeys(const WorldConfig& config, Rng rng) {
+  CorridorWorld world;
+  for (const std::uint64_t storey : {0U, 1U}) {
+    const CorridorWorld one = make_tunnel(config, rng.fork(storey));
+    const std::size_t before = world.junctions.size();
+    for (const Eigen::Vector3d& junction : one.junctions)
+      world.junctions.emplace_back(junction + Eigen::Vector3d(0.0, 0.0, kStorey_m * static_cast<double>(storey)));
+    for (const Corridor& corridor : one.corridors) join(world, before + corridor.a, before + corridor.b, corridor.kind);
+  }
+  return world;
+}
+
 CorridorWorld make_terrace(const WorldConfig& config, Rng rng) {
   CorridorWorld world;
   const double length = config.office_length_m, width = config.office_width_m;
@@ -93,6 +105,7 @@ CorridorWorld make_terrace(const WorldConfig& config, Rng rng) {
 const std::vector<WorldKind>& world_kinds() {
   static const std::vector<WorldKind> rows{
       {"tunnel", "a network of rough corridors", &make_tunnel},
+      {"storeys", "two tunnels, one above the other, which nothing joins", &make_storeys},
       {"terrace", "an office loop and a rooftop with almost nothing to see", &make_terrace},
   };
   return rows;

@@ -31,7 +31,7 @@ const std::vector<WorldKind>& world_kinds();
 /// Which world robots walk in; each field's text names the `kind` that it is for.
 struct WorldConfig {
   std::string kind = "tunnel";
-  CorridorWorldConfig network;      ///< tunnel
+  CorridorWorldConfig network;      ///< tunnel, storeys
   double featureless_share = 0.15;  ///< tunnel: share of the corridors
   std::vector<int> featureless;     ///< tunnel: further corridors, as pairs of junctions
   double office_length_m = 30.0;    ///< terrace, like all that follow
@@ -43,7 +43,7 @@ struct WorldConfig {
   template <class V>
   void describe(V& v) {
     v.field("kind", kind, one_of(names_of(world_kinds())), help_of(world_kinds()) + ".");
-    v.field("network", network, any(), "tunnel: the corridors.");
+    v.field("network", network, any(), "tunnel, storeys: the corridors.");
     v.field("featureless_share", featureless_share, between(0.0, 1.0),
             "tunnel: share of the corridors that are straight, smooth and empty: the longest.");
     v.field("featureless", featureless, at_least(0.0),
@@ -61,11 +61,13 @@ struct WorldConfig {
 /// end.
 ///   tunnel: make_corridor_world(); the longest corridors and the named ones are featureless, the others
 ///   rough.
+///   storeys: two tunnels, each with corridors of its own, one kStorey_m above the other. Nothing joins them.
 ///   terrace: junctions about every 10 m, counter-clockwise on both loops. The office comes first, from the corner at
 ///   the origin (with the default size 0 to 9, corners 0, 3, 5, 8), with a cross-corridor (1 to 7); then the roof,
 ///   level, from the end of the ramp on (10 to 24; the ramp is 4 to 10). Corridors of the roof are open, all others are
 ///   office.
 CorridorWorld make_world(const WorldConfig& config, Rng rng);
+inline constexpr double kStorey_m = 15.0;  ///< More than a tunnel's height and all that its corridors rise.
 /// Fails when the configuration names a corridor that the world of make_world() does not have.
 Status check_world(const CorridorWorld& world, const WorldConfig& config);
 

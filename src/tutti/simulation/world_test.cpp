@@ -114,5 +114,23 @@ RC_GTEST_PROP(World, CorridorAtFindsTheCorridorOfAPlace, (std::uint32_t seed)) {
   RC_ASSERT(!corridor_at(world, beside, 0.49));
 }
 
+TEST(World, RobotsStartInTheTwoTunnelsOfStoreysInTurn) {
+  WorldConfig config;
+  config.kind = "storeys";
+  const CorridorWorld world = make_world(config, Rng(4));
+  const std::vector<std::size_t> networks = networks_of(world);
+  const std::size_t half = world.junctions.size() / 2;
+  for (std::size_t k = 0; k < networks.size(); ++k) EXPECT_EQ(networks[k], k < half ? 0 : half);
+  EXPECT_GT(world.junctions[half].z() - world.junctions[0].z(), 0.5 * kStorey_m);
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    std::size_t above = 0;
+    const auto starts = spread_starts(world, 5, Rng(seed));
+    for (std::size_t k = 0; k < 5; ++k) {
+      above += starts[k] >= half ? 1 : 0;
+      EXPECT_NEAR(static_cast<double>(above), 0.5 * static_cast<double>(k + 1), 0.5);
+    }
+  }
+}
+
 }  // namespace world_test
 }  // namespace tutti::simulation

@@ -62,6 +62,75 @@ inline std::shared_ptr<KnownMap> map_of(const std::vector<Recording>& robots) {
   return map;
 }
 
+/// The walls, floor and ceiling of a lift, from its middle.
+inline PointCloud lift() {
+  constexpr float kHalf_m = 1.0F;
+  PointCloud out;
+  for (float a = -kHalf_m; a <= kHalf_m; a += 0.1F)
+    for (float b = -kHalf_m; b <= kHalf_m; b += 0.1F)
+      for (const float side : {-kHalf_m, kHalf_m})
+        for (int axis = 0; axis < 3; ++axis) {
+          Eigen::Vector3f& p = out.points.emplace_back();
+          p[axis] = side;
+          p[(axis + 1) % 3] = a;
+          p[(axis + 2) % 3] = b;
+        }
+  return out;
+}
+
+/// What is on the way of a robot that drives on one floor, rides a lift for 20 s and drives on another.
+enum class Ride { before, in_lift, after };
+/// Feeds what the third robots of two worlds see on such a way to what takes inputs. `after_each` hears after each
+/// sample where that was, and its number in the recording.
+template <class Taker>
+void ride(const World& from, const World& to, Taker& taker, const std::function<void(Ride, std::size_t)>& after_each) {
+  constexpr std::size_t kIn = 200, kOut = 250, kEnd = 480;
+  constexpr double kStep_s = 0.2;
+  const Recording &first = from.robots[2], &second = to.robots[2];
+  std::size_t k = 0;
+  feed(first, first.odometry, 0, kIn, taker, [&] { after_each(Ride::before, k++); });
+  const auto add = [&](Timestamp stamp, const Pose3& T_odom_body, std::optional<Scan> scan) {
+    EXPECT_TRUE(taker.add(OdometrySample{stamp, T_odom_body, Matrix6d::Identity() * 1e-6}).has_value());
+    if (!scan || !taker.wants_scan(stamp)) return;
+    scan->stamp = stamp;
+    (void)taker.add(*scan);
+  };
+  const StampedPose at = first.odometry[kIn - 1];
+  const auto cabin = std::make_shared<const PointCloud>(lift());
+  Timestamp stamp = at.stamp + kStep_s;
+  for (; stamp - at.stamp < 20.0; stamp = stamp + kStep_s) {
+    add(stamp, at.pose, Scan{.stamp = {}, .cloud = cabin, .age_s = nullptr});
+    after_each(Ride::in_lift, 0);
+  }
+  const Pose3 T_shift = at.pose * second.odometry[kOut].pose.inverse();
+  for (k = kOut; k < kEnd; ++k, stamp = stamp + kStep_s) {
+    add(stamp, T_shift * second.odometry[k].pose, second.scans->scan(k).value());
+    after_each(Ride::after, k);
+  }
+}
+
+/// Two maps as the floors of one, each in its frame.
+inline std::shared_ptr<KnownMap> as_floors(const KnownMap& first, const KnownMap& second) {
+  auto out = std::make_shared<KnownMap>();
+  auto payloads = std::make_shared<server::MemoryPayloadStore>();
+  for (const std::uint32_t floor : {1U, 2U}) {
+    const KnownMap& map = floor == 1 ? first : second;
+    for (const auto& [id, entry] : map.submaps) {
+      Submap submap = *entry.submap;
+      submap.id.chain.robot.value += 100 * (floor - 1);
+      submap.cloud = *map.payloads->cloud(id);
+      EXPECT_TRUE(payloads->put(submap).has_value());
+      KnownMap::Entry& there = out->submaps[submap.id] = entry;
+      there.submap = std::make_shared<const Submap>(without_payloads(submap));
+      there.floor = floor;
+    }
+  }
+  out->floors = 2;
+  out->payloads = std::move(payloads);
+  out->id = "building";
+  return out;
+}
+
 inline World make_world(std::uint64_t seed) {
   simulation::SimulationConfig config;
   config.sensors = "lidar";

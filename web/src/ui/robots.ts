@@ -269,7 +269,7 @@ function details(app: App, robot: RobotView): Child[] {
     );
   if (status?.localisation)
     line(
-      `In ${map_name(status)}: ${status.localisation}, ${status.localisation_why}`,
+      `In ${map_name(status)}${status.floor > 1 ? `, floor ${status.floor}` : ""}: ${status.localisation}, ${status.localisation_why}`,
       status.localisation === "localised" || status.localisation === "searching" ? "" : "warn",
     );
   if (status?.conflict) line(status.conflict, "bad");

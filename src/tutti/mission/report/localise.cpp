@@ -17,8 +17,8 @@ namespace tutti::mission {
 namespace {
 
 using localise::Located, localise::State;
-constexpr State kStates[] = {State::searching, State::ambiguous, State::localised,
-                             State::off_map,   State::lost,      State::stale};
+constexpr State kStates[] = {State::searching, State::ambiguous, State::localised, State::off_map,
+                             State::lost,      State::stale,     State::between};
 constexpr std::size_t kMostChanges = 20;  // of one robot's states, on a console
 
 double quantile(std::vector<double> values, double share) {
@@ -99,10 +99,11 @@ std::string places_text(const std::map<SubmapId, localise::PlaceTrust>& places, 
 }
 
 std::string states_csv(const LocalisedRobot& robot) {
-  std::string out = "stamp_s,state,age_s,x_m,y_m,z_m,qx,qy,qz,qw,sigma_x_m,sigma_y_m,sigma_z_m,sigma_yaw_rad,why\n";
+  std::string out =
+      "stamp_s,state,floor,age_s,x_m,y_m,z_m,qx,qy,qz,qw,sigma_x_m,sigma_y_m,sigma_z_m,sigma_yaw_rad,why\n";
   for (const Located& located : robot.course) {
-    out += fmt::format("{:.6f},{},{:.3f},", static_cast<double>(located.stamp.ns) * 1e-9, to_string(located.state),
-                       located.age_s);
+    out += fmt::format("{:.6f},{},{},{:.3f},", static_cast<double>(located.stamp.ns) * 1e-9, to_string(located.state),
+                       located.T_world_body ? std::to_string(located.floor) : "", located.age_s);
     if (located.T_world_body) {
       const auto& [T, covariance] = *located.T_world_body;
       const Eigen::Vector3d& t = T.translation;
@@ -136,23 +137,44 @@ std::string kidnaps_text(const LocalisedRobot& robot) {
       "  " + robot.name + ": ");
 }
 
+std::string on_floor(std::uint32_t floor, const localise::KnownMap& map) {
+  return map.floors > 1 ? fmt::format(" on floor {}", floor) : "";
+}
+
 std::string changes_of(const LocalisedRobot& robot, const localise::KnownMap& map) {
   std::string out;
   std::size_t changes = 0;
-  std::optional<State> before;
+  std::optional<std::pair<State, std::uint32_t>> before;
   for (const Located& located : robot.course) {
-    if (before == located.state) continue;
-    before = located.state;
+    const std::pair now(located.state, located.floor);
+    if (std::exchange(before, now) == now) continue;
     if (++changes > kMostChanges) continue;
     std::string places;
     for (const localise::PlaceFound& place : located.places)
-      places += (places.empty() ? ": near submap " : ", ") + map.names.of(place.submap);
-    out += wrap(fmt::format("{:.1f} s: {}; {}{}", located.stamp - robot.course.front().stamp, to_string(located.state),
-                            located.why, places),
-                "  " + robot.name + ", ");
+      places += (places.empty() ? ": near submap " : ", ") + map.names.of(place.submap) + on_floor(place.floor, map);
+    out +=
+        wrap(fmt::format("{:.1f} s: {}{}; {}{}", located.stamp - robot.course.front().stamp, to_string(located.state),
+                         located.T_world_body ? on_floor(located.floor, map) : "", located.why, places),
+             "  " + robot.name + ", ");
   }
   if (changes > kMostChanges) out += fmt::format("  {}: {} more changes\n", robot.name, changes - kMostChanges);
   return out;
+}
+
+/// One file a floor, as each has a frame of its own.
+Status write_published(const LocalisedRobot& robot, const localise::KnownMap& map,
+                       const std::filesystem::path& out_dir) {
+  for (std::uint32_t floor = 1; floor <= map.floors; ++floor) {
+    Trajectory published;
+    for (const Located& located : robot.course)
+      if (located.state == State::localised && located.T_world_body && located.floor == floor &&
+          (published.empty() || published.back().stamp < located.stamp))
+        published.push_back({located.stamp, located.T_world_body->T_a_b});
+    const std::string name = floor == 1 ? "localised" : fmt::format("localised_floor_{}", floor);
+    if (auto ok = formats::write_tum((out_dir / trajectory_file_name(robot.name, name)).string(), published); !ok)
+      return ok;
+  }
+  return {};
 }
 
 }  // namespace
@@ -160,17 +182,15 @@ std::string changes_of(const LocalisedRobot& robot, const localise::KnownMap& ma
 Status write_localised(const std::vector<LocalisedRobot>& robots, const localise::KnownMap& map,
                        const std::filesystem::path& out_dir) {
   if (auto made = make_folder(out_dir.string()); !made) return made;
-  Json json{{"map", map.id}, {"version", map.revision}, {"submaps", map.submaps.size()}, {"robots", Json::array()}};
+  Json json{{"map", map.id},
+            {"version", map.revision},
+            {"submaps", map.submaps.size()},
+            {"floors", map.floors},
+            {"robots", Json::array()}};
   json["places"] = places_json(trust_of(robots), map);
   for (const LocalisedRobot& robot : robots) {
     json["robots"].push_back(json_of(robot));
-    Trajectory published;
-    for (const Located& located : robot.course)
-      if (located.state == State::localised && located.T_world_body &&
-          (published.empty() || published.back().stamp < located.stamp))
-        published.push_back({located.stamp, located.T_world_body->T_a_b});
-    const auto tum = out_dir / trajectory_file_name(robot.name, "localised");
-    if (auto ok = formats::write_tum(tum.string(), published); !ok) return ok;
+    if (auto ok = write_published(robot, map, out_dir); !ok) return ok;
     const auto csv = (out_dir / trajectory_file_name(robot.name, "states")).replace_extension(".csv");
     if (auto ok = write_file(csv.string(), states_csv(robot)); !ok) return ok;
   }
@@ -178,8 +198,8 @@ Status write_localised(const std::vector<LocalisedRobot>& robots, const localise
 }
 
 std::string localised_text(const std::vector<LocalisedRobot>& robots, const localise::KnownMap& map) {
-  std::string out =
-      fmt::format("map {}, version {}: {} submaps, which have not moved\n\n", map.id, map.revision, map.submaps.size());
+  std::string out = fmt::format("map {}, version {}: {} submaps{}, which have not moved\n\n", map.id, map.revision,
+                                map.submaps.size(), map.floors > 1 ? fmt::format(" on {} floors", map.floors) : "");
   TextTable table(1);
   table.add({"robot", "starts", "fixes", "after", "localised", "ambiguous", "off the map", "lost", "error", "worst",
              "wrong"});
@@ -208,7 +228,7 @@ std::string localised_text(const std::vector<LocalisedRobot>& robots, const loca
   for (const LocalisedRobot& robot : robots) {
     out += kidnaps_text(robot);
     out += changes_of(robot, map);
-    for (const std::string& trouble : robot.troubles) out += wrap(trouble, "  " + robot.name + ": ");
+    for (const std::string& trouble : robot.troubles) out += wrap(trouble, "  ");
   }
   return out;
 }

@@ -17,7 +17,7 @@ std::string agv_position(const InMap& in_map) {
   nlohmann::ordered_json out{{"x", has_place ? in_map.T_world_body.translation.x() : 0.0},
                              {"y", has_place ? in_map.T_world_body.translation.y() : 0.0},
                              {"theta", has_place ? std::atan2(forward.y(), forward.x()) : 0.0},
-                             {"mapId", in_map.map},
+                             {"mapId", in_map.floor > 1 ? fmt::format("{}_{}", in_map.map, in_map.floor) : in_map.map},
                              {"mapDescription", fmt::format("revision {}", in_map.version)},
                              {"positionInitialized", is_localised},
                              {"localizationScore", is_localised ? in_map.overlap.value_or(1.0) : 0.0}};

@@ -24,6 +24,8 @@ TEST(AgvPosition, IsInitialisedOnlyWhereTheRobotIsLocalised) {
   EXPECT_EQ(json.at("positionInitialized"), true);
   EXPECT_EQ(json.at("localizationScore"), 0.9);
   EXPECT_EQ(json.at("deviationRange"), 0.05);
+  in_map.floor = 2;
+  EXPECT_EQ(nlohmann::json::parse(agv_position(in_map)).at("mapId"), "site_2");
 
   in_map.state = "off the map";  // odometry goes on from its last place
   json = nlohmann::json::parse(agv_position(in_map));

@@ -47,6 +47,7 @@ FromClient read(const v1::Feed::StartPose& in) {
   const auto covariance = read_covariance(in.covariance(), "covariance");
   if (!covariance) return BadSample{{}, "a start pose with a " + covariance.error().message};
   StartPose out{.T_world_body = RelativePose{read(in.t_world_body()), *covariance}, .is_planar = in.is_planar()};
+  if (in.floor() > 0) out.floor = in.floor();
   if (const Status ok = check_start_pose(out); !ok) return BadSample{{}, ok.error().message};
   return out;
 }

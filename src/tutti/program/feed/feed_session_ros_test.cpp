@@ -101,13 +101,17 @@ TEST_F(FeedSessionRos, AStartPoseIsTakenInTheFrameOfTheKnownMap) {
   EXPECT_TRUE(target_.starts[0].is_planar);
   EXPECT_EQ(target_.starts[0].T_world_body->T_a_b.translation, Eigen::Vector3d(4, 5, 0));
   EXPECT_EQ(target_.starts[0].T_world_body->covariance(5, 5), 0.07);
+  EXPECT_EQ(target_.starts[0].floor, 1U);
+  EXPECT_TRUE(say(1, start("world_2")).empty());
+  ASSERT_EQ(target_.starts.size(), 2U);
+  EXPECT_EQ(target_.starts[1].floor, 2U);
 
   const auto refused = say(1, start("r1/map"));
   ASSERT_EQ(kinds(refused), std::vector{Feed::kRefused});
   EXPECT_EQ(refused[0].refused().why(),
             "initialpose: a start pose in frame 'r1/map', expected 'world', the frame of the map that the robot "
             "localises in, or 'r1/map' once it has found itself there");
-  target_.known.component = 0;
+  target_.known.component = 2;
   target_.known.T_map_world = Pose3{Eigen::Quaterniond::Identity(), {1, 0, 0}};
   target_.known.T_world_body = RelativePose{{Eigen::Quaterniond::Identity(), {2, 0, 0}}, Matrix6d::Identity()};
   target_.known.located = {kStart};
@@ -116,12 +120,13 @@ TEST_F(FeedSessionRos, AStartPoseIsTakenInTheFrameOfTheKnownMap) {
   const auto pose = std::ranges::find(told, "localised_pose", [](const Feed& m) { return m.raw().topic(); });
   ASSERT_NE(pose, told.end());
   const auto localised = bags::decode_pose_with_covariance(pose->raw().data()).value();
-  EXPECT_EQ(localised.header.frame_id, "world");
+  EXPECT_EQ(localised.header.frame_id, "world_3");
   EXPECT_EQ(localised.header.stamp.ns, kStart);
   EXPECT_EQ(localised.pose.position.x(), 2.0);
   EXPECT_TRUE(say(1, start("r1/map")).empty());
-  ASSERT_EQ(target_.starts.size(), 2U);
-  EXPECT_EQ(target_.starts[1].T_world_body->T_a_b.translation, Eigen::Vector3d(3, 5, 0));
+  ASSERT_EQ(target_.starts.size(), 3U);
+  EXPECT_EQ(target_.starts[2].T_world_body->T_a_b.translation, Eigen::Vector3d(3, 5, 0));
+  EXPECT_EQ(target_.starts[2].floor, 3U);
 }
 
 TEST_F(FeedSessionRos, EverySensorReachesTheRobot) {

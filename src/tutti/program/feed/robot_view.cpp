@@ -14,14 +14,14 @@ namespace {
 
 constexpr double kJumpAlert_s = 600.0;  // of odometry
 
-/// In a map that does not move the robot's own trajectory is tied to the map's world where the map shows the robot;
-/// that world is the first component's.
+/// In a map that does not move the robot's own trajectory is tied to the world of the floor on which the map shows the
+/// robot.
 void set_place(const localise::Located& located, bool wants_scan, const Pose3& T_map_body, FeedState& out) {
   out.wants_scan |= wants_scan;
   out.component.reset();
   out.T_map_world.reset();
   if (located.state == localise::State::localised) {
-    out.component = 0;
+    out.component = located.floor - 1;
     out.T_map_world = T_map_body * located.T_world_body->T_a_b.inverse();
     out.T_world_body = located.T_world_body;
     out.located = located.stamp;

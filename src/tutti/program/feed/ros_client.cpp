@@ -98,17 +98,19 @@ Status RosClient::take_start_pose(std::string_view cdr) {
   const auto message = bags::decode_pose_with_covariance(cdr);
   if (!message) return tl::unexpected(message.error());
   const std::string frame = plain_text(message->header.frame_id, kLongest);
-  const std::string world = world_.empty() ? world_frame(said_.world_frame, 0) : world_;
+  const auto component = component_of_frame(frame, said_.world_frame);
   const bool is_in_map = T_world_map_ && answers_ && frame == answers_->map_frame();
-  if (said_.world_frame.empty() || (frame != world && !is_in_map))
+  if (said_.world_frame.empty() || (!component && !is_in_map))
     return fail(ErrorCode::invalid,
                 "a start pose in frame '{}', expected '{}', the frame of the map that the robot localises in{}", frame,
-                world, answers_ ? fmt::format(", or '{}' once it has found itself there", answers_->map_frame()) : "");
+                world_.empty() ? world_frame(said_.world_frame, 0) : world_,
+                answers_ ? fmt::format(", or '{}' once it has found itself there", answers_->map_frame()) : "");
   const Matrix6d in_axes = Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(message->covariance.data());
   const Pose3 T_frame_body{message->pose.orientation, message->pose.position};
   StartPose out{.T_world_body = RelativePose{is_in_map ? *T_world_map_ * T_frame_body : T_frame_body,
                                              bags::covariance_of(in_axes, T_frame_body.rotation)},
-                .is_planar = in_axes(2, 2) <= 0.0 && in_axes(3, 3) <= 0.0 && in_axes(4, 4) <= 0.0};
+                .is_planar = in_axes(2, 2) <= 0.0 && in_axes(3, 3) <= 0.0 && in_axes(4, 4) <= 0.0,
+                .floor = (is_in_map ? component_ : *component) + 1};
   if (const Status ok = check_start_pose(out); !ok) return ok;
   start_ = std::move(out);
   return {};
@@ -120,7 +122,8 @@ std::vector<FeedRaw> RosClient::hear(const FeedState& known, Timestamp located) 
   world_.clear();
   if (known.T_map_world && known.component) {
     T_world_map_ = known.T_map_world->inverse();
-    world_ = world_frame(said_.world_frame, *known.component);
+    component_ = *known.component;
+    world_ = world_frame(said_.world_frame, component_);
   }
   if (!answers_ || said_.world_frame.empty()) return out;
   answers_->hear_world(world_, T_world_map_);

@@ -66,6 +66,7 @@ class RosClient {
   RosGrid grid_;
   std::optional<StartPose> start_;
   std::optional<Pose3> T_world_map_;  ///< The world is that of the component that this robot is in.
+  std::uint32_t component_ = 0;       ///< That one.
   std::string world_;                 ///< Its frame.
   std::optional<Timestamp> located_;  ///< The last one that was published.
   bool wants_scan_ = false;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <vector>
 
@@ -27,7 +28,17 @@ Eigen::Vector2d centre(std::int64_t x, std::int64_t y, double resolution_m) {
 }  // namespace
 
 std::string world_frame(const std::string& name, std::uint32_t component) {
-  return component == 0 ? name : fmt::format("{}_{}", name, component);
+  return component == 0 ? name : fmt::format("{}_{}", name, component + 1);
+}
+
+std::optional<std::uint32_t> component_of_frame(std::string_view frame, const std::string& name) {
+  if (frame == name) return 0;
+  if (!frame.starts_with(name + "_")) return std::nullopt;
+  const std::string_view digits = frame.substr(name.size() + 1);
+  std::uint32_t number = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+  const bool is_one = error == std::errc() && number >= 2 && frame == world_frame(name, number - 1);
+  return is_one ? std::optional(number - 1) : std::nullopt;
 }
 
 Status RosGrid::take(std::string_view cdr) {

@@ -15,8 +15,10 @@
 namespace tutti::program {
 
 /// The frame of ROS that stands for the world of one component of the server's map: "world" of component 0, "world_2"
-/// of component 2, because poses of two components must not be compared.
+/// of component 1 (the second floor of a map that does not move), because poses of two components must not be compared.
 std::string world_frame(const std::string& name, std::uint32_t component);
+/// The component whose frame this is; nothing when it is none.
+std::optional<std::uint32_t> component_of_frame(std::string_view frame, const std::string& name);
 
 /// A server's grid (nav_msgs/OccupancyGrid in a world's frame) as a robot drives by it: in the frame of its own map.
 class RosGrid {

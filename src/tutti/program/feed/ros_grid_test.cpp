@@ -138,7 +138,12 @@ TEST(RosGrid, IsWhereItIsSeenInATiltedWorld) {
   EXPECT_LT((made.origin.position.head<2>() - Eigen::Vector2d(2.0, 6.0)).norm(), 0.15);
   EXPECT_EQ(at(made, 5.0, 8.0), kFree);
   EXPECT_EQ(world_frame("world", 0), "world");
-  EXPECT_EQ(world_frame("world", 2), "world_2");
+  EXPECT_EQ(world_frame("world", 1), "world_2");
+  for (const std::uint32_t component : {0U, 1U, 9U, 4'294'967'294U})
+    EXPECT_EQ(component_of_frame(world_frame("world", component), "world"), component);
+  for (const char* const other :
+       {"", "map", "world_", "world_0", "world_1", "world_02", "world_2x", "world_-2", "world_4294967296", "world2"})
+    EXPECT_FALSE(component_of_frame(other, "world").has_value()) << other;
 }
 
 }  // namespace ros_grid_test

@@ -68,6 +68,7 @@ void write(const Health& health, v1::Feed& message) {
 void write(const StartPose& start, v1::Feed& message) {
   auto& out = *message.mutable_start_pose();
   out.set_is_planar(start.is_planar);
+  out.set_floor(start.floor.value_or(0));
   if (!start.T_world_body) return;
   internal::write(start.T_world_body->T_a_b, *out.mutable_t_world_body());
   for (int i = 0; i < 36; ++i) out.add_covariance(start.T_world_body->covariance(i / 6, i % 6));
