@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "tutti/mapfile/content.hpp"
+#include "tutti/mapfile/floors.hpp"
 #include "tutti/mapfile/make_map.hpp"
-#include "tutti/mapfile/placement.hpp"
 #include "tutti/mapfile/renumber.hpp"
 #include "tutti/mapfile/versions.hpp"
 #include "tutti/node/robot_registry.hpp"
@@ -20,11 +20,20 @@
 namespace tutti::mapfile {
 namespace {
 
-/// Which component is held: the one that is already, or the largest.
-std::uint32_t component_to_hold(const Content& content, const server::MapEstimate& made) {
-  for (const auto& [id, pose] : content.held)
-    if (const MapNode* node = server::find_node(made, id)) return node->component;
-  return component_to_show(content, made);
+/// The components that are held, and the number of each one's floor: those that are already, and all that are floors.
+std::map<std::uint32_t, std::uint32_t> floors_to_hold(const Content& content, const server::MapEstimate& made) {
+  std::map<std::uint32_t, std::vector<KeyframeId>> nodes;
+  for (const MapNode& node : made.nodes) nodes[node.component].push_back(node.id);
+  std::uint32_t next = 0;
+  for (const auto& [id, pose] : content.held) next = std::max(next, pose.floor + 1);
+  const Floors floors = Floors::of(content, made);
+  std::map<std::uint32_t, std::uint32_t> out;
+  for (const auto& [component, ids] : nodes)
+    if (const auto floor = server::main_floor(content.held, ids))
+      out.emplace(component, *floor);
+    else if (floors.of_component(component))
+      out.emplace(component, next++);
+  return out;
 }
 
 /// New numbers for the sessions of robots that were in the map before under another number.
@@ -63,17 +72,18 @@ Result<std::size_t> hold_map(storage::TableStore& map, std::int64_t now_ns) {
   auto all = versions(map);
   if (!all) return tl::unexpected(all.error());
   const server::MapEstimate made = estimate(*content);
-  const std::uint32_t component = component_to_hold(*content, made);
+  const std::map<std::uint32_t, std::uint32_t> floors = floors_to_hold(*content, made);
   Writer writer(map);
   std::set<KeyframeId> held;  // neighbouring submaps share one
   for (const auto& [id, submap] : content->submaps) {
-    std::vector<std::pair<std::uint32_t, Pose3>> poses;
-    for (const Keyframe& keyframe : submap->keyframes)
-      if (const MapNode* node = server::find_node(made, {id.chain, keyframe.index});
-          node != nullptr && node->component == component) {
-        poses.emplace_back(keyframe.index, node->T_world_body);
-        held.insert(node->id);
-      }
+    std::vector<std::pair<std::uint32_t, server::HeldPose>> poses;
+    for (const Keyframe& keyframe : submap->keyframes) {
+      const MapNode* node = server::find_node(made, {id.chain, keyframe.index});
+      const auto floor = node != nullptr ? floors.find(node->component) : floors.end();
+      if (floor == floors.end()) continue;
+      poses.emplace_back(keyframe.index, server::HeldPose{node->T_world_body, floor->second});
+      held.insert(node->id);
+    }
     if (poses.empty()) continue;
     if (auto ok = writer.put(node::to_row(id, poses)); !ok) return tl::unexpected(ok.error());
   }

@@ -111,6 +111,51 @@ TEST_F(Versions, WhatIsHeldAgainIsTheNextOne) {
   EXPECT_EQ(content(folder_ / "wednesday").held.size(), was.size());
 }
 
+/// Finds nothing between bravo and the others until it is told to.
+class Apart final : public server::WrappedVerifier {
+ public:
+  Apart() : WrappedVerifier(std::make_shared<server::test::TestVerifier>(7)) {}
+  [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
+                                              const server::PayloadStore& payloads) const override {
+    auto verdict = wrapped().verify(first, second, payloads);
+    if (is_apart && (first.id.chain.robot == kBravo) != (second.id.chain.robot == kBravo)) verdict->closures.clear();
+    return verdict;
+  }
+  bool is_apart = true;
+};
+
+TEST_F(Versions, FloorsAreHeldEachInItsWorldAndOfJoinedOnesTheFirst) {
+  const auto verifier = std::make_shared<Apart>();
+  storage::MemoryStore store(storage::map_schema());
+  Mapper mapper({kAlpha, kBravo}, store, verifier, {});
+  mapper.walk({kAlpha, 0});
+  mapper.walk({kBravo, 0});
+  ASSERT_EQ(mapper.server().map().components, 2U);
+  ASSERT_TRUE(copy_map(store, folder_ / "monday"));
+  const auto was = poses(folder_ / "monday");
+  const HeldMap held = read_held(folder_ / "monday", kMonday_ns).value();
+  for (const bool is_apart : {true, false}) {
+    verifier->is_apart = is_apart;
+    storage::MemoryStore today(storage::map_schema(), held.rows);
+    Mapper extends({kCharlie}, today, verifier, {});
+    extends.walk({kCharlie, 0}, 5);
+    const fs::path file = folder_ / (is_apart ? "apart" : "joined");
+    ASSERT_TRUE(keep_extended(held, today, file));
+    const server::MapEstimate made = estimate(content(file));
+    EXPECT_EQ(made.components, is_apart ? 2U : 1U);
+    for (const MapNode& node : made.nodes)
+      if (const auto before = was.find(node.id); before != was.end() && (is_apart || node.id.chain.robot == kAlpha)) {
+        EXPECT_EQ(node.T_world_body, before->second);
+      }
+    ASSERT_TRUE(copy_held(file, folder_ / (file.filename().string() + "_held"), kTuesday_ns).has_value());
+    std::map<RobotId, std::set<std::uint32_t>> floors;
+    for (const auto& [id, pose] : content(folder_ / (file.filename().string() + "_held")).held)
+      floors[id.chain.robot].insert(pose.floor);
+    EXPECT_EQ(floors.at(kAlpha), floors.at(kCharlie));
+    EXPECT_EQ(floors.at(kAlpha) == floors.at(kBravo), !is_apart);
+  }
+}
+
 TEST_F(Versions, RevertedIsAsItWas) {
   const fs::path before = monday(), after = tuesday(before);
   const auto left_out = revert(after, 1, folder_ / "reverted");

@@ -148,14 +148,14 @@ Result<server::PlaceSet> read_places(const storage::TableStore& map) {
   return places;
 }
 
-storage::Write to_row(SubmapId id, const std::vector<std::pair<std::uint32_t, Pose3>>& held) {
+storage::Write to_row(SubmapId id, const std::vector<std::pair<std::uint32_t, server::HeldPose>>& held) {
   std::string bytes;
   const auto bits = [](double value) { return std::bit_cast<std::uint64_t>(value); };
   for (const auto& [index, pose] : held) {
-    const Eigen::Vector3d& t = pose.translation;
-    const Eigen::Quaterniond& q = pose.rotation;
-    bytes += storage::key_of(
-        {index, bits(t.x()), bits(t.y()), bits(t.z()), bits(q.x()), bits(q.y()), bits(q.z()), bits(q.w())});
+    const Eigen::Vector3d& t = pose.T_world_body.translation;
+    const Eigen::Quaterniond& q = pose.T_world_body.rotation;
+    bytes += storage::key_of({index | std::uint64_t{pose.floor} << 32U, bits(t.x()), bits(t.y()), bits(t.z()),
+                              bits(q.x()), bits(q.y()), bits(q.z()), bits(q.w())});
   }
   return {map_tables::kMeta, std::string(kHeldPrefix) + key_of(id), std::move(bytes)};
 }
@@ -174,7 +174,9 @@ Result<server::HeldPoses> read_held_poses(const storage::TableStore& map) {
       const Pose3 pose{{value(at + 7), value(at + 4), value(at + 5), value(at + 6)},
                        {value(at + 1), value(at + 2), value(at + 3)}};
       if (!is_valid(pose)) return fail(ErrorCode::parse, "the row '{}' of table 'meta' has no valid poses", key);
-      held.emplace(KeyframeId{id->chain, static_cast<std::uint32_t>((*numbers)[at])}, pose);
+      const std::uint64_t index = (*numbers)[at];
+      held.emplace(KeyframeId{id->chain, static_cast<std::uint32_t>(index)},
+                   server::HeldPose{pose, static_cast<std::uint32_t>(index >> 32U)});
     }
     return {};
   });

@@ -75,8 +75,8 @@ std::optional<std::pair<SubmapId, server::Place>> place_of_row(std::string_view 
 Result<server::PlaceSet> read_places(const storage::TableStore& map);
 
 /// Rows `held/SUBMAP` of a map that does not move: the poses of the submap's keyframes in its world, 8 numbers each
-/// (the keyframe's index; the bits of x, y, z and of the quaternion's x, y, z, w).
-storage::Write to_row(SubmapId id, const std::vector<std::pair<std::uint32_t, Pose3>>& held);
+/// (the keyframe's index plus 2^32 times the floor's number; the bits of x, y, z and of the quaternion's x, y, z, w).
+storage::Write to_row(SubmapId id, const std::vector<std::pair<std::uint32_t, server::HeldPose>>& held);
 /// All of them; empty for a map whose poses may all move. Fails when a row is damaged: the map could move unseen.
 Result<server::HeldPoses> read_held_poses(const storage::TableStore& map);
 

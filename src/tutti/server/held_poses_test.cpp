@@ -28,7 +28,7 @@ MapEstimate map_of(std::uint32_t robots) {
 HeldPoses held_of(const MapEstimate& map) {
   const Pose3 T_held_world{Eigen::Quaterniond(Eigen::AngleAxisd(1.0, Eigen::Vector3d::UnitZ())), {100.0, -50.0, 3.0}};
   HeldPoses out;
-  for (const MapNode& node : map.nodes) out.emplace(node.id, T_held_world * node.T_world_body);
+  for (const MapNode& node : map.nodes) out.emplace(node.id, HeldPose{T_held_world * node.T_world_body});
   return out;
 }
 
@@ -38,7 +38,7 @@ TEST(HeldPoses, StayToTheBitWhileOthersAreLaidBesideThem) {
   std::size_t others = 0;
   for (const MapNode& node : map.nodes) {
     if (const auto found = held.find(node.id); found != held.end()) {
-      EXPECT_EQ(node.T_world_body, found->second);
+      EXPECT_EQ(node.T_world_body, found->second.T_world_body);
       continue;
     }
     ++others;
@@ -53,8 +53,37 @@ TEST(HeldPoses, StayToTheBitWhileOthersAreLaidBesideThem) {
 
 TEST(HeldPoses, ThatTheMapLacksChangeNothing) {
   const MapEstimate map = map_of(2);
-  const MapEstimate same = hold(map, {{KeyframeId{RobotId{9}, 0}, Pose3{}}}, {});
+  const MapEstimate same = hold(map, {{KeyframeId{RobotId{9}, 0}, {}}}, {});
   for (std::size_t i = 0; i < map.nodes.size(); ++i) EXPECT_EQ(same.nodes[i].T_world_body, map.nodes[i].T_world_body);
+}
+
+/// Robots 0 and 1 were held apart, each in a world of its own, and robot 2 joins them: the larger one stays.
+TEST(HeldPoses, OfFloorsThatWereJoinedTheMainOneStaysAndTheOtherComesToIt) {
+  const MapEstimate joined = map_of(3);
+  HeldPoses held = held_of(joined);
+  std::erase_if(held, [](const auto& pose) { return pose.first.chain.robot == RobotId{2}; });
+  const Pose3 T_other{Eigen::Quaterniond(Eigen::AngleAxisd(-2.0, Eigen::Vector3d::UnitZ())), {7.0, 900.0, 0.0}};
+  std::size_t left_out = 0;
+  for (auto& [id, pose] : held)
+    if (id.chain.robot == RobotId{1}) pose = {T_other * pose.T_world_body, 4};
+  std::erase_if(held, [&](const auto& pose) { return pose.first.chain.robot == RobotId{1} && left_out++ < 5; });
+  const MapEstimate map = hold(joined, held, {});
+  const MapNode& first = map.nodes.front();
+  for (const MapNode& node : map.nodes) {
+    const auto found = held.find(node.id);
+    EXPECT_TRUE(found == held.end() || found->second.floor != 0 || found->second.T_world_body == node.T_world_body);
+    const Pose3 truth = test::true_pose(first.id.chain.robot, first.id.index).inverse() *
+                        test::true_pose(node.id.chain.robot, node.id.index);
+    EXPECT_LT(local(truth, first.T_world_body.inverse() * node.T_world_body).head<3>().norm(), 0.6);
+  }
+}
+
+TEST(HeldPoses, FloorsThatNothingJoinsStayEachInItsWorld) {
+  MapEstimate map = map_of(1);
+  const HeldPoses held = held_of(map);
+  HeldPoses floors = held;
+  for (auto& [id, pose] : floors) pose.floor = 3;
+  for (const MapNode& node : hold(map, floors, {}).nodes) EXPECT_EQ(node.T_world_body, held.at(node.id).T_world_body);
 }
 
 }  // namespace held_poses_test
