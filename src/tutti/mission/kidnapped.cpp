@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "tutti/mission/chosen_scans.hpp"
+#include "tutti/mission/resample.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -73,7 +74,7 @@ Result<KidnappedRecording> kidnapped(const Recording& recording, double every_s)
   if (gaps.empty())
     return fail(ErrorCode::invalid, "{}: {:.0f} s long, expected more than {:g} + {:g} s to kidnap it once",
                 recording.name, odometry.back().stamp - odometry.front().stamp, every_s, kCarried_s);
-  const double step_s = odometry[1].stamp - odometry[0].stamp;
+  const double step_s = typical_gap_s(stamps_of(odometry));
   KidnappedRecording out;
   out.recording.robot = recording.robot;
   out.recording.name = recording.name;

@@ -65,6 +65,17 @@ TEST(Kidnapped, OdometryNoticesNothingAndScansAreOfTheNewPlace) {
   EXPECT_TRUE(out.scans->scan(out.odometry.size()).has_value());
 }
 
+/// A robot that stood before its second sample is not carried for so long either.
+TEST(Kidnapped, TheFirstSampleAfterwardsComesAUsualStepLater) {
+  Recording from = recording();
+  for (auto* const poses : {&from.odometry, &from.reference}) poses->front().stamp = Timestamp{} - 6.0;
+  const auto made = kidnapped(from, 15.0);
+  ASSERT_TRUE(made.has_value()) << made.error().message;
+  const Trajectory& odometry = made->recording.odometry;
+  for (std::size_t k = 2; k < odometry.size(); ++k)
+    EXPECT_NEAR(odometry[k].stamp - odometry[k - 1].stamp, kStep_s, 1e-6) << k;
+}
+
 TEST(Kidnapped, WhatCannotBeIsSaid) {
   Recording from = recording();
   EXPECT_FALSE(kidnapped(from, 90.0).has_value());

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "tutti/mission/chosen_scans.hpp"
+#include "tutti/mission/resample.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -68,7 +69,7 @@ Result<KidnappedRecording> ride_lift(const Recording& before, const Recording& a
     if (of->scans == nullptr || of->odometry.size() < 4)
       return fail(ErrorCode::invalid, "{}: no scans, expected robots with LiDAR to ride a lift", of->name);
   const std::size_t in = before.odometry.size() / 2, out_of = after.odometry.size() / 2;
-  const double step_s = before.odometry[1].stamp - before.odometry[0].stamp;
+  const double step_s = typical_gap_s(stamps_of(before.odometry));
   KidnappedRecording out;
   Recording& made = out.recording;
   made.robot = before.robot;

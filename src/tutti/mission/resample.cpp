@@ -29,6 +29,12 @@ Pose3 smoothly(const Trajectory& trajectory, std::size_t k, Timestamp stamp) {
 
 }  // namespace
 
+std::vector<Timestamp> stamps_of(const Trajectory& trajectory) {
+  std::vector<Timestamp> out;
+  for (const StampedPose& sample : trajectory) out.push_back(sample.stamp);
+  return out;
+}
+
 Status resample(Recording& recording, double rate_hz, double phase_s) {
   const Trajectory& old = recording.odometry;
   std::vector<Timestamp> stamps;

@@ -10,6 +10,7 @@
 #include "tutti/formats/image_file.hpp"
 #include "tutti/formats/image_folder.hpp"
 #include "tutti/formats/imu_file.hpp"
+#include "tutti/mission/resample.hpp"
 #include "tutti/model/pose_at.hpp"
 #include "tutti/perception/visual/frontend/tracking_source.hpp"
 
@@ -41,12 +42,6 @@ class NoImages final : public VisualSource {
 
 /// Odometry with gaps shorter than this much of the images' is faster than they are.
 constexpr double kFaster = 0.75;
-
-std::vector<Timestamp> stamps_of(const Trajectory& trajectory) {
-  std::vector<Timestamp> out;
-  for (const StampedPose& sample : trajectory) out.push_back(sample.stamp);
-  return out;
-}
 
 /// A recording none of whose first images can be read has none.
 Status check_first_images(const std::vector<formats::ImageFile>& files) {
