@@ -88,7 +88,7 @@ Status Localiser::hear(const OdometrySample& sample) {
 }
 
 bool Localiser::wants_scan(Timestamp stamp) const {
-  const bool is_followed = track_ || start_;
+  const bool is_followed = track_ || start_ || setup_.map->floors > 1;  // is_shut_in()
   return submaps_.wants_scan(stamp) ||
          (is_followed && (!last_match_ || stamp - *last_match_ >= setup_.config.track_every_s));
 }
