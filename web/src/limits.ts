@@ -35,6 +35,8 @@ export const LIMITS = {
   rows: 200,
   /** So many alerts of one cause are one line. */
   folds: 3,
+  /** Robots that a line names; beyond, it has their number. */
+  names: 3,
   /** Robots beyond which the list is dense and has a search. */
   dense_robots: 12,
   /** A picture narrower than this has its legend folded. */

@@ -254,6 +254,45 @@ test("a correction is shown in metres, beside where the map was", () =>
     await page.until("the correction is known", () => tutti.app.correction?.largest_m > 0.5 && tutti.app.shows_ghost());
   }));
 
+test("where the map no longer fits: the worst place first, who saw it and when; in the picture on a press", () =>
+  served(small(), async (page, server, mission) => {
+    assert.ok(!(await page.texts(".tabs button")).some((text) => /Places/.test(text)), "nobody has localised");
+    const place = (index, missing, appeared, trust, robots) => ({
+      submap: `0:1/${index}`,
+      name: `alpha/${index}`,
+      matched: 900,
+      missing,
+      appeared,
+      trust,
+      seen_s: mission.time - 10 * (index + 1),
+      robots,
+    });
+    const found = { map_id: "c0ffee", map_version: 3 };
+    server.send(mission.message("places", { ...found, places: [place(3, 0, 0, 1, [2])] }));
+    await page.press("Places");
+    await page.until("nothing has changed", () =>
+      /1 submap again; none has changed/.test(document.querySelector(".places").textContent),
+    );
+    const places = [place(1, 1, 0, 0.97, [2]), place(2, 40, 8, 0.8, [2, 1, 0, 2]), place(3, 0, 0, 1, [2])];
+    server.send(mission.message("places", { ...found, places }));
+    await page.until("two have", () => document.querySelectorAll(".places .closure").length === 3);
+    assert.ok((await page.texts(".tabs button")).includes("Places 2"));
+    assert.deepEqual(await page.texts(".places .closure b"), ["alpha/2", "alpha/1", "alpha/3"]);
+    assert.deepEqual(await page.texts(".places .detail"), [
+      "40 cubes gone, 8 cubes new, 80.0\u00a0% fits · by charlie, bravo, alpha and 1 more",
+      "1 cube gone, 97.0\u00a0% fits · by charlie",
+      "100.0\u00a0% fits · by charlie",
+    ]);
+    assert.match((await page.texts(".places .seen"))[0], /^\d+\u00a0(s|min.*) ago$/);
+    await page.click(".places .closure");
+    assert.equal(await page.evaluate(() => tutti.app.selection.id), "0:1/2");
+    await page.press("Show it in the map");
+    await page.until("its colours are explained", () =>
+      /share that fits/.test(document.querySelector(".legend-box").textContent),
+    );
+    await page.press("Colour by robot again");
+  }));
+
 test("a mark is placed where somebody points, shown, and removed", () =>
   served(small(), async (page, server) => {
     await page.evaluate(() => localStorage.setItem("tutti.by", JSON.stringify("eva")));

@@ -46,6 +46,13 @@ function in_the_map(app: App): Child {
   );
 }
 
+/** The last that saw it, and how many more. */
+function seen_by(app: App, robots: number[]): string {
+  const names = robots.slice(0, LIMITS.names).map((n) => app.robot_name(n));
+  const more = robots.length - names.length;
+  return `by ${names.join(", ")}${more > 0 ? ` and ${more} more` : ""}`;
+}
+
 function line(app: App, view: View, place: Place): HTMLElement {
   const chosen = app.selection?.kind === "submap" && place.submap !== "" && app.selection.id === place.submap;
   const change = [
@@ -77,7 +84,7 @@ function line(app: App, view: View, place: Place): HTMLElement {
     h(
       "span",
       { class: "detail" },
-      `${[...change, `${share(place.trust)} fits`].join(", ")} · by ${place.robots.map((n) => app.robot_name(n)).join(", ")}`,
+      `${[...change, `${share(place.trust)} fits`].join(", ")} · ${seen_by(app, place.robots)}`,
     ),
   );
 }
