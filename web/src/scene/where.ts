@@ -5,13 +5,17 @@ import { compose, inverse, transform } from "../pose";
 import type { RobotView } from "../derive";
 import type { Vec3 } from "../schema";
 
-/** Where a robot is now: beyond its newest submap by its odometry, where the submap states how its frame lies in odometry. */
+/**
+ * Where a robot is now: beyond its newest submap by its odometry, where the submap states how its frame lies in odometry and
+ * the server has heard the robot. Of one that only the map knows, nobody knows more than the map.
+ */
 export function position_of(app: App, robot: RobotView): Vec3 | null {
   const { newest, status } = robot;
   if (!newest) return null;
   const placed = app.world.placed.get(newest.id);
   if (!placed) return null;
-  if (newest.T_odom_submap && status?.position && status.session === newest.session)
+  const is_known = status !== null && status.last_seen_s_ago !== null && status.session === newest.session;
+  if (newest.T_odom_submap && is_known && status.position)
     return transform(compose(placed.T, inverse(newest.T_odom_submap)), status.position);
   return transform(placed.T, newest.path.at(-1) ?? [0, 0, 0]);
 }
