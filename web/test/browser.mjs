@@ -288,7 +288,7 @@ test("where the map no longer fits: the worst place first, who saw it and when; 
     assert.equal(await page.evaluate(() => tutti.app.selection.id), "0:1/2");
     await page.press("Show it in the map");
     await page.until("its colours are explained", () =>
-      /share that fits/.test(document.querySelector(".legend-box").textContent),
+      /share that fits.*100 %80\.0\u00a0%/.test(document.querySelector(".legend-box").textContent),
     );
     await page.press("Colour by robot again");
   }));

@@ -3,7 +3,7 @@
 import type { Cloud, Clouds } from "../cloud";
 import { abgr, bad, css, even, height_ramp, mix, ramp_of, robot_rgb } from "../colours";
 import type { Rgb } from "../colours";
-import { figure, metres, span } from "../format";
+import { figure, metres, share, span } from "../format";
 import type { Options } from "../options";
 import { rows_of, transform } from "../pose";
 import type { Painted, Window3 } from "../raster";
@@ -44,22 +44,24 @@ const kHolding: { most: number; colour: Rgb; label: string }[] = [
   { most: Infinity, colour: [70, 200, 150], label: "3 or more" },
 ];
 
-/** What is trusted by so much less than wholly has the worst colour. */
-export const LEAST_TRUST = 0.3;
+/** The share that does not fit has the worst colour where it is largest, but for less than this. */
+export const LEAST_DISTRUST = 0.02;
 
-/** Largest sigma of a submap, oldest age, worst disagreement in units of its threshold: the ends of scales. */
+/** Largest sigma of a submap, oldest age, worst disagreement in units of its threshold, worst misfit: the ends of scales. */
 interface Scales {
   sigma_m: number;
   age_s: number;
   disagreement: number;
+  distrust: number;
 }
 
 function scales_of(world: World, d: Dressing): Scales {
-  const out = { sigma_m: 0.01, age_s: 10, disagreement: 2 };
+  const out = { sigma_m: 0.01, age_s: 10, disagreement: 2, distrust: LEAST_DISTRUST };
   for (const p of world.placed.values()) {
     if (p.sigma_m > out.sigma_m) out.sigma_m = p.sigma_m;
     out.age_s = Math.max(out.age_s, d.t - p.submap.until_s);
     out.disagreement = Math.max(out.disagreement, d.disagreement(p.id) ?? 0);
+    out.distrust = Math.max(out.distrust, 1 - (d.trust(p.id) ?? 1));
   }
   return out;
 }
@@ -82,7 +84,7 @@ function colour_of(p: Placed, d: Dressing, s: Scales): Rgb {
     }
     case "trust": {
       const x = d.trust(p.id);
-      return x === null ? [130, 138, 150] : bad((1 - x) / LEAST_TRUST);
+      return x === null ? [130, 138, 150] : bad((1 - x) / s.distrust);
     }
     case "part":
       return robot_rgb(p.component, d.dark);
@@ -188,12 +190,7 @@ export function legend_of(world: World, d: Dressing): Legend {
     case "disagreement":
       return scale("disagreement, times the threshold", bad, "0", figure(s.disagreement), "1");
     case "trust":
-      return scale(
-        "share that fits what robots see now; grey: none saw it",
-        bad,
-        "100 %",
-        `${100 * (1 - LEAST_TRUST)} % or less`,
-      );
+      return scale("share that fits what robots see now; grey: none saw it", bad, "100 %", share(1 - s.distrust));
     case "held":
       return {
         title: "closures that hold it",

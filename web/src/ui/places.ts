@@ -5,7 +5,7 @@ import { bad, css } from "../colours";
 import { many, share, span } from "../format";
 import { LIMITS } from "../limits";
 import type { Place } from "../schema";
-import { LEAST_TRUST } from "../scene/dress";
+import { LEAST_DISTRUST } from "../scene/dress";
 import type { View } from "../scene/view";
 import { button, h, panel, swatch } from "./dom";
 import type { Child } from "./dom";
@@ -17,6 +17,7 @@ export function places_panel(app: App, view: View): HTMLElement {
     const found = app.store.get("places", app.at());
     if (!found) return [h("p", { class: "empty" }, "No robot has said yet how the map fits.")];
     const changed = found.places.filter(has_changed).sort((a, b) => a.trust - b.trust);
+    const worst = Math.max(LEAST_DISTRUST, ...found.places.map((place) => 1 - place.trust));
     const others = found.places.filter((place) => !has_changed(place)).sort((a, b) => a.seen_s - b.seen_s);
     return [
       h(
@@ -26,9 +27,9 @@ export function places_panel(app: App, view: View): HTMLElement {
         changed.length === 0 ? "none has changed." : `something has changed in ${changed.length}:`,
       ),
       found.places.some((place) => place.submap !== "") ? in_the_map(app) : null,
-      changed.slice(0, LIMITS.rows).map((place) => line(app, view, place)),
+      changed.slice(0, LIMITS.rows).map((place) => line(app, view, place, worst)),
       others.length > 0 ? h("p", { class: "lead" }, "Those that fit, the longest unseen first:") : null,
-      others.slice(0, LIMITS.rows).map((place) => line(app, view, place)),
+      others.slice(0, LIMITS.rows).map((place) => line(app, view, place, worst)),
     ];
   });
 }
@@ -53,7 +54,8 @@ function seen_by(app: App, robots: number[]): string {
   return `by ${names.join(", ")}${more > 0 ? ` and ${more} more` : ""}`;
 }
 
-function line(app: App, view: View, place: Place): HTMLElement {
+/** `worst`: the largest share of a place that does not fit. */
+function line(app: App, view: View, place: Place, worst: number): HTMLElement {
   const chosen = app.selection?.kind === "submap" && place.submap !== "" && app.selection.id === place.submap;
   const change = [
     place.missing > 0 ? `${many(place.missing, "cube")} gone` : "",
@@ -77,7 +79,7 @@ function line(app: App, view: View, place: Place): HTMLElement {
     h(
       "span",
       { class: "line" },
-      swatch(css(bad((1 - place.trust) / LEAST_TRUST))),
+      swatch(css(bad((1 - place.trust) / worst))),
       h("b", {}, place.name),
       h("span", { class: "seen" }, `${span(app.shown() - place.seen_s)} ago`),
     ),
