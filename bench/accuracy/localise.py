@@ -2,9 +2,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Writes docs/results/localise.md: robots in maps that do not move.
 
-Usage: bench/accuracy/localise.py TUTTI_PROGRAM --shared FOLDER [--seeds 3]
+Usage: bench/accuracy/localise.py TUTTI_PROGRAM --shared FOLDER [--seeds 3] [--keep FOLDER]
+
+--keep: what is in this folder is not measured again (use a new one for a new program).
 """
 import argparse
+import hashlib
 import json
 import pathlib
 import subprocess
@@ -14,36 +17,69 @@ from runs import mission_file, page, row, write_results
 
 # A name, the mission, whether it is real, seeds, what maps it, who is localised
 LATE = 100000
+CAMERAS = ("hall", "euroc_v101_halves")
 RESTART_S, KIDNAP_S, ONE_SUBMAP_S, SAID_S = 30, 30, 12, 2
 CASES = [
     ("HKU session 2 in session 1's map", "hku_two_sessions", "real", False, ["robots.1.start_s=%d" % LATE, "duration_s=130"]),
     ("HKU session 1 in session 2's map", "hku_two_sessions", "real", False, ["robots.0.start_s=%d" % LATE, "duration_s=130"]),
+    ("EuRoC V1_01, its second half in its first's map, cameras", "euroc_v101_halves", "real", False,
+     ["robots.1.start_s=%d" % LATE, "duration_s=130"]),
+    ("EuRoC V1_01, its first half in its second's map, cameras", "euroc_v101_halves", "real", False,
+     ["robots.0.start_s=%d" % LATE, "duration_s=130"]),
     ("a tunnel, four minutes, other robots", "next_day", "simulated", True, ["duration_s=240"]),
     ("a hall, three flights with cameras alone", "hall", "simulated", True, ["hall.robots.2.start_s=%d" % LATE, "duration_s=130"]),
     ("a regular grid of look-alike corridors, twenty starts", "look_alike", "simulated", False, ["duration_s=480"]),
 ]
 
 
-def run(tutti, *words):
-    done = subprocess.run([str(tutti), *[str(word) for word in words]], capture_output=True, text=True)
+def run(program, *words):
+    done = subprocess.run([str(program), *[str(word) for word in words]], capture_output=True, text=True)
     if done.returncode != 0:
         raise SystemExit(f"{' '.join(str(word) for word in words)}: {done.stderr}")
+    return done.stdout
 
 
-def localised(tutti, mission, data, seed, mapping):
-    """The robots' figures of localise.json: of one start, where robots forget their place every RESTART_S, and where those with
-    LiDAR are carried elsewhere every KIDNAP_S."""
-    with tempfile.TemporaryDirectory() as folder:
-        folder = pathlib.Path(folder)
-        common = [mission_file(mission), "--seed", seed, *(["--data", data] if data else [])]
-        settings = [word for one in mapping for word in ("--set", one)]
-        run(tutti, "run", *common, *settings, "--map", folder / "map.tutti", "-o", folder / "mapped")
+def remembered(keep, what, make):
+    """make(), or what it was the last time."""
+    kept = pathlib.Path(keep) / (hashlib.sha256(json.dumps(what).encode()).hexdigest()[:16] + ".json") if keep else None
+    if kept and kept.exists():
+        return json.loads(kept.read_text())
+    made = make()
+    if kept:
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        kept.write_text(json.dumps(made))
+    return made
+
+
+class Runs:
+    """A mission's robots in the map that the others of them made."""
+    def __init__(self, arguments, mission, kind, mapping):
+        self.tutti, self.keep = arguments.tutti, arguments.keep
+        self.mission, self.mapping = mission, mapping
+        self.data = ["--data", pathlib.Path(arguments.shared) / "data"] if kind == "real" else []
+
+    def mapped(self, folder, seed):
+        """The map, and what names the mission."""
+        common = [mission_file(self.mission), "--seed", seed, *self.data]
+        settings = [word for one in self.mapping for word in ("--set", one)]
+        run(self.tutti, "run", *common, *settings, "--map", folder / "map.tutti", "-o", folder / "mapped")
+        return folder / "map.tutti", common
+
+    def localised(self, seed):
+        """The robots' figures of localise.json: of one start, where robots forget their place every RESTART_S, and where those
+        with LiDAR are carried elsewhere every KIDNAP_S."""
         trials = {"once": [], "often": ["--restart-every", RESTART_S], "carried": ["--kidnap-every", KIDNAP_S]}
-        if mission == "hall":  # cameras alone
+        if self.mission in CAMERAS:
             del trials["carried"]
-        for name, more in trials.items():
-            run(tutti, "run", *common, "--map-in", folder / "map.tutti", "--frozen", *more, "-o", folder / name)
-        return [json.loads((folder / name / "localise.json").read_text())["robots"] for name in trials]
+
+        def make():
+            with tempfile.TemporaryDirectory() as folder:
+                folder = pathlib.Path(folder)
+                known, common = self.mapped(folder, seed)
+                for name, more in trials.items():
+                    run(self.tutti, "run", *common, "--map-in", known, "--frozen", *more, "-o", folder / name)
+                return [json.loads((folder / name / "localise.json").read_text())["robots"] for name in trials]
+        return remembered(self.keep, [self.mission, self.mapping, seed, trials], make)
 
 
 def percent(value):
@@ -92,6 +128,7 @@ def main():
     parser.add_argument("tutti")
     parser.add_argument("--shared", required=True, help="folder with data/")
     parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--keep", help="folder for what was measured")
     arguments = parser.parse_args()
     starts = [row("map and robots", "input", "starts", "fixes", "after (median)", "in one submap", "wrong"),
               row("---", "---", *["---:"] * 5)]
@@ -100,10 +137,9 @@ def main():
     carried = [row("map and robots", "input", "kidnaps", f"said within {SAID_S} s", "said, worst", "found again", "after (median)", "worst",
                    "wrong"), row("---", "---", *["---:"] * 7)]
     for name, mission, kind, all_seeds, mapping in CASES:
-        data = pathlib.Path(arguments.shared) / "data" if kind == "real" else None
         once, often, taken = [], [], []
         for seed in range(1, (arguments.seeds if all_seeds else 1) + 1):
-            for robots, found in zip((once, often, taken), localised(arguments.tutti, mission, data, seed, mapping)):
+            for robots, found in zip((once, often, taken), Runs(arguments, mission, kind, mapping).localised(seed)):
                 robots += found
         table.append(row(name, kind, *cells(once)))
         starts.append(row(name, kind, *start_cells(once, often)))
@@ -140,8 +176,15 @@ def main():
         "Said within 2 s, and found within one more submap, was asked of all: missed where scans of the new place half fit the map at the old",
         "one, and where corridors look the same a robot that was carried to such a place does not notice.",
         "",
-        "Not measured yet: ten thousand starts ([starts.md](starts.md) has hundreds), KITTI, EuRoC and KAIST, a lift, PCL's NDT and GICP beside",
-        "it. Moved furniture is in [map-versions.md](../map-versions.md).",
+        "## What is missing",
+        "",
+        "KITTI and KAIST are at hand as trajectories without scans. Their closures are made from the truth, so a robot that is laid into a",
+        "map by them shows what the solver makes of given closures, and nothing of finding a place: no row here. Of EuRoC V1_01's tracks are",
+        "at hand, and 100 of its stereo pairs, which are too far apart to follow points. There the covariance is too small: 0.92 and 0.98 of",
+        "the errors are within three sigma.",
+        "",
+        "Not measured yet: ten thousand starts ([starts.md](starts.md) has hundreds), a lift, PCL's NDT and GICP beside it.",
+        "Moved furniture is in [map-versions.md](../map-versions.md).",
     ))
 
 
