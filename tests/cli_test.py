@@ -467,6 +467,27 @@ class CommandLine(unittest.TestCase):
         self.expect(tutti("map", "info", self.path / "both"), 0, "submaps")
         self.expect(tutti("map", "diff", site, self.path / "both"), 1, "no clouds in the joint map")  # of another place
 
+    def finds_no_place(self, *run):
+        """Robots in the map of another site: nothing is ever published, and why is said."""
+        out = self.path / "nowhere"
+        self.expect(tutti("run", *run, "--frozen", "--out", out), 0)
+        for robot in json.loads((out / "localise.json").read_text())["robots"]:
+            self.assertEqual([start["fix_after_s"] for start in robot["starts"]], [None], robot)
+            self.assertEqual(robot["share_of_time"]["localised"], 0)
+            self.assertEqual(robot["share_of_time"]["off the map"], 0, "it never knew where it was")
+            self.assertGreater(robot["work"]["submaps_compared"], 0)
+            self.assertEqual((out / f"{robot['robot']}_localised.tum").read_text().strip().count("\n"), 0)
+            states = (out / f"{robot['robot']}_states.csv").read_text()
+            self.assertRegex(states, r",(searching|ambiguous),")
+
+    @unittest.skipIf(os.environ.get("TUTTI_SANITIZE"), "takes long")
+    def test_cameras_in_the_map_of_another_hall_find_no_place(self):
+        mission, other = pathlib.Path(__file__).resolve().parents[1] / "missions" / "hall.yaml", self.path / "other.tutti"
+        late = ["--set", "hall.robots.2.start_s=1000"]
+        self.expect(tutti("run", mission, "--seed", "2", *late, "--set", "duration_s=40", "--map", other, "--out",
+                          self.path / "mapped"), 0)
+        self.finds_no_place(mission, *late, "--map-in", other)
+
     def test_a_map_is_extended_and_taken_back(self):
         day, next_day, back = (self.path / name for name in ("day.tutti", "next.tutti", "back.tutti"))
         extend = ["run", "demo", *BRIEF, "--seed", "2", "--map-in", day, "--extend"]
