@@ -104,10 +104,9 @@ def run_live(reader, lines):
     printed = reader.wait_for("the server's line for robots", lambda: re.search(r"--bus nats://(\S+)", (reader.folder / "server.out").read_text()))
     robot = robot.replace("HOST:PORT", printed[1])
     has_ros = "--ros" in reader.type("tutti robot --help")
-    reader.start(robot if has_ros else re.sub(r"--ros\b.*", "--feed alpha.sock", robot), "robot")
-    play = "tutti bag play recordings/alpha --wait-for /alpha/odom --rate 4"
-    fed = f"until [ -S alpha.sock ]; do sleep 0.1; done; tutti mission play demo --name alpha --feed alpha.sock --rate 4 --set '{BRIEF}'"
-    reader.type(play if has_ros else fed)
+    reader.start(robot if has_ros else re.sub(r"--ros\b.*", f"demo --stay --rate 4 --set '{BRIEF}'", robot), "robot")
+    if has_ros:
+        reader.type("tutti bag play recordings/alpha --wait-for /alpha/odom --rate 4")
     reader.wait_for("submaps of alpha", lambda: re.search(r"[1-9][0-9]* submaps", reader.type(f"tutti status {printed[0]} --mission site")))
     with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=WAIT_S) as page:
         if "tutti" not in page.read().decode().lower():

@@ -10,7 +10,6 @@
 #include "live_mission.hpp"
 #include "options.hpp"
 #include "program_options.hpp"
-#include "tutti/lab/feed_player.hpp"
 #include "tutti/lab/mission_up.hpp"
 #include "tutti/mission/report/report.hpp"
 
@@ -33,49 +32,17 @@ Status run_as_programs(lab::MissionUpOptions& options, program::Level console) {
   return {};
 }
 
-namespace {
-
-/// `mission up` runs it, and whoever wants a robot's program fed as its driver would.
-void add_play_command(CLI::App& group, int& exit_code) {
-  const auto options = std::make_shared<lab::FeedPlayerOptions>();
-  const auto common = std::make_shared<ProgramArguments>();
-  CLI::App* command = group.add_subcommand("play",
-                                           "Play one simulated or recorded robot of a mission over the live feed of "
-                                           "its program (tutti robot --feed), as its\n"
-                                           "driver would: odometry, scans, images and IMU samples when they are due.");
-  add_mission_argument(*command, *common, "The mission, or 'demo'")->required();
-  command->add_option("--name", options->robot, "The robot, as the mission calls it")->type_name("NAME")->required();
-  command->add_option("--feed", options->socket, "The socket of the robot's program")->type_name("SOCKET")->required();
-  command
-      ->add_option(
-          "--scores", options->scores,
-          "Folder for what the robot makes of the map against its reference; with it, it listens until SIGTERM")
-      ->type_name("DIR");
-  add_rate_option(*command, options->rate, "Times real time");
-  add_program_options(*command, *common);
-  command->callback([options, common, &exit_code] {
-    options->mission = common->mission;
-    program::Level console{};
-    exit_code =
-        run_program("mission play", *common, console, [&] { return lab::play_feed(*options, program::stop_asked()); });
-  });
-}
-
-}  // namespace
-
 void add_mission_command(CLI::App& app, int& exit_code) {
   CLI::App* group = app.add_subcommand("mission", "A mission as separate programs: see tutti mission up --help");
   group->require_subcommand(1);
-  add_play_command(*group, exit_code);
   const auto options = std::make_shared<lab::MissionUpOptions>();
   const auto common = std::make_shared<ProgramArguments>();
   CLI::App* command = group->add_subcommand("up",
                                             "Start server, robots and workers of a mission as programs of their own on "
-                                            "this machine, which talk over NATS, play "
-                                            "each\n"
-                                            "robot over its live feed; wait until every one has had its recording and "
-                                            "heard the last map; stop them and write the same report as\n"
-                                            "tutti run. What each program reported and stored is left in OUT/state.");
+                                            "this machine, which talk over NATS; wait until every robot has\n"
+                                            "replayed its recording and heard the last map; stop them and write the "
+                                            "same report as tutti run. What each program\n"
+                                            "reported and stored is left in OUT/state.");
   add_mission_argument(*command, *common, "The mission, or 'demo'")->required();
   command
       ->add_option("-o,--out", options->out,

@@ -102,7 +102,7 @@ def main():
         "a place again to the millimetre. An antenna that is not known costs its length where fixes are of 5 cm.", "",
         "Two wrong closures that agree joined the two 134.6 m off with seed 4 (mode `off`, with loops, errors of 1.5 m); `factors` takes them back: 0.57 m.",
         "`tutti demo`, which has no fixes: `report.json` is the same, byte for byte, as before there were any.",
-        "Fed live (`tutti mission up missions/apart_fixes.yaml`, four minutes each) the map, its origin and which fixes count are those of `tutti run`, and the submaps the same bytes.")
+        "As programs (`tutti mission up missions/apart_fixes.yaml`, four minutes each) the map, its origin and which fixes count are those of `tutti run`, and the submaps the same bytes.")
     _, section, by_hand = (SOURCE / "docs/results/fixes.md").read_text().partition("\n## Another size of place")
     write_results("fixes.md", text + [section + by_hand])
 

@@ -71,6 +71,7 @@ struct Robot {
   std::unique_ptr<storage::TableStore> store;
   std::unique_ptr<mission::RobotActor> actor;
   mission::FinishedRobot finished;
+  std::vector<mission::UpdateRecord> scores;
   mission::PolicyTiming timing;
 };
 
@@ -93,6 +94,11 @@ Status take(const Json& event, const std::string& name, Robot& robot) try {
     auto update = update_of(event);
     if (!update) return tl::unexpected(update.error());
     robot.finished.updates.push_back(std::move(*update));
+  }
+  if (what == kUpdateScored) {
+    auto score = update_of(event);
+    if (!score) return tl::unexpected(score.error());
+    robot.scores.push_back(std::move(*score));
   }
   if (what == program::kUpdateTimed) {
     const auto add = [&](const char* key, std::vector<double>& to) {
@@ -121,18 +127,15 @@ Status take(const Json& event, const std::string& name, Robot& robot) try {
   return fail(ErrorCode::parse, "event {}: {}", event.dump(), error.what());
 }
 
-/// What a player has scored, beside what the robot reported of the same update.
-Status take_score(const Json& event, Robot& robot) {
-  if (event.value("event", "") != kUpdateScored) return {};
-  auto score = update_of(event);
-  if (!score) return tl::unexpected(score.error());
+/// Beside what the robot reported of the same updates, which come later.
+void add_scores(Robot& robot) {
   for (mission::UpdateRecord& update : robot.finished.updates) {
-    if (update.revision != score->revision) continue;
+    const auto score = std::ranges::find(robot.scores, update.revision, &mission::UpdateRecord::revision);
+    if (score == robot.scores.end()) continue;
     update.onboard_rmse_m = score->onboard_rmse_m;
     update.server_rmse_m = score->server_rmse_m;
     update.answers = score->answers;
   }
-  return {};
 }
 
 /// What the robot would report of the last map, once more: its own odometry against it, whatever it has corrected.
@@ -156,7 +159,7 @@ std::string cut_short(const std::string& whose, std::uint64_t files) {
 }
 
 Result<Robot> read_robot(const MissionConfig& config, const mission::MissionRecording& recording,
-                         const fs::path& folder, const fs::path& scores) {
+                         const fs::path& folder) {
   const std::string& name = recording.recording.name;
   Robot robot;
   auto store = storage::open_sqlite_store(folder / program::kRobotFile, storage::robot_schema());
@@ -172,14 +175,9 @@ Result<Robot> read_robot(const MissionConfig& config, const mission::MissionReco
     if (taken) taken = take(event, name, robot);
   });
   if (!read || !taken) return in_context(folder.string(), read ? taken.error() : read.error());
+  add_scores(robot);
   robot.finished.troubles = robot.troubles.lines(name);
-  const bool was_fed = fs::exists(scores);  // else the robot has scored itself
-  const auto scored = program::read_events(was_fed ? scores : folder, [&](const Json& event) {
-    if (taken) taken = take_score(event, robot);
-  });
-  if (!scored || !taken) return in_context(scores.string(), scored ? taken.error() : scored.error());
-  for (const auto& [whose, gone] : {std::pair(name, *read), std::pair(name + "'s player", was_fed ? *scored : 0)})
-    if (gone > 0) robot.finished.troubles.push_back(cut_short(whose, gone));
+  if (*read > 0) robot.finished.troubles.push_back(cut_short(name, *read));
   robot.finished.outcome = robot.actor->outcome();
   return robot;
 }
@@ -240,8 +238,7 @@ Result<mission::MissionRecord> collect_mission(const MissionConfig& config, cons
   std::vector<Robot> robots;
   std::set<RobotId> ids;
   for (const mission::MissionRecording& recording : input->robots) {
-    auto robot = read_robot(config, recording, state / "robots" / recording.recording.name,
-                            state / "players" / recording.recording.name);
+    auto robot = read_robot(config, recording, state / "robots" / recording.recording.name);
     if (!robot) return tl::unexpected(robot.error());
     robots.push_back(std::move(*robot));
     ids.insert(recording.recording.robot);

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <chrono>
 #include <optional>
-#include <set>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -43,28 +42,10 @@ bool is_over(const MissionStatus& status, const std::vector<std::string>& names)
   });
 }
 
-/// A folder of its own whose name is short, as a socket's must be.
-struct SocketFolder {
-  SocketFolder() {
-    std::string name = (fs::temp_directory_path() / "tutti-XXXXXX").string();
-    if (mkdtemp(name.data()) != nullptr) path = name;
-  }
-  ~SocketFolder() {
-    std::error_code ignored;
-    if (!path.empty()) fs::remove_all(path, ignored);
-  }
-  SocketFolder(const SocketFolder&) = delete;
-  SocketFolder& operator=(const SocketFolder&) = delete;
-  fs::path path;
-};
-
 class MissionUp {
  public:
   MissionUp(const MissionUpOptions& options, MissionConfig config)
-      : options_(options), config_(std::move(config)), names_(robot_names(config_)), state_(options.out / "state") {
-    for (const mission::RobotConfig& robot : config_.robots)
-      if (!robot.images.maplab_submaps.empty()) replays_.insert(robot.name);
-  }
+      : options_(options), config_(std::move(config)), names_(robot_names(config_)), state_(options.out / "state") {}
   Status start(const std::atomic<bool>& stop);
   Status watch(const std::atomic<bool>& stop);
   void end();
@@ -73,7 +54,7 @@ class MissionUp {
  private:
   /// `member`: whose credential it gets, if the bus has rights; empty: nobody's.
   [[nodiscard]] std::vector<std::string> command_line(const std::string& command, const std::string& member,
-                                                      const fs::path& folder, bool replays) const;
+                                                      const fs::path& folder) const;
   Status make_credentials();
   Status start_server(const std::atomic<bool>& stop);
   void report(const MissionStatus& status) const;
@@ -81,10 +62,8 @@ class MissionUp {
   const MissionUpOptions& options_;
   MissionConfig config_;
   std::vector<std::string> names_;
-  std::set<std::string> replays_;  // robots that read their own recording: keypoints of maplab, which no driver feeds
-  std::string name_;               // on the bus
+  std::string name_;  // on the bus
   fs::path state_;
-  SocketFolder sockets_;
   Children children_;
   std::string bus_;
   std::optional<pki::Pki> pki_;  // of a bus with rights
@@ -96,18 +75,17 @@ class MissionUp {
 
 /// The command line that all programs get.
 std::vector<std::string> MissionUp::command_line(const std::string& command, const std::string& member,
-                                                 const fs::path& folder, bool replays) const {
+                                                 const fs::path& folder) const {
   const MissionSource& mission = options_.mission;
   std::vector<std::string> out{options_.program.string(), command, mission.file, "--seed",
                                std::to_string(mission.seed)};
   const auto add = [&](std::initializer_list<std::string> more) { out.insert(out.end(), more); };
-  if (!mission.data.empty() && (command != "robot" || replays_.contains(member)))
-    add({"--data", mission.data.string()});
+  if (!mission.data.empty()) add({"--data", mission.data.string()});
   for (const std::string& assignment : mission.assignments) add({"--set", assignment});
   if (!folder.empty()) add({"--state", folder.string()});
-  if (replays) add({"--rate", fmt::format("{}", options_.rate)});
-  if (!bus_.empty() && command != "mission") add({"--bus", bus_});
-  if (command != "mission") add({"--mission", name_});
+  if (command != "worker") add({"--rate", fmt::format("{}", options_.rate)});
+  if (!bus_.empty()) add({"--bus", bus_});
+  add({"--mission", name_});
   if (pki_ && !member.empty()) add({"--credentials", pki_->credential(member).string()});
   add({"--end-with-parent", std::to_string(getpid())});
   return out;
@@ -137,7 +115,7 @@ Status MissionUp::start_server(const std::atomic<bool>& stop) {
   fs::create_directories(state_, error);
   if (error) return fail(ErrorCode::io, "{}: cannot be made: {}", state_.string(), error.message());
   if (Status made = make_credentials(); !made) return made;
-  auto server = command_line("server", "", state_ / "server", true);
+  auto server = command_line("server", "", state_ / "server");
   if (pki_) server.insert(server.end(), {"--pki", (state_ / "pki").string()});
   server.insert(server.end(), {"--threads", std::to_string(options_.workers > 0 ? 0 : options_.threads)});
   if (!options_.view.empty()) server.insert(server.end(), {"--view", options_.view});
@@ -161,26 +139,17 @@ Status MissionUp::start(const std::atomic<bool>& stop) {
   auto on_bus = name_on_bus(options_.mission, config_);
   if (!on_bus) return tl::unexpected(on_bus.error());
   name_ = std::move(*on_bus);
-  if (sockets_.path.empty()) return fail(ErrorCode::io, "no folder for sockets can be made");
   if (Status started = start_server(stop); !started) return started;
   for (int i = 0; i < options_.workers; ++i) {
     const std::string name = worker_name(i);
-    auto worker = command_line("worker", name, {}, false);
+    auto worker = command_line("worker", name, {});
     worker.insert(worker.end(), {"--threads", std::to_string(options_.threads)});
     if (Status started = children_.start(name, worker, state_ / (name + ".out")); !started) return started;
   }
   for (const std::string& name : names_) {
-    const std::string feed = (sockets_.path / name).string();
-    auto robot = command_line("robot", name, state_ / "robots" / name, true);
+    auto robot = command_line("robot", name, state_ / "robots" / name);
     robot.insert(robot.end(), {"--name", name, "--stay", "--session", "0"});
-    if (!replays_.contains(name)) robot.insert(robot.end(), {"--feed", feed});
     if (Status started = children_.start("robot " + name, robot, state_ / (name + ".out")); !started) return started;
-    if (replays_.contains(name)) continue;
-    auto player = command_line("mission", "", {}, true);
-    player.insert(player.begin() + 2, "play");
-    player.insert(player.end(), {"--name", name, "--feed", feed, "--scores", (state_ / "players" / name).string()});
-    const fs::path output = state_ / (name + "_player.out");
-    if (Status started = children_.start("player " + name, player, output); !started) return started;
   }
   return {};
 }
@@ -228,10 +197,7 @@ void MissionUp::report(const MissionStatus& status) const {
 /// The server last: it still takes what the others send.
 void MissionUp::end() {
   wall_s_ = std::chrono::duration<double>(SteadyClock::now() - begin_).count();
-  std::vector<std::string> others, players;
-  for (const std::string& name : names_)
-    if (!replays_.contains(name)) players.push_back("player " + name);
-  children_.stop(players);
+  std::vector<std::string> others;
   for (const std::string& name : names_) others.push_back("robot " + name);
   for (int i = 0; i < options_.workers; ++i) others.push_back(worker_name(i));
   children_.stop(others);

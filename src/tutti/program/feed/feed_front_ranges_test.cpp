@@ -6,11 +6,11 @@
 #include <utility>
 #include <vector>
 
+#include "support/program/feed/client_messages.hpp"
 #include "support/program/feed/node_target.hpp"
 #include "support/robot/drifting_robot.hpp"
 #include "tutti/program/feed/feed_frames.hpp"
 #include "tutti/program/feed/feed_front.hpp"
-#include "tutti/program/feed/internal/feed_messages.hpp"
 #include "tutti/program/feed/robot_view.hpp"
 #include "tutti/wire/codec.hpp"
 
@@ -28,7 +28,7 @@ std::string why(const Status& status) { return status ? "" : status.error().mess
 
 TEST(FeedFrontRanges, ComeThroughTheSocketAsTheyWereSent) {
   for (const RobotRange& sent : {range({5}), range({-7}, ""), RobotRange{}}) {
-    const auto message = decode_from_client(internal::message_of(sent).SerializeAsString());
+    const auto message = decode_from_client(test::message_of(sent).SerializeAsString());
     ASSERT_TRUE(message) << message.error().message;
     const auto* heard = sample_in<RobotRange>(*message);
     ASSERT_NE(heard, nullptr);

@@ -8,16 +8,6 @@
 namespace tutti::program {
 namespace {
 
-template <class Stamps, class Numbers>
-Trajectory trajectory(const Stamps& stamps, const Numbers& numbers) {
-  Trajectory out;
-  for (int i = 0; i < stamps.size() && 7 * i + 6 < numbers.size(); ++i) {
-    const auto at = [&](int k) { return numbers.Get(7 * i + k); };
-    out.push_back({{stamps.Get(i)}, {Eigen::Quaterniond(at(6), at(3), at(4), at(5)), {at(0), at(1), at(2)}}});
-  }
-  return out;
-}
-
 Pose3 pose(const v1::Feed::Pose& in) {
   return {Eigen::Quaterniond(in.qw(), in.qx(), in.qy(), in.qz()), {in.x(), in.y(), in.z()}};
 }
@@ -25,7 +15,6 @@ Pose3 pose(const v1::Feed::Pose& in) {
 FeedAnswer answer(const v1::Feed::Correction& in) {
   FeedAnswer out{.stamp = {in.stamp_ns()},
                  .wants_scan = in.wants_scan(),
-                 .stored = in.has_stored() ? std::optional(Timestamp{in.stored_stamp_ns()}) : std::nullopt,
                  .T_map_body = pose(in.t_map_body()),
                  .T_map_odom = pose(in.t_map_odom()),
                  .map_age = {in.map_epoch(), in.map_revision()},
@@ -44,33 +33,16 @@ FeedSituation situation(const v1::Feed::Situation& in) {
 
 FromRobot read(const v1::Feed& message) {
   switch (message.what_case()) {
-    case v1::Feed::kWelcome: {
-      const auto& welcome = message.welcome();
-      return FeedWelcome{welcome.robot_name(),
-                         welcome.has_odometry() ? std::optional(Timestamp{welcome.last_stamp_ns()}) : std::nullopt,
-                         pose(welcome.t_map_odom())};
-    }
+    case v1::Feed::kWelcome:
+      return FeedWelcome{};
     case v1::Feed::kCorrection:
       return answer(message.correction());
     case v1::Feed::kJump:
       return FeedJump{message.jump().translation_m(), message.jump().why()};
     case v1::Feed::kSituation:
       return situation(message.situation());
-    case v1::Feed::kTimeAnswer: {
-      const auto& in = message.time_answer();
-      return FeedProgress{in.has_stored() ? std::optional(Timestamp{in.stored_stamp_ns()}) : std::nullopt};
-    }
     case v1::Feed::kRefused:
       return FeedRefusal{{message.refused().stamp_ns()}, message.refused().why()};
-    case v1::Feed::kTrajectory: {
-      const auto& in = message.trajectory();
-      return FeedTrajectory{{in.map_epoch(), in.map_revision()},
-                            in.constraints(),
-                            trajectory(in.stamp_ns(), in.t_map_body()),
-                            trajectory(in.map_stamp_ns(), in.t_world_body())};
-    }
-    case v1::Feed::kEnded:
-      return FeedEnd{};
     case v1::Feed::kRaw: {
       const auto& raw = message.raw();
       return FeedRaw{raw.topic(), raw.type(), raw.encoding(), raw.data()};

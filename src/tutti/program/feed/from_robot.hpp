@@ -14,15 +14,10 @@ namespace tutti::program {
 
 /// What a robot answers (proto/tutti/v1/feed.proto), reduced to the fields that the drivers here need. Poses are
 /// `T_a_b` in metres; stamps are the client's own.
-struct FeedWelcome {
-  std::string robot;
-  std::optional<Timestamp> newest;  ///< The newest sample that the robot has; feeding goes on behind it.
-  Pose3 T_map_odom;
-};
+struct FeedWelcome {};
 struct FeedAnswer {
   Timestamp stamp;
-  bool wants_scan = false;          ///< A scan at or after this sample would be used.
-  std::optional<Timestamp> stored;  ///< The newest sample that the robot has on its disk.
+  bool wants_scan = false;  ///< A scan at or after this sample would be used.
   Pose3 T_map_body, T_map_odom;
   Matrix6d covariance = Matrix6d::Zero();           ///< T_map_odom's, right tangent.
   std::pair<std::uint64_t, std::uint64_t> map_age;  ///< ProxyGraph::age() of the newest map heard: epoch, revision.
@@ -36,10 +31,6 @@ struct FeedSituation {
   std::vector<std::string> alerts;
   std::vector<std::pair<std::string, std::string>> status;  ///< FeedState::status
 };
-/// The answer to say_time().
-struct FeedProgress {
-  std::optional<Timestamp> stored;
-};
 /// The robot ends the connection.
 struct FeedOver {
   std::string why;
@@ -50,8 +41,8 @@ struct FeedNote {
 };
 /// A message that drivers here do not need.
 struct FeedOther {};
-using FromRobot = std::variant<FeedWelcome, FeedAnswer, FeedProgress, FeedJump, FeedSituation, FeedRefusal,
-                               FeedTrajectory, FeedEnd, FeedOver, FeedRaw, FeedNote, FeedOther>;
+using FromRobot =
+    std::variant<FeedWelcome, FeedAnswer, FeedJump, FeedSituation, FeedRefusal, FeedOver, FeedRaw, FeedNote, FeedOther>;
 /// Decodes a message of the robot; an error when it is none.
 Result<FromRobot> decode_from_robot(const std::string& payload);
 

@@ -17,7 +17,6 @@
 #include "support/program/feed/client.hpp"
 #include "support/program/feed/node_target.hpp"
 #include "support/robot/drifting_robot.hpp"
-#include "tutti/program/feed/feed_client.hpp"
 #include "tutti/program/feed/local_client.hpp"
 
 namespace tutti::program {
@@ -178,33 +177,39 @@ TEST(LiveFeed, OutlivesStampsInTheFutureAndAClockThatGoesBack) {
 }
 
 /// The trajectory that a robot corrects comes to who asked for it, to the bit.
-TEST(LiveFeed, SendsTheCorrectedTrajectoryToAFeedClient) {
+TEST(LiveFeed, SendsTheCorrectedTrajectoryToWhoWantsIt) {
   const std::string path = path_of("live_feed_way_");
   test::NodeTarget robot;
   std::unique_ptr<LiveFeed> feed = opened(path, robot);
-  Client other(path);
+  Client other(path), client(path);
   other.say(test::hello(true));
-  const auto client = FeedClient::connect(path, "driver", {}, true);
-  ASSERT_TRUE(client.has_value()) << client.error().message;
-  const auto hear = [&] {
-    while (true) {
-      const auto heard = (*client)->hear(10'000);
-      if (!heard || !*heard) return FromRobot{FeedOther{}};
-      if (!std::holds_alternative<FeedOther>(**heard) && !std::holds_alternative<FeedSituation>(**heard))
-        return **heard;
-    }
-  };
-  EXPECT_EQ(std::get<FeedWelcome>(hear()).robot, "alpha");
+  v1::Feed hello;
+  hello.mutable_hello()->set_protocol_version(kFeedVersion);
+  hello.mutable_hello()->set_wants_trajectory(true);
+  client.say(test::framed(hello));
+  EXPECT_TRUE(client.hear().has_welcome());
+  EXPECT_TRUE(client.hear().has_situation());
   EXPECT_TRUE(feed->front().wants_trajectory());
-  const Trajectory trajectory = robot::test::drifting_odometry(30);
-  feed->front().say({{2, 7}, 5, trajectory, {trajectory[3], trajectory[9]}});
-  const auto heard = std::get<FeedTrajectory>(hear());
-  EXPECT_EQ(heard.map_age, (std::pair<std::uint64_t, std::uint64_t>{2, 7}));
-  EXPECT_EQ(heard.constraints, 5U);
-  EXPECT_EQ(heard.corrected, trajectory);
-  EXPECT_EQ(heard.map, (Trajectory{trajectory[3], trajectory[9]}));
-  EXPECT_TRUE((*client)->say(OdometrySample{trajectory[0].stamp, trajectory[0].pose, Matrix6d::Zero()}));
-  EXPECT_EQ(std::get<FeedAnswer>(hear()).stamp, trajectory[0].stamp);
+  const Trajectory odometry = robot::test::drifting_odometry(30);
+  feed->front().say({{2, 7}, 5, odometry, {odometry[3], odometry[9]}});
+  const v1::Feed heard = client.hear();
+  ASSERT_TRUE(heard.has_trajectory());
+  EXPECT_EQ(heard.trajectory().map_epoch(), 2U);
+  EXPECT_EQ(heard.trajectory().map_revision(), 7U);
+  EXPECT_EQ(heard.trajectory().constraints(), 5U);
+  const auto poses = [](const auto& stamps, const auto& numbers) {
+    Trajectory out;
+    for (int i = 0; i < stamps.size(); ++i) {
+      const auto at = [&](int k) { return numbers.Get(7 * i + k); };
+      out.push_back({{stamps.Get(i)}, {Eigen::Quaterniond(at(6), at(3), at(4), at(5)), {at(0), at(1), at(2)}}});
+    }
+    return out;
+  };
+  EXPECT_EQ(poses(heard.trajectory().stamp_ns(), heard.trajectory().t_map_body()), odometry);
+  EXPECT_EQ(poses(heard.trajectory().map_stamp_ns(), heard.trajectory().t_world_body()),
+            (Trajectory{odometry[3], odometry[9]}));
+  client.say(test::odometry(odometry[0], Matrix6d::Zero()));
+  EXPECT_EQ(client.hear().correction().stamp_ns(), odometry[0].stamp.ns);
   EXPECT_TRUE(other.hear().has_welcome());
   EXPECT_TRUE(other.hear().has_situation());
   EXPECT_TRUE(other.hear().has_correction());  // and no trajectory

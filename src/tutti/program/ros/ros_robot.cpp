@@ -80,9 +80,6 @@ class Robot final : public RosRobot {
     options_.say(Level::warning, fmt::format("jump by {:.2f} m: {}", jump.translation_m, jump.why));
   }
   void note(const program::FeedWelcome&) {}
-  void note(const program::FeedProgress&) {}
-  void note(const program::FeedTrajectory&) {}
-  void note(const program::FeedEnd&) {}
   void note(const program::FeedOther&) {}
   void complain(const std::string& what, ErrorCode code, const std::string& why) {
     complaints_.add(what, fail(code, "{}", why));

@@ -5,15 +5,14 @@
 #include <string_view>
 #include <vector>
 
+#include "support/program/feed/client_messages.hpp"
 #include "tutti/geometry/pose3.hpp"
 #include "tutti/program/feed/feed_frames.hpp"
-#include "tutti/program/feed/internal/feed_messages.hpp"
 
 /// The client's end of a live feed.
 namespace tutti::program::test {
 
 using internal::framed;
-using internal::write;
 
 inline Pose3 read(const v1::Feed::Pose& in) {
   return {Eigen::Quaterniond(in.qw(), in.qx(), in.qy(), in.qz()), {in.x(), in.y(), in.z()}};
@@ -37,12 +36,12 @@ inline std::string hello(const v1::Feed::Sensors& sensors) {
   *message.mutable_hello()->mutable_sensors() = sensors;
   return framed(message);
 }
-inline std::string images(const EncodedImages& of) { return framed(internal::message_of(of)); }
-inline std::string imu(const std::vector<ImuSample>& samples) { return framed(internal::message_of(samples)); }
-inline std::string fix(const PositionFix& of) { return framed(internal::message_of(of)); }
+inline std::string images(const EncodedImages& of) { return framed(message_of(of)); }
+inline std::string imu(const std::vector<ImuSample>& samples) { return framed(message_of(samples)); }
+inline std::string fix(const PositionFix& of) { return framed(message_of(of)); }
 
 inline std::string odometry(const StampedPose& at, const Matrix6d& covariance) {
-  return framed(internal::message_of(OdometrySample{at.stamp, at.pose, covariance}));
+  return framed(message_of(OdometrySample{at.stamp, at.pose, covariance}));
 }
 inline std::string scan(Timestamp stamp, int points) {
   v1::Feed message;
@@ -50,7 +49,7 @@ inline std::string scan(Timestamp stamp, int points) {
   for (int i = 0; i < 3 * points; ++i) message.mutable_scan()->add_xyz(static_cast<float>(1 + i % 7));
   return framed(message);
 }
-inline std::string scan(const Scan& of) { return framed(internal::message_of(of)); }
+inline std::string scan(const Scan& of) { return framed(message_of(of)); }
 inline std::string end_of_recording() {
   v1::Feed message;
   message.mutable_end_of_recording();
