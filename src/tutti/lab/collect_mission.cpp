@@ -10,13 +10,14 @@
 #include <vector>
 
 #include "tutti/consistency/proxy_graph_builder.hpp"
+#include "tutti/drive/replay.hpp"
 #include "tutti/history/history_file.hpp"
 #include "tutti/lab/mission_input.hpp"
 #include "tutti/lab/update_json.hpp"
 #include "tutti/mission/make_record.hpp"
 #include "tutti/mission/misfit_record.hpp"
-#include "tutti/mission/robot_actor.hpp"
 #include "tutti/mission/runner.hpp"
+#include "tutti/mission/troubles.hpp"
 #include "tutti/mission/view_recorder.hpp"
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/program/event_log.hpp"
@@ -34,42 +35,11 @@ using program::Json, program::kEnded;
 
 namespace fs = std::filesystem;
 
-/// What went wrong, by what robots have reported: one line of a kind with a count and the first case.
-class Troubles {
- public:
-  void take(const Json& event) {
-    const std::string what = event.value("event", "");
-    for (const auto& [kind, sentence] : kKinds)
-      if (what == kind && (what != "sensor_missing" || event.value("keyframes", 0) > 0)) {
-        auto& [count, first] = seen_[sentence];
-        count += 1 + event.value("left_out", std::size_t{0});
-        if (first.empty()) first = event.contains("why") ? event.value("why", "") : event.dump();
-      }
-  }
-  [[nodiscard]] std::vector<std::string> lines(const std::string& robot) const {
-    std::vector<std::string> out;
-    for (const auto& [what, of] : seen_)
-      out.push_back(fmt::format("{}: {} {}, the first because: {}", robot, of.first, what, of.second));
-    return out;
-  }
-
- private:
-  static constexpr std::pair<const char*, const char*> kKinds[] = {
-      {"sample_refused", "samples refused"},
-      {"odometry_jumped", "steps of odometry that no body makes"},
-      {"session_begun", "times another session had to begin"},
-      {"scan_refused", "wanted scans that are not there or no good"},
-      {"images_refused", "times images refused"},
-      {"fix_refused", "fixes refused"},
-      {"sensor_missing", "times a sensor was missing"}};
-  std::map<std::string, std::pair<std::size_t, std::string>> seen_;
-};
-
 /// A robot's store and what was made of it; the store lives as long.
 struct Robot {
-  Troubles troubles;
+  mission::Troubles troubles;
   std::unique_ptr<storage::TableStore> store;
-  std::unique_ptr<mission::RobotActor> actor;
+  std::unique_ptr<node::RobotNode> node;
   mission::FinishedRobot finished;
   std::vector<mission::UpdateRecord> scores;
   mission::PolicyTiming timing;
@@ -101,12 +71,9 @@ Status take(const Json& event, const std::string& name, Robot& robot) try {
     robot.scores.push_back(std::move(*score));
   }
   if (what == program::kUpdateTimed) {
-    const auto add = [&](const char* key, std::vector<double>& to) {
-      if (const double ms = event.at(key).get<double>(); ms > 0.0) to.push_back(ms);
-    };
-    add("update_ms", robot.timing.update_ms);
-    add("comparison_ms", robot.timing.comparison_ms);
-    add("optimisation_ms", robot.timing.optimisation_ms);
+    drive::UpdateTime time;
+    if (const Status ok = read_json_fields(event, time); !ok) return ok;
+    robot.timing.add(time);
   }
   if (what == kEnded) {
     robot.finished.traffic.clear();
@@ -121,7 +88,9 @@ Status take(const Json& event, const std::string& name, Robot& robot) try {
     if (const Status ok = read_json_fields(event, misfit); !ok) return ok;
     mission::note_misfit(misfit, robot.finished.misfits);
   }
-  robot.troubles.take(event);
+  if (what == "sensor_missing" && event.value("keyframes", 0) == 0) return {};  // it is there again
+  const std::string why = event.contains("why") ? event.value("why", "") : event.dump();
+  robot.troubles.note(what, why, 1 + event.value("left_out", std::size_t{0}));
   return {};
 } catch (const std::exception& error) {  // of the JSON library, or a place of less than three numbers
   return fail(ErrorCode::parse, "event {}: {}", event.dump(), error.what());
@@ -139,13 +108,13 @@ void add_scores(Robot& robot) {
 }
 
 /// What the robot would report of the last map, once more: its own odometry against it, whatever it has corrected.
-consistency::Explanation explain_again(const mission::RobotActor& actor, const MissionConfig& config,
+consistency::Explanation explain_again(const robot::RobotAgent& agent, const MissionConfig& config,
                                        const ProxyGraph& map) {
-  robot::AgentState state = actor.node().agent().state();
+  robot::AgentState state = agent.state();
   state.epoch = state.revision = 0;                // as if it had not heard it,
   if (state.comparisons > 0) --state.comparisons;  // nor compared it
-  robot::RobotAgent again(actor.id(), config.agent, std::move(state));
-  const ProxyGraphMessage own{{}, consistency::own_part(map, actor.id())};
+  robot::RobotAgent again(agent.robot(), config.agent, std::move(state));
+  const ProxyGraphMessage own{{}, consistency::own_part(map, agent.robot())};
   const auto sent = wire::decode_proxy_graph(wire::encode(own));
   return again.receive(sent ? *sent : own).explanation;
 }
@@ -165,10 +134,11 @@ Result<Robot> read_robot(const MissionConfig& config, const mission::MissionReco
   auto store = storage::open_sqlite_store(folder / program::kRobotFile, storage::robot_schema());
   if (!store) return tl::unexpected(store.error());
   robot.store = std::move(*store);
-  auto actor =
-      mission::RobotActor::open(recording, {.agent = config.agent, .name = name}, config.association, 0, *robot.store);
-  if (!actor) return in_context((folder / program::kRobotFile).string(), actor.error());
-  robot.actor = std::move(*actor);
+  auto node = node::RobotNode::open(recording.recording.robot, 0,
+                                    {.agent = drive::with_sensors(config.agent, recording.recording), .name = name},
+                                    *robot.store);
+  if (!node) return in_context((folder / program::kRobotFile).string(), node.error());
+  robot.node = std::move(*node);
   robot.timing = {.robot = name, .policy = config.agent.policy.name};
   Status taken;
   const auto read = program::read_events(folder, [&](const Json& event) {
@@ -178,7 +148,10 @@ Result<Robot> read_robot(const MissionConfig& config, const mission::MissionReco
   add_scores(robot);
   robot.finished.troubles = robot.troubles.lines(name);
   if (*read > 0) robot.finished.troubles.push_back(cut_short(name, *read));
-  robot.finished.outcome = robot.actor->outcome();
+  robot.finished.outcome = {.recording = &recording,
+                            .default_policy = config.agent.policy.name,
+                            .agents = {{config.agent.policy.name, &robot.node->agent()}},
+                            .replayed = drive::heard_samples(recording.recording, robot.node->agent())};
   return robot;
 }
 
@@ -267,7 +240,7 @@ Result<mission::MissionRecord> collect_mission(const MissionConfig& config, cons
                                     .undelivered = {}};
   for (Robot& robot : robots) {
     if (config.agent.explain && !robot.finished.updates.empty())
-      robot.finished.explanation = explain_again(*robot.actor, config, (*server)->broadcast());
+      robot.finished.explanation = explain_again(robot.node->agent(), config, (*server)->broadcast());
     finished.robots.push_back(std::move(robot.finished));
   }
   mission::MissionRecord record = mission::make_record(finished);

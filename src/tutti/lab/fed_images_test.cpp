@@ -12,9 +12,10 @@
 
 #include "support/program/feed/client.hpp"
 #include "support/program/hosting.hpp"
+#include "tutti/drive/replay.hpp"
 #include "tutti/formats/image_file.hpp"
 #include "tutti/mission/resample.hpp"
-#include "tutti/mission/robot_actor.hpp"
+#include "tutti/perception/visual/frontend/tracking_source.hpp"
 #include "tutti/program/feed/feed_session.hpp"
 #include "tutti/simulation/hall_recordings.hpp"
 #include "tutti/simulation/receiver.hpp"
@@ -64,21 +65,24 @@ simulation::FlownRecording simulate(const simulation::HallMissionConfig& config)
 }
 
 Submaps replayed(simulation::FlownRecording flown) {
-  mission::MissionRecording recording{.recording = std::move(flown.recording)};
+  Recording recording = std::move(flown.recording);
   if (!flown.images.stamps.empty()) {
     Trajectory stamps;  // of images
     for (const Timestamp stamp : flown.images.stamps) stamps.push_back({stamp, {}});
-    recording.recording.visual = visual::TrackingSource::open(std::move(flown.images), stamps, {}).value();
+    recording.visual = visual::TrackingSource::open(std::move(flown.images), stamps, {}).value();
   }
   const storage::MemoryStore store{storage::robot_schema()};
-  const evaluation::AssociationConfig association;
-  auto actor = mission::RobotActor::open(recording, {.agent = agent()}, association, 7, store).value();
+  const node::RobotNodeConfig config{.agent = drive::with_sensors(agent(), recording)};
+  drive::Driver robot(node::RobotNode::open(recording.robot, 7, config, store).value());
+  drive::Replay replay(recording, 0.0, robot);
   Submaps out;
-  for (actor->resume({}); actor->next_time() < 1e9;) {
-    actor->replay_next({});
-    keep_submaps(actor->take_step().messages, out);
+  for (replay.resume({}); replay.next_time() < 1e9;) {
+    replay.feed_next({});
+    const node::Step step = robot.take_step();
+    EXPECT_TRUE(taken(step));
+    keep_submaps(step.messages, out);
   }
-  EXPECT_TRUE(actor->troubles().empty());
+  EXPECT_TRUE(robot.sight().notes().empty());
   return out;
 }
 
@@ -87,7 +91,7 @@ class Fed {
  public:
   explicit Fed(const Sensors& sensors) {
     const auto open = [this] {
-      return std::make_unique<LiveRobot>(
+      return std::make_unique<drive::Driver>(
           std::move(node::RobotNode::open(RobotId{0}, 7, {.agent = agent()}, store_).value()));
     };
     front_ = std::make_unique<FeedFront>(RobotView("alpha").state(open()->node()), FeedFront::Limits{});
@@ -205,7 +209,8 @@ TEST(FedImages, WithDepthMakeTheSubmapsOfTheRecording) { expect_same(simulate(ha
 /// An IMU without a camera is heard, and nobody uses it.
 TEST(FedImages, OfALidarAndAnImuMakeTheSubmapsOfTheRecording) {
   simulation::FlownRecording flown = simulate(hall("lidar", 1, false));
-  for (std::int64_t i = 0; i < 700; ++i) flown.recording.imu.push_back({{i * 5000000}, {}, {0.0, 0.0, 9.81}});
+  for (std::int64_t i = 0; i < 700; ++i)
+    flown.recording.imu.push_back({{i * 5000000}, {0.0, 0.0, 0.0}, {0.0, 0.0, 9.81}});
   expect_same(flown, false);
 }
 

@@ -8,8 +8,9 @@
 #include "tutti/bus/transport.hpp"
 #include "tutti/lab/closure_verifiers.hpp"
 #include "tutti/lab/mission_input.hpp"
-#include "tutti/lab/replayed_robot.hpp"
+#include "tutti/lab/update_json.hpp"
 #include "tutti/mapfile/known_map.hpp"
+#include "tutti/mission/evaluate.hpp"
 #include "tutti/mission/localise_mission.hpp"
 #include "tutti/mission/runner.hpp"
 #include "tutti/simulation/recordings.hpp"
@@ -169,16 +170,17 @@ Status fill_robot_options(const MissionSource& source, program::RobotOptions& op
   if (!number) return tl::unexpected(number.error());
   auto input = load_input(*config, source.data, source.seed);
   if (!input) return tl::unexpected(input.error());
-  options.duration_s = mission::duration_of(*config, input->robots);
-  const auto recording = std::make_shared<const mission::MissionRecording>(std::move(input->robots.at(number->value)));
-  options.replay = [recording,
-                    association = std::make_shared<const evaluation::AssociationConfig>(config->association)](
-                       const node::RobotNodeConfig& node, std::uint64_t session,
-                       const storage::TableStore& store) -> Result<std::unique_ptr<program::RobotDriver>> {
-    auto actor = mission::RobotActor::open(*recording, node, *association, session, store);
-    if (!actor) return tl::unexpected(actor.error());
-    return std::make_unique<ReplayedRobot>(std::move(*actor));
+  const double duration_s = mission::duration_of(*config, input->robots);
+  const auto robot = std::make_shared<const mission::MissionRecording>(std::move(input->robots.at(number->value)));
+  const auto score = [robot, policy = config->agent.policy.name, association = config->association](
+                         const Trajectory& map, const robot::RobotAgent& agent) {
+    mission::UpdateRecord update{.revision = agent.map_age().second};
+    score_update({.recording = robot.get(), .default_policy = policy, .agents = {{policy, &agent}}}, map, association,
+                 update);
+    return to_json(update);
   };
+  options.replay = {
+      .recording = {robot, &robot->recording}, .start_s = robot->start_s, .duration_s = duration_s, .score = score};
   return {};
 }
 

@@ -47,7 +47,7 @@ Result<program::RobotSettings> robot_settings(const MissionSource& source);
 /// What a robot of the mission needs to localise in a map's file, as mission::localise_setup() makes it.
 Result<std::shared_ptr<const localise::Localiser::Setup>> localise_setup(const MissionSource& source,
                                                                          const std::filesystem::path& map);
-/// Sets the settings, replay and duration_s of a robot, and reads its recording for that unless the robot is fed
+/// Sets the settings and the replay of a robot, and reads its recording for that unless the robot is fed
 /// (RobotOptions::feed).
 Status fill_robot_options(const MissionSource& source, program::RobotOptions& options);
 

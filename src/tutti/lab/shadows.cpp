@@ -16,7 +16,7 @@ Shadows::Shadows(const Recording& recording, const robot::AgentConfig& config, c
                  std::uint64_t seed)
     : own_policy_(config.policy.name) {
   const Rng rng = Rng(seed).fork("agent/" + recording.name);
-  robot::AgentConfig of_shadow = mission::with_sensors(config, recording);
+  robot::AgentConfig of_shadow = drive::with_sensors(config, recording);
   of_shadow.explain = false;  // shadows are not shown
   for (const std::string& name : policies) {
     if (name == own_policy_) continue;
@@ -40,9 +40,9 @@ void Shadows::add_keyframe_time(Timestamp stamp) {
 }
 
 void Shadows::update(Shadow& shadow, const ProxyGraphMessage& message) {
-  mission::UpdateStopwatch stopwatch(shadow.timing);
+  drive::UpdateStopwatch stopwatch;
   const auto stage_ended = [&](robot::UpdateStage stage) { stopwatch.stage_ended(stage); };
-  if (shadow.agent->receive(message, stage_ended).synchronised > 0) stopwatch.update_ended();
+  if (shadow.agent->receive(message, stage_ended).synchronised > 0) shadow.timing.add(*stopwatch.ended());
 }
 
 void Shadows::receive(const ProxyGraphMessage& message, const robot::RobotAgent& own) {

@@ -27,6 +27,11 @@ struct RobotOutcome {
   [[nodiscard]] std::span<const StampedPose> way() const { return {recording->recording.odometry.data(), replayed}; }
 };
 
+/// Fills in how far every estimate is from the reference at the nodes of `map`, the server's estimate of the robot's
+/// trajectory, when the robot has taken an update of it.
+void score_update(const RobotOutcome& robot, const Trajectory& map, const evaluation::AssociationConfig& association,
+                  UpdateRecord& update);
+
 /// These functions fill in what is measured at the end, in this order: the accuracy of every estimate; the final map,
 /// its closures and the transforms between robots; the clouds. Accuracy is the ATE after one rigid alignment (SE(3), no
 /// scale) and the RPE over 1 s and over 10 m, at keyframes, each with the share of the distance on which it was scored;

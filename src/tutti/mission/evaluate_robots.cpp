@@ -95,6 +95,24 @@ void read_run(const RobotOutcome& robot, RobotRecord& out) {
 
 }  // namespace
 
+void score_update(const RobotOutcome& robot, const Trajectory& map, const evaluation::AssociationConfig& association,
+                  UpdateRecord& update) {
+  Trajectory truth, odometry;
+  if (robot.recording->score_against_reference)
+    for (const auto& pair : evaluation::associate(map, robot.recording->recording.reference, association))
+      truth.push_back({pair.stamp, pair.reference});
+  const auto rmse = [&](const Trajectory& estimate) -> std::optional<double> {
+    const auto error = evaluation::agreement(estimate, truth);
+    return error ? std::optional(error->rmse_m) : std::nullopt;
+  };
+  for (const Keyframe& keyframe : robot.agents.front().second->keyframes())
+    odometry.push_back({keyframe.stamp, keyframe.T_odom_body});
+  update.onboard_rmse_m = rmse(odometry);
+  update.server_rmse_m = rmse(map);
+  for (const auto& [policy, agent] : robot.agents)
+    update.answers.push_back({policy, agent->ledger().size(), rmse(agent->corrected())});
+}
+
 void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapEstimate& map,
                      const server::MapEstimate* perfect, const evaluation::AssociationConfig& association,
                      MissionRecord& record) {

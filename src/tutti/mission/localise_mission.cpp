@@ -9,7 +9,6 @@
 #include "tutti/evaluation/association.hpp"
 #include "tutti/mission/kidnapped.hpp"
 #include "tutti/mission/lift_ride.hpp"
-#include "tutti/mission/load_meter.hpp"
 #include "tutti/mission/robot_actor.hpp"
 
 namespace tutti::mission {
@@ -192,7 +191,7 @@ Result<std::vector<LocalisedRobot>> localise_mission(
       recording = std::move(made->recording);
       kidnapped_at = std::move(made->at);
     }
-    auto setup = localise_setup(config, with_sensors(config.agent, recording).submap, map.known, make_verifier);
+    auto setup = localise_setup(config, drive::with_sensors(config.agent, recording).submap, map.known, make_verifier);
     out.push_back(replay(robot, config, std::move(setup), trial.restart_s, stop));
     const auto course = measure_kidnaps(kidnapped_at, out.back());
     if (!has_reference || recording.reference.empty()) continue;

@@ -4,14 +4,16 @@
 #include <algorithm>
 #include <variant>
 
+#include "tutti/mission/load_meter.hpp"
+
 namespace tutti::mission {
 
 Result<ClosureVerdict> MeasuredVerifier::verify(const Submap& first, const Submap& second,
                                                 const server::PayloadStore& payloads) const {
   double cpu_s = 0.0;
-  Stopwatch watch;
+  drive::Stopwatch watch;
   auto verdict = [&] {
-    const CpuScope cpu(cpu_s);
+    const drive::CpuScope cpu(cpu_s);
     return wrapped().verify(first, second, payloads);
   }();
   const double took_ms = watch.lap_ms();
@@ -28,7 +30,7 @@ Result<Refinement> MeasuredRefiner::refine(const RefinementJob& job, const serve
   timing.free_submaps = static_cast<std::size_t>(std::ranges::count_if(job.parts, is_free));
   timing.submaps = job.parts.size();
   auto refinement = [&] {
-    const CpuScope cpu(timing.cpu_s);
+    const drive::CpuScope cpu(timing.cpu_s);
     return refiner_->refine(job, submaps, payloads);
   }();
   took_.push_back(timing);

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "tutti/mission/load_meter.hpp"
+#include "tutti/drive/stopwatch.hpp"
 #include "tutti/mission/timing_record.hpp"
 #include "tutti/node/step.hpp"
 #include "tutti/server/closure_verifier.hpp"
@@ -68,7 +68,7 @@ class ServerMeter {
   /// Calls `step` of the server, which may store a submap, and returns its result.
   template <class F>
   node::Step serve(double time_s, F&& step) {
-    const CpuScope cpu(map_cpu_s_);
+    const drive::CpuScope cpu(map_cpu_s_);
     node::Step made = step();
     note_submap(time_s, made);
     return made;
@@ -77,9 +77,9 @@ class ServerMeter {
   template <class F>
   node::Step update(double time_s, F&& step) {
     double cpu_s = 0.0;
-    Stopwatch watch;
+    drive::Stopwatch watch;
     node::Step made = [&] {
-      const CpuScope cpu(cpu_s);
+      const drive::CpuScope cpu(cpu_s);
       return step();
     }();
     note_update({time_s, watch.lap_ms(), 1e3 * cpu_s});

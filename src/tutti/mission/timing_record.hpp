@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "tutti/drive/stopwatch.hpp"
+
 /// What a mission cost: the part of its record that depends on this machine's clock, and counts of work beside it.
 namespace tutti::mission {
 
@@ -17,6 +19,11 @@ struct PolicyTiming {
   std::vector<double> update_ms;
   std::vector<double> comparison_ms;
   std::vector<double> optimisation_ms;
+  void add(const drive::UpdateTime& time) {
+    update_ms.push_back(time.update_ms);
+    comparison_ms.push_back(time.comparison_ms);
+    optimisation_ms.push_back(time.optimisation_ms);
+  }
 };
 
 /// How much of one core a participant used, and its worst delay. Only measured with --rate.

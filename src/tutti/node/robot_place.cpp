@@ -34,7 +34,8 @@ Status RobotNode::begin_at_stored_place() {
 }
 
 bool RobotNode::wants_scan(Timestamp stamp) const {
-  return agent_.wants_scan(stamp) || (localiser_ && localiser_->wants_scan(stamp));
+  const bool is_wanted = stamp == agent_.newest_sample() ? agent_.wants_scan() : agent_.wants_scan(stamp);
+  return is_wanted || (localiser_ && localiser_->wants_scan(stamp));
 }
 
 /// What the localiser refuses, the agent has refused before, or it is of no use to it.

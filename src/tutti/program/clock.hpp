@@ -2,7 +2,6 @@
 #pragma once
 
 #include <chrono>
-#include <ctime>
 #include <functional>
 #include <limits>
 #include <utility>
@@ -38,13 +37,6 @@ class Clock {
   double from_s_;
   double start_s_;
 };
-
-/// CPU time of the calling thread so far, in seconds.
-inline double thread_cpu_s() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 /// Nanoseconds since the Unix epoch, by this machine's clock.
 std::uint64_t wall_clock_ns();

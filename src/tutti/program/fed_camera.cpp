@@ -34,18 +34,18 @@ Result<DepthImage> decoded_depth(const EncodedImage& image, const CameraModel& c
 
 }  // namespace
 
-TrackedImages FedCamera::see(const EncodedImages& images, bool keyframe) {
+drive::Driver::Seen FedCamera::see(const EncodedImages& images, bool keyframe) {
   constexpr std::int64_t kNsPerInstant =
       1'000'000;  // numbers that grow across restarts, at up to 1,000 images a second
   const auto instant = static_cast<std::uint64_t>(std::max<std::int64_t>(images.stamp.ns, 0) / kNsPerInstant);
+  drive::Driver::Seen out{{.stamp = images.stamp, .cameras = nullptr, .images = {}}, {}};
   if (images.sensors != sensors_) {
     sensors_ = images.sensors;
     auto made = visual::ImageTracker::make(sensors_->cameras, sensors_->depth, config_);
     tracker_ = made ? std::move(*made) : nullptr;
     if (tracker_) tracker_->restart(instant);
-    if (!made) errors_.push_back(made.error());
+    if (!made) out.errors.push_back(made.error());
   }
-  TrackedImages out{.stamp = images.stamp, .cameras = nullptr, .images = {}};
   if (!tracker_) return out;
   visual::SeenImages seen{.stamp = images.stamp, .instant = instant, .images = {}};
   seen.images.resize(sensors_->cameras.size(), Image());
@@ -53,10 +53,10 @@ TrackedImages FedCamera::see(const EncodedImages& images, bool keyframe) {
     seen.images.at(image.camera) = decoded(image, sensors_->cameras[image.camera].model, images.stamp);
   if (images.depth)
     seen.load_depth = [&] { return decoded_depth(*images.depth, sensors_->cameras.front().model, images.stamp); };
-  out.cameras = tracker_->cameras();
-  out.images = tracker_->track(seen, keyframe);
-  if (sensors_->imu) out.imu_noise = *sensors_->imu;
-  for (Error& error : tracker_->take_errors()) errors_.push_back(std::move(error));
+  out.images.cameras = tracker_->cameras();
+  out.images.images = tracker_->track(seen, keyframe);
+  if (sensors_->imu) out.images.imu_noise = *sensors_->imu;
+  out.errors = tracker_->take_errors();
   return out;
 }
 

@@ -5,23 +5,6 @@
 
 namespace tutti::program {
 
-/// How long an update took is noted.
-void LiveRobot::receive(const bus::Envelope& envelope, Timestamp now) {
-  const double begin_s = Clock::steady_s();
-  double stage_s = begin_s, compare_s = 0.0, optimise_s = 0.0;
-  bool is_update = false;
-  node_->observe([&](robot::UpdateStage ended) {
-    const double lap_s = Clock::steady_s() - std::exchange(stage_s, Clock::steady_s());
-    is_update = true;
-    if (ended == robot::UpdateStage::choose) compare_s = lap_s;
-    if (ended == robot::UpdateStage::optimise) optimise_s = lap_s;
-  });
-  take(node_->receive(envelope, now));
-  node_->observe({});
-  if (!is_update) return;
-  notes_.push_back(update_timed(1e3 * (Clock::steady_s() - begin_s), 1e3 * compare_s, 1e3 * optimise_s));
-}
-
 void FedRobot::note(const node::Step& step) {
   for (const node::Event& event : step.events) view_.note(event, robot_.node());
 }
@@ -55,35 +38,19 @@ void FedRobot::hear(const Input& input, Timestamp now) {
     numbered.name.clear();
     return robot_.add(std::move(numbered), now);
   }
-  const robot::RobotAgent& agent = robot_.node().agent();
-  const auto* scan = std::get_if<Scan>(&input);  // received before anybody knew whether it shows anything new
-  const localise::Localiser* localiser = robot_.node().localiser();
-  if (scan == nullptr || agent.newest_sample() != scan->stamp || agent.wants_scan() ||
-      (localiser != nullptr && localiser->wants_scan(scan->stamp)))
-    robot_.add(input, now);
+  robot_.add(input, now);
 }
 
-/// Every image is tracked, those of keyframes are kept.
 void FedRobot::see(const EncodedImages& images, Timestamp now) {
-  const robot::RobotAgent& agent = robot_.node().agent();
-  const bool is_keyframe = agent.wants_images(images.stamp);
-  TrackedImages seen = camera_.see(images, is_keyframe);
-  emit_image_errors(images.stamp, now);
-  if (!is_keyframe || seen.images.empty()) return;
-  if (images.sensors->imu)
-    if (const auto before = agent.keyframe_before(images.stamp)) seen.imu = front_.imu(*before, images.stamp);
-  robot_.add(std::move(seen), now);
-}
-
-/// To the client all; of a row of images with errors the first is an event.
-void FedRobot::emit_image_errors(Timestamp stamp, Timestamp now) {
-  const std::vector<Error> errors = camera_.take_errors();
-  for (const Error& error : errors) {
-    front_.refuse(stamp, error.message);
-    if (!std::exchange(images_fail_, true))
-      robot_.emit(now, node::ImagesRefused{robot_.node().agent().robot(), error.message, true});
-  }
-  images_fail_ = !errors.empty();
+  const auto track = [&](bool keyframe) {
+    drive::Driver::Seen seen = camera_.see(images, keyframe);
+    for (const Error& error : seen.errors) front_.refuse(images.stamp, error.message);
+    return seen;
+  };
+  const auto imu = [&](Timestamp keyframe) {
+    return images.sensors->imu ? front_.imu(keyframe, images.stamp) : std::vector<ImuSample>();
+  };
+  robot_.see(images.stamp, track, imu, now);
 }
 
 bool FedRobot::take(const FeedInput& input) {

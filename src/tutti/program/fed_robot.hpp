@@ -4,12 +4,12 @@
 #include <memory>
 #include <utility>
 
+#include "tutti/drive/driver.hpp"
 #include "tutti/program/clock.hpp"
 #include "tutti/program/fed_camera.hpp"
 #include "tutti/program/feed/feed_front.hpp"
 #include "tutti/program/feed/robot_view.hpp"
 #include "tutti/program/host.hpp"
-#include "tutti/program/robot_driver.hpp"
 
 namespace tutti::program {
 
@@ -22,7 +22,7 @@ class FedRobot {
   static constexpr double kPublish_s = 0.05;  ///< The front gets news at least this often while the robot is behind.
 
   /// All arguments must outlive it.
-  FedRobot(FeedFront& front, LiveRobot& robot, Host& host, const Clock& clock, RobotView view,
+  FedRobot(FeedFront& front, drive::Driver& robot, Host& host, const Clock& clock, RobotView view,
            const visual::TrackerConfig& tracker = {})
       : front_(front), robot_(robot), host_(host), clock_(clock), view_(std::move(view)), camera_(tracker) {
     expect(*front_.sensors());
@@ -45,16 +45,14 @@ class FedRobot {
   void hear(FeedEnded, Timestamp now) { robot_.finish(now); }
   void hear(const FeedAnew& anew, Timestamp now) { robot_.begin_session(anew.why, now); }
   void expect(const Sensors& sensors) { robot_.expect_sensors(sensors.scans, !sensors.cameras.empty()); }
-  void emit_image_errors(Timestamp stamp, Timestamp now);
   void publish();
 
   FeedFront& front_;
-  LiveRobot& robot_;
+  drive::Driver& robot_;
   Host& host_;
   const Clock& clock_;
   RobotView view_;
   FedCamera camera_;
-  bool images_fail_ = false;  // the last images could not be used
   double publish_s_ = 0.0;
 };
 

@@ -41,8 +41,8 @@ class FedRobotTest : public testing::Test {
     };
     host_ = std::make_unique<Host>(std::move(parts), clock_, *log_);
   }
-  std::unique_ptr<LiveRobot> open_robot() {
-    return std::make_unique<LiveRobot>(std::move(node::RobotNode::open(kRobot, 7, {}, disk_).value()));
+  std::unique_ptr<drive::Driver> open_robot() {
+    return std::make_unique<drive::Driver>(std::move(node::RobotNode::open(kRobot, 7, {}, disk_).value()));
   }
   void feed(std::size_t from, std::size_t until) {
     for (std::size_t i = from; i < until; ++i) {

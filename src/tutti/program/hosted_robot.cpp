@@ -41,26 +41,31 @@ Json changed_places(const localise::Localiser& localiser, Timestamp now) {
 
 Answer HostedRobot::receive(const bus::Received& message, Timestamp now) {
   std::optional<Trajectory> map;
-  if (feed_ && feed_->front().wants_trajectory())
-    if (const auto graph = driver_->node().graph_in(message.envelope); graph && *graph)
-      map = trajectory_of((*graph)->graph, driver_->node().agent().chain());
-  driver_->receive(message.envelope, now);
-  for (const Json& note : driver_->take_notes()) log_.write(note);
+  if ((feed_ && feed_->front().wants_trajectory()) || options_.replay.score)
+    if (const auto graph = driver_.node().graph_in(message.envelope); graph && *graph)
+      map = trajectory_of((*graph)->graph, driver_.node().agent().chain());
+  driver_.receive(message.envelope, now);
+  for (drive::UpdateTime& time : driver_.take_update_times()) {
+    Json line{{"event", kUpdateTimed}};
+    line.update(json_of_fields(time));
+    log_.write(line);
+  }
   note_conflict();
   Answer out = answer_for({message.ticket});
   const bool has_updated = std::ranges::any_of(out.step.events, [](const node::Event& event) {
     const auto* update = std::get_if<node::RobotUpdated>(&event.what);
     return update != nullptr && update->summary.synchronised > 0;
   });
-  const robot::RobotAgent& agent = driver_->node().agent();
-  if (map && has_updated)
-    feed_->front().say({agent.map_age(), agent.ledger().size(), agent.corrected(), std::move(*map)});
+  const robot::RobotAgent& agent = driver_.node().agent();
+  if (!map || !has_updated) return out;
+  if (options_.replay.score) log_.write(options_.replay.score(*map, agent));
+  if (feed_) feed_->front().say({agent.map_age(), agent.ledger().size(), agent.corrected(), std::move(*map)});
   return out;
 }
 
 /// Who has just started ends; who maps goes on, whatever others report.
 void HostedRobot::note_conflict() {
-  const auto& conflict = driver_->node().conflict();
+  const auto& conflict = driver_.node().conflict();
   if (!conflict || warned_) return;
   warned_ = true;
   if (clock_.wall_s() - begin_s_ < kStarts_s)
@@ -70,26 +75,27 @@ void HostedRobot::note_conflict() {
 }
 
 std::optional<Timestamp> HostedRobot::next_work() const {
-  std::optional<Timestamp> next = driver_->node().next_timer();
-  if (feed_ || ended_) return next;
-  const double next_s = driver_->next_time();
-  const Timestamp sample = next_s > duration_s_ ? Timestamp{} : Timestamp{} + next_s;  // at its end: at once
+  std::optional<Timestamp> next = driver_.node().next_timer();
+  if (!replay_ || ended_) return next;
+  const double next_s = replay_->next_time();
+  const Timestamp sample =
+      next_s > options_.replay.duration_s ? Timestamp{} : Timestamp{} + next_s;  // at its end: at once
   return next ? std::min(*next, sample) : sample;
 }
 
 /// All samples that are due, as far as they get in a while and within one submap: what the node sends later it reads
 /// from its store.
 Answer HostedRobot::work(Timestamp now) {
-  if (const auto timer = driver_->node().next_timer(); timer && *timer <= now) driver_->on_timer(now);
+  if (const auto timer = driver_.node().next_timer(); timer && *timer <= now) driver_.on_timer(now);
   const double until_s = clock_.wall_s() + kLongestWork_s;
-  const std::size_t backlog = driver_->node().backlog().size();
-  while (!feed_ && !ended_ && clock_.wall_s() < until_s && driver_->node().backlog().size() == backlog) {
-    const double next_s = driver_->next_time();
-    if (next_s > duration_s_) {
-      driver_->finish(now);
+  const std::size_t backlog = driver_.node().backlog().size();
+  while (replay_ && !ended_ && clock_.wall_s() < until_s && driver_.node().backlog().size() == backlog) {
+    const double next_s = replay_->next_time();
+    if (next_s > options_.replay.duration_s) {
+      driver_.finish(now);
       ended_ = true;
     } else if (Timestamp{} + next_s <= now) {
-      driver_->replay_next(now);
+      replay_->feed_next(now);
     } else {
       break;
     }
@@ -99,7 +105,7 @@ Answer HostedRobot::work(Timestamp now) {
 
 /// What the feed refuses, the node never hears of.
 NodeStatus HostedRobot::node_status(Timestamp now) const {
-  NodeStatus status = driver_->node().status(now);
+  NodeStatus status = driver_.node().status(now);
   status.version = options_.version;
   if (maps_ != nullptr) {
     if (status.in_map.state.empty()) status.in_map.state = "no map";
@@ -117,12 +123,12 @@ NodeStatus HostedRobot::node_status(Timestamp now) const {
 Answer HostedRobot::report(Timestamp now) {
   NodeStatus status = node_status(now);
   if (feed_) feed_->front().say_status(status);
-  return {{.messages = {node::to_server(bus::Endpoint::of(driver_->node().agent().robot()), std::move(status))}}, {}};
+  return {{.messages = {node::to_server(bus::Endpoint::of(driver_.node().agent().robot()), std::move(status))}}, {}};
 }
 
 bool HostedRobot::finished() const {
   if (refused_ || (options_.is_alone && !options_.stay && has_ended())) return true;
-  if (options_.stay || !has_ended() || !driver_->node().backlog().empty()) {
+  if (options_.stay || !has_ended() || !driver_.node().backlog().empty()) {
     settled_s_.reset();
     return false;
   }
@@ -131,7 +137,8 @@ bool HostedRobot::finished() const {
 }
 
 std::string HostedRobot::progress(double time_s) const {
-  if (!feed_) return fmt::format("{:.0f} of {:.0f} s", std::min(time_s, duration_s_), duration_s_);
+  const double end_s = options_.replay.duration_s;
+  if (!feed_) return fmt::format("{:.0f} of {:.0f} s", std::min(time_s, end_s), end_s);
   const std::string behind = feed_->front().load().waiting > kBehind ? ", the map is behind what is fed" : "";
   return (has_ended() ? "the recording has ended" : feed_->is_fed() ? "a client feeds" : "no client feeds") + behind;
 }
@@ -168,7 +175,7 @@ Json HostedRobot::status(Timestamp now) const {
   const NodeStatus status = node_status(now);
   const bus::LinkState link = port_.state();
   const double time_s = now - Timestamp{};
-  const localise::Localiser* const localiser = driver_->node().localiser();
+  const localise::Localiser* const localiser = driver_.node().localiser();
   Json changed = localiser ? changed_places(*localiser, localiser->located().stamp) : Json::array();
   std::string in_map = status.in_map.state.empty() ? "" : ", in its map: " + status.in_map.state;
   if (!changed.empty()) in_map += fmt::format(", something has changed in {} submaps", changed.size());
@@ -180,7 +187,7 @@ Json HostedRobot::status(Timestamp now) const {
               {"revision", status.heard_revision},
               {"connected", link.connected},
               {"alone", alone_},
-              {"refused", driver_->node().conflict().value_or("")},
+              {"refused", driver_.node().conflict().value_or("")},
               {"line", fmt::format("{}, {} keyframes, {} submaps not stored yet, heard map revision {}{}{}{}",
                                    progress(time_s), status.keyframes, status.backlog_submaps, status.heard_revision,
                                    in_map, link.connected ? "" : ", no link: " + link.last_error,

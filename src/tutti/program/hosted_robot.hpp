@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "tutti/bus/port.hpp"
+#include "tutti/drive/replay.hpp"
 #include "tutti/program/fed_robot.hpp"
 #include "tutti/program/feed/live_feed.hpp"
 #include "tutti/program/host.hpp"
@@ -22,25 +23,27 @@ class HostedRobot final : public Hosted {
   /// For a map with all of its submaps, after the server has stored them.
   static constexpr double kWaitsForMap_s = 60.0;
 
-  HostedRobot(std::unique_ptr<RobotDriver> driver, double duration_s, const RobotOptions& options, const Clock& clock,
+  HostedRobot(std::unique_ptr<node::RobotNode> node, const RobotOptions& options, const Clock& clock,
               const bus::Port& port, EventLog& log, const std::string& alone, const MapFetcher* maps)
-      : driver_(std::move(driver)),
-        duration_s_(duration_s),
+      : driver_(std::move(node)),
         options_(options),
         clock_(clock),
         port_(port),
         log_(log),
         alone_(alone),
         maps_(maps),
-        begin_s_(clock.wall_s()) {}
-  /// From now on samples come from the clients of `feed`; `robot` is this robot's driver.
-  void feed_live(LiveFeed& feed, LiveRobot& robot, Host& host, RobotView view) {
+        begin_s_(clock.wall_s()) {
+    const RobotReplay& replay = options.replay;
+    if (replay.recording) replay_.emplace(*replay.recording, replay.start_s, driver_);
+  }
+  /// From now on samples come from the clients of `feed`.
+  void feed_live(LiveFeed& feed, Host& host, RobotView view) {
     feed_ = &feed;
-    fed_.emplace(feed.front(), robot, host, clock_, std::move(view), options_.settings.tracking.tracker);
+    fed_.emplace(feed.front(), driver_, host, clock_, std::move(view), options_.settings.tracking.tracker);
   }
 
   Answer start(Timestamp now) override {
-    driver_->resume(now);
+    replay_ ? replay_->resume(now) : driver_.resume(now);
     return answer_for();
   }
   Answer receive(const bus::Received& message, Timestamp now) override;
@@ -49,17 +52,17 @@ class HostedRobot final : public Hosted {
   void wait(double wall_s) override { fed_ ? fed_->wait(wall_s) : Hosted::wait(wall_s); }
   Answer end() override {
     if (fed_) fed_->end();
-    driver_->store_all();
+    driver_.store_all();
     return answer_for();
   }
   Answer report(Timestamp now) override;
   [[nodiscard]] bool finished() const override;
   [[nodiscard]] Json status(Timestamp now) const override;
-  [[nodiscard]] bool is_whole_in_map() const { return driver_->node().is_whole_in_map(); }
+  [[nodiscard]] bool is_whole_in_map() const { return driver_.node().is_whole_in_map(); }
   /// To be called when the node is to be made anew: nothing that it heard is lost.
   [[nodiscard]] node::Step store_all() {
-    driver_->store_all();
-    return driver_->take_step();
+    driver_.store_all();
+    return driver_.take_step();
   }
   /// Why this program must end: another program is this robot. Nothing when it need not.
   [[nodiscard]] const std::optional<std::string>& refused() const { return refused_; }
@@ -69,7 +72,7 @@ class HostedRobot final : public Hosted {
 
  private:
   Answer answer_for(std::vector<std::uint64_t> done = {}) {
-    Answer out{driver_->take_step(), std::move(done)};
+    Answer out{driver_.take_step(), std::move(done)};
     if (fed_) fed_->note(out.step);
     return out;
   }
@@ -78,8 +81,8 @@ class HostedRobot final : public Hosted {
   [[nodiscard]] std::string progress(double time_s) const;
   [[nodiscard]] Json feed_status() const;
 
-  std::unique_ptr<RobotDriver> driver_;
-  double duration_s_;
+  drive::Driver driver_;
+  std::optional<drive::Replay> replay_;  // nothing: it is fed
   const RobotOptions& options_;
   const Clock& clock_;
   const bus::Port& port_;
@@ -87,7 +90,7 @@ class HostedRobot final : public Hosted {
   const std::string& alone_;  // why it hears no server
   const MapFetcher* maps_;    // null: it does not localise in published maps
   double begin_s_;
-  LiveFeed* feed_ = nullptr;     // null: it replays a recording
+  LiveFeed* feed_ = nullptr;     // null: it replays
   std::optional<FedRobot> fed_;  // the robot's end of that feed
   bool ended_ = false;           // the recording that it replays has ended
   bool warned_ = false;

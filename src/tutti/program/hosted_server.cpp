@@ -6,6 +6,7 @@
 #include <chrono>
 
 #include "tutti/base/freed_memory.hpp"
+#include "tutti/drive/stopwatch.hpp"
 #include "tutti/node/status_envelope.hpp"
 
 namespace tutti::program {
@@ -37,9 +38,10 @@ Answer HostedServer::work(Timestamp now) {
   }
   if (auto task = node_->begin_map(now))
     making_ = std::async(std::launch::async, [this, task = std::move(*task)]() mutable {
-      const double begun_s = thread_cpu_s();
+      const double begun_s = drive::thread_cpu_s();
       node::MapOfTask made = make_map_(std::move(task));
-      made.pace.cost_s = clock_.rate() * (thread_cpu_s() - begun_s);  // a mission's clock may be faster than the wall's
+      made.pace.cost_s =
+          clock_.rate() * (drive::thread_cpu_s() - begun_s);  // a mission's clock may be faster than the wall's
       return made;
     });
   if (node_->changes() != reported_changes_) answer.step.messages.push_back(mission_status(now));

@@ -57,8 +57,8 @@ class RobotProgram {
   Status run(const std::atomic<bool>& stop);
 
  private:
-  [[nodiscard]] double begin_s(const RobotDriver& driver) const;
-  Result<std::unique_ptr<RobotDriver>> open_driver();
+  [[nodiscard]] double begin_s(drive::Driver& robot) const;
+  Result<std::unique_ptr<node::RobotNode>> open_robot();
   Result<std::unique_ptr<Hosted>> open_node(bus::Port& port);
   [[nodiscard]] RobotView view() const;
   Status open_feed(const node::RobotNode& node);
@@ -93,7 +93,7 @@ void RobotProgram::tell_alone() {
   alone_ = why;
 }
 
-Result<std::unique_ptr<RobotDriver>> RobotProgram::open_driver() {
+Result<std::unique_ptr<node::RobotNode>> RobotProgram::open_robot() {
   node::RobotNodeConfig config{.agent = options_.settings.agent,
                                .name = options_.name,
                                .incarnation = incarnation_,
@@ -106,20 +106,17 @@ Result<std::unique_ptr<RobotDriver>> RobotProgram::open_driver() {
     config.agent.submap.has_scans = sensors->scans;
     config.agent.submap.has_images = !sensors->cameras.empty();
   }
-  const std::uint64_t session = options_.session.value_or(folder_->made_ns());
-  if (options_.feed.empty()) return options_.replay(config, session, *store_);
-  auto node = node::RobotNode::open(robot_, session, config, *store_);
-  if (!node) return tl::unexpected(node.error());
-  return std::make_unique<LiveRobot>(std::move(*node));
+  if (options_.replay.recording) config.agent = drive::with_sensors(config.agent, *options_.replay.recording);
+  auto node = node::RobotNode::open(robot_, options_.session.value_or(folder_->made_ns()), config, *store_);
+  if (!node) return in_context((folder_->path() / kRobotFile).string(), node.error());
+  return node;
 }
 
 Result<std::unique_ptr<Hosted>> RobotProgram::open_node(bus::Port& port) {
-  auto driver = open_driver();
-  if (!driver) return in_context((folder_->path() / kRobotFile).string(), driver.error());
-  auto* const live = dynamic_cast<LiveRobot*>(driver->get());
-  auto robot = std::make_unique<HostedRobot>(std::move(*driver), options_.duration_s, options_, *clock_, port, *log_,
-                                             alone_, maps_.get());
-  if (feed_) robot->feed_live(*feed_, *live, *host_, view());
+  auto node = open_robot();
+  if (!node) return tl::unexpected(node.error());
+  auto robot = std::make_unique<HostedRobot>(std::move(*node), options_, *clock_, port, *log_, alone_, maps_.get());
+  if (feed_) robot->feed_live(*feed_, *host_, view());
   return robot;
 }
 
@@ -185,9 +182,11 @@ void RobotProgram::follow_maps() {
 }
 
 /// A recording is replayed from where it stood; for a robot that is fed, time has passed.
-double RobotProgram::begin_s(const RobotDriver& driver) const {
+double RobotProgram::begin_s(drive::Driver& robot) const {
   if (!options_.feed.empty()) return options_.rate * folder_->age_s();
-  return folder_->is_new() ? 0.0 : std::min(driver.next_time(), options_.duration_s);
+  const RobotReplay& replay = options_.replay;
+  if (folder_->is_new()) return 0.0;
+  return std::min(drive::Replay(*replay.recording, replay.start_s, robot).next_time(), replay.duration_s);
 }
 
 Status RobotProgram::start() {
@@ -214,9 +213,10 @@ Status RobotProgram::start() {
         std::move(*board), publishing::KeptMaps(folder_->path() / "maps", where.credentials), options_.open_map, *log_);
     localise_ = maps_->take();
   }
-  const auto driver = open_driver();  // where the recording stood
-  if (!driver) return in_context((folder_->path() / kRobotFile).string(), driver.error());
-  clock_.emplace(options_.rate, begin_s(**driver));
+  auto node = open_robot();
+  if (!node) return tl::unexpected(node.error());
+  drive::Driver stood(std::move(*node));  // as it was stored
+  clock_.emplace(options_.rate, begin_s(stood));
   auto lease = bus::MissionLease::open(where, std::nullopt);
   if (!lease) return tl::unexpected(lease.error());
   lease_ = std::move(*lease);
@@ -233,7 +233,7 @@ Status RobotProgram::start() {
                             .table_aside = "meta",
                             .version = options_.version},
                 *clock_, *log_);
-  if (Status opened = open_feed((*driver)->node()); !opened) return opened;
+  if (Status opened = open_feed(stood.node()); !opened) return opened;
   // On a full disk there is no map, but clients learn where they are.
   if (Status opened = host_->open(); !opened && !(feed_ && host_->tries_again())) return opened;
   log_->say(Level::info, fmt::format("robot {} runs in {}, bus {}, {}, {}", robot_.value, folder_->path().string(),

@@ -14,17 +14,18 @@
 #include "tutti/base/result.hpp"
 #include "tutti/bus/transport.hpp"
 #include "tutti/intake/sensor_intake.hpp"
+#include "tutti/model/recording.hpp"
 #include "tutti/perception/visual/frontend/tracking_source.hpp"
 #include "tutti/program/event_log.hpp"
 #include "tutti/program/feed/live_feed.hpp"
 #include "tutti/program/map_fetcher.hpp"
-#include "tutti/program/robot_driver.hpp"
 #include "tutti/program/robot_store.hpp"
 #include "tutti/robot/agent.hpp"
 
 namespace tutti::program {
 
 inline constexpr const char* kEnded = "ended";  ///< The program's last event, which has its traffic and status.
+inline constexpr const char* kUpdateTimed = "update_timed";  ///< The event of drive::UpdateTime.
 
 /// What a robot's command line gives about its mission.
 struct RobotSettings {
@@ -42,15 +43,23 @@ struct RobotSettings {
   }
 };
 
+/// The recording that a robot replays.
+struct RobotReplay {
+  std::shared_ptr<const Recording> recording;  ///< Null: there is none, and samples are fed.
+  double start_s = 0.0;                        ///< Mission time of its first sample.
+  double duration_s = 0.0;                     ///< The mission's.
+  /// Makes an event of an update, whose estimate of the robot's trajectory is `map`. Not set: it is not scored.
+  std::function<Json(const Trajectory& map, const robot::RobotAgent& agent)> score;
+};
+
 /// How a robot program runs.
 struct RobotOptions {
   std::string name;     ///< One of the mission's robots; any name when the robot is fed.
   bus::BusOptions bus;  ///< The mission is that of the settings.
   std::filesystem::path state;
   RobotSettings settings;
-  std::string feed;         ///< Path of the Unix socket on which samples are fed; empty: they are from a recording.
-  ReplayMaker replay;       ///< Makes the robot that replays the recording.
-  double duration_s = 0.0;  ///< Duration of the mission; not used when the robot is fed.
+  std::string feed;  ///< Path of the Unix socket on which samples are fed; empty: they are from a recording.
+  RobotReplay replay;
   FeedAccess feed_access;
   /// Called with the feed of a robot that is fed: starts what feeds it in this process, until the result is destroyed.
   std::function<std::shared_ptr<void>(LiveFeed&)> beside_feed;

@@ -18,9 +18,9 @@
 #include "support/bus/nats_network.hpp"
 #include "support/paths.hpp"
 #include "tutti/base/file.hpp"
+#include "tutti/drive/replay.hpp"
 #include "tutti/lab/mission_input.hpp"
 #include "tutti/lab/mission_source.hpp"
-#include "tutti/mission/robot_actor.hpp"
 #include "tutti/mission/runner.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/worker_node.hpp"
@@ -107,14 +107,14 @@ inline std::unique_ptr<storage::MemoryStore> undisturbed(const World& world) {
   };
   for (const mission::MissionRecording& recording : world.recordings) {
     storage::MemoryStore store(storage::robot_schema());
-    node::RobotNodeConfig config{.agent = world.config.agent};
+    node::RobotNodeConfig config{.agent = drive::with_sensors(world.config.agent, recording.recording)};
     config.uplink.max_under_way_bytes = 0;
-    auto robot =
-        std::move(mission::RobotActor::open(recording, config, world.config.association, kSession, store).value());
-    robot->resume({});
-    while (robot->next_time() < 1e9) {
-      robot->replay_next({});
-      const node::Step step = robot->take_step();
+    drive::Driver robot(node::RobotNode::open(recording.recording.robot, kSession, config, store).value());
+    drive::Replay replay(recording.recording, recording.start_s, robot);
+    replay.resume({});
+    while (replay.next_time() < 1e9) {
+      replay.feed_next({});
+      const node::Step step = robot.take_step();
       EXPECT_TRUE(store.commit(step.writes));
       for (const bus::Envelope& message : step.messages) serve(serve, server->receive(message, {}));
     }

@@ -28,7 +28,7 @@ class SentPort final : public bus::Port {
 /// What of HostedRobot is about being fed.
 class Hosting final : public Hosted {
  public:
-  Hosting(std::unique_ptr<LiveRobot> robot, FeedFront& front, Host& host, const Clock& clock,
+  Hosting(std::unique_ptr<drive::Driver> robot, FeedFront& front, Host& host, const Clock& clock,
           const visual::TrackerConfig& tracker = {})
       : robot_(std::move(robot)), fed_(front, *robot_, host, clock, RobotView("alpha"), tracker) {}
   Answer start(Timestamp now) override {
@@ -56,7 +56,7 @@ class Hosting final : public Hosted {
     fed_.note(out.step);
     return out;
   }
-  std::unique_ptr<LiveRobot> robot_;
+  std::unique_ptr<drive::Driver> robot_;
   FedRobot fed_;
 };
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/mission/image_tally.hpp"
+#include "tutti/drive/image_tally.hpp"
 
 #include <gtest/gtest.h>
 
-namespace tutti::mission {
+namespace tutti::drive {
 namespace image_tally_test {
 
 std::vector<TrackedImage> image_with(std::size_t points) {
@@ -51,4 +51,4 @@ TEST(ImageTally, CountsImagesWithoutAnythingToFollow) {
 }
 
 }  // namespace image_tally_test
-}  // namespace tutti::mission
+}  // namespace tutti::drive

@@ -8,7 +8,7 @@
 
 #include "tutti/model/visual.hpp"
 
-namespace tutti::mission {
+namespace tutti::drive {
 
 /// Watches whether a robot's cameras keep delivering images at its keyframes, and whether these show enough.
 class ImageTally {
@@ -30,4 +30,4 @@ class ImageTally {
   bool stopped_ = true;  // or has not begun
 };
 
-}  // namespace tutti::mission
+}  // namespace tutti::drive

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/mission/image_tally.hpp"
+#include "tutti/drive/image_tally.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-namespace tutti::mission {
+namespace tutti::drive {
 namespace {
 
 std::size_t followed(const TrackedImage& image) {
@@ -49,4 +49,4 @@ std::vector<std::string> ImageTally::notes() const {
   return out;
 }
 
-}  // namespace tutti::mission
+}  // namespace tutti::drive
