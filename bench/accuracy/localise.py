@@ -34,11 +34,10 @@ LIFT = ("a lift between two floors", "floors", "simulated", ["duration_s=240"])
 LIFT_SEEDS = (2, 3)  # with seed 1 the floors are joined while they are mapped (docs/floors.md)
 
 
-def run(program, *words):
-    done = subprocess.run([str(program), *[str(word) for word in words]], capture_output=True, text=True)
+def run(tutti, *words):
+    done = subprocess.run([str(tutti), *[str(word) for word in words]], capture_output=True, text=True)
     if done.returncode != 0:
         raise SystemExit(f"{' '.join(str(word) for word in words)}: {done.stderr}")
-    return done.stdout
 
 
 def remembered(keep, what, make):

@@ -51,7 +51,7 @@ class Driver {
   /// Reports that a scan which the node wanted could not be read.
   void refuse_scan(const std::string& why, Timestamp now);
 
-  /// What the node has to write, send and report since the last call.
+  /// Returns what the node has to write, send and report since the last call.
   node::Step take_step() { return std::exchange(step_, {}); }
   /// How long updates of the map took, since the last call.
   std::vector<UpdateTime> take_update_times() { return std::exchange(update_times_, {}); }

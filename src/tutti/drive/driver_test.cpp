@@ -28,7 +28,7 @@ class DriverTest : public testing::Test {
   void walk_to(std::size_t i) {
     driver_.add(OdometrySample{kOdometry[i].stamp, kOdometry[i].pose, robot::test::kStepCovariance}, {});
   }
-  /// What there is to see at sample `i`; false: nothing.
+  /// The driver sees sample `i`, in which there is something to see if `shows`.
   void see(std::size_t i, bool shows, const std::vector<Error>& errors = {}) {
     const auto track = [&](bool keyframe) {
       ++tracked_;

@@ -37,7 +37,7 @@ Replay::Replay(const Recording& recording, double start_s, Driver& driver)
   next_measured_ = static_cast<std::size_t>(first - recording.measured.begin());
 }
 
-/// What sensors saw since all was settled, and the end of the recording, may not have been stored.
+/// Nobody may have stored what sensors saw since all was settled, nor the end of the recording.
 void Replay::resume(Timestamp now) {
   driver_.resume(now);
   if (next_ == 0) return;

@@ -167,7 +167,7 @@ const World& another_world() {
   return made;
 }
 
-/// What a robot says on its way through a lift; on the other floor it is right, or says nothing.
+/// Returns what a robot says on its way through a lift; on the other floor it is right, or says nothing.
 std::map<Ride, std::vector<Located>> ride(Localiser& one, const World& from, const World& to) {
   std::map<Ride, std::vector<Located>> out;
   test::ride(from, to, one, [&](Ride part, std::size_t k) {

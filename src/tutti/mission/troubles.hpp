@@ -11,7 +11,7 @@
 
 namespace tutti::mission {
 
-/// What went wrong with a robot, by the events that it reported.
+/// Counts what went wrong with a robot, by the events that it reported.
 class Troubles {
  public:
   struct Trouble {

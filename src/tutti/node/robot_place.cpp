@@ -43,8 +43,8 @@ void RobotNode::locate(const Input& input, Timestamp now, Step& step) {
   if (!localiser_) return;
   (void)localiser_->add(input);
   tell_place(now, step);
-  if (const localise::Located located = localiser_->located(); places_.is_elsewhere(located))
-    return change_floor(located.floor, now, step);
+  if (localiser_->map().floors > 1 && places_.is_elsewhere(localiser_->located()))
+    return change_floor(localiser_->located().floor, now, step);
   if (base_ || !places_.wants(agent_, localiser_->state())) return;  // where there is a server, its map corrects it
   places_.note(agent_, localiser_->located(), localiser_->map());
   if (const auto graph = places_.graph_if_due(agent_))  // as it will be read again after a start

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
+#include <ranges>
 #include <utility>
 
 #include "tutti/base/check.hpp"
@@ -14,27 +14,30 @@ namespace {
 
 using Ends = std::pair<std::size_t, std::size_t>;
 
-bool is_connected(std::size_t junctions, const std::vector<Ends>& corridors) {
+/// Per junction the first of those that corridors join it to.
+std::vector<std::size_t> networks(std::size_t junctions, const std::vector<Ends>& corridors) {
   std::vector<std::vector<std::size_t>> neighbours(junctions);
   for (const auto& [a, b] : corridors) {
     neighbours[a].push_back(b);
     neighbours[b].push_back(a);
   }
-  std::vector<bool> reached(junctions, false);
-  std::vector<std::size_t> stack{0};
-  reached[0] = true;
-  std::size_t count = 1;
-  while (!stack.empty()) {
-    const std::size_t at = stack.back();
-    stack.pop_back();
-    for (const std::size_t next : neighbours[at]) {
-      if (reached[next]) continue;
-      reached[next] = true;
-      ++count;
-      stack.push_back(next);
+  std::vector<std::size_t> out(junctions, junctions);  // in none yet
+  for (std::size_t first = 0; first < junctions; ++first) {
+    if (out[first] != junctions) continue;
+    out[first] = first;
+    std::vector<std::size_t> stack{first};
+    while (!stack.empty()) {
+      const std::size_t at = stack.back();
+      stack.pop_back();
+      for (const std::size_t next : neighbours[at])
+        if (std::exchange(out[next], first) == junctions) stack.push_back(next);
     }
   }
-  return count == junctions;
+  return out;
+}
+
+bool is_connected(std::size_t junctions, const std::vector<Ends>& corridors) {
+  return std::ranges::all_of(networks(junctions, corridors), [](std::size_t first) { return first == 0; });
 }
 
 std::vector<Ends> grid_corridors(std::size_t rows, std::size_t columns) {
@@ -109,17 +112,9 @@ CorridorWorld make_corridor_world(const CorridorWorldConfig& config, Rng rng) {
 }
 
 std::vector<std::size_t> networks_of(const CorridorWorld& world) {
-  std::vector<std::size_t> out(world.junctions.size());
-  std::iota(out.begin(), out.end(), std::size_t{0});
-  for (bool is_changed = true; is_changed;) {
-    is_changed = false;
-    for (const Corridor& corridor : world.corridors) {
-      const std::size_t least = std::min(out[corridor.a], out[corridor.b]);
-      is_changed |= out[corridor.a] != least || out[corridor.b] != least;
-      out[corridor.a] = out[corridor.b] = least;
-    }
-  }
-  return out;
+  std::vector<Ends> corridors;
+  for (const Corridor& corridor : world.corridors) corridors.emplace_back(corridor.a, corridor.b);
+  return networks(world.junctions.size(), corridors);
 }
 
 std::vector<std::size_t> spread_starts(const CorridorWorld& world, std::size_t count, Rng rng) {
@@ -127,13 +122,11 @@ std::vector<std::size_t> spread_starts(const CorridorWorld& world, std::size_t c
   std::vector<std::size_t> starts;
   std::vector<double> distance(world.junctions.size(), std::numeric_limits<double>::infinity());
   std::vector<std::ptrdiff_t> in_network(world.junctions.size(), 0);  // starts, by network
-  const auto is_better = [&](std::size_t a, std::size_t b) {
-    return std::pair(-in_network[network[a]], distance[a]) > std::pair(-in_network[network[b]], distance[b]);
-  };
+  const auto merit = [&](std::size_t i) { return std::pair(-in_network[network[i]], distance[i]); };
+  const auto all = std::views::iota(std::size_t{0}, world.junctions.size());
   while (starts.size() < count) {
-    std::size_t next = starts.empty() ? rng.index(world.junctions.size()) : 0;
-    for (std::size_t i = 1; !starts.empty() && i < distance.size(); ++i)
-      if (is_better(i, next)) next = i;
+    const std::size_t next =
+        starts.empty() ? rng.index(world.junctions.size()) : *std::ranges::max_element(all, {}, merit);
     starts.push_back(next);
     ++in_network[network[next]];
     for (std::size_t i = 0; i < distance.size(); ++i)
