@@ -161,7 +161,8 @@ void Localiser::try_start(const Scan& scan) {
                    .T_world_body = fits.front().prior,
                    .at = usable->at,
                    .confirmed = scan.stamp,
-                   .to_confirm = kConfirmations};
+                   .to_confirm = kConfirmations,
+                   .gate = GuessGate::of_start()};
     fits.front().match.T_world_body.covariance *= kAlike;
     correct(fits.front().match.T_world_body);
     why_ = "the start pose fits, which more scans are to confirm";
@@ -246,8 +247,8 @@ void Localiser::follow(const Scan& scan) {
   ScanMatch match = match_scan(*local, usable->scan, track_->T_world_body.T_a_b);
   ++work_.registered;
   match.T_world_body.covariance *= kAlike;
-  const Assessment assessment =
-      track_->to_confirm > 0 ? assess_guess(match, track_->T_world_body) : assess(match, track_->T_world_body);
+  const Assessment assessment = track_->to_confirm > 0 ? assess_guess(match, track_->T_world_body, track_->gate)
+                                                       : assess(match, track_->T_world_body);
   if (assessment.evidence != Evidence::confirms) return doubt(assessment, scan.stamp);
   confirm(match);
   if (track_->to_confirm == 0) map_fit_.see(*local, usable->scan, track_->T_world_body.T_a_b);
@@ -355,10 +356,8 @@ void Localiser::decide(SearchResult found, const Submap& submap) {
     return std::ranges::any_of(pending_, [&](const Hypothesis& p) { return is_same_place(p, place, T_odom_body); });
   };
   Hypothesis& best = found.places.front();
-  std::vector<Hypothesis> rivals = found.rivals();
-  const bool is_known = was_seen(best);
-  if (is_known) std::erase_if(rivals, [&](const Hypothesis& rival) { return !was_seen(rival); });
-  if (rivals.empty() && (is_known || best.shown == Shown::surely)) {
+  const std::vector<Hypothesis> rivals = found.rivals();
+  if (rivals.empty() && (best.shown == Shown::surely || was_seen(best))) {
     pending_.assign(1, best);  // should scans not confirm it, the next submap may
     return begin_track(best);
   }

@@ -80,12 +80,13 @@ class Localiser {
 
  private:
   struct Track {
-    std::uint32_t floor = 1;        ///< In whose frame the pose is.
-    RelativePose T_world_body;      ///< At `at`; right tangent, without what the map itself errs by.
-    StampedPose at;                 ///< By odometry.
-    Timestamp confirmed;            ///< When a scan last lay on the map.
-    int to_confirm = 0;             ///< Scans that are still to confirm it before it counts.
-    std::optional<double> overlap;  ///< ScanMatch::overlap of that scan.
+    std::uint32_t floor = 1;                 ///< In whose frame the pose is.
+    RelativePose T_world_body;               ///< At `at`; right tangent, without what the map itself errs by.
+    StampedPose at;                          ///< By odometry.
+    Timestamp confirmed;                     ///< When a scan last lay on the map.
+    int to_confirm = 0;                      ///< Scans that are still to confirm it before it counts.
+    GuessGate gate = GuessGate::of_found();  ///< That they must pass.
+    std::optional<double> overlap;           ///< ScanMatch::overlap of that scan.
     std::optional<Timestamp> against_since;
     std::optional<StampedPose> nothing_since;  ///< By odometry.
     std::size_t against = 0;                   ///< Scans in a row.

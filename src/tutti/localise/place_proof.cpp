@@ -14,14 +14,13 @@ namespace {
 // Means over a stretch that show a place: alone, and where an earlier submap of the robot has shown it, too. At right
 // places of the tunnels 0.84 to 0.98 of the scans lie on the map, at wrong ones 0.91 at most and those far from
 // closely.
-constexpr GuessGate kAloneGate{.least_overlap = 0.75, .most_contradiction = 0.06};
-constexpr double kAloneQuality = 0.7;
+constexpr GuessGate kAloneGate{.least_overlap = 0.75, .most_contradiction = 0.06, .least_quality = 0.7};
 // Beyond the map, places that fit 0.35 to 0.51 have come twice in a row; right ones had 0.65 and more.
-constexpr double kAgreedQuality = 0.6;
+constexpr GuessGate kAgreedGate{.least_overlap = 0.6, .most_contradiction = 0.15, .least_quality = 0.6};
 
 Shown shown_by(double overlap, double contradiction, double quality) {
-  if (kAloneGate.passes(overlap, contradiction) && quality >= kAloneQuality) return Shown::surely;
-  return kAgreedGate.passes(overlap, contradiction) && quality >= kAgreedQuality ? Shown::by_one : Shown::no;
+  if (kAloneGate.passes(overlap, contradiction, quality)) return Shown::surely;
+  return kAgreedGate.passes(overlap, contradiction, quality) ? Shown::by_one : Shown::no;
 }
 
 std::vector<Hypothesis> turned(const Hypothesis& place) {

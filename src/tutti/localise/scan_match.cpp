@@ -87,15 +87,18 @@ Assessment assess(const ScanMatch& match, const RelativePose& predicted) {
   return {Evidence::confirms, {}};
 }
 
-Assessment assess_guess(const ScanMatch& match, const RelativePose& predicted) {
+Assessment assess_guess(const ScanMatch& match, const RelativePose& predicted, const GuessGate& gate) {
   const Assessment out = assess(match, predicted);
   if (out.evidence != Evidence::confirms) return out;
-  if (kAgreedGate.passes(match.overlap, match.contradiction)) return out;
-  return {Evidence::nothing,
-          fmt::format("{:.0f} % of the scan lies on the map and {:.0f} % contradicts it, expected {:.0f} "
-                      "and {:.0f} % to begin with",
-                      100.0 * match.overlap, 100.0 * match.contradiction, 100.0 * kAgreedGate.least_overlap,
-                      100.0 * kAgreedGate.most_contradiction)};
+  const double quality = match.quality();
+  if (gate.passes(match.overlap, match.contradiction, quality) && match.in_view >= gate.least_in_view) return out;
+  return {
+      Evidence::nothing,
+      fmt::format(
+          "{:.0f} % of the scan lies on the map, {:.0f} % contradicts it, it fits to {:.0f} %, and {} points are "
+          "in view, expected {:.0f}, {:.0f} and {:.0f} %, and {} to begin with",
+          100.0 * match.overlap, 100.0 * match.contradiction, 100.0 * quality, match.in_view,
+          100.0 * gate.least_overlap, 100.0 * gate.most_contradiction, 100.0 * gate.least_quality, gate.least_in_view)};
 }
 
 namespace {
@@ -112,7 +115,7 @@ bool is_one(const RelativePose& a, const RelativePose& b) {
 void add_fits(const LocalMap& map, const fit::FitScan& scan, const StartTries& tries, std::vector<StartFit>& fits) {
   for (const Pose3& from : tries.from) {
     StartFit fit{tries.floor, tries.T_world_body, match_scan(map, scan, from)};
-    if (assess_guess(fit.match, fit.prior).evidence != Evidence::confirms) continue;
+    if (assess_guess(fit.match, fit.prior, GuessGate::of_start()).evidence != Evidence::confirms) continue;
     const auto same = std::ranges::find_if(fits, [&](const StartFit& other) {
       return other.floor == fit.floor && is_one(other.match.T_world_body, fit.match.T_world_body);
     });

@@ -41,5 +41,22 @@ TEST(ScanMatch, WhereTheMapShowsLittleNothingFollows) {
   EXPECT_EQ(assess(match, kHere).evidence, Evidence::nothing);
 }
 
+/// A place that was found needs more than a start pose: closer scans, and enough in view that could contradict.
+TEST(ScanMatch, WhatWasFoundMustPassAStricterGate) {
+  EXPECT_EQ(assess_guess(good(), kHere, GuessGate::of_found()).evidence, Evidence::confirms);
+  const auto refused = [](auto spoil, const char* why) {
+    ScanMatch match = good();
+    spoil(match);
+    EXPECT_EQ(assess(match, kHere).evidence, Evidence::confirms) << why;
+    EXPECT_EQ(assess_guess(match, kHere, GuessGate::of_start()).evidence, Evidence::confirms) << why;
+    const Assessment found = assess_guess(match, kHere, GuessGate::of_found());
+    EXPECT_EQ(found.evidence, Evidence::nothing) << why;
+    EXPECT_NE(found.why.find(why), std::string::npos) << found.why;
+  };
+  refused([](ScanMatch& match) { match.contradiction = 0.12; }, "12 % contradicts it");
+  refused([](ScanMatch& match) { match.plane_rmse_m = 0.09; }, "fits to 51 %");
+  refused([](ScanMatch& match) { match.in_view = 780; }, "780 points are in view");
+}
+
 }  // namespace scan_match_test
 }  // namespace tutti::localise

@@ -36,8 +36,8 @@ std::optional<StartPose> start_at(const StoredPlace& place, const localise::Know
 
 /// Where a robot was localised in a map as it drove: from it a robot without a server makes the proxy graph that a
 /// server would send, so that its own trajectory is corrected by the map in the same way, by the comparison and the
-/// constraints of the paper. Only the last place is stored. It is of one floor of the map: when the robot has left
-/// that, another one begins.
+/// constraints of the paper. One that has a server is corrected by that. Only the last place is stored. It is of one
+/// floor of the map: when the robot has left that, another one begins.
 class PlaceRecord {
  public:
   /// True when the state is another than at the last call, and at the first one.

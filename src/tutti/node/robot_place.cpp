@@ -45,9 +45,10 @@ void RobotNode::locate(const Input& input, Timestamp now, Step& step) {
   tell_place(now, step);
   if (localiser_->map().floors > 1 && places_.is_elsewhere(localiser_->located()))
     return change_floor(localiser_->located().floor, now, step);
-  if (base_ || !places_.wants(agent_, localiser_->state())) return;  // where there is a server, its map corrects it
+  if (!places_.wants(agent_, localiser_->state())) return;
   places_.note(agent_, localiser_->located(), localiser_->map());
-  if (const auto graph = places_.graph_if_due(agent_))  // as it will be read again after a start
+  // Where there is a server, its map corrects it. The graph is as it will be read again after a start.
+  if (const auto graph = base_ ? std::nullopt : places_.graph_if_due(agent_))
     follow(wire::decode_proxy_graph(wire::encode(*graph)).value(), now, step);
 }
 

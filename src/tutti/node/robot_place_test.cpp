@@ -17,6 +17,7 @@
 #include "tutti/node/status_envelope.hpp"
 #include "tutti/node/status_text.hpp"
 #include "tutti/storage/memory_store.hpp"
+#include "tutti/wire/codec.hpp"
 #include "tutti/wire/field_bytes.hpp"
 
 namespace tutti::node {
@@ -212,6 +213,28 @@ TEST(RobotPlace, OnAnotherFloorAnotherSessionBegins) {
   localise::KnownMap without = robot.node->localiser()->map();
   without.submaps.erase(stored->near);
   EXPECT_FALSE(start_at(*stored, without).has_value());
+
+  // A server corrects the trajectories of its robots, and measures a lift no better.
+  Robot of_a_server(localise::test::as_floors(*below.map, *above.map));
+  ProxyGraphMessage others;
+  others.graph.revision = 1;
+  others.graph.nodes = {{.chain = RobotId{9}, .stamp = {}, .T_world_body = {}}};
+  others.graph.components = {{RobotId{9}, 0}};
+  (void)of_a_server.done(of_a_server.node->receive({bus::Endpoint::server(),
+                                                    bus::Endpoint::of(kRobot),
+                                                    bus::MessageKind::proxy_graph,
+                                                    {},
+                                                    std::make_shared<const std::string>(wire::encode(others))},
+                                                   {}));
+  localise::test::ride(below, above, of_a_server, [&](Ride part, std::size_t) {
+    if (part == Ride::in_lift) {
+      EXPECT_EQ(of_a_server.node->status(of_a_server.now).session, 1U);
+    }
+  });
+  EXPECT_EQ(of_a_server.node->status(of_a_server.now).session, 2U);
+  EXPECT_EQ(of_a_server.updates, 1U) << "the server's graph alone corrects it";
+  (void)of_a_server.done(of_a_server.node->store_all());
+  EXPECT_EQ(of_a_server.store.read(robot_tables::kMeta, robot_tables::kPlace).value(), *row);
 }
 
 TEST(RobotPlace, AServerSaysWhereTheMapOfARobotFitsNoMore) {
