@@ -25,12 +25,12 @@ async function ask(path: string, body?: unknown, at_most_ms: number = TIMES.answ
 }
 
 export const api = {
-  me: async (): Promise<Me> => decode_me(await ask("/api/me")),
+  me: async (): Promise<Me> => decode_me(await ask("/api/me"), "me"),
   login: (nonce: string, key: string, signature: string) => ask("/api/login", { nonce, key, signature }),
   logout: () => ask("/api/logout", {}),
   decide: (closure: string, wish: Wish, by: string) => ask("/api/decide", { closure, wish, by }),
   register: async (from: SubmapId, to: SubmapId, T_from_to: Pose | null): Promise<Registration> =>
-    decode_registration(await ask("/api/register", { from, to, T_from_to })),
+    decode_registration(await ask("/api/register", { from, to, T_from_to }), "registration"),
   /** The value of `poses` that the map would have with what was registered; takes as long as an update of the map. */
   change: async (look: number): Promise<unknown> =>
     ((await ask("/api/change", { look }, TIMES.change_ms)) as { poses?: unknown }).poses,
@@ -42,7 +42,7 @@ export const api = {
   acknowledge: (alerts: string[], undo: boolean, by: string) => ask("/api/acknowledge", { alerts, undo, by }),
   hold: (what: string, by: string) => ask("/api/hold", { what, by }),
   why: async (from: string, to: string): Promise<Why> =>
-    decode_why(await ask(`/api/why?from=${encodeURIComponent(from)}&to=${encodeURIComponent(to)}`)),
+    decode_why(await ask(`/api/why?from=${encodeURIComponent(from)}&to=${encodeURIComponent(to)}`), "why"),
 };
 
 export const kNobody: Me = {

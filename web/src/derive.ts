@@ -218,7 +218,7 @@ export function correction_between(store: Store, t: number, was: Poses, after: P
 /** The server's wall clock at mission time t, ms since 1970; null: not known. */
 export function wall_ms_at(store: Store, t: number): number | null {
   const track = store.track("status");
-  const wall = (i: number): number | null => track?.values[i]?.wall_ms ?? null;
+  const wall = (i: number): number | null => (track?.values[i]?.wall_ns ?? 0) / 1e6 || null;
   const i = track ? track.index(t) : -1;
   const here = wall(i);
   if (!track || here === null) return null;

@@ -2,7 +2,7 @@
 /** The mission so far as one file, to hand over: this page, with everything that it knows in it. */
 import type { App } from "./app";
 import { base64_of_cloud } from "./cloud";
-import type { Disagreement, Kind, Mark, Mission, Poses, Status } from "./schema";
+import type { Kind, Mark, Mission, Poses, Status } from "./schema";
 import { POSE_ROW } from "./schema";
 import { MISSION_ELEMENT } from "./sources/inlined";
 import type { Store } from "./store";
@@ -19,16 +19,9 @@ const ENCODERS: { [K in Kind]?: (value: never, store: Store) => unknown } = {
     ...s.numbers.get(""),
     ...s,
     numbers: undefined,
-    wall_ns: s.wall_ms && s.wall_ms * 1e6,
     workers: s.workers.map((w) => ({ ...s.numbers.get(`workers: ${w.name}`), ...w })),
-    robots: s.robots.map((r) => ({
-      ...s.numbers.get(r.name),
-      ...r,
-      T_odom_body: r.position && { translation_m: r.position },
-    })),
-    refusals: s.refused.map((r) => ({ ...r, last_why: r.why })),
+    robots: s.robots.map((r) => ({ ...s.numbers.get(r.name), ...r })),
   }),
-  disagreement: (d: Disagreement) => ({ ...d, nodes: d.nodes.map((n) => ({ ...n, d: n.d_m })) }),
 };
 
 function rows_of_submaps(poses: Poses, store: Store): [string, (number | null)[]][] {

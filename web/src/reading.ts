@@ -1,10 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /** Reads values that came from outside; what does not fit throws a DecodeError that names where. */
-import type { Numbers } from "./schema";
 
 export class DecodeError extends Error {}
 
 export type Fields = Record<string, unknown>;
+/** From JSON to a value; `what` names it in errors. */
+export type Reader<T> = (value: unknown, what: string) => T;
+/** What reads each field of a record. */
+type Table = Readonly<Record<string, Reader<unknown>>>;
+export type Decoded<T extends Table> = { [K in keyof T]: ReturnType<T[K]> };
+
+export type Vec3 = [number, number, number];
+/** x, y, z, qx, qy, qz, qw: T_a_b maps coordinates of b to coordinates of a. */
+export type Pose = [number, number, number, number, number, number, number];
+/** By whose they are ("": the server's): numbers by name. */
+export type Numbers = ReadonlyMap<string, Readonly<Record<string, number>>>;
 
 const shown = (value: unknown): string => (JSON.stringify(value) ?? "nothing").slice(0, 40);
 
@@ -22,47 +32,72 @@ export function number(value: unknown, what: string): number {
   return value;
 }
 
-/** A number, or null when it is missing. */
-export function maybe(value: unknown, what: string): number | null {
-  return value === null || value === undefined ? null : number(value, what);
-}
+/** As `read`; `otherwise` when it is missing. */
+export const or =
+  <T, U>(read: Reader<T>, otherwise: U): Reader<T | U> =>
+  (value, what) =>
+    value === null || value === undefined ? otherwise : read(value, what);
 
-/** A number, or `otherwise` when it is missing. */
-export function count(value: unknown, what: string, otherwise = 0): number {
-  return maybe(value, what) ?? otherwise;
-}
+export const or_null = <T>(read: Reader<T>): Reader<T | null> => or(read, null);
+
+/** A number, or null when it is missing. */
+export const maybe = or_null(number);
+
+/** A number, or 0 when it is missing. */
+export const count: Reader<number> = or(number, 0);
 
 export function text(value: unknown, what: string): string {
   if (typeof value !== "string") wrong(what, value, "a text");
   return value;
 }
 
-/** A text, or "" when it is missing. Numbers become texts: a session may come as either. */
-export function words(value: unknown, what: string): string {
-  if (value === null || value === undefined) return "";
-  return typeof value === "number" ? String(value) : text(value, what);
-}
+/** A text, or null when it is missing or empty. */
+export const maybe_text: Reader<string | null> = (value, what) => (value ? text(value, what) : null);
 
-export function list<T>(value: unknown, what: string, read: (element: unknown, what: string) => T): T[] {
-  if (!Array.isArray(value)) wrong(what, value, "a list");
-  return value.map((element, i) => read(element, `${what}[${i}]`));
+/** A text, or "" when it is missing. Numbers become texts: a session may come as either. */
+export const words = or((value, what) => (typeof value === "number" ? String(value) : text(value, what)), "");
+
+/** False when it is missing. */
+export const truth: Reader<boolean> = (value) => value === true;
+
+export function list<T>(read: Reader<T>): Reader<T[]> {
+  return (value, what) => {
+    if (!Array.isArray(value)) wrong(what, value, "a list");
+    return value.map((element, i) => read(element, `${what}[${i}]`));
+  };
 }
 
 /** As list(); empty when it is missing. */
-export function maybe_list<T>(value: unknown, what: string, read: (element: unknown, what: string) => T): T[] {
-  return value === null || value === undefined ? [] : list(value, what, read);
+export const maybe_list = <T>(read: Reader<T>): Reader<T[]> => or(list(read), []);
+
+export function numbers<T extends number[]>(n: number): Reader<T> {
+  return (value, what) => {
+    const out = list(number)(value, what);
+    if (out.length !== n) wrong(what, value, `${n} numbers`);
+    return out as T;
+  };
 }
 
-export function numbers<T extends number[]>(value: unknown, what: string, n: number): T {
-  const out = list(value, what, number);
-  if (out.length !== n) wrong(what, value, `${n} numbers`);
-  return out as T;
+export function one_of<T extends string>(...all: T[]): Reader<T> {
+  return (value, what) => {
+    if (!all.includes(value as T)) wrong(what, value, `one of ${all.join(", ")}`);
+    return value as T;
+  };
 }
 
-export function one_of<T extends string>(value: unknown, what: string, all: readonly T[]): T {
-  if (!all.includes(value as T)) wrong(what, value, `one of ${all.join(", ")}`);
-  return value as T;
+/** A record; keys that the table does not have are passed over. */
+export function record<T extends Table>(table: T): Reader<Decoded<T>> {
+  const all = Object.entries(table);
+  return (value, what) => {
+    const f = fields(value, what);
+    return Object.fromEntries(all.map(([key, read]) => [key, read(f[key], key)])) as Decoded<T>;
+  };
 }
+
+export const vec3 = numbers<Vec3>(3);
+export const pose = numbers<Pose>(7);
+/** As programs write a pose in records; the page uses no rotation of these. */
+export const maybe_pose = or_null(record({ translation_m: vec3 }));
 
 /** All numbers of a status, its truths as 0 and 1, and of everything in its lists that has a name. */
 export function named_numbers(status: Fields): Numbers {

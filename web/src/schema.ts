@@ -1,12 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
-/** What the program sends the page: {key, t, value}. A key is KIND or KIND/NAME. */
-import type { RobotColours } from "./colours";
+/**
+ * What the program sends the page: {key, t, value}. A key is KIND or KIND/NAME. Of records that have a list of fields in
+ * the program the tables are in records.ts, which is made of these; the others are here.
+ */
+import { count, list, maybe, maybe_list, maybe_text, number, numbers, one_of, or_null } from "./reading";
+import { pose, record, text, truth, vec3, words } from "./reading";
+import type { Decoded, Numbers, Pose, Reader } from "./reading";
+import type { Rgb, RobotColours } from "./colours";
+import * as records from "./records";
+import type { RobotStatus, StatusFields } from "./records";
+
+export type { Numbers, Pose, Vec3 } from "./reading";
+export type { RobotStatus, WorkerStatus } from "./records";
 
 /** "ROBOT:SESSION/INDEX"; text, because a session may have 64 bits. */
 export type SubmapId = string;
-export type Vec3 = [number, number, number];
-/** x, y, z, qx, qy, qz, qw: T_a_b maps coordinates of b to coordinates of a. */
-export type Pose = [number, number, number, number, number, number, number];
 
 export interface Message {
   key: string;
@@ -14,111 +22,40 @@ export interface Message {
   value: unknown;
 }
 
-export interface Mission {
-  name: string;
-  description: string;
-  version: string;
-  mode: "live" | "report" | "compare";
-  duration_s: number | null;
-  robots: string[];
-  /** A robot that was not heard for so long is silent. */
-  robot_silent_s: number;
-  robot_colours: RobotColours | null;
-}
-
-/** Of a robot's status, what the page shows. */
-export interface RobotStatus {
-  number: number;
-  name: string;
-  session: string;
-  last_seen_s_ago: number | null;
-  last_update_s_ago: number | null;
-  submaps: number;
-  submaps_begun: number | null;
-  refused_submaps: number;
-  unread_submaps: number;
-  conflict: string;
-  version: string;
-  backlog_submaps: number;
-  backlog_bytes: number;
-  heard_revision: number;
-  update_age_s: number | null;
-  keyframes: number;
-  position: Vec3 | null;
-  alerts: number;
-  finished: boolean;
-  trouble: string;
-  battery_v: number | null;
-  battery_percent: number | null;
-  localisation: string; // in a map that does not move; "": it does not localise
-  localisation_why: string;
-  map_id: string; // of that map
-  map_version: number;
-  floor: number; // of that map
-}
+const rgb = numbers<Rgb>(3);
+export const mission = {
+  ...records.mission,
+  mode: ((mode) => (mode === "report" || mode === "compare" ? mode : "live")) as Reader<"live" | "report" | "compare">,
+  robot_colours: or_null<RobotColours>(record({ light: list(rgb), dark: list(rgb) })),
+};
+export type Mission = Decoded<typeof mission>;
 
 /** A map that does not move, as a robot names it. */
 export type MapVersion = Pick<RobotStatus, "map_id" | "map_version">;
 
-export interface WorkerStatus {
-  number: number;
-  name: string;
-  last_seen_s_ago: number | null;
-  jobs_done: number;
-  trouble: string;
-}
-
-/** By whose they are ("": the server's): numbers by name. */
-export type Numbers = ReadonlyMap<string, Readonly<Record<string, number>>>;
-
-export interface Status {
-  version: string;
-  revision: number;
-  submaps: number;
-  closures: number;
-  components: number;
-  pending_jobs: number;
-  has_news: boolean;
-  robots: RobotStatus[];
-  workers: WorkerStatus[];
-  refused: { from: string; kind: string; count: number; why: string }[];
-  trouble: string;
-  /** The server's wall clock, ms since 1970; null: not known. */
-  wall_ms: number | null;
-  verifier: string;
-  waiting: number;
-  why_waiting: string;
+export interface Status extends StatusFields {
   /** Every number that came, also those that the page has no other use for. */
   numbers: Numbers;
 }
 
-export type Severity = "info" | "warning" | "error";
-export interface Alert {
-  id: string;
-  severity: Severity;
-  what: string;
-  where: string;
-  since_s: number | null;
-  todo: string;
-  robot: number | null;
-  submap: SubmapId | null;
-  closure: string | null;
-}
+export const alert = { ...records.alert, since_s: maybe, submap: maybe_text };
+export type Alert = Decoded<typeof alert>;
 
-export interface Submap {
-  id: SubmapId;
-  name: string;
-  robot: number;
-  session: string;
-  index: number;
-  from_s: number;
-  until_s: number;
-  path: Vec3[];
+export const submap = {
+  id: text,
+  name: text,
+  robot: number,
+  session: words,
+  index: number,
+  from_s: count,
+  until_s: count,
+  path: list(vec3),
   /** Where the robot's own odometry has this submap; null: not sent. */
-  T_odom_submap: Pose | null;
-  points: number;
-  bytes: number;
-}
+  T_odom_submap: or_null(pose),
+  points: count,
+  bytes: count,
+};
+export type Submap = Decoded<typeof submap>;
 
 /** Poses of all submaps at one revision; `rows` has POSE_ROW numbers for each place in the store's table of ids. */
 export interface Poses {
@@ -132,56 +69,73 @@ export interface Poses {
 /** component, x, y, z, qx, qy, qz, qw, closures that join it to the map, sigma (both NaN: not computed). A component of NaN: not in the map. */
 export const POSE_ROW = 10;
 
-export type ClosureState = "accepted" | "rejected" | "candidate";
-export type Wish = "accept" | "reject" | "withdraw";
-export interface Gate {
-  reason: string;
-  value: number | null;
-  limit: number | null;
-  unit: string;
+export const gate = {
+  reason: words,
+  value: maybe,
+  limit: maybe,
+  unit: words,
   /** The limit is the least that is allowed; otherwise the most. */
-  at_least: boolean;
-  ok: boolean;
-}
-export interface Link {
-  at_from: Vec3;
-  at_to: Vec3;
-  T_from_to: Pose;
-  misfit_m: number | null;
-  misfit_deg: number | null;
-  chi2: number | null;
-  reason: string;
-}
-export interface Closure {
-  name: string;
-  from: SubmapId;
-  to: SubmapId;
-  state: ClosureState;
-  reason: string;
-  by_hand: boolean;
-  decision: { wish: Wish; by: string; wall_ns: number | null } | null;
-  verifier: string;
-  worker: string;
-  verified_ns: number | null;
-  links: Link[];
-  evidence: Gate[];
-}
+  at_least: truth,
+  ok: truth,
+};
+export type Gate = Decoded<typeof gate>;
 
-export interface Disagreement {
-  robot: number | null;
-  scale_length_m: number[];
+export const link = {
+  at_from: vec3,
+  at_to: vec3,
+  T_from_to: pose,
+  misfit_m: maybe,
+  misfit_deg: maybe,
+  chi2: maybe,
+  reason: words,
+};
+export type Link = Decoded<typeof link>;
+
+const decision = { wish: one_of("accept", "reject", "withdraw"), by: words, wall_ns: maybe };
+export const closure = {
+  name: text,
+  from: text,
+  to: text,
+  state: one_of("accepted", "rejected", "candidate"),
+  reason: words,
+  by_hand: truth,
+  decision: or_null(record(decision)),
+  verifier: words,
+  worker: words,
+  verified_ns: maybe,
+  links: maybe_list(record(link)),
+  evidence: maybe_list(record(gate)),
+};
+export type Closure = Decoded<typeof closure>;
+export type ClosureState = Closure["state"];
+export type Wish = Decoded<typeof decision>["wish"];
+
+export const disagreement = {
+  robot: maybe,
+  scale_length_m: list(number),
   /** By scale: the difference, and over what chance explains (above 1 it is none). `submap` only in a running mission. */
-  nodes: { submap: SubmapId | null; t: number; distance_m: number; d_m: number[]; significance: number[] }[];
+  nodes: list(
+    record({
+      submap: maybe_text,
+      t: number,
+      distance_m: count,
+      d: maybe_list(number),
+      significance: list(number),
+    }),
+  ),
   /** Where odometry left the map. */
-  origins: {
-    from_s: number;
-    until_s: number;
-    translation_m: number;
-    rotation_rad: number;
-    significance: number;
-    alert: boolean;
-  }[];
-}
+  origins: maybe_list(
+    record({
+      from_s: count,
+      until_s: count,
+      translation_m: count,
+      rotation_rad: count,
+      significance: count,
+      alert: truth,
+    }),
+  ),
+};
+export type Disagreement = Decoded<typeof disagreement>;
 
 export interface Trajectory {
   robot: number | null;
@@ -199,46 +153,36 @@ export interface Errors {
   columns: Float64Array[];
 }
 
-export interface Survey {
-  component: number;
-  cloud: string;
-}
+export const survey = { component: count, cloud: text };
+export type Survey = Decoded<typeof survey>;
 
-export interface Mark {
-  id: string;
-  submap: SubmapId;
-  at: Vec3;
-  text: string;
-  by: string;
-  wall_ns: number | null;
-  photo: string | null;
-}
+/** Photos are the server's, or pictures inside the message; anything else could be fetched from elsewhere. */
+export const is_photo = (url: string): boolean =>
+  /^(\/api\/photo\/\d{1,20}|data:image\/(jpeg|png);base64,[A-Za-z0-9+/=]*)$/.test(url);
 
-/** Who is looking at what now. */
-export interface Held {
-  by: string;
-  /** A key: closure/NAME or robot/NUMBER. */
-  what: string;
-}
+export const mark = {
+  id: text,
+  submap: text,
+  at: vec3,
+  text: words,
+  by: words,
+  wall_ns: maybe,
+  photo: ((url) => (typeof url === "string" && is_photo(url) ? url : null)) as Reader<string | null>,
+};
+export type Mark = Decoded<typeof mark>;
 
-/** What robots that localise in a map have found of one of its submaps, together; in cubes. */
-export interface Place {
-  /** "": it is of another map than the server's. */
-  submap: SubmapId;
-  name: string;
-  matched: number;
-  missing: number;
-  appeared: number;
-  /** The share that fits. */
-  trust: number;
+/** Who is looking at what now: a key, closure/NAME or robot/NUMBER. */
+export const held = { by: text, what: text };
+export type Held = Decoded<typeof held>;
+
+const place = {
+  ...records.place,
   /** When a robot saw any of it, s. */
-  seen_s: number;
-  /** Those that did, the last first. */
-  robots: number[];
-}
-export interface Places extends MapVersion {
-  places: Place[];
-}
+  seen_s: number,
+};
+export type Place = Decoded<typeof place>;
+export const places = { map_id: words, map_version: count, places: maybe_list(record(place)) };
+export type Places = Decoded<typeof places>;
 
 /** Bytes since the server's start, by kind of message. */
 export interface RadioBytes {
@@ -247,19 +191,18 @@ export interface RadioBytes {
 }
 
 /** That somebody has seen an alert, for all who watch. */
-export interface Acknowledged {
-  alert: string;
-  by: string;
-}
+export const acknowledged = { alert: text, by: words };
+export type Acknowledged = Decoded<typeof acknowledged>;
 
 /** Of which times the program knows something. */
-export interface Known {
+export const history = {
   /** Null: of none yet. */
-  first_s: number | null;
-  gaps: [number, number][];
+  first_s: maybe,
+  gaps: maybe_list(numbers<[number, number]>(2)),
   /** Why it does not remember what is now; "": it does. */
-  trouble: string;
-}
+  trouble: words,
+};
+export type Known = Decoded<typeof history>;
 
 /** The types of values by kind of key. */
 export interface Values {
@@ -294,38 +237,43 @@ export type Kind = keyof Values;
 export type Report = Record<string, unknown>;
 
 export type Offer = "decide" | "register" | "closure" | "mark" | "hold" | "acknowledge" | "why" | "disagreement";
-export interface Me {
-  login: boolean;
-  name: string;
-  role: "operator" | "viewer" | null;
-  mission: string;
-  may_decide: boolean;
-  nonce: string;
-  offers: Offer[];
-}
+export const me = {
+  login: truth,
+  name: words,
+  role: ((role) => (role === "operator" || role === "viewer" ? role : null)) as Reader<"operator" | "viewer" | null>,
+  mission: words,
+  may_decide: truth,
+  nonce: words,
+  offers: maybe_list(text as Reader<Offer>),
+};
+export type Me = Decoded<typeof me>;
 
-export interface Registration {
-  found: boolean;
-  why: string;
+export const registration = {
+  found: truth,
+  why: words,
   /** What would help; "": every gate is passed. */
-  hint: string;
-  T_from_to: Pose | null;
-  evidence: Gate[];
+  hint: words,
+  T_from_to: or_null(pose),
+  evidence: maybe_list(record(gate)),
   /** What to ask for the map with it by; null: nothing was found. */
-  look: number | null;
-}
+  look: maybe,
+};
+export type Registration = Decoded<typeof registration>;
 
-export interface Why {
-  sentence: string;
-  candidates: {
-    pair: string;
-    from: SubmapId;
-    to: SubmapId;
-    reason: string;
-    value: number | null;
-    limit: number | null;
-    unit: string;
-    nearest: boolean;
-    hint: string;
-  }[];
-}
+export const why = {
+  sentence: words,
+  candidates: maybe_list(
+    record({
+      pair: words,
+      from: words,
+      to: words,
+      reason: words,
+      value: maybe,
+      limit: maybe,
+      unit: words,
+      nearest: truth,
+      hint: words,
+    }),
+  ),
+};
+export type Why = Decoded<typeof why>;

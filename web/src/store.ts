@@ -110,7 +110,7 @@ export class Store {
 
   /** Poses that no message has, such as those of a map that might be. */
   read_poses(value: unknown): Poses {
-    return DECODERS.poses(value, { place: (id) => this.place(id) });
+    return DECODERS.poses(value, "poses", { place: (id) => this.place(id) });
   }
 
   /** Place of a submap in the rows of poses; -1 when it is in none. */
@@ -136,7 +136,8 @@ export class Store {
 
   private put(kind: Kind, name: string, message: Message): void {
     const table = { place: (id: string) => this.place(id) };
-    const value = message.value === null || message.value === undefined ? null : DECODERS[kind](message.value, table);
+    const value =
+      message.value === null || message.value === undefined ? null : DECODERS[kind](message.value, kind, table);
     const named = this.tracks.get(kind) ?? new Map<string, Track<unknown>>();
     this.tracks.set(kind, named);
     let track = named.get(name);

@@ -12,7 +12,7 @@ function position(last_seen_s_ago: number | null, session = "0") {
   const placed = new Map([["0:0/3", { T: [10, 0, 0, 0, 0, 0, 1] }]]);
   const robot = {
     newest: { id: "0:0/3", session: "0", T_odom_submap: kHere, path: [[2, 0, 0]] },
-    status: { last_seen_s_ago, session, position: [5, 0, 0] },
+    status: { last_seen_s_ago, session, T_odom_body: { translation_m: [5, 0, 0] } },
   };
   return position_of({ world: { placed } } as unknown as App, robot as unknown as RobotView);
 }

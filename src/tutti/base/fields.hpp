@@ -45,8 +45,10 @@ struct FieldRule {
   std::size_t at_most = kPlainTextBytes;                  ///< Bytes of a text, elements of a list.
   double low = -std::numeric_limits<double>::infinity();  ///< Range of a number, both ends included.
   double high = std::numeric_limits<double>::infinity();
-  bool fixed = false;    ///< An integer that uses all its bits, such as a hash: takes all its bytes on the wire.
-  bool always = false;   ///< On the wire also with its default; a pose or covariance must be there.
+  bool fixed = false;   ///< An integer that uses all its bits, such as a hash: takes all its bytes on the wire.
+  bool always = false;  ///< On the wire also with its default; a pose or covariance must be there.
+  /// The page refuses a record without this field; of any other that is missing it takes the default.
+  bool is_needed = false;
   bool is_flat = false;  ///< JSON has the fields of this struct beside those of its owner.
   /// On the wire the fields of this struct, or the columns of this list, are beside those of their owner, with this
   /// field's number added to theirs; this number itself states whether an optional one is there.

@@ -28,25 +28,28 @@ constexpr const char* to_string(Wish wish) {
 
 /// An operator's decision on the closures between two submaps.
 struct ClosureDecision {
-  std::string closure;  ///< Name of the pair (server/closure_names.hpp) at the time of the decision.
+  std::string closure;
   Wish wish = Wish::withdraw;
-  std::string by;             ///< Who decided, for people; may be empty.
-  std::int64_t given_ns = 0;  ///< When, since the Unix epoch, by the operator's clock.
-  /// With `accept`: a closure that the operator has added, beside those that were found; at most one.
+  std::string by;
+  std::int64_t given_ns = 0;
   std::vector<LoopClosure> by_hand = {};
-  /// When the server took it, by the server's clock; 0: it did not say. Whatever a message claims, the server replaces.
   std::int64_t taken_ns = 0;
   /// From when on it counts: a clock that is ahead makes no decision later than the server took it.
   [[nodiscard]] std::int64_t counts_from_ns() const { return taken_ns > 0 ? std::min(given_ns, taken_ns) : given_ns; }
   template <class V>
   void describe(V& v) {
     constexpr std::size_t kMostBytes = 200;
-    v.field(1, "closure", closure, {.text = FieldRule::Text::any, .at_least = 1, .at_most = kMostBytes});
-    v.field(2, "wish", wish, {.low = 1, .high = 3});
-    v.field(3, "by", by, {.text = FieldRule::Text::any, .at_most = kMostBytes});
-    v.field(4, "given_ns", given_ns);
-    v.field(5, "by_hand", by_hand, {.at_most = 1});
-    v.field(6, "taken_ns", taken_ns);
+    v.field(1, "closure", closure, {.text = FieldRule::Text::any, .at_least = 1, .at_most = kMostBytes},
+            "The pair's name at the time of the decision.");
+    v.field(2, "wish", wish, {.low = 1, .high = 3}, "1: accept, 2: reject, 3: withdraw.");
+    v.field(3, "by", by, {.text = FieldRule::Text::any, .at_most = kMostBytes},
+            "Who decided, for people; may be empty.");
+    v.field(4, "given_ns", given_ns, {}, "Since the Unix epoch, by the operator's clock.");
+    v.field(5, "by_hand", by_hand, {.at_most = 1},
+            "With accept: a closure that the operator has added, beside those that were found; at most one.");
+    v.field(6, "taken_ns", taken_ns, {},
+            "When the server took it, by its clock, which it writes itself: given_ns counts up to that. 0: it did not "
+            "say.");
   }
   friend bool operator==(const ClosureDecision&, const ClosureDecision&) = default;
 };

@@ -20,22 +20,22 @@ struct MapMark {
   static constexpr double kFarthest_m = 1'000.0;             ///< From the submap's first keyframe.
 
   SubmapId submap;
-  Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< In the submap's frame, m.
-  std::string text;                              ///< UTF-8, any; may be empty.
-  std::string by;                                ///< Who wrote it, for people; may be empty.
-  std::int64_t given_ns = 0;                     ///< When, since the Unix epoch.
-  std::string photo_type;                        ///< "image/jpeg" or "image/png"; empty: there is no photo.
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();
+  std::string text;
+  std::string by;
+  std::int64_t given_ns = 0;
+  std::string photo_type;
   template <class V>
   void describe(V& v) {
     constexpr std::size_t kLongestName = 200;
     v.field(1, "submap", submap);
-    v.field(2, "x", at.x(), {.low = -kFarthest_m, .high = kFarthest_m});
+    v.field(2, "x", at.x(), {.low = -kFarthest_m, .high = kFarthest_m}, "In the submap's frame, m.");
     v.field(3, "y", at.y(), {.low = -kFarthest_m, .high = kFarthest_m});
     v.field(4, "z", at.z(), {.low = -kFarthest_m, .high = kFarthest_m});
-    v.field(5, "text", text, {.text = FieldRule::Text::any, .at_most = kMostBytes});
-    v.field(6, "by", by, {.at_most = kLongestName});
-    v.field(7, "given_ns", given_ns);
-    v.field(8, "photo_type", photo_type, {.at_most = 16});
+    v.field(5, "text", text, {.text = FieldRule::Text::any, .at_most = kMostBytes}, "UTF-8, any; may be empty.");
+    v.field(6, "by", by, {.at_most = kLongestName}, "Who wrote it, for people; may be empty.");
+    v.field(7, "given_ns", given_ns, {}, "Since the Unix epoch.");
+    v.field(8, "photo_type", photo_type, {.at_most = 16}, "'image/jpeg' or 'image/png'; empty: there is no photo.");
   }
   friend bool operator==(const MapMark&, const MapMark&) = default;
 };
@@ -44,16 +44,17 @@ struct MapMark {
 struct MarkOrder {
   std::uint64_t number = 0;
   std::optional<MapMark> mark;
-  std::string photo = {};     ///< The mark's, a JPEG or PNG file; may be empty.
-  std::int64_t given_ns = 0;  ///< When, by the operator's clock.
-  std::string by = {};        ///< Who, for people.
+  std::string photo = {};
+  std::int64_t given_ns = 0;
+  std::string by = {};
   template <class V>
   void describe(V& v) {
     v.field(1, "number", number);
     v.field(2, "mark", mark);
-    v.field(3, "photo", photo, {.text = FieldRule::Text::any, .at_most = MapMark::kMostPhotoBytes});
-    v.field(4, "given_ns", given_ns);
-    v.field(5, "by", by, {.at_most = 200});
+    v.field(3, "photo", photo, {.text = FieldRule::Text::any, .at_most = MapMark::kMostPhotoBytes},
+            "The mark's, a JPEG or PNG file; may be empty.");
+    v.field(4, "given_ns", given_ns, {}, "By the operator's clock.");
+    v.field(5, "by", by, {.at_most = 200}, "For people.");
   }
   friend bool operator==(const MarkOrder&, const MarkOrder&) = default;
 };

@@ -1,12 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/wire/field_bytes.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <functional>
+#include <map>
 #include <regex>
-#include <sstream>
+#include <typeindex>
+#include <utility>
+#include <vector>
 
+#include "support/made_file.hpp"
 #include "support/paths.hpp"
 #include "support/wire/messages.hpp"
 #include "tutti/model/map_mark.hpp"
@@ -17,64 +23,109 @@
 namespace tutti::wire {
 namespace field_bytes_test {
 
-/// A struct's list as a .proto file has it: "NUMBER [repeated|optional ]TYPE NAME" per field.
+/// By type: the name of its message; that of a list in columns is of the list.
+using ProtoNames = std::map<std::type_index, std::string>;
+
+/// A struct's list as a .proto file has it.
 class ProtoFields {
  public:
+  explicit ProtoFields(ProtoNames names = {}) : names_(std::move(names)) {}
+
   template <class T>
-  void field(int number, const std::string& name, const T& /*value*/, const FieldRule& rule = {}, const char* = "") {
+  void field(int number, const std::string& name, const T& /*value*/, const FieldRule& rule = {},
+             const std::string& help = "") {
     if constexpr (HasFields<T>)
       if (rule.is_spread) return spread(number, "", T{});
     if constexpr (IsOptionalStruct<T>)
-      if (rule.is_spread) return add(number, "", "bool", name, false), spread(number, name + "_", *T(std::in_place));
+      if (rule.is_spread) return add(number, "", "bool", name, help), spread(number, name + "_", *T(std::in_place));
     if constexpr (IsColumnsField<T>)
       return rule.is_spread ? spread(number, name + "_", typename T::value_type{}, "repeated ")
-                            : add(number, "", "MESSAGE", name, false);
+                            : add(number, "", message<T>(), name, help);
     else if constexpr (IsOptionalField<T>)
-      add(number, HasFields<typename T::value_type> ? "" : "optional ", type_of<typename T::value_type>(rule), name,
-          is_time<typename T::value_type>);
+      add(number, HasFields<typename T::value_type> ? "" : "optional ", type_of<typename T::value_type>(rule),
+          name + stamp<typename T::value_type>(), help);
     else if constexpr (IsListField<T>)
-      add(number, "repeated ", type_of<typename T::value_type>(rule), name, false);
+      add(number, "repeated ", type_of<typename T::value_type>(rule), name, help);
     else if constexpr (std::is_same_v<T, NumberSets>)
-      add(number, "repeated ", "MESSAGE", name, false);
+      add(number, "repeated ", message<T>(), name, help);
     else
-      add(number, kNumbers<T> > 0 ? "repeated " : each_, type_of<T>(rule), name, is_time<T>);
+      add(number, kNumbers<T> > 0 ? "repeated " : each_, type_of<T>(rule), name + stamp<T>(), help);
   }
   /// The fields of a struct as they are in its list's columns.
   template <class T>
   void spread(int number, const std::string& prefix, const T& value, const std::string& each = "") {
-    const ProtoFields outside = *this;
+    const std::string prefix_outside = std::exchange(prefix_, prefix == "_" ? "" : prefix);
+    const std::string each_outside = std::exchange(each_, each);
     offset_ += number;
-    prefix_ = prefix == "_" ? "" : prefix;
-    each_ = each;
     visit_fields(value, *this);
-    offset_ = outside.offset_;
-    prefix_ = outside.prefix_;
-    each_ = outside.each_;
+    offset_ -= number;
+    prefix_ = prefix_outside;
+    each_ = each_outside;
   }
-  std::string lines;
+  std::string lines;  ///< "NUMBER [repeated|optional ]TYPE NAME"
+  std::string rows;   ///< As the file has them.
   int last = 0;
   bool ascend = true;
 
  private:
   template <class T>
-  static constexpr bool is_time = std::is_same_v<T, Timestamp>;
+  static std::string stamp() {
+    return std::is_same_v<T, Timestamp> ? "_ns" : "";
+  }
   template <class T>
-  static std::string type_of(const FieldRule& rule) {
-    if (HasFields<T>) return "MESSAGE";
+  std::string message() const {
+    const auto name = names_.find(typeid(T));
+    return name == names_.end() ? "MESSAGE" : name->second;
+  }
+  template <class T>
+  std::string type_of(const FieldRule& rule) const {
+    if (HasFields<T>) return message<T>();
     if (std::is_same_v<T, std::string>) return "bytes";
     if (std::is_same_v<T, bool>) return "bool";
     if (std::is_same_v<T, double> || kNumbers < T >> 0) return "double";
     if (std::is_same_v<T, Timestamp> || std::is_signed_v<T>) return "sint64";
     return (rule.fixed ? "fixed" : "uint") + std::string(sizeof(T) <= 4 ? "32" : "64");
   }
-  void add(int number, const std::string& label, const std::string& type, const std::string& name, bool is_stamp) {
+  void add(int number, const std::string& label, const std::string& type, const std::string& name,
+           const std::string& help) {
     const int at = number + offset_;
-    lines += std::to_string(at) + " " + label + type + " " + prefix_ + name + (is_stamp ? "_ns\n" : "\n");
+    lines += fmt::format("{} {}{} {}{}\n", at, label, type, prefix_, name);
+    rows += fmt::format("  {}{} {}{} = {};{}{}\n", label, type, prefix_, name, at, help.empty() ? "" : "  // ", help);
     ascend = ascend && at > last;
     last = at;
   }
+  ProtoNames names_;
   int offset_ = 0;
   std::string prefix_, each_;
+};
+
+/// A .proto file made of lists.
+class ProtoFile {
+ public:
+  explicit ProtoFile(ProtoNames from_others) : names_(std::move(from_others)) {}
+
+  template <class T>
+  void add(const std::string& name, const std::string& about) {
+    names_[typeid(T)] = name;
+    makers_.emplace_back([this, name, about] {
+      ProtoFields fields(names_);
+      if constexpr (HasFields<T>)
+        fields.spread(0, "", T{});
+      else
+        fields.spread(0, "", typename T::value_type{}, "repeated ");
+      EXPECT_TRUE(fields.ascend) << name << ": protobuf writes fields in the order of their numbers";
+      return fmt::format("\n// {}\nmessage {} {{\n{}}}\n", about, name, fields.rows);
+    });
+  }
+  [[nodiscard]] std::string text() const {
+    std::string out;
+    for (const auto& maker : makers_) out += maker();
+    return out;
+  }
+
+ private:
+  ProtoNames names_;
+  std::vector<std::function<std::string()>> makers_;
 };
 
 /// The same of a message in proto/tutti/v1; empty when there is none.
@@ -103,21 +154,47 @@ void expect_in_proto(const std::string& file, const std::string& message, const 
   EXPECT_TRUE(fields.ascend) << message << ": protobuf writes fields in the order of their numbers";
 }
 
+/// proto/tutti/v1/status.proto, of which every message has a list.
+std::string status_proto() {
+  ProtoFile file({{typeid(MethodId), "Method"}, {typeid(LoopClosure), "LoopClosure"}});
+  file.add<NodeStatus>("Status", "What a robot or a worker reports. Texts are printable ASCII, in all that follows.");
+  file.add<InMap>("InMap", "Where a robot is in a map that does not move, as it finds itself.");
+  file.add<std::vector<SubmapReturn>>(
+      "SubmapReturns",
+      "How submaps of that map fit what the robot has seen of them lately, in cubes of 0.3 m: equally many of each.");
+  file.add<Health>("Health", "What a robot's body reports of itself. Feed.Health (feed.proto) has the same fields.");
+  file.add<MissionStatus::Robot>("RobotInMission", "What the server knows of a robot.");
+  file.add<MissionStatus::Worker>("WorkerInMission", "What it knows of a worker.");
+  file.add<MissionStatus::Refusals>("RefusedMessages", "Messages of one kind from one role that it has refused.");
+  file.add<MissionStatus>("MissionStatus", "From the server to everybody who watches, every two seconds.");
+  file.add<MissionStatus::Place>("MapPlace",
+                                 "What robots that localise in a map have found of one of its submaps, together.");
+  file.add<MissionStatus::Radio>(
+      "RobotsRadio", "What the server has exchanged with a robot since it was started, of one kind and direction.");
+  file.add<MissionStatus::Decision>("AnsweredDecision", "The server's answer to a Decision.");
+  file.add<ClosureDecision>("Decision", "What an operator decides on the closures between two submaps.");
+  file.add<MapMark>("Mark", "What somebody has written on the map, as a map's file has it (docs/storage.md).");
+  file.add<MarkOrder>("MarkOrder",
+                      "What an operator asks of the server: a mark to be stored, or, without one, to be removed.");
+  file.add<SubmapId>("SubmapId", "A submap: it counts up from 0 in a session of a robot.");
+  return R"(// SPDX-License-Identifier: BSD-3-Clause
+// Made by src/tutti/wire/field_bytes_test.cpp, of the lists of fields in src/tutti/model (status.hpp, closure_decision.hpp,
+// map_mark.hpp), by which the program codes these messages: for those who read them in other languages. Frames, and what
+// never changes: messages.proto.
+syntax = "proto3";
+
+package tutti.v1;
+
+import "tutti/v1/messages.proto";
+)" + file.text();
+}
+
+TEST(FieldBytes, TheStatusForOtherLanguagesIsMadeOfTheLists) {
+  tutti::test::expect_made("proto/tutti/v1/status.proto", status_proto());
+}
+
+/// These files have also what no list does, and so are written by hand.
 TEST(FieldBytes, TheFilesForOtherLanguagesHaveTheSameFields) {
-  expect_in_proto<NodeStatus>("status.proto", "Status");
-  expect_in_proto<MissionStatus>("status.proto", "MissionStatus");
-  expect_in_proto<MissionStatus::Robot>("status.proto", "RobotInMission");
-  expect_in_proto<MissionStatus::Worker>("status.proto", "WorkerInMission");
-  expect_in_proto<MissionStatus::Refusals>("status.proto", "RefusedMessages");
-  expect_in_proto<MissionStatus::Decision>("status.proto", "AnsweredDecision");
-  expect_in_proto<MissionStatus::Radio>("status.proto", "RobotsRadio");
-  expect_in_proto<MissionStatus::Place>("status.proto", "MapPlace");
-  expect_in_proto<SubmapReturn>("status.proto", "SubmapReturns", "repeated ");
-  expect_in_proto<ClosureDecision>("status.proto", "Decision");
-  expect_in_proto<MarkOrder>("status.proto", "MarkOrder");
-  expect_in_proto<MapMark>("status.proto", "Mark");
-  expect_in_proto<SubmapId>("status.proto", "SubmapId");
-  expect_in_proto<Health>("status.proto", "Health");
   expect_in_proto<Health>("feed.proto", "Health");
   expect_in_proto<RobotRange>("messages.proto", "Ranges", "repeated ");
   expect_in_proto<MethodId>("messages.proto", "Method");

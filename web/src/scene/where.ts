@@ -15,8 +15,8 @@ export function position_of(app: App, robot: RobotView): Vec3 | null {
   const placed = app.world.placed.get(newest.id);
   if (!placed) return null;
   const is_known = status !== null && status.last_seen_s_ago !== null && status.session === newest.session;
-  if (newest.T_odom_submap && is_known && status.position)
-    return transform(compose(placed.T, inverse(newest.T_odom_submap)), status.position);
+  if (newest.T_odom_submap && is_known && status.T_odom_body)
+    return transform(compose(placed.T, inverse(newest.T_odom_submap)), status.T_odom_body.translation_m);
   return transform(placed.T, newest.path.at(-1) ?? [0, 0, 0]);
 }
 

@@ -2,7 +2,7 @@
 /** Marks: a place, a text, a photo. Pinned to a submap, so that they move with the map. */
 import { api } from "../api";
 import type { App } from "../app";
-import { is_photo } from "../decode";
+import { is_photo } from "../schema";
 import { metres, wall } from "../format";
 import { LIMITS } from "../limits";
 import type { Mark } from "../schema";

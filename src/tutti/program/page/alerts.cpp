@@ -25,7 +25,7 @@ double longest_without_update_s(const MissionStatus& status) {
   return std::max(kNoUpdate_s, kNoUpdatePerSubmap_s * static_cast<double>(status.submaps));
 }
 
-Alert robot_alert(const MissionStatus::Robot& robot, const char* kind, const char* severity, std::string what,
+Alert robot_alert(const MissionStatus::Robot& robot, const char* kind, Severity severity, std::string what,
                   std::string todo) {
   return {.id = fmt::format("robot/{}/{}", robot.robot.value, kind),
           .severity = severity,
@@ -40,14 +40,14 @@ void check_silence(const MissionStatus& status, const MissionStatus::Robot& robo
                    std::vector<Alert>& out) {
   if (robot.status.finished) return;
   if (!robot.last_seen) {
-    out.push_back(robot_alert(robot, "unseen", "info", "not heard since the server started",
+    out.push_back(robot_alert(robot, "unseen", Severity::info, "not heard since the server started",
                               "Start its program, or check its network."));
     return;
   }
   const double silent_s = status.time - *robot.last_seen;
   if (silent_s < limit_s) return;
   Alert alert =
-      robot_alert(robot, "silent", "warning", "silent",
+      robot_alert(robot, "silent", Severity::warning, "silent",
                   "If its program runs, it goes on mapping and joins again when the radio reaches it; else start it.");
   alert.since_s = *robot.last_seen - Timestamp{};
   out.push_back(std::move(alert));
@@ -59,38 +59,38 @@ void check_robot(const MissionStatus& status, const MissionStatus::Robot& robot,
   const NodeStatus& own = robot.status;
   const bool is_heard = robot.last_seen && status.time - *robot.last_seen < silent_s;
   if (!robot.conflict.empty())
-    out.push_back(robot_alert(robot, "conflict", "error", robot.conflict,
+    out.push_back(robot_alert(robot, "conflict", Severity::error, robot.conflict,
                               "Two programs claim to be this robot: stop one, or give it another --name."));
   if (!own.trouble.empty())
-    out.push_back(robot_alert(robot, "trouble", "warning", own.trouble, "See the robot's log.txt."));
+    out.push_back(robot_alert(robot, "trouble", Severity::warning, own.trouble, "See the robot's log.txt."));
   if (own.alerts > 0)
-    out.push_back(robot_alert(robot, "drift", "warning",
+    out.push_back(robot_alert(robot, "drift", Severity::warning,
                               own.alerts == 1 ? "its odometry left the map at one place"
                                               : fmt::format("its odometry left the map at {} places", own.alerts),
                               "Look at disagreement: the robot is corrected, its sensors may not be well."));
   if (own.backlog_submaps >= kLongBacklog)
-    out.push_back(robot_alert(robot, "backlog", "warning",
+    out.push_back(robot_alert(robot, "backlog", Severity::warning,
                               fmt::format("{} submaps are not on the server yet", own.backlog_submaps),
                               "Bring it nearer to the base, or wait: the newest come first."));
   const bool is_behind = own.heard_epoch != status.epoch || own.heard_revision < status.revision;
   if (is_heard && !own.finished && robot.submaps > 0 && status.revision > 0 && is_behind &&
       (!robot.last_update || status.time - *robot.last_update > longest_without_update_s(status)))
-    out.push_back(robot_alert(robot, "uncorrected", "warning", "does not use the map",
+    out.push_back(robot_alert(robot, "uncorrected", Severity::warning, "does not use the map",
                               "The way down may be cut: it hears no proxy graph."));
   if (own.health.battery_percent && *own.health.battery_percent < kLowBattery_percent)
-    out.push_back(robot_alert(robot, "battery", "error",
+    out.push_back(robot_alert(robot, "battery", Severity::error,
                               fmt::format("battery at {:.0f} %", *own.health.battery_percent), "Bring it home."));
   if (robot.refused > 0)
-    out.push_back(robot_alert(robot, "refused", "warning",
+    out.push_back(robot_alert(robot, "refused", Severity::warning,
                               fmt::format("{} submaps are no good and not in the map", robot.refused),
                               "See the server's log.txt for why."));
   if (robot.unread > 0)
-    out.push_back(robot_alert(robot, "unread", "warning",
+    out.push_back(robot_alert(robot, "unread", Severity::warning,
                               fmt::format("{} submaps are of a newer version than this server reads", robot.unread),
                               "Upgrade the server; the robot keeps them until then."));
 }
 
-Alert server_alert(const char* kind, const char* severity, std::string what, std::string todo) {
+Alert server_alert(const char* kind, Severity severity, std::string what, std::string todo) {
   return {.id = fmt::format("server/{}", kind),
           .severity = severity,
           .what = std::move(what),
@@ -104,7 +104,7 @@ void check_age_of_map(const MissionStatus& status, std::vector<Alert>& out) {
   for (const MissionStatus::Robot& robot : status.robots)
     if (robot.last_update && (!newest || *newest < *robot.last_update)) newest = robot.last_update;
   if (!status.has_news || !newest || status.time - *newest <= longest_without_update_s(status)) return;
-  Alert alert = server_alert("late", "warning", "no new map although submaps have come",
+  Alert alert = server_alert("late", Severity::warning, "no new map although submaps have come",
                              "Many submaps, wrong closures or too little CPU make an update long: look at the server's "
                              "machine. Robots use the last map meanwhile.");
   alert.since_s = *newest - Timestamp{};
@@ -112,10 +112,7 @@ void check_age_of_map(const MissionStatus& status, std::vector<Alert>& out) {
 }
 
 void sort(std::vector<Alert>& alerts) {
-  std::ranges::sort(alerts, {}, [](const Alert& alert) {
-    const int rank = alert.severity == "error" ? 0 : alert.severity == "warning" ? 1 : 2;
-    return std::tuple(rank, alert.since_s, alert.id);
-  });
+  std::ranges::sort(alerts, {}, [](const Alert& alert) { return std::tuple(alert.severity, alert.since_s, alert.id); });
 }
 
 }  // namespace
@@ -143,14 +140,14 @@ std::vector<Alert> Alerts::dated(std::vector<Alert> found, std::map<std::string,
 std::vector<Alert> Alerts::of_status(const MissionStatus& status) {
   std::vector<Alert> out;
   if (!status.trouble.empty())
-    out.push_back(server_alert("trouble", "error", status.trouble, "See the server's log.txt."));
+    out.push_back(server_alert("trouble", Severity::error, status.trouble, "See the server's log.txt."));
   if (status.waiting > 0)
     out.push_back(server_alert(
-        "waiting", "warning",
+        "waiting", Severity::warning,
         fmt::format("{} pairs or refinements wait for a worker that can: {}", status.waiting, status.why_waiting),
         "Start a worker of this server's version."));
   if (status.pending_jobs > kManyWaitingJobs)
-    out.push_back(server_alert("jobs", "info", fmt::format("{} jobs wait for workers", status.pending_jobs),
+    out.push_back(server_alert("jobs", Severity::info, fmt::format("{} jobs wait for workers", status.pending_jobs),
                                "Closures come late. Start more workers (tutti worker)."));
   check_age_of_map(status, out);
   for (const MissionStatus::Robot& robot : status.robots) check_robot(status, robot, silent_s_, out);
@@ -164,7 +161,7 @@ std::vector<Alert> Alerts::of_map(const mapfile::ShownMap& map, const std::map<S
   for (const auto& [robot, component] : components.of_robot) {
     if (component == components.largest) continue;
     Alert alert{.id = fmt::format("map/{}/alone", robot.value),
-                .severity = "info",
+                .severity = Severity::info,
                 .what = "its component of the map is merged with no other",
                 .where = names.of(ChainId(robot)),
                 .todo = "Let it see a place that another robot has seen; or ask why there is no closure.",
@@ -175,7 +172,7 @@ std::vector<Alert> Alerts::of_map(const mapfile::ShownMap& map, const std::map<S
   }
   for (const server::FailedOdometry& failed : map.map.failed_odometry)
     out.push_back({.id = fmt::format("map/{}/odometry/{}", to_string(failed.chain), failed.from),
-                   .severity = "warning",
+                   .severity = Severity::warning,
                    .what = fmt::format("odometry failed by {:.2f} m between keyframes {} and {}", failed.jump_m,
                                        failed.from, failed.to),
                    .where = names.of(failed.chain),
@@ -185,7 +182,7 @@ std::vector<Alert> Alerts::of_map(const mapfile::ShownMap& map, const std::map<S
   for (const auto& [submap, closures] : holding)
     if (closures == 1 && hanging.insert(submap.chain).second)
       out.push_back({.id = fmt::format("map/{}/hangs", to_string(submap.chain)),
-                     .severity = "warning",
+                     .severity = Severity::warning,
                      .what = "its component hangs on one closure",
                      .where = names.of(submap.chain),
                      .todo = "Look at that closure; another meeting would settle it.",

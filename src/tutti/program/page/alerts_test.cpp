@@ -72,8 +72,8 @@ TEST(Alerts, EveryTroubleIsReportedWithWhenItBegan) {
     ASSERT_NE(find(first, id), nullptr) << id;
     EXPECT_EQ(find(first, id)->since_s, 100.0) << id;
   }
-  EXPECT_EQ(first.front().severity, "error") << "what is worst comes first";
-  EXPECT_EQ(first.back().severity, "info");
+  EXPECT_EQ(first.front().severity, Severity::error) << "what is worst comes first";
+  EXPECT_EQ(first.back().severity, Severity::info);
   status.time = status.time + 50.0;
   status.robots.front().last_seen = status.time;
   status.robots.front().status.health.battery_percent = 80.0;
@@ -140,7 +140,7 @@ TEST(Alerts, WhatTroublesTheServerIsAnError) {
   const auto found = Alerts().of_status(status);
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found.front().id, "server/trouble");
-  EXPECT_EQ(found.front().severity, "error");
+  EXPECT_EQ(found.front().severity, Severity::error);
   EXPECT_EQ(found.front().what, status.trouble);
 }
 

@@ -34,7 +34,7 @@ struct Mission {
   double robot_silent_s = silent_after_s(1.0);
   template <class V>
   void describe(V& v) {
-    v.field(1, "name", name);
+    v.field(1, "name", name, {.is_needed = true});
     v.field(2, "description", description);
     v.field(3, "mode", mode);
     v.field(4, "version", version);
@@ -45,10 +45,15 @@ struct Mission {
 /// With the robots' colours, which are to be the same everywhere.
 Message mission_message(const Mission& mission);
 
+enum class Severity : std::uint8_t { error, warning, info };
+constexpr const char* to_string(Severity severity) {
+  return severity == Severity::error ? "error" : severity == Severity::warning ? "warning" : "info";
+}
+
 /// A problem, for people: what, where, since when, and what to do about it.
 struct Alert {
-  std::string id;        ///< The same as long as it is the same problem.
-  std::string severity;  ///< "error", "warning", "info".
+  std::string id;  ///< The same as long as it is the same problem.
+  Severity severity = Severity::info;
   std::string what;
   std::string where;
   double since_s = 0.0;  ///< Mission time.
@@ -58,8 +63,8 @@ struct Alert {
   template <class V>
   void describe(V& v) {
     v.field(1, "id", id);
-    v.field(2, "severity", severity);
-    v.field(3, "what", what);
+    v.field(2, "severity", severity, {.high = 2.0, .is_needed = true});
+    v.field(3, "what", what, {.is_needed = true});
     v.field(4, "where", where);
     v.field(5, "since_s", since_s);
     v.field(6, "todo", todo);
