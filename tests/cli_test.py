@@ -452,10 +452,17 @@ class CommandLine(unittest.TestCase):
             self.assertLess(robot["score"]["rmse_m"], 0.3)
         self.assertTrue((out / "charlie_localised.tum").stat().st_size > 0)
         brief = [word for i in (2, 3) for word in ("--set", f"simulation.robots.{i}.walk.duration_s=75")]
-        carried = ["run", mission, *short, *brief, "--map-in", site, "--frozen", "--out", out, "--kidnap-every"]
+        self.expect(tutti("run", mission, "--true-start", "--out", out), 2, "--frozen")
+        carried = ["run", mission, *short, *brief, "--map-in", site, "--frozen", "--true-start", "--out", out, "--kidnap-every"]
         self.expect(tutti(*carried, 80), 1, "charlie", "kidnap")
         self.expect(tutti(*carried, 20), 0, "carried elsewhere")
-        kidnaps = [kidnap for robot in json.loads((out / "localise.json").read_text())["robots"] for kidnap in robot["kidnaps"]]
+        robots = json.loads((out / "localise.json").read_text())["robots"]
+        for robot in robots:  # told where it starts, and scored until it said that it was carried, too
+            self.assertLess(robot["starts"][0]["fix_after_s"], 2.0)
+            self.assertGreater(robot["score_since_kidnap"]["scored"], 0)
+            self.assertGreaterEqual(robot["score_since_kidnap"]["wrong"], robot["score"]["wrong"])
+            self.assertGreater(robot["score"]["right_last_s"], 15.0)
+        kidnaps = [kidnap for robot in robots for kidnap in robot["kidnaps"]]
         self.assertGreater(len(kidnaps), 0)
         for kidnap in kidnaps:
             self.assertLess(kidnap["said_after_s"], 2.0)

@@ -91,12 +91,13 @@ Status localise(const lab::MissionConfig& config, const MissionArguments& argume
   if (!input) return tl::unexpected(input.error());
   ProgressLine progress;
   const auto stop = announced_stop("what is there is reported");
-  const auto robots = mission::localise_mission(
-      config, *input, *map, [&] { return verifiers::make_verifier(config.closures); }, arguments.trial,
+  const auto follow = mission::follow_by_node(
+      config, map->known, [&] { return verifiers::make_verifier(config.closures); }, arguments.trial.restart_s,
       [&](const std::string& robot, double share) {
         progress.show(share, fmt::format("{}: {:4.0f} %", robot, 100.0 * share));
         return stop();
       });
+  const auto robots = mission::localise_mission(config, *input, *map, arguments.trial, follow);
   progress.close();
   if (!robots) return tl::unexpected(robots.error());
   if (auto ok = mission::write_localised(*robots, *map->known, arguments.out); !ok) return ok;
@@ -333,6 +334,10 @@ void add_run_command(CLI::App& app, int& exit_code) {
       ->needs("--frozen")
       ->excludes("--restart-every")
       ->excludes("--kidnap-every");
+  command
+      ->add_flag("--true-start", arguments->trial.true_start,
+                 "With --frozen: each robot is told where it starts, by its reference; scans have to confirm it")
+      ->needs("--frozen");
   add_mission_options(*command, *arguments);
   command->callback([arguments, inputs, bags, topics, graph, &exit_code] {
     const auto run_text = [&](const fs::path& name, const char* option, const Result<std::string>& text) {

@@ -7,14 +7,17 @@
 #include <utility>
 
 #include "tutti/evaluation/association.hpp"
+#include "tutti/geometry/so3.hpp"
 #include "tutti/mission/kidnapped.hpp"
 #include "tutti/mission/lift_ride.hpp"
 #include "tutti/mission/robot_actor.hpp"
+#include "tutti/model/pose_at.hpp"
 
 namespace tutti::mission {
 namespace {
 
 constexpr double kCourse_s = 0.1;
+constexpr double kTrueStart_m = 0.1, kTrueStart_rad = 1.0 * kRadPerDeg;  // what a true start pose is stated to err by
 
 /// The poses of a robot on a floor of the map, or on all, of all its sessions.
 Trajectory poses_in(const mapfile::OpenedMap& map, const std::string& robot,
@@ -89,6 +92,33 @@ std::vector<localise::Located> measure_kidnaps(const std::vector<Timestamp>& at,
   return rest;
 }
 
+/// Where the robot is in the map at its first sample, on the floor whose robots have been nearest.
+Result<StartPose> true_start(const Recording& recording, const std::vector<std::optional<MapReference>>& floors) {
+  const auto T_reference_body = pose_at(recording.reference, recording.odometry.front().stamp);
+  std::optional<StartPose> out;
+  double least_m = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; T_reference_body && k < floors.size(); ++k) {
+    if (!floors[k]) continue;
+    const Pose3 T_world_body = floors[k]->T_world_reference * *T_reference_body;
+    for (const MapReference::Error& error : floors[k]->errors) {
+      const double away_m = (error.p_world - T_world_body.translation).norm();
+      if (away_m >= least_m) continue;
+      least_m = away_m;
+      Vector6d variances;
+      variances << Eigen::Vector3d::Constant(kTrueStart_m * kTrueStart_m),
+          Eigen::Vector3d::Constant(kTrueStart_rad * kTrueStart_rad);
+      out = StartPose{.T_world_body = RelativePose{T_world_body, variances.asDiagonal()},
+                      .floor = static_cast<std::uint32_t>(k + 1)};
+    }
+  }
+  if (!out)
+    return fail(
+        ErrorCode::invalid,
+        "{}: no reference says where it starts in the map, expected one of its own and of the robots that made the map",
+        recording.name);
+  return *out;
+}
+
 /// That of the robot after this one; of the first after the last.
 const Recording& next_of(const Recording& recording, const std::vector<const MissionRecording*>& robots) {
   const auto at = std::ranges::find_if(
@@ -98,8 +128,8 @@ const Recording& next_of(const Recording& recording, const std::vector<const Mis
 
 /// Replays one recording alone.
 LocalisedRobot replay(const MissionRecording& recording, const MissionConfig& config,
-                      std::shared_ptr<const localise::Localiser::Setup> setup, double restart_s,
-                      const std::function<bool(const std::string&, double)>& stop) {
+                      std::shared_ptr<const localise::Localiser::Setup> setup, const std::optional<StartPose>& start,
+                      double restart_s, const std::function<bool(const std::string&, double)>& stop) {
   robot::AgentConfig agent = config.agent;
   agent.submap.fit.scans = "off";  // nobody hears its map
   RobotActor robot(recording, agent, config.association, nullptr, std::move(setup));
@@ -108,6 +138,7 @@ LocalisedRobot replay(const MissionRecording& recording, const MissionConfig& co
   const double length_s = recording.recording.odometry.back().stamp - begin;
   LocalisedRobot out{.name = recording.recording.name};
   out.starts.emplace_back();
+  if (start) robot.start_at(*start, kMissionStart + recording.start_s);
   while (std::isfinite(robot.next_time())) {
     const double time_s = robot.next_time();
     if (stop && stop(out.name, length_s > 0.0 ? (time_s - recording.start_s) / length_s : 1.0)) break;
@@ -167,10 +198,19 @@ std::shared_ptr<const localise::Localiser::Setup> localise_setup(
                                  .config = config.localise});
 }
 
-Result<std::vector<LocalisedRobot>> localise_mission(
-    const MissionConfig& config, const MissionInput& input, const mapfile::OpenedMap& map,
-    const std::function<std::shared_ptr<const server::ClosureVerifier>()>& make_verifier, const LocaliseTrial& trial,
-    const std::function<bool(const std::string&, double share)>& stop) {
+Follow follow_by_node(const MissionConfig& config, std::shared_ptr<const localise::KnownMap> map,
+                      std::function<std::shared_ptr<const server::ClosureVerifier>()> make_verifier, double restart_s,
+                      std::function<bool(const std::string&, double share)> stop) {
+  return [&config, map = std::move(map), make_verifier = std::move(make_verifier), restart_s, stop = std::move(stop)](
+             const MissionRecording& robot, const std::optional<StartPose>& start) {
+    auto setup = localise_setup(config, drive::with_sensors(config.agent, robot.recording).submap, map, make_verifier);
+    return replay(robot, config, std::move(setup), start, restart_s, stop);
+  };
+}
+
+Result<std::vector<LocalisedRobot>> localise_mission(const MissionConfig& config, const MissionInput& input,
+                                                     const mapfile::OpenedMap& map, const LocaliseTrial& trial,
+                                                     const Follow& follow) {
   std::vector<std::optional<MapReference>> floors;
   for (std::uint32_t floor = 1; floor <= map.known->floors; ++floor)
     floors.push_back(reference_of(map, floor, input, config.association));
@@ -191,11 +231,24 @@ Result<std::vector<LocalisedRobot>> localise_mission(
       recording = std::move(made->recording);
       kidnapped_at = std::move(made->at);
     }
-    auto setup = localise_setup(config, drive::with_sensors(config.agent, recording).submap, map.known, make_verifier);
-    out.push_back(replay(robot, config, std::move(setup), trial.restart_s, stop));
+    std::optional<StartPose> start;
+    if (trial.true_start) {
+      const auto known = true_start(recording, floors);
+      if (!known) return tl::unexpected(known.error());
+      start = *known;
+    }
+    out.push_back(follow(robot, start));
     const auto course = measure_kidnaps(kidnapped_at, out.back());
     if (!has_reference || recording.reference.empty()) continue;
-    out.back().score = score_of(course, recording.reference, floors, config.association);
+    const auto score = [&](const std::vector<localise::Located>& of) {
+      return score_of(of, recording.reference, floors, config.association);
+    };
+    out.back().score = score(course);
+    if (!kidnapped_at.empty()) {
+      const auto& all = out.back().course;
+      const auto since = std::ranges::upper_bound(all, kidnapped_at.front(), {}, &localise::Located::stamp);
+      out.back().score_since_kidnap = score({since, all.end()});
+    }
     measure_starts(*map.known, recording.reference, floors, out.back());
   }
   if (out.empty())

@@ -15,6 +15,7 @@
 #include "tutti/mission/localise_score.hpp"
 #include "tutti/mission/mission_config.hpp"
 #include "tutti/mission/recordings.hpp"
+#include "tutti/model/start_pose.hpp"
 #include "tutti/server/closure_verifier.hpp"
 
 namespace tutti::mission {
@@ -45,6 +46,8 @@ struct LocalisedRobot {
   double cpu_s = 0.0;
   std::vector<double> scan_ms;         ///< CPU of each scan that was registered.
   std::optional<LocaliseScore> score;  ///< Without what was published between a kidnap and Kidnap::said_after_s.
+  /// All that was published since the first kidnap is in it; nothing without one.
+  std::optional<LocaliseScore> score_since_kidnap;
   std::map<SubmapId, localise::SubmapFit> map_fit;  ///< Where the map does not fit what the robot saw of it.
   std::vector<std::string> troubles;                ///< RobotActor::troubles()
   /// Share of the time in this state.
@@ -61,16 +64,24 @@ std::shared_ptr<const localise::Localiser::Setup> localise_setup(
 
 /// Robots are put to the test in this way, to see how they find their places; 0: never.
 struct LocaliseTrial {
-  double restart_s = 0.0;  ///< So often they forget where they are.
-  double kidnap_s = 0.0;   ///< So often they are carried elsewhere (kidnapped.hpp).
-  bool lift = false;       ///< Each takes a lift to where the next one drives (lift_ride.hpp).
+  double restart_s = 0.0;   ///< So often they forget where they are.
+  double kidnap_s = 0.0;    ///< So often they are carried elsewhere (kidnapped.hpp).
+  bool lift = false;        ///< Each takes a lift to where the next one drives (lift_ride.hpp).
+  bool true_start = false;  ///< Each is told where it begins, which its reference knows.
 };
 
-/// Replays every robot of the mission that did not make the map alone, without a server. `stop` is asked between
-/// samples. An error names a recording that cannot be read, or not be kidnapped.
-Result<std::vector<LocalisedRobot>> localise_mission(
-    const MissionConfig& config, const MissionInput& input, const mapfile::OpenedMap& map,
-    const std::function<std::shared_ptr<const server::ClosureVerifier>()>& make_verifier, const LocaliseTrial& trial,
-    const std::function<bool(const std::string&, double share)>& stop);
+/// Replays one robot alone and follows it in the map, from a start pose if there is one. Its kidnaps and scores are
+/// left to localise_mission().
+using Follow = std::function<LocalisedRobot(const MissionRecording&, const std::optional<StartPose>&)>;
+/// By a robot's own node, without a server. `stop` is asked between samples. What it refers to must outlive it.
+Follow follow_by_node(const MissionConfig& config, std::shared_ptr<const localise::KnownMap> map,
+                      std::function<std::shared_ptr<const server::ClosureVerifier>()> make_verifier, double restart_s,
+                      std::function<bool(const std::string&, double share)> stop);
+
+/// Follows every robot of the mission that did not make the map, and scores what was published. An error names a
+/// recording that cannot be read, or not be kidnapped, or whose start nothing tells.
+Result<std::vector<LocalisedRobot>> localise_mission(const MissionConfig& config, const MissionInput& input,
+                                                     const mapfile::OpenedMap& map, const LocaliseTrial& trial,
+                                                     const Follow& follow);
 
 }  // namespace tutti::mission

@@ -53,7 +53,10 @@ LocaliseScore score_of(const std::vector<localise::Located>& course, const Traje
     const Eigen::Vector3d in_map = error.head<3>() + pair.estimate.rotation.conjugate() * map_error;
     const double metres = error.head<3>().norm(), angle_deg = error.tail<3>().norm() / kRadPerDeg;
     ++out.scored;
-    if (metres > LocaliseScore::kWrong_m || angle_deg > LocaliseScore::kWrong_deg) ++out.wrong;
+    if (metres > LocaliseScore::kWrong_m || angle_deg > LocaliseScore::kWrong_deg)
+      ++out.wrong;
+    else
+      out.right_last = pair.stamp;
     squares += metres * metres;
     map_squares += map_error.squaredNorm();
     in_map_squares += in_map.squaredNorm();

@@ -31,6 +31,7 @@ struct LocaliseScore {
   std::size_t scored = 0;  ///< Poses of state localised with a reference.
   std::size_t wrong = 0;   ///< By more than kWrong_m or kWrong_deg; some of those.
   static constexpr double kWrong_m = 1.0, kWrong_deg = 5.0;
+  std::optional<Timestamp> right_last;  ///< The last that is not wrong.
   double rmse_m = 0.0, max_m = 0.0, median_deg = 0.0;
   double map_rmse_m = 0.0;     ///< The map's own errors at these places.
   double in_map_rmse_m = 0.0;  ///< Without these: how far off the robot is from what the map shows about it.

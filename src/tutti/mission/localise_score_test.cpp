@@ -77,6 +77,7 @@ TEST(LocaliseScore, WrongIsMeasuredAgainstTheReference) {
   const LocaliseScore score = score_of(course, reference, {map}, {});
   EXPECT_EQ(score.scored, 9U);
   EXPECT_EQ(score.wrong, 3U);
+  EXPECT_EQ(score.right_last, at(6));
   EXPECT_FALSE(lay_on_map({}).has_value());
 }
 

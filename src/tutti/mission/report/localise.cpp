@@ -28,8 +28,23 @@ double quantile(std::vector<double> values, double share) {
   return *at;
 }
 
+Json json_of(const std::optional<LocaliseScore>& score, Timestamp begin) {
+  if (!score) return nullptr;
+  std::optional<double> right_last_s;
+  if (score->right_last) right_last_s = *score->right_last - begin;
+  return {{"scored", score->scored},
+          {"wrong", score->wrong},
+          {"right_last_s", number(right_last_s)},
+          {"rmse_m", number(score->rmse_m)},
+          {"max_m", number(score->max_m)},
+          {"median_deg", number(score->median_deg)},
+          {"map_rmse_m", number(score->map_rmse_m)},
+          {"in_map_rmse_m", number(score->in_map_rmse_m)},
+          {"within_sigma", {number(score->within[0]), number(score->within[1]), number(score->within[2])}}};
+}
+
 Json json_of(const LocalisedRobot& robot) {
-  Json shares, score, starts = Json::array();
+  Json shares, starts = Json::array();
   for (const LocalisedRobot::Start& start : robot.starts)
     starts.push_back({{"at_s", number(start.at_s)},
                       {"fix_after_s", number(start.fix_after_s)},
@@ -40,22 +55,14 @@ Json json_of(const LocalisedRobot& robot) {
                        {"said_after_s", number(kidnap.said_after_s)},
                        {"found_after_s", number(kidnap.found_after_s)}});
   for (const State state : kStates) shares[std::string(to_string(state))] = number(robot.share(state));
-  if (robot.score)
-    score = {{"scored", robot.score->scored},
-             {"wrong", robot.score->wrong},
-             {"rmse_m", number(robot.score->rmse_m)},
-             {"max_m", number(robot.score->max_m)},
-             {"median_deg", number(robot.score->median_deg)},
-             {"map_rmse_m", number(robot.score->map_rmse_m)},
-             {"in_map_rmse_m", number(robot.score->in_map_rmse_m)},
-             {"within_sigma",
-              {number(robot.score->within[0]), number(robot.score->within[1]), number(robot.score->within[2])}}};
+  const Timestamp begin = robot.course.empty() ? Timestamp{} : robot.course.front().stamp;
   return {{"robot", robot.name},
           {"duration_s", number(robot.duration_s)},
           {"starts", starts},
           {"kidnaps", kidnaps},
           {"share_of_time", shares},
-          {"score", score},
+          {"score", json_of(robot.score, begin)},
+          {"score_since_kidnap", json_of(robot.score_since_kidnap, begin)},
           {"work",
            {{"submaps_compared", robot.work.compared},
             {"scans_registered", robot.work.registered},
