@@ -96,7 +96,8 @@ targets=(test_bus test_feed test_verifiers test_integration test_program)
 build_stage tsan TSan
 test_stage tsan TSan -R '^(bus|feed|verifiers|program)/|^integration/mission$'
 targets=()
-! is_over 55 "ASan and UBSan" || exit 0
+! is_over 50 "ASan and UBSan" || exit 0
 build_stage asan "ASan + UBSan"
-! is_over 65 "missions and programs under ASan and UBSan" || tests=(-LE "mission|system")
+! is_over 75 "tests under ASan and UBSan" || exit 0
+! is_over 62 "missions and programs under ASan and UBSan" || tests=(-LE "mission|system")
 test_stage asan "ASan + UBSan" "${tests[@]}"
