@@ -95,21 +95,19 @@ std::vector<localise::Located> measure_kidnaps(const std::vector<Timestamp>& at,
 /// Where the robot is in the map at its first sample, on the floor whose robots have been nearest.
 Result<StartPose> true_start(const Recording& recording, const std::vector<std::optional<MapReference>>& floors) {
   const auto T_reference_body = pose_at(recording.reference, recording.odometry.front().stamp);
+  Vector6d variances;
+  variances << Eigen::Vector3d::Constant(kTrueStart_m * kTrueStart_m),
+      Eigen::Vector3d::Constant(kTrueStart_rad * kTrueStart_rad);
   std::optional<StartPose> out;
   double least_m = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; T_reference_body && k < floors.size(); ++k) {
     if (!floors[k]) continue;
     const Pose3 T_world_body = floors[k]->T_world_reference * *T_reference_body;
-    for (const MapReference::Error& error : floors[k]->errors) {
-      const double away_m = (error.p_world - T_world_body.translation).norm();
-      if (away_m >= least_m) continue;
-      least_m = away_m;
-      Vector6d variances;
-      variances << Eigen::Vector3d::Constant(kTrueStart_m * kTrueStart_m),
-          Eigen::Vector3d::Constant(kTrueStart_rad * kTrueStart_rad);
-      out = StartPose{.T_world_body = RelativePose{T_world_body, variances.asDiagonal()},
-                      .floor = static_cast<std::uint32_t>(k + 1)};
-    }
+    const double away_m = (floors[k]->nearest(T_world_body.translation).p_world - T_world_body.translation).norm();
+    if (away_m >= least_m) continue;
+    least_m = away_m;
+    out = StartPose{.T_world_body = RelativePose{T_world_body, variances.asDiagonal()},
+                    .floor = static_cast<std::uint32_t>(k + 1)};
   }
   if (!out)
     return fail(

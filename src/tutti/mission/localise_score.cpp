@@ -9,9 +9,9 @@
 
 namespace tutti::mission {
 
-const Eigen::Vector3d& MapReference::error_near(const Eigen::Vector3d& p_world) const {
+const MapReference::Error& MapReference::nearest(const Eigen::Vector3d& p_world) const {
   const auto away = [&](const Error& error) { return (error.p_world - p_world).squaredNorm(); };
-  return std::ranges::min_element(errors, {}, away)->by_m;
+  return *std::ranges::min_element(errors, {}, away);
 }
 
 std::optional<MapReference> lay_on_map(const std::vector<evaluation::PosePair>& pairs) {
@@ -49,7 +49,7 @@ LocaliseScore score_of(const std::vector<localise::Located>& course, const Traje
     const MapReference& map = *floors[located.floor - 1];
     const Pose3 truth = map.T_world_reference * pair.reference;
     const Vector6d error = local(pair.estimate, truth);
-    const Eigen::Vector3d& map_error = map.error_near(truth.translation);
+    const Eigen::Vector3d& map_error = map.nearest(truth.translation).by_m;
     const Eigen::Vector3d in_map = error.head<3>() + pair.estimate.rotation.conjugate() * map_error;
     const double metres = error.head<3>().norm(), angle_deg = error.tail<3>().norm() / kRadPerDeg;
     ++out.scored;

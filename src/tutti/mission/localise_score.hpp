@@ -19,8 +19,8 @@ struct MapReference {
     Eigen::Vector3d by_m = Eigen::Vector3d::Zero();     ///< What the map has it off by, in its frame.
   };
   std::vector<Error> errors;  ///< Not empty.
-  /// The map's own error about a place, which nobody who is localised in it can know: that of the nearest pose.
-  [[nodiscard]] const Eigen::Vector3d& error_near(const Eigen::Vector3d& p_world) const;
+  /// The nearest pose, with the map's own error there, which nobody who is localised in the map can know.
+  [[nodiscard]] const Error& nearest(const Eigen::Vector3d& p_world) const;
 };
 /// From poses of the map and the reference's of the same moments; nothing from fewer than three.
 std::optional<MapReference> lay_on_map(const std::vector<evaluation::PosePair>& pairs);
