@@ -108,12 +108,7 @@ struct Robot {
       uncertainty.whole.position_m = one_of(rng, {0.0, 1.0, 1e9, 1e300});
     if (!wire::validate(message)) return;
     ++heard;
-    done(node->receive({bus::Endpoint::server(),
-                        bus::Endpoint::of(kRobot),
-                        bus::MessageKind::proxy_graph,
-                        {},
-                        std::make_shared<const std::string>(wire::encode(message))},
-                       now));
+    done(node->receive(test::from_server(kRobot, bus::MessageKind::proxy_graph, wire::encode(message)), now));
   }
 
   Rng rng;

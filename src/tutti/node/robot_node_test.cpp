@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "support/node/submaps.hpp"
 #include "support/robot/drifting_robot.hpp"
 #include "tutti/base/content_hash.hpp"
 #include "tutti/node/submap_frames.hpp"
@@ -20,10 +21,6 @@ namespace robot_node_test {
 
 using bus::Endpoint, bus::MessageKind;
 constexpr RobotId kRobot{1};
-
-bus::Envelope from_server(MessageKind kind, std::string bytes) {
-  return {Endpoint::server(), Endpoint::of(kRobot), kind, {}, std::make_shared<const std::string>(std::move(bytes))};
-}
 
 /// A robot on a store, whose steps are committed.
 class RobotNodeTest : public testing::Test {
@@ -54,7 +51,8 @@ class RobotNodeTest : public testing::Test {
     }
   }
   Step hear(std::uint64_t revision) {
-    return done(node_->receive(from_server(MessageKind::proxy_graph, wire::encode(graph(revision))), now_));
+    return done(
+        node_->receive(test::from_server(kRobot, MessageKind::proxy_graph, wire::encode(graph(revision))), now_));
   }
   ProxyGraphMessage graph(std::uint64_t revision) {
     return robot::test::broadcast(node_->agent(), revision, robot::test::kWorld);
@@ -62,7 +60,7 @@ class RobotNodeTest : public testing::Test {
   Step confirm(const std::vector<SubmapId>& ids, RobotId robot = kRobot) {
     Receipt receipt{.robot = robot, .stored = {}};
     for (const SubmapId id : ids) receipt.stored[id.chain.session].insert(id.index);
-    return done(node_->receive(from_server(MessageKind::receipt, wire::encode(receipt)), now_));
+    return done(node_->receive(test::from_server(kRobot, MessageKind::receipt, wire::encode(receipt)), now_));
   }
   [[nodiscard]] std::size_t rows(const char* table) const { return store_->tables().at(table).size(); }
 
@@ -129,7 +127,7 @@ TEST_F(RobotNodeTest, WhatTheServerRefusesForGoodLeavesTheOutboxAndIsReported) {
   const SubmapId bad = node_->backlog().begin()->first;
   Receipt receipt{.robot = kRobot, .why_refused = "no good"};
   receipt.refuse(bad, content_hash(store_->tables().at("outbox").at(key_of(bad))), 1);
-  const bus::Envelope envelope = from_server(MessageKind::receipt, wire::encode(receipt));
+  const bus::Envelope envelope = test::from_server(kRobot, MessageKind::receipt, wire::encode(receipt));
   const Step step = done(node_->receive(envelope, now_));
   EXPECT_FALSE(node_->backlog().contains(bad));
   EXPECT_TRUE(node_->archive().contains(bad));
@@ -146,12 +144,13 @@ TEST_F(RobotNodeTest, WhatIsRefusedOfSomebodyElseUnderItsIdStays) {
   Receipt receipt{.robot = kRobot, .why_refused = "no good"};
   receipt.refused[id.chain.session].insert(id.index);
   receipt.refusals.push_back({id.chain.session, id.index, content_hash("garbage")});
-  EXPECT_TRUE(done(node_->receive(from_server(MessageKind::receipt, wire::encode(receipt)), now_)).events.empty());
+  EXPECT_TRUE(done(node_->receive(test::from_server(kRobot, MessageKind::receipt, wire::encode(receipt)), now_))
+                  .events.empty());
   EXPECT_TRUE(node_->backlog().contains(id));
   const auto mine = std::ranges::find(sent_, message_id(id), &bus::Envelope::id);
   ASSERT_NE(mine, sent_.end());
   receipt.refusals.push_back({id.chain.session, id.index, content_hash(*mine->bytes)});
-  done(node_->receive(from_server(MessageKind::receipt, wire::encode(receipt)), now_));
+  done(node_->receive(test::from_server(kRobot, MessageKind::receipt, wire::encode(receipt)), now_));
   EXPECT_FALSE(node_->backlog().contains(id));
 }
 
@@ -160,11 +159,11 @@ TEST_F(RobotNodeTest, WhatAServerHasForgottenGoesAgainAlsoWhenItRefusesGarbageUn
   const SubmapId id = node_->backlog().begin()->first;
   Receipt receipt{.robot = kRobot, .incarnation = 1};
   receipt.stored[id.chain.session].insert(id.index);
-  done(node_->receive(from_server(MessageKind::receipt, wire::encode(receipt)), now_));
+  done(node_->receive(test::from_server(kRobot, MessageKind::receipt, wire::encode(receipt)), now_));
   EXPECT_FALSE(node_->backlog().contains(id));
   receipt = {.robot = kRobot, .incarnation = 2, .why_refused = "no good"};
   receipt.refuse(id, content_hash("garbage"), 9);
-  done(node_->receive(from_server(MessageKind::receipt, wire::encode(receipt)), now_));
+  done(node_->receive(test::from_server(kRobot, MessageKind::receipt, wire::encode(receipt)), now_));
   EXPECT_TRUE(node_->backlog().contains(id));
 }
 
@@ -190,14 +189,14 @@ TEST_F(RobotNodeTest, WhatAServerRefusedLongAgoIsNotSentAgainAndAgain) {
   const SubmapId bad = node_->backlog().begin()->first;
   Receipt receipt{.robot = kRobot, .incarnation = 1, .why_refused = "no good"};
   receipt.refuse(bad, content_hash(store_->tables().at("outbox").at(key_of(bad))), 1);
-  done(node_->receive(from_server(MessageKind::receipt, wire::encode(receipt)), now_));
+  done(node_->receive(test::from_server(kRobot, MessageKind::receipt, wire::encode(receipt)), now_));
   ASSERT_TRUE(node_->archive().contains(bad));
   restart();
   receipt.forget_refusals(bad);  // its list is bounded
-  done(node_->receive(from_server(MessageKind::receipt, wire::encode(receipt)), now_));
+  done(node_->receive(test::from_server(kRobot, MessageKind::receipt, wire::encode(receipt)), now_));
   EXPECT_TRUE(node_->archive().contains(bad));
   receipt.incarnation = 2;  // another server may take it
-  done(node_->receive(from_server(MessageKind::receipt, wire::encode(receipt)), now_));
+  done(node_->receive(test::from_server(kRobot, MessageKind::receipt, wire::encode(receipt)), now_));
   EXPECT_TRUE(node_->backlog().contains(bad));
 }
 
@@ -228,7 +227,8 @@ TEST_F(RobotNodeTest, SaysHowItIs) {
 TEST_F(RobotNodeTest, KnowsWhenItsNameIsSomebodyElses) {
   const auto reported = [&](std::uint64_t session, std::uint64_t start, const std::string& why) {
     Receipt receipt{.robot = kRobot, .owner_session = 7, .conflict = Receipt::Conflict{session, start, why}};
-    return done(node_->receive(from_server(MessageKind::receipt, wire::encode(receipt)), now_)).events.size();
+    return done(node_->receive(test::from_server(kRobot, MessageKind::receipt, wire::encode(receipt)), now_))
+        .events.size();
   };
   EXPECT_EQ(node_->owner_session(), std::nullopt);
   EXPECT_EQ(reported(101, 7, "of another start"), 0U);
@@ -318,9 +318,9 @@ TEST_F(RobotNodeTest, RefusesWhatIsNotForIt) {
   walk(0, 50);
   const auto before = store_->tables();
   for (const Step& step : {confirm({{{RobotId{2}, 101}, 0}}, RobotId{2}),
-                           done(node_->receive(from_server(MessageKind::receipt, "garbage"), now_)),
-                           done(node_->receive(from_server(MessageKind::proxy_graph, "garbage"), now_)),
-                           done(node_->receive(from_server(MessageKind::job, "garbage"), now_)),
+                           done(node_->receive(test::from_server(kRobot, MessageKind::receipt, "garbage"), now_)),
+                           done(node_->receive(test::from_server(kRobot, MessageKind::proxy_graph, "garbage"), now_)),
+                           done(node_->receive(test::from_server(kRobot, MessageKind::job, "garbage"), now_)),
                            done(node_->add(OdometrySample{odometry_[3].stamp, {}, {}}, now_)),
                            done(node_->add(Scan{odometry_[3].stamp, std::make_shared<PointCloud>(), {}}, now_))})
     EXPECT_EQ(step.events.size(), 1U);
@@ -457,9 +457,9 @@ TEST_F(RobotNodeTest, ADeltaIsHeardAsSoonAsItsBaseIsThere) {
   walk(0, 130);
   const std::string first = wire::encode(graph(1));
   const ProxyGraph base = wire::decode_proxy_graph(first)->graph;
-  const auto delta = from_server(MessageKind::proxy_graph_delta, wire::encode_delta(graph(2), base));
+  const auto delta = test::from_server(kRobot, MessageKind::proxy_graph_delta, wire::encode_delta(graph(2), base));
   EXPECT_TRUE(done(node_->receive(delta, now_)).events.empty());  // it waits
-  const Step step = done(node_->receive(from_server(MessageKind::proxy_graph, first), now_));
+  const Step step = done(node_->receive(test::from_server(kRobot, MessageKind::proxy_graph, first), now_));
   ASSERT_EQ(step.events.size(), 1U);  // for both
   EXPECT_EQ(std::get<RobotUpdated>(step.events[0].what).summary.revision, 2U);
   const std::string heard = wire::encode(node_->agent().state());
@@ -467,14 +467,16 @@ TEST_F(RobotNodeTest, ADeltaIsHeardAsSoonAsItsBaseIsThere) {
   restart();  // the journal does without the base
   EXPECT_EQ(wire::encode(node_->agent().state()), heard);
   EXPECT_TRUE(done(node_->receive(delta, now_)).events.empty());
-  EXPECT_TRUE(done(node_->receive(from_server(MessageKind::proxy_graph, first), now_)).events.empty());  // old
-  const auto newer = from_server(MessageKind::proxy_graph_delta, wire::encode_delta(graph(3), base));
+  EXPECT_TRUE(
+      done(node_->receive(test::from_server(kRobot, MessageKind::proxy_graph, first), now_)).events.empty());  // old
+  const auto newer = test::from_server(kRobot, MessageKind::proxy_graph_delta, wire::encode_delta(graph(3), base));
   EXPECT_EQ(done(node_->receive(newer, now_)).events.size(), 1U);
-  const auto of_another = from_server(MessageKind::proxy_graph_delta, wire::encode_delta(graph(4), graph(3).graph));
+  const auto of_another =
+      test::from_server(kRobot, MessageKind::proxy_graph_delta, wire::encode_delta(graph(4), graph(3).graph));
   EXPECT_TRUE(done(node_->receive(of_another, now_)).events.empty());
   hear(5);  // in full; the waiting delta is of no use any more
   EXPECT_EQ(node_->agent().state().revision, 5U);
-  const Step garbage = done(node_->receive(from_server(MessageKind::proxy_graph_delta, "garbage"), now_));
+  const Step garbage = done(node_->receive(test::from_server(kRobot, MessageKind::proxy_graph_delta, "garbage"), now_));
   ASSERT_EQ(garbage.events.size(), 1U);
   EXPECT_TRUE(std::holds_alternative<MessageRefused>(garbage.events[0].what));
 }

@@ -220,12 +220,8 @@ TEST(RobotPlace, OnAnotherFloorAnotherSessionBegins) {
   others.graph.revision = 1;
   others.graph.nodes = {{.chain = RobotId{9}, .stamp = {}, .T_world_body = {}}};
   others.graph.components = {{RobotId{9}, 0}};
-  (void)of_a_server.done(of_a_server.node->receive({bus::Endpoint::server(),
-                                                    bus::Endpoint::of(kRobot),
-                                                    bus::MessageKind::proxy_graph,
-                                                    {},
-                                                    std::make_shared<const std::string>(wire::encode(others))},
-                                                   {}));
+  (void)of_a_server.done(
+      of_a_server.node->receive(test::from_server(kRobot, bus::MessageKind::proxy_graph, wire::encode(others)), {}));
   localise::test::ride(below, above, of_a_server, [&](Ride part, std::size_t) {
     if (part == Ride::in_lift) {
       EXPECT_EQ(of_a_server.node->status(of_a_server.now).session, 1U);

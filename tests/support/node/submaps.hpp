@@ -37,6 +37,11 @@ inline bus::Envelope envelope(const SubmapMessage& message) {
           message_id(message.submap.id), std::make_shared<const std::string>(wire::encode(message))};
 }
 
+inline bus::Envelope from_server(RobotId to, bus::MessageKind kind, std::string bytes) {
+  return {
+      bus::Endpoint::server(), bus::Endpoint::of(to), kind, {}, std::make_shared<const std::string>(std::move(bytes))};
+}
+
 /// What an operator sends.
 inline bus::Envelope envelope(const ClosureDecision& decision) {
   return {bus::Endpoint::viewer(7), bus::Endpoint::server(), bus::MessageKind::decision,
