@@ -457,9 +457,9 @@ class CommandLine(unittest.TestCase):
         self.expect(tutti(*carried, 80), 1, "charlie", "kidnap")
         self.expect(tutti(*carried, 20), 0, "carried elsewhere")
         robots = json.loads((out / "localise.json").read_text())["robots"]
-        told = [robot for robot in robots if robot["starts"][0]["from_map_m"] < 5.0]
-        self.assertGreater(len(told), 0)
-        for robot in told:  # where it starts, and scored until it said that it was carried, too
+        on_map = [robot for robot in robots if robot["starts"][0]["from_map_m"] < 5.0]
+        self.assertGreater(len(on_map), 0)
+        for robot in on_map:  # given its start pose, and scored until it said that it was carried, too
             self.assertLess(robot["starts"][0]["fix_after_s"], 2.0)
             self.assertGreater(robot["score_since_kidnap"]["scored"], 0)
             self.assertGreaterEqual(robot["score_since_kidnap"]["wrong"], robot["score"]["wrong"])

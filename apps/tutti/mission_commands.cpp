@@ -336,7 +336,7 @@ void add_run_command(CLI::App& app, int& exit_code) {
       ->excludes("--kidnap-every");
   command
       ->add_flag("--true-start", arguments->trial.true_start,
-                 "With --frozen: each robot is told where it starts, by its reference; scans have to confirm it")
+                 "With --frozen: each robot is given its true start pose, by its reference; scans have to confirm it")
       ->needs("--frozen");
   add_mission_options(*command, *arguments);
   command->callback([arguments, inputs, bags, topics, graph, &exit_code] {

@@ -41,7 +41,7 @@ BESIDE_COMMAND = ("bench/accuracy/localise.py build/bench/apps/tutti/tutti --sha
                   "--pcl build/bench/bench/accuracy/tutti_beside_pcl")
 BESIDE_ASKED = [
     "Asked was what registration alone does on the same runs, as its users set it up: PCL's NDT and GICP (1.13, Debian 12). All robots",
-    "are told their true start pose, Tutti's too (`--true-start`); seed 1.",
+    "are given their true start pose, Tutti's too (`--true-start`); seed 1.",
 ]
 BESIDE_WORDS = [
     "NDT and GICP have the defaults of lidar_localization_ros2, which calls these classes: NDT with cells of 1 m and steps of 0.1 m on",
@@ -121,16 +121,16 @@ class Runs:
         return remembered(self.keep, [self.mission, self.mapping, seed, trials], make)
 
     def beside_pcl(self):
-        """By method, the figures of robots that are told where they start; left alone, and carried elsewhere."""
+        """By method, the figures of robots that are given their start pose; left alone, and carried elsewhere."""
         def make():
             with tempfile.TemporaryDirectory() as folder:
                 folder = pathlib.Path(folder)
                 known, common = self.mapped(folder, 1)
-                return [{method: self.told(method, folder / method, known, common, more) for method in METHODS}
+                return [{method: self.given_start(method, folder / method, known, common, more) for method in METHODS}
                         for more in ([], ["--kidnap-every", KIDNAP_S])]
         return remembered(self.keep, [self.mission, self.mapping, *METHODS], make)
 
-    def told(self, method, out, known, common, more):
+    def given_start(self, method, out, known, common, more):
         program = [self.tutti, "run", "--frozen", "--true-start"] if method == "Tutti" else [self.pcl, "--method", method]
         run(*program, *common, "--map-in", known, *more, "--out", out)
         return robots_of(out)

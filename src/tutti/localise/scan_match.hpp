@@ -41,7 +41,7 @@ struct Assessment {
 };
 /// `predicted` is where the robot should be with its covariance, `match` begun there.
 Assessment assess(const ScanMatch& match, const RelativePose& predicted);
-/// What scans must show where a place is not confirmed yet.
+/// Scans must pass it where a place is not confirmed yet.
 struct GuessGate {
   double least_overlap = 0.0, most_contradiction = 1.0, least_quality = 0.0;  ///< Shares, as in ScanMatch.
   int least_in_view = 0;                                                      ///< ScanMatch::in_view

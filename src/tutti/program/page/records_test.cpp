@@ -20,7 +20,7 @@
 namespace tutti::page {
 namespace records_test {
 
-/// What records.ts has so far.
+/// The file as far as it is made.
 struct Records {
   std::string tables;
   std::set<std::string> readers;  ///< Those of web/src/reading.ts that the tables use.
