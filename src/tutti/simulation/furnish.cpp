@@ -20,6 +20,8 @@ constexpr double kFurniturePer100m = 10.0;  ///< Office: cupboards and pillars a
 constexpr double kAtJunction = 3.0;         ///< Nothing stands this near to a junction, where robots cut corners.
 constexpr double kClearance = 1.0;          ///< Around the lines that robots walk along (offices: 0.75).
 constexpr double kIntoWall = 0.6;           ///< How far things reach into the wall they stand at.
+constexpr double kGonePiece_m = 2.0;        ///< Length of a piece of wall that is gone,
+constexpr double kBehindWall_m = 2.0;       ///< and depth of the space behind it.
 constexpr double kStairhouseIn = 2.0;       ///< The door's house, inside the roof's edge.
 constexpr double kStairhouseOut = 1.5;      ///< And beyond it, so that sky and rock never meet.
 
@@ -55,7 +57,8 @@ std::vector<double> places(const Aisle& aisle, double per_100m, Rng& rng) {
 
 double either_side(Rng& rng) { return rng.bernoulli(0.5) ? 1.0 : -1.0; }
 
-void furnish_tunnel(const Aisle& aisle, SpaceParts& parts, Rng rng) {
+/// `on_another_day`: what stands at the walls stands elsewhere; the walls with their alcoves are the same.
+void furnish_tunnel(const Aisle& aisle, bool on_another_day, SpaceParts& parts, Rng rng) {
   for (const double s : places(aisle, kAlcovesPer100m, rng)) {
     const double depth = rng.uniform(0.6, 1.6);
     const double height = rng.uniform(1.4, 2.3);
@@ -63,6 +66,7 @@ void furnish_tunnel(const Aisle& aisle, SpaceParts& parts, Rng rng) {
     parts.openings.push_back(box_at(aisle, s, rng.uniform(0.5, 1.5), side, aisle.half_width - 0.6,
                                     aisle.half_width + depth, height, kRoughness_m));
   }
+  if (on_another_day) rng = rng.fork("another day");
   for (const double s : places(aisle, kObstaclesPer100m, rng)) {
     const double front = std::max(kClearance, aisle.half_width - rng.uniform(0.2, 0.5)) + kRoughness_m;
     const double height = rng.bernoulli(0.3) ? kHeight_m + 1.0 : rng.uniform(0.4, 1.8);
@@ -70,6 +74,16 @@ void furnish_tunnel(const Aisle& aisle, SpaceParts& parts, Rng rng) {
     parts.solids.push_back(
         box_at(aisle, s, rng.uniform(0.2, 0.7), side, front, aisle.half_width + kIntoWall, height, kRoughness_m));
   }
+}
+
+/// Takes this share of both walls away, in pieces.
+void open_walls(const Aisle& aisle, double share, SpaceParts& parts, Rng rng) {
+  const double half = 0.5 * kGonePiece_m;
+  for (const double side : {-1.0, 1.0})
+    for (double s = kAtJunction + half; s + half <= aisle.length - kAtJunction; s += kGonePiece_m)
+      if (rng.bernoulli(share))
+        parts.openings.push_back(
+            box_at(aisle, s, half, side, aisle.half_width - 0.6, aisle.half_width + kBehindWall_m, kHeight_m, 0.0));
 }
 
 /// A room may not break into another corridor, nor reach under the open sky.
@@ -205,8 +219,11 @@ SpaceParts furnish(const CorridorWorld& world, const SurfaceConfig& config, Rng 
     const Eigen::Vector3d ab = passage.b - passage.a;
     const double length = ab.head<2>().norm();
     const Aisle aisle{passage.a, ab.head<2>() / length, length, ab.z() / length, passage.half_width};
-    if (corridor.kind == CorridorKind::rough) furnish_tunnel(aisle, parts, rng.fork(i));
-    if (corridor.kind == CorridorKind::office) furnish_office(world, i, aisle, config, parts, rng.fork(i));
+    if (corridor.kind == CorridorKind::office)
+      furnish_office(world, i, aisle, config, parts, rng.fork(i));
+    else
+      open_walls(aisle, config.changed_share, parts, rng.fork("gone").fork(i));
+    if (corridor.kind == CorridorKind::rough) furnish_tunnel(aisle, config.changed_share > 0.0, parts, rng.fork(i));
     for (const std::size_t end : {corridor.a, corridor.b}) {
       const Eigen::Vector3d at = world.junctions[end] + down;
       if (is_open[end]) {

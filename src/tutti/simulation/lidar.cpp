@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tutti/base/check.hpp"
+#include "tutti/geometry/so3.hpp"
 #include "tutti/model/pose_at.hpp"
 
 namespace tutti::simulation {
@@ -25,6 +26,25 @@ std::optional<double> measure(const Bvh& surface, const Eigen::Vector3f& origin,
   return range;
 }
 
+constexpr LidarConfig kNarrow{.beams = 64,
+                              .lowest_deg = -12.5,
+                              .highest_deg = 12.5,
+                              .azimuth_step_deg = 0.2,
+                              .max_range_m = 150.0,
+                              .sector_deg = 120.0};
+
+LidarConfig looking_left(LidarConfig config) {
+  config.facing_deg = 90.0;
+  return config;
+}
+
+/// Whether the direction (unit vector, sensor frame) is in the sector.
+bool sees(const LidarConfig& config, const Eigen::Vector3d& direction) {
+  if (config.sector_deg >= 360.0) return true;
+  const double azimuth_deg = std::atan2(direction.y(), direction.x()) / kRadPerDeg;
+  return std::abs(std::remainder(azimuth_deg - config.facing_deg, 360.0)) <= 0.5 * config.sector_deg;
+}
+
 }  // namespace
 
 const std::vector<LidarModel>& lidar_models() {
@@ -37,6 +57,11 @@ const std::vector<LidarModel>& lidar_models() {
        "beams that swing from 7 degrees below level to 52 above while they turn, nowhere the same from sweep to sweep, "
        "200,000 rays a second, as a Livox Mid-360's",
        {.pattern = "rosette", .beams = 4, .lowest_deg = -7.0, .highest_deg = 52.0}},
+      {"narrow",
+       "64 beams within 12.5 degrees of level, every 0.2 degrees, 120 degrees wide and 150 m far, ahead, as "
+       "solid-state ones",
+       kNarrow},
+      {"narrow-left", "the same, looking to the left", looking_left(kNarrow)},
   };
   return rows;
 }
@@ -73,6 +98,7 @@ std::optional<Scan> simulate_sweep(const Bvh& surface, const Trajectory& truth, 
     const Eigen::Vector3f origin = (T_reference_body * mount).cast<float>();
     fire(share, directions);
     for (const Eigen::Vector3d& direction : directions) {
+      if (!sees(config, direction)) continue;
       const auto range = measure(surface, origin, (R_reference_body * direction).cast<float>(), config, rng);
       if (!range) continue;
       cloud->points.push_back((mount + *range * direction).cast<float>());

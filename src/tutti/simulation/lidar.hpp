@@ -37,6 +37,8 @@ struct LidarConfig {
   double dropout_share = 0.02;   ///< Share of the echoes lost.
   double grazing_cosine = 0.08;  ///< Below this cosine of the angle of incidence, echoes are lost in proportion.
   double mount_height_m = 0.25;  ///< Sensor above the body frame.
+  double sector_deg = 360.0;     ///< It sees nothing outside of an angle as wide as this about the vertical,
+  double facing_deg = 0.0;       ///< whose middle is so far to the left of ahead.
 
   /// T_body_lidar
   [[nodiscard]] Pose3 pose() const { return {Eigen::Quaterniond::Identity(), {0.0, 0.0, mount_height_m}}; }

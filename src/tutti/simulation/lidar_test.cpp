@@ -114,6 +114,23 @@ TEST(Lidar, EveryModelCanBeChosenAndThinned) {
   }
 }
 
+TEST(Lidar, ANarrowOneSeesItsSectorAlone) {
+  for (const auto& [model, facing_deg] : {std::pair("narrow", 0.0), {"narrow-left", 90.0}}) {
+    LidarConfig config = LidarChoice{.model = model, .rays_share = 0.2}.config();
+    const Scan scan = (*SimulatedLidar(room(), walk(), config, Rng(1)).scan(20)).value();
+    std::vector<double> off_deg;
+    for (const Eigen::Vector3f& point : scan.cloud->points)
+      off_deg.push_back(std::remainder(std::atan2(point.y(), point.x()) / kRadPerDeg - facing_deg, 360.0));
+    const auto [low, high] = std::ranges::minmax(off_deg);
+    EXPECT_NEAR(low, -60.0, 1.1) << model;  // rays are 1 degree apart
+    EXPECT_NEAR(high, 60.0, 1.1) << model;
+    config.sector_deg = 360.0;
+    const Scan all = (*SimulatedLidar(room(), walk(), config, Rng(1)).scan(20)).value();
+    EXPECT_NEAR(static_cast<double>(off_deg.size()), static_cast<double>(all.cloud->points.size()) / 3.0,
+                0.1 * static_cast<double>(all.cloud->points.size()));
+  }
+}
+
 TEST(Lidar, ARosetteLooksEverywhereButNeverInTheSameDirectionTwice) {
   const LidarConfig config = ideal("rosette");
   const ScanPattern& pattern = scan_pattern(config.pattern);

@@ -26,12 +26,17 @@ struct SurfaceConfig {
   double doors_per_100m = 20.0;    ///< Office: door niches; every third stands open to a room.
   double parapet_height_m = 0.35;  ///< Roof: wall around its edge.
   int chimneys = 2;                ///< Roof: the only things that stand on it, beside the house of the door.
+  double changed_share = 0.0;      ///< Share of the walls that is gone.
   template <class V>
   void describe(V& v) {
     v.field("cell_m", cell_m, between(0.05, 1.0), "Grid the surface is built on: details below it are lost.");
     v.field("body_height_m", body_height_m, above_zero_to(kLargestRoom_m),
             "Height of the network's lines above the floor.");
     v.field("width_m", width_m, above_zero_to(kLargestRoom_m), "Width of rough and featureless corridors.");
+    v.field(
+        "changed_share", changed_share, between(0.0, 1.0),
+        "Above 0 it is another day: this share of the walls of rough and featureless corridors is gone, in pieces of "
+        "2 m with 2 m of space behind them, and all that stands in rough ones stands elsewhere.");
   }
 };
 

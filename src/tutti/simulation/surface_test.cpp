@@ -168,6 +168,48 @@ TEST(Surface, FeaturelessCorridorsLookTheSameAllAlong) {
   EXPECT_GT(largest_change(tunnel(), first_of(tunnel(), CorridorKind::rough)), 0.2);
 }
 
+/// A tunnel today, and the same on a day when a fifth of its walls is gone.
+struct TwoDays {
+  CorridorWorld world = small_world("tunnel");
+  SurfaceConfig later{.changed_share = 0.2};
+  FreeSpace first{world, SurfaceConfig{}, Rng(2)}, second{world, later, Rng(2)};
+};
+
+TEST(Surface, OnAnotherDayAShareOfTheWallsIsGone) {
+  const TwoDays days;
+  const TriangleMesh mesh = extract_surface(days.second, days.later.cell_m);
+  EXPECT_TRUE(open_edges(mesh).empty());  // there is a wall behind what is gone
+  const Bvh walls(mesh);
+  int same = 0, farther = 0, nearer = 0;
+  Rng rng(5);
+  for (int i = 0; i < 20000; ++i) {
+    const std::size_t c = rng.index(days.world.corridors.size());
+    const Corridor& corridor = days.world.corridors[c];
+    const Eigen::Vector3d ab = days.world.junctions[corridor.b] - days.world.junctions[corridor.a];
+    const double share = rng.uniform(3.0, corridor.length_m - 3.0) / corridor.length_m;
+    const Eigen::Vector3f from = (days.world.junctions[corridor.a] + share * ab).cast<float>();
+    const Eigen::Vector3f side =
+        ((rng.bernoulli(0.5) ? 1.0 : -1.0) * Eigen::Vector3d(-ab.y(), ab.x(), 0.0).normalized()).cast<float>();
+    const auto before = tunnel().bvh.cast(from, side, 60.0F), after = walls.cast(from, side, 60.0F);
+    ASSERT_TRUE(before && after);
+    const float moved = after->distance - before->distance;
+    (std::abs(moved) < 0.1F ? same : moved > 0.0F ? farther : nearer) += 1;
+  }
+  EXPECT_NEAR(farther, 0.2 * 20000, 0.08 * 20000);  // and where something stood, or an alcove is
+  EXPECT_GT(nearer, 0);                             // what stands elsewhere
+  EXPECT_GT(same, 0.6 * 20000);
+}
+
+TEST(Surface, OnAnotherDayAlcovesStayAndOtherThingsStandElsewhere) {
+  const TwoDays days;
+  const SpaceParts &first = days.first.parts(), &second = days.second.parts();
+  ASSERT_FALSE(first.solids.empty());
+  for (const Box& solid : second.solids)
+    for (const Box& before : first.solids) EXPECT_GT((solid.centre - before.centre).norm(), 0.01);
+  for (const Box& alcove : first.openings)
+    EXPECT_TRUE(std::ranges::any_of(second.openings, [&](const Box& box) { return box.centre == alcove.centre; }));
+}
+
 TEST(Surface, NothingIsAboveTheRoof) {
   const Place& place = terrace();
   Rng rng(4);
