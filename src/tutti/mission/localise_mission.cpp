@@ -42,32 +42,44 @@ bool overlaps(const Trajectory& a, const Trajectory& b) {
 /// A floor's, by the robots that made the map there; nothing when none of them has a reference.
 std::optional<MapReference> reference_of(const mapfile::OpenedMap& map, std::uint32_t floor, const MissionInput& input,
                                          const evaluation::AssociationConfig& association) {
-  std::vector<evaluation::PosePair> pairs;
+  std::vector<std::vector<evaluation::PosePair>> drives;
   for (const MissionRecording& robot : input.robots) {
     const Trajectory poses = poses_in(map, robot.recording.name, floor);
-    if (!overlaps(poses, robot.recording.reference)) continue;
-    std::ranges::move(evaluation::associate(poses, robot.recording.reference, association), std::back_inserter(pairs));
+    if (overlaps(poses, robot.recording.reference))
+      drives.push_back(evaluation::associate(poses, robot.recording.reference, association));
   }
-  return lay_on_map(pairs);
+  return lay_on_map(std::move(drives));
 }
 
-void measure_starts(const localise::KnownMap& map, const Trajectory& reference,
-                    const std::vector<std::optional<MapReference>>& floors, LocalisedRobot& robot) {
-  std::vector<Eigen::Vector3d> seen_from;  // in the reference's frame, in which floors can be compared
+/// In the reference's frame, in which floors can be compared.
+std::vector<Pose3> keyframes_of(const localise::KnownMap& map, const std::vector<std::optional<MapReference>>& floors) {
+  std::vector<Pose3> out;
   for (const auto& [id, entry] : map.submaps) {
     const auto& floor = floors.at(entry.floor - 1);
     if (!floor) continue;
     for (const Keyframe& keyframe : entry.submap->keyframes)
-      seen_from.push_back(floor->T_world_reference.inverse() *
-                          (entry.T_world_odom() * keyframe.T_odom_body.translation));
+      out.push_back(floor->T_world_reference.inverse() * entry.T_world_odom() * keyframe.T_odom_body);
   }
+  return out;
+}
+
+Eigen::Vector2d heading(const Pose3& pose) { return (pose.rotation * Eigen::Vector3d::UnitX()).head<2>().normalized(); }
+
+void measure_starts(const std::vector<Pose3>& keyframes, const Trajectory& reference, LocalisedRobot& robot) {
   const Timestamp begin = robot.course.empty() ? reference.front().stamp : robot.course.front().stamp;
   for (LocalisedRobot::Start& start : robot.starts)
-    for (const StampedPose& pose : reference) {
-      const double since_s = pose.stamp - begin - start.at_s;
+    for (const auto& [stamp, pose] : reference) {
+      const double since_s = stamp - begin - start.at_s;
       if (since_s < 0.0 || since_s > LocalisedRobot::kOneSubmap_s) continue;
       double nearest_m = std::numeric_limits<double>::infinity();
-      for (const Eigen::Vector3d& p : seen_from) nearest_m = std::min(nearest_m, (p - pose.pose.translation).norm());
+      for (const Pose3& keyframe : keyframes) {
+        const double apart_m = (keyframe.translation - pose.translation).norm();
+        nearest_m = std::min(nearest_m, apart_m);
+        if (apart_m > LocalisedRobot::kSamePlace_m) continue;
+        const double cosine = heading(keyframe).dot(heading(pose));
+        start.turned_deg =
+            std::min(start.turned_deg.value_or(180.0), std::acos(std::clamp(cosine, -1.0, 1.0)) / kRadPerDeg);
+      }
       start.from_map_m = std::max(start.from_map_m.value_or(0.0), nearest_m);
     }
 }
@@ -102,11 +114,11 @@ Result<StartPose> true_start(const Recording& recording, const std::vector<std::
   double least_m = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; T_reference_body && k < floors.size(); ++k) {
     if (!floors[k]) continue;
-    const Pose3 T_world_body = floors[k]->T_world_reference * *T_reference_body;
-    const double away_m = (floors[k]->nearest(T_world_body.translation).p_world - T_world_body.translation).norm();
+    const evaluation::PosePair& nearest = *floors[k]->nearest(T_reference_body->translation).front();
+    const double away_m = (nearest.reference.translation - T_reference_body->translation).norm();
     if (away_m >= least_m) continue;
     least_m = away_m;
-    out = StartPose{.T_world_body = RelativePose{T_world_body, variances.asDiagonal()},
+    out = StartPose{.T_world_body = RelativePose{in_map(nearest, *T_reference_body), variances.asDiagonal()},
                     .floor = static_cast<std::uint32_t>(k + 1)};
   }
   if (!out)
@@ -213,6 +225,7 @@ Result<std::vector<LocalisedRobot>> localise_mission(const MissionConfig& config
   for (std::uint32_t floor = 1; floor <= map.known->floors; ++floor)
     floors.push_back(reference_of(map, floor, input, config.association));
   const bool has_reference = std::ranges::any_of(floors, [](const auto& floor) { return floor.has_value(); });
+  const std::vector<Pose3> keyframes = keyframes_of(*map.known, floors);
   std::vector<const MissionRecording*> driving;
   for (const MissionRecording& robot : input.robots) {
     const Trajectory& odometry = robot.recording.odometry;
@@ -247,7 +260,7 @@ Result<std::vector<LocalisedRobot>> localise_mission(const MissionConfig& config
       const auto since = std::ranges::upper_bound(all, kidnapped_at.front(), {}, &localise::Located::stamp);
       out.back().score_since_kidnap = score({since, all.end()});
     }
-    measure_starts(*map.known, recording.reference, floors, out.back());
+    measure_starts(keyframes, recording.reference, out.back());
   }
   if (out.empty())
     return fail(ErrorCode::invalid, "every robot of the mission has made this map, expected one to be localised in it");

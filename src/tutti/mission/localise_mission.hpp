@@ -32,6 +32,9 @@ struct LocalisedRobot {
     /// The farthest that the robot was from where a robot of the map has been, in the kOneSubmap_s after it; nothing
     /// without a reference.
     std::optional<double> from_map_m;
+    /// The least angle in that time between its heading and that of a robot of the map within kSamePlace_m of it;
+    /// nothing where none has been so near. 180: everywhere it drives against them.
+    std::optional<double> turned_deg;
   };
   /// When it was carried elsewhere while it was localised, and after how long it was not any more, and was again.
   struct Kidnap {
@@ -40,8 +43,9 @@ struct LocalisedRobot {
   };
   std::vector<Kidnap> kidnaps;
   static constexpr double kOneSubmap_s = 12.0;  ///< A submap's 10 s, and scans that confirm what it shows.
-  std::vector<Start> starts;                    ///< The first at its first sample.
-  double first_fix_cpu_s = 0.0;                 ///< CPU until the first one was localised.
+  static constexpr double kSamePlace_m = 2.0;
+  std::vector<Start> starts;     ///< The first at its first sample.
+  double first_fix_cpu_s = 0.0;  ///< CPU until the first one was localised.
   localise::LocaliserWork work;
   double cpu_s = 0.0;
   std::vector<double> scan_ms;         ///< CPU of each scan that was registered.

@@ -3,31 +3,58 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "tutti/geometry/alignment.hpp"
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::mission {
 
-const MapReference::Error& MapReference::nearest(const Eigen::Vector3d& p_world) const {
-  const auto away = [&](const Error& error) { return (error.p_world - p_world).squaredNorm(); };
-  return *std::ranges::min_element(errors, {}, away);
-}
+using evaluation::PosePair;
 
-std::optional<MapReference> lay_on_map(const std::vector<evaluation::PosePair>& pairs) {
-  if (pairs.size() < 3) return std::nullopt;
-  std::vector<Eigen::Vector3d> in_world, in_reference;
-  for (const evaluation::PosePair& pair : pairs) {
-    in_world.push_back(pair.estimate.translation);
-    in_reference.push_back(pair.reference.translation);
-  }
-  MapReference out{.T_world_reference = align_points(in_world, in_reference), .errors = {}};
-  for (std::size_t k = 0; k < pairs.size(); ++k) {
-    const Eigen::Vector3d p_world = out.T_world_reference * in_reference[k];
-    out.errors.push_back({p_world, in_world[k] - p_world});
-  }
+std::vector<const PosePair*> MapReference::nearest(const Eigen::Vector3d& p_reference) const {
+  const auto away_m = [&](const PosePair& pair) { return (pair.reference.translation - p_reference).norm(); };
+  std::vector<const PosePair*> out;
+  for (const std::vector<PosePair>& drive : drives) out.push_back(&*std::ranges::min_element(drive, {}, away_m));
+  std::ranges::sort(out, {}, [&](const PosePair* pair) { return away_m(*pair); });
+  const auto out_of_sight =
+      std::find_if(out.begin() + 1, out.end(), [&](const PosePair* pair) { return away_m(*pair) > kInSight_m; });
+  out.erase(out_of_sight, out.end());
   return out;
 }
+
+std::optional<MapReference> lay_on_map(std::vector<std::vector<PosePair>> drives) {
+  std::erase_if(drives, [](const auto& drive) { return drive.empty(); });
+  std::vector<Eigen::Vector3d> in_world, in_reference;
+  for (const std::vector<PosePair>& drive : drives)
+    for (const PosePair& pair : drive) {
+      in_world.push_back(pair.estimate.translation);
+      in_reference.push_back(pair.reference.translation);
+    }
+  if (in_world.size() < 3) return std::nullopt;
+  return MapReference{.T_world_reference = align_points(in_world, in_reference), .drives = std::move(drives)};
+}
+
+Pose3 in_map(const PosePair& of_map, const Pose3& T_reference_body) {
+  return of_map.estimate * of_map.reference.inverse() * T_reference_body;
+}
+
+namespace {
+
+bool is_wrong(const Vector6d& error) {
+  return error.head<3>().norm() > LocaliseScore::kWrong_m ||
+         error.tail<3>().norm() > LocaliseScore::kWrong_deg * kRadPerDeg;
+}
+
+/// Where the map has the robot that is said to be at `estimate`.
+Pose3 place_in(const MapReference& map, const Pose3& estimate, const Pose3& T_reference_body) {
+  const auto by = map.nearest(T_reference_body.translation);
+  const auto right = std::ranges::find_if(
+      by, [&](const PosePair* pair) { return !is_wrong(local(estimate, in_map(*pair, T_reference_body))); });
+  return in_map(right == by.end() ? *by.front() : **right, T_reference_body);
+}
+
+}  // namespace
 
 LocaliseScore score_of(const std::vector<localise::Located>& course, const Trajectory& reference,
                        const std::vector<std::optional<MapReference>>& floors,
@@ -47,24 +74,22 @@ LocaliseScore score_of(const std::vector<localise::Located>& course, const Traje
     const localise::Located& located = *of[static_cast<std::size_t>(at)];
     const Matrix6d& covariance = located.T_world_body->covariance;
     const MapReference& map = *floors[located.floor - 1];
-    const Pose3 truth = map.T_world_reference * pair.reference;
-    const Vector6d error = local(pair.estimate, truth);
-    const Eigen::Vector3d& map_error = map.nearest(truth.translation).by_m;
-    const Eigen::Vector3d in_map = error.head<3>() + pair.estimate.rotation.conjugate() * map_error;
-    const double metres = error.head<3>().norm(), angle_deg = error.tail<3>().norm() / kRadPerDeg;
+    const Pose3 truth = map.T_world_reference * pair.reference, place = place_in(map, pair.estimate, pair.reference);
+    const Vector6d error = local(pair.estimate, place);
+    const double metres = error.head<3>().norm();
     ++out.scored;
-    if (metres > LocaliseScore::kWrong_m || angle_deg > LocaliseScore::kWrong_deg)
+    if (is_wrong(error))
       ++out.wrong;
     else
       out.right_last = pair.stamp;
-    squares += metres * metres;
-    map_squares += map_error.squaredNorm();
-    in_map_squares += in_map.squaredNorm();
+    squares += (pair.estimate.translation - truth.translation).squaredNorm();
+    map_squares += (place.translation - truth.translation).squaredNorm();
+    in_map_squares += metres * metres;
     out.max_m = std::max(out.max_m, metres);
-    degrees.push_back(angle_deg);
+    degrees.push_back(error.tail<3>().norm() / kRadPerDeg);
     for (int axis = 0; axis < 3; ++axis)
       for (int k = 0; k < 3; ++k)
-        if (std::abs(in_map[axis]) <= (k + 1) * std::sqrt(covariance(axis, axis))) out.within[k] += 1.0 / 3.0;
+        if (std::abs(error[axis]) <= (k + 1) * std::sqrt(covariance(axis, axis))) out.within[k] += 1.0 / 3.0;
   }
   if (out.scored == 0) return out;
   const auto count = static_cast<double>(out.scored);

@@ -11,31 +11,35 @@
 
 namespace tutti::mission {
 
-/// The reference of a map that does not move, laid on it by the robots that made it.
+/// The reference of a map that does not move, by the robots that made it.
 struct MapReference {
-  Pose3 T_world_reference;
-  struct Error {
-    Eigen::Vector3d p_world = Eigen::Vector3d::Zero();  ///< A pose of the map by the reference, m.
-    Eigen::Vector3d by_m = Eigen::Vector3d::Zero();     ///< What the map has it off by, in its frame.
-  };
-  std::vector<Error> errors;  ///< Not empty.
-  /// The nearest pose, with the map's own error there, which nobody who is localised in the map can know.
-  [[nodiscard]] const Error& nearest(const Eigen::Vector3d& p_world) const;
+  Pose3 T_world_reference;  ///< Lays the reference on the map as a whole.
+  /// The map's poses and the reference's of the same moments, by the robot that made them; none is empty.
+  std::vector<std::vector<evaluation::PosePair>> drives;
+  static constexpr double kInSight_m = 25.0;  ///< Walls that a robot has seen can be seen from so far away.
+  /// The nearest one, and those nearest of other drives within kInSight_m, the nearer first.
+  [[nodiscard]] std::vector<const evaluation::PosePair*> nearest(const Eigen::Vector3d& p_reference) const;
 };
 /// From poses of the map and the reference's of the same moments; nothing from fewer than three.
-std::optional<MapReference> lay_on_map(const std::vector<evaluation::PosePair>& pairs);
+std::optional<MapReference> lay_on_map(std::vector<std::vector<evaluation::PosePair>> drives);
+/// T_world_body of a robot that stands to a pose of the map as the reference says: where a map that is bent has it,
+/// which is all that can be known in that map.
+Pose3 in_map(const evaluation::PosePair& of_map, const Pose3& T_reference_body);
 
-/// How far published poses are from where the robot was, in the map's frame: by the map's reference, and by nothing of
-/// the robot that is scored.
+/// How far published poses are from where the robot was: in the map, and by the reference, of which nothing of the
+/// robot that is scored ties it to the map.
 struct LocaliseScore {
   std::size_t scored = 0;  ///< Poses of state localised with a reference.
-  std::size_t wrong = 0;   ///< By more than kWrong_m or kWrong_deg; some of those.
+  /// In the map by more than kWrong_m or kWrong_deg; some of those. Where a map is torn between two of the robots that
+  /// made it, a pose that is right by either of them, in sight, is right.
+  std::size_t wrong = 0;
   static constexpr double kWrong_m = 1.0, kWrong_deg = 5.0;
   std::optional<Timestamp> right_last;  ///< The last that is not wrong.
-  double rmse_m = 0.0, max_m = 0.0, median_deg = 0.0;
-  double map_rmse_m = 0.0;     ///< The map's own errors at these places.
-  double in_map_rmse_m = 0.0;  ///< Without these: how far off the robot is from what the map shows about it.
-  double within[3] = {};       ///< Share of the latter along x, y and z within 1, 2 and 3 standard deviations.
+  double rmse_m = 0.0;                  ///< By the reference, the map's own errors in it.
+  double map_rmse_m = 0.0;              ///< The map's own errors at these places.
+  double in_map_rmse_m = 0.0;           ///< From in_map(), as all that follows.
+  double max_m = 0.0, median_deg = 0.0;
+  double within[3] = {};  ///< Share of the errors along x, y and z within 1, 2 and 3 standard deviations.
 };
 /// `floors` has the reference of each floor of the map; poses on one that has none are not scored.
 LocaliseScore score_of(const std::vector<localise::Located>& course, const Trajectory& reference,

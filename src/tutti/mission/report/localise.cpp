@@ -48,7 +48,8 @@ Json json_of(const LocalisedRobot& robot) {
   for (const LocalisedRobot::Start& start : robot.starts)
     starts.push_back({{"at_s", number(start.at_s)},
                       {"fix_after_s", number(start.fix_after_s)},
-                      {"from_map_m", number(start.from_map_m)}});
+                      {"from_map_m", number(start.from_map_m)},
+                      {"turned_deg", number(start.turned_deg)}});
   Json kidnaps = Json::array();
   for (const LocalisedRobot::Kidnap& kidnap : robot.kidnaps)
     kidnaps.push_back({{"at_s", number(kidnap.at_s)},
@@ -225,12 +226,13 @@ std::string localised_text(const std::vector<LocalisedRobot>& robots, const loca
                score ? fmt::format("{} of {}", score->wrong, score->scored) : "-"});
   }
   out += table.str() + '\n';
-  out += wrap(fmt::format("after: median time from a start to its fix. error: RMSE of published poses in the map's "
-                          "frame, which the robots that made the map tie to "
-                          "the reference. wrong: by more than {:g} m or {:g} degrees",
-                          LocaliseScore::kWrong_m, LocaliseScore::kWrong_deg),
-              "") +
-         "\n\n";
+  out +=
+      wrap(fmt::format("after: median time from a start to its fix. error: RMSE against the reference, which "
+                       "the robots that made the map tie to it, with the map's own errors in it. worst, and wrong by "
+                       "more than {:g} m or {:g} degrees: without these, against the nearest poses of the map",
+                       LocaliseScore::kWrong_m, LocaliseScore::kWrong_deg),
+           "") +
+      "\n\n";
   if (const auto places = trust_of(robots); !places.empty()) out += places_text(places, map) + "\n\n";
   for (const LocalisedRobot& robot : robots) {
     out += kidnaps_text(robot);
