@@ -34,6 +34,14 @@ void call(MemoryStore& store, RobotId robot, const std::string& name, std::uint6
       store.commit(std::vector<Write>{{"meta", node::RobotRegistry::key(robot), encode(node::RobotRow{name, session})}})
           .has_value());
 }
+/// A row as PlaceBook writes it; what is in it matters to nobody here.
+void return_something(MemoryStore& store) {
+  ASSERT_TRUE(store.commit(std::vector<Write>{{"meta", std::string(node::kReturnedPrefix) + "x", "y"}}).has_value());
+}
+bool has_returned(const MemoryStore& store) {
+  return std::ranges::any_of(store.tables().at("meta"),
+                             [](const auto& row) { return row.first.starts_with(node::kReturnedPrefix); });
+}
 /// The closures that are in a map, with their bytes.
 std::vector<LoopClosure> accepted(const server::MapEstimate& map) {
   std::vector<LoopClosure> out;
@@ -173,6 +181,19 @@ TEST(Merge, TheRefinementsOfBothAreKeptAsThoseOfParts) {
   EXPECT_GE(content.meta.revision, content.refinements.all().rbegin()->first);
   EXPECT_EQ(content.counts, std::nullopt);  // no update has been made of the two
   EXPECT_FALSE(node::read_last_update(both).value().has_value());
+}
+
+/// They return it of a map by its id and version, and this is another map.
+TEST(Merge, WhatRobotsReturnedOfEitherIsNotOfBoth) {
+  const auto a = map_of({{kAlpha, 5}}), b = map_of({{kBravo, 6}});
+  for (MemoryStore* map : {a.get(), b.get()}) return_something(*map);
+  MemoryStore both(storage::map_schema()), other(storage::map_schema());
+  ASSERT_TRUE(merge(*a, *b, both).has_value());
+  EXPECT_FALSE(has_returned(both));
+  ASSERT_TRUE(renumber(*a, {{{kAlpha, 5}, ChainId(RobotId{7}, 1)}}, other).has_value());
+  EXPECT_FALSE(has_returned(other));
+  EXPECT_TRUE(has_returned(*a));
+  EXPECT_FALSE(other.tables().at("submaps").empty());
 }
 
 TEST(Merge, WhatEitherNeverTakesIsNotTaken) {
