@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "tutti/base/random.hpp"
@@ -17,26 +19,31 @@ using Eigen::Vector3d;
 /// A box that stands in a hall.
 struct Crate {
   Vector3d middle, size;
-  [[nodiscard]] bool has(const Vector3d& p) const { return ((p - middle).array().abs() <= 0.5 * size.array()).all(); }
+  /// Where a ray from outside of it meets it; infinity where it does not (slabs).
+  [[nodiscard]] double range(const Vector3d& from, const Vector3d& ray) const {
+    const Eigen::Array3d low = (middle - 0.5 * size - from).array() / ray.array();
+    const Eigen::Array3d high = (middle + 0.5 * size - from).array() / ray.array();
+    const double in = low.min(high).maxCoeff(), out = low.max(high).minCoeff();
+    return in > 0.0 && in <= out ? in : std::numeric_limits<double>::infinity();
+  }
 };
 
 /// A LiDAR's scan in a hall of 16 x 10 x 3 m with a wall across it at x = 3, with errors of 2 cm. Points in the body
 /// frame.
 PointCloud look(const std::vector<Crate>& crates, const Pose3& T_world_body, Rng& rng) {
   const Crate wall{{3.0, 0.0, 1.5}, {0.2, 10.0, 3.0}};
+  const Eigen::Array3d low(-8.0, -5.0, 0.0), high(8.0, 5.0, 3.0);
+  const Vector3d& from = T_world_body.translation;
   PointCloud out;
-  const auto is_outside = [](const Vector3d& p) {
-    return std::abs(p.x()) > 8.0 || std::abs(p.y()) > 5.0 || p.z() < 0.0 || p.z() > 3.0;
-  };
   for (int azimuth = 0; azimuth < 240; ++azimuth)
     for (int beam = -8; beam <= 8; ++beam) {
       const double yaw = 2.0 * M_PI * azimuth / 240.0, pitch = 0.05 * beam;
       const Vector3d ray(std::cos(yaw) * std::cos(pitch), std::sin(yaw) * std::cos(pitch), std::sin(pitch));
-      double range = 0.0;
-      Vector3d at;
-      do at = T_world_body * Vector3d((range += 0.04) * ray);
-      while (!is_outside(at) && !wall.has(at) &&
-             std::ranges::none_of(crates, [&](const Crate& crate) { return crate.has(at); }));
+      const Vector3d in_hall = T_world_body.rotation * ray;
+      const Eigen::Array3d to_low = (low - from.array()) / in_hall.array();
+      double range = to_low.max((high - from.array()) / in_hall.array()).minCoeff();
+      range = std::min(range, wall.range(from, in_hall));
+      for (const Crate& crate : crates) range = std::min(range, crate.range(from, in_hall));
       out.points.push_back(((range + rng.normal(0.02)) * ray).cast<float>());
     }
   return out;

@@ -9,6 +9,11 @@
 namespace tutti::localise {
 namespace place_search_test {
 
+const test::World& tunnel() {
+  static const test::World world = test::make_world(3);
+  return world;
+}
+
 /// The robot's submaps, of a chain that the map does not have.
 std::vector<Submap> submaps_of(const Recording& robot, const KnownMap& map) {
   robot::SubmapConfig config;
@@ -24,7 +29,7 @@ std::vector<Submap> submaps_of(const Recording& robot, const KnownMap& map) {
 /// Robots of one kind see the same: submaps of another robot are found where it drove, and those of the map's features
 /// that are asked for twice are computed once.
 TEST(PlaceSearch, CloudsShowRoughlyWhereARobotIs) {
-  const test::World world = test::make_world(3);
+  const test::World& world = tunnel();
   const Recording& robot = world.robots[2];
   const auto verifier = test::verifier();
   LocalMaps maps(world.map, {});
@@ -57,7 +62,7 @@ TEST(PlaceSearch, ACloudThatCannotBeReadIsSaid) {
     }
     [[nodiscard]] Result<std::shared_ptr<const VisualPayload>> visual(SubmapId) const override { return nullptr; }
   };
-  const test::World world = test::make_world(3);
+  const test::World& world = tunnel();
   KnownMap damaged = *world.map;
   damaged.payloads = std::make_shared<const Damaged>();
   const auto map = std::make_shared<const KnownMap>(std::move(damaged));
