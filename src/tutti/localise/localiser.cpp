@@ -3,13 +3,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <iterator>
 #include <utility>
 
 #include "tutti/base/check.hpp"
-#include "tutti/geometry/covariance.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/model/pose_at.hpp"
 #include "tutti/perception/lidar/undistort.hpp"
@@ -18,13 +16,9 @@ namespace tutti::localise {
 namespace {
 
 constexpr int kConfirmations = 3;         // scans that a found place must lie under
-constexpr double kKept_s = 3.0;           // of odometry
 constexpr std::size_t kMostWaiting = 64;  // scans
 constexpr std::size_t kMostPending = 16;
 constexpr int kStartScans = 3;  // that are tried from a start pose
-// Odometry errs by this at least, as a share of the distance, and per radian.
-constexpr double kDrift = 0.01, kDrift_rad_per_m = 0.2 * kRadPerDeg, kDrift_rad_per_rad = 0.01;
-constexpr double kStep_m = 0.002;
 // The map itself errs by this where the robot is.
 constexpr double kMap_m = 0.02, kMap_rad = 0.1 * kRadPerDeg;
 // Registrations of one stretch err alike: so much more than they say.
@@ -35,22 +29,10 @@ constexpr double kOffMapAfter_s = 1.5;  // of scans that show nothing of the map
 constexpr double kGuessedFor_s = 2.0;   // of such scans; then a place that was found is none
 constexpr double kScanSilence_s = 2.0;  // without a registered scan the pose is stale
 
-Matrix6d diagonal(double metres, double radians) {
+Matrix6d what_the_map_errs_by() {
   Vector6d d;
-  d << Eigen::Vector3d::Constant(metres * metres), Eigen::Vector3d::Constant(radians * radians);
+  d << Eigen::Vector3d::Constant(kMap_m * kMap_m), Eigen::Vector3d::Constant(kMap_rad * kMap_rad);
   return d.asDiagonal();
-}
-
-/// Odometry may err by this over one step, whatever it states.
-Matrix6d least_doubt(const Pose3& step) {
-  const double metres = step.translation.norm(), radians = rotation_angle(step);
-  return diagonal(kDrift * metres + kStep_m, kDrift_rad_per_m * metres + kDrift_rad_per_rad * radians);
-}
-
-/// The robot's pose at T_odom_body, by where it was found to be at another time.
-RelativePose carried_to(const Pose3& T_odom_body, const Hypothesis& place) {
-  const Pose3 step = place.at.pose.inverse() * T_odom_body;
-  return {place.T_world_body.T_a_b * step, compound_covariance(step, place.T_world_body.covariance, least_doubt(step))};
 }
 
 /// Submaps have the odometry that scans are registered from, whatever scans show of it.
@@ -77,12 +59,7 @@ Status Localiser::add(const Input& input) {
 
 Status Localiser::hear(const OdometrySample& sample) {
   if (auto ok = submaps_.add(sample); !ok) return ok;
-  recent_.push_back({sample.stamp, sample.T_odom_body});
-  recent_steps_.push_back(bounded_covariance(sample.increment_covariance, 1.0, 0.2));
-  const auto old =
-      std::ranges::find_if(recent_, [&](const StampedPose& pose) { return sample.stamp - pose.stamp <= kKept_s; });
-  recent_steps_.erase(recent_steps_.begin(), recent_steps_.begin() + (old - recent_.begin()));
-  recent_.erase(recent_.begin(), old);
+  recent_.add(sample);
   advance();
   return {};
 }
@@ -107,7 +84,8 @@ Status Localiser::hear(const Scan& scan) {
 
 /// Uses the scans that odometry has reached, and the submaps that have ended.
 void Localiser::advance() {
-  while (!waiting_.empty() && !recent_.empty() && waiting_.front().stamp <= recent_.back().stamp) {
+  const auto newest = recent_.newest();
+  while (newest && !waiting_.empty() && waiting_.front().stamp <= newest->stamp) {
     const Scan scan = std::move(waiting_.front());
     waiting_.pop_front();
     if (!last_match_ || scan.stamp - *last_match_ >= setup_.config.track_every_s) follow(scan);
@@ -126,13 +104,14 @@ Status Localiser::hear(const StartPose& start) {
   auto levels = tries_of(*setup_.map, normalised);
   if (!levels) return tl::unexpected(levels.error());
   search_anew("a start pose was given, which scans have not confirmed yet");
-  start_ = Start{std::move(*levels), recent_.empty() ? Timestamp{} : recent_.back().stamp};
+  const auto newest = recent_.newest();
+  start_ = Start{std::move(*levels), newest ? newest->stamp : Timestamp{}};
   return {};
 }
 
 std::optional<ReadyScan> Localiser::ready(const Scan& scan, Timestamp not_before) const {
-  const auto T_odom_body = pose_at(recent_, scan.stamp);
-  const auto undistorted = lidar::undistort(scan, recent_);
+  const auto T_odom_body = pose_at(recent_.poses(), scan.stamp);
+  const auto undistorted = lidar::undistort(scan, recent_.poses());
   if (!T_odom_body || !undistorted || scan.stamp < not_before) return std::nullopt;
   return ReadyScan{{scan.stamp, *T_odom_body},
                    fit::make_fit_scan(scan.stamp, *undistorted->cloud, setup_.submap.min_range_m)};
@@ -140,7 +119,7 @@ std::optional<ReadyScan> Localiser::ready(const Scan& scan, Timestamp not_before
 
 /// Keeps some of the scans, to ask them all about the places that are found.
 void Localiser::remember(const Scan& scan) {
-  const auto at = pose_at(recent_, scan.stamp);
+  const auto at = pose_at(recent_.poses(), scan.stamp);
   if (!at || !stretch_.wants({scan.stamp, *at})) return;
   if (auto usable = ready(scan, scan.stamp)) stretch_.add(std::move(*usable));
 }
@@ -164,7 +143,7 @@ void Localiser::try_start(const Scan& scan) {
                    .to_confirm = kConfirmations,
                    .gate = GuessGate::of_start()};
     fits.front().match.T_world_body.covariance *= kAlike;
-    correct(fits.front().match.T_world_body);
+    track_->correct(fits.front().match.T_world_body);
     why_ = "the start pose fits, which more scans are to confirm";
     return start_.reset();
   }
@@ -178,8 +157,7 @@ void Localiser::begin_submaps() {
   ++chain_.session;  // nothing of before belongs to what comes
   stretch_.clear();
   submaps_ = robot::SubmapBuilder(chain_, setup_.submap);
-  if (!recent_.empty())
-    (void)submaps_.add(OdometrySample{recent_.back().stamp, recent_.back().pose, recent_steps_.back()});
+  if (const auto newest = recent_.newest()) (void)submaps_.add(*newest);
 }
 
 void Localiser::search_anew(const std::string& why) {
@@ -195,7 +173,7 @@ void Localiser::search_anew(const std::string& why) {
 
 /// While it is shut in, nothing tells on which floor it is, and nothing is looked for.
 bool Localiser::is_shut_in(const Scan& scan) {
-  const auto at = pose_at(recent_, scan.stamp);
+  const auto at = pose_at(recent_.poses(), scan.stamp);
   if (setup_.map->floors < 2 || !at) return false;
   const bool was = shut_in_.is();
   shut_in_.see(*scan.cloud, setup_.submap.min_range_m, {scan.stamp, *at});
@@ -211,26 +189,8 @@ bool Localiser::is_shut_in(const Scan& scan) {
   return shut_in_.is();
 }
 
-/// Moves the pose with odometry to a time after it.
-void Localiser::predict_to(const StampedPose& at) {
-  const Pose3 step = track_->at.pose.inverse() * at.pose;
-  Matrix6d stated = Matrix6d::Zero();
-  for (std::size_t k = 0; k < recent_.size(); ++k)
-    if (recent_[k].stamp > track_->at.stamp && recent_[k].stamp <= at.stamp) stated += recent_steps_[k];
-  Matrix6d& covariance = track_->T_world_body.covariance;
-  covariance = compound_covariance(step, covariance, stated + least_doubt(step));
-  track_->T_world_body.T_a_b = track_->T_world_body.T_a_b * step;
-  track_->at = at;
-}
-
-/// The Kalman filter's update with a pose.
-void Localiser::correct(const RelativePose& measured) {
-  RelativePose& now = track_->T_world_body;
-  const Matrix6d S = now.covariance + measured.covariance;
-  const Matrix6d gain = S.ldlt().solve(now.covariance).transpose();
-  now.T_a_b = retract(now.T_a_b, gain * local(now.T_a_b, measured.T_a_b));
-  const Matrix6d rest = Matrix6d::Identity() - gain;
-  now.covariance = rest * now.covariance * rest.transpose() + gain * measured.covariance * gain.transpose();
+void Localiser::predict_to(const StampedPose& to) {
+  track_->predict_to(to, recent_.stated(track_->at.stamp, to.stamp));
 }
 
 void Localiser::follow(const Scan& scan) {
@@ -242,7 +202,7 @@ void Localiser::follow(const Scan& scan) {
   const auto usable = ready(scan, track_->at.stamp);
   if (!usable) return;
   predict_to(usable->at);
-  const LocalMap* local = local_maps_.about(position());
+  const LocalMap* local = local_maps_.about(track_->position());
   if (local == nullptr) return doubt({Evidence::nothing, "the map shows nothing there"}, scan.stamp);
   ScanMatch match = match_scan(*local, usable->scan, track_->T_world_body.T_a_b);
   ++work_.registered;
@@ -255,7 +215,7 @@ void Localiser::follow(const Scan& scan) {
 }
 
 void Localiser::confirm(const ScanMatch& match) {
-  correct(match.T_world_body);
+  track_->correct(match.T_world_body);
   track_->against_since.reset();
   track_->nothing_since.reset();
   track_->against = 0;
@@ -379,7 +339,7 @@ void Localiser::decide(SearchResult found, const Submap& submap) {
 
 /// Goes on from a place that was found, which scans have to confirm; without scans it counts.
 void Localiser::begin_track(const Hypothesis& place) {
-  const StampedPose& now = recent_.back();
+  const StampedPose& now = recent_.poses().back();
   track_ = Track{.floor = place.floor,
                  .T_world_body = carried_to(now.pose, place),
                  .at = now,
@@ -398,7 +358,7 @@ void Localiser::begin_track(const Hypothesis& place) {
 
 /// A robot without scans: its submaps say whether it is still where it should be.
 void Localiser::follow_submap(const SearchResult& found) {
-  predict_to(recent_.back());
+  predict_to(recent_.poses().back());
   const Hypothesis here{.floor = track_->floor, .T_world_body = track_->T_world_body, .at = track_->at};
   for (const Hypothesis& place : found.places) {
     if (place.shown == Shown::no) break;
@@ -408,7 +368,7 @@ void Localiser::follow_submap(const SearchResult& found) {
       state_ = State::lost;
       return;
     }
-    correct(carried_to(track_->at.pose, place));
+    track_->correct(carried_to(track_->at.pose, place));
     track_->confirmed = track_->at.stamp;
     why_ = fmt::format("{} submaps of the map show what it saw", place.accepted);
     return;
@@ -419,18 +379,20 @@ void Localiser::follow_submap(const SearchResult& found) {
 }
 
 State Localiser::state() const {
-  const bool is_silent = has_scans() && !recent_.empty() && recent_.back().stamp - *last_scan_ > kScanSilence_s;
+  const auto newest = recent_.newest();
+  const bool is_silent = has_scans() && newest && newest->stamp - *last_scan_ > kScanSilence_s;
   return state_ == State::localised && is_silent ? State::stale : state_;
 }
 
 Located Localiser::located() const {
   Located out{.state = state(), .why = why_, .places = places_};
-  if (recent_.empty()) return out;
-  out.stamp = recent_.back().stamp;
+  const auto newest = recent_.newest();
+  if (!newest) return out;
+  out.stamp = newest->stamp;
   if (!track_ || track_->to_confirm > 0) return out;
   out.floor = track_->floor;
-  RelativePose pose = carried_to(recent_.back().pose, {.T_world_body = track_->T_world_body, .at = track_->at});
-  pose.covariance += diagonal(kMap_m, kMap_rad);
+  RelativePose pose = track_->carried_to(newest->T_odom_body);
+  pose.covariance += what_the_map_errs_by();
   out.age_s = out.stamp - track_->confirmed;
   out.overlap = track_->overlap;
   if (out.state == State::stale) out.why = fmt::format("no scan has come for {:.1f} s", out.stamp - *last_scan_);

@@ -20,6 +20,7 @@
 #include "tutti/localise/shut_in.hpp"
 #include "tutti/localise/start_tries.hpp"
 #include "tutti/localise/state.hpp"
+#include "tutti/localise/track.hpp"
 #include "tutti/model/input.hpp"
 #include "tutti/robot/submap_builder.hpp"
 #include "tutti/server/closure_verifier.hpp"
@@ -79,19 +80,6 @@ class Localiser {
   [[nodiscard]] LocaliserWork work() const;
 
  private:
-  struct Track {
-    std::uint32_t floor = 1;                 ///< In whose frame the pose is.
-    RelativePose T_world_body;               ///< At `at`; right tangent, without what the map itself errs by.
-    StampedPose at;                          ///< By odometry.
-    Timestamp confirmed;                     ///< When a scan last lay on the map.
-    int to_confirm = 0;                      ///< Scans that are still to confirm it before it counts.
-    GuessGate gate = GuessGate::of_found();  ///< That they must pass.
-    std::optional<double> overlap;           ///< ScanMatch::overlap of that scan.
-    std::optional<Timestamp> against_since;
-    std::optional<StampedPose> nothing_since;  ///< By odometry.
-    std::size_t against = 0;                   ///< Scans in a row.
-  };
-
   Status hear(const OdometrySample& sample);
   Status hear(const Scan& scan);
   Status hear(const TrackedImages& images) { return submaps_.add(images); }
@@ -105,8 +93,7 @@ class Localiser {
   void advance();
   bool is_shut_in(const Scan& scan);
   void follow(const Scan& scan);
-  void predict_to(const StampedPose& at);
-  void correct(const RelativePose& measured);
+  void predict_to(const StampedPose& to);
   void confirm(const ScanMatch& match);
   void doubt(const Assessment& assessment, Timestamp stamp);
   void take_submaps();
@@ -114,7 +101,6 @@ class Localiser {
   void consider(const Submap& submap);
   void decide(SearchResult found, const Submap& submap);
   void begin_track(const Hypothesis& place);
-  [[nodiscard]] OnFloor position() const { return {track_->floor, track_->T_world_body.T_a_b.translation}; }
   void follow_submap(const SearchResult& found);
   [[nodiscard]] bool has_scans() const { return last_scan_.has_value(); }
 
@@ -123,8 +109,7 @@ class Localiser {
   LocalMaps local_maps_;
   ChainId chain_;
   robot::SubmapBuilder submaps_;
-  Trajectory recent_;                    // raw odometry over the longest sweep and what waits
-  std::vector<Matrix6d> recent_steps_;   // covariance of the step to each
+  RecentOdometry recent_;
   std::deque<Scan> waiting_;             // for odometry of their stamps
   std::optional<Timestamp> last_scan_;   // the newest heard
   std::optional<Timestamp> last_match_;  // the newest registered
