@@ -207,8 +207,10 @@ void Localiser::follow(const Scan& scan) {
   ScanMatch match = match_scan(*local, usable->scan, track_->T_world_body.T_a_b);
   ++work_.registered;
   match.T_world_body.covariance *= kAlike;
-  const Assessment assessment = track_->to_confirm > 0 ? assess_guess(match, track_->T_world_body, track_->gate)
-                                                       : assess(match, track_->T_world_body);
+  // Off the map it may have been carried: what it must show there is what it had to show when it was found.
+  const bool is_guess = track_->to_confirm > 0 || state_ == State::off_map;
+  const Assessment assessment =
+      is_guess ? assess_guess(match, track_->T_world_body, track_->gate) : assess(match, track_->T_world_body);
   if (assessment.evidence != Evidence::confirms) return doubt(assessment, scan.stamp);
   confirm(match);
   if (track_->to_confirm == 0) map_fit_.see(*local, usable->scan, track_->T_world_body.T_a_b);

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "support/localise/tunnel.hpp"
+#include "tutti/base/random.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/model/pose_at.hpp"
 
@@ -309,6 +310,44 @@ TEST(Localiser, BeyondTheMapItSaysSo) {
   EXPECT_GT(judged.published, 50U);
   EXPECT_EQ(judged.wrong, 0U);
   EXPECT_TRUE(judged.states.contains(State::off_map));
+}
+
+/// The scan with this share of its points where nobody has ever looked: through the roof.
+Scan spoiled(const Scan& scan, double share, Rng& rng) {
+  auto cloud = std::make_shared<PointCloud>(*scan.cloud);
+  for (Eigen::Vector3f& point : cloud->points)
+    if (rng.bernoulli(share))
+      point = Eigen::Vector3d(rng.uniform(-5.0, 5.0), rng.uniform(-5.0, 5.0), rng.uniform(40.0, 50.0)).cast<float>();
+  return {scan.stamp, cloud, scan.age_s};
+}
+
+/// A robot that was carried is off the map before it is lost. Then no scan that would do on the way counts.
+TEST(Localiser, OffTheMapItMustShowWhatItHadToShowWhenItWasFound) {
+  const Recording& robot = world().robots[2];
+  Localiser one = localiser(world().map);
+  std::size_t k = 0;
+  for (; k < robot.odometry.size() && one.located().state != State::localised; ++k)
+    feed(robot, robot.odometry, k, k + 1, one);
+  Rng rng(4);
+  const auto see = [&](int samples, double share) {
+    for (const std::size_t end = k + static_cast<std::size_t>(samples); k < end; ++k) {
+      const auto& [stamp, T_odom_body] = robot.odometry.at(k);
+      ASSERT_TRUE(one.add(OdometrySample{stamp, T_odom_body, Matrix6d::Identity() * 1e-6}).has_value());
+      const auto scan = robot.scans->scan(k);
+      if (scan && *scan && one.wants_scan(stamp)) {
+        ASSERT_TRUE(one.add(spoiled(**scan, share, rng)).has_value());
+      }
+    }
+  };
+  constexpr double kHalf = 0.5;
+  see(10, kHalf);
+  EXPECT_EQ(one.located().state, State::localised) << "on the way half of a scan is enough";
+  see(12, 1.0);
+  EXPECT_EQ(one.located().state, State::off_map) << one.located().why;
+  see(10, kHalf);
+  EXPECT_EQ(one.located().state, State::off_map) << one.located().why;
+  see(10, 0.0);
+  EXPECT_EQ(one.located().state, State::localised) << one.located().why;
 }
 
 TEST(Localiser, WithoutScansItsPoseIsStale) {
