@@ -36,13 +36,6 @@ inline Vector6d random_tangent(Rng& rng, double sigma = 1.0) {
   return xi;
 }
 
-/// A measurement of a relative pose that errs by this, independently in all directions.
-inline Matrix6d diagonal_covariance(double sigma_m, double sigma_rad) {
-  Vector6d variance;
-  variance << Eigen::Vector3d::Constant(sigma_m * sigma_m), Eigen::Vector3d::Constant(sigma_rad * sigma_rad);
-  return variance.asDiagonal();
-}
-
 inline Vector6d draw(Rng& rng, double sigma_m, double sigma_rad) {
   Vector6d xi;
   for (int i = 0; i < 3; ++i) {

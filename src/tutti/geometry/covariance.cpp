@@ -44,6 +44,12 @@ Status check_covariance(const Matrix6d& covariance) {
   return {};
 }
 
+Matrix6d diagonal_covariance(double sigma_m, double sigma_rad) {
+  Vector6d variances;
+  variances << Eigen::Vector3d::Constant(sigma_m * sigma_m), Eigen::Vector3d::Constant(sigma_rad * sigma_rad);
+  return variances.asDiagonal();
+}
+
 Matrix6d bounded_covariance(const Matrix6d& covariance, double most_m, double most_rad) {
   const Vector6d most = per_axis(most_m, most_rad).cwiseAbs2();
   if ((covariance.diagonal().array() <= most.array()).all()) return covariance;

@@ -19,6 +19,9 @@ inline constexpr double kLeastRotation_rad = 1e-5;
 /// ErrorCode::invalid otherwise.
 [[nodiscard]] Status check_covariance(const Matrix6d& covariance);
 
+/// The covariance of a pose that errs by these, independently in all directions; standard deviations.
+[[nodiscard]] Matrix6d diagonal_covariance(double sigma_m, double sigma_rad);
+
 /// The covariance with its standard deviations cut to `most_m` and `most_rad` and its correlations kept. A pose graph
 /// with variances too far apart has no numerical solution, for any robot in it. A covariance within the limits comes
 /// back unchanged.

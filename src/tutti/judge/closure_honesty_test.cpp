@@ -9,6 +9,7 @@
 
 #include "support/random_pose.hpp"
 #include "tutti/base/random.hpp"
+#include "tutti/geometry/covariance.hpp"
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::judge {
@@ -36,7 +37,7 @@ OdometrySegment chain_of(RobotId robot, const Case& c, Rng& rng, std::vector<Pos
     truth.push_back(truth.back() * step);
     chain.T_odom_body.push_back(chain.T_odom_body.back() *
                                 retract(step, test::draw(rng, c.scale * kOdometry_m, kOdometry_rad)));
-    chain.step_covariance.push_back(test::diagonal_covariance(c.scale * kOdometry_m, kOdometry_rad));
+    chain.step_covariance.push_back(diagonal_covariance(c.scale * kOdometry_m, kOdometry_rad));
   }
   return chain;
 }
@@ -48,10 +49,9 @@ void add_closures(const Case& c, RobotId first, RobotId second, const std::vecto
     const auto b = std::min(kLength - 1, a + static_cast<std::uint32_t>(rng.index(5)));
     Pose3 T_a_b = retract(one[a].inverse() * two[b], test::draw(rng, c.scale * kError_m, kError_rad));
     if (rng.bernoulli(c.wrong_share)) T_a_b = T_a_b * retract(Pose3{}, test::draw(rng, c.scale * 5.0, 1.0));
-    closures.push_back(
-        {{first, a},
-         {second, b},
-         {T_a_b, test::diagonal_covariance(c.scale * kError_m * c.stated_m, kError_rad * c.stated_rad)}});
+    closures.push_back({{first, a},
+                        {second, b},
+                        {T_a_b, diagonal_covariance(c.scale * kError_m * c.stated_m, kError_rad * c.stated_rad)}});
   }
 }
 

@@ -8,6 +8,7 @@
 
 #include "support/random_pose.hpp"
 #include "tutti/base/random.hpp"
+#include "tutti/geometry/covariance.hpp"
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::judge {
@@ -38,7 +39,7 @@ OdometryHonesty honesty(const Case& c, std::uint64_t seed) {
     measured.translation *= c.scale;
     truth.push_back(truth.back() * step);
     chain.T_odom_body.push_back(chain.T_odom_body.back() * measured);
-    chain.step_covariance.push_back(test::diagonal_covariance(kStep_m * c.stated_m, kStep_rad * c.stated));
+    chain.step_covariance.push_back(diagonal_covariance(kStep_m * c.stated_m, kStep_rad * c.stated));
   }
   std::vector<LoopClosure> closures;
   while (closures.size() < c.closures) {
@@ -47,7 +48,7 @@ OdometryHonesty honesty(const Case& c, std::uint64_t seed) {
     if (const auto apart = std::max(a, b) - std::min(a, b); apart < 40 || apart > c.longest) continue;
     Pose3 T_a_b = retract(truth[a].inverse() * truth[b], test::draw(rng, kClosure_m, kClosure_rad));
     if (rng.bernoulli(c.wrong_share)) T_a_b = T_a_b * Pose3{so3_exp(Eigen::Vector3d(0, 0, 1.0)), {3, 2, 1}};
-    closures.push_back({{kRobot, a}, {kRobot, b}, {T_a_b, test::diagonal_covariance(kClosure_m, kClosure_rad)}});
+    closures.push_back({{kRobot, a}, {kRobot, b}, {T_a_b, diagonal_covariance(kClosure_m, kClosure_rad)}});
   }
   const std::vector<OdometrySegment> odometry{chain};
   return odometry_honesty(odometry, closures).at(kRobot);
@@ -138,8 +139,7 @@ TEST(OdometryHonesty, HonestOdometryKeepsItsCovariance) {
 }
 
 TEST(OdometryHonesty, ScalesOnlyRotations) {
-  EXPECT_LT((scale_rotation(test::diagonal_covariance(2.0, 2.0), 0.25) - test::diagonal_covariance(2.0, 1.0)).norm(),
-            1e-12);
+  EXPECT_LT((scale_rotation(diagonal_covariance(2.0, 2.0), 0.25) - diagonal_covariance(2.0, 1.0)).norm(), 1e-12);
 }
 
 }  // namespace odometry_honesty_test

@@ -9,6 +9,7 @@
 
 #include "support/random_pose.hpp"
 #include "tutti/base/random.hpp"
+#include "tutti/geometry/covariance.hpp"
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::judge {
@@ -18,7 +19,7 @@ constexpr std::uint32_t kKeyframes = 60;
 constexpr RobotId kOne{0}, kTwo{1};
 
 RelativePose measured(const Pose3& truth, double sigma_m, double sigma_rad, Rng& rng) {
-  return {retract(truth, test::draw(rng, sigma_m, sigma_rad)), test::diagonal_covariance(sigma_m, sigma_rad)};
+  return {retract(truth, test::draw(rng, sigma_m, sigma_rad)), diagonal_covariance(sigma_m, sigma_rad)};
 }
 
 /// Two robots on one winding trajectory, the second a metre beside the first.
@@ -131,12 +132,12 @@ TEST(OdometryLoops, AreAsCertainAfterADayByCarAsAtItsBegin) {
   for (std::uint32_t k = 0; k < kSteps; ++k) {
     day.index.push_back(k + 1);
     day.T_odom_body.push_back(day.T_odom_body.back() * step);
-    day.step_covariance.push_back(test::diagonal_covariance(0.01, 1e-3));
+    day.step_covariance.push_back(diagonal_covariance(0.01, 1e-3));
   }
   ASSERT_GT(day.T_odom_body.back().translation.norm(), 500e3);
   std::vector<LoopClosure> closures;
   for (const std::uint32_t from : {0U, kSteps - 5})
-    closures.push_back({{kOne, from}, {kOne, from + 5}, {Pose3{}, test::diagonal_covariance(0.1, 0.1)}});
+    closures.push_back({{kOne, from}, {kOne, from + 5}, {Pose3{}, diagonal_covariance(0.1, 0.1)}});
   const auto loops = odometry_loops(std::span(&day, 1), closures).at(kOne);
   ASSERT_EQ(loops.size(), 2U);
   const Eigen::LLT<Matrix6d> begin(loops[0].odometry);

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/geometry/covariance.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/model/pose_at.hpp"
 #include "tutti/perception/lidar/undistort.hpp"
@@ -28,12 +29,6 @@ constexpr double kLostAfter_s = 1.0;    // of scans that contradict the map; the
 constexpr double kOffMapAfter_s = 1.5;  // of scans that show nothing of the map, without contradicting it
 constexpr double kGuessedFor_s = 2.0;   // of such scans; then a place that was found is none
 constexpr double kScanSilence_s = 2.0;  // without a registered scan the pose is stale
-
-Matrix6d what_the_map_errs_by() {
-  Vector6d d;
-  d << Eigen::Vector3d::Constant(kMap_m * kMap_m), Eigen::Vector3d::Constant(kMap_rad * kMap_rad);
-  return d.asDiagonal();
-}
 
 /// Submaps have the odometry that scans are registered from, whatever scans show of it.
 Localiser::Setup checked(Localiser::Setup setup) {
@@ -394,7 +389,7 @@ Located Localiser::located() const {
   if (!track_ || track_->to_confirm > 0) return out;
   out.floor = track_->floor;
   RelativePose pose = track_->carried_to(newest->T_odom_body);
-  pose.covariance += what_the_map_errs_by();
+  pose.covariance += diagonal_covariance(kMap_m, kMap_rad);
   out.age_s = out.stamp - track_->confirmed;
   out.overlap = track_->overlap;
   if (out.state == State::stale) out.why = fmt::format("no scan has come for {:.1f} s", out.stamp - *last_scan_);

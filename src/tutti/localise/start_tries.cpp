@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "tutti/geometry/covariance.hpp"
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::localise {
@@ -117,15 +118,13 @@ Result<std::vector<StartTries>> tries_of(const KnownMap& map, const StartPose& s
                 "a start pose at {:.1f}, {:.1f} m, expected one within {} m of where the map's "
                 "robots were",
                 at.x(), at.y(), kNearStart_m);
-  Vector6d least;
-  least << Eigen::Vector3d::Constant(kLeastStart_m * kLeastStart_m),
-      Eigen::Vector3d::Constant(kLeastStart_rad * kLeastStart_rad);
+  const Matrix6d least = diagonal_covariance(kLeastStart_m, kLeastStart_rad);
   std::vector<StartTries> out;
   for (const Level& level : levels) {
     StartTries tries{.floor = level.floor,
                      .T_world_body = start.is_planar ? on_level(given, level.T_world_body) : given,
                      .from = {}};
-    tries.T_world_body.covariance += least.asDiagonal();
+    tries.T_world_body.covariance += least;
     tries.from = around(tries.T_world_body);
     out.push_back(std::move(tries));
   }

@@ -17,15 +17,11 @@ constexpr double kStep_m = 0.002;
 /// Odometry may err by this over one step, whatever it states.
 Matrix6d least_doubt(const Pose3& step) {
   const double metres = step.translation.norm(), radians = rotation_angle(step);
-  const double sigma_m = kDrift * metres + kStep_m;
-  const double sigma_rad = kDrift_rad_per_m * metres + kDrift_rad_per_rad * radians;
-  Vector6d d;
-  d << Eigen::Vector3d::Constant(sigma_m * sigma_m), Eigen::Vector3d::Constant(sigma_rad * sigma_rad);
-  return d.asDiagonal();
+  return diagonal_covariance(kDrift * metres + kStep_m, kDrift_rad_per_m * metres + kDrift_rad_per_rad * radians);
 }
 
-RelativePose carried(const RelativePose& T_world_body, const Pose3& step) {
-  return {T_world_body.T_a_b * step, compound_covariance(step, T_world_body.covariance, least_doubt(step))};
+RelativePose carried(const RelativePose& T_world_body, const Pose3& step, const Matrix6d& stated = Matrix6d::Zero()) {
+  return {T_world_body.T_a_b * step, compound_covariance(step, T_world_body.covariance, stated + least_doubt(step))};
 }
 
 }  // namespace
@@ -52,9 +48,7 @@ Matrix6d RecentOdometry::stated(Timestamp from, Timestamp to) const {
 }
 
 void Track::predict_to(const StampedPose& to, const Matrix6d& stated) {
-  const Pose3 step = at.pose.inverse() * to.pose;
-  T_world_body = {T_world_body.T_a_b * step,
-                  compound_covariance(step, T_world_body.covariance, stated + least_doubt(step))};
+  T_world_body = carried(T_world_body, at.pose.inverse() * to.pose, stated);
   at = to;
 }
 

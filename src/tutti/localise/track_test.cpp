@@ -6,23 +6,16 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
-#include "tutti/base/random.hpp"
+#include "support/random_pose.hpp"
+#include "tutti/geometry/covariance.hpp"
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::localise {
 namespace track_test {
 
-Matrix6d diagonal(double metres, double radians) {
-  Vector6d d;
-  d << Eigen::Vector3d::Constant(metres * metres), Eigen::Vector3d::Constant(radians * radians);
-  return d.asDiagonal();
-}
+using tutti::test::draw;
+
 Timestamp at(double seconds) { return Timestamp{} + seconds; }
-Vector6d drawn(double metres, double radians, Rng& rng) {
-  Vector6d out;
-  for (int i = 0; i < 6; ++i) out[i] = rng.normal(i < 3 ? metres : radians);
-  return out;
-}
 
 /// The truth is drawn from what odometry states to err by and from the share of the way that it may err by anyway, so
 /// the filter's errors are as large as it says (chi-square of 6 degrees of freedom; 300 runs of 20 steps).
@@ -32,14 +25,14 @@ TEST(Track, ErrsAsItSays) {
   const double least_m = 0.01 * 0.2 + 0.002, least_rad = 0.2 * kRadPerDeg * 0.2 + 0.01 * 0.05;
   double nees = 0.0;
   for (int run = 0; run < kRuns; ++run) {
-    Track track{.T_world_body = {Pose3(), diagonal(0.1, 0.02)}};
-    Pose3 truth = retract(Pose3(), drawn(0.1, 0.02, rng)), T_odom_body;
+    Track track{.T_world_body = {Pose3(), diagonal_covariance(0.1, 0.02)}};
+    Pose3 truth = retract(Pose3(), draw(rng, 0.1, 0.02)), T_odom_body;
     const Pose3 step{so3_exp({0.0, 0.0, 0.05}), {0.2, 0.0, 0.0}};
     for (int k = 1; k <= 20; ++k) {
       T_odom_body = T_odom_body * step;
-      truth = retract(retract(truth * step, drawn(0.005, 0.001, rng)), drawn(least_m, least_rad, rng));
-      track.predict_to({at(k), T_odom_body}, diagonal(0.005, 0.001));
-      if (k % 4 == 0) track.correct({retract(truth, drawn(0.03, 0.01, rng)), diagonal(0.03, 0.01)});
+      truth = retract(retract(truth * step, draw(rng, 0.005, 0.001)), draw(rng, least_m, least_rad));
+      track.predict_to({at(k), T_odom_body}, diagonal_covariance(0.005, 0.001));
+      if (k % 4 == 0) track.correct({retract(truth, draw(rng, 0.03, 0.01)), diagonal_covariance(0.03, 0.01)});
     }
     const Vector6d error = local(track.T_world_body.T_a_b, truth);
     nees += error.dot(track.T_world_body.covariance.ldlt().solve(error)) / kRuns;
@@ -49,12 +42,12 @@ TEST(Track, ErrsAsItSays) {
 
 TEST(Track, APoseThatIsSureTakesOverAndOneThatIsNotChangesNothing) {
   const Pose3 there{so3_exp({0.0, 0.0, 0.1}), {1.0, 0.5, 0.0}};
-  const Track before{.T_world_body = {Pose3(), diagonal(0.5, 0.2)}};
+  const Track before{.T_world_body = {Pose3(), diagonal_covariance(0.5, 0.2)}};
   Track sure = before, unsure = before;
-  sure.correct({there, diagonal(1e-5, 1e-5)});
+  sure.correct({there, diagonal_covariance(1e-5, 1e-5)});
   EXPECT_LT(local(sure.T_world_body.T_a_b, there).norm(), 1e-6);
   EXPECT_LT(sure.T_world_body.covariance.norm(), 1e-8);
-  unsure.correct({there, diagonal(1e5, 1e5)});
+  unsure.correct({there, diagonal_covariance(1e5, 1e5)});
   EXPECT_LT(local(unsure.T_world_body.T_a_b, before.T_world_body.T_a_b).norm(), 1e-6);
   EXPECT_LT((unsure.T_world_body.covariance - before.T_world_body.covariance).norm(), 1e-6);
 }
@@ -75,12 +68,12 @@ TEST(RecentOdometry, KeepsTheLastSecondsAndSumsWhatItsStepsState) {
   RecentOdometry recent;
   EXPECT_FALSE(recent.newest().has_value());
   for (int k = 0; k <= 100; ++k)
-    recent.add({at(0.1 * k), {Eigen::Quaterniond::Identity(), {0.1 * k, 0.0, 0.0}}, diagonal(0.01, 0.001)});
+    recent.add({at(0.1 * k), {Eigen::Quaterniond::Identity(), {0.1 * k, 0.0, 0.0}}, diagonal_covariance(0.01, 0.001)});
   EXPECT_EQ(recent.newest()->stamp, at(10.0));
   EXPECT_NEAR(recent.poses().back().stamp - recent.poses().front().stamp, RecentOdometry::kKept_s, 1e-6);
   EXPECT_NEAR(recent.stated(at(9.0), at(9.5))(0, 0), 5e-4, 1e-12);  // five steps, and not that to 9.0
   EXPECT_EQ(recent.stated(at(10.0), at(10.0)), Matrix6d::Zero());
-  recent.add({at(10.1), Pose3(), diagonal(1e3, 1e3)});  // whatever it states
+  recent.add({at(10.1), Pose3(), diagonal_covariance(1e3, 1e3)});  // whatever it states
   EXPECT_LE(recent.newest()->increment_covariance(0, 0), 1.0 + 1e-9);
 }
 

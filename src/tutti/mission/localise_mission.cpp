@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "tutti/evaluation/association.hpp"
+#include "tutti/geometry/covariance.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/mission/kidnapped.hpp"
 #include "tutti/mission/lift_ride.hpp"
@@ -107,9 +108,6 @@ std::vector<localise::Located> measure_kidnaps(const std::vector<Timestamp>& at,
 /// Where the robot is in the map at its first sample, on the floor whose robots have been nearest.
 Result<StartPose> true_start(const Recording& recording, const std::vector<std::optional<MapReference>>& floors) {
   const auto T_reference_body = pose_at(recording.reference, recording.odometry.front().stamp);
-  Vector6d variances;
-  variances << Eigen::Vector3d::Constant(kTrueStart_m * kTrueStart_m),
-      Eigen::Vector3d::Constant(kTrueStart_rad * kTrueStart_rad);
   std::optional<StartPose> out;
   double least_m = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; T_reference_body && k < floors.size(); ++k) {
@@ -118,7 +116,8 @@ Result<StartPose> true_start(const Recording& recording, const std::vector<std::
     const double away_m = (nearest.reference.translation - T_reference_body->translation).norm();
     if (away_m >= least_m) continue;
     least_m = away_m;
-    out = StartPose{.T_world_body = RelativePose{in_map(nearest, *T_reference_body), variances.asDiagonal()},
+    out = StartPose{.T_world_body = RelativePose{in_map(nearest, *T_reference_body),
+                                                 diagonal_covariance(kTrueStart_m, kTrueStart_rad)},
                     .floor = static_cast<std::uint32_t>(k + 1)};
   }
   if (!out)

@@ -8,6 +8,7 @@
 
 #include "tutti/consistency/chain_uncertainty.hpp"
 #include "tutti/consistency/proxy_graph_builder.hpp"
+#include "tutti/geometry/covariance.hpp"
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::node {
@@ -31,9 +32,7 @@ std::optional<StartPose> start_at(const StoredPlace& place, const localise::Know
   constexpr double kSigma_m = 0.5, kSigma_rad = 10.0 * kRadPerDeg;
   const auto near = map.submaps.find(place.near);
   if (place.map != map.id || near == map.submaps.end()) return std::nullopt;
-  Vector6d variances;
-  variances << Eigen::Vector3d::Constant(kSigma_m * kSigma_m), Eigen::Vector3d::Constant(kSigma_rad * kSigma_rad);
-  return StartPose{.T_world_body = RelativePose{place.T_world_body, variances.asDiagonal()},
+  return StartPose{.T_world_body = RelativePose{place.T_world_body, diagonal_covariance(kSigma_m, kSigma_rad)},
                    .floor = near->second.floor};
 }
 

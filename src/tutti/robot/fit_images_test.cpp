@@ -8,6 +8,7 @@
 
 #include "support/perception/visual/textured_room.hpp"
 #include "support/random_pose.hpp"
+#include "tutti/geometry/covariance.hpp"
 #include "tutti/robot/agent.hpp"
 
 namespace tutti::robot {
@@ -43,7 +44,7 @@ struct Flight {
     config.submap.has_images = true;
     config.submap.fit.scans = fit;
     RobotAgent agent(RobotId{0}, 1, config);
-    const Matrix6d covariance = tutti::test::diagonal_covariance(1e-3, 1e-4);
+    const Matrix6d covariance = diagonal_covariance(1e-3, 1e-4);
     const auto every = static_cast<int>(kTick_s / kStep_s);
     for (int k = 0; k * kStep_s < kDuration_s; ++k) {
       const double t = k * kStep_s;

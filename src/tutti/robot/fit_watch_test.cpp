@@ -8,6 +8,7 @@
 
 #include "support/perception/lidar/rooms.hpp"
 #include "support/random_pose.hpp"
+#include "tutti/geometry/covariance.hpp"
 #include "tutti/robot/agent.hpp"
 
 namespace tutti::robot {
@@ -60,7 +61,7 @@ struct Mission {
     config.submap.has_scans = true;
     config.submap.fit.scans = fit;
     RobotAgent agent(RobotId{0}, 1, config);
-    const Matrix6d covariance = tutti::test::diagonal_covariance(1e-3, 1e-4);
+    const Matrix6d covariance = diagonal_covariance(1e-3, 1e-4);
     const auto every = static_cast<int>(kScanStep_s / kOdometryStep_s);
     for (int k = 0; k * kOdometryStep_s < duration_s; ++k) {
       const double t = k * kOdometryStep_s;

@@ -9,6 +9,7 @@
 
 #include "support/server/world.hpp"
 #include "tutti/geometry/alignment.hpp"
+#include "tutti/geometry/covariance.hpp"
 #include "tutti/server/graph_monitor.hpp"
 
 namespace tutti::server {
@@ -194,7 +195,7 @@ TEST(MapEstimate, CovariancesOfOneRobotHarmNoOther) {
       expect_unharmed(in, fmt::format("variance {} of axis {}", variance, axis));
     }
   expect_unharmed(changed([](Submap& submap) {  // sure of all but one step
-                    for (RelativePose& step : submap.odometry) step.covariance = test::diagonal_covariance(1e-6, 1e-6);
+                    for (RelativePose& step : submap.odometry) step.covariance = diagonal_covariance(1e-6, 1e-6);
                     if (submap.id.index == 8) submap.odometry.back().covariance = 1e20 * Matrix6d::Identity();
                   }),
                   "sure and unknown", 0.4);  // it claims a micrometre and is off by centimetres

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "support/server/refiners.hpp"
+#include "tutti/geometry/covariance.hpp"
 #include "tutti/server/map_server.hpp"
 
 namespace tutti::server {
@@ -22,7 +23,7 @@ std::vector<RefinedStep> true_steps(const MapEstimate& map) {
     const KeyframeId a = map.nodes[i].id, b = map.nodes[i + 1].id;
     if (a.chain != b.chain) continue;
     const Pose3 step = test::true_pose(a.chain.robot, a.index).inverse() * test::true_pose(b.chain.robot, b.index);
-    out.push_back({a, {step, test::diagonal_covariance(1e-3, 1e-4)}});
+    out.push_back({a, {step, diagonal_covariance(1e-3, 1e-4)}});
   }
   return out;
 }

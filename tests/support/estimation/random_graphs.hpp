@@ -9,6 +9,7 @@
 
 #include "tutti/base/random.hpp"
 #include "tutti/estimation/marginals.hpp"
+#include "tutti/geometry/covariance.hpp"
 #include "tutti/geometry/pose3.hpp"
 #include "tutti/model/pose_graph.hpp"
 
@@ -32,9 +33,7 @@ inline Pose3 random_pose(Rng& rng, double size_m = 5.0, double angle_rad = 1.0) 
 inline Matrix6d random_covariance(Rng& rng, double sigma_m, double sigma_rad) {
   Matrix6d root;
   for (int k = 0; k < 6; ++k) root.col(k) = random_tangent(rng, sigma_m, sigma_rad);
-  Vector6d diagonal;
-  diagonal << Eigen::Vector3d::Constant(sigma_m * sigma_m), Eigen::Vector3d::Constant(sigma_rad * sigma_rad);
-  return 0.2 * root * root.transpose() + Matrix6d(diagonal.asDiagonal());
+  return 0.2 * root * root.transpose() + diagonal_covariance(sigma_m, sigma_rad);
 }
 
 /// Noise drawn from a covariance.

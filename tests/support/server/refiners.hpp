@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "support/server/world.hpp"
+#include "tutti/geometry/covariance.hpp"
 #include "tutti/server/map_refiner.hpp"
 
 /// Who refines maps in tests: submaps with a cloud.

@@ -15,6 +15,7 @@
 
 #include "support/random_pose.hpp"
 #include "tutti/base/random.hpp"
+#include "tutti/geometry/covariance.hpp"
 #include "tutti/server/closure_verifier.hpp"
 #include "tutti/server/map_estimate.hpp"
 
@@ -36,7 +37,6 @@ struct TestWorldConfig {
   double sigma_rad = 0.005;
 };
 
-using tutti::test::diagonal_covariance;
 using tutti::test::draw;
 
 /// Overlapping submaps of one chain with noisy odometry, in an odom frame of its own.

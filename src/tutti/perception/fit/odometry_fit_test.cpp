@@ -11,6 +11,7 @@
 
 #include "support/random_pose.hpp"
 #include "tutti/base/random.hpp"
+#include "tutti/geometry/covariance.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/model/pose_at.hpp"
 
@@ -59,7 +60,7 @@ struct Robot {
       for (int k = 0; k < 6; ++k) noise[k] = rng.normal(k < 3 ? sigma_m : sigma_rad);
       ScanStep step{.from = from + scans_late_s, .to = to + scans_late_s};
       step.T_from_to = retract(stated * lidar * stated.inverse(), noise);
-      step.covariance = test::diagonal_covariance(sigma_m, sigma_rad);
+      step.covariance = diagonal_covariance(sigma_m, sigma_rad);
       out.push_back(step);
     }
     return out;
