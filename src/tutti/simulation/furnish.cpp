@@ -20,7 +20,7 @@ constexpr double kFurniturePer100m = 10.0;  ///< Office: cupboards and pillars a
 constexpr double kAtJunction = 3.0;         ///< Nothing stands this near to a junction, where robots cut corners.
 constexpr double kClearance = 1.0;          ///< Around the lines that robots walk along (offices: 0.75).
 constexpr double kIntoWall = 0.6;           ///< How far things reach into the wall they stand at.
-constexpr double kGonePiece_m = 2.0;        ///< Length of a piece of wall that is gone,
+constexpr double kGoneSection_m = 2.0;      ///< Length of a section of wall that is gone,
 constexpr double kBehindWall_m = 2.0;       ///< and depth of the space behind it.
 constexpr double kStairhouseIn = 2.0;       ///< The door's house, inside the roof's edge.
 constexpr double kStairhouseOut = 1.5;      ///< And beyond it, so that sky and rock never meet.
@@ -76,11 +76,11 @@ void furnish_tunnel(const Aisle& aisle, bool on_another_day, SpaceParts& parts, 
   }
 }
 
-/// Takes this share of both walls away, in pieces.
+/// Takes this share of both walls away, in sections.
 void open_walls(const Aisle& aisle, double share, SpaceParts& parts, Rng rng) {
-  const double half = 0.5 * kGonePiece_m;
+  const double half = 0.5 * kGoneSection_m;
   for (const double side : {-1.0, 1.0})
-    for (double s = kAtJunction + half; s + half <= aisle.length - kAtJunction; s += kGonePiece_m)
+    for (double s = kAtJunction + half; s + half <= aisle.length - kAtJunction; s += kGoneSection_m)
       if (rng.bernoulli(share))
         parts.openings.push_back(
             box_at(aisle, s, half, side, aisle.half_width - 0.6, aisle.half_width + kBehindWall_m, kHeight_m, 0.0));

@@ -35,7 +35,7 @@ struct SurfaceConfig {
     v.field("width_m", width_m, above_zero_to(kLargestRoom_m), "Width of rough and featureless corridors.");
     v.field(
         "changed_share", changed_share, between(0.0, 1.0),
-        "Above 0 it is another day: this share of the walls of rough and featureless corridors is gone, in pieces of "
+        "Above 0 it is another day: this share of the walls of rough and featureless corridors is gone, in sections of "
         "2 m with 2 m of space behind them, and all that stands in rough ones stands elsewhere.");
   }
 };
