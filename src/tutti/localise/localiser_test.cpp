@@ -48,6 +48,14 @@ struct Judged {
   }
 };
 
+/// Returns the number of the sample that comes next.
+std::size_t drive_until_localised(const Recording& robot, Localiser& one) {
+  std::size_t k = 0;
+  for (; k < robot.odometry.size() && one.located().state != State::localised; ++k)
+    feed(robot, robot.odometry, k, k + 1, one);
+  return k;
+}
+
 TEST(Localiser, FindsItsPlaceInOneSubmapAndFollowsTheMap) {
   const Recording& robot = world().robots[2];
   Localiser one = localiser(world().map);
@@ -280,9 +288,7 @@ TEST(Localiser, AStartPoseOnAPlanIsWithinTwoStandardDeviations) {
 TEST(Localiser, AStartPoseThatCannotBeTriedIsRefusedAndChangesNothing) {
   const Recording& robot = world().robots[2];
   Localiser one = localiser(world().map);
-  std::size_t k = 0;
-  for (; k < robot.odometry.size() && one.located().state != State::localised; ++k)
-    feed(robot, robot.odometry, k, k + 1, one);
+  const std::size_t k = drive_until_localised(robot, one);
   RelativePose far{{Eigen::Quaterniond::Identity(), {900, 0, 0}}, Matrix6d::Identity() * 0.01}, vague = far;
   vague.T_a_b = robot.reference[k].pose;
   vague.covariance *= 10'000.0;
@@ -325,9 +331,7 @@ Scan spoiled(const Scan& scan, double share, Rng& rng) {
 TEST(Localiser, OffTheMapItMustShowWhatItHadToShowWhenItWasFound) {
   const Recording& robot = world().robots[2];
   Localiser one = localiser(world().map);
-  std::size_t k = 0;
-  for (; k < robot.odometry.size() && one.located().state != State::localised; ++k)
-    feed(robot, robot.odometry, k, k + 1, one);
+  std::size_t k = drive_until_localised(robot, one);
   Rng rng(4);
   const auto see = [&](int samples, double share) {
     for (const std::size_t end = k + static_cast<std::size_t>(samples); k < end; ++k) {
@@ -353,9 +357,7 @@ TEST(Localiser, OffTheMapItMustShowWhatItHadToShowWhenItWasFound) {
 TEST(Localiser, WithoutScansItsPoseIsStale) {
   const Recording& robot = world().robots[2];
   Localiser one = localiser(world().map);
-  std::size_t k = 0;
-  for (; k < robot.odometry.size() && one.located().state != State::localised; ++k)
-    feed(robot, robot.odometry, k, k + 1, one);
+  std::size_t k = drive_until_localised(robot, one);
   ASSERT_LT(k + 20, robot.odometry.size());
   for (std::size_t n = 0; n < 15; ++n, ++k)
     ASSERT_TRUE(one.add(OdometrySample{robot.odometry[k].stamp, robot.odometry[k].pose, Matrix6d::Zero()}).has_value());

@@ -11,7 +11,6 @@
 #include "support/mapfile/small_map.hpp"
 #include "tutti/mapfile/hold_map.hpp"
 #include "tutti/mapfile/make_map.hpp"
-#include "tutti/node/map_meta.hpp"
 #include "tutti/node/meta_keys.hpp"
 #include "tutti/node/robot_registry.hpp"
 
@@ -40,14 +39,6 @@ class Versions : public ::testing::Test {
     std::map<KeyframeId, Pose3> out;
     for (const MapNode& node : estimate(content(file)).nodes) out[node.id] = node.T_world_body;
     return out;
-  }
-  static std::size_t returned(const fs::path& file) {
-    std::size_t rows = 0;
-    EXPECT_TRUE(node::each_row_of(**open(file), node::kReturnedPrefix, [&](std::string_view, std::string_view) {
-      ++rows;
-      return Status();
-    }));
-    return rows;
   }
   static Content content(const fs::path& file) { return read(**open(file)).value(); }
 
@@ -191,9 +182,9 @@ TEST_F(Versions, RevertedHasNothingThatRobotsReturned) {
   const storage::Write row{"meta", std::string(node::kReturnedPrefix) + "x", "y"};
   ASSERT_TRUE(store.commit(std::vector<storage::Write>{row}).has_value());
   ASSERT_TRUE(keep_extended(held, store, folder_ / "heard").has_value());
-  EXPECT_EQ(returned(folder_ / "heard"), 1U);
+  EXPECT_EQ(test::rows_of(**open(folder_ / "heard"), node::kReturnedPrefix), 1U);
   ASSERT_TRUE(revert(folder_ / "heard", 1, folder_ / "reverted").has_value());
-  EXPECT_EQ(returned(folder_ / "reverted"), 0U);
+  EXPECT_EQ(test::rows_of(**open(folder_ / "reverted"), node::kReturnedPrefix), 0U);
 }
 
 TEST_F(Versions, ThatAreNotThereAreSaid) {

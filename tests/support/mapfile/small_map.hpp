@@ -8,10 +8,12 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "support/server/world.hpp"
+#include "tutti/node/map_meta.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/worker_node.hpp"
 #include "tutti/storage/memory_store.hpp"
@@ -94,5 +96,15 @@ class Mapper {
   std::unique_ptr<node::ServerNode> node_;
   Timestamp now_;
 };
+
+/// Rows of table `meta` whose keys begin so.
+inline std::size_t rows_of(const storage::TableStore& map, std::string_view prefix) {
+  std::size_t rows = 0;
+  EXPECT_TRUE(node::each_row_of(map, prefix, [&](std::string_view, std::string_view) {
+    ++rows;
+    return Status();
+  }));
+  return rows;
+}
 
 }  // namespace tutti::mapfile::test
