@@ -26,16 +26,14 @@ std::optional<double> measure(const Bvh& surface, const Eigen::Vector3f& origin,
   return range;
 }
 
-constexpr LidarConfig kNarrow{.beams = 64,
-                              .lowest_deg = -12.5,
-                              .highest_deg = 12.5,
-                              .azimuth_step_deg = 0.2,
-                              .max_range_m = 150.0,
-                              .sector_deg = 120.0};
-
-LidarConfig looking_left(LidarConfig config) {
-  config.facing_deg = 90.0;
-  return config;
+LidarConfig narrow(double facing_deg) {
+  return {.beams = 64,
+          .lowest_deg = -12.5,
+          .highest_deg = 12.5,
+          .azimuth_step_deg = 0.2,
+          .max_range_m = 150.0,
+          .sector_deg = 120.0,
+          .facing_deg = facing_deg};
 }
 
 /// Whether the direction (unit vector, sensor frame) is in the sector.
@@ -60,8 +58,8 @@ const std::vector<LidarModel>& lidar_models() {
       {"narrow",
        "64 beams within 12.5 degrees of level, every 0.2 degrees, 120 degrees wide and 150 m far, ahead, as "
        "solid-state ones",
-       kNarrow},
-      {"narrow-left", "the same, looking to the left", looking_left(kNarrow)},
+       narrow(0.0)},
+      {"narrow-left", "the same, looking to the left", narrow(90.0)},
   };
   return rows;
 }
