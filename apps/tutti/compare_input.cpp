@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <filesystem>
 #include <map>
@@ -14,6 +13,7 @@
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/graph_stamps.hpp"
 #include "tutti/formats/trajectory_file.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::app {
 namespace {
@@ -93,9 +93,8 @@ std::optional<Matrix6d> motion_covariance(const std::map<std::pair<std::size_t, 
     const auto found = edge_of.find(forward ? std::pair(from, to) : std::pair(to, from));
     if (found == edge_of.end()) continue;
     const PoseGraphEdge& edge = graph.edges[found->second];
-    const Eigen::LLT<Matrix6d> information(edge.information);
-    if (information.info() != Eigen::Success) continue;
-    const RelativePose motion{edge.T_from_to, information.solve(Matrix6d::Identity())};
+    if (!is_definite(edge.information)) continue;
+    const RelativePose motion{edge.T_from_to, inverse_of(edge.information)};
     return (forward ? motion : inverse(motion)).covariance;
   }
   return std::nullopt;

@@ -17,6 +17,7 @@
 #include "tutti/formats/pyfg.hpp"
 #include "tutti/formats/symbol_keys.hpp"
 #include "tutti/geometry/covariance.hpp"
+#include "tutti/geometry/symmetric.hpp"
 #include "tutti/judge/patience.hpp"
 
 namespace tutti::app {
@@ -95,7 +96,7 @@ Result<NamedGraph> from_pyfg(const GraphSource& source) {
   }
   for (const auto& edge : file->edges)
     graph.edges.push_back(
-        {edge.from, edge.to, edge.measurement.T_a_b, invertible_covariance(edge.measurement.covariance).inverse()});
+        {edge.from, edge.to, edge.measurement.T_a_b, inverse_of(invertible_covariance(edge.measurement.covariance))});
   place(graph, std::move(loose), out);
   if (auto times = formats::times_of(*file)) {
     out.robots.stamps = std::move(times->stamps);

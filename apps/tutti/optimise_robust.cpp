@@ -18,6 +18,7 @@
 #include "tutti/formats/graph_stamps.hpp"
 #include "tutti/formats/pyfg.hpp"
 #include "tutti/formats/trajectory_file.hpp"
+#include "tutti/geometry/symmetric.hpp"
 #include "tutti/program/stop.hpp"
 
 namespace tutti::app {
@@ -61,7 +62,8 @@ Status write_graph(const std::string& path, const NamedGraph& graph, const serve
                              map.nodes[v].T_world_body,
                              graph.fixed_poses[v]});
   for (const PoseGraphEdge& edge : map.graph.edges)
-    file.edges.push_back({map.nodes[edge.to].stamp, edge.from, edge.to, {edge.T_from_to, edge.information.inverse()}});
+    file.edges.push_back(
+        {map.nodes[edge.to].stamp, edge.from, edge.to, {edge.T_from_to, inverse_of(edge.information)}});
   return formats::write_pyfg(path, file);
 }
 

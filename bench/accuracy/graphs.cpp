@@ -17,6 +17,7 @@
 #include "support/server/corridor_run.hpp"
 #include "tutti/evaluation/ate.hpp"
 #include "tutti/formats/pyfg.hpp"
+#include "tutti/geometry/symmetric.hpp"
 #include "tutti/server/graph_judge.hpp"
 
 namespace {
@@ -86,7 +87,7 @@ Graph make_graph(const std::string& odometry, std::uint64_t seed) {
       graph.poses.push_back(T_world_odom * k.T_odom_body);
     }
   const auto add = [&](const KeyframeId& from, const KeyframeId& to, const RelativePose& measured, bool wrong) {
-    graph.edges.push_back({position(from), position(to), measured.T_a_b, measured.covariance.inverse()});
+    graph.edges.push_back({position(from), position(to), measured.T_a_b, inverse_of(measured.covariance)});
     out.wrong.push_back(wrong);
   };
   for (const auto& [id, submap] : run.submaps)
@@ -114,7 +115,7 @@ void write(const Graph& of, const std::string& folder) {
   formats::PyfgFile right = file;
   for (std::size_t e = 0; e < graph.edges.size(); ++e) {
     const PoseGraphEdge& edge = graph.edges[e];
-    file.edges.push_back({stamps[edge.to], edge.from, edge.to, {edge.T_from_to, edge.information.inverse()}});
+    file.edges.push_back({stamps[edge.to], edge.from, edge.to, {edge.T_from_to, inverse_of(edge.information)}});
     if (!of.wrong[e]) right.edges.push_back(file.edges.back());
   }
   std::string name = of.odometry;

@@ -4,8 +4,9 @@
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
 
-#include <Eigen/Cholesky>
 #include <array>
+
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::bench {
 namespace {
@@ -48,7 +49,7 @@ std::vector<Pose3> solve_with_ceres(const PoseGraph& graph) {
   problem.SetParameterBlockConstant(poses[0].translation.data());
   problem.SetParameterBlockConstant(poses[0].rotation.coeffs().data());
   for (const auto& edge : graph.edges) {
-    const Matrix6d root = edge.information.llt().matrixU();
+    const Matrix6d root = root_of_information(edge.information);
     problem.AddResidualBlock(
         new ceres::AutoDiffCostFunction<BetweenCost, 6, 3, 4, 3, 4>(new BetweenCost{edge.T_from_to, root}), nullptr,
         poses[edge.from].translation.data(), poses[edge.from].rotation.coeffs().data(),

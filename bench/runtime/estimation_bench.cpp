@@ -4,39 +4,23 @@
 #include <benchmark/benchmark.h>
 #include <dlfcn.h>
 
-#include <Eigen/LU>
 #include <cmath>
 #include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "tunnel_chain.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/estimation/marginals.hpp"
 #include "tutti/estimation/pose_graph_solver.hpp"
 #include "tutti/formats/g2o.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace {
 
 using namespace tutti;
 using namespace tutti::estimation;
-
-Vector6d noise(Rng& rng, double sigma_m, double sigma_rad) {
-  Vector6d xi;
-  for (int k = 0; k < 3; ++k) {
-    xi[k] = rng.normal(sigma_m);
-    xi[3 + k] = rng.normal(sigma_rad);
-  }
-  return xi;
-}
-
-Matrix6d covariance(double sigma_m, double sigma_rad) {
-  Vector6d d;
-  d << Eigen::Vector3d::Constant(sigma_m * sigma_m), Eigen::Vector3d::Constant(sigma_rad * sigma_rad);
-  Matrix6d m = d.asDiagonal();
-  m(0, 5) = m(5, 0) = 0.3 * sigma_m * sigma_rad;
-  return m;
-}
 
 void public_set(benchmark::State& state, const std::string& name, const SolverConfig& config) {
   const auto path = std::filesystem::path(TUTTI_SHARED_DIR) / "data/g2o" / name;
@@ -68,7 +52,8 @@ PoseGraph revisiting_graph() {
   }
   const auto link = [&](std::size_t a, std::size_t b) {
     const Pose3 exact = graph.poses[a].inverse() * graph.poses[b];
-    graph.edges.push_back({a, b, retract(exact, noise(rng, 0.02, 0.005)), covariance(0.02, 0.005).inverse()});
+    graph.edges.push_back(
+        {a, b, retract(exact, bench::noise(rng, 0.02, 0.005)), inverse_of(bench::covariance(0.02, 0.005))});
   };
   for (std::size_t k = 0; k + 1 < 2000; ++k) link(k, k + 1);
   for (std::size_t k = 0; k + 200 < 2000; k += 3) link(k, k + 200);

@@ -22,6 +22,7 @@
 #include "tutti/base/config_io.hpp"
 #include "tutti/estimation/pose_graph_solver.hpp"
 #include "tutti/geometry/alignment.hpp"
+#include "tutti/geometry/symmetric.hpp"
 #include "tutti/perception/lidar/candidates.hpp"
 #include "tutti/perception/lidar/verify.hpp"
 
@@ -71,7 +72,7 @@ Judgement judge(const Sample& a, const Sample& b, const Options& options) {
   out.error_m = error.head<3>().norm();
   out.error_deg = error.tail<3>().norm() * kDegPerRad;
   out.wrong = out.error_m > 0.5 || out.error_deg > 2.0;
-  out.nees = error.dot(closure.measurement.covariance.inverse() * error);
+  out.nees = squared_distance(error, closure.measurement.covariance);
   out.T_odom1_odom1 = T_ref_from * closure.measurement.T_a_b * T_ref_to.inverse();
   return out;
 }
@@ -95,7 +96,7 @@ double joint_rmse(const std::vector<Sample>& samples, const std::vector<Judgemen
   std::vector<Eigen::Vector3d> reference;
   std::map<KeyframeId, std::size_t> node;
   const auto add = [&](KeyframeId from, KeyframeId to, const RelativePose& m) {
-    graph.edges.push_back({node.at(from), node.at(to), m.T_a_b, m.covariance.inverse()});
+    graph.edges.push_back({node.at(from), node.at(to), m.T_a_b, inverse_of(m.covariance)});
   };
   for (const auto& sample : samples)
     for (std::size_t k = 0; k < sample.submap.keyframes.size(); ++k) {

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "lidar_hku_samples.hpp"
+#include "tutti/geometry/symmetric.hpp"
 #include "tutti/lab/mission_config.hpp"
 #include "tutti/lab/mission_input.hpp"
 #include "tutti/model/pose_at.hpp"
@@ -106,10 +107,11 @@ void judge(const Seen& a, const Seen& b, const lidar::LidarClosureConfig& config
   }
   tally.m.push_back(m);
   tally.deg.push_back(deg);
-  tally.nees.push_back(error.dot(measured.covariance.inverse() * error));
-  tally.nees_m.push_back(error.head<3>().dot(measured.covariance.topLeftCorner<3, 3>().inverse() * error.head<3>()));
-  tally.nees_rad.push_back(
-      error.tail<3>().dot(measured.covariance.bottomRightCorner<3, 3>().inverse() * error.tail<3>()));
+  tally.nees.push_back(squared_distance(error, measured.covariance));
+  tally.nees_m.push_back(
+      squared_distance(Eigen::Vector3d(error.head<3>()), Eigen::Matrix3d(measured.covariance.topLeftCorner<3, 3>())));
+  tally.nees_rad.push_back(squared_distance(Eigen::Vector3d(error.tail<3>()),
+                                            Eigen::Matrix3d(measured.covariance.bottomRightCorner<3, 3>())));
 }
 
 double sum(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }

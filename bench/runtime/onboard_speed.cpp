@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 #include <malloc.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -19,6 +18,7 @@
 #include "tutti/estimation/pose_graph_solver.hpp"
 #ifdef TUTTI_HAVE_CERES
 #include "ceres_solve.hpp"
+#include "tutti/geometry/symmetric.hpp"
 #endif
 
 namespace {
@@ -70,13 +70,12 @@ Difference difference(const std::vector<Pose3>& a, const std::vector<Pose3>& b) 
 PoseGraph full_graph(const TunnelChain& chain) {
   PoseGraph graph;
   graph.poses.push_back(chain.truth.front());
-  const auto information = [](const Matrix6d& C) -> Matrix6d { return C.llt().solve(Matrix6d::Identity()); };
   for (std::size_t k = 0; k < chain.odometry.size(); ++k) {
     graph.poses.push_back(graph.poses.back() * chain.odometry[k].T_a_b);
-    graph.edges.push_back({k, k + 1, chain.odometry[k].T_a_b, information(chain.odometry[k].covariance)});
+    graph.edges.push_back({k, k + 1, chain.odometry[k].T_a_b, inverse_of(chain.odometry[k].covariance)});
   }
   for (const auto& c : chain.constraints)
-    graph.edges.push_back({c.from, c.to, c.measurement.T_a_b, information(c.measurement.covariance)});
+    graph.edges.push_back({c.from, c.to, c.measurement.T_a_b, inverse_of(c.measurement.covariance)});
   return graph;
 }
 

@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <cmath>
 #include <string>
@@ -12,6 +11,7 @@
 #include "support/consistency/uncertainty.hpp"
 #include "tutti/consistency/disagreement.hpp"
 #include "tutti/consistency/internal/chain_filter.hpp"
+#include "tutti/geometry/symmetric.hpp"
 #include "tutti/spectral/spectrum.hpp"
 #include "tutti/spectral/wavelet_transform.hpp"
 
@@ -72,7 +72,7 @@ class TrueCoefficients {
     return draws * draws.transpose();
   }
   [[nodiscard]] double variance_of_worst(Index node, int scale) const {
-    return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance(node, scale)).eigenvalues()(2);
+    return eigen_of(covariance(node, scale)).values(2);
   }
   /// The coefficients of errors, n x (3 columns), as spectral::exact_transform gives them.
   [[nodiscard]] MatrixXd transformed(MatrixXd errors) const {

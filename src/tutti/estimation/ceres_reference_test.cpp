@@ -12,6 +12,7 @@
 #include "support/shared_data.hpp"
 #include "tutti/estimation/pose_graph_solver.hpp"
 #include "tutti/formats/g2o.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::estimation {
 namespace ceres_reference_test {
@@ -85,7 +86,7 @@ CeresSolution solve_with_ceres(const PoseGraph& graph) {
   }
   problem.SetParameterBlockConstant(blocks[0].data());
   for (const auto& edge : graph.edges) {
-    const Matrix6d root = edge.information.llt().matrixU();
+    const Matrix6d root = root_of_information(edge.information);
     problem.AddResidualBlock(
         new ceres::AutoDiffCostFunction<BetweenCost, 6, 7, 7>(new BetweenCost{edge.T_from_to, root}), nullptr,
         blocks[edge.from].data(), blocks[edge.to].data());

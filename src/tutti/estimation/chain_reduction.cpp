@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/estimation/chain_reduction.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 
 #include "tutti/estimation/internal/chain_run.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::estimation {
 namespace {
@@ -36,9 +36,7 @@ std::vector<Passage> passages(const PoseGraph& graph, std::span<const EdgeRole> 
   return nodes;
 }
 
-RelativePose step_of(const PoseGraphEdge& edge) {
-  return {edge.T_from_to, edge.information.llt().solve(Matrix6d::Identity())};
-}
+RelativePose step_of(const PoseGraphEdge& edge) { return {edge.T_from_to, inverse_of(edge.information)}; }
 
 /// Poses of the nodes of a run of these steps.
 std::vector<Pose3> poses_of(const PoseGraph& graph, std::span<const std::size_t> steps, std::span<const Pose3> all) {

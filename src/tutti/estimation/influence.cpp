@@ -2,7 +2,6 @@
 #include "tutti/estimation/influence.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -16,6 +15,7 @@
 #include "tutti/estimation/chain_reduction.hpp"
 #include "tutti/estimation/internal/graph_equations.hpp"
 #include "tutti/estimation/internal/selected_inverse.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::estimation {
 namespace {
@@ -40,7 +40,7 @@ struct Whitened {
 
 Whitened whiten(const PoseGraphEdge& edge, const EdgeSlot& slot, int component, std::span<const Pose3> poses) {
   const BetweenLinearisation factor = linearise_between(poses[edge.from], poses[edge.to], edge.T_from_to);
-  const Matrix6d upper = edge.information.llt().matrixU();
+  const Matrix6d upper = root_of_information(edge.information);
   return {slot, component, upper * factor.residual, upper * factor.J_i, upper * factor.J_j};
 }
 
@@ -114,7 +114,7 @@ class GroupLoss {
     const Eigen::MatrixXd solved = others_.solve(right);
     const Vector6d moved = right.rightCols<6>().transpose() * solved.col(0);
     const Matrix6d covariance = right.rightCols<6>().transpose() * solved.rightCols<6>();
-    return std::max(0.0, moved.dot(Matrix6d(0.5 * (covariance + covariance.transpose())).ldlt().solve(moved)));
+    return std::max(0.0, squared_distance(moved, 0.5 * (covariance + covariance.transpose())));
   }
 
  private:

@@ -10,6 +10,7 @@
 
 #include "support/estimation/random_graphs.hpp"
 #include "tutti/estimation/between_factor.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::estimation {
 namespace marginals_test {
@@ -113,7 +114,7 @@ TEST(Marginals, SamplesHaveTheJointCovariance) {
   const std::size_t alone = graph.poses.size();  // a second component, with a gauge of its own
   graph.poses.insert(graph.poses.end(), {random_pose(rng), random_pose(rng)});
   graph.edges.push_back({alone, alone + 1, graph.poses[alone].inverse() * graph.poses[alone + 1],
-                         random_covariance(rng, 0.1, 0.1).inverse()});
+                         inverse_of(random_covariance(rng, 0.1, 0.1))});
   const std::vector<double> weights(graph.edges.size(), 0.7);
   const Pairs pairs{{4, 9}};
   const JointPosterior posterior(graph, graph.poses, pairs, weights);

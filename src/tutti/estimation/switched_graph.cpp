@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/estimation/switched_graph.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <limits>
 #include <utility>
@@ -14,6 +12,7 @@
 #include "tutti/estimation/internal/gauss_newton.hpp"
 #include "tutti/estimation/internal/graph_equations.hpp"
 #include "tutti/estimation/internal/selected_inverse.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::estimation {
 namespace {
@@ -34,14 +33,14 @@ using internal::SelectedInverse;
 /// `covariance`: H^-1 at the edge's ends.
 double price(const PoseGraphEdge& edge, const BetweenLinearisation& factor,
              const Eigen::Matrix<double, 12, 12>& covariance, bool is_in) {
-  const Matrix6d upper = edge.information.llt().matrixU();  // Omega = upper^T upper
+  const Matrix6d upper = root_of_information(edge.information);  // Omega = upper^T upper
   Eigen::Matrix<double, 6, 12> J;
   J << upper * factor.J_i, upper * factor.J_j;
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> known(J * covariance * J.transpose());
-  const Vector6d missed = known.eigenvectors().transpose() * (upper * factor.residual);
+  const Eigen6 known = eigen_of(Matrix6d(J * covariance * J.transpose()));
+  const Vector6d missed = known.vectors.transpose() * (upper * factor.residual);
   double out = 0.0;
   for (int d = 0; d < 6; ++d) {
-    const double share = std::max(0.0, known.eigenvalues()(d));
+    const double share = std::max(0.0, known.values(d));
     const double rest = is_in ? 1.0 - share : 1.0 + share;
     if (rest > kNothingElse) out += missed(d) * missed(d) / rest;
   }

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/evaluation/cloud_distance.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <nanoflann.hpp>
 
+#include "tutti/geometry/symmetric.hpp"
 #include "tutti/model/kdtree_points.hpp"
 
 namespace tutti::evaluation {
@@ -38,12 +38,10 @@ Patch fit_patch(const std::vector<Eigen::Vector3f>& points, const Eigen::Vector3
     const Eigen::Vector3d d = points[i].cast<double>() - mean;
     scatter += d * d.transpose();
   }
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
-  solver.computeDirect(scatter);
-  const Eigen::Vector3d spread = solver.eigenvalues();
+  const auto [spread, axes] = quick_eigen_of(scatter);
   // On one line a plane could have any tilt.
   if (!(spread[0] <= kFlat * spread[1]) || !(spread[1] >= kFlat * spread[2])) return {};
-  const Eigen::Vector3d normal = solver.eigenvectors().col(0).normalized();
+  const Eigen::Vector3d normal = axes.col(0).normalized();
   return {normal.cast<float>(), static_cast<float>(normal.dot(mean)), (points[neighbours.back()] - point).norm()};
 }
 

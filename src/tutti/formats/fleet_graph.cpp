@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/formats/fleet_graph.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <filesystem>
 #include <vector>
@@ -10,6 +9,7 @@
 #include "tutti/formats/graph_stamps.hpp"
 #include "tutti/formats/jrl.hpp"
 #include "tutti/formats/symbol_keys.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::formats {
 namespace {
@@ -18,9 +18,9 @@ namespace {
 /// the smallest.
 Matrix6d covariance_of(const Matrix6d& information) {
   constexpr double kLeastShare = 1e-9;
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(information);
-  const Vector6d values = eigen.eigenvalues().cwiseMax(kLeastShare * eigen.eigenvalues().maxCoeff());
-  const Matrix6d out = eigen.eigenvectors() * values.cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
+  const Eigen6 eigen = eigen_of(information);
+  const Vector6d values = eigen.values.cwiseMax(kLeastShare * eigen.values(5));
+  const Matrix6d out = eigen.vectors * values.cwiseInverse().asDiagonal() * eigen.vectors.transpose();
   return 0.5 * (out + out.transpose());
 }
 

@@ -21,7 +21,7 @@ Eigen::Quaterniond best_rotation(const Eigen::Matrix3d& cross, double extent2) {
   const Eigen::Vector3d& s = svd.singularValues();
   if (s(0) <= kCoincident * extent2) return Eigen::Quaterniond::Identity();
   if (s(1) <= kCollinear * s(0))  // only the line's direction is known: turn it by the smaller angle
-    return Eigen::Quaterniond::FromTwoVectors(svd.matrixV().col(0), svd.matrixU().col(0)).normalized();
+    return rotation_between(svd.matrixV().col(0), svd.matrixU().col(0)).normalized();
   return Eigen::Quaterniond(project_to_so3(cross)).normalized();
 }
 

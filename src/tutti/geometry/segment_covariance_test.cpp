@@ -3,10 +3,10 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
 #include <vector>
 
 #include "tutti/base/random.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti {
 namespace segment_covariance_test {
@@ -60,7 +60,7 @@ TEST(SegmentCovariance, IsPositiveDefiniteBesideStepsThatAreUnknown) {
   const SegmentCovariance segment(chain.poses, chain.steps);
   for (std::size_t a = 0; a + 1 < chain.poses.size(); ++a) {
     const Matrix6d C = segment(a, a + 1);
-    EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix6d>(C).eigenvalues().minCoeff(), 0.0) << a;
+    EXPECT_GT(eigen_of(C).values(0), 0.0) << a;
     if ((a + 1) % 50 != 0) {
       EXPECT_LT(C.norm(), 1e-7) << a;
     }

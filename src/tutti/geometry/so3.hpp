@@ -25,6 +25,8 @@ Eigen::Vector3d so3_log(const Eigen::Quaterniond& q);
 /// Right Jacobian: Exp(theta + d) ~ Exp(theta) Exp(Jr(theta) d), eq. (143), and its inverse, eq. (144).
 Eigen::Matrix3d so3_right_jacobian(const Eigen::Vector3d& theta);
 Eigen::Matrix3d so3_right_jacobian_inverse(const Eigen::Vector3d& theta);
+/// The smallest rotation that turns `from` into the direction of `to`; about any axis across when they are opposite.
+Eigen::Quaterniond rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 /// Closest rotation to a 3x3 matrix in the Frobenius norm (SVD, det +1).
 Eigen::Matrix3d project_to_so3(const Eigen::Matrix3d& m);
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/judge/closure_honesty.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include "tutti/base/chi_square.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::judge {
 namespace {
@@ -29,7 +29,7 @@ std::size_t count_within(const std::vector<ClosurePair>& pairs, const ClosureHon
     const OdometryLoop loop = loop_of(pair);
     const Eigen::Matrix<double, N, N> C = (loop.odometry + loop.closures).bottomRightCorner<N, N>();
     const Eigen::Matrix<double, N, 1> missed = loop.missed.tail<N>();
-    return missed.dot(C.ldlt().solve(missed)) <= limit;
+    return squared_distance(missed, C) <= limit;
   });
   return static_cast<std::size_t>(within);
 }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/judge/closure_support.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -9,6 +8,7 @@
 #include <utility>
 
 #include "tutti/base/chi_square.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::judge {
 namespace {
@@ -27,7 +27,7 @@ class Agreement {
       : odometry_(odometry), limit_(chi_square_quantile(config.confidence, 6)) {}
 
   [[nodiscard]] Directed directed(const PoseGraphEdge& closure) const {
-    Directed out{closure.from, closure.to, {closure.T_from_to, closure.information.llt().solve(Matrix6d::Identity())}};
+    Directed out{closure.from, closure.to, {closure.T_from_to, inverse_of(closure.information)}};
     if (closure.to < closure.from) out = {closure.to, closure.from, inverse(out.measurement)};
     out.turn_variance = out.measurement.covariance.bottomRightCorner<3, 3>().trace();
     return out;
@@ -44,14 +44,14 @@ class Agreement {
     const Matrix6d covariance = odometry_.between(a.to, b.to).covariance + b.measurement.covariance +
                                 over_second * odometry_.between(a.from, b.from).covariance * over_second.transpose() +
                                 over_two * a.measurement.covariance * over_two.transpose();
-    return missed.dot(covariance.llt().solve(missed)) <= limit_;
+    return squared_distance(missed, covariance) <= limit_;
   }
 
   [[nodiscard]] bool fits_odometry(const Directed& closure) const {
     if (odometry_.segment(closure.from) != odometry_.segment(closure.to)) return false;
     const RelativePose between = odometry_.between(closure.from, closure.to);
     const Vector6d missed = local(closure.measurement.T_a_b, between.T_a_b);
-    return missed.dot((between.covariance + closure.measurement.covariance).llt().solve(missed)) <= limit_;
+    return squared_distance(missed, between.covariance + closure.measurement.covariance) <= limit_;
   }
 
  private:

@@ -9,6 +9,7 @@
 
 #include "tutti/base/random.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/geometry/symmetric.hpp"
 #include "tutti/judge/closure_support.hpp"
 #include "tutti/judge/hypothesis.hpp"
 #include "tutti/judge/patience.hpp"
@@ -92,7 +93,7 @@ TEST(OdometryTrajectories, KnowsTheSegmentsAndWhatLiesBetween) {
   EXPECT_NEAR(ways.usual_speed(), kStep_m / 2.0, 0.05);
   RelativePose sum{.T_a_b = {}, .covariance = Matrix6d::Zero()};
   for (std::size_t e = 10; e < 14; ++e)
-    sum = compound(sum, {laps.graph.edges[e].T_from_to, laps.graph.edges[e].information.inverse()});
+    sum = compound(sum, {laps.graph.edges[e].T_from_to, inverse_of(laps.graph.edges[e].information)});
   const RelativePose forth = ways.between(10, 14), back = ways.between(14, 10);
   EXPECT_LT(local(sum.T_a_b, forth.T_a_b).norm(), 1e-9);
   EXPECT_LT((sum.covariance - forth.covariance).norm(), 1e-9);

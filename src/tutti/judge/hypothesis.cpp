@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/judge/hypothesis.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -14,6 +13,7 @@
 #include "tutti/estimation/edge_roles.hpp"
 #include "tutti/estimation/truncated_least_squares.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::judge {
 namespace {
@@ -235,9 +235,9 @@ Solution HypothesisSolver::judge(Hypothesis hypothesis, estimation::GncResult op
 double HypothesisSolver::votes_for(const FailedSegment& failed) const {
   if (!is_possible(odometry_, failed)) return kInfinite;
   const Matrix6d covariance = odometry_.between(failed.from, failed.to).covariance;
-  const double squared_distance = failed.missed.dot(covariance.llt().solve(failed.missed));
+  const double missed2 = squared_distance(failed.missed, covariance);
   constexpr double kPower = 1.25, kAxes = 6.0;
-  return std::max(0.0, kPower * kAxes / limit_ * std::log(squared_distance / limit_));
+  return std::max(0.0, kPower * kAxes / limit_ * std::log(missed2 / limit_));
 }
 
 void HypothesisSolver::find_failed(const std::vector<Pose3>& poses, Solution& out) const {

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "tutti/geometry/covariance.hpp"
+#include "tutti/geometry/symmetric.hpp"
 #include "tutti/judge/internal/optimiser.hpp"
 #include "tutti/judge/patience.hpp"
 
@@ -237,7 +238,7 @@ Matrix6d information_of(const Matrix6d& covariance) {
   Matrix6d floored = covariance;
   floored.diagonal().head<3>().array() += kLeastTranslation_m * kLeastTranslation_m;
   floored.diagonal().tail<3>().array() += kLeastRotation_rad * kLeastRotation_rad;
-  const Matrix6d inverse = floored.llt().solve(Matrix6d::Identity());
+  const Matrix6d inverse = inverse_of(floored);
   return 0.5 * (inverse + inverse.transpose());
 }
 
@@ -246,7 +247,7 @@ void weaken(PoseGraph& graph, std::size_t odometry_edges, std::size_t from, std:
   for (std::size_t e = 0; e < odometry_edges; ++e) {
     PoseGraphEdge& edge = graph.edges[e];
     if (edge.from < from || edge.to > to) continue;
-    Matrix6d covariance = edge.information.inverse();
+    Matrix6d covariance = inverse_of(edge.information);
     const double steps = static_cast<double>(to - from);
     covariance.diagonal().head<3>().array() += sigma_m * sigma_m / steps;
     covariance.diagonal().tail<3>().array() += sigma_rad * sigma_rad / steps;

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/judge/odometry_honesty.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <vector>
 
 #include "tutti/base/chi_square.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::judge {
 namespace {
@@ -68,7 +68,7 @@ double least_factor(const Loops& loops, double share, bool with_closures) {
       const Eigen::Matrix<double, N, N> C = (with_closures ? factor : 1.0) * loop->closures.bottomRightCorner<N, N>() +
                                             factor * loop->odometry.bottomRightCorner<N, N>();
       const Eigen::Matrix<double, N, 1> missed = loop->missed.tail<N>();
-      return missed.dot(C.ldlt().solve(missed)) <= limit;
+      return squared_distance(missed, C) <= limit;
     });
     return static_cast<double>(within) >= share * static_cast<double>(loops.size());
   };

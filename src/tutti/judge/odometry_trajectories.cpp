@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/judge/odometry_trajectories.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <utility>
+
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::judge {
 namespace {
@@ -61,7 +62,7 @@ OdometryTrajectories::OdometryTrajectories(std::span<const double> seconds, std:
     if (step_to[i] == nullptr) continue;
     const PoseGraphEdge& step = *step_to[i];
     const At& before = at_[step.from];
-    const Matrix6d covariance = step.information.llt().solve(Matrix6d::Identity());
+    const Matrix6d covariance = inverse_of(step.information);
     at_[i] = {.segment = before.segment,
               .position = before.position + 1,
               .seconds = seconds[i],

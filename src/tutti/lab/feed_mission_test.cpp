@@ -2,7 +2,6 @@
 // Robots of a simulated mission are fed through their live feeds, and what the feeds send is compared with the truth.
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <deque>
 #include <map>
 #include <set>
@@ -10,6 +9,7 @@
 #include "support/program/feed/client.hpp"
 #include "support/program/feed/node_target.hpp"
 #include "support/sanitized.hpp"
+#include "tutti/geometry/symmetric.hpp"
 #include "tutti/lab/closure_verifiers.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/worker_node.hpp"
@@ -122,7 +122,7 @@ class Mission {
     // `map` begins where `odom` does.
     const Pose3 T_map_reference = recording.odometry[0].pose * recording.reference[0].pose.inverse();
     const Vector6d error = local(T_map_body, T_map_reference * recording.reference[i].pose);
-    const double squared = error.dot(of_body.llt().solve(error));
+    const double squared = squared_distance(error, of_body);
     ++tally_.samples;
     tally_.nees += squared / 6.0;
     tally_.outside += squared > 16.8 ? 1 : 0;  // 99 % of chi-square with 6 degrees of freedom

@@ -68,7 +68,7 @@ RelativePose on_level(const RelativePose& start, const Pose3& level) {
   RelativePose out = start;
   out.T_a_b.translation.z() = level.translation.z();
   const Eigen::Vector3d up = level.rotation * Eigen::Vector3d::UnitZ();
-  out.T_a_b.rotation = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), up) *
+  out.T_a_b.rotation = rotation_between(Eigen::Vector3d::UnitZ(), up) *
                        Eigen::AngleAxisd(heading(start.T_a_b.rotation), Eigen::Vector3d::UnitZ());
   for (const int row : {2, 3, 4}) {
     out.covariance.row(row).setZero();

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "tutti/geometry/covariance.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::mapfile {
 namespace {
@@ -17,7 +18,7 @@ std::optional<ClosureFit::Misfit> misfit_of(const server::MapEstimate& map, cons
   if (from == nullptr || to == nullptr || from->component != to->component) return std::nullopt;
   const Vector6d error = local(closure.measurement.T_a_b, from->T_world_body.inverse() * to->T_world_body);
   const Matrix6d covariance = invertible_covariance(bounded_covariance(closure.measurement.covariance));
-  return ClosureFit::Misfit{error.head<3>().norm(), error.tail<3>().norm(), error.dot(covariance.llt().solve(error))};
+  return ClosureFit::Misfit{error.head<3>().norm(), error.tail<3>().norm(), squared_distance(error, covariance)};
 }
 
 std::string reason_of(const ClosureInfo& info) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 
+#include "tutti/geometry/so3.hpp"
 #include "tutti/server/map_components.hpp"
 
 namespace tutti::mapfile {
@@ -96,8 +97,7 @@ std::uint32_t component_to_show(const Content& content, const server::MapEstimat
 }
 
 Pose3 level_frame(const server::MapEstimate& map, std::uint32_t component) {
-  return {Eigen::Quaterniond::FromTwoVectors(mean_up(map, component), Eigen::Vector3d::UnitZ()),
-          Eigen::Vector3d::Zero()};
+  return {rotation_between(mean_up(map, component), Eigen::Vector3d::UnitZ()), Eigen::Vector3d::Zero()};
 }
 
 Pose3 upright_frame(const server::MapEstimate& map, std::uint32_t component) {
@@ -110,7 +110,7 @@ Pose3 upright_frame(const server::MapEstimate& map, std::uint32_t component) {
   if (axis == 2)
     return {nearest.z() > 0.0 ? Eigen::Quaterniond::Identity() : Eigen::Quaterniond(0.0, 1.0, 0.0, 0.0),
             Eigen::Vector3d::Zero()};
-  return {Eigen::Quaterniond::FromTwoVectors(nearest, Eigen::Vector3d::UnitZ()), Eigen::Vector3d::Zero()};
+  return {rotation_between(nearest, Eigen::Vector3d::UnitZ()), Eigen::Vector3d::Zero()};
 }
 
 std::optional<std::string> disagreement_on_up(const Content& content, const server::MapEstimate& map,

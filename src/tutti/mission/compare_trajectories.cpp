@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/mission/compare_trajectories.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -15,6 +14,7 @@
 #include "tutti/consistency/synchronise.hpp"
 #include "tutti/estimation/onboard_smoother.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -168,7 +168,7 @@ void fix(const std::vector<consistency::RobotNode>& nodes, const CompareTrajecto
 Status check_covariances(const NamedTrajectory& b) {
   TUTTI_CHECK(b.step_covariance.empty() || b.step_covariance.size() + 1 == b.poses.size());
   for (std::size_t k = 0; k < b.step_covariance.size(); ++k)
-    if (!b.step_covariance[k].allFinite() || b.step_covariance[k].llt().info() != Eigen::Success)
+    if (!is_definite(b.step_covariance[k]))
       return fail(ErrorCode::invalid, "covariance of the motion from pose {} to {} is not positive definite", k, k + 1);
   return {};
 }

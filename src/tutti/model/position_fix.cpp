@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/model/position_fix.hpp"
 
-#include <Eigen/Eigenvalues>
-
 #include "tutti/geometry/covariance.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti {
 namespace {
@@ -31,7 +30,7 @@ Status check_fix(const Geodetic& antenna, const Eigen::Matrix3d& covariance, con
                   kLeast, kMost);
   const double largest = covariance.diagonal().maxCoeff();
   const double least = covariance.allFinite() && (covariance - covariance.transpose()).norm() <= kRounding * largest
-                           ? Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues()(0)
+                           ? eigen_of(covariance).values(0)
                            : -largest;
   if (!(least >= -kRounding * largest))
     return fail(ErrorCode::invalid,
@@ -50,10 +49,9 @@ Eigen::Matrix3d invertible_fix_covariance(const Eigen::Matrix3d& covariance) {
   raised.diagonal() = raised.diagonal().cwiseMax(kLeastTranslation_m * kLeastTranslation_m);
   const Eigen::Vector3d sigma = raised.diagonal().cwiseSqrt();
   const Eigen::Matrix3d correlation = sigma.cwiseInverse().asDiagonal() * raised * sigma.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(correlation);
-  if (solver.eigenvalues()(0) >= kRounding) return raised;
-  const Eigen::Matrix3d regular =
-      solver.eigenvectors() * solver.eigenvalues().cwiseMax(kRounding).asDiagonal() * solver.eigenvectors().transpose();
+  const auto [values, vectors] = eigen_of(correlation);
+  if (values(0) >= kRounding) return raised;
+  const Eigen::Matrix3d regular = vectors * values.cwiseMax(kRounding).asDiagonal() * vectors.transpose();
   const Eigen::Matrix3d scaled = sigma.asDiagonal() * regular * sigma.asDiagonal();
   return 0.5 * (scaled + scaled.transpose());
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/model/relative_pose.hpp"
 
-#include <Eigen/Cholesky>
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti {
 
@@ -16,7 +16,7 @@ RelativePose inverse(const RelativePose& a_b) {
 
 double squared_distance(const RelativePose& one, const RelativePose& other) {
   const Vector6d missed = local(one.T_a_b, other.T_a_b);
-  return missed.dot((one.covariance + other.covariance).ldlt().solve(missed));
+  return squared_distance(missed, one.covariance + other.covariance);
 }
 
 }  // namespace tutti

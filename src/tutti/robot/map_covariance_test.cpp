@@ -3,18 +3,16 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <vector>
 
 #include "support/consistency/uncertainty.hpp"
 #include "support/robot/drifting_robot.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::robot {
 namespace map_covariance_test {
 
 using consistency::test::kAlpha, consistency::test::WalkWithClosures;
-
-double nees(const Vector6d& error, const Matrix6d& covariance) { return error.dot(covariance.llt().solve(error)); }
 
 /// A robot on a map of 240 nodes whose errors are those of `walk`; one link spans its whole run.
 struct Scene {
@@ -61,7 +59,7 @@ TEST(MapCovariance, HoldsTheErrorsOfMapsThatItSpeaksOf) {
       int outside = 0;
       for (int i = 0; i < kDraws; ++i) {
         const auto drawn = walk.displace(scene.truth, Rng(5).fork(static_cast<std::uint64_t>(i)));
-        const double squared = nees(local(drawn.front().inverse() * drawn.back(), relative), covariance);
+        const double squared = squared_distance(local(drawn.front().inverse() * drawn.back(), relative), covariance);
         sum += squared / 6.0 / kDraws;
         outside += squared > 16.8 ? 1 : 0;  // 99 % of chi-square with 6 degrees of freedom
       }

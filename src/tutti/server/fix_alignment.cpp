@@ -4,7 +4,6 @@
 #include <fmt/core.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,6 +14,7 @@
 #include "tutti/base/random.hpp"
 #include "tutti/geometry/alignment.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::server {
 namespace {
@@ -38,7 +38,7 @@ constexpr double kUpsideDown = -0.7;  // cosine
 /// Squared, in standard deviations.
 double misfit(const FixedPoint& point, const Pose3& T_enu_world) {
   const Vector3d r = T_enu_world * point.p_world - point.p_enu;
-  return r.dot(point.covariance.llt().solve(r));
+  return squared_distance(r, point.covariance);
 }
 
 template <class Value>
@@ -145,11 +145,10 @@ std::optional<FixAlignment> refine(std::span<const FixedPoint> points, const Pos
     H = equations.H;
     if (is_levelled)  // of the turn only that about the vertical is free
       H.diagonal().segment<2>(3).array() += 1.0 / (kSigmaLevel_rad * kSigmaLevel_rad);
-    else if (Eigen::SelfAdjointEigenSolver<Matrix3d>(equations.turn()).eigenvalues()(0) <
-             1.0 / (kTiltKnown_rad * kTiltKnown_rad))
+    else if (eigen_of(equations.turn()).values(0) < 1.0 / (kTiltKnown_rad * kTiltKnown_rad))
       return std::nullopt;
     if (k == kRefinements) break;
-    Vector6d step = -H.ldlt().solve(equations.g);
+    Vector6d step = -solve_definite(H, equations.g);
     if (is_levelled) {
       Eigen::Matrix4d levelled;
       const std::array<int, 4> free{0, 1, 2, 5};
@@ -166,7 +165,7 @@ std::optional<FixAlignment> refine(std::span<const FixedPoint> points, const Pos
     Pose3& T = out.T_enu_world;
     T = {(turn * T.rotation).normalized(), turn * (T.translation - out.middle_enu) + out.middle_enu + step.head<3>()};
   }
-  out.covariance = H.ldlt().solve(Matrix6d::Identity());
+  out.covariance = inverse_of(H);
   return out;
 }
 
@@ -205,9 +204,7 @@ std::string why_uncertain(std::span<const FixedPoint> points, const FixAlignment
 
 }  // namespace
 
-double FixAlignment::sigma_m() const {
-  return std::sqrt(Eigen::SelfAdjointEigenSolver<Matrix3d>(covariance.topLeftCorner<3, 3>()).eigenvalues()(2));
-}
+double FixAlignment::sigma_m() const { return largest_sigma(covariance.topLeftCorner<3, 3>()); }
 double FixAlignment::sigma_yaw_rad() const { return std::sqrt(covariance(5, 5)); }
 
 FixAlignment align_fixes(std::span<const FixedPoint> points) {

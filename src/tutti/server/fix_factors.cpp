@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/server/fix_factors.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,6 +8,7 @@
 
 #include "tutti/base/chi_square.hpp"
 #include "tutti/estimation/pose_graph_solver.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::server {
 namespace {
@@ -126,7 +126,7 @@ class Bender {
     std::map<ChainId, std::vector<double>> misfits;
     for (const std::size_t s : candidates_) {
       const Vector3d missed = missed_by(factors_.joined[s], map_.graph.poses, factors_.T_enu_world);
-      misfits[placed_.submaps[s].submap.chain].push_back(missed.dot(factors_.joined[s].covariance.llt().solve(missed)));
+      misfits[placed_.submaps[s].submap.chain].push_back(squared_distance(missed, factors_.joined[s].covariance));
     }
     bool any = false;
     for (auto& [chain, of_chain] : misfits) {

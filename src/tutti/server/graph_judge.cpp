@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/server/graph_judge.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <limits>
 #include <memory>
@@ -9,6 +8,7 @@
 #include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::server {
 namespace {
@@ -17,10 +17,9 @@ namespace {
 constexpr double kLeastShare = 1e-12;
 
 RelativePose measurement_of(const PoseGraphEdge& edge) {
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(edge.information);
-  const Vector6d& values = eigen.eigenvalues();
+  const auto [values, vectors] = eigen_of(edge.information);
   const Vector6d variances = values.cwiseMax(kLeastShare * values(5)).cwiseInverse();
-  const Matrix6d covariance = eigen.eigenvectors() * variances.asDiagonal() * eigen.eigenvectors().transpose();
+  const Matrix6d covariance = vectors * variances.asDiagonal() * vectors.transpose();
   return {edge.T_from_to, 0.5 * (covariance + covariance.transpose())};
 }
 

@@ -9,6 +9,7 @@
 #include "support/sanitized.hpp"
 #include "support/server/corridor_run.hpp"
 #include "tutti/estimation/pose_graph_solver.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::server {
 namespace graph_judge_test {
@@ -37,7 +38,7 @@ Case make_case(const CorridorRunConfig& config, std::uint64_t seed) {
       }
   out.graph.graph.poses.resize(out.graph.vertices.size());
   const auto add = [&](const KeyframeId& from, const KeyframeId& to, const RelativePose& measured, bool wrong) {
-    out.graph.graph.edges.push_back({position(from), position(to), measured.T_a_b, measured.covariance.inverse()});
+    out.graph.graph.edges.push_back({position(from), position(to), measured.T_a_b, inverse_of(measured.covariance)});
     out.wrong.push_back(wrong);
   };
   for (const auto& [id, submap] : run.submaps)
@@ -93,8 +94,8 @@ TEST(GraphJudge, HowAnEdgeIsWrittenDoesNotMatter) {
   std::ranges::reverse(other.graph.graph.edges);
   for (std::size_t e = 0; e < other.graph.graph.edges.size(); e += 2) {
     PoseGraphEdge& edge = other.graph.graph.edges[e];
-    const RelativePose turned = inverse({edge.T_from_to, edge.information.inverse()});
-    edge = {edge.to, edge.from, turned.T_a_b, turned.covariance.inverse()};
+    const RelativePose turned = inverse({edge.T_from_to, inverse_of(edge.information)});
+    edge = {edge.to, edge.from, turned.T_a_b, inverse_of(turned.covariance)};
   }
   const JudgedGraph again = judge_graph(other.graph, {});
   for (std::size_t e = 0; e < of.wrong.size(); ++e) {

@@ -16,6 +16,7 @@
 #include "tutti/consistency/chain_uncertainty.hpp"
 #include "tutti/estimation/influence.hpp"
 #include "tutti/geometry/covariance.hpp"
+#include "tutti/geometry/symmetric.hpp"
 #include "tutti/judge/closure_groups.hpp"
 #include "tutti/server/georeference.hpp"
 #include "tutti/server/map_components.hpp"
@@ -133,9 +134,10 @@ std::vector<Matrix6d> spread_odometry(const MapEstimate& map, std::span<const st
       const PoseGraphEdge& edge = map.graph.edges[e];
       if (edge.from != reached) break;
       const auto refined = map.odometry_of_steps.find(e);
-      out[k] = compound_covariance(
-          edge.T_from_to, out[k],
-          refined == map.odometry_of_steps.end() ? Matrix6d(edge.information.inverse() / weights[e]) : refined->second);
+      out[k] = compound_covariance(edge.T_from_to, out[k],
+                                   refined == map.odometry_of_steps.end()
+                                       ? Matrix6d(inverse_of(edge.information) / weights[e])
+                                       : refined->second);
       reached = edge.to;
     }
     if (reached == spread[k]) continue;

@@ -10,6 +10,7 @@
 
 #include "tutti/base/chi_square.hpp"
 #include "tutti/geometry/covariance.hpp"
+#include "tutti/geometry/symmetric.hpp"
 #include "tutti/judge/closure_honesty.hpp"
 #include "tutti/judge/judge_closures.hpp"
 #include "tutti/judge/odometry_honesty.hpp"
@@ -166,11 +167,11 @@ void record_failure(const judge::FailedSegment& failed, MapEstimate& map) {
     const PoseGraphEdge& edge = map.graph.edges[e];
     if (edge.from < failed.from || edge.to > failed.to) continue;
     const Matrix6d to_end = adjoint(b.T_odom_body.inverse() * map.nodes[edge.to].T_odom_body);
-    covariance += to_end * edge.information.inverse() * to_end.transpose();
+    covariance += to_end * inverse_of(edge.information) * to_end.transpose();
   }
   const Vector6d jump = local(a.T_odom_body.inverse() * b.T_odom_body, a.T_world_body.inverse() * b.T_world_body);
   const double jump_m = jump.head<3>().norm(), jump_rad = jump.tail<3>().norm();
-  if (jump.dot(covariance.llt().solve(jump)) < chi_square_quantile(kRightAfterAll, 6)) return;
+  if (squared_distance(jump, covariance) < chi_square_quantile(kRightAfterAll, 6)) return;
   map.failed_odometry.push_back({a.id.chain, a.id.index, b.id.index, jump_m, jump_rad});
   judge::weaken(map.graph, map.odometry_edges, failed.from, failed.to, jump_m, jump_rad);
 }
@@ -223,8 +224,7 @@ std::map<ChainId, judge::OdometryHonesty> honesty_after(const MapEstimate& map, 
   for (std::size_t e = 0; e < map.odometry_edges; ++e) {
     const PoseGraphEdge& edge = map.graph.edges[e];
     const auto holds = [&](const judge::FailedSegment& f) { return f.from < edge.to && edge.from < f.to; };
-    if (std::ranges::none_of(optimum.failed, holds))
-      step_to[edge.to] = edge.information.ldlt().solve(Matrix6d::Identity());
+    if (std::ranges::none_of(optimum.failed, holds)) step_to[edge.to] = inverse_of(edge.information);
   }
   std::vector<LoopClosure> fitting;
   for (const std::size_t c : optimum.closure_of_edge) fitting.push_back(closures[c]);

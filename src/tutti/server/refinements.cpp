@@ -11,6 +11,7 @@
 #include "tutti/estimation/pose_graph_solver.hpp"
 #include "tutti/estimation/termination.hpp"
 #include "tutti/geometry/covariance.hpp"
+#include "tutti/geometry/symmetric.hpp"
 #include "tutti/judge/judge_closures.hpp"
 #include "tutti/server/known_ground.hpp"
 
@@ -39,7 +40,7 @@ void put_steps(const Refinements& refinements, MapEstimate& map) {
     if (step == steps.end() || to.index != from.index + 1 || has_failed(map, from)) continue;
     const auto overstated = map.overstated.find(from.chain);
     map.odometry_of_steps[e] =
-        edge.information.inverse() * (overstated == map.overstated.end() ? 1.0 : overstated->second);
+        inverse_of(edge.information) * (overstated == map.overstated.end() ? 1.0 : overstated->second);
     edge.T_from_to = step->second->T_a_b;
     edge.information = judge::information_of(bounded_covariance(step->second->covariance));
   }

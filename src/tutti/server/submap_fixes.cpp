@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/server/submap_fixes.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
 
 #include "tutti/base/chi_square.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::server {
 namespace {
@@ -72,7 +72,7 @@ double apart(const SubmapFixes::Fix& a, const SubmapFixes::Fix& b, const Vector3
   const Vector3d error = b.p_enu - a.p_enu - moved;
   const Matrix3d covariance =
       a.covariance + b.covariance + std::pow(kHeading_rad, 2) * moved.squaredNorm() * Matrix3d::Identity();
-  return error.dot(covariance.llt().solve(error));
+  return squared_distance(error, covariance);
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 
 #include "support/perception/visual/textured_room.hpp"
 #include "tutti/base/random.hpp"
+#include "tutti/geometry/symmetric.hpp"
 #include "tutti/verifiers/parallel.hpp"
 
 namespace tutti::verifiers {
@@ -121,8 +122,8 @@ TEST(SensorVerifiers, WhatSeveralSensorsFindOfAPairIsNoSurerThanWhatOneFinds) {
     if (alone.empty()) continue;
     ++closed;
     Matrix6d information = Matrix6d::Zero();
-    for (const LoopClosure& closure : both) information += closure.measurement.covariance.inverse();
-    EXPECT_TRUE(information.isApprox(alone.front().measurement.covariance.inverse(), 1e-6));
+    for (const LoopClosure& closure : both) information += inverse_of(closure.measurement.covariance);
+    EXPECT_TRUE(information.isApprox(inverse_of(alone.front().measurement.covariance), 1e-6));
   }
   EXPECT_GT(closed, 0U);
 }

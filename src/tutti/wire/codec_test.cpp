@@ -298,7 +298,7 @@ TEST(ProxyGraphCodec, NodesMayBeAsFarApartAsLegalPosesAre) {
     ProxyGraphMessage message = test::any_proxy_graph(rng, 1, 20, false);
     // From corner to corner, along one axis of the body.
     const Eigen::Vector3d corner = Eigen::Vector3d::Constant(far);
-    const auto rotation = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), corner);
+    const auto rotation = rotation_between(Eigen::Vector3d::UnitX(), corner);
     for (std::size_t i = 0; ProxyNode & node : message.graph.nodes)
       node.T_world_body = {rotation, (i++ % 2 == 0 ? 1.0 : -1.0) * corner};
     const auto decoded = decode_proxy_graph(encode(message));

@@ -9,6 +9,7 @@
 #include "support/estimation/random_graphs.hpp"
 #include "tutti/estimation/onboard_smoother.hpp"
 #include "tutti/estimation/pose_graph_solver.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 /// Odometry chains with constraints and known truth for the tests of the onboard smoother.
 namespace tutti::estimation::testing {
@@ -52,9 +53,9 @@ inline OnboardSmoother smoother_of(const Mission& mission, const OnboardSmoother
 inline std::vector<Pose3> full_optimum(const Mission& mission, const std::vector<Pose3>& start) {
   PoseGraph graph{.poses = start, .edges = {}};
   for (std::size_t k = 0; k < mission.odometry.size(); ++k)
-    graph.edges.push_back({k, k + 1, mission.odometry[k].T_a_b, mission.odometry[k].covariance.inverse()});
+    graph.edges.push_back({k, k + 1, mission.odometry[k].T_a_b, inverse_of(mission.odometry[k].covariance)});
   for (const auto& c : mission.constraints)
-    graph.edges.push_back({c.from, c.to, c.measurement.T_a_b, c.measurement.covariance.inverse()});
+    graph.edges.push_back({c.from, c.to, c.measurement.T_a_b, inverse_of(c.measurement.covariance)});
   const auto solution = solve_pose_graph(graph, {.relative_cost_tolerance = 1e-14, .initialisation = "given"});
   EXPECT_EQ(solution.summary.termination, Termination::converged);
   return solution.poses;

@@ -11,6 +11,7 @@
 #include "tutti/estimation/marginals.hpp"
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/geometry/pose3.hpp"
+#include "tutti/geometry/symmetric.hpp"
 #include "tutti/model/pose_graph.hpp"
 
 /// Small pose graphs with known truth for the tests of this module.
@@ -63,8 +64,7 @@ inline RandomGraph random_graph(Rng& rng, std::size_t nodes, std::size_t loops, 
   for (const auto& [a, b] : pairs) {
     const Matrix6d covariance = random_covariance(rng, sigma_m, sigma_rad);
     const Pose3 exact = out.truth[a].inverse() * out.truth[b];
-    out.graph.edges.push_back(
-        {a, b, retract(exact, noise * sample(rng, covariance)), covariance.llt().solve(Matrix6d::Identity())});
+    out.graph.edges.push_back({a, b, retract(exact, noise * sample(rng, covariance)), inverse_of(covariance)});
     out.covariances.push_back(covariance);
   }
   out.graph.poses = out.truth;

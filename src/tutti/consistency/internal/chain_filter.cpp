@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/consistency/internal/chain_filter.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <vector>
 
 #include "tutti/geometry/so3.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::consistency::internal {
 namespace {
@@ -37,11 +37,12 @@ RigidMotion::RigidMotion(std::span<const ProxyNode> nodes) : arms_(static_cast<E
     arms_.row(static_cast<Eigen::Index>(k)) = nodes[k].T_world_body.translation.transpose();
   remove_mean(arms_);
   const Eigen::Matrix3d scatter = arms_.transpose() * arms_;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> inertia(scatter.trace() * Eigen::Matrix3d::Identity() - scatter);
-  const double smallest = kSmallestInertiaShare * inertia.eigenvalues().maxCoeff();
+  const Eigen::Matrix3d tensor = scatter.trace() * Eigen::Matrix3d::Identity() - scatter;
+  const Eigen3 inertia = eigen_of(tensor);
+  const double smallest = kSmallestInertiaShare * inertia.values(2);
   const Eigen::Vector3d inverse =
-      inertia.eigenvalues().unaryExpr([&](double value) { return value > smallest ? 1.0 / value : 0.0; });
-  inverse_inertia_ = inertia.eigenvectors() * inverse.asDiagonal() * inertia.eigenvectors().transpose();
+      inertia.values.unaryExpr([&](double value) { return value > smallest ? 1.0 / value : 0.0; });
+  inverse_inertia_ = inertia.vectors * inverse.asDiagonal() * inertia.vectors.transpose();
 }
 
 void RigidMotion::remove(Eigen::Ref<Eigen::MatrixX3d> displacements) const {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/consistency/internal/drift_origins.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -10,6 +8,7 @@
 #include "tutti/base/chi_square.hpp"
 #include "tutti/consistency/internal/odometry_drift.hpp"
 #include "tutti/geometry/segment_covariance.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::consistency::internal {
 namespace {
@@ -27,10 +26,8 @@ double quantile(std::vector<double> values, double share) {
 
 /// Clips the variances (eigenvalues) of a 3 x 3 block.
 void clip(Eigen::Ref<Eigen::Matrix3d> block, double largest) {
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
-  eigen.computeDirect(Eigen::Matrix3d(block));
-  const Eigen::Vector3d kept = eigen.eigenvalues().cwiseMin(largest).cwiseMax(0.0);
-  block = eigen.eigenvectors() * kept.asDiagonal() * eigen.eigenvectors().transpose();
+  const auto [values, vectors] = quick_eigen_of(block);
+  block = vectors * values.cwiseMin(largest).cwiseMax(0.0).asDiagonal() * vectors.transpose();
 }
 
 /// Odometry with no step less sure, per metre, than usual.
@@ -43,8 +40,8 @@ std::vector<RelativePose> usual_odometry(const TimeChain& chain) {
   };
   for (std::size_t k = 1; k < chain.odometry.size(); ++k) {
     const Matrix6d& C = chain.odometry[k].covariance;
-    metres.push_back(C.topLeftCorner<3, 3>().selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff() / length(k));
-    radians.push_back(C.bottomRightCorner<3, 3>().selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff() / length(k));
+    metres.push_back(eigen_of(Eigen::Matrix3d(C.topLeftCorner<3, 3>())).values(2) / length(k));
+    radians.push_back(eigen_of(Eigen::Matrix3d(C.bottomRightCorner<3, 3>())).values(2) / length(k));
   }
   std::vector<RelativePose> out = chain.odometry;
   if (metres.empty()) return out;
@@ -117,7 +114,7 @@ class Scan {
     missed << to_b * missed.head<3>(), to_b * missed.tail<3>();
     C.diagonal().head<3>().array() += server_[b - a].position_m + 1e-6;
     C.diagonal().tail<3>().array() += server_[b - a].rotation_rad + 1e-7;
-    return missed.dot(C.llt().solve(missed));
+    return squared_distance(missed, C);
   }
   std::span<const Pose3> poses_;
   std::span<const RelativePose> odometry_;

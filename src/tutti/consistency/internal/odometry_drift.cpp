@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/consistency/internal/odometry_drift.hpp"
 
-#include <Eigen/Cholesky>
-
 #include "tutti/base/check.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::consistency::internal {
 
@@ -50,7 +49,7 @@ Eigen::MatrixXd OdometryDrift::with_fixed(std::span<const std::size_t> fixed) co
     const std::size_t a = fixed[j - 1], b = fixed[j];
     Matrix6d S = Matrix6d::Zero();
     for (std::size_t k = a + 1; k <= b; ++k) S += nodes_[k].step;
-    const Vector6d pull = S.ldlt().solve(nodes_[b].E - nodes_[a].E);
+    const Vector6d pull = solve_definite(S, nodes_[b].E - nodes_[a].E);
     S.setZero();
     for (std::size_t k = a + 1; k <= b; ++k) {
       S += nodes_[k].step;

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/consistency/internal/worst_sigma.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
+
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::consistency::internal {
 
@@ -14,7 +15,7 @@ double worst_sigma(const Eigen::Matrix3d& scatter, double samples) {
   const double spread = (samples + 1.0 / 3.0) * (squares - trace * trace / 3.0);
   const double wanted = squares / 3.0 + trace * trace;
   const double share = wanted < spread ? wanted / spread : 1.0;
-  const double largest = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(S, Eigen::EigenvaluesOnly).eigenvalues()(2);
+  const double largest = eigen_of(S).values(2);
   return std::sqrt((1.0 - share) * largest + share * trace / 3.0);
 }
 

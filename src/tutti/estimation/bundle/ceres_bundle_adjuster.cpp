@@ -14,6 +14,7 @@
 #include "tutti/estimation/bundle/internal/problem_structure.hpp"
 #include "tutti/estimation/bundle/projection_factor.hpp"
 #include "tutti/estimation/robust_loss.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::bundle {
 namespace {
@@ -102,7 +103,7 @@ class ProjectionCost final : public ceres::SizedCostFunction<2, 7, 3> {
 class OdometryCost final : public ceres::SizedCostFunction<6, 7, 7> {
  public:
   explicit OdometryCost(const RelativePose& measurement)
-      : T_(measurement.T_a_b), root_(measurement.covariance.llt().matrixL().solve(Matrix6d::Identity())) {}
+      : T_(measurement.T_a_b), root_(root_of_inverse(measurement.covariance)) {}
   bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
     const auto at = estimation::linearise_between(pose_of(x[0]), pose_of(x[1]), T_);
     Eigen::Map<Vector6d>{residual} = root_ * at.residual;

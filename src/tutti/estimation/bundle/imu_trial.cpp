@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/estimation/bundle/imu_trial.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <map>
 #include <memory>
@@ -9,6 +8,7 @@
 
 #include "tutti/base/disjoint_sets.hpp"
 #include "tutti/estimation/bundle/path_scale.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::bundle {
 namespace {
@@ -57,7 +57,7 @@ class Trial {
       }
       const std::size_t middle = steps[steps.size() / 2].from;
       const Eigen::Matrix3d bias = posterior_with.accelerometer_bias(middle);
-      run.bias_sigma_mps2 = std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(bias).eigenvalues().maxCoeff());
+      run.bias_sigma_mps2 = largest_sigma(bias);
       const PathScale fit = path_scale(steps, without, posterior_without);
       run.scale = fit.scale > 0.0 ? 1.0 / fit.scale : 1.0;
       run.scale_sigma = std::sqrt(fit.variance);

@@ -3,11 +3,11 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 
 #include "support/estimation/bundle/scene.hpp"
 #include "support/sanitized.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::bundle {
 namespace refine_map_test {
@@ -43,7 +43,7 @@ double mean_nees(const Scene& scene, const RefinedMap& refined) {
   double sum = 0.0;
   for (const auto& [from, to, measurement] : refined.factors) {
     const Vector6d error = local(measurement.T_a_b, scene.truth[from.index].inverse() * scene.truth[to.index]);
-    sum += error.dot(measurement.covariance.ldlt().solve(error));
+    sum += squared_distance(error, measurement.covariance);
   }
   return sum / static_cast<double>(refined.factors.size());
 }

@@ -15,6 +15,7 @@
 #include "tutti/estimation/internal/block_structure.hpp"
 #include "tutti/estimation/internal/selected_inverse.hpp"
 #include "tutti/estimation/robust_loss.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::bundle {
 namespace {
@@ -114,7 +115,7 @@ void add_odometry(const BundleProblem& problem, const BundleSolution& solution, 
   for (const auto& odometry : problem.odometry) {
     const auto at = estimation::linearise_between(solution.T_world_body[odometry.from],
                                                   solution.T_world_body[odometry.to], odometry.measurement.T_a_b);
-    const Matrix6d root = odometry.measurement.covariance.llt().matrixL().solve(Matrix6d::Identity());
+    const Matrix6d root = root_of_inverse(odometry.measurement.covariance);
     const double weight = std::sqrt(config.odometry_loss.weight((root * at.residual).squaredNorm()));
     const Pose3& T_from_to = odometry.measurement.T_a_b;
     Matrix6d J_scale = Matrix6d::Zero();  // the residual's translation is in the frame of the step's end

@@ -7,6 +7,7 @@
 
 #include "tutti/estimation/internal/chain_run.hpp"
 #include "tutti/estimation/internal/gauss_newton.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::estimation::internal {
 namespace {
@@ -81,8 +82,7 @@ PoseGraph reduced_graph(std::span<const std::size_t> nodes, std::span<const Pose
   };
   for (const auto& [from, to, measurement] : constraints)
     if (from != to)
-      graph.edges.push_back(
-          {position(from), position(to), measurement.T_a_b, measurement.covariance.llt().solve(Matrix6d::Identity())});
+      graph.edges.push_back({position(from), position(to), measurement.T_a_b, inverse_of(measurement.covariance)});
   return graph;
 }
 

@@ -3,11 +3,11 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
 #include "tutti/geometry/so3.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::fit {
 namespace {
@@ -85,10 +85,9 @@ MotionModel moved(const MotionModel& model, const Parameters& step) {
 WeighedSteps weigh(std::span<const ScanStep> steps) {
   WeighedSteps out;
   for (const ScanStep& step : steps) {
-    const Eigen::LLT<Matrix6d> cholesky(step.covariance);
-    if (cholesky.info() != Eigen::Success) continue;
+    if (!is_definite(step.covariance)) continue;
     out.steps.push_back(step);
-    out.root.emplace_back(cholesky.matrixL().solve(Matrix6d::Identity()));
+    out.root.push_back(root_of_inverse(step.covariance));
   }
   return out;
 }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/perception/fit/standstill.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <optional>
 
 #include "tutti/geometry/so3.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::fit {
 namespace {
@@ -18,7 +18,7 @@ constexpr double kSureDistance2 = 36.0;
 /// The scans surely show another motion.
 bool contradicts(const ScanStep& step, const Pose3& by_odometry) {
   const Vector6d difference = local(by_odometry, step.T_from_to);
-  return difference.dot(step.covariance.ldlt().solve(difference)) >= kSureDistance2;
+  return squared_distance(difference, step.covariance) >= kSureDistance2;
 }
 
 bool stands(const ScanStep& step, const Pose3& by_odometry) {

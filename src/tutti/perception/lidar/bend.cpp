@@ -3,6 +3,7 @@
 
 #include <Eigen/LU>
 
+#include "tutti/geometry/symmetric.hpp"
 #include "tutti/perception/lidar/submap_middle.hpp"
 
 namespace tutti::lidar {
@@ -74,7 +75,7 @@ Matrix6d bend_covariance(const Bend& target, const Bend& source, const Pose3& T_
     weights += contact.weight;
   }
   // Damped as the registration is: what nothing constrains stays where it is.
-  const Matrix6d inverse = (information + 1e-6 * weights * Matrix6d::Identity()).inverse();
+  const Matrix6d inverse = inverse_of(information + 1e-6 * weights * Matrix6d::Identity());
   return covariance_of(source, information_by_keyframe(source, contacts, &Contact::source), inverse,
                        Matrix6d::Identity()) +
          covariance_of(target, information_by_keyframe(target, contacts, &Contact::target), inverse,

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/perception/lidar/levelling.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 
 #include "tutti/geometry/so3.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::lidar {
 namespace {
@@ -42,11 +42,11 @@ UpDirection refine_up(std::span<const Eigen::Vector3f> normals, const Eigen::Vec
   for (const double tolerance : kSearchDeg) {
     const Split sums = split(normals, result.up, tolerance);
     if (sums.used < kMinShare * sums.all || sums.used < 10.0) break;
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(sums.walls_minus_floors);
-    const Eigen::Vector3d up = solver.eigenvectors().col(0);
+    const Eigen3 eigen = eigen_of(sums.walls_minus_floors);
+    const Eigen::Vector3d up = eigen.vectors.col(0);
     // Walls of one direction only leave up free to turn about their normal: then the smallest two eigenvalues are
     // close.
-    if (solver.eigenvalues()[1] - solver.eigenvalues()[0] < kMinShare * sums.used) break;
+    if (eigen.values[1] - eigen.values[0] < kMinShare * sums.used) break;
     result.up = up.dot(result.up) < 0.0 ? Eigen::Vector3d(-up) : up;
   }
   const Split final_sums = split(normals, result.up, kUpToleranceDeg);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/perception/lidar/oriented_cloud.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <nanoflann.hpp>
 
+#include "tutti/geometry/symmetric.hpp"
 #include "tutti/model/kdtree_points.hpp"
 
 namespace tutti::lidar {
@@ -48,10 +48,9 @@ Eigen::Vector3f fit_normal(const NeighbourIndex& index, std::span<const std::int
     const Eigen::Vector3d d = index.points()[static_cast<std::size_t>(i)].cast<double>() - mean;
     scatter += d * d.transpose();
   }
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
-  solver.computeDirect(scatter);
-  if (!(solver.eigenvalues()[0] <= max_ratio * solver.eigenvalues()[1])) return Eigen::Vector3f::Zero();
-  return solver.eigenvectors().col(0).cast<float>().normalized();
+  const auto [values, vectors] = quick_eigen_of(scatter);
+  if (!(values[0] <= max_ratio * values[1])) return Eigen::Vector3f::Zero();
+  return vectors.col(0).cast<float>().normalized();
 }
 
 Eigen::Vector3f nearest_viewpoint(std::span<const Eigen::Vector3f> viewpoints, const Eigen::Vector3f& p) {

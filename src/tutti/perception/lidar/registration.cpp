@@ -12,6 +12,7 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::lidar {
 namespace {
@@ -128,7 +129,7 @@ bool run_level(const OrientedCloud& target, const OrientedCloud& source, const R
     const auto matches = matcher.at(result.T_target_source, level.max_distance_m);
     if (matches.size() < kMinCorrespondences) return false;
     const auto sums = linearise(target, source, matches, result.T_target_source, scale);
-    const Vector6d step = sums.damped().ldlt().solve(-sums.g);
+    const Vector6d step = solve_definite(sums.damped(), -sums.g);
     if (!step.allFinite()) return false;
     result.T_target_source = retract(result.T_target_source, step);
     ++result.iterations;
@@ -215,9 +216,9 @@ void assess(const OrientedCloud& target, const OrientedCloud& source, const Regi
   result.overlap = count / static_cast<double>(matcher.size());
   result.plane_rmse_m = std::sqrt(scatter.squares / count);
   result.overlap_centre_source = sums.centre;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> facing(scatter.normals / count);
-  result.min_translation_eigenvalue = facing.eigenvalues()[0];
-  result.weakest_source = facing.eigenvectors().col(0);
+  const Eigen3 facing = eigen_of(Eigen::Matrix3d(scatter.normals / count));
+  result.min_translation_eigenvalue = facing.values[0];
+  result.weakest_source = facing.vectors.col(0);
   result.misfit = worst_ratio(scatter.residuals, scatter.roughness, matches.size());
   result.covariance = residual_covariance(sums.damped(), terms);
 }

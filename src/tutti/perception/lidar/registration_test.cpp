@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "support/perception/lidar/rooms.hpp"
+#include "tutti/geometry/symmetric.hpp"
 #include "tutti/perception/lidar/submap_features.hpp"
 
 namespace tutti::lidar {
@@ -76,7 +77,7 @@ TEST(SelfResiduals, areTheNoiseOfAFlatWall) {
 class ErrorOverCovariance {
  public:
   void add(const Vector6d& error, const Matrix6d& covariance) {
-    sum_ += error.dot(covariance.inverse() * error);
+    sum_ += squared_distance(error, covariance);
     dof_ += 6;
   }
   /// The chance that a true ratio of `expected` shows outside of this is 2 in 10,000 (chi-square, Wilson-Hilferty).

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <span>
 
+#include "tutti/geometry/so3.hpp"
 #include "tutti/model/path_length.hpp"
 #include "tutti/perception/lidar/levelling.hpp"
 #include "tutti/perception/lidar/registration.hpp"
@@ -96,7 +97,7 @@ SeenFromAbove see_from_above(const Submap& submap, const LidarClosureConfig& con
   for (const auto& pose : poses) out.viewpoints.push_back(pose.translation.cast<float>());
   out.cloud = orient(std::move(points), out.viewpoints, config.normals);
   const Eigen::Vector3d up = find_up(submap, poses, *out.cloud.normals);
-  out.R_level_submap = Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ());
+  out.R_level_submap = rotation_between(up, Eigen::Vector3d::UnitZ());
   out.view = make_view(out.cloud, out.R_level_submap, config.candidates.cell_m);
   return out;
 }

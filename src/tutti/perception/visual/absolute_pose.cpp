@@ -9,6 +9,7 @@
 #include <cstddef>
 
 #include "tutti/geometry/so3.hpp"
+#include "tutti/geometry/symmetric.hpp"
 #include "tutti/perception/visual/p3p.hpp"
 
 namespace tutti::visual {
@@ -112,7 +113,7 @@ class Problem {
 Pose3 refine(const Problem& problem, const std::vector<std::uint32_t>& chosen, Pose3 T_map_body) {
   for (int i = 0; i < kRefinements; ++i) {
     const auto normal = problem.normal_equations(chosen, T_map_body, true);
-    const Vector6d step = -normal.H.ldlt().solve(normal.g);
+    const Vector6d step = -solve_definite(normal.H, normal.g);
     if (!step.allFinite()) break;
     T_map_body = retract(T_map_body, step);
     if (step.norm() < kConverged) break;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/perception/visual/p3p.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
@@ -10,6 +9,7 @@
 #include <utility>
 
 #include "tutti/geometry/so3.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::visual {
 namespace {
@@ -114,15 +114,15 @@ std::vector<Eigen::Vector3d> distances(const Triangle& t) {
   const double c3 = D2.determinant(), c2 = mixed(D2, D1), c1 = mixed(D1, D2), c0 = D1.determinant();
   if (std::abs(c3) < kTooSmall * D2.cwiseAbs().maxCoeff()) return {};
   const double g = cubic_root(c2 / c3, c1 / c3, c0 / c3);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(D1 + g * D2);
+  const Eigen3 eigen = eigen_of(Eigen::Matrix3d(D1 + g * D2));
   // One eigenvalue is zero; with the others of different signs the cone is two planes, eq. (11).
-  Eigen::Vector3d values = eigen.eigenvalues();
+  Eigen::Vector3d values = eigen.values;
   Eigen::Index zero = 0;
   values.cwiseAbs().minCoeff(&zero);
   const Eigen::Index low = zero == 0 ? 1 : 0, high = zero == 2 ? 1 : 2;
   if (!(values[low] < 0.0 && values[high] > 0.0)) return {};
   const double s = std::sqrt(-values[low] / values[high]);
-  const Eigen::Vector3d e_low = eigen.eigenvectors().col(low), e_high = eigen.eigenvectors().col(high);
+  const Eigen::Vector3d e_low = eigen.vectors.col(low), e_high = eigen.vectors.col(high);
   std::vector<Eigen::Vector3d> out;
   for (const double sign : {s, -s}) {
     const Eigen::Vector3d normal = e_high - sign * e_low;  // normal^T l = 0

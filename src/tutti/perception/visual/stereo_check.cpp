@@ -7,6 +7,7 @@
 #include <map>
 
 #include "tutti/geometry/so3.hpp"
+#include "tutti/geometry/symmetric.hpp"
 
 namespace tutti::visual {
 namespace {
@@ -74,8 +75,7 @@ std::optional<StereoTurn> StereoCheck::turn() const {
   const double sigma_rad = median_error(equations) / kMadOfSigma;
   out.covariance = sigma_rad * sigma_rad * (H + 1e-9 * Eigen::Matrix3d::Identity()).inverse() +
                    kStated_rad * kStated_rad * Eigen::Matrix3d::Identity();
-  out.is_wrong =
-      out.turn_rad.dot(out.covariance.ldlt().solve(out.turn_rad)) > kMaxSigmas * kMaxSigmas || out.turned_px > kMax_px;
+  out.is_wrong = squared_distance(out.turn_rad, out.covariance) > kMaxSigmas * kMaxSigmas || out.turned_px > kMax_px;
   out.is_turned = out.is_wrong && 2.0 * out.turned_px < out.stated_px;
   return out;
 }

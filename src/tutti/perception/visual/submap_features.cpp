@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/perception/visual/submap_features.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <map>
 
+#include "tutti/geometry/symmetric.hpp"
 #include "tutti/perception/visual/reprojection.hpp"
 #include "tutti/perception/visual/triangulate.hpp"
 
@@ -40,11 +39,11 @@ SegmentCovariance odometry_of(const Submap& submap) {
 MappedPoint map_point(const Landmark& landmark, const std::vector<View>& views) {
   MappedPoint out{landmark.position.cast<double>(), Eigen::Matrix3d::Identity()};
   const double variance = static_cast<double>(landmark.sigma_m) * landmark.sigma_m;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> information(point_information(views, out.position));
-  const double least = information.eigenvalues()[0];
+  const auto [values, vectors] = eigen_of(point_information(views, out.position));
+  const double least = values[0];
   if (least > 0.0 && std::isfinite(least)) {
-    const Eigen::Vector3d shape = (information.eigenvalues() / least).cwiseInverse();  // at most 1
-    out.covariance_m2 = information.eigenvectors() * shape.asDiagonal() * information.eigenvectors().transpose();
+    const Eigen::Vector3d shape = (values / least).cwiseInverse();  // at most 1
+    out.covariance_m2 = vectors * shape.asDiagonal() * vectors.transpose();
     out.covariance_m2 *= variance > 0.0 ? 1.0 : 1.0 / least;
   }
   if (variance > 0.0) out.covariance_m2 *= variance;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/perception/visual/verify.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -13,6 +12,7 @@
 #include <vector>
 
 #include "tutti/base/check.hpp"
+#include "tutti/geometry/symmetric.hpp"
 #include "tutti/perception/visual/matching.hpp"
 
 namespace tutti::visual {
@@ -72,10 +72,6 @@ double spread(const std::vector<Sighting>& sightings, const std::vector<std::uin
     out = std::max(out, box.volume() / (static_cast<double>(cameras[c].model.width_px) * cameras[c].model.height_px));
   }
   return out;
-}
-
-double largest_sigma(const Eigen::Matrix3d& covariance) {
-  return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues()[2]);
 }
 
 /// How many of the landmarks each keyframe of the map saw.

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/perception/visual/visual_payload.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -10,6 +9,7 @@
 #include <queue>
 #include <utility>
 
+#include "tutti/geometry/symmetric.hpp"
 #include "tutti/perception/visual/hamming.hpp"
 
 namespace tutti::visual {
@@ -104,8 +104,7 @@ Result<std::map<std::uint64_t, std::vector<Seen>>> tracks_of(const std::vector<I
 }
 
 Landmark to_landmark(const TriangulatedPoint& point) {
-  const double variance = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(point.covariance).eigenvalues().maxCoeff();
-  return {point.position.cast<float>(), static_cast<float>(std::sqrt(variance))};
+  return {point.position.cast<float>(), static_cast<float>(largest_sigma(point.covariance))};
 }
 
 /// What a track's views miss its point by, and what pixels and odometry explain of it: root mean squares over them.
