@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tutti/mapfile/make_map.hpp"
+#include "tutti/mapfile/meta_rows.hpp"
 #include "tutti/mapfile/renumber.hpp"
 #include "tutti/node/decisions.hpp"
 #include "tutti/node/meta_keys.hpp"
@@ -26,15 +27,6 @@ using storage::TableStore, storage::Write;
 /// What becomes of a row of `b` when there is another one in `a`: the bytes that are taken.
 using Choose = std::function<Result<std::string>(std::string_view key, std::string a, std::string b)>;
 
-/// Rows that are about one map alone: what became of it, its versions, the poses that it holds and what robots returned
-/// of it, and refinements and places, which join_refinements() and join_places() put.
-bool is_of_one_map(const std::string& table, std::string_view key) {
-  return table == map_tables::kMeta &&
-         (key == node::kCountsKey || key == node::kLastUpdateKey || key.starts_with(node::kRefinementPrefix) ||
-          key.starts_with(node::kPlacePrefix) || key.starts_with(node::kHeldPrefix) ||
-          key.starts_with(node::kVersionPrefix) || key.starts_with(node::kReturnedPrefix));
-}
-
 /// Rows of `a`, and those of `b`, into the table; counts the keys that are in both.
 Result<std::size_t> join(const TableStore& a, const TableStore& b, const std::string& table, const Choose& choose,
                          Writer& out) {
@@ -42,7 +34,7 @@ Result<std::size_t> join(const TableStore& a, const TableStore& b, const std::st
   Status ok;
   const auto copy = [&](const TableStore& from, const TableStore* other, bool first) {
     const auto scanned = from.scan(table, {}, [&](std::string_view key, std::string_view bytes) {
-      if (is_of_one_map(table, key)) return true;
+      if (table == map_tables::kMeta && meta_row(key).merge_drops) return true;
       const auto there = other->read(table, key);
       if (!there) {
         ok = tl::unexpected(there.error());

@@ -11,9 +11,9 @@
 #include <utility>
 
 #include "tutti/mapfile/changed_tables.hpp"
+#include "tutti/mapfile/meta_rows.hpp"
 #include "tutti/node/decisions.hpp"
 #include "tutti/node/map_meta.hpp"
-#include "tutti/node/meta_keys.hpp"
 #include "tutti/node/robot_registry.hpp"
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/storage/map_tables.hpp"
@@ -119,30 +119,40 @@ node::RobotRow renamed(node::RobotRow row, RobotId robot, const Chains& chains) 
 }
 
 Result<NewRows> renamed_meta(std::string_view key, std::string_view bytes, const Chains& chains) {
-  if (key.starts_with(node::kRefusedPrefix)) return NewRows();   // written anew, by refusals
-  if (key.starts_with(node::kReturnedPrefix)) return NewRows();  // robots return it of the map that this becomes
-  for (const std::string_view prefix : {node::kHeldPrefix, node::kRetiredPrefix}) {
-    if (!key.starts_with(prefix)) continue;
-    const auto id = node::submap_of_key(key.substr(prefix.size()));
-    if (!id) return fail(ErrorCode::parse, "the row '{}' of table 'meta' is damaged", key);
-    return NewRows{{map_tables::kMeta, std::string(prefix) + node::key_of(renamed(*id, chains)), std::string(bytes)}};
-  }
-  if (const auto robot = node::RobotRegistry::robot_of(key)) {
-    const auto row = node::decode_robot(bytes);
-    if (!row) return fail(ErrorCode::parse, "the row '{}' of table 'meta' is damaged", key);
-    RobotId number = *robot;
-    for (const auto& [from, to] : chains)
-      if (from.robot == *robot) number = to.robot;
-    return NewRows{{map_tables::kMeta, node::RobotRegistry::key(number), encode(renamed(*row, *robot, chains))}};
-  }
-  if (auto place = node::place_of_row(key, bytes)) {
-    for (server::Alike& alike : place->second.candidates) alike.submap = renamed(alike.submap, chains);
-    return NewRows{node::to_row(renamed(place->first, chains), place->second)};
-  }
-  if (key.starts_with(node::kRefinementPrefix)) {
-    auto refinement = wire::decode_refinement(bytes);
-    if (!refinement) return NewRows();  // as who opens the map: it is made again
-    return NewRows{{map_tables::kMeta, std::string(key), wire::encode(renamed(std::move(*refinement), chains))}};
+  const auto damaged = [&] { return fail(ErrorCode::parse, "the row '{}' of table 'meta' is damaged", key); };
+  const MetaRow& row = meta_row(key);
+  if (row.renumber_drops) return NewRows();
+  switch (row.of) {
+    using enum MetaRow::Of;
+    case map:
+    case version:
+      break;
+    case submap: {
+      const auto id = node::submap_of_key(key.substr(row.key.size()));
+      if (!id) return damaged();
+      return NewRows{
+          {map_tables::kMeta, std::string(row.key) + node::key_of(renamed(*id, chains)), std::string(bytes)}};
+    }
+    case robot: {
+      const auto of = node::RobotRegistry::robot_of(key);
+      const auto known = node::decode_robot(bytes);
+      if (!of || !known) return damaged();
+      RobotId number = *of;
+      for (const auto& [from, to] : chains)
+        if (from.robot == *of) number = to.robot;
+      return NewRows{{map_tables::kMeta, node::RobotRegistry::key(number), encode(renamed(*known, *of, chains))}};
+    }
+    case place: {
+      auto known = node::place_of_row(key, bytes);
+      if (!known) return NewRows();  // as who opens the map: it is made again
+      for (server::Alike& alike : known->second.candidates) alike.submap = renamed(alike.submap, chains);
+      return NewRows{node::to_row(renamed(known->first, chains), known->second)};
+    }
+    case refinement: {
+      auto known = wire::decode_refinement(bytes);
+      if (!known) return NewRows();  // likewise
+      return NewRows{{map_tables::kMeta, std::string(key), wire::encode(renamed(std::move(*known), chains))}};
+    }
   }
   return NewRows{{map_tables::kMeta, std::string(key), std::string(bytes)}};
 }

@@ -12,6 +12,7 @@
 
 #include "tutti/mapfile/changed_tables.hpp"
 #include "tutti/mapfile/make_map.hpp"
+#include "tutti/mapfile/meta_rows.hpp"
 #include "tutti/node/decisions.hpp"
 #include "tutti/node/map_meta.hpp"
 #include "tutti/node/meta_keys.hpp"
@@ -67,23 +68,32 @@ NewRows meta_without(std::string_view key, std::string_view bytes, const Without
   const auto same_if = [&](bool is_kept) {
     return is_kept ? NewRows{{map_tables::kMeta, std::string(key), std::string(bytes)}} : NewRows();
   };
-  if (key == node::kCountsKey || key == node::kLastUpdateKey || key.starts_with(node::kReturnedPrefix)) return {};
-  if (key.starts_with(node::kVersionPrefix)) return same_if(number_of(key).value_or(until) < until);
-  if (const auto robot = node::RobotRegistry::robot_of(key)) return same_if(stays.contains(*robot));
-  for (const std::string_view prefix : {node::kHeldPrefix, node::kRetiredPrefix}) {
-    if (!key.starts_with(prefix)) continue;
-    const auto id = node::submap_of_key(key.substr(prefix.size()));
-    return same_if(id && without.has(*id));
+  const MetaRow& row = meta_row(key);
+  if (row.revert_drops) return {};
+  switch (row.of) {
+    using enum MetaRow::Of;
+    case map:
+      return same_if(true);
+    case version:
+      return same_if(number_of(key).value_or(until) < until);
+    case robot:
+      return same_if(stays.contains(node::RobotRegistry::robot_of(key).value_or(RobotId())));
+    case submap: {
+      const auto id = node::submap_of_key(key.substr(row.key.size()));
+      return same_if(id && without.has(*id));
+    }
+    case place: {
+      auto known = node::place_of_row(key, bytes);
+      if (!known || !without.has(known->first)) return {};
+      std::erase_if(known->second.candidates, [&](const server::Alike& alike) { return !without.has(alike.submap); });
+      return {node::to_row(known->first, known->second)};
+    }
+    case refinement: {
+      const auto known = wire::decode_refinement(bytes);
+      return same_if(known && without.has(*known));
+    }
   }
-  if (auto place = node::place_of_row(key, bytes)) {
-    std::erase_if(place->second.candidates, [&](const server::Alike& alike) { return !without.has(alike.submap); });
-    return without.has(place->first) ? NewRows{node::to_row(place->first, place->second)} : NewRows();
-  }
-  if (key.starts_with(node::kRefinementPrefix)) {
-    const auto refinement = wire::decode_refinement(bytes);
-    return same_if(refinement && without.has(*refinement));
-  }
-  return same_if(true);
+  return {};
 }
 
 /// Everything but what later versions, from number `until` on, added.

@@ -13,13 +13,6 @@
 #include "tutti/wire/refinement_codec.hpp"
 
 namespace tutti::node {
-namespace {
-
-constexpr const char* kMap = "map";
-constexpr const char* kSettings = "settings";
-
-}  // namespace
-
 Status each_row_of(const storage::TableStore& map, std::string_view prefix,
                    const std::function<Status(std::string_view key, std::string_view bytes)>& visit) {
   Status ok;
@@ -32,11 +25,12 @@ Status each_row_of(const storage::TableStore& map, std::string_view prefix,
 }
 
 storage::Write to_row(const MapMeta& meta) {
-  return {map_tables::kMeta, kMap, storage::key_of({meta.epoch, meta.revision, meta.news ? 1U : 0U, meta.start})};
+  return {map_tables::kMeta, std::string(kMapKey),
+          storage::key_of({meta.epoch, meta.revision, meta.news ? 1U : 0U, meta.start})};
 }
 
 Result<std::optional<MapMeta>> read_map_meta(const storage::TableStore& map) {
-  const auto row = map.read(map_tables::kMeta, kMap);
+  const auto row = map.read(map_tables::kMeta, kMapKey);
   if (!row) return tl::unexpected(row.error());
   if (!*row) return std::nullopt;
   const auto numbers = storage::numbers_of(**row, 4);
@@ -75,12 +69,12 @@ Result<std::optional<LastUpdate>> read_last_update(const storage::TableStore& ma
 }
 
 storage::Write to_row(const server::ServerConfig& settings) {
-  return {map_tables::kMeta, kSettings, to_yaml(dump_config(settings))};
+  return {map_tables::kMeta, std::string(kSettingsKey), to_yaml(dump_config(settings))};
 }
 
 Result<server::ServerConfig> read_settings(const storage::TableStore& map) {
   server::ServerConfig settings;
-  const auto row = map.read(map_tables::kMeta, kSettings);
+  const auto row = map.read(map_tables::kMeta, kSettingsKey);
   if (!row) return tl::unexpected(row.error());
   if (!*row) return settings;
   const auto node = parse_yaml(**row, "the map's settings");

@@ -8,14 +8,13 @@
 #include <utility>
 
 #include "tutti/node/map_meta.hpp"
+#include "tutti/node/meta_keys.hpp"
 #include "tutti/node/picture.hpp"
 #include "tutti/storage/map_tables.hpp"
 #include "tutti/wire/field_bytes.hpp"
 
 namespace tutti::node {
 namespace {
-
-constexpr std::string_view kMark = "mark/", kPhoto = "photo/";
 
 std::string key(std::string_view prefix, std::uint64_t number) { return fmt::format("{}{:020}", prefix, number); }
 
@@ -42,8 +41,8 @@ Status check(const MapMark& mark, const std::string& photo, std::size_t known) {
 
 Result<MarkSet> read_marks(const storage::TableStore& map) {
   MarkSet out;
-  const Status ok = each_row_of(map, kMark, [&](std::string_view key, std::string_view bytes) {
-    const auto number = number_of(key, kMark);
+  const Status ok = each_row_of(map, kMarkPrefix, [&](std::string_view key, std::string_view bytes) {
+    const auto number = number_of(key, kMarkPrefix);
     auto mark = wire::read_fields<MapMark>(bytes);
     if (number && mark && wire::check_fields(*mark)) out.emplace(*number, std::move(*mark));
     return Status();
@@ -53,13 +52,13 @@ Result<MarkSet> read_marks(const storage::TableStore& map) {
 }
 
 Result<std::optional<std::string>> read_photo(const storage::TableStore& map, std::uint64_t number) {
-  return map.read(map_tables::kMeta, key(kPhoto, number));
+  return map.read(map_tables::kMeta, key(kPhotoPrefix, number));
 }
 
 Result<std::vector<storage::Write>> follow(const MarkOrder& order, MarkSet& known) {
   const auto found = known.find(order.number);
-  std::vector<storage::Write> rows{{map_tables::kMeta, key(kMark, order.number), std::nullopt},
-                                   {map_tables::kMeta, key(kPhoto, order.number), std::nullopt}};
+  std::vector<storage::Write> rows{{map_tables::kMeta, key(kMarkPrefix, order.number), std::nullopt},
+                                   {map_tables::kMeta, key(kPhotoPrefix, order.number), std::nullopt}};
   if (!order.mark) {
     if (found == known.end()) return fail(ErrorCode::invalid, "there is no such mark");
     known.erase(found);

@@ -6,12 +6,11 @@
 #include <charconv>
 
 #include "tutti/node/map_meta.hpp"
+#include "tutti/node/meta_keys.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::node {
 namespace {
-
-constexpr std::string_view kKey = "robot/";
 
 /// When there are too many, the oldest are forgotten.
 void remember(std::set<std::uint64_t>& sessions, std::uint64_t session) {
@@ -158,13 +157,13 @@ RobotRegistry::Heard RobotRegistry::hear(RobotId id, const NodeStatus& status, T
   return heard;
 }
 
-std::string RobotRegistry::key(RobotId robot) { return fmt::format("{}{}", kKey, robot.value); }
+std::string RobotRegistry::key(RobotId robot) { return fmt::format("{}{}", kRobotPrefix, robot.value); }
 
 std::optional<RobotId> RobotRegistry::robot_of(std::string_view key) {
   RobotId robot;
-  if (!key.starts_with(kKey)) return std::nullopt;
+  if (!key.starts_with(kRobotPrefix)) return std::nullopt;
   const char* const end = key.data() + key.size();
-  const auto [stop, error] = std::from_chars(key.data() + kKey.size(), end, robot.value);
+  const auto [stop, error] = std::from_chars(key.data() + kRobotPrefix.size(), end, robot.value);
   return error == std::errc() && stop == end ? std::optional(robot) : std::nullopt;
 }
 

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+/// What becomes of each row of table `meta` when a map is copied: said once, for all that copies maps.
+namespace tutti::mapfile {
+
+struct MetaRow {
+  enum class Of { map, robot, submap, place, refinement, version };  ///< What the key names, after its prefix.
+  std::string_view key;                                              ///< A prefix when it ends with a slash.
+  Of of = Of::map;
+  bool merge_drops = false;     ///< It is about one map alone, or is joined by merge() itself.
+  bool revert_drops = false;    ///< It is about the map as it was.
+  bool renumber_drops = false;  ///< It names robots, and is made again.
+};
+
+[[nodiscard]] const std::vector<MetaRow>& meta_rows();
+/// Without a key for a row of a newer program, which is copied as it is.
+[[nodiscard]] const MetaRow& meta_row(std::string_view key);
+
+}  // namespace tutti::mapfile
