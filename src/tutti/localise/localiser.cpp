@@ -26,7 +26,7 @@ constexpr double kMap_m = 0.02, kMap_rad = 0.1 * kRadPerDeg;
 constexpr double kAlike = 4.0;
 constexpr double kCameraAge_s = 25.0;   // a camera's submap is due before
 constexpr double kLostAfter_s = 1.0;    // of scans that contradict the map; then it searches again
-constexpr double kOffMapAfter_s = 1.5;  // of scans that show nothing of the map, without contradicting it
+constexpr double kOffMapAfter_s = 1.5;  // of scans of which none confirms; a robot that was carried may see both kinds
 constexpr double kGuessedFor_s = 2.0;   // of such scans; then a place that was found is none
 constexpr double kScanSilence_s = 2.0;  // without a registered scan the pose is stale
 
@@ -204,8 +204,8 @@ void Localiser::follow(const Scan& scan) {
   match.T_world_body.covariance *= kAlike;
   // Off the map it may have been carried: what it must show there is what it had to show when it was found.
   const bool is_guess = track_->to_confirm > 0 || state_ == State::off_map;
-  const Assessment assessment =
-      is_guess ? assess_guess(match, track_->T_world_body, track_->gate) : assess(match, track_->T_world_body);
+  const Assessment assessment = is_guess ? assess_guess(match, track_->T_world_body, track_->gate)
+                                         : assess(match, track_->T_world_body, track_->usual_quality.value_or(0.0));
   if (assessment.evidence != Evidence::confirms) return doubt(assessment, scan.stamp);
   confirm(match);
   if (track_->to_confirm == 0) map_fit_.see(*local, usable->scan, track_->T_world_body.T_a_b);
@@ -213,8 +213,9 @@ void Localiser::follow(const Scan& scan) {
 
 void Localiser::confirm(const ScanMatch& match) {
   track_->correct(match.T_world_body);
+  track_->learn(match.quality());
   track_->against_since.reset();
-  track_->nothing_since.reset();
+  track_->doubted_since.reset();
   track_->against = 0;
   track_->confirmed = track_->at.stamp;
   track_->overlap = match.overlap;
@@ -236,16 +237,17 @@ void Localiser::doubt(const Assessment& assessment, Timestamp stamp) {
     }
     return;
   }
+  if (!track_->doubted_since) track_->doubted_since = track_->at;
   if (assessment.evidence == Evidence::against) {
     ++track_->against;
     if (!track_->against_since) track_->against_since = stamp;
-    if (stamp - *track_->against_since < kLostAfter_s || track_->against < 3) return;
-    search_anew(assessment.why);
-    state_ = State::lost;
-    return;
+    if (stamp - *track_->against_since >= kLostAfter_s && track_->against >= 3) {
+      search_anew(assessment.why);
+      state_ = State::lost;
+      return;
+    }
   }
-  if (!track_->nothing_since) track_->nothing_since = track_->at;
-  const StampedPose& since = *track_->nothing_since;
+  const StampedPose& since = *track_->doubted_since;
   if (stamp - since.stamp < kOffMapAfter_s) return;
   if (state_ != State::off_map) begin_submaps();  // it may have been carried: what it saw before is elsewhere
   const bool stands = (since.pose.translation - track_->at.pose.translation).norm() < ShutIn::kStands_m;

@@ -40,7 +40,7 @@ struct LocaliserWork {
 /// the last 12 s are registered on the map at the places that are found so. A place counts when they lie on the map
 /// there, and no other fits nearly as well. Then every scan is registered on the nearest submaps from where odometry
 /// says that the robot is; a Kalman filter of the pose weighs odometry and scans by their covariances. Scans that
-/// contradict the map for a second end that.
+/// contradict the map for a second end that; after 1.5 s in which none fits about as well as before it is off the map.
 ///
 /// Odometry does not notice a lift. In a map with several floors a robot that is shut in is on none of them until it
 /// comes out and is found again, on whichever; so is one that stands while the map shows nothing of what it sees.

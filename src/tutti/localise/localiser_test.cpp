@@ -101,35 +101,53 @@ TEST(Localiser, WhatOneRobotSawIsNotTakenForWhatAnotherSees) {
   EXPECT_EQ(drive(Localiser(shared), 250, 370), drive(localiser(world().map), 250, 370));
 }
 
-/// The robot is carried to where it will be a minute later; its odometry notices nothing.
+/// A drive on which the robot is carried, which its odometry does not notice.
+struct Carried {
+  Trajectory odometry, truth;
+  std::vector<std::size_t> scans;  ///< The recording's numbers of the samples.
+  Timestamp taken;
+};
+
+/// Carried from one sample to where it will be at a later one.
+Carried carried(const Recording& robot, std::size_t from, std::size_t to) {
+  Carried out{.odometry = {}, .truth = {}, .scans = {}, .taken = robot.odometry[from].stamp};
+  const double gap_s = robot.odometry[to].stamp - robot.odometry[from].stamp;
+  const Pose3 T_shift = robot.odometry[from - 1].pose * robot.odometry[to].pose.inverse();
+  for (std::size_t k = 0; k < robot.odometry.size(); k = k + 1 == from ? to : k + 1) {
+    const auto& [stamp, T_odom_body] = robot.odometry[k];
+    const bool is_after = k >= to;
+    out.odometry.push_back({is_after ? stamp - gap_s : stamp, is_after ? T_shift * T_odom_body : T_odom_body});
+    out.truth.push_back({out.odometry.back().stamp, robot.reference[k].pose});
+    out.scans.push_back(k);
+  }
+  return out;
+}
+
+/// Feeds samples of it, each with its scan. `after` hears after each.
+void feed(const Recording& robot, const Carried& drive, std::size_t samples, Localiser& one,
+          const std::function<void(const Located&)>& after) {
+  for (std::size_t k = 0; k < std::min(samples, drive.odometry.size()); ++k) {
+    const auto& [stamp, T_odom_body] = drive.odometry[k];
+    ASSERT_TRUE(one.add(OdometrySample{stamp, T_odom_body, Matrix6d::Identity() * 1e-6}).has_value());
+    if (auto scan = robot.scans->scan(drive.scans[k]); scan && *scan) {
+      (*scan)->stamp = stamp;
+      (void)one.add(**scan);
+    }
+    after(one.located());
+  }
+}
+
 TEST(Localiser, KidnappedItSaysThatItIsLostWithinTwoSecondsAndFindsItselfAgain) {
   const Recording& robot = world().robots[2];
-  constexpr std::size_t kTaken = 200, kLater = 350;
-  Recording carried = robot;
-  Trajectory odometry(robot.odometry.begin(), robot.odometry.begin() + kTaken),
-      truth(robot.reference.begin(), robot.reference.begin() + kTaken);
-  const double gap_s = robot.odometry[kLater].stamp - robot.odometry[kTaken].stamp;
-  const Pose3 T_shift = robot.odometry[kTaken - 1].pose * robot.odometry[kLater].pose.inverse();
-  for (std::size_t k = kLater; k < robot.odometry.size(); ++k) {
-    odometry.push_back({robot.odometry[k].stamp - gap_s, T_shift * robot.odometry[k].pose});
-    truth.push_back({robot.reference[k].stamp - gap_s, robot.reference[k].pose});
-  }
+  const Carried drive = carried(robot, 200, 350);  // half a minute later
   Localiser one = localiser(world().map);
   Judged judged;
   std::optional<double> lost_s, found_s;
-  const Timestamp taken = odometry[kTaken].stamp;
-  for (std::size_t k = 0; k < odometry.size(); ++k) {
-    ASSERT_TRUE(one.add(OdometrySample{odometry[k].stamp, odometry[k].pose, Matrix6d::Identity() * 1e-6}).has_value());
-    const std::size_t of = k < kTaken ? k : k - kTaken + kLater;
-    if (auto scan = robot.scans->scan(of); scan && *scan) {
-      (*scan)->stamp = odometry[k].stamp;
-      (void)one.add(**scan);
-    }
-    const Located located = one.located();
-    if (located.stamp >= taken && located.state == State::lost && !lost_s) lost_s = located.stamp - taken;
-    if (lost_s && located.state == State::localised && !found_s) found_s = located.stamp - taken;
-    if (!(located.stamp >= taken && !lost_s)) judged.add(located, truth);
-  }
+  feed(robot, drive, drive.odometry.size(), one, [&](const Located& located) {
+    if (located.stamp >= drive.taken && located.state == State::lost && !lost_s) lost_s = located.stamp - drive.taken;
+    if (lost_s && located.state == State::localised && !found_s) found_s = located.stamp - drive.taken;
+    if (!(located.stamp >= drive.taken && !lost_s)) judged.add(located, drive.truth);
+  });
   ASSERT_TRUE(lost_s.has_value());
   EXPECT_LE(*lost_s, 2.0);
   ASSERT_TRUE(found_s.has_value());
@@ -137,6 +155,26 @@ TEST(Localiser, KidnappedItSaysThatItIsLostWithinTwoSecondsAndFindsItselfAgain) 
   for (const auto& [submap, fit] : one.map_fit().fits())  // nothing that it saw where it was not counts
     EXPECT_FALSE(fit.has_changed()) << to_string(submap);
   EXPECT_EQ(judged.wrong, 0U);
+}
+
+/// Scans of the new place half fit the map at the old one: more of each lies on the map, and less contradicts it, than
+/// a scan must show on the way.
+TEST(Localiser, KidnappedToWhereScansHalfFitItSaysWithinTwoSecondsThatItIsNotThere) {
+  const Recording& robot = world().robots[2];
+  for (const std::size_t to : {400, 450}) {
+    const Carried drive = carried(robot, 250, to);
+    Localiser one = localiser(world().map);
+    bool was_localised = false;
+    std::optional<double> said_s;
+    feed(robot, drive, 275, one, [&](const Located& located) {
+      const bool is_localised = located.state == State::localised;
+      if (located.stamp < drive.taken) was_localised = is_localised;
+      if (located.stamp >= drive.taken && !is_localised && !said_s) said_s = located.stamp - drive.taken;
+    });
+    EXPECT_TRUE(was_localised);
+    ASSERT_TRUE(said_s.has_value()) << "carried to " << to;
+    EXPECT_LE(*said_s, 2.0) << "carried to " << to;
+  }
 }
 
 /// The map twice, side by side: nothing tells one from the other.

@@ -39,8 +39,10 @@ struct Assessment {
   Evidence evidence = Evidence::nothing;
   std::string why;  ///< As a sentence's end; empty when it confirms.
 };
-/// `predicted` is where the robot should be with its covariance, `match` begun there.
-Assessment assess(const ScanMatch& match, const RelativePose& predicted);
+/// `predicted` is where the robot should be with its covariance, `match` begun there. `usual_quality` is what
+/// ScanMatch::quality() was of scans before: one that fits far worse does not confirm. Scans of a robot that was
+/// carried still half fit the map at the old place.
+Assessment assess(const ScanMatch& match, const RelativePose& predicted, double usual_quality = 0.0);
 /// Scans must pass it where a place is not confirmed yet.
 struct GuessGate {
   double least_overlap = 0.0, most_contradiction = 1.0, least_quality = 0.0;  ///< Shares, as in ScanMatch.

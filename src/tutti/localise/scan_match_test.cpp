@@ -41,6 +41,14 @@ TEST(ScanMatch, WhereTheMapShowsLittleNothingFollows) {
   EXPECT_EQ(assess(match, kHere).evidence, Evidence::nothing);
 }
 
+TEST(ScanMatch, FarWorseThanTheScansBeforeConfirmsNothing) {
+  const double quality = good().quality();
+  EXPECT_EQ(assess(good(), kHere, quality / 0.75).evidence, Evidence::confirms);
+  const Assessment refused = assess(good(), kHere, quality / 0.65);
+  EXPECT_EQ(refused.evidence, Evidence::nothing);
+  EXPECT_NE(refused.why.find("those before did to"), std::string::npos) << refused.why;
+}
+
 /// A place that was found needs more than a start pose: closer scans, and enough in view that could contradict.
 TEST(ScanMatch, WhatWasFoundMustPassAStricterGate) {
   EXPECT_EQ(assess_guess(good(), kHere, GuessGate::of_found()).evidence, Evidence::confirms);

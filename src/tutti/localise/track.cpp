@@ -13,6 +13,9 @@ namespace {
 // Odometry errs by this at least, as a share of the distance, and per radian.
 constexpr double kDrift = 0.01, kDrift_rad_per_m = 0.2 * kRadPerDeg, kDrift_rad_per_rad = 0.01;
 constexpr double kStep_m = 0.002;
+// The weight of the newest scan in what is usual. Scans fit worse within seconds where a robot drives into ground that
+// has changed, and from one to the next where it was carried.
+constexpr double kNewest = 0.1;
 
 /// Odometry may err by this over one step, whatever it states.
 Matrix6d least_doubt(const Pose3& step) {
@@ -59,6 +62,10 @@ void Track::correct(const RelativePose& measured) {
   now.T_a_b = retract(now.T_a_b, gain * local(now.T_a_b, measured.T_a_b));
   const Matrix6d rest = Matrix6d::Identity() - gain;
   now.covariance = rest * now.covariance * rest.transpose() + gain * measured.covariance * gain.transpose();
+}
+
+void Track::learn(double quality) {
+  usual_quality = usual_quality ? *usual_quality + kNewest * (quality - *usual_quality) : quality;
 }
 
 RelativePose Track::carried_to(const Pose3& T_odom_body) const {

@@ -40,8 +40,9 @@ struct Track {
   int to_confirm = 0;                      ///< Scans that are still to confirm it before it counts.
   GuessGate gate = GuessGate::of_found();  ///< That they must pass.
   std::optional<double> overlap;           ///< ScanMatch::overlap of that scan.
+  std::optional<double> usual_quality;     ///< ScanMatch::quality() of scans that confirmed it, by learn().
   std::optional<Timestamp> against_since;
-  std::optional<StampedPose> nothing_since;  ///< By odometry.
+  std::optional<StampedPose> doubted_since;  ///< By odometry; no scan has confirmed it from then on.
   std::size_t against = 0;                   ///< Scans in a row.
 
   /// Moves the pose with odometry to a time after it. `stated`: RecentOdometry::stated() of the way there; odometry may
@@ -49,6 +50,8 @@ struct Track {
   void predict_to(const StampedPose& to, const Matrix6d& stated);
   /// The filter's update with a pose of the same time, in Joseph's form.
   void correct(const RelativePose& measured);
+  /// Takes the quality of a scan that confirms the pose into what is usual.
+  void learn(double quality);
   /// Where odometry has it, at a later time.
   [[nodiscard]] RelativePose carried_to(const Pose3& T_odom_body) const;
   [[nodiscard]] OnFloor position() const { return {floor, T_world_body.T_a_b.translation}; }

@@ -77,5 +77,15 @@ TEST(RecentOdometry, KeepsTheLastSecondsAndSumsWhatItsStepsState) {
   EXPECT_LE(recent.newest()->increment_covariance(0, 0), 1.0 + 1e-9);
 }
 
+TEST(Track, WhatIsUsualFollowsScansOfSomeSeconds) {
+  Track track;
+  track.learn(0.9);
+  EXPECT_DOUBLE_EQ(track.usual_quality.value(), 0.9);
+  track.learn(0.5);
+  EXPECT_GT(*track.usual_quality, 0.8);
+  for (int k = 0; k < 40; ++k) track.learn(0.5);
+  EXPECT_NEAR(*track.usual_quality, 0.5, 0.02);
+}
+
 }  // namespace track_test
 }  // namespace tutti::localise
