@@ -61,14 +61,16 @@ Status Localiser::hear(const OdometrySample& sample) {
 
 bool Localiser::wants_scan(Timestamp stamp) const {
   const bool is_followed = track_ || start_ || setup_.map->floors > 1;  // is_shut_in()
-  return submaps_.wants_scan(stamp) ||
+  return (searches() && submaps_.wants_scan(stamp)) ||
          (is_followed && (!last_match_ || stamp - *last_match_ >= setup_.config.track_every_s));
 }
 
 Status Localiser::hear(const Scan& scan) {
   if (scan.cloud == nullptr) return fail(ErrorCode::invalid, "a scan without points");
-  if (submaps_.wants_scan(scan.stamp))
+  if (searches() && submaps_.wants_scan(scan.stamp)) {
     if (auto ok = submaps_.add(scan); !ok) return ok;
+    ++work_.in_submaps;
+  }
   if (last_scan_ && scan.stamp <= *last_scan_) return {};
   last_scan_ = scan.stamp;
   if (waiting_.size() >= kMostWaiting) waiting_.pop_front();
@@ -212,6 +214,7 @@ void Localiser::follow(const Scan& scan) {
 }
 
 void Localiser::confirm(const ScanMatch& match) {
+  const bool has_searched = searches();
   track_->correct(match.T_world_body);
   track_->learn(match.quality());
   track_->against_since.reset();
@@ -225,6 +228,7 @@ void Localiser::confirm(const ScanMatch& match) {
                      100.0 * match.contradiction);
   pending_.clear();
   places_.clear();
+  if (has_searched) begin_submaps();
 }
 
 /// A scan that does not confirm the pose.
@@ -281,8 +285,7 @@ Result<SearchResult> Localiser::find_places(const Submap& submap) {
 
 /// Compares a submap with the map, where that may tell something.
 void Localiser::consider(const Submap& submap) {
-  if (payload_size(submap) == PayloadSize() || shut_in_.is()) return;
-  if (track_ && has_scans() && state_ == State::localised) return;  // scans follow it
+  if (payload_size(submap) == PayloadSize() || shut_in_.is() || !searches()) return;
   auto found = find_places(submap);
   if (!found) {
     why_ = found.error().message;

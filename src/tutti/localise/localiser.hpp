@@ -31,6 +31,7 @@ namespace tutti::localise {
 struct LocaliserWork {
   std::size_t compared = 0;    ///< Submaps of the map, with submaps of the robot.
   std::size_t registered = 0;  ///< Scans, on the map.
+  std::size_t in_submaps = 0;  ///< Scans that went into the robot's own submaps.
   std::size_t local_maps = 0;
   std::size_t extracted = 0;  ///< Submaps of the map whose features were computed for local maps.
 };
@@ -82,7 +83,7 @@ class Localiser {
  private:
   Status hear(const OdometrySample& sample);
   Status hear(const Scan& scan);
-  Status hear(const TrackedImages& images) { return submaps_.add(images); }
+  Status hear(const TrackedImages& images) { return searches() ? submaps_.add(images) : Status(); }
   Status hear(const StartPose& start);
   Status hear(const auto&) { return {}; }
   /// Nothing for a scan that is older, or that odometry does not reach.
@@ -103,6 +104,9 @@ class Localiser {
   void begin_track(const Hypothesis& place);
   void follow_submap(const SearchResult& found);
   [[nodiscard]] bool has_scans() const { return last_scan_.has_value(); }
+  /// While scans follow it, nobody asks what its own submaps show, and they get no scans: merging those of one submap
+  /// takes as long as registering ten to twenty of them.
+  [[nodiscard]] bool searches() const { return !(track_ && has_scans() && state_ == State::localised); }
 
   Setup setup_;
   std::shared_ptr<const server::ClosureVerifier> verifier_;

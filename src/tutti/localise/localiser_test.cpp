@@ -75,6 +75,21 @@ TEST(Localiser, FindsItsPlaceInOneSubmapAndFollowsTheMap) {
   }
 }
 
+/// Its own submaps tell where it is only while it does not know.
+TEST(Localiser, WhileScansFollowItItsSubmapsGetNone) {
+  const Recording& robot = world().robots[2];
+  Localiser one = localiser(world().map);
+  const std::size_t k = drive_until_localised(robot, one);
+  const std::size_t before = one.work().in_submaps;
+  EXPECT_GT(before, 5U);
+  feed(robot, robot.odometry, k, k + 200, one);
+  ASSERT_EQ(one.located().state, State::localised);
+  EXPECT_EQ(one.work().in_submaps, before);
+  one.search_anew("asked to");
+  feed(robot, robot.odometry, k + 200, k + 300, one);
+  EXPECT_GT(one.work().in_submaps, before + 5U);
+}
+
 TEST(Localiser, TheSameInputsGiveTheSamePosesToTheBit) {
   const Recording& robot = world().robots[2];
   std::vector<Pose3> poses[2];

@@ -67,6 +67,7 @@ Json json_of(const LocalisedRobot& robot) {
           {"work",
            {{"submaps_compared", robot.work.compared},
             {"scans_registered", robot.work.registered},
+            {"scans_in_submaps", robot.work.in_submaps},
             {"local_maps", robot.work.local_maps},
             {"features_extracted", robot.work.extracted}}},
           {"troubles", robot.troubles},
