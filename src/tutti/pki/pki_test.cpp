@@ -103,7 +103,8 @@ TEST_F(PkiTest, ARevokedCertificateOpensNothingWithAnybodysKey) {
     return whose;
   };
   const auto other = open(Endpoint::of(RobotId{4}), bravo);
-  const auto mixed = bus::NatsConnection::open(options(with_certificate_of_alpha(bravo)), "mixed").value();
+  const auto mixed = connect(with_certificate_of_alpha(bravo));
+  ASSERT_NE(mixed, nullptr);
   ASSERT_TRUE(within(10.0, [&] { return other->state().connected; }));
   ASSERT_TRUE(mixed->publish("mission.cave.robot.3.submap", "", "", "as alpha"));
   mixed->flush();
@@ -126,7 +127,8 @@ TEST_F(PkiTest, ABusThatIsSlowToReadCutsOffARevokedCertificateToo) {
   const auto alpha = add(BusRole::robot, "alpha", 3);
   auto mixed_with = add(BusRole::robot, "bravo", 4);
   mixed_with.certificate = alpha.certificate;
-  const auto mixed = bus::NatsConnection::open(options(mixed_with), "mixed").value();
+  const auto mixed = connect(mixed_with);
+  ASSERT_NE(mixed, nullptr);
   ASSERT_EQ(kill(child_->pid(), SIGSTOP), 0);
   ASSERT_TRUE(pki_->revoke("alpha"));
   for (int second = 0; second < 3; ++second) tend();

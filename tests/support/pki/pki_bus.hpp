@@ -72,6 +72,16 @@ class PkiBus : public ::testing::Test {
     EXPECT_TRUE(tended_until([&] { return bus::NatsConnection::open(options(who), "newcomer").has_value(); }));
     static_cast<void>(child_->take_refusals());
   }
+  /// A connection of its own. Its handshake may fall into the midst of the bus reading its rights again: then it is
+  /// refused, and tried again as by whoever connects.
+  std::shared_ptr<bus::NatsConnection> connect(const bus::BusCredentials& who) {
+    std::shared_ptr<bus::NatsConnection> out;
+    EXPECT_TRUE(test::within(10.0, [&] {
+      if (auto opened = bus::NatsConnection::open(options(who), "test")) out = std::move(*opened);
+      return out != nullptr;
+    }));
+    return out;
+  }
   /// Whether the bus's log says, now or soon, that somebody was refused as one of these words.
   bool is_refused_as(const std::string& words) {
     return test::within(10.0, [&] {
