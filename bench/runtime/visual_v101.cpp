@@ -16,6 +16,7 @@
 
 #include "tutti/formats/maplab_submaps.hpp"
 #include "tutti/formats/trajectory_file.hpp"
+#include "tutti/geometry/symmetric.hpp"
 #include "tutti/model/pose_at.hpp"
 #include "tutti/perception/visual/verify.hpp"
 #include "tutti/perception/visual/visual_payload.hpp"
@@ -156,8 +157,10 @@ void count(const LoopClosure& closure, const Truth& truth, Tally& tally) {
   const Matrix6d& C = closure.measurement.covariance;
   tally.errors_m.push_back(metres);
   tally.errors_deg.push_back(angle);
-  tally.chi2_position.push_back(error.head<3>().dot(C.topLeftCorner<3, 3>().inverse() * error.head<3>()));
-  tally.chi2_rotation.push_back(error.tail<3>().dot(C.bottomRightCorner<3, 3>().inverse() * error.tail<3>()));
+  tally.chi2_position.push_back(
+      squared_distance(Eigen::Vector3d(error.head<3>()), Eigen::Matrix3d(C.topLeftCorner<3, 3>())));
+  tally.chi2_rotation.push_back(
+      squared_distance(Eigen::Vector3d(error.tail<3>()), Eigen::Matrix3d(C.bottomRightCorner<3, 3>())));
   tally.sigma_m.push_back(std::sqrt(C.topLeftCorner<3, 3>().trace()));
   tally.closed.insert({closure.from, closure.to});
 }

@@ -13,7 +13,7 @@
 namespace tutti {
 namespace symmetric_test {
 
-/// A A^T, conditioned by at most 1e6; metres and radians differ by 100.
+/// A A^T, regular by 0.01; metres and radians differ by 100.
 template <int N>
 Eigen::Matrix<double, N, N> definite(Rng& rng) {
   Eigen::Matrix<double, N, N> A;

@@ -2,12 +2,13 @@
 #include "tutti/mapfile/meta_rows.hpp"
 
 #include <algorithm>
+#include <vector>
 
 #include "tutti/node/meta_keys.hpp"
 
 namespace tutti::mapfile {
 
-const std::vector<MetaRow>& meta_rows() {
+const MetaRow& meta_row(std::string_view key) {
   using enum MetaRow::Of;
   static const std::vector<MetaRow> rows{
       {node::kMapKey},
@@ -25,16 +26,12 @@ const std::vector<MetaRow>& meta_rows() {
       {.key = node::kRefusedPrefix, .renumber_drops = true},
       {.key = node::kReturnedPrefix, .merge_drops = true, .revert_drops = true, .renumber_drops = true},
   };
-  return rows;
-}
-
-const MetaRow& meta_row(std::string_view key) {
   static const MetaRow unknown;
   const auto is = [&](const MetaRow& row) {
     return row.key.ends_with('/') ? key.starts_with(row.key) : key == row.key;
   };
-  const auto found = std::ranges::find_if(meta_rows(), is);
-  return found == meta_rows().end() ? unknown : *found;
+  const auto found = std::ranges::find_if(rows, is);
+  return found == rows.end() ? unknown : *found;
 }
 
 }  // namespace tutti::mapfile

@@ -2,9 +2,8 @@
 #pragma once
 
 #include <string_view>
-#include <vector>
 
-/// What becomes of each row of table `meta` when a map is copied: said once, for all that copies maps.
+/// Each row of table `meta` has a line here, by which all that copies maps keeps it, changes it or leaves it out.
 namespace tutti::mapfile {
 
 struct MetaRow {
@@ -16,8 +15,7 @@ struct MetaRow {
   bool renumber_drops = false;  ///< It names robots, and is made again.
 };
 
-[[nodiscard]] const std::vector<MetaRow>& meta_rows();
-/// Without a key for a row of a newer program, which is copied as it is.
+/// Its line; without a key for a row of a newer program, which is copied as it is.
 [[nodiscard]] const MetaRow& meta_row(std::string_view key);
 
 }  // namespace tutti::mapfile

@@ -135,8 +135,9 @@ Result<NewRows> renamed_meta(std::string_view key, std::string_view bytes, const
     }
     case robot: {
       const auto of = node::RobotRegistry::robot_of(key);
+      if (!of) break;
       const auto known = node::decode_robot(bytes);
-      if (!of || !known) return damaged();
+      if (!known) return damaged();
       RobotId number = *of;
       for (const auto& [from, to] : chains)
         if (from.robot == *of) number = to.robot;

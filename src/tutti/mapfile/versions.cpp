@@ -76,8 +76,10 @@ NewRows meta_without(std::string_view key, std::string_view bytes, const Without
       return same_if(true);
     case version:
       return same_if(number_of(key).value_or(until) < until);
-    case robot:
-      return same_if(stays.contains(node::RobotRegistry::robot_of(key).value_or(RobotId())));
+    case robot: {
+      const auto number = node::RobotRegistry::robot_of(key);
+      return same_if(!number || stays.contains(*number));
+    }
     case submap: {
       const auto id = node::submap_of_key(key.substr(row.key.size()));
       return same_if(id && without.has(*id));
