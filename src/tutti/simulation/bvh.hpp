@@ -17,8 +17,8 @@ struct RayHit {
   std::uint32_t triangle = 0;
 };
 
-/// Closest-hit ray casting with a bounding volume hierarchy that is split at the median; triangles are intersected
-/// after Moeller and Trumbore (1997). Single precision, immutable, may be used from several threads.
+/// Closest-hit ray casting with a bounding volume hierarchy; triangles are intersected after Moeller and Trumbore
+/// (1997). Single precision, immutable, may be used from several threads.
 class Bvh {
  public:
   explicit Bvh(const TriangleMesh& mesh);

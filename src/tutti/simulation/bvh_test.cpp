@@ -62,7 +62,8 @@ RC_GTEST_PROP(Bvh, FindsWhatTryingAllTrianglesFinds, (std::uint32_t seed)) {
     const Eigen::Vector3f origin(static_cast<float>(rng.uniform(-7, 7)), static_cast<float>(rng.uniform(-7, 7)),
                                  static_cast<float>(rng.uniform(-7, 7)));
     const Eigen::Vector3f direction = any_direction(rng);
-    const auto range = static_cast<float>(rng.bernoulli(0.5) ? 100.0 : rng.uniform(0.0, 10.0));
+    const auto range = rng.bernoulli(0.2) ? std::numeric_limits<float>::infinity()
+                                          : static_cast<float>(rng.bernoulli(0.5) ? 100.0 : rng.uniform(0.0, 10.0));
     const auto hit = bvh.cast(origin, direction, range);
     double nearest = std::numeric_limits<double>::infinity();  // Among those that the ray certainly meets.
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -81,6 +82,29 @@ RC_GTEST_PROP(Bvh, FindsWhatTryingAllTrianglesFinds, (std::uint32_t seed)) {
     if (!std::isfinite(truth.distance)) continue;
     RC_ASSERT(truth.inside > -1e-3);
     RC_ASSERT(std::abs(truth.distance - hit->distance) < 1e-3);
+  }
+}
+
+/// Each triangle is ten times as far and as large as the one before, which would make a tree as deep as there are
+/// scales.
+TEST(Bvh, FindsTrianglesOfAllScales) {
+  TriangleMesh mesh;
+  for (int scale = -8; scale < 8; ++scale)
+    for (int twin = 0; twin < 40; ++twin) {
+      const auto x = static_cast<float>(std::pow(10.0, scale)), side = 0.1F * x;
+      const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+      for (const Eigen::Vector3f& corner :
+           {Eigen::Vector3f(x, -side, -side), Eigen::Vector3f(x, side, -side), Eigen::Vector3f(x, 0, side)})
+        mesh.vertices.push_back(corner * (1.0F + 0.01F * static_cast<float>(twin)));
+      mesh.triangles.push_back({first, first + 1, first + 2});
+    }
+  const Bvh bvh(mesh);
+  for (int scale = -8; scale < 8; ++scale) {
+    const auto x = static_cast<float>(std::pow(10.0, scale));
+    const auto hit =
+        bvh.cast({0.99F * x, 0.0F, 0.0F}, Eigen::Vector3f::UnitX(), std::numeric_limits<float>::infinity());
+    ASSERT_TRUE(hit) << scale;
+    EXPECT_NEAR(hit->distance, 0.01F * x, 1e-5F * x) << scale;
   }
 }
 
