@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
+#include <optional>
 #include <tuple>
 #include <vector>
 
@@ -12,7 +14,9 @@
 namespace tutti::lidar {
 namespace {
 
-constexpr double kHalfRange = 1048576.0;  // 2^20 voxels: 21 bits per axis fit one 63-bit Morton code
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr std::int64_t kHalfRange = 1048576;  // 2^20 voxels: 21 bits per axis fit one 63-bit Morton code
+constexpr auto kFarthest = static_cast<double>(kHalfRange);
 
 struct KeyedPoint {
   std::uint64_t key;
@@ -28,37 +32,132 @@ std::uint64_t spread_bits(std::uint64_t x) {
   return (x | (x << 2U)) & 0x1249249249249249ULL;
 }
 
-/// Counted from the far corner of the range.
-Eigen::Array3d cell_of(const Eigen::Vector3f& p, double voxel_m) {
-  return (p.cast<double>().array() / voxel_m).floor() + kHalfRange;
+/// Where the point is in the grid, in voxels.
+Eigen::Array3d place_of(const Eigen::Vector3f& p, double voxel_m) { return p.cast<double>().array() / voxel_m; }
+
+bool is_in_range(const Eigen::Array3d& place) {
+  return (place >= -kFarthest).all() && (place < kFarthest).all();  // also false for NaN
 }
 
-bool is_in_range(const Eigen::Array3d& cell) {
-  return (cell >= 0.0).all() && (cell < 2.0 * kHalfRange).all();  // also false for NaN
+/// floor(place), which takes a call without SSE 4, counted from the far corner of the range.
+std::uint64_t cell_of(double place) {
+  const auto whole = static_cast<std::int64_t>(place);
+  return static_cast<std::uint64_t>(whole - (static_cast<double>(whole) > place ? 1 : 0) + kHalfRange);
 }
 
 /// Appends the point unless it is not finite or out of range.
 void append(std::vector<KeyedPoint>& out, const Eigen::Vector3f& p, double voxel_m) {
-  const Eigen::Array3d cell = cell_of(p, voxel_m);
-  if (!is_in_range(cell)) return;
-  const auto axis = [&](int i) { return spread_bits(static_cast<std::uint64_t>(cell[i])); };
+  const Eigen::Array3d place = place_of(p, voxel_m);
+  if (!is_in_range(place)) return;
+  const auto axis = [&](int i) { return spread_bits(cell_of(place[i])); };
   out.push_back({axis(0) | (axis(1) << 1U) | (axis(2) << 2U), p});
 }
 
-PointCloud centroids(std::vector<KeyedPoint> points) {
-  // Also ordered within a voxel: the sum, to the bit, must not depend on the order of the input.
+/// What the points of one voxel add up to.
+struct VoxelSum {
+  std::uint64_t key;
+  std::uint32_t count = 0;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  Eigen::Array3f least = Eigen::Array3f::Constant(kInfinity);  ///< Smallest size of a coordinate that is not zero.
+  Eigen::Array3f most = Eigen::Array3f::Zero();                ///< Largest one.
+
+  void add(const Eigen::Vector3f& point) {
+    const Eigen::Array3f size = point.array().abs();
+    ++count;
+    sum += point.cast<double>();
+    least = least.min((size == 0.0F).select(kInfinity, size));
+    most = most.max(size);
+  }
+  /// Whether no order of the points gives another sum, as none is rounded: a float is a multiple of 2^-24 of its size
+  /// at least, and a double holds 2^53 multiples; half of that, as this product is rounded, too.
+  [[nodiscard]] bool is_exact() const { return (most * static_cast<float>(count) <= 0x1p28F * least).all(); }
+};
+
+/// The voxels of points in any order, by a table of their keys (open addressing).
+class VoxelTable {
+ public:
+  /// False when keys crowd in the table, as somebody may have made them to.
+  bool add(const KeyedPoint& point) {
+    if (2 * voxels_.size() >= slots_.size() && !grow()) return false;
+    const std::size_t slot = slot_of(point.key);
+    if (slot == slots_.size()) return false;
+    if (slots_[slot] == kFree) {
+      slots_[slot] = static_cast<std::uint32_t>(voxels_.size());
+      voxels_.push_back({.key = point.key});
+    }
+    voxels_[slots_[slot]].add(point.point);
+    return true;
+  }
+  [[nodiscard]] VoxelSum& voxel(std::uint64_t key) { return voxels_[slots_[slot_of(key)]]; }  ///< One that was added.
+  [[nodiscard]] std::vector<VoxelSum>& voxels() { return voxels_; }
+
+ private:
+  static constexpr std::uint32_t kFree = std::numeric_limits<std::uint32_t>::max();
+  static constexpr std::size_t kMostProbes = 64;
+
+  /// Where the key is or would be; the table's size when there is no place for it nearby.
+  [[nodiscard]] std::size_t slot_of(std::uint64_t key) const {
+    const std::size_t mask = slots_.size() - 1;
+    std::size_t slot = (key * 0x9e3779b97f4a7c15ULL) >> shift_;  // Knuth's multiplicative hashing
+    for (std::size_t probe = 0; probe < kMostProbes; ++probe, slot = (slot + 1) & mask)
+      if (slots_[slot] == kFree || voxels_[slots_[slot]].key == key) return slot;
+    return slots_.size();
+  }
+
+  bool grow() {
+    --shift_;
+    slots_.assign(2 * slots_.size(), kFree);
+    for (std::uint32_t i = 0; i < voxels_.size(); ++i) {
+      const std::size_t slot = slot_of(voxels_[i].key);
+      if (slot == slots_.size()) return false;
+      slots_[slot] = i;
+    }
+    return true;
+  }
+
+  std::vector<VoxelSum> voxels_;
+  unsigned shift_ = 52;
+  std::vector<std::uint32_t> slots_ = std::vector<std::uint32_t>(std::size_t{1} << (64U - shift_), kFree);
+};
+
+/// The voxels of points, which are added in an order that is not the input's.
+std::vector<VoxelSum> sums_in_order(std::vector<KeyedPoint> points) {
   std::sort(points.begin(), points.end(), [](const KeyedPoint& a, const KeyedPoint& b) {
     return std::tie(a.key, a.point.x(), a.point.y(), a.point.z()) <
            std::tie(b.key, b.point.x(), b.point.y(), b.point.z());
   });
-  PointCloud out;
-  for (std::size_t begin = 0; begin < points.size();) {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    std::size_t end = begin;
-    for (; end < points.size() && points[end].key == points[begin].key; ++end) sum += points[end].point.cast<double>();
-    out.points.push_back((sum / static_cast<double>(end - begin)).cast<float>());
-    begin = end;
+  std::vector<VoxelSum> out;
+  for (const KeyedPoint& point : points) {
+    if (out.empty() || out.back().key != point.key) out.push_back({.key = point.key});
+    out.back().add(point.point);
   }
+  return out;
+}
+
+/// The same by a table, where most points need no order; nothing if that is no use.
+std::optional<std::vector<VoxelSum>> sums_by_table(const std::vector<KeyedPoint>& points) {
+  VoxelTable table;
+  for (const KeyedPoint& point : points)
+    if (!table.add(point)) return std::nullopt;
+  if (!std::ranges::all_of(table.voxels(), &VoxelSum::is_exact)) {  // as where rays run along an axis: x is 1e-17
+    std::vector<KeyedPoint> rounded;
+    for (const KeyedPoint& point : points)
+      if (!table.voxel(point.key).is_exact()) rounded.push_back(point);
+    for (const VoxelSum& ordered : sums_in_order(std::move(rounded))) table.voxel(ordered.key) = ordered;
+  }
+  std::ranges::sort(table.voxels(), {}, &VoxelSum::key);
+  return std::move(table.voxels());
+}
+
+/// The result, to the bit, does not depend on the order of the input. Sorting all of a submap's million points takes
+/// several times as long as the table.
+PointCloud centroids(std::vector<KeyedPoint> points) {
+  auto voxels = sums_by_table(points);
+  if (!voxels) voxels = sums_in_order(std::move(points));
+  PointCloud out;
+  out.points.reserve(voxels->size());
+  for (const VoxelSum& voxel : *voxels)
+    out.points.push_back((voxel.sum / static_cast<double>(voxel.count)).cast<float>());
   return out;
 }
 
@@ -75,13 +174,16 @@ PointCloud voxel_downsample(const PointCloud& cloud, double voxel_m) {
 const Eigen::Vector3f* first_skipped(const PointCloud& cloud, double voxel_m) {
   TUTTI_CHECK(voxel_m > 0.0, "voxel_m = {}", voxel_m);
   const auto found = std::find_if(cloud.points.begin(), cloud.points.end(),
-                                  [&](const Eigen::Vector3f& p) { return !is_in_range(cell_of(p, voxel_m)); });
+                                  [&](const Eigen::Vector3f& p) { return !is_in_range(place_of(p, voxel_m)); });
   return found == cloud.points.end() ? nullptr : &*found;
 }
 
 PointCloud merge_scans(std::span<const PosedCloud> scans, double voxel_m, RangeLimits limits) {
   TUTTI_CHECK(voxel_m > 0.0, "voxel_m = {}", voxel_m);
+  std::size_t count = 0;
+  for (const auto& scan : scans) count += scan.cloud ? scan.cloud->points.size() : 0;
   std::vector<KeyedPoint> keyed;
+  keyed.reserve(count);
   for (const auto& scan : scans) {
     if (!scan.cloud) continue;
     const Eigen::Matrix3d R = scan.T_submap_body.rotation.toRotationMatrix();

@@ -7,8 +7,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <set>
 #include <tuple>
+#include <utility>
 
 #include "tutti/base/random.hpp"
 #include "tutti/geometry/so3.hpp"
@@ -34,6 +36,56 @@ RC_GTEST_PROP(VoxelDownsample, doesNotDependOnTheOrderToTheBit, (std::uint64_t s
   const PointCloud before = voxel_downsample(cloud, 0.4);
   for (std::size_t i = cloud.points.size(); i > 1; --i) std::swap(cloud.points[i - 1], cloud.points[rng.index(i)]);
   RC_ASSERT(voxel_downsample(cloud, 0.4) == before);
+}
+
+/// By its definition: points of a voxel are added in the order of their coordinates.
+std::map<std::tuple<int, int, int>, Eigen::Vector3f> centroids_by_sorting(PointCloud cloud, double voxel) {
+  std::ranges::sort(cloud.points, {}, [](const Eigen::Vector3f& p) { return std::tuple(p.x(), p.y(), p.z()); });
+  std::map<std::tuple<int, int, int>, std::pair<Eigen::Vector3d, double>> sums;
+  for (const Eigen::Vector3f& p : cloud.points) {
+    auto& [sum, count] = sums.try_emplace(voxel_of(p, voxel), Eigen::Vector3d::Zero(), 0.0).first->second;
+    sum += p.cast<double>();
+    ++count;
+  }
+  std::map<std::tuple<int, int, int>, Eigen::Vector3f> out;
+  for (const auto& [cell, sum] : sums) out[cell] = (sum.first / sum.second).cast<float>();
+  return out;
+}
+
+/// Also of numbers that lose digits when they are added, as those of rays that run along an axis: 1e-17 and 1.
+RC_GTEST_PROP(VoxelDownsample, isThatOfSortedPointsToTheBit, (std::uint64_t seed)) {
+  Rng rng(seed);
+  PointCloud cloud = random_cloud(rng, 2000, 2.0);
+  for (Eigen::Vector3f& p : cloud.points)
+    for (float& x : p)
+      if (rng.bernoulli(0.2)) x *= static_cast<float>(std::pow(10.0, -static_cast<double>(rng.index(40))));
+  const auto expected = centroids_by_sorting(cloud, 0.5);
+  const PointCloud thin = voxel_downsample(cloud, 0.5);
+  RC_ASSERT(thin.points.size() == expected.size());
+  for (const Eigen::Vector3f& p : thin.points)
+    RC_ASSERT(std::ranges::find(expected, p, [](const auto& entry) { return entry.second; }) != expected.end());
+}
+
+/// Voxels that somebody has chosen so that a table of them is no use.
+TEST(VoxelDownsample, WorksWithVoxelsThatCrowdInATable) {
+  constexpr std::uint64_t kFactor = 0x9e3779b97f4a7c15ULL;  // as in voxel_filter.cpp
+  std::uint64_t inverse = kFactor;                          // modulo 2^64, by Newton's iteration
+  for (int i = 0; i < 6; ++i) inverse *= 2 - kFactor * inverse;
+  ASSERT_EQ(inverse * kFactor, 1U);
+  PointCloud cloud;
+  for (std::uint64_t i = 1; cloud.points.size() < 500; ++i) {
+    const std::uint64_t key = i * inverse;  // hashes to i, so that all begin at the table's begin
+    if (key >> 63U != 0) continue;
+    const auto coordinate = [key](unsigned axis) {
+      std::uint64_t cell = 0;
+      for (unsigned bit = 0; bit < 21; ++bit) cell |= (key >> (3 * bit + axis) & 1U) << bit;
+      return static_cast<float>(static_cast<double>(cell) - 1048576.0 + 0.5);
+    };
+    cloud.points.emplace_back(coordinate(0), coordinate(1), coordinate(2));
+  }
+  const PointCloud thin = voxel_downsample(cloud, 1.0);
+  EXPECT_EQ(thin.points.size(), 500U);
+  EXPECT_TRUE(std::ranges::is_permutation(thin.points, cloud.points));
 }
 
 RC_GTEST_PROP(VoxelDownsample, leavesOnePointInEveryOccupiedVoxel, (std::uint64_t seed)) {
