@@ -223,6 +223,7 @@ void Localiser::confirm(const ScanMatch& match) {
   track_->confirmed = track_->at.stamp;
   track_->overlap = match.overlap;
   if (track_->to_confirm > 0 && --track_->to_confirm > 0) return;
+  track_->gate = GuessGate::of_found();  // who gave a start pose does not vouch for where the robot is later
   state_ = State::localised;
   why_ = fmt::format("{:.0f} % of the scan lies on the map, {:.0f} % contradicts it", 100.0 * match.overlap,
                      100.0 * match.contradiction);
