@@ -382,11 +382,18 @@ class CommandLine(unittest.TestCase):
 
     def test_settings_say_what_can_be_set(self):
         few = tutti("settings")
-        self.expect(few, 0, "server.update_least_s = ", "closures.verifier = ", "link.loss = 0", "--all")
+        self.expect(few, 0, "server.update_least_s = ", "closures.verifier = ", "link.loss = 0", "--all", "--simulation")
         self.assertLess(len(few.stdout.splitlines()), 35, few.stdout)
-        everything = tutti("settings", "--all")
-        self.expect(everything, 0, "closures.verifier = ", "simulation.robots[].start_s = 0")
-        self.assertGreater(len(everything.stdout.splitlines()), 500)
+        keys = lambda listed: [line.split()[0] for line in listed.stdout.splitlines() if not line.startswith(" ")]
+        product, simulated, both = (keys(tutti("settings", *flags)) for flags in (["--all"], ["--simulation"], ["--all", "--simulation"]))
+        self.assertEqual(product + simulated, both)
+        self.assertEqual(len(both), len(set(both)))
+        self.assertIn("closures.verifier", product)
+        self.assertEqual([key for key in product if key.startswith(("simulation.", "hall.", "receivers", "ranging.", "mistakes"))], [])
+        self.assertIn("simulation.robots[].start_s", simulated)
+        self.assertEqual([key for key in simulated if key.startswith(("agent.", "server.", "link."))], [])
+        self.expect(tutti("settings", "antenna"), 0, "robots[].antenna_m", "receivers[].antenna_m")  # a word is looked for everywhere
+        self.expect(tutti("settings", "--all", "dance"), 1, "no key or meaning contains 'dance'")
         one = tutti("settings", "disagreement", "alarm")
         self.expect(one, 0, "agent.disagreement.false_alarm_rate = 0.01   (a number, ")
         self.assertEqual(len(one.stdout.splitlines()), 2, one.stdout)

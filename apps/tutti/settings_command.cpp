@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
+#include <iterator>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -31,48 +32,56 @@ std::string words_of(const FieldDoc& field, std::string_view meaning) {
 }
 
 /// The operator's settings, in their own words.
-void list_operators(const std::vector<FieldDoc>& fields) {
+int list_operators(const lab::MissionDocs& docs) {
   for (const auto& [key, meaning] : mission::operator_settings())
-    if (const auto field = std::ranges::find(fields, key, &FieldDoc::path); field != fields.end())
+    if (const auto field = std::ranges::find(docs.product, key, &FieldDoc::path); field != docs.product.end())
       fmt::print("{}", words_of(*field, meaning));
   fmt::print(
-      "These are what an operator sets; tutti settings --all lists all {}, tutti settings WORD what contains it.\n",
-      fields.size());
+      "These are what an operator sets; tutti settings --all lists all {}, --simulation the {} with which robots are "
+      "simulated,\nand tutti settings WORD what contains it.\n",
+      docs.product.size(), docs.laboratory.size());
+  return 0;
 }
 
-/// A program's, or, without one, a whole mission's with all that is simulated and measured in it.
-std::vector<FieldDoc> settings_of(const std::string& program) {
-  if (program == "server") return document_config(program::ServerSettings());
-  if (program == "robot") return document_config(program::RobotSettings());
-  if (program == "worker") return document_config(program::WorkerSettings());
-  return lab::document_mission();
-}
-
-int run(const std::vector<std::string>& parts, bool all, const std::string& program) {
-  const auto fields = settings_of(program);
-  if (parts.empty() && !all && program.empty()) {
-    list_operators(fields);
-    return 0;
-  }
+/// Those that have all these words in their key or meaning.
+int list(const std::vector<FieldDoc>& fields, const std::vector<std::string>& words) {
   std::size_t shown = 0;
   for (const auto& field : fields) {
-    const auto contains = [&](const std::string& part) {
-      return field.path.find(part) != std::string::npos || field.help.find(part) != std::string::npos;
+    const auto contains = [&](const std::string& word) {
+      return field.path.find(word) != std::string::npos || field.help.find(word) != std::string::npos;
     };
-    if (!std::ranges::all_of(parts, contains)) continue;
+    if (!std::ranges::all_of(words, contains)) continue;
     fmt::print("{}", words_of(field, field.help));
     ++shown;
   }
   if (shown > 0) return 0;
-  return complain("settings",
-                  fmt::format("no key or meaning contains '{}'; --all lists all", fmt::join(parts, "' and '")));
+  return complain("settings", fmt::format("no key or meaning contains '{}'; --all and --simulation list all",
+                                          fmt::join(words, "' and '")));
+}
+
+struct SettingsOptions {
+  std::vector<std::string> words;
+  bool all = false, simulation = false;
+  std::string program;
+};
+
+int run(const SettingsOptions& options) {
+  if (options.program == "server") return list(document_config(program::ServerSettings()), options.words);
+  if (options.program == "robot") return list(document_config(program::RobotSettings()), options.words);
+  if (options.program == "worker") return list(document_config(program::WorkerSettings()), options.words);
+  lab::MissionDocs docs = lab::document_mission();
+  if (options.words.empty() && !options.all && !options.simulation) return list_operators(docs);
+  const bool searches_all = options.all == options.simulation;  // neither: a word is looked for in both
+  std::vector<FieldDoc> fields;
+  if (options.all || searches_all) std::ranges::move(docs.product, std::back_inserter(fields));
+  if (options.simulation || searches_all) std::ranges::move(docs.laboratory, std::back_inserter(fields));
+  return list(fields, options.words);
 }
 
 }  // namespace
 
 void add_settings_command(CLI::App& app, int& exit_code) {
-  const auto parts = std::make_shared<std::vector<std::string>>();
-  const auto all = std::make_shared<bool>(false);
+  const auto options = std::make_shared<SettingsOptions>();
   auto* command = app.add_subcommand(
       "settings", "List what an operator sets: key, default, bounds and meaning; --all: all there is to set.");
   command->footer(
@@ -80,14 +89,16 @@ void add_settings_command(CLI::App& app, int& exit_code) {
       "...\n"
       "What one mission has: tutti run MISSION.yaml --print-config\n"
       "Example: tutti settings agreement\n");
-  command->add_option("word", *parts, "Only what has this in its key or meaning; of several words, all of them.")
+  command
+      ->add_option("word", options->words, "Only what has this in its key or meaning; of several words, all of them.")
       ->type_name("WORD");
-  command->add_flag("--all", *all, "Not only what an operator sets.");
-  const auto program = std::make_shared<std::string>();
-  command->add_option("--of", *program, "All that a server, a robot or a worker knows of a mission file")
+  command->add_flag("--all", options->all, "All that recordings and live robots have, not only what an operator sets");
+  command->add_flag("--simulation", options->simulation,
+                    "What simulates robots, and spoils what they measure, find or say");
+  command->add_option("--of", options->program, "All that a server, a robot or a worker knows of a mission file")
       ->type_name("PROGRAM")
       ->check(CLI::IsMember({"server", "robot", "worker"}));
-  command->callback([parts, all, program, &exit_code] { exit_code = run(*parts, *all, *program); });
+  command->callback([options, &exit_code] { exit_code = run(*options); });
 }
 
 }  // namespace tutti::app

@@ -181,17 +181,17 @@ std::string to_yaml(const MissionConfig& config) {
   return tutti::to_yaml(all);
 }
 
-std::vector<config_internal::FieldDoc> document_mission() {
+MissionDocs document_mission() {
   const auto config = std::make_unique<const MissionConfig>();  // large
-  auto all = document_config<mission::MissionConfig>(*config);
+  MissionDocs out{.product = document_config<mission::MissionConfig>(*config), .laboratory = {}};
   for (config_internal::FieldDoc& field : document_config(*config)) {
-    const auto there = std::ranges::find(all, field.path, &config_internal::FieldDoc::path);
-    if (there != all.end())
+    const auto there = std::ranges::find(out.product, field.path, &config_internal::FieldDoc::path);
+    if (there != out.product.end())
       *there = std::move(field);
     else
-      all.push_back(std::move(field));
+      out.laboratory.push_back(std::move(field));
   }
-  return all;
+  return out;
 }
 
 }  // namespace tutti::lab

@@ -125,6 +125,10 @@ Result<MissionConfig> demo_mission(const std::vector<std::string>& assignments,
 /// The text of a mission file with every setting in it.
 std::string to_yaml(const MissionConfig& config);
 /// The documentation of every setting of a mission file.
-std::vector<config_internal::FieldDoc> document_mission();
+struct MissionDocs {
+  std::vector<config_internal::FieldDoc> product;     ///< For recordings and live robots, too.
+  std::vector<config_internal::FieldDoc> laboratory;  ///< To simulate robots, and to spoil what is recorded or found.
+};
+MissionDocs document_mission();
 
 }  // namespace tutti::lab
