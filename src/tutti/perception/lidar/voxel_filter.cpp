@@ -53,35 +53,37 @@ void append(std::vector<KeyedPoint>& out, const Eigen::Vector3f& p, double voxel
   out.push_back({axis(0) | (axis(1) << 1U) | (axis(2) << 2U), p});
 }
 
-/// What the points of one voxel add up to.
+/// The sum of a voxel's points.
 struct VoxelSum {
   std::uint64_t key;
   std::uint32_t count = 0;
+  float least = kInfinity, most = 0.0F;  ///< Smallest size of a coordinate that is not zero, and largest one.
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  Eigen::Array3f least = Eigen::Array3f::Constant(kInfinity);  ///< Smallest size of a coordinate that is not zero.
-  Eigen::Array3f most = Eigen::Array3f::Zero();                ///< Largest one.
 
   void add(const Eigen::Vector3f& point) {
     const Eigen::Array3f size = point.array().abs();
     ++count;
     sum += point.cast<double>();
-    least = least.min((size == 0.0F).select(kInfinity, size));
-    most = most.max(size);
+    least = std::min(least, (size == 0.0F).select(kInfinity, size).minCoeff());
+    most = std::max(most, size.maxCoeff());
   }
   /// Whether no order of the points gives another sum, as none is rounded: a float is a multiple of 2^-24 of its size
   /// at least, and a double holds 2^53 multiples; half of that, as this product is rounded, too.
-  [[nodiscard]] bool is_exact() const { return (most * static_cast<float>(count) <= 0x1p28F * least).all(); }
+  [[nodiscard]] bool is_exact() const { return most * static_cast<float>(count) <= 0x1p28F * least; }
+  [[nodiscard]] Eigen::Vector3f centroid() const { return (sum / static_cast<double>(count)).cast<float>(); }
 };
 
 /// The voxels of points in any order, by a table of their keys (open addressing).
 class VoxelTable {
  public:
-  /// False when keys crowd in the table, as somebody may have made them to.
+  explicit VoxelTable(std::size_t most_voxels) : most_voxels_(most_voxels) {}
+  /// False when there are more voxels than that, or keys crowd in the table, as somebody may have made them to.
   bool add(const KeyedPoint& point) {
     if (2 * voxels_.size() >= slots_.size() && !grow()) return false;
     const std::size_t slot = slot_of(point.key);
     if (slot == slots_.size()) return false;
     if (slots_[slot] == kFree) {
+      if (voxels_.size() == most_voxels_) return false;
       slots_[slot] = static_cast<std::uint32_t>(voxels_.size());
       voxels_.push_back({.key = point.key});
     }
@@ -115,35 +117,36 @@ class VoxelTable {
     return true;
   }
 
+  std::size_t most_voxels_;
   std::vector<VoxelSum> voxels_;
   unsigned shift_ = 52;
   std::vector<std::uint32_t> slots_ = std::vector<std::uint32_t>(std::size_t{1} << (64U - shift_), kFree);
 };
 
-/// The voxels of points, which are added in an order that is not the input's.
-std::vector<VoxelSum> sums_in_order(std::vector<KeyedPoint> points) {
+/// The voxels of points, by key. They are added in an order that is not the input's.
+template <class Visit>
+void visit_in_order(std::vector<KeyedPoint> points, const Visit& visit) {
   std::sort(points.begin(), points.end(), [](const KeyedPoint& a, const KeyedPoint& b) {
     return std::tie(a.key, a.point.x(), a.point.y(), a.point.z()) <
            std::tie(b.key, b.point.x(), b.point.y(), b.point.z());
   });
-  std::vector<VoxelSum> out;
-  for (const KeyedPoint& point : points) {
-    if (out.empty() || out.back().key != point.key) out.push_back({.key = point.key});
-    out.back().add(point.point);
+  for (auto begin = points.begin(); begin != points.end();) {
+    VoxelSum voxel{.key = begin->key};
+    for (; begin != points.end() && begin->key == voxel.key; ++begin) voxel.add(begin->point);
+    visit(voxel);
   }
-  return out;
 }
 
-/// The same by a table, where most points need no order; nothing if that is no use.
+/// The same by a table, where most points need no order and share their voxel with others; nothing if it is no use.
 std::optional<std::vector<VoxelSum>> sums_by_table(const std::vector<KeyedPoint>& points) {
-  VoxelTable table;
+  VoxelTable table(points.size() / 2);
   for (const KeyedPoint& point : points)
     if (!table.add(point)) return std::nullopt;
   if (!std::ranges::all_of(table.voxels(), &VoxelSum::is_exact)) {  // as where rays run along an axis: x is 1e-17
     std::vector<KeyedPoint> rounded;
     for (const KeyedPoint& point : points)
       if (!table.voxel(point.key).is_exact()) rounded.push_back(point);
-    for (const VoxelSum& ordered : sums_in_order(std::move(rounded))) table.voxel(ordered.key) = ordered;
+    visit_in_order(std::move(rounded), [&](const VoxelSum& ordered) { table.voxel(ordered.key) = ordered; });
   }
   std::ranges::sort(table.voxels(), {}, &VoxelSum::key);
   return std::move(table.voxels());
@@ -152,12 +155,12 @@ std::optional<std::vector<VoxelSum>> sums_by_table(const std::vector<KeyedPoint>
 /// The result, to the bit, does not depend on the order of the input. Sorting all of a submap's million points takes
 /// several times as long as the table.
 PointCloud centroids(std::vector<KeyedPoint> points) {
-  auto voxels = sums_by_table(points);
-  if (!voxels) voxels = sums_in_order(std::move(points));
   PointCloud out;
-  out.points.reserve(voxels->size());
-  for (const VoxelSum& voxel : *voxels)
-    out.points.push_back((voxel.sum / static_cast<double>(voxel.count)).cast<float>());
+  const auto keep = [&out](const VoxelSum& voxel) { out.points.push_back(voxel.centroid()); };
+  if (const auto voxels = sums_by_table(points))
+    std::ranges::for_each(*voxels, keep);
+  else
+    visit_in_order(std::move(points), keep);
   return out;
 }
 
