@@ -33,7 +33,7 @@ class BusGuard {
   /// Why the folder could not be read kMostUnread times in a row: nobody is let in or revoked meanwhile. Empty: it can.
   [[nodiscard]] std::string trouble() const;
   static constexpr int kMostUnread = 5;
-  /// What the bus has refused, as lines for the log: who, what, and how many so far; of each member, and of all
+  /// Log lines for what the bus has refused: who, what, and how many so far; of each member, and of all
   /// strangers together, as Throttle lets through.
   [[nodiscard]] std::vector<std::string> lines(const bus::NatsChild::Refusals& refusals, double wall_s);
   [[nodiscard]] std::uint64_t refused() const { return refused_; }

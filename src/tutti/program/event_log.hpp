@@ -35,8 +35,8 @@ Json to_json(const node::Event& event);
 /// one older file of each is kept; a later file of events has in its first line how many were before it. May be called
 /// from any thread.
 ///
-/// What cannot be written, for example because the disk is full, is lost, and the program goes on. Events that others
-/// can cause at will (refusals, statuses) are throttled, and a sentence is repeated only after kSame_s.
+/// Lines that cannot be written, for example because the disk is full, are lost, and the program goes on. Events that
+/// others can cause at will (refusals, statuses) are throttled, and a sentence is repeated only after kSame_s.
 class EventLog {
  public:
   static constexpr std::uintmax_t kMaxEventBytes = std::uintmax_t{64} << 20U;

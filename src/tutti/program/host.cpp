@@ -18,7 +18,7 @@ namespace tutti::program {
 
 namespace {
 
-/// What a call throws; nothing: it returns.
+/// The message of the exception that a call throws; nothing: it returns.
 template <class Call>
 std::optional<std::string> thrown_by(Call&& call) {
   try {
@@ -263,8 +263,8 @@ Status Host::store_and_send(Answer answer) {
   return {};
 }
 
-/// What the port refuses waits; what it can never take, or what nobody needs later, goes. A retained value takes the
-/// place of the one that waits before it.
+/// Messages that the port refuses wait; those that it can never take, or that nobody needs later, are dropped. A
+/// retained value takes the place of the one that waits before it.
 void Host::send_waiting() {
   std::deque<bus::Envelope> refused;
   for (bus::Envelope& message : waiting_) {

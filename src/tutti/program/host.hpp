@@ -81,7 +81,7 @@ class Host {
   static constexpr double kLongestTaking_s = 0.25;
   static constexpr std::size_t kMostUncommitted = 8U << 20U;  ///< Bytes.
 
-  /// What a host is made of.
+  /// The parts that a host is made of.
   struct Parts {
     storage::TableStore* store = nullptr;  ///< Null: the node stores nothing.
     std::function<Result<std::unique_ptr<bus::Port>>()> open_port;
@@ -92,7 +92,7 @@ class Host {
     std::string table_aside = {};
     /// Version of the program; another version tries messages again that this one has put aside.
     std::string version = {};
-    /// What the program knows to be wrong, which goes before what the host sees of it; may be empty.
+    /// Trouble that the program knows of, which goes before what the host sees of it; may be empty.
     std::function<std::string()> trouble = {};
   };
   Host(Parts parts, const Clock& clock, EventLog& log)

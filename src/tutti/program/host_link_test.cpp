@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a host reports of its link, and how it begins anew.
+// A host reports the state of its link, and begins anew.
 #include <gtest/gtest.h>
 #include <unistd.h>
 

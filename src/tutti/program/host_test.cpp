@@ -19,7 +19,7 @@ namespace host_test {
 using bus::Endpoint;
 using bus::MessageKind;
 
-/// What happened, in order, as all of the parts below note it.
+/// The events in order, as all of the parts below note them.
 using Diary = std::vector<std::string>;
 
 class DiaryStore final : public test::FullDisk {
@@ -34,7 +34,7 @@ class DiaryStore final : public test::FullDisk {
   Diary& diary_;
 };
 
-/// What has come and is not acknowledged, whatever ports come and go.
+/// Messages that have come and are not acknowledged, whatever ports come and go.
 struct Mail {
   std::map<std::uint64_t, bus::Envelope> owed;
   ErrorCode refuses_with{};

@@ -103,7 +103,7 @@ Answer HostedRobot::work(Timestamp now) {
   return answer_for();
 }
 
-/// What the feed refuses, the node never hears of.
+/// The node never hears of what the feed refuses.
 NodeStatus HostedRobot::node_status(Timestamp now) const {
   NodeStatus status = driver_.node().status(now);
   status.version = options_.version;
@@ -143,7 +143,7 @@ std::string HostedRobot::progress(double time_s) const {
   return (has_ended() ? "the recording has ended" : feed_->is_fed() ? "a client feeds" : "no client feeds") + behind;
 }
 
-/// What is fed, and by whose clock.
+/// How much is fed, by which client and by whose clock.
 Json HostedRobot::feed_status() const {
   const FeedSession::Feeder feeder = feed_->feeder();
   const FeedFront::Figures of = feed_->front().figures();

@@ -67,7 +67,7 @@ class HostedRobot final : public Hosted {
   /// Why this program must end: another program is this robot. Nothing when it need not.
   [[nodiscard]] const std::optional<std::string>& refused() const { return refused_; }
 
-  /// What the node reports of itself, and this program of its feed.
+  /// The node's status, with this program's report of its feed.
   [[nodiscard]] NodeStatus node_status(Timestamp now) const;
 
  private:

@@ -27,7 +27,7 @@ class LinkWatch {
   };
   /// The sentences to report now. To be called about once a second.
   std::vector<Line> check(const bus::LinkState& state, double wall_s);
-  /// What is wrong now; empty when nothing is.
+  /// The present trouble; empty when there is none.
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
 
  private:

@@ -38,7 +38,7 @@ Json last_words(const Host::TrafficTable& table, const std::optional<NodeStatus>
   return out;
 }
 
-/// What a status may carry, and a unit of systemd, a folder and a subject of the bus can be called.
+/// The name must be one that a status may carry and that a systemd unit, a folder and a subject of the bus can have.
 Status check_robot_name(const std::string& name) {
   constexpr std::size_t kLongest = 64;
   if (is_plain_name(name, kLongest)) return {};

@@ -27,7 +27,7 @@ namespace tutti::program {
 inline constexpr const char* kEnded = "ended";  ///< The program's last event, which has its traffic and status.
 inline constexpr const char* kUpdateTimed = "update_timed";  ///< The event of drive::UpdateTime.
 
-/// What a robot's command line gives about its mission.
+/// A robot's mission, as its command line gives it.
 struct RobotSettings {
   std::string mission;              ///< Its name on the bus (bus::check_mission_name).
   std::vector<std::string> robots;  ///< By number; empty: unknown.

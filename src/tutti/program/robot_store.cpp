@@ -44,7 +44,7 @@ Result<std::unique_ptr<storage::TableStore>> open_whole(const fs::path& file, co
   return store;
 }
 
-/// What is kept, and what is lost, for people.
+/// Says what is kept and what is lost, for people.
 std::string summary(const mapfile::Salvaged& salvaged) {
   const auto submaps = salvaged.rows.find("outbox");
   std::string out = fmt::format("{} submaps are kept", submaps == salvaged.rows.end() ? 0 : submaps->second);

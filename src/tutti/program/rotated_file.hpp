@@ -13,11 +13,11 @@
 namespace tutti::program {
 
 /// A file of lines in a program's own folder, to which lines are appended. When it is full it becomes the older file,
-/// NAME.1.EXTENSION, in the place of the one before, and a new one is begun. What cannot be written, for example
-/// because the disk is full, is lost.
+/// NAME.1.EXTENSION, in the place of the one before, and a new one is begun. Lines that cannot be written, for example
+/// because the disk is full, are lost.
 class RotatedFile {
  public:
-  /// What a new file begins with when another one was full.
+  /// The beginning of a new file when another one was full.
   using Heading = std::function<std::string()>;
   /// Continues the file. Fails when it cannot be opened, or is a link.
   static Result<RotatedFile> open(const std::filesystem::path& file, std::uintmax_t max_bytes, Heading heading = {});

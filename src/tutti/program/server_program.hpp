@@ -26,7 +26,7 @@ inline constexpr const char* kEstimateFile = "estimate";
 /// In a server's and in a robot's: Hosted::status(), at most half a second old.
 inline constexpr const char* kStatusFile = "status.json";
 
-/// What a server's command line gives about its mission.
+/// A server's mission, as its command line gives it.
 struct ServerSettings {
   std::string mission;                            ///< Its name on the bus (bus::check_mission_name).
   std::vector<std::string> robots;                ///< By number; empty: unknown, and every robot is welcome.

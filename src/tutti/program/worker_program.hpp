@@ -14,7 +14,7 @@
 
 namespace tutti::program {
 
-/// What a worker's command line gives about its mission.
+/// A worker's mission, as its command line gives it.
 struct WorkerSettings {
   std::string mission;  ///< Its name on the bus; empty: the mission that has a server there.
   VerifierSettings verifiers;

@@ -85,7 +85,7 @@ struct BadSample {
   Timestamp stamp;
   std::string why;
 };
-/// What a client may send.
+/// Any message that a client may send.
 using FromClient = std::variant<FeedHello, Input, FeedEnd, FeedTime, FeedRaw, FeedUnknown, BadSample>;
 /// Decodes untrusted bytes; an error when they are no message of the protocol.
 Result<FromClient> decode_from_client(std::string_view payload);

@@ -26,7 +26,7 @@ struct FeedEnded {};
 struct FeedAnew {
   std::string why;
 };
-/// What the robot is handed. Sensors mean that later inputs are of these sensors.
+/// One entry of the robot's queue. Sensors mean that later inputs are of these sensors.
 using FeedInput = std::variant<Input, FeedEnded, std::shared_ptr<const Sensors>, FeedAnew>;
 
 /// The input's stamp; zero for what has none.
@@ -69,7 +69,7 @@ class FeedFront final : public FeedTarget {
   /// on, so that an input that makes the robot fail can be found.
   std::shared_ptr<const FeedInput> take(double wall_s);
   void note_heard();
-  /// What inputs from now on come from; never null.
+  /// The sensors that inputs from now on come from; never null.
   [[nodiscard]] std::shared_ptr<const Sensors> sensors() const;
   /// imu_over() the IMU samples that are kept.
   [[nodiscard]] std::vector<ImuSample> imu(Timestamp from, Timestamp until) const;
@@ -88,14 +88,14 @@ class FeedFront final : public FeedTarget {
   /// Queues a trajectory for the client; only the newest kTrajectories wait.
   void say(FeedTrajectory trajectory);
   static constexpr std::size_t kTrajectories = 4;
-  /// What the robot's body reported last, unless that is older than kHealthLasts.
+  /// The last report of the robot's body, unless that is older than kHealthLasts.
   [[nodiscard]] Health health() const;
   static constexpr std::chrono::seconds kHealthLasts{60};
-  /// What the robot reports of itself, which clients are shown.
+  /// Sets the robot's own status, which clients are shown.
   void say_status(const NodeStatus& status);
   /// Shows `trouble` to clients as an alert until it is called with an empty text.
   void say_trouble(std::string trouble);
-  /// What is wrong with the odometry that comes, for people; empty when nothing is.
+  /// The trouble with the odometry that comes, for people; empty when there is none.
   [[nodiscard]] std::string odometry_trouble() const;
   /// From now on everything from clients is refused, because the program ends.
   void close();

@@ -22,7 +22,7 @@ PositionFix fix(Timestamp stamp) {
 }
 std::string why(const Status& status) { return status ? "" : status.error().message; }
 
-/// What the front has goes to the robot; what that refuses is returned.
+/// Hands the front's inputs to the robot and returns its refusals.
 std::vector<std::string> work(FeedFront& front, test::NodeTarget& robot) {
   std::vector<std::string> out;
   while (const auto input = front.take(0.0)) {

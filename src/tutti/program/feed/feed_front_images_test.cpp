@@ -26,7 +26,7 @@ Sensors eyes() {
 EncodedImages images(Timestamp stamp) { return {stamp, {{0, true, std::string(32, 'x')}}, {}}; }
 std::vector<ImuSample> imu(Timestamp stamp) { return {{.stamp = stamp}}; }
 
-/// What the robot is given next: o, i, s (what is fed), or nothing.
+/// The robot's next input: o, i, s (by what is fed), or a space if there is none.
 char next(FeedFront& front) {
   const auto input = front.take(0.0);
   if (!input) return ' ';

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What is fed beside odometry and scans: images, IMU samples, position fixes and ranges.
+// The part of FeedFront for inputs other than odometry and scans: images, IMU samples, position fixes and ranges.
 #include <fmt/format.h>
 
 #include <utility>

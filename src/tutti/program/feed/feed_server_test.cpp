@@ -35,7 +35,7 @@ class FeedServerTest : public testing::Test {
     EXPECT_EQ(::connect(file, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
     return file;
   }
-  /// What the server answers to this, when it has done all it can.
+  /// Sends this and returns the server's answers, when it has done all it can.
   std::vector<v1::Feed> say(int file, const std::string& bytes) {
     const ssize_t sent = bytes.empty() ? 0 : send(file, bytes.data(), bytes.size(), MSG_NOSIGNAL);
     EXPECT_EQ(sent, static_cast<ssize_t>(bytes.size()));

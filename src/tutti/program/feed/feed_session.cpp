@@ -215,7 +215,7 @@ void FeedSession::put(Connection& connection, std::string frame, bool is_correct
 
 void FeedSession::make_room(Connection& connection) {
   const std::size_t most = static_cast<std::size_t>(settings_.max_queue_kb) * 1024;
-  // What has left in part must leave whole; the newest correction stays.
+  // A frame sent in part must be sent whole; the newest correction stays.
   std::size_t at = connection.sent > 0 ? 1 : 0;
   while (connection.queued > most && at + 1 < connection.queue.size()) {
     if (!connection.queue[at].is_correction) {

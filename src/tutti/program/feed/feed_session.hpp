@@ -47,7 +47,7 @@ class FeedSession {
     last_.bytes += raw.bytes.size();
     take_raw(client, raw);
   }
-  /// What reads the raw messages of the client that feeds; null for one that feeds none. After it has got something,
+  /// The reader of the feeding client's raw messages; null for a client that feeds none. After it has got something,
   /// take_due() is to be called.
   [[nodiscard]] RosClient* ros() { return ros_.get(); }
   /// Takes the inputs that are due of the raw messages so far.

@@ -34,7 +34,7 @@ struct FeedAlert {
   friend bool operator==(const FeedAlert&, const FeedAlert&) = default;
 };
 
-/// What a robot knows, as its live feed reports it.
+/// A robot's knowledge as its live feed reports it.
 struct FeedState {
   ChainId chain;
   std::string name;

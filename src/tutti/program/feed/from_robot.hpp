@@ -12,7 +12,7 @@
 
 namespace tutti::program {
 
-/// What a robot answers (proto/tutti/v1/feed.proto), reduced to the fields that the drivers here need. Poses are
+/// A robot's answers (proto/tutti/v1/feed.proto), reduced to the fields that the drivers here need. Poses are
 /// `T_a_b` in metres; stamps are the client's own.
 struct FeedWelcome {};
 struct FeedAnswer {

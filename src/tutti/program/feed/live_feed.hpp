@@ -35,7 +35,7 @@ class LiveFeed {
   /// A client that feeds is connected.
   [[nodiscard]] bool is_fed() const { return is_fed_; }
   [[nodiscard]] FeedSession::Feeder feeder() const;
-  /// What the thread has thrown since the last call; empty when nothing. All clients lose their connection when it
+  /// The exception that the thread threw since the last call; empty: none. All clients lose their connection when it
   /// throws, and may connect again.
   std::string take_thrown();
 

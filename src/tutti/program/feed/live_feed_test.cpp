@@ -215,7 +215,7 @@ TEST(LiveFeed, SendsTheCorrectedTrajectoryToWhoWantsIt) {
   EXPECT_TRUE(other.hear().has_correction());  // and no trajectory
 }
 
-/// What a robot program that ends has still to send is sent.
+/// A robot program that ends first sends everything that it still has to send.
 TEST(LiveFeed, SaysTheEndBeforeItGoes) {
   const Trajectory odometry = robot::test::drifting_odometry(3);
   const std::string path = path_of("live_feed_end_");

@@ -27,7 +27,7 @@ class LocalClient {
   void say(FeedEnd end);
   /// Uses what reads the messages of this client, then takes the inputs that are due.
   void use_intake(const std::function<void(intake::SensorIntake&)>& work);
-  /// What the robot has sent since the last call. An error when the connection has ended.
+  /// The robot's messages since the last call. An error when the connection has ended.
   Result<std::vector<FromRobot>> hear();
 
  private:

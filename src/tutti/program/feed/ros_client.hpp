@@ -25,8 +25,8 @@ class RosClient {
   /// that say it to the client.
   static constexpr const char* kPoseWithCovarianceType = "geometry_msgs/msg/PoseWithCovarianceStamped";
 
-  /// What `ros` leaves open is as in `of_mission`. `newest` is the newest sample that the robot has. Fails when the
-  /// topics that it names cannot be those of a robot's cameras.
+  /// Settings that `ros` leaves open are those of `of_mission`. `newest` is the newest sample that the robot has. Fails
+  /// when the topics that it names cannot be those of a robot's cameras.
   static Result<std::unique_ptr<RosClient>> make(intake::SensorConfig of_mission, FeedRos ros,
                                                  const std::optional<Timestamp>& newest);
 
@@ -44,7 +44,7 @@ class RosClient {
   [[nodiscard]] bool has_sensors_of(const FeedRos& before) const;
   [[nodiscard]] const FeedRos& said() const { return said_; }
 
-  /// What the client is to publish: where the robot is, as transform and pose.
+  /// The messages that the client is to publish: where the robot is, as transform and pose.
   std::vector<FeedRaw> hear(const FeedAnswer& answer, const Pose3& T_odom_body);
   void hear(const FeedTrajectory& trajectory);
   /// The team-mates, if they are others than before; where the robot is in a map that does not move, if that is newer;

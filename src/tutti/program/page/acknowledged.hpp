@@ -24,7 +24,7 @@ class Acknowledged {
   void resume(const Message& message);
   /// The alerts that there are now.
   void show(const std::vector<Alert>& alerts);
-  /// What is to be put on the board. `undo`: they are new again. Errors of code `invalid`: none of these ids is an
+  /// Returns the messages for the board. `undo`: they are new again. Errors of code `invalid`: none of these ids is an
   /// alert now, or there are too many.
   Result<std::vector<Message>> acknowledge(const std::vector<std::string>& ids, bool undo, const std::string& by,
                                            double time_s);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What an operator should know without being asked: from statuses and maps to a list of problems.
+// Lists the problems that an operator should hear of without asking, from statuses and maps.
 #include <fmt/format.h>
 
 #include <algorithm>

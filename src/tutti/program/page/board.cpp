@@ -28,7 +28,7 @@ bool Board::put(const Message& message) {
   return true;
 }
 
-/// What has ended stays as "null": a page that was away is to hear of it.
+/// A key that has ended stays as "null": a page that was away is to hear of it.
 void Board::put_all(std::string_view prefix, const std::vector<Message>& messages, double time_s) {
   std::set<std::string, std::less<>> keys;
   for (const Message& message : messages) keys.insert(message.key);

@@ -49,7 +49,7 @@ class Board {
   void put_all(std::string_view prefix, const std::vector<Message>& messages, double time_s);
   /// Counts what was taken.
   [[nodiscard]] std::uint64_t sequence() const { return sequence_; }
-  /// What was taken after `sequence`, each key once, in order; at first call with 0: everything.
+  /// The messages taken after `sequence`, each key once, in order; at first call with 0: everything.
   [[nodiscard]] std::vector<std::shared_ptr<const Posted>> after(std::uint64_t sequence) const;
 
  private:

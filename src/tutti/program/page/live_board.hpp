@@ -23,7 +23,7 @@ class LiveBoard {
     }
     changed_.notify_all();
   }
-  /// What was put after `sequence`, which then counts it; waits for it at most so long. Empty after close().
+  /// The messages put after `sequence`, which then counts them; waits for one at most so long. Empty after close().
   std::vector<std::shared_ptr<const Posted>> wait_after(std::uint64_t& sequence, std::chrono::milliseconds at_most) {
     return posted_after(sequence, at_most, false);
   }

@@ -12,7 +12,7 @@ namespace tutti::page {
 
 /// The last status as Prometheus reads it: every number of the mission's, its robots' and its workers' statuses is a
 /// gauge called tutti_mission_.., tutti_robot_.. or tutti_worker_.. after its field, robots and workers with the label
-/// `name`; times as seconds before it. What robots have sent and were sent by kind are counters,
+/// `name`; times as seconds before it. Counters by kind tell what robots have sent and were sent:
 /// tutti_radio_bytes_total and tutti_radio_messages_total. May be called from several threads.
 class Metrics {
  public:

@@ -135,7 +135,7 @@ class ServedPage final : public Page {
   std::vector<AskedOrder> take_orders() override { return site_.orders.take(); }
 
  private:
-  /// What an earlier program has shown goes on: the past, since when problems are there, who has acknowledged them.
+  /// Goes on from an earlier program: the past, since when problems are there, who has acknowledged them.
   void remember(const std::filesystem::path& file) {
     const double gap_s = 3.0 * silent_after_s(rate_);
     auto opened = history::open_history(file, {.gap_s = gap_s});

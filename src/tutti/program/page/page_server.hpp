@@ -45,7 +45,7 @@ struct PageOptions {
   std::function<void(const std::string& url)> announce;
 };
 
-/// The page of a running mission (docs/page.md), while it is served. What calls these functions waits for none of those
+/// The page of a running mission (docs/page.md), while it is served. Callers of these functions wait for none of those
 /// who look at it.
 class Page {
  public:
@@ -56,7 +56,7 @@ class Page {
   virtual void show_status(const MissionStatus& status) = 0;
   /// All marks of the map; those that it has, too.
   virtual void show_marks(const MarkSet& marks) = 0;
-  /// What operators have decided and written since the last call.
+  /// The operators' decisions and marks since the last call.
   [[nodiscard]] virtual std::vector<AskedOrder> take_orders() = 0;
 
  protected:

@@ -31,7 +31,7 @@ Recorder::~Recorder() {
   thread_.join();
 }
 
-/// What came until the board was closed is still stored.
+/// Messages that came until the board was closed are still stored.
 void Recorder::run() {
   while (true) {
     const bool is_last = board_.is_closed();

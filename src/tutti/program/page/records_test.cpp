@@ -32,8 +32,8 @@ struct Records {
   }
 };
 
-/// A struct's list as a table of what reads each of its keys in JSON (program/field_json.hpp). What a record lacks has
-/// the default that the struct has.
+/// A struct's list as a table of what reads each of its keys in JSON (program/field_json.hpp). A key that a record
+/// lacks has the struct's default.
 class RecordFields {
  public:
   RecordFields(Records& records, std::set<std::string> without) : records_(records), without_(std::move(without)) {}

@@ -28,7 +28,7 @@ class SignIn {
   explicit SignIn(std::filesystem::path pki) : pki_(std::move(pki)) {}
 
   [[nodiscard]] bool is_open() const { return pki_.empty(); }
-  /// What is to be signed next, within kNonce_s seconds.
+  /// The nonce to be signed next, within kNonce_s seconds.
   std::string nonce(double now_s);
   /// The token of a new session. Fails, with a sentence, when the key is nobody's who may see the page, or the
   /// signature is not of a nonce that is still good.

@@ -17,14 +17,14 @@
 #include "tutti/model/status.hpp"
 #include "tutti/program/page/board.hpp"
 
-/// What the page shows, as messages (docs/page.md): pure functions of a map and a status.
+/// The contents of the page, as messages (docs/page.md): pure functions of a map and a status.
 namespace tutti::page {
 
 /// After how many seconds of mission time a robot is silent: five statuses that did not come. Statuses come by the
 /// wall clock, so a mission that is played `rate` times as fast waits as much longer.
 constexpr double silent_after_s(double rate) { return 10.0 * std::max(1.0, rate); }
 
-/// What the page is sent first.
+/// The first message that the page is sent.
 struct Mission {
   std::string name;
   std::string description;
@@ -99,7 +99,7 @@ Message status_message(const MissionStatus& status);
 /// `places`: what robots have found of the map that they localise in, and when each place was seen, in mission time.
 Message places_message(const MissionStatus& status);
 
-/// What one map shows, to be put on a board with the prefixes below.
+/// The messages of one map, to be put on a board with the prefixes below.
 struct MapMessages {
   std::vector<Message> submaps;   ///< "submap/".
   std::vector<Message> closures;  ///< "closure/".

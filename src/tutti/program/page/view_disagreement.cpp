@@ -21,7 +21,7 @@ FieldJson number(double value, double digits) {
   return std::isfinite(value) ? FieldJson(std::round(digits * value) / digits) : FieldJson(nullptr);
 }
 
-/// What one chain's comparison needs, which has pointers into it.
+/// The data of one chain's comparison, which has pointers into it.
 struct Comparison {
   ProxyGraph graph;
   std::vector<consistency::RobotNode> nodes;

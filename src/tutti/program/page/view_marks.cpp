@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What operators have written on the map, as messages.
+// The marks that operators have put on the map, as messages.
 #include <fmt/format.h>
 
 #include "tutti/node/marks.hpp"

@@ -88,7 +88,7 @@ TEST_F(ViewOfAMap, HasEveryClosureWithWhyItIsInTheMapOrNot) {
     if (!is_in) {
       continue;
     }
-    // What it measured of the two submaps is what the map has, but for what the map does not believe of it.
+    // The map has the two submaps as it measured them, but for what the map does not believe of it.
     const Pose3 T_world_from = pose_of(poses.at("submaps").at(closure.at("from").get<std::string>()), 1);
     const Pose3 T_world_to = pose_of(poses.at("submaps").at(closure.at("to").get<std::string>()), 1);
     const Pose3 difference = pose_of(link.at("T_from_to"), 0).inverse() * T_world_from.inverse() * T_world_to;

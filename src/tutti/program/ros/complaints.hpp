@@ -12,8 +12,8 @@
 
 namespace tutti::ros {
 
-/// What is wrong with the messages of others: the newest of each kind for /diagnostics, one every 5 s for the log, for
-/// what strangers cause fills no log.
+/// Problems with the messages of others: the newest of each kind for /diagnostics, one every 5 s for the log, so that
+/// strangers cannot fill it.
 class Complaints {
  public:
   explicit Complaints(std::function<void(program::Level, const std::string&)> say) : say_(std::move(say)) {}

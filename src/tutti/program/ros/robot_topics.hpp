@@ -15,7 +15,7 @@
 
 namespace tutti::ros {
 
-/// What a robot publishes (docs/ros.md). What cannot be written is complained about.
+/// The topics that a robot publishes (docs/ros.md). A message that cannot be written is complained about.
 class RobotTopics {
  public:
   /// `complaints` must live as long as this.

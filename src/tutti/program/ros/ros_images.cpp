@@ -43,7 +43,7 @@ void RosImages::check_topics(program::LocalClient& client) {
     give_up(client, now_s);
 }
 
-/// What is chosen by type must be the same twice: of two cameras one may be discovered first.
+/// Topics chosen by type must be the same twice in a row: of two cameras one may be discovered first.
 void RosImages::find(program::LocalClient& client, double now_s) {
   const std::vector<Publication> published = participant_->publications();
   const auto topics = find_images(published, options_.config);

@@ -69,7 +69,7 @@ class Robot final : public RosRobot {
   void look_for_odometry();
   void publish_diagnostics();
 
-  // What a robot sends, by kind.
+  // The robot's messages, by kind.
   void note(const program::FeedAnswer& answer);
   void note(const program::FeedRaw& message) { topics_.publish(message); }
   void note(const program::FeedNote& message) { options_.say(Level::info, message.text); }
@@ -292,8 +292,8 @@ void Robot::hold_odometry(bool holds) {
   client_->use_intake([&](intake::SensorIntake& intake) { intake.hold_odometry(holds && points_, holds && images_); });
 }
 
-/// What waits when nothing more comes goes without. Turns are counted and not seconds: a thread that was blocked has
-/// messages before it. What comes afterwards waits as before.
+/// Odometry that waits goes alone when nothing more comes. Turns are counted and not seconds: a thread that was blocked
+/// has messages before it. Later odometry waits as before.
 void Robot::release_odometry() {
   silent_turns_ = is_silent_turn_ ? silent_turns_ + 1 : 0;
   if (silent_turns_ != kSilentTurns) return;

@@ -12,13 +12,13 @@
 
 namespace tutti::page {
 
-/// What the page asks of two submaps that an operator would join (docs/page.md). Nothing is stored here. May be called
+/// The page's requests about two submaps that an operator would join (docs/page.md). Stores nothing. May be called
 /// from several threads; one at a time is looked at, and one map is made, because either takes seconds of a core.
 class ByHand {
  public:
   explicit ByHand(Site& site) : site_(site) {}
 
-  /// What a verifier sees in two submaps of the last map, in the order of their ids.
+  /// A verifier's view of two submaps of the last map, in the order of their ids.
   struct Seen {
     std::shared_ptr<const mapfile::ShownMap> map;
     SubmapPair pair;

@@ -12,7 +12,7 @@
 
 namespace tutti::page {
 
-/// What a peer may take its time for, in seconds.
+/// How long a peer may take, in seconds.
 struct Patience {
   double head_s = 10.0;       ///< For the whole head of a request, and before it for a TLS handshake.
   double keep_alive_s = 3.0;  ///< Until the next request begins.

@@ -12,7 +12,7 @@
 
 namespace tutti::page {
 
-/// What the page asks of the past (docs/page.md).
+/// The page's requests about the past (docs/page.md).
 class HistoryRoutes {
  public:
   explicit HistoryRoutes(Site& site) : site_(site) {}

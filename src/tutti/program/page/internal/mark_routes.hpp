@@ -15,7 +15,7 @@ namespace httplib {
 class ContentReader;
 }  // namespace httplib
 
-/// What the page asks of marks (docs/page.md).
+/// The page's requests about marks (docs/page.md).
 namespace tutti::page {
 
 /// Where a mark's photo is, for its message.

@@ -15,8 +15,8 @@ namespace tutti::page {
 class Recorder {
  public:
   using Say = std::function<void(program::Level, const std::string&)>;
-  /// Puts what the history has on the board, and stores what is put after that until the board is closed. What is known
-  /// of the past is message "history". All must outlive this.
+  /// Puts what the history has on the board, and stores what is put after that until the board is closed. Message
+  /// "history" says what is known of the past. All must outlive this.
   Recorder(LiveBoard& board, history::History& history, Say say);
   ~Recorder();
   Recorder(const Recorder&) = delete;

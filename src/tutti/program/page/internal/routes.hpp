@@ -89,7 +89,7 @@ class Guarded {
   Value value_;
 };
 
-/// What the page's threads share.
+/// The state that the page's threads share.
 struct Site {
   Site(const PageOptions& options, const storage::TableStore& map)
       : mission_name(options.mission),

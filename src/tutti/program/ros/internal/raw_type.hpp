@@ -15,7 +15,7 @@ namespace tutti::ros::internal {
 
 /// The encapsulation header, which every message has.
 inline constexpr std::size_t kHeaderBytes = 4;
-/// What is longer is no message for us: it is dropped as it comes from the network.
+/// A longer message is none for us: it is dropped as it comes from the network.
 inline constexpr std::size_t kMaxMessageBytes = std::size_t{64} << 20;
 
 /// For dds_create_topic_sertype(), which takes it. Data are XCDR1.
