@@ -21,7 +21,7 @@ constexpr std::size_t kLongestName = 253;  // of the domain name system
 
 bool is_letter_or_digit(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9'); }
 
-/// What names and addresses of IPv4 are made of; those of IPv6 have ':' and '%', too.
+/// Checks the letters of names and IPv4 addresses; addresses of IPv6 have ':' and '%', too.
 bool is_host(std::string_view host, std::string_view more) {
   const auto allowed = [&](char c) {
     return is_letter_or_digit(c) || c == '.' || c == '-' || c == '_' || more.find(c) != std::string_view::npos;

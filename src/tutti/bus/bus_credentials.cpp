@@ -35,7 +35,7 @@ std::string take_block(std::string_view& text, const std::string& label) {
   return block;
 }
 
-/// What stands behind "KEY: " in a line.
+/// The text behind "KEY: " in a line.
 std::string field_of(std::string_view text, std::string_view key) {
   const std::string begin = fmt::format("\n{}: ", key);
   const std::size_t at = text.find(begin);

@@ -10,7 +10,7 @@
 
 namespace tutti::bus {
 
-/// What a user of a bus with rights may do (bus_rights.hpp). An operator sees what a viewer sees, and decides.
+/// A user's role, which gives it its rights (bus_rights.hpp). An operator sees what a viewer sees, and decides.
 enum class BusRole : std::uint8_t { server, robot, worker, operates, views };
 
 /// "server", "robot", "worker", "operator", "viewer"
@@ -42,7 +42,7 @@ struct Certificate {
   friend bool operator==(const Certificate&, const Certificate&) = default;
 };
 
-/// What a bus asks of those who connect. Never printed.
+/// The credentials that a bus asks for from those who connect. Never printed.
 struct BusCredentials {
   std::string user;    ///< Empty: `secret` is a token.
   std::string secret;  ///< Empty: there are none.
@@ -56,7 +56,7 @@ struct BusCredentials {
 };
 /// Those in a file, with its name; errors name it, and do not repeat what is in it.
 Result<BusCredentials> read_credentials(const std::string& file);
-/// What is in their file now, if that is still for the same user; otherwise the same again.
+/// The credentials in their file now, if that is still for the same user; otherwise the same again.
 BusCredentials read_again(const BusCredentials& credentials);
 /// "USER:PASSWORD" or "TOKEN" in the first line of a text, or the text of a file of `tutti pki`. Errors do not repeat
 /// it.

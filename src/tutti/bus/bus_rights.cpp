@@ -116,7 +116,7 @@ std::string user_block(const KeyedUser& one) {
       one.user.role == BusRole::server ? ", allow_responses: true" : "");
 }
 
-/// What passes between the accounts: all that members publish and subscribe to, but their inboxes.
+/// The subjects that pass between the accounts: all that members publish and subscribe to, but their inboxes.
 struct Passages {
   std::string exports, imports;
 };

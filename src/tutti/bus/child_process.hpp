@@ -37,7 +37,7 @@ class ChildProcess {
 
   [[nodiscard]] int failure() const;  ///< errno of what did not let it start; 0: it did.
   [[nodiscard]] bool ended() const;
-  /// What it ended with; nothing: it runs, or a signal ended it.
+  /// The exit code; nothing: it runs, or a signal ended it.
   [[nodiscard]] std::optional<int> exit_code() const;
   [[nodiscard]] int pid() const;
   /// Ends it at once.

@@ -5,7 +5,7 @@
 
 namespace tutti::bus {
 
-/// What a port (port.hpp) guarantees for a message, by the message's kind.
+/// The guarantee that a port (port.hpp) gives for a message, by the message's kind.
 enum class Delivery {
   durable,     ///< Comes until it is acknowledged, also to a receiver that has restarted; in any order, maybe twice.
   retained,    ///< Only the newest value counts: it comes last, and at once to a receiver that comes later.

@@ -24,7 +24,7 @@ struct LeaseHolder {
 /// "process 17 on base, state /var/lib/tutti-server, since 2026-01-31 12:00:00 UTC".
 std::string to_string(const LeaseHolder& holder);
 
-/// What a lease's value on the bus is: a line for each field, as plain_text().
+/// A lease's value on the bus: a line for each field, as plain_text().
 std::string lease_text(const LeaseHolder& holder);
 /// The holder that a value on the bus names; nothing when the value is no lease. Anybody may have written it.
 std::optional<LeaseHolder> lease_of(std::string_view text);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a bus in memory does beyond the contract of a port, and how transports are chosen.
+// The bus in memory beyond the contract of a port, and the choice of transports.
 #include <gtest/gtest.h>
 
 #include <chrono>

@@ -66,7 +66,7 @@ std::string complaint_of(const fs::path& log) {
   return text.substr(text.size() - std::min(text.size(), kTail));
 }
 
-/// What nats-server wrote of where it listens; "" when that is not there yet.
+/// The address at which nats-server has written that it listens; "" when it is not there yet.
 std::string url_in(const fs::path& ports) {
   std::error_code none;
   if (!fs::exists(ports, none)) return {};

@@ -54,7 +54,7 @@ class NatsChild {
   Status tend();
   /// From the next tend() on.
   void set_rights(std::string rights) { options_.rights = std::move(rights); }
-  /// What it has refused since this was last called, at most kMostRefusals, and how many more.
+  /// Its refusals since this was last called, at most kMostRefusals, and how many more.
   struct Refusals {
     std::vector<BusRefusal> all;
     std::uint64_t more = 0;

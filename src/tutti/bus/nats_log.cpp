@@ -11,7 +11,7 @@
 namespace tutti::bus {
 namespace {
 
-/// What stands between `begin` and `end`; empty when it does not.
+/// The text between `begin` and `end`; empty when there is none.
 std::string_view text_between(std::string_view line, std::string_view begin, std::string_view end) {
   const std::size_t first = line.find(begin);
   if (first == std::string_view::npos) return {};
@@ -83,7 +83,7 @@ std::optional<BusRefusal> refusal_of(std::string_view line) {
   return out;
 }
 
-/// `[17] 2026/01/31 12:00:00.000000 [INF] Reloaded server configuration`. What strangers choose is behind the level.
+/// `[17] 2026/01/31 12:00:00.000000 [INF] Reloaded server configuration`. Strangers' words are behind the level only.
 bool has_read_configuration(std::string_view line) {
   line.remove_prefix(std::min(line.find(" ["), line.size()));
   return line.starts_with(" [INF] Reloaded server configuration") ||

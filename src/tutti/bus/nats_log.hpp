@@ -7,7 +7,7 @@
 
 namespace tutti::bus {
 
-/// What a bus has refused, as its nats-server logs it.
+/// A bus's refusal, as its nats-server logs it.
 struct BusRefusal {
   std::string address;  ///< "10.0.0.7:40123"
   std::string key;      ///< NatsKey::open of the user; empty: nobody has proved to be one.

@@ -28,7 +28,7 @@ TEST(NatsLogTest, SaysWhoWasRefusedWhat) {
                         "certificate)"}));
 }
 
-/// What nats-server writes is Go's: whom it concerns does not know what a bad record MAC is.
+/// The words of nats-server are Go's: whom they concern does not know what a bad record MAC is.
 TEST(NatsLogTest, ExplainsPlainlyWhyNobodyWasLetIn) {
   const std::vector<std::pair<std::string, std::string>> ends{
       {"local error: tls: bad record MAC", "showed no certificate of this mission"},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What port_conformance_test.cpp does not try: kills, limits, garbage, and links that break.
+// Tests that port_conformance_test.cpp does not have: kills, limits, garbage, and links that break.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <nats/nats.h>
@@ -38,7 +38,7 @@ Status send_submap(Port& robot, const std::string& id, std::string bytes) {
   return robot.send({kRobot, kServer, MessageKind::submap, id, std::make_shared<const std::string>(std::move(bytes))});
 }
 
-/// What a server does: takes each message, and acknowledges it. How often each id came.
+/// Takes each message and acknowledges it, as a server does. Counts how often each id came.
 class Receiver {
  public:
   explicit Receiver(std::uint64_t most) : most_(most) {}

@@ -195,7 +195,7 @@ void JetStreamPort::watch() {
        });
 }
 
-/// What is there when a server starts is of an earlier start, whose answers nobody waits for.
+/// Jobs that are there when a server starts are of an earlier start, whose answers nobody waits for.
 void JetStreamPort::keep_jobs_ours() {
   const std::string jobs = job_stream(options_.mission);
   std::uint64_t looked = 0;
@@ -220,7 +220,7 @@ void JetStreamPort::keep_jobs_ours() {
 }
 
 /// The bus would let any worker say so of any job, given or not. A job's secret is in the job: whoever knows it has
-/// been given it. What is said of a job that is gone does nothing.
+/// been given it. A message about a job that is gone does nothing.
 void JetStreamPort::settle_jobs() {
   const std::string jobs = job_stream(options_.mission);
   const auto passes = [&](natsMsg* heard, const NatsConnection& connection) {

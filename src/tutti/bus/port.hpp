@@ -17,7 +17,7 @@ struct Received {
   std::uint64_t ticket = 0;
 };
 
-/// State of a port's link to its bus. What a transport does not have stays 0 or empty.
+/// State of a port's link to its bus. Fields that a transport does not have stay 0 or empty.
 struct LinkState {
   std::string url = {};    ///< Without credentials.
   bool connected = false;  ///< Connected, and subscribed to all that this port receives.
@@ -35,7 +35,7 @@ struct LinkState {
   std::uint32_t strange_settler = 0;
   /// For how long a connected bus has confirmed nothing of what was sent.
   double unconfirmed_s = 0.0;
-  /// What the bus does not let this program do, in the bus's words, since it connected; empty: nothing was refused.
+  /// The bus's refusal of something that this program did since it connected, in its words; empty: none.
   std::string denied = {};
   /// Server's port only: how often jobs were given to workers since one was last answered, once every job that is out
   /// was given kGivenInVain times on average. 0: jobs are answered.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What every implementation of Port owes (port.hpp, delivery.hpp), for each of them.
+// The contract of Port (port.hpp, delivery.hpp), tested for each implementation.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -41,7 +41,7 @@ class PortConformance : public ::testing::TestWithParam<test::PortImplementation
     const MessageKind kind = id == "b" ? MessageKind::refinement_job : MessageKind::job;  // of one queue
     send(port, server, Endpoint::any_worker(), kind, id, "job " + id);
   }
-  /// Until nothing more comes. What is expected may need many rounds on a busy machine; if nothing is expected, a few
+  /// Receives until nothing more comes. Expected messages may need many rounds on a busy machine; if none are, a few
   /// must pass.
   std::vector<Received> receive(Port& port, const std::function<bool(const std::vector<Received>&)>& is_enough,
                                 int patience = 50) {
@@ -57,12 +57,12 @@ class PortConformance : public ::testing::TestWithParam<test::PortImplementation
   std::vector<Received> receive(Port& port, std::size_t expected) {
     return receive(port, [&](const auto& all) { return all.size() >= expected; });
   }
-  /// What comes within a few rounds, if anything does.
+  /// The messages that come within a few rounds, if any do.
   std::vector<Received> receive(Port& port) {
     return receive(
         port, [](const auto& all) { return !all.empty(); }, 5);
   }
-  /// What has come by now, acknowledged if its id is not in `keep_back`.
+  /// The messages that have come by now, acknowledged if their id is not in `keep_back`.
   Messages take(Port& port, std::size_t expected = 0, const std::set<std::string>& keep_back = {}) {
     Messages ids;
     for (const Received& received : expected == 0 ? receive(port) : receive(port, expected)) {

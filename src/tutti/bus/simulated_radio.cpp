@@ -41,7 +41,7 @@ Timestamp after_airtime(const LinkConfig& link, Timestamp start, Timestamp t, do
   }
 }
 
-/// What the repetitions of a message last sent at `t` wait for contact, beside the time between them.
+/// How long the repetitions of a message last sent at `t` wait for contact, beside the time between them.
 double wait_of_repetitions(const LinkConfig& link, Timestamp start, Timestamp t, int repetitions) {
   double waited_s = 0.0;
   for (int i = 0; i < repetitions; ++i) {

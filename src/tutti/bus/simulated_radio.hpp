@@ -76,7 +76,7 @@ struct TopicStatistics {
 };
 
 /// The radio between robots and server in virtual time, without threads. Each robot has one link to the server; one end
-/// of every message is the server. What happens to a message is drawn from (seed, its kind, its number), so the same
+/// of every message is the server. A message's fate is drawn from (seed, its kind, its number), so the same
 /// calls give the same arrivals, whatever other kinds are sent beside it. A message waits in the bounded queue of its
 /// direction until there is contact and bandwidth; its airtime passes with contact only, its latency always. Only the
 /// newest waiting retained message (delivery.hpp) of a kind is kept, and a durable one that already waits is not queued

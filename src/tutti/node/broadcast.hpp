@@ -47,7 +47,7 @@ class Broadcast {
   bool to_all_;
   std::shared_ptr<const ProxyGraphMessage> last_ = std::make_shared<const ProxyGraphMessage>();
   FollowedMaps followed_;
-  /// What a robot was last sent in full, and what was sent as differences from it since.
+  /// The graph that a robot was last sent in full, and how much was sent as differences from it since.
   struct Base {
     ProxyGraph graph;
     std::size_t messages = 0, bytes = 0;  // including the one sent in full

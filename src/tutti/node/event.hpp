@@ -18,8 +18,8 @@
 #include "tutti/perception/fit/misfit.hpp"
 #include "tutti/robot/agent.hpp"
 
-/// What has happened at a node, for those who keep a record. Durations are not in it, because the same inputs must give
-/// the same events; the host measures them.
+/// The events at a node, for those who keep a record. They have no durations, because the same inputs must give the
+/// same events; the host measures them.
 namespace tutti::node {
 
 /// Reported by the server, once per submap.

@@ -27,8 +27,8 @@ class LaterAnswers {
   /// note_newest().
   void add(const std::string& job, ClosureVerdict verdict, std::vector<Timestamp> known_at);
   [[nodiscard]] bool has(const std::string& job) const { return awaited_.contains(job); }
-  /// What is to be sent now. Only the last answer to a job carries its name; the others have names of their own, so the
-  /// server goes on waiting.
+  /// The answers to be sent now. Only the last answer to a job carries its name; the others have names of their own, so
+  /// the server goes on waiting.
   [[nodiscard]] std::vector<Verdicts> take_due(Timestamp now);
   /// When take_due() has something to return; nothing: never.
   [[nodiscard]] std::optional<Timestamp> next_due() const;

@@ -27,7 +27,7 @@ struct MapTask {
   Broadcast broadcast;
 };
 
-/// What became of a task.
+/// The outcome of a task.
 struct MapOfTask {
   server::MadeMap made;
   bool is_update = false;

@@ -20,10 +20,10 @@ Result<MarkSet> read_marks(const storage::TableStore& map);
 /// A mark's photo; nothing when it has none.
 Result<std::optional<std::string>> read_photo(const storage::TableStore& map, std::uint64_t number);
 
-/// What stores the mark of an order, whose photo_type follows from its photo, or removes it; `known` are the marks that
-/// the store has, and is changed likewise. Errors of code `invalid`, which name what is wrong: a picture of another
-/// kind or size, words that are too long, a place that is none, too many marks, a number that another mark has, or that
-/// none has.
+/// The writes that store the mark of an order, whose photo_type follows from its photo, or remove it; `known` are the
+/// marks that the store has, and is changed likewise. Errors of code `invalid`, which name what is wrong: a picture of
+/// another kind or size, words that are too long, a place that is none, too many marks, a number that another mark has,
+/// or that none has.
 Result<std::vector<storage::Write>> follow(const MarkOrder& order, MarkSet& known);
 
 }  // namespace tutti::node

@@ -22,8 +22,8 @@ class OdometryGate {
   /// `newest`: the stamp of the robot's newest sample.
   explicit OdometryGate(RobotId robot, std::optional<Timestamp> newest = {}) : robot_(robot), watch_(newest) {}
 
-  /// What is to be done with a sample that passes. In this order: a new session begins; the sample that waited is
-  /// taken; the sample is taken.
+  /// The steps for a sample that passes, in this order: a new session begins; the sample that waited is taken; the
+  /// sample is taken.
   struct Passed {
     std::string why_anew;  ///< The clock of odometry began anew, so nothing after it can be in the same session; else
                            ///< empty.
@@ -33,7 +33,7 @@ class OdometryGate {
   Result<Passed> take(const OdometrySample& sample);
   /// A sample waits for another one that confirms it.
   [[nodiscard]] bool holds_one() const { return waiting_.has_value(); }
-  /// What is wrong while samples are refused, for people; empty when nothing is. The same text until one is taken.
+  /// The trouble while samples are refused, for people; empty: none are. The same text until one is taken.
   [[nodiscard]] std::string trouble() const;
 
  private:

@@ -17,11 +17,11 @@
 
 namespace tutti::node {
 
-/// What a robot returns of the map in one status: the submaps that it saw last, and of the others some in turn, so that
+/// The submaps that a robot returns in one status: those that it saw last, and of the others some in turn, so that
 /// nothing is missed when a status is lost. `now` is by the clock of the scans.
 std::vector<SubmapReturn> fits_to_return(const std::map<SubmapId, localise::SubmapFit>& fits, Timestamp now);
 
-/// What robots have returned of the maps that they localise in. A robot's return of a submap takes the place of its
+/// The returns of robots about the maps that they localise in. A robot's return of a submap takes the place of its
 /// earlier one, and of nobody else's.
 class PlaceBook {
  public:

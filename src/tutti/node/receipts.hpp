@@ -12,7 +12,7 @@
 
 namespace tutti::node {
 
-/// What the server has reported to each robot about its submaps, or is to report: the mission's robots (members), and
+/// The server's reports to each robot about its submaps, made or still to make: the mission's robots (members), and
 /// others (strangers). Memory is bounded, whatever anybody sends.
 class Receipts {
  public:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a robot's node makes of what the server sends: graphs, and receipts of which submaps it has.
+// The part of RobotNode that takes the server's messages: graphs, and receipts of which submaps it has.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -83,7 +83,7 @@ void RobotNode::follow(const ProxyGraphMessage& graph, Timestamp now, Step& step
 }
 
 /// One graph in the server's name, with a revision that it will never have, would be the last that this robot believes.
-/// What is only late comes once, and the newest of a kind last.
+/// A graph that is only late comes once, and the newest of a kind last.
 bool RobotNode::goes_on_behind(const ProxyGraph& heard) {
   constexpr unsigned kGoesOn = 3;
   if (heard.age() >= agent_.map_age()) {
@@ -159,7 +159,7 @@ void RobotNode::note_start(std::uint32_t incarnation, Step& step) {
 }
 
 /// A server that runs on forgets nothing: what it named as stored and names no more, somebody else named in its name.
-/// What it refused it may forget, for its list is bounded, unless it has started again.
+/// It may forget refusals, for its list is bounded, unless it has started again.
 void RobotNode::take_back(const Receipt& receipt, bool has_started, Timestamp now, Step& step) {
   std::vector<SubmapId> forgotten;
   for (const auto& [id, bytes] : archive_) {

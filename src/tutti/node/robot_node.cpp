@@ -79,7 +79,7 @@ Result<std::unique_ptr<RobotNode>> RobotNode::open(RobotId robot, std::uint64_t 
   return node;
 }
 
-/// What is no submap's key is another version's, and stays as it is.
+/// A row whose key is no submap's is another version's, and stays as it is.
 Status RobotNode::read_outbox() {
   Status ok;
   std::map<SubmapId, std::size_t> kept;

@@ -122,7 +122,7 @@ class RobotNode {
   Status set_aside(const wire::StateRows& checkpoint, std::uint64_t session);
   Status hear_again(const JournalEntry& entry);
   Status read_outbox();
-  /// What has passed the gate, or needs not.
+  /// Takes an input that has passed the gate, or need not.
   void hear(const Input& input, Timestamp now, Step& step);
   /// Tells the localiser, if there is one, and reports when it knows more or less than before.
   void locate(const Input& input, Timestamp now, Step& step);

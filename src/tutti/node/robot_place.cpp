@@ -38,7 +38,7 @@ bool RobotNode::wants_scan(Timestamp stamp) const {
   return is_wanted || (localiser_ && localiser_->wants_scan(stamp));
 }
 
-/// What the localiser refuses, the agent has refused before, or it is of no use to it.
+/// An input that the localiser refuses was refused by the agent before, or is of no use to the localiser.
 void RobotNode::locate(const Input& input, Timestamp now, Step& step) {
   if (!localiser_) return;
   (void)localiser_->add(input);

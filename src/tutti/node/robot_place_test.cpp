@@ -84,7 +84,7 @@ TEST(RobotPlace, WithoutAServerTheMapThatItIsLocalisedInCorrectsItsTrajectory) {
   EXPECT_LT(error_m(corrected, recording.reference), 0.25 * error_m(raw, recording.reference));
   EXPECT_GT(with.node->agent().ledger().size(), 0U);
 
-  // What it has heard is in its store, as what a server sends is.
+  // Its store has what it has heard, as it has what a server sends.
   RobotNodeConfig config;
   config.agent.submap.has_scans = true;
   (void)with.done(with.node->store_all());
@@ -119,7 +119,7 @@ TEST(RobotPlace, AStartPoseForARobotWithoutAMapIsRefusedWithTheWayOn) {
             "a start pose, and this robot does not localise in a map: start it with --map FILE --localise");
 }
 
-/// What a robot sees where a box was put up that the map does not have.
+/// The scans of a robot where a box was put up that the map does not have.
 class ScansOfABox final : public ScanSource {
  public:
   ScansOfABox(const Recording& robot, Eigen::Vector3d middle)

@@ -82,8 +82,8 @@ void RobotNode::note_foreign(const std::set<std::uint64_t>& sessions, Timestamp 
         waiting, *foreign_sessions_.rbegin());
 }
 
-/// What is one chain in the map must be of one body. So who was not the first to have a session begins another, and the
-/// submap that it was making is lost.
+/// A chain in the map must be of one body. So who was not the first to have a session begins another, and the submap
+/// that it was making is lost.
 void RobotNode::leave(std::uint64_t session, const std::string& why, Timestamp now, Step& step) {
   foreign_sessions_.insert(session);
   if (config_.keeps_state)

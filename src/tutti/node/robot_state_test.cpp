@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a robot's store is written, and what becomes of one that another version has written.
+// A robot's store: what is written to it, and how one that another version has written is read.
 #include <gtest/gtest.h>
 
 #include <algorithm>

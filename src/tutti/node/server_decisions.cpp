@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What operators send to the server: decisions on closures, and marks.
+// The part of ServerNode that takes operators' messages: decisions on closures, and marks.
 #include <fmt/format.h>
 
 #include <algorithm>

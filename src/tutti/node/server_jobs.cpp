@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a ServerNode asks its workers, and what they answer.
+// The part of ServerNode that asks workers and takes their answers.
 #include <fmt/format.h>
 
 #include <algorithm>

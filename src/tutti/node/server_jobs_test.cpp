@@ -49,7 +49,7 @@ class ServerJobs : public test::StoredServer {
                               std::make_shared<const std::string>(wire::encode(job))};
     for (const bus::Envelope& verdicts : worker.receive(asked, now_).messages) receive(verdicts);
   }
-  /// What is asked when the map's next update and what is due until `later` have been.
+  /// The jobs asked once the map's next update, and all that is due until `later`, have been.
   std::vector<Job> wait(double later) { return decoded(wait_for(MessageKind::job, later)); }
   static std::vector<bool> given_up(const Step& step) {
     std::vector<bool> out;
@@ -148,7 +148,7 @@ TEST_F(ServerJobs, AJobOfAnEarlierStartComesBackForNothing) {
   expect_refused("every worker that had it has ended");
 }
 
-/// What anybody can send: a verdict with other closures than the worker found.
+/// Answers that anybody can send: a verdict with other closures than the worker found.
 class StrangeAnswers : public ServerJobs {
  protected:
   Job ask() {
@@ -182,7 +182,7 @@ TEST_F(StrangeAnswers, ToAJobThatIsAnsweredAreDropped) {
   EXPECT_EQ(store_->tables(), before);
 }
 
-/// What members have sent, sent again 10,000 times by somebody who has their credential and their disk.
+/// Members' messages, sent again 10,000 times by somebody who has their credential and their disk.
 TEST_F(StrangeAnswers, ReplaysChangeNothing) {
   const Job job = ask();
   WorkerNode worker(Endpoint::worker(0), verifier_, SubmapFrames::of(*store_));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a server takes while it makes a map. The map is made when the test asks for it: no clock and no thread decides.
+// A server takes messages while it makes a map. The map is made when the test asks: no clock and no thread decides.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -19,7 +19,7 @@
 namespace tutti::node {
 namespace {
 
-/// What the names of all jobs of a start begin with: no other map's do. An older map that was put back counts its
+/// The prefix of the names of all jobs of a start, which no other map has. An older map that was put back counts its
 /// starts once more.
 std::string names_of_jobs(std::uint64_t epoch, std::uint64_t start, std::uint32_t incarnation) {
   const std::string prefix = fmt::format("{}/{}/", epoch, start);
@@ -273,8 +273,8 @@ void ServerNode::note_refused(SubmapId id, const bus::Envelope& envelope, const 
   send_receipt(*receipt, step);
 }
 
-/// What a worker asked for, of jobs that are out; what it does not get it asks for again. A copy without a frame means
-/// that the map does not have it, or no job that is out needs it.
+/// Sends a worker the copies that it asked for, of jobs that are out; it asks again for those that it does not get. A
+/// copy without a frame means that the map does not have it, or no job that is out needs it.
 void ServerNode::send_copies(const bus::Envelope& envelope, Timestamp now, Step& step) {
   if (envelope.from.role != bus::Endpoint::Role::worker) return refuse(envelope, "only workers get copies", now, step);
   const auto request = wire::decode_submap_request(*envelope.bytes);

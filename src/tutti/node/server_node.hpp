@@ -63,8 +63,8 @@ struct ServerNodeConfig {
 
 /// The server as a node: MapServer with its store and messages. It takes submaps, verdicts and operators' decisions,
 /// and gives receipts, jobs and proxy graphs. The store is the map (storage::map_schema()): submaps, verdicts and
-/// decisions as they came, and the outcome for all other pairs; everything else is computed from these. What was sent
-/// is never newer than what is stored, so a server that starts again on its own store keeps its epoch.
+/// decisions as they came, and the outcome for all other pairs; everything else is computed from these. It sends
+/// nothing newer than what is stored, so a server that starts again on its own store keeps its epoch.
 class ServerNode {
  public:
   /// On an empty store, begins a new map of this epoch, which must be larger than any before (server::MapServer);

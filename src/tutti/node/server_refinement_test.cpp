@@ -34,7 +34,7 @@ class ServerRefinement : public test::StoredServer {
       for (const bus::Envelope& verdicts : worker_->receive(job, now_).messages) receive(verdicts);
   }
   static std::vector<bus::Envelope> asked(const Step& step) { return of_kind(step, MessageKind::refinement_job); }
-  /// What is to be refined when all that is due until `later` has been.
+  /// The refinements asked for once all that is due until `later` has been.
   std::vector<bus::Envelope> wait(double later) { return wait_for(MessageKind::refinement_job, later); }
   static Step answer_of(WorkerNode& worker, const bus::Envelope& job) { return worker.receive(job, Timestamp{}); }
   Step answer(const bus::Envelope& job) { return receive(answer_of(*worker_, job).messages.at(0)); }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a ServerNode knows of the others, and reports of the whole.
+// The part of ServerNode that keeps track of robots and workers and makes the mission's status.
 #include <fmt/format.h>
 
 #include <algorithm>

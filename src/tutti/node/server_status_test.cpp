@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a ServerNode knows of robots and workers, and sends them and viewers.
+// ServerNode keeps track of robots and workers, and sends them and viewers its status.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -260,7 +260,7 @@ TEST_F(ServerStatus, WhatItNeverTakesIsInTheReceiptAndSurvivesARestart) {
   check();
 }
 
-/// What is refused under numbers that the robot has not used is not the robot's, and is not reported as that. It was
+/// A submap refused under a number that the robot has not used is not the robot's, and is not reported as that. It was
 /// reported for ever.
 TEST_F(ServerStatus, GarbageUnderNumbersThatARobotNeverUsedIsNotTheRobots) {
   const ChainId chain{kAlpha, 7};
@@ -386,7 +386,7 @@ TEST_F(ServerStatus, StrangersLockNobodyOut) {
   EXPECT_EQ(node_->mission_status(now_).robots[1].status.name, "real");
 }
 
-/// What a robot returns of the map that it localises in, if that is this server's.
+/// A robot's returns about the map that it localises in, if that is this server's.
 class ServerStatusPlaces : public ServerStatus {
  protected:
   ServerStatusPlaces() {

@@ -23,8 +23,8 @@ struct UnreadRows {
   std::string why;  ///< Why the last one was left.
 };
 
-/// What the call threw; nothing when it did not throw. An exception on one row is a defect of this program, and no
-/// reason to lose all other rows. std::bad_alloc is thrown on.
+/// The message of what the call threw; nothing when it did not throw. An exception on one row is a defect of this
+/// program, and no reason to lose all other rows. std::bad_alloc is thrown on.
 template <class Call>
 std::optional<std::string> thrown_by(Call&& call) {
   try {

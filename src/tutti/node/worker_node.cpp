@@ -33,7 +33,7 @@ std::set<SubmapId> submaps_of(const std::variant<Job, RefinementJob>& job) {
   return std::visit([](const auto& one) { return submaps_of(one); }, job);
 }
 
-/// What a verifier or refiner throws is a defect of ours, which costs the pair, or the refinement, and nothing else.
+/// An exception of a verifier or refiner is a defect of ours: it costs the pair, or the refinement, and nothing else.
 template <class T, class Call>
 Result<T> caught(Call&& call) {
   try {
@@ -179,7 +179,7 @@ void WorkerNode::receive_job(const bus::Envelope& envelope, Timestamp now, Step&
   ask(now, step);
 }
 
-/// What is no good, or was not asked for, is left where it is.
+/// A copy that is no good, or was not asked for, is not taken.
 void WorkerNode::receive_copy(const bus::Envelope& envelope, Timestamp now, Step& step) {
   const auto refuse = [&](const std::string& why) {
     step.emit(now, MessageRefused{envelope.from, envelope.kind, why});

@@ -140,7 +140,7 @@ TEST_F(WorkerNodeTest, AnswersWithEachClosureWhenItIsKnownAndTheJobWithTheLast) 
   EXPECT_FALSE(worker.next_timer().has_value());
 }
 
-/// What a worker asks the server for, and the server's answers.
+/// A worker's requests for submaps to the server, and the server's answers.
 class DistantWorkerTest : public WorkerNodeTest {
  protected:
   static Job job_of(std::uint32_t count) {

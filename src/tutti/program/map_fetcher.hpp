@@ -39,7 +39,7 @@ class MapFetcher {
   [[nodiscard]] bool has_news() const;
   /// The newest map, once; null: it was taken, or there is none.
   LocaliseSetup take();
-  /// What it is doing, for people; empty: nothing new.
+  /// The state of the fetch as a sentence for people; empty: nothing new.
   [[nodiscard]] std::string state() const;
 
  private:

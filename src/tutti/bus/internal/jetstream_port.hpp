@@ -121,7 +121,7 @@ class JetStreamPort final : public Port {
   Inbox inbox_;
   std::vector<std::string> busy_;                ///< Where work is reported to go on.
   std::map<MessageKind, std::string> retained_;  ///< What was last given.
-  /// What was last sent, of the server's: a bus that has lost it gets it again.
+  /// The server's values as last sent: a bus that has lost them gets them again.
   std::map<std::pair<Endpoint, MessageKind>, Envelope> retained_sent_;
   std::string stranded_;  ///< The stream to be made anew; "": none.
   std::uint64_t streams_made_anew_ = 0;

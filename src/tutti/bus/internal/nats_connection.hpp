@@ -67,7 +67,7 @@ class NatsConnection {
   void close() const { natsConnection_Close(connection_); }
   /// Why the bus hangs up on this connection, which tries to come back; empty: it is there, or the bus is not.
   [[nodiscard]] std::string not_let_in() const;
-  /// What the bus does not let this connection do, in its words; empty: it has refused nothing.
+  /// The bus's refusal of something that this connection did, in its words; empty: it has refused nothing.
   [[nodiscard]] std::string denied() const;
   /// An error of libnats as one of ours: where, while doing what, why.
   [[nodiscard]] tl::unexpected<Error> failure(natsStatus status, std::string_view doing, int code = 0) const;
@@ -76,7 +76,7 @@ class NatsConnection {
   [[nodiscard]] Status prepare(const BusOptions& options) const;
   /// The server's consumer of a stream, anew: whatever is not acknowledged comes at once.
   [[nodiscard]] Status renew_consumer(const std::string& stream, const std::string& consumer) const;
-  /// What a stream has, and what its consumer is to get of it.
+  /// The contents of a stream, and the part that its consumer is to get.
   struct StreamState {
     std::uint64_t first = 0;       ///< Sequence in the stream.
     std::uint64_t messages = 0;    ///< In the stream.
@@ -102,7 +102,7 @@ class NatsConnection {
   [[nodiscard]] Result<std::uint64_t> remove_strange(const std::string& stream, std::uint64_t after,
                                                      const std::function<bool(std::string_view)>& ours,
                                                      std::uint64_t& removed) const;
-  // What these return is the connection's, which frees it when it is closed: libnats (issue 637) may be at a message
+  // The connection owns what these return, and frees it when it is closed: libnats (issue 637) may be at a message
   // for a subscription that is being destroyed.
   /// The consumer of a stream, if it is missing.
   [[nodiscard]] Status add_consumer(const std::string& stream, const std::string& consumer) const;

@@ -92,7 +92,7 @@ Inbox::Messages::iterator Inbox::oldest_half_of(Endpoint from) {
   return messages_.find(found->second);
 }
 
-/// What has just grown is the newest, and alone it is below every bound.
+/// The message that has just grown is the newest, and alone it is below every bound.
 void Inbox::keep_bounds(Endpoint from, Time now) {
   const auto exceeds = [](const Halves& halves, std::size_t messages, std::size_t bytes) {
     return halves.messages > messages || halves.bytes > bytes;

@@ -18,7 +18,7 @@
 
 namespace tutti::bus {
 
-/// What has come to a port, from its first part until it is acknowledged on the bus. A message that comes again
+/// A port's messages, each from its first part until it is acknowledged on the bus. A message that comes again
 /// meanwhile is not given again (the bus thinks that 30 s are long), nor for some time after: a bus that is killed
 /// forgets acknowledgements.
 ///
@@ -60,7 +60,7 @@ class Inbox {
   };
   /// The oldest that the bus does not know.
   [[nodiscard]] std::optional<Acknowledgement> next_acknowledgement() const;
-  /// What was acknowledged where is void: the bus has lost its stream of these. Parts of messages that are not whole
+  /// The bus has lost its stream of these, so where to acknowledge them is void. Parts of messages that are not whole
   /// are forgotten; whole ones are still to be acknowledged, and nobody learns of it.
   void forget_stream(MessageKind kind);
   /// The bus knows, or cannot be reached and will send the message again: it is forgotten here.

@@ -40,7 +40,7 @@ struct Settlement {
 /// Nothing: no such text, or of another stream than this one.
 std::optional<Settlement> settlement_of(std::string_view text, std::string_view stream);
 
-/// What a subject of ours has on its message; nothing when it is none of a robot, a worker or the viewers.
+/// A message's address, as a subject of ours has it; nothing when it is none of a robot, a worker or the viewers.
 struct Address {
   Endpoint end;  ///< Who sent it, or of retained ones to whom.
   MessageKind kind = MessageKind::submap;

@@ -17,7 +17,7 @@
 
 namespace tutti::bus {
 
-/// What a port has to send, in parts, until the bus has confirmed each. It has no clock: callers pass the time.
+/// A port's messages to send, in parts, until the bus has confirmed each. It has no clock: callers pass the time.
 class Outbox {
  public:
   using Time = std::chrono::steady_clock::time_point;
@@ -38,8 +38,8 @@ class Outbox {
   /// Refused: durable messages and jobs above the limit, anything too large. One that is here already changes nothing.
   /// A retained one takes the place of one that waits for the same receiver; status waits for nothing.
   Status add(const Envelope& envelope);
-  /// What is to be sent now, if anything: at most so many are without confirmation at a time, and of one retained
-  /// value one. It is under way from here on; what is best effort is forgotten.
+  /// The piece to be sent now, if any: at most so many are without confirmation at a time, and of one retained value
+  /// one. It is under way from here on; one that is best effort is forgotten.
   std::optional<Piece> next(Time now);
   /// The bus has it.
   void confirm(std::uint64_t number);
@@ -47,7 +47,7 @@ class Outbox {
   void refuse(std::uint64_t number, Time now);
   /// Everything under way counts as refused.
   void refuse_all(Time now);
-  /// What was under way for too long waits again.
+  /// Pieces that were under way for too long wait again.
   void expire(Time now);
   /// All that was under way waits again: the connection was gone, and with it maybe the messages.
   void resend_all();
@@ -55,7 +55,7 @@ class Outbox {
   [[nodiscard]] std::optional<Time> unconfirmed_since() const { return unconfirmed_since_; }
   /// It could not.
   void note_cut() { unconfirmed_since_.reset(); }
-  /// What is best effort is not heard without a connection.
+  /// Best-effort messages are not heard without a connection.
   void forget_best_effort();
 
   [[nodiscard]] std::size_t messages() const { return waiting_.size() + under_way_.size(); }

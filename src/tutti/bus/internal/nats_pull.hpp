@@ -17,7 +17,7 @@ class NatsPull {
   /// `settle_at`: as in reply_of().
   NatsPull(std::shared_ptr<NatsConnection> connection, const std::string& stream, const std::string& consumer,
            natsSubscription* subscription, std::string inbox, std::string settle_at = {});
-  /// What still comes is given back, so that another gets it at once.
+  /// Gives back the messages that still come, so that another gets them at once.
   ~NatsPull();
   NatsPull(const NatsPull&) = delete;
   NatsPull& operator=(const NatsPull&) = delete;
@@ -35,7 +35,7 @@ class NatsPull {
 
  private:
   [[nodiscard]] bool ask(int batch);
-  /// What the bus answers to a request instead of a message.
+  /// The meaning of the bus's answer to a request when it is no message.
   [[nodiscard]] State state_of(natsMsg* message);
 
   std::shared_ptr<NatsConnection> connection_;

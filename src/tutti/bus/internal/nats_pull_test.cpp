@@ -47,7 +47,7 @@ class NatsPullFrom : public ::testing::Test {
   std::unique_ptr<NatsPull> pull;
 };
 
-// What comes later must not wait until a request that was answered in part counts as lost.
+// Later messages must not wait until a request that was answered in part counts as lost.
 TEST_F(NatsPullFrom, ARequestAnsweredInPartAndNotEndedIsFollowedByAnotherAtOnce) {
   EXPECT_EQ(pull->next(32).state, State::nothing);
   ASSERT_TRUE(is_asked(5000));

@@ -5,14 +5,14 @@
 
 #include "tutti/bus/transport.hpp"
 
-/// What the rows of transports() consist of.
+/// The functions in the rows of transports().
 namespace tutti::bus {
 
 /// A port over NATS JetStream (docs/bus.md). The server's port makes the streams that the mission needs on the bus and
-/// keeps those that exist. Threads of its own connect, send, receive and acknowledge. What the bus has not confirmed is
-/// sent again with the same id, of which the bus stores one. Sent first are status messages, then retained ones, then
-/// the rest in the order of send(), of submaps the newest. Without a bus the port waits for one. The destructor takes
-/// seconds at most, in which acknowledgements are delivered if the bus can be reached.
+/// keeps those that exist. Threads of its own connect, send, receive and acknowledge. Messages that the bus has not
+/// confirmed are sent again with the same id, of which the bus stores one. Sent first are status messages, then
+/// retained ones, then the rest in the order of send(), of submaps the newest. Without a bus the port waits for one.
+/// The destructor takes seconds at most, in which acknowledgements are delivered if the bus can be reached.
 std::unique_ptr<Port> open_nats_port(Endpoint endpoint, const BusOptions& options);
 /// Values of a bucket.
 std::unique_ptr<LeaseBoard> open_nats_leases(const BusOptions& options);

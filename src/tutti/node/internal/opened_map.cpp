@@ -73,8 +73,8 @@ void OpenedMap::add(ClosureVerdict verdict) {
   state.verdicts.insert_or_assign(pair, without_evidence(std::move(verdict)));
 }
 
-/// After those. What others have refused need not be known; closures that were set aside are believed when their
-/// verifier is the server's.
+/// To be called after those. Refusals by other verifiers need not be known; closures that were set aside are believed
+/// when their verifier is the server's.
 void OpenedMap::add_answer(ClosureVerdict verdict) {
   const SubmapPair pair = verdict.pair;
   if (!state.answered.has_both(pair)) return;

@@ -18,7 +18,7 @@
 
 namespace tutti::node {
 
-/// What a server finds in its store.
+/// The state that a server finds in its store.
 struct OpenedMap {
   server::MapServerState state;
   std::map<RobotId, Receipt> receipts;

@@ -12,7 +12,7 @@
 
 namespace tutti::node::internal {
 
-/// What a robot finds in its store, but for its journal and its submaps.
+/// The state that a robot finds in its store, but for its journal and its submaps.
 struct StoredRobot {
   std::uint64_t starts = 0;
   std::uint64_t newest_session = 0;  ///< That the store or a waiting submap names; 0: none.
