@@ -23,8 +23,8 @@ void note_no_fixes(const BagIndex& index, std::vector<std::string>& notes) {
   }
 }
 
-/// What was measured on one topic, with where the antenna is on the body, and by odometry's clock, as of a live topic.
-/// Returns what is to be said of it: ", of an antenna at ..".
+/// Takes one topic's measurements, with where the antenna is on the body, and by odometry's clock, as of a live topic.
+/// Returns words for a note: ", of an antenna at ..".
 std::string take_antenna(const BagIndex& index, const OdometryTrack& odometry, const RobotConfig& robot,
                          const std::string& topic, AntennaTrack& track, BagRecording& out) {
   constexpr std::size_t kMostPlaces = 4;

@@ -98,7 +98,7 @@ class BagCameras : public testing::Test {
     }
   }
 
-  /// What a mission has of the robot with these topics of depth.
+  /// A mission's recording of the robot with these topics of depth.
   Recording load(const std::vector<Depth>& depths, const std::vector<std::string>& topics = {},
                  const std::vector<std::string>& settings = {}) {
     std::vector<Sample> samples = robot();

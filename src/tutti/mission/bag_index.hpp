@@ -83,7 +83,7 @@ struct AntennaTrack : Track<bags::AntennaSample> {
   std::uint64_t unsure = 0;   ///< Fixes that do not state their uncertainty.
 };
 
-/// What a mission needs to know of a bag before it reads scans one by one. It has the poses of all topics that may be
+/// The index of a bag that a mission needs before it reads scans one by one. It has the poses of all topics that may be
 /// odometry, and of /tf the frames that are odometry by their name.
 struct BagIndex {
   std::map<std::string, OdometryTrack> odometry;  ///< nav_msgs/Odometry, by topic

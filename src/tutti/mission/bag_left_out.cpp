@@ -97,7 +97,7 @@ void warn_of_sensor(const BagIndex& index, const TakenOdometry& odometry, const 
                             fmt::join(why, ", "), type.empty() ? "" : "; ", fmt::join(type, "; ")));
 }
 
-/// What to type if the files of a folder are of a robot each; empty for one file.
+/// The command to type if the files of a folder are of a robot each; empty for one file.
 std::string robots_in(const std::string& folder) {
   std::vector<std::string> files;
   std::error_code failure;
@@ -107,7 +107,7 @@ std::string robots_in(const std::string& folder) {
   return files.size() < 2 ? "" : fmt::format("if its files are of a robot each: tutti run {}", fmt::join(files, " "));
 }
 
-/// What to type to make bags of the parts before and after the one that is used.
+/// The command that makes bags of the parts before and after the one that is used.
 std::string cut(const OdometryTrack& track, const std::string& file) {
   if (const std::string robots = robots_in(file); !robots.empty()) return robots;
   const auto [from, to] = std::ranges::minmax(track.arrivals, {}, &bags::Arrival::logged);

@@ -18,7 +18,7 @@ ConfigNode map(std::vector<ConfigNode::Entry> entries) {
   return {.kind = ConfigNode::Kind::map, .map = std::move(entries)};
 }
 
-/// What is before and behind the first '='.
+/// The parts before and behind the first '='.
 Result<std::pair<std::string, std::string>> split(const std::string& argument, const char* expected) {
   const std::size_t at = argument.find('=');
   if (at == std::string::npos || at == 0 || at + 1 == argument.size())

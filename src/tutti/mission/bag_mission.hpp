@@ -23,8 +23,8 @@ Status check_is_one(const std::filesystem::path& bag);
 /// The name of the robot whose bag this is: the file's or folder's name up to a dot, of letters, digits, '_' and '-'.
 std::string robot_of_bag(const std::filesystem::path& bag);
 
-/// What a folder is that holds no bag itself, and what to type, after "FOLDER: ": a recording in files of its own with
-/// the robot of a mission file that reads it, what `tutti run` has written, several bags; empty for all others.
+/// Says what a folder without a bag of its own is, and what to type, after "FOLDER: ": a recording in files of its own
+/// with the robot of a mission file that reads it, what `tutti run` has written, several bags; empty for all others.
 std::string known_folder(const std::filesystem::path& folder);
 
 /// Bags of robots as bag_mission() takes them, "a=FOLDER/a.mcap", of files and folders below `data`: a file or a folder

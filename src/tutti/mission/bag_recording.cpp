@@ -260,7 +260,7 @@ Status take_scans(const OdometryTrack& odometry, const std::string& topic, ScanT
               ahead_s > 0.0 ? "earlier" : "later");
 }
 
-/// What was left out of the odometry, and why.
+/// Notes what was left out of the odometry or changed in it, and why.
 void note_odometry(const std::string& topic, const OdometryTrack& track, std::vector<std::string>& notes) {
   if (track.refused.count > 0) notes.push_back(note_of(topic, track.refused, track.messages));
   if (track.scaled > 0)

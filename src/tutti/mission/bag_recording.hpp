@@ -25,7 +25,7 @@ struct BagCamera : BagImages {
   Camera camera;
 };
 
-/// What a mission uses of a bag.
+/// The part of a bag that a mission uses.
 struct BagRecording {
   std::string file;
   Trajectory odometry;           ///< T_odom_body

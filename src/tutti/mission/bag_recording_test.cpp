@@ -57,7 +57,7 @@ class Bags : public testing::Test {
 
   static double scan_time(std::size_t i) { return 0.15 + kSweep_s * static_cast<double>(i); }
 
-  /// What stands still is measured as it is seen in the meantime. `absolute`: times by the clock of the stamps.
+  /// Each point of the still world is seen from where the LiDAR is then. `absolute`: times by the clock of the stamps.
   [[nodiscard]] std::string cloud(std::size_t scan, CloudShape shape, bool absolute = false) const {
     const auto [points, times] = sweep(scan, shape.time_field.empty() ? 0.0 : kSweep_s);
     std::vector<double> written = times;

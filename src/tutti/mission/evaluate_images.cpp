@@ -11,7 +11,7 @@
 namespace tutti::mission {
 namespace {
 
-/// What the submaps of one robot add up to.
+/// The sum over the submaps of one robot.
 struct Sum {
   std::set<KeyframeId> keyframes;  ///< With an image.
   std::size_t frames = 0;          ///< Every submap's: a keyframe that two share counts twice, as its landmarks do.

@@ -12,7 +12,7 @@ namespace {
 
 /// Equal voxels: every square metre of a wall counts the same, no matter how often it was seen.
 constexpr double kMapVoxel_m = 0.1;
-/// What is known worse along the viewing ray is no picture of the place.
+/// Landmarks known worse along the viewing ray are no picture of the place.
 constexpr float kMaxLandmarkSigma_m = 0.1F;
 
 void append_moved(const Pose3& T_a_b, const PointCloud& cloud_b, PointCloud& cloud_a) {
@@ -61,7 +61,7 @@ std::shared_ptr<const PointCloud> landmarks_of(const VisualPayload& payload) {
   return out;
 }
 
-/// What a submap saw, in its own frame: its cloud, or else the landmarks of its images. The only place that knows where
+/// A submap's points, in its own frame: its cloud, or else the landmarks of its images. The only place that knows where
 /// payloads lie. Null when it saw nothing.
 std::shared_ptr<const PointCloud> cloud_of(const server::MapServer& server, SubmapId id, MissionRecord& record) {
   const auto size = server.state().payload_sizes.find(id);

@@ -10,7 +10,7 @@
 
 namespace tutti::mission {
 
-/// What a pose graph of several robots has of one of them.
+/// The part of a pose graph of several robots that is of one of them.
 struct GraphRecording {
   Trajectory odometry;                         ///< From the origin, along the graph's odometry.
   std::vector<Matrix6d> increment_covariance;  ///< As in Recording.

@@ -20,7 +20,7 @@
 
 namespace tutti::mission {
 
-/// What became of one robot that was replayed in a map that does not move.
+/// The result of one robot that was replayed in a map that does not move.
 struct LocalisedRobot {
   std::string name;
   double duration_s = 0.0;
@@ -58,10 +58,10 @@ struct LocalisedRobot {
   [[nodiscard]] double share(localise::State state) const;
 };
 
-/// What the robots have found of each submap of the map that any of them saw.
+/// The robots' findings on each submap of the map that any of them saw.
 std::map<SubmapId, localise::PlaceTrust> trust_of(const std::vector<LocalisedRobot>& robots);
 
-/// What a robot with these submaps needs to localise in a map; none of the pointers may be null.
+/// The setup for a robot with these submaps to localise in a map; none of the pointers may be null.
 std::shared_ptr<const localise::Localiser::Setup> localise_setup(
     const MissionConfig& config, const robot::SubmapConfig& submap, std::shared_ptr<const localise::KnownMap> map,
     std::function<std::shared_ptr<const server::ClosureVerifier>()> make_verifier);
@@ -77,7 +77,7 @@ struct LocaliseTrial {
 /// Replays one robot alone and follows it in the map, from a start pose if there is one. Its kidnaps and scores are
 /// left to localise_mission().
 using Follow = std::function<LocalisedRobot(const MissionRecording&, const std::optional<StartPose>&)>;
-/// By a robot's own node, without a server. `stop` is asked between samples. What it refers to must outlive it.
+/// By a robot's own node, without a server. `stop` is asked between samples. The objects it refers to must outlive it.
 Follow follow_by_node(const MissionConfig& config, std::shared_ptr<const localise::KnownMap> map,
                       std::function<std::shared_ptr<const server::ClosureVerifier>()> make_verifier, double restart_s,
                       std::function<bool(const std::string&, double share)> stop);

@@ -48,7 +48,7 @@ struct FinishedMission {
 /// The mission's record without its timing.
 MissionRecord make_record(const FinishedMission& mission);
 
-/// What one robot sent and was sent, by kind, as its radio counted it; bytes_per_s is not set.
+/// The traffic from and to one robot, by kind, as its radio counted it; bytes_per_s is not set.
 std::vector<TrafficRecord> traffic_of(const bus::SimulatedRadio& radio, RobotId robot, const std::string& name);
 
 }  // namespace tutti::mission

@@ -11,8 +11,8 @@
 
 namespace tutti::mission {
 
-/// The course of a mission for its record, collected from the events of all nodes in order. What becomes of each robot
-/// is collected by its RobotActor.
+/// The course of a mission for its record, collected from the events of all nodes in order. Each robot's outcome is
+/// collected by its RobotActor.
 class MissionEvents {
  public:
   void take(const node::Event& event);

@@ -29,8 +29,8 @@
 #include "tutti/model/trajectory.hpp"
 #include "tutti/server/fixes.hpp"
 
-/// The record of a finished mission as plain values: filled by the mission, read by the report's writers. What could
-/// not be measured is std::nullopt (or an empty vector). docs/report.md defines every figure.
+/// The record of a finished mission as plain values: filled by the mission, read by the report's writers. Figures that
+/// could not be measured are std::nullopt (or an empty vector). docs/report.md defines every figure.
 namespace tutti::mission {
 
 struct ViewRecord;  // view_recorder.hpp
@@ -71,7 +71,7 @@ struct PolicyRecord {
   std::vector<ConstraintRecord> constraints;
 };
 
-/// What one policy made of one broadcast.
+/// One policy's result for one broadcast.
 struct AnswerRecord {
   std::string policy;
   std::size_t constraints = 0;   ///< After the broadcast.
@@ -84,7 +84,7 @@ struct AnswerRecord {
   }
 };
 
-/// What one broadcast changed on a robot (default policy).
+/// The change that one broadcast made on a robot (default policy).
 struct UpdateRecord {
   double time_s = 0.0;  ///< Mission time.
   std::uint64_t revision = 0;
@@ -141,7 +141,7 @@ struct TrafficRecord {
   std::uint64_t largest_message = 0;    ///< Bytes.
 };
 
-/// What became of a robot's images, by the submaps that the server has.
+/// The use of a robot's images, by the submaps that the server has.
 struct ImagesRecord {
   std::size_t keyframes = 0;  ///< Keyframes with an image.
   std::size_t landmarks = 0;  ///< Over all submaps.
@@ -260,7 +260,7 @@ struct ChangeOfMindRecord {
   std::string reason;  ///< In words.
 };
 
-/// What became of one robot's fixes in the final map; the fixes of a submap count as one.
+/// The use of one robot's fixes in the final map; the fixes of a submap count as one.
 struct RobotFixesRecord {
   std::string robot;
   std::size_t fixes = 0, used = 0;
@@ -268,7 +268,7 @@ struct RobotFixesRecord {
   std::size_t contradictory = 0, misfit = 0, unaligned = 0;
   double understated = 1.0;  ///< Ratio of the fixes' errors to what they state.
 };
-/// What became of all fixes in the final map.
+/// The use of all fixes in the final map.
 struct FixesRecord {
   std::string mode;
   std::vector<RobotFixesRecord> robots;
@@ -294,7 +294,7 @@ struct ServerRecord {
   std::optional<double> survey_covered;  ///< Share of the survey's points with a point of the joint map within 0.3 m.
   std::vector<FailedOdometryRecord> failed_odometry;
   std::optional<FixesRecord> fixes;  ///< Nothing when no submap has fixes.
-  /// What bundle adjustment did in the final map; nothing without images.
+  /// The work of bundle adjustment in the final map; nothing without images.
   std::optional<RefinementCounts> refinement;
   std::vector<NodeRecord> nodes;    ///< One per pose of `graph`, sorted by (robot, index).
   PoseGraph graph;                  ///< Poses are T_world_body.

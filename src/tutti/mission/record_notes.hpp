@@ -24,7 +24,7 @@ void note_changes_of_mind(MissionRecord& record);
 /// Notes submaps that are not in the map, and closures that were not judged.
 void note_what_the_map_lacks(const server::MapEstimate& map, MissionRecord& record);
 
-/// What makes the figures of a finished record mean little, one plain sentence each: a map that no closure ties
+/// Reasons why the figures of a finished record mean little, one plain sentence each: a map that no closure ties
 /// together, with the reason, robots that are not in it, and robots that do not fit themselves.
 std::vector<std::string> warnings_of(const MissionRecord& record);
 

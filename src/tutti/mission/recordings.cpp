@@ -86,7 +86,7 @@ void take_images(RobotImages images, Recording& out) {
   out.imu_noise = images.imu_noise;
 }
 
-/// What the bag has beside odometry, which may have been changed.
+/// Takes everything in the bag but odometry, which may have been changed.
 Status take_bag(const BagRecording& bag, const Trajectory& odometry, const RobotConfig& robot,
                 const visual::TrackingConfig& tracking, MissionRecording& out) {
   const auto note = [&](const std::string& text) { out.notes.push_back(fmt::format("{}: {}", robot.name, text)); };
@@ -112,7 +112,7 @@ Status take_bag(const BagRecording& bag, const Trajectory& odometry, const Robot
 
 std::string letter_of(const RobotConfig& robot) { return robot.graph.robot.empty() ? robot.name : robot.graph.robot; }
 
-/// What the graph has beside odometry and its covariance. A reference of its own counts before the graph's.
+/// Takes everything in the graph but odometry and its covariance. A reference of its own counts before the graph's.
 void take_graph(const GraphRecording& graph, const RobotConfig& robot, MissionRecording& out) {
   if (robot.reference.file.empty()) out.recording.reference = graph.reference;
   out.graph = robot.graph.file;
@@ -145,7 +145,7 @@ Status check_bag(const RobotConfig& robot, const verifiers::VerifierKind& verifi
               robot.name, notes, verifier.name, help_of(verifiers::verifier_kinds()));
 }
 
-/// What a robot's odometry is from, where that has more than odometry.
+/// The recording that a robot's odometry is from, where that has more than odometry.
 struct Sources {
   std::optional<formats::MaplabRecording> maplab;
   std::optional<BagRecording> bag;

@@ -36,7 +36,7 @@ class Companions {
 };
 
 /// One robot of a mission in virtual time, which nobody kills: its recording is replayed into a node, which talks to
-/// the server. What becomes of the robot is collected from its node's events.
+/// the server. The robot's outcome is collected from its node's events.
 class RobotActor {
  public:
   /// `companions` may be null, and `localise` is, unless the robot localises in a map.
@@ -55,7 +55,7 @@ class RobotActor {
   /// Ends the last submap before the recording ends.
   void finish(Timestamp now);
   void receive(const bus::Envelope& envelope, Timestamp now);
-  /// What the node has to send and report since the last call.
+  /// The node's messages and events since the last call.
   node::Step take_step() { return std::exchange(step_, {}); }
 
   [[nodiscard]] const MissionRecording& recording() const { return recording_; }
@@ -68,8 +68,8 @@ class RobotActor {
   /// The node's first.
   [[nodiscard]] std::vector<PolicyTiming> timing() const;
   [[nodiscard]] double cpu_s() const { return driver_.cpu_s(); }  ///< The node's.
-  /// What went wrong (samples or scans refused, updates without a correction): one line per kind, with a count and the
-  /// first case.
+  /// The robot's troubles (samples or scans refused, updates without a correction): one line per kind, with a count and
+  /// the first case.
   [[nodiscard]] std::vector<std::string> troubles() const;
   /// In what its scans contradict its odometry (note_misfit()).
   [[nodiscard]] const std::vector<fit::Misfit>& misfits() const { return misfits_; }

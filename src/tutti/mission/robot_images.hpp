@@ -14,7 +14,7 @@
 
 namespace tutti::mission {
 
-/// What a robot's cameras and its IMU recorded.
+/// The recordings of a robot's cameras and its IMU.
 struct RobotImages {
   std::shared_ptr<VisualSource> visual;
   std::vector<ImuSample> imu;  ///< Empty without an IMU.

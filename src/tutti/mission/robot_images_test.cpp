@@ -68,7 +68,7 @@ class RobotImages : public testing::Test {
     EXPECT_TRUE(record.has_value()) << record.error().message;
     return record ? std::move(*record) : MissionRecord{};
   }
-  /// What the first sample's images fail with.
+  /// The error of the first sample's images.
   [[nodiscard]] std::string first_error() const {
     auto input = load_input(config_, folder(), 1);
     if (!input) return input.error().message;

@@ -32,7 +32,7 @@ class Scans : public testing::Test {
     return Pose3{so3_exp({0.1, 0.2, 0.3}), {5, 6, 7}} *
            Pose3{so3_exp(Eigen::Vector3d(0.0, 0.1, 1.0) * time_s), Eigen::Vector3d(3.0, 0.5, 0.0) * time_s};
   }
-  /// What the LiDAR measured during the sweep that ends at a sample; `stamped`: with times in ns since its begin.
+  /// Writes the LiDAR's points of the sweep that ends at a sample; `stamped`: with times in ns since its begin.
   void write_scan(int number, double begin_s, bool stamped) {
     const Pose3 T_body_lidar = to_pose(robot_.T_body_lidar).value();
     std::string text = fmt::format(

@@ -23,7 +23,7 @@ constexpr double kPeriod_s = 0.05, kScanPeriod_s = 0.2;
 
 Pose3 at_x(double x, double z = 0.0) { return {Eigen::Quaterniond::Identity(), {x, 0.0, z}}; }
 
-/// What one robot sends: odometry at 20 Hz along x for 10 s, scans at 5 Hz, and where its LiDAR is.
+/// A robot that sends odometry at 20 Hz along x for 10 s, scans at 5 Hz, and where its LiDAR is.
 struct Robot {
   std::string topics;  ///< In front of its topics: "/alpha".
   std::string frames;  ///< In front of its frames: "alpha/".

@@ -8,7 +8,7 @@
 
 #include "tutti/drive/stopwatch.hpp"
 
-/// What a mission cost: the part of its record that depends on this machine's clock, and counts of work beside it.
+/// The cost of a mission: the part of its record that depends on this machine's clock, and counts of work beside it.
 namespace tutti::mission {
 
 /// Wall-clock samples of one policy on one robot, one per update, in milliseconds. An update is comparison plus

@@ -16,7 +16,7 @@
 
 namespace tutti::mission {
 
-/// What somebody at the page of a mission would have seen (docs/page.md), for the report's page.
+/// The contents of the page (docs/page.md) as the mission would have shown them, for the report's page.
 struct ViewRecord {
   std::vector<page::Message> messages;        ///< In the order of time.
   std::map<std::string, std::string> clouds;  ///< page::cloud_bytes(), by the submap's id.

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What an earlier mission wrote here, by its report.json, is not to be taken for this one's.
+/// Files that an earlier mission wrote here, by its report.json, are not to be taken for this one's.
 Status remove_former(const fs::path& out_dir) {
   const auto former = nlohmann::json::parse(read_file((out_dir / "report.json").string()).value_or(""), nullptr, false);
   if (!former.is_object() || !former.contains("files") || !former["files"].is_array()) return {};

@@ -25,7 +25,7 @@ Json rounded(double value, double digits = 1e4) {
   return std::isfinite(value) ? Json(std::round(digits * value) / digits) : Json(nullptr);
 }
 
-/// What the page's poses of a component's world are in.
+/// A component's world in the frame of the page's poses.
 Pose3 page_from_world(const MissionRecord& record, std::uint32_t component) {
   if (record.view == nullptr) return {};
   const auto found = record.view->T_upright_world.find(component);
