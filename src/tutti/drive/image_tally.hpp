@@ -19,7 +19,7 @@ class ImageTally {
   /// Adds the images at a keyframe (possibly none); keyframes by increasing stamps. Returns a message when the camera
   /// has stopped, once per stop.
   std::optional<std::string> add(Timestamp keyframe, const std::vector<TrackedImage>& images);
-  /// What was wrong, one line each.
+  /// The faults so far, one line each.
   [[nodiscard]] std::vector<std::string> notes() const;
 
  private:

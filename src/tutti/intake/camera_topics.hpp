@@ -22,7 +22,7 @@ struct ImagesConfig {
   double most_depth_difference_s = 0.02;  ///< Between the stamps of an image and of its depth.
 };
 
-/// What a topic of images was configured to be.
+/// The use that a topic of images was configured for.
 enum class Wish { nothing, camera, depth };
 
 /// A topic of images, and that of its CameraInfo.

@@ -54,13 +54,13 @@ class ImagesIntake {
 
   /// Fills in the cameras and their depth, once they are chosen, and the IMU once its place is known.
   void describe(Sensors& sensors) const;
-  /// What is being waited for: "/a/camera_info: no sensor_msgs/CameraInfo"; empty when there is everything.
+  /// The messages still waited for: "/a/camera_info: no sensor_msgs/CameraInfo"; empty when there is everything.
   [[nodiscard]] std::string missing() const;
   /// The calibration of this topic's camera is known.
   [[nodiscard]] bool has_info(std::size_t topic) const { return topics_[topic].model.has_value(); }
   /// Everything up to `stamp` has been added.
   [[nodiscard]] bool reaches(Timestamp stamp) const;
-  /// What waits takes half of the room: a topic has ended, or another is far behind.
+  /// Waiting messages take half of the room: a topic has ended, or another is far behind.
   [[nodiscard]] bool is_filling() const;
 
   /// The next images that odometry up to `stamp` covers, of both cameras if the second's come in time; nothing when

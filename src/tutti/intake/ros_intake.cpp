@@ -107,7 +107,7 @@ Status RosIntake::add_sample(Timestamp stamp, const Pose3& T_odom_body, const st
   return {};
 }
 
-/// What the robot has and who feeds sends again, before anything new: the motion to the next sample is known then.
+/// A sample that the robot has and who feeds sends again, before anything new: the motion to the next is known then.
 bool RosIntake::is_history(const StampedPose& sample) {
   const bool is_again = known_ && counts_.odometry == 0 && sample.stamp <= *known_ &&
                         *known_ - sample.stamp <= kHistory_s &&

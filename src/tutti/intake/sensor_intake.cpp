@@ -50,7 +50,7 @@ Result<std::vector<CameraTopics>> named_topics(const ImagesConfig& config) {
   return out;
 }
 
-/// What becomes of messages that are for something.
+/// How messages of one use are taken.
 struct SensorIntake::Row {
   bags::Use use;
   Status (*take)(SensorIntake&, const RawMessage&, bags::RosEncoding);
@@ -135,7 +135,7 @@ Status SensorIntake::take_camera(std::string_view topic, std::string_view bytes,
   return first;
 }
 
-/// What is no number, or no share of 1, the robot's driver does not know.
+/// A value that is no number, or no share of 1, is one that the robot's driver does not know.
 Status SensorIntake::take_battery(std::string_view bytes, bags::RosEncoding encoding) {
   const auto message = bags::decode_battery_state(bytes, encoding);
   if (!message) return tl::unexpected(message.error());
@@ -147,7 +147,7 @@ Status SensorIntake::take_battery(std::string_view bytes, bags::RosEncoding enco
   return {};
 }
 
-/// What can be known of cameras and IMU now; while nothing new is to be expected, not at every message.
+/// Finds what can be known of cameras and IMU now; while nothing new is to be expected, not at every message.
 void SensorIntake::check_missing(bool is_new) {
   if (!images_) return;
   if (!images_->is_chosen()) choose();
@@ -201,7 +201,7 @@ bool SensorIntake::wants(std::string_view topic) const {
   return topic == imu_;
 }
 
-/// What odometry has reached.
+/// The next input that odometry has reached.
 Result<std::optional<Input>> SensorIntake::next_beside(bool wants_scan) {
   if (health_) return std::optional<Input>(*std::exchange(health_, std::nullopt));
   if (auto sample = ros_.next_antenna()) return sample;

@@ -15,7 +15,7 @@ constexpr const char *kOdometry = "nav_msgs/msg/Odometry", *kTf = "tf2_msgs/msg/
                      *kPoints = "sensor_msgs/msg/PointCloud2", *kFix = "sensor_msgs/msg/NavSatFix",
                      *kBattery = "sensor_msgs/msg/BatteryState";
 
-/// What comes out, one letter each: odometry, scan, pictures, imu, fix, range, health; '!' for an error.
+/// The inputs that come out, one letter each: odometry, scan, pictures, imu, fix, range, health; '!' for an error.
 struct Letters {
   std::string out;
   std::vector<std::string> errors;

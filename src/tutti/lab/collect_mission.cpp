@@ -107,7 +107,7 @@ void add_scores(Robot& robot) {
   }
 }
 
-/// What the robot would report of the last map, once more: its own odometry against it, whatever it has corrected.
+/// The robot's explanation of the last map, made once more: its own odometry against it, whatever it has corrected.
 consistency::Explanation explain_again(const robot::RobotAgent& agent, const MissionConfig& config,
                                        const ProxyGraph& map) {
   robot::AgentState state = agent.state();

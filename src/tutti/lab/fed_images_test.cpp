@@ -162,7 +162,7 @@ EncodedImages images_of(const ImageStream& stream, std::size_t instant, bool as_
   return out;
 }
 
-/// What the driver of a robot with these sensors sends, in the order in which it happens.
+/// Feeds the messages of a driver of a robot with these sensors, in the order in which they happen.
 Submaps fed(const simulation::FlownRecording& flown, bool as_files) {
   const Recording& recording = flown.recording;
   Fed robot(sensors_of(flown));

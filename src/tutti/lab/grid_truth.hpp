@@ -13,7 +13,7 @@
 /// Scores an occupancy grid against the simulated world, which is known exactly.
 namespace tutti::lab {
 
-/// What the simulated world has in the slab of a cell.
+/// The true content of the slab of a cell in the simulated world.
 enum class TrueCell : std::uint8_t {
   free,     ///< Nothing.
   surface,  ///< A wall or an object cuts it.

@@ -109,7 +109,7 @@ Result<program::WorkerSettings> worker_settings(const MissionSource& source) {
 
 namespace {
 
-/// What the file has on the robot's messages, if it is a robot with a recording.
+/// Takes the file's settings of the robot's messages, if it is a robot with a recording.
 Status fill_sensors(const MissionConfig& config, program::RobotOptions& options) {
   const auto robot = std::ranges::find(config.robots, options.name, &mission::RobotConfig::name);
   if (config.source != "recordings" || robot == config.robots.end()) return {};

@@ -44,7 +44,7 @@ Result<std::shared_ptr<const server::ClosureVerifier>> make_verifier(const Missi
 Result<program::ServerSettings> server_settings(const MissionSource& source);
 Result<program::WorkerSettings> worker_settings(const MissionSource& source);
 Result<program::RobotSettings> robot_settings(const MissionSource& source);
-/// What a robot of the mission needs to localise in a map's file, as mission::localise_setup() makes it.
+/// The setup for a robot of the mission to localise in a map's file, as mission::localise_setup() makes it.
 Result<std::shared_ptr<const localise::Localiser::Setup>> localise_setup(const MissionSource& source,
                                                                          const std::filesystem::path& map);
 /// Sets the settings and the replay of a robot, and reads its recording for that unless the robot is fed

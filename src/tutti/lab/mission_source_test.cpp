@@ -32,7 +32,7 @@ TEST(MissionSource, WithoutAMissionClosuresAreFoundFromScans) {
   EXPECT_FALSE(load({.file = "nowhere.yaml"}).has_value());
 }
 
-// What is drawn, or taken from a reference, only who has the mission can find.
+// Only who has the mission can find closures that are drawn, or taken from a reference.
 TEST(MissionSource, OnlyVerifiersThatNeedTheMissionAreMadeOfIt) {
   const auto plain = server_settings({.file = "demo"});
   ASSERT_TRUE(plain.has_value()) << plain.error().message;

@@ -12,7 +12,7 @@
 
 namespace tutti::lab {
 
-/// What to run, and where.
+/// The mission to run, and where and how to run it.
 struct MissionUpOptions {
   std::filesystem::path program;  ///< The program `tutti` itself.
   MissionSource mission;

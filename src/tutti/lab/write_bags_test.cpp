@@ -26,7 +26,7 @@ fs::path fresh(const std::string& name) {
   return folder;
 }
 
-/// What is in a bag, read back into what robots are fed.
+/// The contents of a bag, read back into what robots are fed.
 struct Heard {
   Trajectory odometry, truth;
   std::vector<Matrix6d> increments;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What every TableStore must do, for each implementation.
+// The contract of TableStore, tested for each implementation.
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 #include <unistd.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a store keeps when its process is killed, and when the disk under it is full.
+// A store's rows after its process is killed, and when the disk under it is full.
 #include <fcntl.h>
 #include <fmt/core.h>
 #include <gtest/gtest.h>
@@ -172,7 +172,7 @@ bool write_line(const char* file, const std::string& line) {
   return out.good();
 }
 
-/// What `work` finds on a disk of 1 MB of its own, in a process of its own; nothing where that is not allowed.
+/// The result of `work` on a disk of 1 MB of its own, in a process of its own; nothing where that is not allowed.
 std::optional<std::uint64_t> on_a_small_disk(const fs::path& folder, const std::function<std::uint64_t()>& work) {
   const std::string user = fmt::format("0 {} 1", getuid());
   const std::string group = fmt::format("0 {} 1", getgid());

@@ -20,7 +20,7 @@ struct SqliteOptions {
 };
 
 /// Opens a store in one SQLite file, which is made if it is missing. While the store is open and after a crash FILE-wal
-/// beside the file is part of it. What commit() has accepted is on the disk and survives a power failure
+/// beside the file is part of it. Writes that commit() has accepted are on the disk and survive a power failure
 /// (synchronous=FULL). The file belongs to this process alone until the store is destroyed. docs/storage.md describes
 /// the file.
 ///

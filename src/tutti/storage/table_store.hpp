@@ -14,7 +14,7 @@
 
 namespace tutti::storage {
 
-/// What a store is for and which tables it has. A store is never opened as one of another kind or version. The version
+/// The purpose of a store, and its tables. A store is never opened as one of another kind or version. The version
 /// is in one place of the file, where a flipped bit makes another of it, so the tables are its witness: every version
 /// has a table that no earlier one has, and a file without a table that is not the schema's is not newer, whatever it
 /// says.

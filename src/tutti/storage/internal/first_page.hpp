@@ -5,7 +5,7 @@
 
 #include "tutti/storage/table_store.hpp"
 
-/// What SQLite wants of a file before it reads anything else of it.
+/// Mends the parts of a damaged file without which SQLite reads nothing else of it.
 namespace tutti::storage::internal {
 
 /// Takes the size in the file's header away, so that SQLite reads the file's own, and makes the file longer by
