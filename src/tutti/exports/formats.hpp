@@ -11,7 +11,7 @@
 #include "tutti/grids/map_grid.hpp"
 #include "tutti/mapfile/content.hpp"
 
-/// What a mission or a map has come to, as files for other programs.
+/// The results of a mission or a map, as files for other programs.
 namespace tutti::exports {
 
 /// A map's file, read and estimated.
@@ -26,7 +26,7 @@ struct MapSource {
 /// the file itself cannot be opened, as when a server has it.
 Result<MapSource> open_map(const std::filesystem::path& file, bool live);
 
-/// What can be set about the formats; fields have the names of the options.
+/// The settings of the formats; fields have the names of the options.
 struct FormatSettings {
   grids::MapGridConfig grid;
   double voxel_m = 0.2;

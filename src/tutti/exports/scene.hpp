@@ -17,7 +17,7 @@
 /// A mission or a map as an MCAP file for viewers of robots' recordings.
 namespace tutti::exports {
 
-/// What the file is to show. Names of topics and frames are ROS's, without a leading slash ("alpha/server"); all stamps
+/// The contents of the file. Names of topics and frames are ROS's, without a leading slash ("alpha/server"); all stamps
 /// are of one clock.
 struct Scene {
   struct Track {
@@ -75,13 +75,13 @@ struct Scene {
   std::optional<Earth> earth;
 };
 
-/// What write_scene() has written.
+/// Counts of what write_scene() has written.
 struct WrittenScene {
   std::size_t messages = 0, topics = 0;
 };
 
-/// Writes an MCAP file that Foxglove, Rerun and PlotJuggler open. What is true all the time (trajectories as
-/// nav_msgs/Path, clouds, closures as lines of one MarkerArray per state, /tf_static, the origin of `enu`) is written
+/// Writes an MCAP file that Foxglove, Rerun and PlotJuggler open. Data that are true all the time (trajectories as
+/// nav_msgs/Path, clouds, closures as lines of one MarkerArray per state, /tf_static, the origin of `enu`) are written
 /// at the first stamp; what moves (/tf, each trajectory once more as PoseStamped and, in the earth's frame, as
 /// NavSatFix, numbers and closures as JSON, alerts in /diagnostics) at its own. If there are stamps before 1970, all
 /// stamps are moved so that the first is at 1970. A scene without any stamp is an error.

@@ -9,7 +9,7 @@
 
 namespace tutti::mapfile {
 
-/// What the map made of a closure.
+/// The map's judgement of a closure.
 enum class ClosureState {
   candidate,  ///< Found, but not judged: enough other closures tie these submaps, or the map leaves out one of them.
   accepted,

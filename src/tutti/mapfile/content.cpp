@@ -112,7 +112,7 @@ Status read_meta(const storage::TableStore& map, Content& content) {
   });
 }
 
-/// What `use` makes of a copy of a map's file, in a folder of its own that is gone then.
+/// The result of `use` on a copy of a map's file, in a folder of its own that is gone then.
 template <class Use>
 auto with_copy(const std::filesystem::path& file, Use use) -> decltype(use(file)) {
   namespace fs = std::filesystem;

@@ -17,7 +17,7 @@
 /// Reads a map's file that no server has open, recomputes its estimate, and stores operators' decisions in it.
 namespace tutti::mapfile {
 
-/// What a map's store contains, except for the submaps' payloads.
+/// The contents of a map's store, except for the submaps' payloads.
 struct Content {
   node::MapMeta meta;
   std::optional<node::MapCounts> counts;  ///< Counts of the last update.

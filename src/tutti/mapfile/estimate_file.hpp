@@ -11,7 +11,7 @@
 
 namespace tutti::mapfile {
 
-/// What a server has computed of its map, for programs that read the map's file meanwhile (docs/storage.md): they would
+/// A server's results on its map, for programs that read the map's file meanwhile (docs/storage.md): they would
 /// otherwise have to compute it again.
 struct ComputedMap {
   std::uint64_t epoch = 0;

@@ -33,7 +33,7 @@ struct JointCloud {
 Result<JointCloud> joint_cloud(const storage::TableStore& store, const Content& content,
                                const server::MapEstimate& map);
 
-/// What a PLY file in the map's world states of its frame, and of that of the map's grids.
+/// The comments of a PLY file in the map's world on its frame, and on that of the map's grids.
 std::vector<std::string> world_comments(const Pose3& T_level_world);
 
 struct ExportedCloud {

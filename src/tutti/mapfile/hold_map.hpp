@@ -13,9 +13,9 @@
 namespace tutti::mapfile {
 
 /// Makes a map one that does not move: from now on whoever opens it keeps every pose of its floors (floors.hpp) as it
-/// is, to the bit, and lays what comes later beside them. Poses that are held already stay so. What is held now for the
-/// first time is a version of the map (Version), of `now_ns` since the Unix epoch. Returns the number of keyframes that
-/// are held.
+/// is, to the bit, and lays what comes later beside them. Poses that are held already stay so. Those held now for the
+/// first time are a version of the map (Version), of `now_ns` since the Unix epoch. Returns the number of keyframes
+/// that are held.
 Result<std::size_t> hold_map(storage::TableStore& map, std::int64_t now_ns);
 
 /// Makes a map's file `out`, which must not exist, of a copy of `map` that is held.

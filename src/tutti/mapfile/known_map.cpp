@@ -11,7 +11,7 @@
 namespace tutti::mapfile {
 namespace {
 
-/// What the submaps of a file carry; it keeps the file open.
+/// The payloads of the submaps of a file, which it keeps open.
 class FilePayloads final : public server::PayloadStore {
  public:
   explicit FilePayloads(std::unique_ptr<storage::TableStore> file)

@@ -22,8 +22,8 @@ class MapBeside {
       : store_(map), estimate_(std::move(estimate)) {}
   /// Whether the server has written an estimate that newest() has not read.
   [[nodiscard]] bool has_news() const;
-  /// The newest map; null: there is none yet, or it is of another map than the file's. What came after the estimate is
-  /// there without a pose.
+  /// The newest map; null: there is none yet, or it is of another map than the file's. Submaps that came after the
+  /// estimate are there without a pose.
   Result<std::shared_ptr<const ShownMap>> newest();
 
  private:

@@ -24,7 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 using storage::TableStore, storage::Write;
 
-/// What becomes of a row of `b` when there is another one in `a`: the bytes that are taken.
+/// Chooses between a row of `b` and another one in `a`: returns the bytes that are taken.
 using Choose = std::function<Result<std::string>(std::string_view key, std::string a, std::string b)>;
 
 /// Rows of `a`, and those of `b`, into the table; counts the keys that are in both.
@@ -110,7 +110,7 @@ NumberSet both(const NumberSet& a, const NumberSet& b) {
   return out;
 }
 
-/// What either never takes; the reason of the first.
+/// The submaps that either never takes; the reason of the first.
 Result<std::string> joined_refusals(std::string_view key, const std::string& a, const std::string& b) {
   auto one = wire::decode_receipt(a);
   const auto other = wire::decode_receipt(b);
@@ -124,7 +124,7 @@ Result<std::string> joined_refusals(std::string_view key, const std::string& a, 
   return wire::encode(*one);
 }
 
-/// What both know of a robot is joined: its newest session, and that it had the others before; which submaps either
+/// Joins what both know of a robot: its newest session, and that it had the others before; which submaps either
 /// refuses. Everything else is the first map's.
 Result<std::string> joined_meta(std::string_view key, std::string a, std::string b) {
   if (key.starts_with(node::kRefusedPrefix)) return joined_refusals(key, a, b);

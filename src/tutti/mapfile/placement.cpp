@@ -39,7 +39,7 @@ Eigen::Vector3d up_axis(const server::MapEstimate& map, std::uint32_t component)
   return is_camera ? Eigen::Vector3d(-Eigen::Vector3d::UnitY()) : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
 }
 
-/// What a robot's nodes in a component say is up.
+/// The direction that is up by a robot's nodes in a component.
 struct Up {
   ChainId chain;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();

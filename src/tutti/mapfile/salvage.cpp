@@ -32,7 +32,7 @@ std::string name_of(const storage::LostRow& row) {
   return is_plain ? fmt::format("{}: '{}'", row.table, row.key) : fmt::format("{}: a row", row.table);
 }
 
-/// What is lost may have been part of the newest revision: whoever opens the map makes the next one. Without a row of
+/// Lost rows may have been part of the newest revision: whoever opens the map makes the next one. Without a row of
 /// its own a map would count as empty.
 Status note_news(storage::TableStore& map) {
   auto meta = node::read_map_meta(map);

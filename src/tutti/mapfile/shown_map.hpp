@@ -20,7 +20,7 @@ struct ShownMap {
 };
 
 /// Makes copies of a server's map: none of their parts is the server's any more, but for the submaps, which never
-/// change. What a verdict's verifier measured, where and when, the server does not keep in memory: it is read from the
+/// change. The server does not keep in memory what a verdict's verifier measured, where and when: it is read from the
 /// server's store, each row once. Where that has no such row yet, or cannot be read, it is missing.
 class ShownMaps {
  public:

@@ -36,7 +36,7 @@ Result<WhyNotJoined> why_not_joined(const storage::TableStore& store, const Cont
                                     const server::MapEstimate& map, const std::string& robot, const std::string& other,
                                     std::size_t most = 10);
 
-/// What would help against a refusal, for people; never empty.
+/// Advice on how to avoid such a refusal, for people; never empty.
 std::string hint_for(RefusalReason reason);
 
 }  // namespace tutti::mapfile

@@ -23,7 +23,7 @@ class WhyNot : public testing::Test {
     out.names = {{kAlpha, "alpha"}, {kBravo, "bravo"}};
     return out;
   }
-  /// What a verifier answers instead of closures.
+  /// Stores a verifier's refusal, its answer instead of closures.
   void refuse(std::uint32_t a, std::uint32_t b, const Refusal& refusal) {
     Verdicts answer{.job = fmt::format("{}/{}", a, b)};
     answer.verdicts.push_back({.pair = {{{kAlpha, 5}, a}, {{kBravo, 5}, b}}, .refusal = refusal});

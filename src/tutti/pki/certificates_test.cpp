@@ -13,7 +13,7 @@
 namespace tutti::pki {
 namespace certificates_test {
 
-/// What nats-server and libnats make of them is tried in pki_test.
+/// pki_test tries what nats-server and libnats make of them.
 TEST(CertificatesTest, EachIsAnotherAndSaysUntilWhen) {
   const auto authority = make_authority("authority", 10);
   ASSERT_TRUE(authority) << authority.error().message;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What members and strangers try that is not theirs to do, on a real bus: nothing of it arrives, each attempt is in
-// what the bus reports, and those who belong go on.
+// Members and strangers try what is not theirs to do, on a real bus: nothing of it arrives, each attempt is in what
+// the bus reports, and those who belong go on.
 #include <arpa/inet.h>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -134,7 +134,7 @@ class Intruders : public test::PkiBus {
   std::unique_ptr<bus::Port> hub_, robot_;
 };
 
-/// What makes, changes and removes what the bus keeps, and the lease of the server.
+/// Subjects that make, change and remove what the bus keeps, and the lease of the server.
 const std::vector<std::string> kOfTheServerAlone{"$JS.API.STREAM.DELETE.SUBMAPS_cave",
                                                  "$JS.API.STREAM.PURGE.SUBMAPS_cave",
                                                  "$JS.API.STREAM.UPDATE.VERDICTS_cave",

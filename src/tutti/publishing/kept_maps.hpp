@@ -20,7 +20,7 @@ class KeptMaps {
   KeptMaps(std::filesystem::path folder, bus::BusCredentials mine)
       : folder_(std::move(folder)), mine_(std::move(mine)) {}
 
-  /// What has a head that is believed, the one that was published last first; its file may be missing.
+  /// The publications whose head is believed, the one published last first; the file of one may be missing.
   [[nodiscard]] std::vector<Publication> signed_maps() const;
   /// Its file is there and has the hash that was signed: it is read to see so.
   [[nodiscard]] bool is_whole(const Publication& map) const;
@@ -42,8 +42,8 @@ class KeptMaps {
     std::string list_;
     std::vector<std::size_t> missing_;  ///< Pieces, the next one last.
   };
-  /// What is there of it already, of a fetch that was cut, is hashed and not fetched again. What else was being fetched
-  /// is removed.
+  /// Pieces that are there already, of a fetch that was cut, are hashed and not fetched again. Parts of other maps are
+  /// removed.
   Result<Fetch> begin(bus::MapBoard& board, const Offer::Entry& entry) const;
   /// Makes what is fetched a map, and removes all but the newest kMost. A file that was there before is taken as it is,
   /// if it has the hash. Error: it has not, and is removed; or the disk is full.

@@ -23,7 +23,7 @@ inline constexpr std::uint64_t kMostPublishedBytes = std::uint64_t{120} << 20U; 
 inline constexpr std::size_t kSlots = 2;
 inline constexpr std::size_t kHashDigits = 64;  ///< A SHA-256 has so many.
 
-/// What is published: a map's file.
+/// A map's file as it is published.
 struct Publication {
   std::string map;                ///< localise::KnownMap::id
   std::uint64_t version = 0;      ///< localise::KnownMap::revision
@@ -50,11 +50,11 @@ std::string list_of(std::string_view file);
 /// A head as it travels: signed by an operator's credential. Where there are no credentials of `tutti pki`, nobody
 /// signs.
 Result<std::string> seal(const Publication& publication, const bus::BusCredentials& by);
-/// What is in a head, once an operator of the authority of `mine` has signed it; without credentials of `tutti pki`
+/// The publication in a head that an operator of the authority of `mine` has signed; without credentials of `tutti pki`
 /// whoever reaches the bus is believed in this, too.
 Result<Publication> unseal(std::string_view head, const bus::BusCredentials& mine);
 
-/// What stands on a board.
+/// The publications on a board.
 struct Offer {
   struct Entry {
     Publication publication;
@@ -70,7 +70,7 @@ Result<std::string> read_list(bus::MapBoard& board, const Offer::Entry& entry);
 Result<std::string> read_piece(bus::MapBoard& board, std::size_t slot, const std::string& list, std::size_t piece);
 
 /// Publishes a file in the slot of the older publication: pieces, list, and then the head, so that what is published
-/// now stays until the new one is whole. What the file's content gives is filled in here.
+/// now stays until the new one is whole. Fields that follow from the file's content are filled in here.
 Result<Publication> publish(bus::MapBoard& board, std::string_view file, Publication what,
                             const bus::BusCredentials& by, std::int64_t now_ns);
 /// Publishes the older of the two again, whose pieces are read to see that they are still there.
