@@ -17,7 +17,7 @@ struct SeenSubmap {
   std::shared_ptr<const PointCloud> cloud;  ///< Null where it was not asked for, or there is none.
 };
 
-/// What a verifier written in Python found.
+/// A closure found by a verifier that is written in Python.
 struct FoundClosure {
   std::uint32_t from_index = 0, to_index = 0;
   RelativePose measurement;

@@ -35,9 +35,9 @@ CONFINED = [
 FORBIDDEN = re.compile(
     r"\bstd::(cout|cerr|clog)\b|\bfmt::print\b|\brandom_device\b|(?<![\w.>])(std::|::)?"
     r"(f?printf|puts|abort|exit|_Exit|quick_exit|terminate|s?rand|getenv)\s*\(")
-# What plays robots and spoils what they send, to measure the product: no other room knows of it.
+# Rooms that play robots and spoil what they send, to measure the product: no other room knows of them.
 LABORATORY = {"simulation", "lab"}
-# What replays recordings and scores them: of the product, but nothing that runs on a robot or its server knows of it.
+# Rooms that replay recordings and score them: of the product, but nothing on a robot or its server knows of them.
 REPLAY = {"mission", "mission/report"}
 CLOCK = re.compile(r"\bsystem_clock\b")  # of the day: for programs
 SUPPORT = "tests/support/"  # what tests share: a folder a module, checked against its layer

@@ -36,7 +36,7 @@ configure() {
   quietly cmake -S "$root" --preset "$1" "${@:2}"
 }
 
-# Of ninja's lines those that are no progress, and of progress one in half a minute.
+# Prints ninja's lines that are no progress, and of progress one in half a minute.
 sparsely() {
   local next=0 line
   while IFS= read -r line; do

@@ -38,7 +38,7 @@ ls -s --block-size=kB "$debs"/*.deb
 work="$(mktemp -d)"
 trap 'rm -rf "$work"' EXIT
 
-# inside SYSTEM COMMAND: by a shell in it, with the packages at /debs. What is mounted ends with the shell.
+# inside SYSTEM COMMAND: by a shell in it, with the packages at /debs. The mounts end with the shell.
 inside() {
   mkdir -p "$work/$1/debs"
   unshare --mount --pid --fork sh -euc '
@@ -101,7 +101,7 @@ inside full '
     tutti map export mine.tutti --grid map.yaml
     ls -s mine/report.html mine.mcap map.yaml map.pgm"'
 
-# What docs/security.md has people type, in its order, all on one machine.
+# The commands of docs/security.md, in its order, all on one machine.
 say "a base station, two robots and an operator with rights (docs/security.md)"
 typed="$(sed -n '/^## A base station/,/^## The model/p' "$root/docs/security.md" | sed -n '/^```/,/^```/{/^```/d;p}' |
   sed -e 's/BASE/127.0.0.1/; s/0\.0\.0\.0/127.0.0.1/; s# \([a-z]*\.cred\)# pki/credentials/\1#; s#/var/lib/tutti-##')"
@@ -130,7 +130,7 @@ if [ "$development" = yes ]; then
   cp -a "$work/minimal" "$work/development"
   cp -a "$root/examples/library" "$work/development/examples"
   quietly inside development 'apt-get update; apt-get install -y --no-install-recommends /debs/libtutti-dev_*.deb g++ cmake make'
-  # What component core needs is what the package depends on.
+  # The package depends on what component core needs.
   quietly inside development '
     mkdir /tmp/core; cd /tmp/core
     printf "%s\n" "cmake_minimum_required(VERSION 3.25)" "project(x LANGUAGES C CXX)" "find_package(tutti REQUIRED COMPONENTS core)" \

@@ -74,7 +74,7 @@ int run(const CompareOptions& options) {
   return 0;
 }
 
-/// What is known of either side's errors.
+/// Adds the options that say what is known of either side's errors.
 void add_noise_options(CLI::App& command, CompareOptions& options) {
   add_number(command, "--tolerance", options.config.tolerance_m,
              "How sure A is of its positions, over segments of any length: standard deviation", "METRES");

@@ -78,7 +78,7 @@ void print(const mapfile::ClosureFit& fit) {
     fmt::print("off the map  nothing ties its two ends\n");
 }
 
-/// What each verifier and operator found of it, and what was measured.
+/// Prints what each verifier and operator found of it, and what was measured.
 void print_origin(const mapfile::ClosureInfo& info) {
   if (info.decision) {
     const ClosureDecision& given = *info.decision;
@@ -118,7 +118,7 @@ int show(const ClosureOptions& options) {
   return 0;
 }
 
-/// What the server answers, of those messages that have come.
+/// The server's answer, if it is among the messages that have come.
 std::optional<std::string> heard_answer(bus::Port& port, const node::DecisionSender& sender) {
   for (const bus::Received& received : port.receive())
     if (const auto status = wire::decode_mission_status(*received.envelope.bytes))

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What takes a mission: run, demo and world.
+// The commands that take a mission: run, demo and world.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -46,7 +46,7 @@ void show(const mission::Progress& progress, ProgressLine& line) {
                                progress.duration_s, progress.submaps, progress.closures, maps));
 }
 
-/// What `run` and `demo` share.
+/// The arguments that `run` and `demo` share.
 struct MissionArguments {
   fs::path mission, out, map, map_in;
   bool frozen = false, extend = false;

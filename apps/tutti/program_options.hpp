@@ -55,7 +55,7 @@ inline void add_program_options(CLI::App& command, ProgramArguments& arguments) 
   command.add_option("--end-with-parent", arguments.parent, "")->group("");
 }
 
-/// What --print-config prints.
+/// Prints the settings for --print-config.
 template <class Settings>
 Status print_settings(const Settings& settings) {
   fmt::print("{}", to_yaml(dump_config(settings)));

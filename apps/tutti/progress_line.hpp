@@ -5,7 +5,7 @@
 #include <functional>
 #include <string>
 
-/// What a command that takes long says meanwhile, and how it is stopped.
+/// How a command that takes long shows its progress, and how it is stopped.
 namespace tutti::app {
 
 /// One line on stderr that is rewritten on a terminal, and elsewhere a line every ten per cent or half a minute.

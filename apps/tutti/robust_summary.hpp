@@ -4,10 +4,10 @@
 #include "graph_input.hpp"
 #include "robust_score.hpp"
 
-/// What `tutti optimise --robust` says of its result.
+/// The summary that `tutti optimise --robust` prints of its result.
 namespace tutti::app {
 
-/// What the summary is of; the parts outlive it.
+/// The result that the summary is of; the parts outlive it.
 struct RobustResult {
   const NamedGraph& graph;
   const server::JudgedGraph& judged;

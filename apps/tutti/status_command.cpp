@@ -39,7 +39,7 @@ struct StatusOptions {
 
 double since(Clock::time_point t) { return std::chrono::duration<double>(Clock::now() - t).count(); }
 
-/// What this viewer has seen of the server.
+/// The server as this viewer has seen it.
 class View {
  public:
   /// Whether there is something new.

@@ -6,7 +6,7 @@ from gate_runs import README, folder_of
 from runs import SOURCE, row, without_partial
 
 BEGIN, END = "<!-- Written by bench/accuracy/gate.py --readme. -->", "<!-- End of the table. -->"
-# What a row says of its input, and how many digits its errors have.
+# A row's words for its input, and the number of digits of its errors.
 ROWS = {
     "cosmo_tuhh": ("`cosmo_tuhh`", "real odometry and closures of three robots, closures as they arrived (COSMO-Bench)", 2),
     "kth wifi": ("kth wifi (`docs/results/fleets.md`)", "the same of three others, `tutti run --graph`", 2),

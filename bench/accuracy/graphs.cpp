@@ -126,7 +126,7 @@ void write(const Graph& of, const std::string& folder) {
     if (!status) throw std::runtime_error(status.error().message);
 }
 
-/// What a method makes of a graph.
+/// A method's result for a graph.
 struct Outcome {
   std::vector<Pose3> poses;
   std::vector<bool> accepted;  ///< Per edge.

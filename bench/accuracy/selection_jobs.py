@@ -18,7 +18,7 @@ FLEETS = {f"fleet_{n}": ["fleet", f"simulation.robots.0.copies={n}"] for n in (4
 ROOM = ["tunnel", *TRAJECTORIES, "simulation.world.featureless_share=0",
         "simulation.world.network={rows: 2, columns: 2, block_m: 8, jitter_m: 1}",
         *(f"simulation.robots.{k}.walk={{duration_s: 900, lookahead_m: 1.2}}" for k in (0, 1))]
-# What is run under a name of its own: the mission file, and what is set.
+# Runs under a name of their own: the mission file, and what is set.
 VARIANTS = {**FLEETS, "room": ROOM, **{name: [name, *TRAJECTORIES] for name in ("tunnel", "terrace", "demo")}}
 NEEDS_SCANS = ("hku_degraded", "hku_two_sessions")
 SHORT_S = 120

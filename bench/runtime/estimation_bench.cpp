@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Pose graphs from scratch, pairwise consistency, marginals. What was computed is printed beside the time. CPU time on
+// Pose graphs from scratch, pairwise consistency, marginals. The results are printed beside the time. CPU time on
 // one thread; run with OPENBLAS_NUM_THREADS=1. The onboard update has its own: onboard_speed.cpp.
 #include <benchmark/benchmark.h>
 #include <dlfcn.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What it costs the server to compute how sure it is of the shapes: time per proxy graph and bytes per broadcast, on a
+// The server's cost of computing how sure it is of the shapes: time per proxy graph and bytes per broadcast, on a
 // map of the size of the tunnel mission. `error` is the root mean square relative error of the sags against many
 // samples; with deletions it also contains what hinges on one closure.
 #include <benchmark/benchmark.h>

@@ -111,8 +111,8 @@ inline std::vector<Pose3> degrade(const Trajectory& reference, double drift_deg_
   return out;
 }
 
-/// What a robot would claim about a step: 2 mm, 0.02 degrees, and the drift as a random walk that reaches over half a
-/// submap (2.5 m) what the drift does.
+/// The covariance that a robot would claim for a step: 2 mm, 0.02 degrees, and the drift as a random walk that reaches
+/// over half a submap (2.5 m) what the drift does.
 inline Matrix6d step_covariance(double metres, const Options& options) {
   const double rotation = 0.02 / kDegPerRad, drift = options.drift_deg_per_m / kDegPerRad;
   Vector6d variance;

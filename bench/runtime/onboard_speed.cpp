@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the onboard update costs, against full solves of the same factors, with how right each is; Markdown, the tables
+// The cost of the onboard update, against full solves of the same factors, with how right each is; Markdown, the tables
 // of docs/results/speed.md. Times are CPU time of one thread. Usage, one core:
 //   OPENBLAS_NUM_THREADS=1 taskset -c 0 bench_onboard_speed [repetitions=25]
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a mapping server keeps in memory after a mission of so many robots and minutes, per robot-hour, and where it
+// The memory of a mapping server after a mission of so many robots and minutes, per robot-hour, and where it
 // goes: trajectories and, where the mission has them, images; the map in an SQLite file. Usage:
 //   bench_server_memory MISSION.yaml ROBOTS MINUTES [SECONDS BETWEEN UPDATES [POINTS PER SUBMAP [MAP: it stays there]]]
 //   bench_server_memory MISSION.yaml DATA-FOLDER [SETTING=VALUE ...]      as the mission has it: robots, trajectories
@@ -61,7 +61,7 @@ auto with_peak(const char* what, double hours, Call&& call) {
   return result;
 }
 
-/// What robots would send, by the time at which each submap ends.
+/// The submaps that robots would send, by the time at which each ends.
 std::multimap<Timestamp, bus::Envelope> submaps_of(const mission::MissionInput& input,
                                                    const robot::SubmapConfig& config, int points) {
   Rng rng(1);

@@ -27,7 +27,7 @@ constexpr double kRadius_m = 7.0;
 constexpr double kSigma_m = 1.0;
 constexpr int kScales = 7;
 
-/// What the server believes, and what a drifting robot does.
+/// A run as the server believes it to be, and as a drifting robot does.
 Positions server_run(benchmark::State& state) { return testing::tunnel(static_cast<int>(state.range(0)), 0.0, Rng(1)); }
 Positions robot_run(benchmark::State& state) { return testing::tunnel(static_cast<int>(state.range(0)), 1.0, Rng(1)); }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What images cost a robot, on one thread: tracking, descriptors and, in simulation, the images themselves; on a flight
-// through the simulated hall, where it is known what each track should have seen.
+// The cost of images for a robot, on one thread: tracking, descriptors and, in simulation, the images themselves; on a
+// flight through the simulated hall, where it is known what each track should have seen.
 #include <algorithm>
 #include <cstdio>
 #include <ctime>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a pair of submaps costs on the 100 real stereo images of euroc_V1_01_visnav, in one room: submaps of images one
+// The cost of a pair of submaps on the 100 real stereo images of euroc_V1_01_visnav, in one room: submaps of images one
 // after the other, which mostly see something in common; and submaps of those images that look in one direction, of
 // which every two that look in opposite directions have nothing in common. The work is counted beside the time. The
 // truth gives the keyframes' poses within a submap. Usage: bench_visual_views [brisk|orb [max Hamming share [max
