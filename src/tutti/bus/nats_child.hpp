@@ -26,7 +26,7 @@ struct NatsChildOptions {
   /// and the server's own credential; empty: whoever reaches the bus may do all.
   std::string rights = {};
   BusCredentials credentials = {};
-  std::uint64_t max_store_bytes = std::uint64_t{4} << 30U;  ///< What messages may take on the disk.
+  std::uint64_t max_store_bytes = std::uint64_t{4} << 30U;  ///< Space for messages on the disk.
   /// Beside max_store_bytes, this must be free on the disk: nats-server hangs on a full one.
   std::uint64_t min_free_bytes = std::uint64_t{1} << 30U;
   double start_timeout_s = 30.0;  ///< It must be ready by then.
@@ -84,7 +84,7 @@ class NatsChild {
   /// When it was sent the signal to read its configuration; nothing: its log says that it has.
   std::optional<std::chrono::steady_clock::time_point> signalled_;
   std::uintmax_t log_read_ = 0;  ///< So much of its log.
-  Refusals refusals_;            ///< What was refused there, and was not taken yet.
+  Refusals refusals_;            ///< Refusals there that were not taken yet.
   std::string url_;
   int pid_ = -1;
 };

@@ -276,8 +276,8 @@ void JetStreamPort::make_stream_anew(const NatsConnection& connection) {
   changed_.notify_all();
 }
 
-/// Sends the last messages, how a robot has ended above all. Messages that were acknowledged are so on the bus; the
-/// others come to the next one at once, not after a time-out.
+/// Afterwards the messages sent last are in transit, how a robot has ended above all; those acknowledged are so on the
+/// bus, and the others come to the next one at once, not after a time-out.
 void JetStreamPort::say_farewell() {
   const auto present = session();
   if (!present || !present->connection->connected()) return;

@@ -42,7 +42,7 @@ struct BusOptions {
 /// A kind of bus. To be added as a row of transports().
 struct Transport {
   std::string_view scheme;   ///< Its URLs'.
-  std::string_view example;  ///< What they look like.
+  std::string_view example;  ///< A URL of this kind.
   std::string_view help;     ///< One phrase for people.
   /// Why these options cannot be; may be null. Mission and URL have been checked.
   Status (*check)(const BusOptions& options, const BusUrl& url);

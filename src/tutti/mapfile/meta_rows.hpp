@@ -7,7 +7,7 @@
 namespace tutti::mapfile {
 
 struct MetaRow {
-  enum class Of { map, robot, submap, place, refinement, version };  ///< What the key names, after its prefix.
+  enum class Of { map, robot, submap, place, refinement, version };  ///< Named by the key, after its prefix.
   std::string_view key;                                              ///< A prefix when it ends with a slash.
   Of of = Of::map;
   bool merge_drops = false;     ///< It is about one map alone, or is joined by merge() itself.

@@ -16,9 +16,9 @@ namespace tutti::mapfile {
 struct NearMiss {
   SubmapPair pair;
   std::string name;
-  Refusal refusal;     ///< What stopped it.
+  Refusal refusal;     ///< The reason that stopped it.
   std::string reason;  ///< The same in words.
-  std::string hint;    ///< What would help.
+  std::string hint;    ///< Advice on it.
 };
 
 struct WhyNotJoined {

@@ -61,7 +61,7 @@ struct OdometryTrack : Track<StampedPose> {
   std::string body;
   std::uint64_t late = 0;    ///< Poses that were sorted in.
   std::uint64_t scaled = 0;  ///< Poses whose quaternion had to be normalised.
-  std::string restarts;      ///< What of the topic is used, where its clock starts again.
+  std::string restarts;      ///< Says which part of the topic is used, where its clock starts again.
 };
 
 /// Where one scan or image is in the bag.

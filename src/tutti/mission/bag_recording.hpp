@@ -39,7 +39,7 @@ struct BagRecording {
   std::vector<ImuSample> imu;         ///< In the body frame.
   std::string fix_topic, fix_note;    ///< Empty: the bag has no fixes; and where the antenna is, and more.
   std::vector<Input> measured;        ///< Recording::measured, but the other robots are named, not numbered.
-  std::vector<std::string> notes;     ///< What was used, what was refused and why, for the report.
+  std::vector<std::string> notes;     ///< Say what was used, what was refused and why, for the report.
   std::vector<std::string> warnings;  ///< much_left_out()
 };
 

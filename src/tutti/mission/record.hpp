@@ -141,7 +141,7 @@ struct TrafficRecord {
   std::uint64_t largest_message = 0;    ///< Bytes.
 };
 
-/// The use of a robot's images, by the submaps that the server has.
+/// Figures on a robot's images, by the submaps that the server has.
 struct ImagesRecord {
   std::size_t keyframes = 0;  ///< Keyframes with an image.
   std::size_t landmarks = 0;  ///< Over all submaps.
@@ -294,7 +294,7 @@ struct ServerRecord {
   std::optional<double> survey_covered;  ///< Share of the survey's points with a point of the joint map within 0.3 m.
   std::vector<FailedOdometryRecord> failed_odometry;
   std::optional<FixesRecord> fixes;  ///< Nothing when no submap has fixes.
-  /// The work of bundle adjustment in the final map; nothing without images.
+  /// Counts of bundle adjustment in the final map; nothing without images.
   std::optional<RefinementCounts> refinement;
   std::vector<NodeRecord> nodes;    ///< One per pose of `graph`, sorted by (robot, index).
   PoseGraph graph;                  ///< Poses are T_world_body.
@@ -316,7 +316,7 @@ struct MissionRecord {
   std::string mission;
   std::string description;
   std::string input;  ///< Such as "real recordings", "real odometry, closures from the reference", "simulated".
-  std::vector<std::string> warnings;  ///< What makes the figures mean little, one sentence each; shown first.
+  std::vector<std::string> warnings;  ///< Why the figures mean little, one sentence each; shown first.
   std::vector<std::string> notes;     ///< Remarks on input and limits in plain words, one or two sentences each.
   std::uint64_t seed = 0;
   std::string default_policy;

@@ -19,7 +19,7 @@ struct RobotImages {
   std::shared_ptr<VisualSource> visual;
   std::vector<ImuSample> imu;  ///< Empty without an IMU.
   ImuNoise imu_noise;
-  std::string note;  ///< What was found, for the report.
+  std::string note;  ///< The findings, for the report.
   /// Recording::image_stamps
   std::vector<Timestamp> stamps = {};
   std::shared_ptr<const ImageStream> images = nullptr;  ///< Recording::images

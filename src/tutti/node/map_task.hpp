@@ -22,7 +22,7 @@ struct MapTask {
   Timestamp begun;
   std::uint32_t incarnation = 0;
   std::set<RobotId> robots;
-  std::map<RobotId, std::string> names;  ///< What robots are called.
+  std::map<RobotId, std::string> names;  ///< The robots' names.
   bool at_once = false;                  ///< Robots are sent it whatever it says.
   Broadcast broadcast;
 };
@@ -33,7 +33,7 @@ struct MapOfTask {
   bool is_update = false;
   LastUpdate pace;  ///< Its cost is counted (server/update_cost.hpp), unless the host has measured it.
   Broadcast broadcast;
-  Step step;  ///< What robots are sent of the map, and what is reported of that.
+  Step step;  ///< The messages to robots on the map, and the events of that.
 };
 
 /// Makes the map, and what robots are sent of it.

@@ -15,7 +15,7 @@ inline constexpr const char* kRobotFile = "robot.tutti";  ///< In a robot's stat
 
 struct RobotStore {
   std::unique_ptr<storage::TableStore> store;
-  std::string damage;  ///< What was damaged, and what became of it; empty: nothing.
+  std::string damage;  ///< The damage, and how it was dealt with; empty: none.
 };
 
 /// Opens the store of the robot whose folder this is, with every row whole. A damaged one is set aside as

@@ -48,7 +48,7 @@ struct ServerOptions {
   std::filesystem::path held_map;  ///< A map's file; where STATE has no map, it begins with this one, which is held.
   bus::BusOptions bus;        ///< The mission is that of the settings. No URL: the program starts its own nats-server,
   std::string listen;         ///< at this "HOST" or "HOST:PORT"; empty: on this machine only, at any free port.
-  std::filesystem::path pki;  ///< Of `tutti pki`, for its own nats-server; empty: whoever reaches that may do all.
+  std::filesystem::path pki;  ///< Folder of `tutti pki`, for its own nats-server; empty: whoever reaches it may do all.
   ServerSettings settings;
   int threads = 1;    ///< Threads that verify closures in this program; 0: workers do it.
   double rate = 1.0;  ///< Mission time per wall time.

@@ -120,7 +120,7 @@ class JetStreamPort final : public Port {
   Outbox outbox_;
   Inbox inbox_;
   std::vector<std::string> busy_;                ///< Where work is reported to go on.
-  std::map<MessageKind, std::string> retained_;  ///< What was last given.
+  std::map<MessageKind, std::string> retained_;  ///< The values last given.
   /// The server's values as last sent: a bus that has lost them gets them again.
   std::map<std::pair<Endpoint, MessageKind>, Envelope> retained_sent_;
   std::string stranded_;  ///< The stream to be made anew; "": none.

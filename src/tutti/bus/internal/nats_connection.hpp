@@ -84,7 +84,7 @@ class NatsConnection {
     std::uint64_t given = 0;       ///< given and not acknowledged.
     std::uint64_t deliveries = 0;  ///< So far.
     std::uint64_t gone = 0;        ///< Messages that were once in the stream, and are not any more.
-    std::uint64_t done_up_to = 0;  ///< What is in the stream up to this sequence is given to nobody any more.
+    std::uint64_t done_up_to = 0;  ///< Messages up to this sequence are given to nobody any more.
     bool asked = false;            ///< Somebody waits for messages.
   };
   [[nodiscard]] bool has_jetstream() const;

@@ -16,7 +16,7 @@ namespace tutti::bus {
 /// (1 Mbit/s: 1 s).
 inline constexpr std::size_t kPartBytes = 128U << 10U;
 inline constexpr std::uint32_t kMostParts = 128;                         ///< 16 MiB
-inline constexpr std::size_t kLargestWhole = (8U << 20U) - (8U << 10U);  ///< What is not cut; NATS counts headers too.
+inline constexpr std::size_t kLargestWhole = (8U << 20U) - (8U << 10U);  ///< Uncut up to this; NATS counts headers too.
 
 /// 1 to 32 letters, digits, '-' or '_'.
 bool is_mission_name(std::string_view mission);

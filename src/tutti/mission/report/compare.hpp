@@ -12,10 +12,10 @@ namespace tutti::mission {
 /// The report of `tutti compare`; docs/compare.md defines every figure. Times are seconds after B's first node.
 struct CompareReport {
   std::string a;  ///< The judge, as the user named it.
-  std::string b;  ///< What is judged.
+  std::string b;  ///< The side that is judged.
   CompareTrajectoriesConfig config;
   std::vector<TrajectoryComparison> robots;
-  std::vector<std::string> notes;  ///< What was left out, in plain words.
+  std::vector<std::string> notes;  ///< Say in plain words what was left out.
   std::string version;
 };
 

@@ -9,7 +9,7 @@ struct FeedSettings {
   double blend_deg_per_s = 2.0;  ///< and turns it no faster than this,
   double jump_m = 1.0;           ///< unless more is left to go than this: a jump, which is announced;
   double jump_deg = 10.0;        ///< or to turn.
-  int max_queue_kb = 1024;       ///< What waits for a client that does not read; beyond it the oldest corrections go.
+  int max_queue_kb = 1024;       ///< Queue of a client that does not read; beyond it the oldest corrections go.
   int max_clients = 16;          ///< Connections at a time.
 };
 

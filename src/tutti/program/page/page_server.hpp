@@ -37,7 +37,7 @@ struct PageOptions {
   std::string version;
   std::shared_ptr<const server::ClosureVerifier> verifier;
   double rate = 1.0;          ///< Mission time per wall time.
-  std::filesystem::path pki;  ///< Of `tutti pki`; empty: whoever reaches the page may do all.
+  std::filesystem::path pki;  ///< Folder of `tutti pki`; empty: whoever reaches the page may do all.
   /// Where it keeps what it has shown, for those who come late; empty: nowhere.
   std::filesystem::path history;
   std::function<void(program::Level, const std::string&)> say;

@@ -16,7 +16,7 @@ struct RosSituation {
   bool is_connected = false;  ///< To the robot's live feed.
   intake::RosIntake::Counts counts;
   bool in_map = false;
-  std::vector<std::pair<std::string, std::string>> status;  ///< What the robot reports of itself.
+  std::vector<std::pair<std::string, std::string>> status;  ///< The robot's own report.
   std::vector<std::string> alerts, troubles;  ///< The robot's alerts, and problems with its messages, the newest last.
 };
 /// The message for /diagnostics.
