@@ -11,13 +11,13 @@
 
 namespace tutti::server {
 
-/// What a map takes for true, without its poses: enough to explain why the next map differs from it.
+/// Which closures and odometry a map believes, without its poses: enough to explain why the next map differs.
 struct Beliefs {
   using Ends = std::pair<KeyframeId, KeyframeId>;
   std::set<Ends> accepted, refused;  ///< Closures by their ends.
   std::vector<FailedOdometry> failed_odometry;
 };
-/// What this map takes for true.
+/// The beliefs of this map.
 Beliefs beliefs_of(const MapEstimate& map);
 
 /// Why a newer map differs from an older one in one chain.

@@ -26,8 +26,8 @@ CandidatePairs::List& CandidatePairs::by_sensor(std::vector<List>& lists, std::u
   return lists[sensor];
 }
 
-/// What was dropped before needs no place here: whatever is less similar and the same robot's comes after it. Those of
-/// this robot that are less similar are one turn later now, and stay in their order; so do all others.
+/// A submap that was dropped before needs no place here: whatever is less similar and the same robot's comes after it.
+/// Those of this robot that are less similar are one turn later now, and stay in their order; so do all others.
 void CandidatePairs::insert(SubmapId of, const Alike& other) {
   List& list = by_sensor(most_alike_[of], other.sensor);
   const RobotId robot = other.submap.chain.robot;

@@ -35,8 +35,8 @@ using PlaceSet = std::map<SubmapId, Place>;
 /// the second of each. So a robot that stands in one place for hours, or makes up submaps, does not keep others from
 /// being compared there.
 ///
-/// What is a candidate is a function of the set of submaps and their likeness. A further submap takes candidates away
-/// from others and never gives them any but itself, so whatever is a candidate in the end was one as soon as both were
+/// The candidates are a function of the set of submaps and their likeness. A further submap takes candidates away from
+/// others and never gives them any but itself, so whatever is a candidate in the end was one as soon as both were
 /// there.
 class CandidatePairs {
  public:

@@ -61,7 +61,7 @@ class ClosureVerifier {
   /// error means that one could not be read: there is no verdict, and the pair may be verified another time.
   [[nodiscard]] virtual Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                                       const PayloadStore& payloads) const = 0;
-  /// What is known of a pair that an operator inspects.
+  /// The findings on a pair that an operator inspects.
   struct Inspection {
     std::optional<LoopClosure> best;  ///< The best alignment that can be measured, also where verify() refuses it.
     std::optional<Refusal> refusal;   ///< Why verify() would refuse it, or why there is none.

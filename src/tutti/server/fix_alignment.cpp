@@ -98,7 +98,7 @@ struct Equations {
   Matrix6d H = Matrix6d::Zero();
   Vector6d g = Vector6d::Zero();
 
-  /// What is known of the turn when the shift is not.
+  /// The information on the turn with the shift marginalised out.
   [[nodiscard]] Matrix3d turn() const {
     const Matrix3d across = H.topRightCorner<3, 3>();
     return H.bottomRightCorner<3, 3>() - across.transpose() * H.topLeftCorner<3, 3>().llt().solve(across);

@@ -46,7 +46,7 @@ class Bender {
   }
 
  private:
-  /// What a lever arm's end is off by, for a heading that is off by so much, beside the fix itself.
+  /// Whether such an error of the heading moves a lever arm's end by more than the sigma of its fix.
   [[nodiscard]] bool matters(double heading_rad) const {
     return std::ranges::any_of(candidates_, [&](std::size_t s) {
       const OneFix& fix = factors_.joined[s];

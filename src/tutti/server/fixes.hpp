@@ -16,7 +16,7 @@
 /// Where on the earth a map lies, as derived from the fixes of its submaps.
 namespace tutti::server {
 
-/// What position fixes do to a map.
+/// How a map uses position fixes.
 struct GeoreferenceConfig {
   std::string mode = "factors";
   double correlation_s = 60.0;
@@ -39,7 +39,7 @@ enum class FixObjection {
 };
 const char* to_string(FixObjection objection);  ///< For people; empty for none.
 
-/// What became of the fixes of one submap, which count as one.
+/// How the fixes of one submap, which count as one, were judged.
 struct JudgedFixes {
   SubmapId submap;
   std::size_t fixes = 0;  ///< How many there are.
@@ -70,7 +70,7 @@ struct Fixes {
   std::vector<JudgedFixes> judged;  ///< One for every submap with fixes; sorted by submap.
   std::vector<Unaligned> unaligned;
   std::map<ChainId, double> understated;  ///< Factor on the variances of a receiver's fixes, where above 1.
-  /// What ties the map to the earth: edges from the frame enu, a node after all nodes of the map, to the map's nodes. A
+  /// Edges that tie the map to the earth: from the frame enu, a node after all nodes of the map, to the map's nodes. A
   /// position is an edge without information about rotation.
   std::vector<PoseGraphEdge> edges;
 };

@@ -94,7 +94,7 @@ FixFactors nothing_yet(const PlacedFixes& placed, const Pose3& T_enu_world) {
           .edges = {}};
 }
 
-/// What the alignment of a part makes of each submap's fixes, before the map is bent.
+/// Joins and judges each submap's fixes by the alignment of their part, before the map is bent.
 void assess(const Part& part, const PlacedFixes& placed, const MapEstimate& map, FixFactors& factors) {
   for (const std::size_t s : part.submaps) {
     factors.joined[s] = join(placed.submaps[s], map.graph.poses, factors.T_enu_world);

@@ -131,7 +131,7 @@ double too_dear(const MapEstimate& map) {
   return estimation::chi2(map.graph) / std::max(anew.summary.final_cost, 1.0) - 1.0;
 }
 
-// What is wrong leads the search astray, and poses that it leaves may lie in a basin of their own. So the same factors
+// Wrong factors lead the search astray, and poses that it leaves may lie in a basin of their own. So the same factors
 // must not be cheaper from their measurements, whatever came before: with many wrong closures, with odometry that
 // fails, and with the first closures of a fleet as with all of them.
 TEST(GraphJudge, ThePosesCostNoMoreThanTheSameFactorsFromTheirMeasurements) {

@@ -63,7 +63,7 @@ std::vector<Repair> repairs(const MapEstimate& map, const ChainId& chain, const 
 }
 
 /// The map hinges on a group of closures without which it would move by more than its own uncertainty lets one expect
-/// of the worst of all its groups (six numbers each), but for this probability. What moves it less is part of that
+/// of the worst of all its groups (six numbers each), but for this probability. A smaller move is part of that
 /// uncertainty.
 constexpr double kFalseHinge = 0.01;
 

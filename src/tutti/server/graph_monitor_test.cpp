@@ -311,7 +311,7 @@ struct Mean {
   int count = 0;
 };
 
-/// What many maps' true errors are over what each says of itself.
+/// The true errors of many maps over those that each states.
 struct Calibration {
   Mean whole_m, whole_rad;                             ///< Squares.
   std::array<Mean, 4> coefficient_m, coefficient_rad;  ///< Per scale.

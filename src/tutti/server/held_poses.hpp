@@ -11,8 +11,8 @@
 
 namespace tutti::server {
 
-/// The poses of a map that does not move: T_world_body of all its keyframes, in the world of their floor. What comes
-/// later is laid beside them.
+/// The poses of a map that does not move: T_world_body of all its keyframes, in the world of their floor. Later
+/// keyframes are laid beside them.
 struct HeldPose {
   Pose3 T_world_body;
   std::uint32_t floor = 0;  ///< A number for each world.

@@ -9,9 +9,9 @@
 
 #include "tutti/server/map_estimate.hpp"
 
-/// What keeps the cost of a map with its area, not with the hours that robots drive in it: a submap that shows ground
-/// which others have shown often enough is *retired*. New submaps are not compared with it; a few of its closures with
-/// the others locate its robot, and when the robot begins another session it leaves the map.
+/// So that the cost of a map grows with its area, not with the hours that robots drive in it, a submap that shows
+/// ground which others have shown often enough is *retired*. New submaps are not compared with it; a few of its
+/// closures with the others locate its robot, and when the robot begins another session it leaves the map.
 namespace tutti::server {
 
 /// The submaps to be retired, in the order in which they ended: each whose keyframes all lie within

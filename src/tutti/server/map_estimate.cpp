@@ -217,7 +217,7 @@ std::vector<judge::OdometrySegment> odometry_segments(const std::vector<MapNode>
 
 namespace {
 
-/// What odometry is worth by the closures that fit. What failed is a gap: the map's word on it is not odometry's.
+/// The honesty of odometry by the closures that fit. Failed odometry is a gap: the map's word on it is not odometry's.
 std::map<ChainId, judge::OdometryHonesty> honesty_after(const MapEstimate& map, const judge::Optimum& optimum,
                                                         const std::vector<LoopClosure>& closures) {
   std::vector<std::optional<Matrix6d>> step_to(map.nodes.size());

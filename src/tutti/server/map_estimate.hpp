@@ -83,8 +83,8 @@ struct MapEstimate {
   std::vector<SubmapId> left_out;
   /// Number of pairs of submaps whose closures were not judged (MapConfig::most_closed_pairs).
   std::size_t spare_pairs = 0;
-  Fixes fixes;             ///< What became of position fixes, and where on the earth the map lies.
-  Ranges ranges;           ///< What became of ranges between robots.
+  Fixes fixes;             ///< How position fixes were judged, and where on the earth the map lies.
+  Ranges ranges;           ///< How ranges between robots were judged.
   judge::SearchWork work;  ///< The cost of judging the closures.
   /// The sum of r^T Omega r over all edges of the graph as it was solved, and by how many degrees of freedom: about as
   /// many where everything errs by what it states.

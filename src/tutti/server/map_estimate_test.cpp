@@ -89,7 +89,7 @@ TEST(MapEstimate, WhatTooFewClosuresJoinStaysWhereOdometryHasIt) {
   }
 }
 
-// What is settled with the search's weights of odometry is settled for the map, where these are its own.
+// A map settled with the search's weights of odometry is settled, where these are its own.
 TEST(MapEstimate, IsSettledOnceWhereOdometryCountsAsItWasSearched) {
   const Inputs in = make_inputs(3, TestVerifier(2), 2);
   const MapEstimate map = estimate_map(in.submaps, in.verdicts, {});

@@ -37,8 +37,8 @@ struct MapJob {
   std::vector<ChainId> owners = {};            ///< The sessions that own robots' numbers: these hear of the map.
 };
 
-/// What becomes of the map of the pose graph alone: refined, moved by ranges, laid on the earth, and with the poses
-/// that are held, if there are any.
+/// The map of the pose graph alone, then refined, moved by ranges, laid on the earth, and with the poses that are held,
+/// if there are any.
 MapEstimate finished_map(const MapEstimate& estimate, const SubmapSet& submaps, const Refinements& refinements,
                          const HeldPoses& held, const MapConfig& config);
 

@@ -37,7 +37,7 @@ Status check_step(const Keyframe& from, const Keyframe& to, const RelativePose& 
   return {};
 }
 
-/// What the map relies on, also of callers who do not come by wire.
+/// Checks what the map relies on, also for callers who do not come by wire.
 Status check_submap(const Submap& submap) {
   const std::string where = "submap " + to_string(submap.id);
   if (submap.keyframes.empty() || submap.odometry.size() + 1 != submap.keyframes.size())
@@ -62,7 +62,7 @@ std::string name_of(const ClosureVerdict& verdict) {
   return fmt::format("verdict on submaps {} and {}", to_string(first), to_string(second));
 }
 
-/// What can be said of a verdict before its submaps are there.
+/// Checks a verdict as far as it can be without its submaps.
 Status check_alone(const ClosureVerdict& verdict, const std::set<RobotId>& robots) {
   const auto& [first, second] = verdict.pair;
   const std::string where = name_of(verdict);

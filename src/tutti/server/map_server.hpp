@@ -122,7 +122,7 @@ class MapServer {
   MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureVerifier> verifier,
             std::shared_ptr<PayloadStore> payloads, const ServerConfig& config, std::uint64_t epoch);
   /// Goes on from a saved state. Verifications without a verdict become jobs again; all of them do when the verifier is
-  /// another than the state's. What the former verifier found stays in the map until the new one has answered, for good
+  /// another than the state's. The former verifier's closures stay in the map until the new one has answered, for good
   /// on pairs that the new one cannot compare. The epoch is raised above the saved one if it is not larger; when two
   /// servers start from one saved state, only the epochs that they are given tell them apart.
   MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureVerifier> verifier,
@@ -163,7 +163,7 @@ class MapServer {
   /// The submaps whose places were described, compared or dropped since the last call; MapServerState::places has those
   /// that were not dropped.
   std::vector<SubmapId> take_places() { return std::exchange(new_places_, {}); }
-  /// What was retired since the last call; the submaps' payloads and places go with it.
+  /// All that was retired since the last call; the submaps' payloads and places go with it.
   Retired take_retired() { return std::exchange(new_retired_, {}); }
   /// The verifications to be done; each is handed out once.
   std::vector<VerificationJob> take_jobs();
@@ -185,13 +185,13 @@ class MapServer {
   [[nodiscard]] std::size_t former_pairs() const { return former_pairs_; }
   /// True when something has come that map() was made without.
   [[nodiscard]] bool has_news() const { return news_ || makes_news_; }
-  /// What the map of the next revision is to be made of. The server takes whatever comes until finish(), which is to
-  /// be called with this job's map before another job is begun; only then is there a new revision.
+  /// The job that makes the map of the next revision. The server takes whatever comes until finish(), which is to be
+  /// called with this job's map before another job is begun; only then is there a new revision.
   [[nodiscard]] MapJob begin_update();
   /// The same for the last revision again, for a server that goes on from a state to which nothing was added;
   /// nothing_is_new() then tells the server so.
   [[nodiscard]] MapJob begin_rebuild();
-  /// Takes the map that was begun. What has come since is news. With `refines` it makes a refinement job if one is due.
+  /// Takes the map that was begun. All input since is news. With `refines` it makes a refinement job if one is due.
   void finish(MadeMap made, bool refines = true);
   void nothing_is_new() { news_ = false; }
   /// Begins, makes and finishes a map, and returns its whole proxy graph, as a new revision.

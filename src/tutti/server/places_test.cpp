@@ -68,7 +68,7 @@ TEST_F(Places, AreComparedAndOnlyTheMostAlikeVerified) {
   few.optimise();
   EXPECT_EQ(few.map().components, 1U);
   EXPECT_LT(few.map().closures.size(), all.map().closures.size());
-  // What a submap's candidates leave of the work grows with the submaps, not with their square.
+  // With so few candidates each, the work grows with the submaps, not with their square.
   EXPECT_LE(few.map().closures.size(), 4 * uploads_.size());
   const MapServer plenty = filled(1000, in_order());
   EXPECT_EQ(plenty.work().pairs_verified, all.work().pairs_verified);

@@ -124,7 +124,7 @@ class Ranger {
     return 0.0;
   }
 
-  /// What a radio or a clock may add to ranges.
+  /// An error that a radio or a clock may add to ranges.
   struct Suspect {
     std::set<std::size_t> judged;  ///< The ranges of these of Ranges::judged depend on it.
     RangeObjection objection = RangeObjection::none;
@@ -155,7 +155,7 @@ class Ranger {
     return out;
   }
 
-  /// What may be wrong with the ranges of some of Ranges::judged, all of one robot, and how surely: in sigmas.
+  /// A possible error in the ranges of some of Ranges::judged, all of one robot, and how sure it is: in sigmas.
   struct Doubt {
     std::set<std::size_t> judged;
     RangeObjection objection = RangeObjection::none;

@@ -167,7 +167,7 @@ TEST(RangeFactors, TakeDriftAwayThatNoClosureDoes) {
   }
 }
 
-/// What the ranges that count miss the map by, against what they state.
+/// The ranges that count miss the map by as much as they state.
 TEST(RangeFactors, MissByWhatTheyState) {
   const World world(1.0, {}, 4);
   const MapEstimate map = world.with();

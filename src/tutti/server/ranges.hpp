@@ -17,7 +17,7 @@ enum class RangeObjection {
   robot,  ///< Most of the robot's others are refused, or most of all.
 };
 
-/// What became of the ranges that one session of a robot measured to one other robot.
+/// How the ranges that one session of a robot measured to one other robot were judged.
 struct JudgedRanges {
   ChainId from;
   RobotId to;

@@ -120,7 +120,7 @@ std::vector<SubmapId> neighbours(const SubmapId& id, const std::set<SubmapId>& s
   return out;
 }
 
-/// What is tied to the free ones, and is not free.
+/// The submaps that are tied to the free ones, and are not free.
 std::set<SubmapId> fixed_submaps(const RefinementScope& scope, const std::set<SubmapId>& free) {
   std::set<SubmapId> out;
   for (const SubmapId& id : free)

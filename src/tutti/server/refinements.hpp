@@ -29,7 +29,7 @@ class Refinements {
   /// one of the whole map.
   bool add(Refinement refinement);
   [[nodiscard]] const ByRevision& all() const { return all_; }
-  /// What the refinements together have taken into account.
+  /// The submaps and closures that all refinements have used.
   [[nodiscard]] RefinementScope scope() const;
   /// Number of refinements of parts since the last one of the whole map.
   [[nodiscard]] std::size_t parts() const;

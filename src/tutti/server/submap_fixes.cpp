@@ -14,7 +14,7 @@ namespace {
 
 using Eigen::Matrix3d, Eigen::Vector3d;
 
-/// What is farther from most fixes than this is no origin: there, another direction is up.
+/// A fix farther from most others than this is no origin: there, another direction is up.
 constexpr double kSamePlace_m = 20e3;
 /// The probability with which two right fixes of one submap agree.
 constexpr double kAgree = 0.99;

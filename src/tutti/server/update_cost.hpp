@@ -5,7 +5,7 @@
 
 namespace tutti::server {
 
-/// What an update costs, in seconds of CPU, counted instead of measured: by it a mission in virtual time paces its
+/// The cost of an update in seconds of CPU, counted instead of measured: by it a mission in virtual time paces its
 /// updates, and so has the same maps on any machine. docs/math.md, "When an update begins", says how.
 double counted_cost_s(const MadeMap& made);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What MapServer makes of verdicts: which it believes, in which order, and what it keeps of them.
+// How MapServer uses verdicts: which it believes, in which order, and what it keeps of them.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -90,7 +90,7 @@ TEST(WildOdometry, OfOneRobotHarmsNoOther) {
     without_it += closures_between_good_robots(estimate_map(world.submaps, world.verdicts, {}));
   }
   EXPECT_GT(without_it, 9 * kSeeds);
-  // What is left: a map that is solved, but too ill-conditioned for a covariance.
+  // The other maps are solved, but too ill-conditioned for a covariance.
   EXPECT_GE(informed, kSeeds * 95 / 100);
   EXPECT_GE(kept, without_it * 95 / 100);
 }
