@@ -233,7 +233,7 @@ RC_GTEST_PROP(ProxyGraphCodec, ARobotsOwnPartIsWhatItWouldTakeFromTheWhole, ()) 
   }
 }
 
-/// What a server makes of a graph a while later: bent as a whole, surer, with more nodes and fewer.
+/// The graph that a server has a while later: bent as a whole, surer, with more nodes and fewer.
 ProxyGraphMessage later(ProxyGraphMessage message, Rng& rng) {
   ProxyGraph& graph = message.graph;
   ++graph.revision;

@@ -23,8 +23,8 @@
 /// signed ones sint64, double double, text bytes, Timestamp sint64 (ns), RobotId uint32, Pose3 repeated double
 /// [x y z; quaternion x y z w], Matrix6d repeated double (its upper triangle by rows), lists of numbers packed. A list
 /// in columns is one message with a repeated field for each field of its elements, and NumberSets are a message each,
-/// of the session and the bounds of the set's intervals as differences. What has its default is left out, unless it is
-/// an optional or an element of a list, or FieldRule::always demands it.
+/// of the session and the bounds of the set's intervals as differences. A field that has its default is left out,
+/// unless it is an optional or an element of a list, or FieldRule::always demands it.
 namespace tutti::wire {
 
 template <class T>

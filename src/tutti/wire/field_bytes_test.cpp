@@ -246,7 +246,7 @@ TEST(FieldBytes, AreProtobufs) {
   EXPECT_EQ(read_fields<Outside>(bytes).value(), value);
 }
 
-/// What protobuf itself writes of a message with these bytes.
+/// These bytes, read and written again by protobuf itself.
 template <class Message>
 std::string again(const std::string& bytes) {
   Message message;

@@ -35,7 +35,7 @@ struct WireField {
 using WireFields = std::vector<WireField>;
 /// The fields of a message. Errors: no protobuf message, or more fields than any message of ours has.
 Result<WireFields> split_fields(std::string_view message);
-/// What a repeated field of doubles or varints contains, packed or one by one.
+/// The numbers of a repeated field of doubles or varints, packed or one by one.
 Result<std::vector<std::uint64_t>> repeated_numbers(const WireFields& fields, int number, bool are_doubles,
                                                     std::size_t at_most);
 

@@ -59,7 +59,7 @@ TEST(SubmapFixesCodec, EdgesOfTheEarthComeThrough) {
   EXPECT_EQ(decoded->submap.fixes[0].antenna, message.submap.fixes[0].antenna);
 }
 
-/// What a peer of before sends and reads is the same message without them.
+/// An older peer sends and reads the same message without them.
 TEST(SubmapFixesCodec, AnOlderPeerMissesNothingElse) {
   Rng rng(1);
   SubmapMessage message = with_fixes(rng, 5);

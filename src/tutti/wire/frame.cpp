@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::string_view kMagic = "TU";
 constexpr std::size_t kHeaderBytes = 5;
-/// What is large and written often.
+/// Kinds that are large and written often.
 constexpr bool is_state(MessageKind kind) { return kind == MessageKind::agent_state || kind == MessageKind::estimate; }
 constexpr int level_of(MessageKind kind) { return is_state(kind) ? 1 : 9; }
 constexpr std::size_t most_bytes(MessageKind kind) { return is_state(kind) ? kMaxStateBytes : kMaxMessageBytes; }

@@ -30,7 +30,7 @@ constexpr std::array kKinds = {MessageKind::submap,      MessageKind::proxy_grap
                                MessageKind::submap_copy, MessageKind::refinement_job,
                                MessageKind::refinement,  MessageKind::mark};
 
-/// What deltas are against.
+/// The graph that deltas are against.
 const ProxyGraph& base() {
   static const ProxyGraph graph = [] {
     Rng rng(9);

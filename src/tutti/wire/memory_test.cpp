@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What decoding takes at most, counted by operator new, whatever the bytes.
+// The most memory that decoding takes, counted by operator new, whatever the bytes.
 #include <gtest/gtest.h>
 #include <malloc.h>
 

@@ -5,8 +5,8 @@
 
 namespace tutti::wire {
 
-/// What a frame carries. The numbers are on the wire and in stores: never reuse one. verdict, cloud, agent_state,
-/// tracked_images and estimate are stored, never sent.
+/// The kind of message in a frame. The numbers are on the wire and in stores: never reuse one. verdict, cloud,
+/// agent_state, tracked_images and estimate are stored, never sent.
 enum class MessageKind : std::uint8_t {
   submap = 1,
   proxy_graph = 2,
@@ -20,12 +20,12 @@ enum class MessageKind : std::uint8_t {
   mission_status = 10,
   submap_request = 13,     ///< Which submaps a worker lacks.
   submap_copy = 14,        ///< A submap for a worker that lacks it.
-  decision = 15,           ///< What an operator decides on a closure.
+  decision = 15,           ///< An operator's decision on a closure.
   proxy_graph_delta = 17,  ///< A proxy graph in terms of an earlier one.
-  tracked_images = 18,     ///< What a robot's cameras saw, in its journal.
+  tracked_images = 18,     ///< Images of a robot's cameras, in its journal.
   refinement_job = 19,     ///< Submaps to be refined together.
   refinement = 20,         ///< The answer to a refinement job.
-  mark = 21,               ///< What an operator writes on the map; travels as a `decision` does.
+  mark = 21,               ///< An operator's note on the map; travels as a `decision` does.
   estimate = 22,           ///< A server's map, for who reads its file meanwhile.
 };
 

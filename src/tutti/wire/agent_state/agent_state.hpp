@@ -27,7 +27,7 @@ Result<robot::AgentState> decode_agent_state(std::string_view bytes);
 ///   smoother's state that does not follow from the other rows
 using StateRows = std::map<std::string, std::string, std::less<>>;
 
-/// What has been stored of an agent, so that changed_rows() leaves out what has not changed since.
+/// The stored state of an agent, by which changed_rows() leaves out what has not changed since.
 struct StoredState {
   std::size_t keyframes = 0;
   std::uint64_t comparisons = 0;  ///< Number of comparisons with the map after which ledger and smoother were stored.
@@ -43,7 +43,7 @@ struct StateChange {
 StateChange changed_rows(const robot::RobotAgent& agent, StoredState& stored);
 /// The state of these rows, to the bit, which an agent can go on from; or an error. Rows of other keys are ignored.
 Result<robot::AgentState> decode_state_rows(const StateRows& rows);
-/// What is stored of an agent after its state was read by decode_state_rows().
+/// The StoredState of an agent after its state was read by decode_state_rows().
 StoredState stored_state(const robot::AgentState& state);
 
 /// Images of one time for the journal, exact. Decoding checks that the bytes are complete, not what they mean:

@@ -69,7 +69,7 @@ void pass(A& a, ChainPart& part) {
   pass(a, part.node_odometry);
 }
 
-/// What of a smoother is neither chain nor follows from the ledger.
+/// A smoother without its chain and without what follows from the ledger.
 struct Corrections {
   Pose3 first;
   std::vector<estimation::ChainConstraint> constraints;  ///< Where they are not the ledger's.

@@ -23,7 +23,7 @@ using robot::test::at;
 
 constexpr RobotId kRobot{1};
 
-/// What one camera saw that tracks a few points.
+/// Images of one camera that tracks a few points.
 TrackedImages images_at(Timestamp stamp, Rng& rng) {
   TrackedImage image;
   for (std::uint64_t track = 0; track < 5; ++track)
@@ -49,7 +49,7 @@ struct Mission {
   [[nodiscard]] RobotAgent start() const { return {kRobot, 7, config}; }
   [[nodiscard]] RobotAgent go_on(robot::AgentState state) const { return {kRobot, config, std::move(state)}; }
 
-  /// What the robot sends meanwhile.
+  /// Returns all that the robot sends meanwhile.
   std::string live(RobotAgent& agent, std::size_t from, std::size_t to) const {
     std::string sent;
     for (std::size_t i = from; i < to; ++i) {

@@ -16,7 +16,7 @@ namespace tutti::wire {
 /// they have bytes. Reads tags and lengths and takes no memory.
 Status check_counts(MessageKind kind, std::string_view payload);
 
-/// What is encoded is ours, and whole.
+/// A message that is encoded is ours, and whole.
 inline void expect_valid(const Status& valid) { TUTTI_CHECK(valid.has_value(), "{}", valid.error().message); }
 
 /// Parses the frame's message into `message`.

@@ -63,8 +63,8 @@ class StampColumn {
   std::uint64_t previous_ = 0;
 };
 
-/// What the nodes of one chain are expected to be by a graph that the receiver has: a map is bent as a whole, so two
-/// neighbours keep their places to each other.
+/// Predicts the nodes of one chain by a graph that the receiver has: a map is bent as a whole, so two neighbours keep
+/// their places to each other.
 class KnownNodes {
  public:
   struct Expected {
@@ -73,7 +73,7 @@ class KnownNodes {
   };
   KnownNodes() = default;
   explicit KnownNodes(std::span<const ProxyNode> nodes) : nodes_(nodes) {}
-  /// What is expected of the node at this stamp. Stamps must be asked for in order; nothing unless this one and the one
+  /// The prediction of the node at this stamp. Stamps must be asked for in order; nothing unless this one and the one
   /// before are neighbours there.
   std::optional<Expected> at(Timestamp stamp) {
     while (next_ < nodes_.size() && nodes_[next_].stamp < stamp) skip();

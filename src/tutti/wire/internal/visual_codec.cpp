@@ -19,8 +19,7 @@ namespace {
 constexpr double kPixelStep = 1.0 / 16.0;
 constexpr double kLandmarkStep_m = 1.0 / 1024.0;
 static_assert(kMaxLandmarkRange_m / kLandmarkStep_m < 0x1p24);
-/// How sigmas are coded: steps from one to its double, and the code of 1. What is smaller than code 1 becomes it; 0 is
-/// 0.
+/// How sigmas are coded: steps from one to its double, and the code of 1. Sigmas smaller than code 1 become it; 0 is 0.
 constexpr double kSigmaSteps = 64.0;
 constexpr std::int64_t kSigmaOne = 20 * 64;
 

@@ -12,7 +12,7 @@ class Visual;
 
 namespace tutti::wire {
 
-/// What the cameras saw along a submap that begins with keyframe `first_keyframe`.
+/// Encodes what the cameras saw along a submap that begins with keyframe `first_keyframe`.
 void encode_visual(const VisualPayload& visual, std::uint32_t first_keyframe, v1::Visual& out);
 /// Indices are in range of what they point at; all else is for check_visual() to judge.
 Result<std::shared_ptr<const VisualPayload>> decode_visual(const v1::Visual& in, std::uint32_t first_keyframe);

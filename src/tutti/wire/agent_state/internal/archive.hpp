@@ -274,7 +274,7 @@ void pass(A& a, robot::SensorSample& sample) {
   pass_optional(sample.scan);
   pass_optional(sample.images);
 }
-/// What keyframes wait for.
+/// The part of a builder that waits to make keyframes.
 template <class A>
 void pass_waiting(A& a, robot::SubmapBuilderState& builder) {
   std::vector<robot::OdometryStep> odometry(builder.waiting.odometry.begin(), builder.waiting.odometry.end());
@@ -293,7 +293,7 @@ void pass(A& a, robot::OdometryWatch::State::Anchor& anchor) {
   pass(a, anchor.T_odom_body);
   pass(a, anchor.T_fed_body);
 }
-/// What odometry was before it was made one that does not jump: after pass_waiting(), whose samples it marks.
+/// Odometry as it was before its jumps were removed: after pass_waiting(), whose samples it marks.
 template <class A>
 void pass_watch(A& a, AgentState& state) {
   robot::OdometryWatch::State& watch = state.watch;

@@ -11,8 +11,8 @@
 namespace tutti::wire {
 namespace {
 
-// What is checked here is what an agent had to have checked: samples were within kMaxCoordinate_m when it took them,
-// but what it computes of them need not be, nor need a covariance compounded over such distances be a covariance to
+// Only what an agent had to have checked is checked here: samples were within kMaxCoordinate_m when it took them, but
+// what it computes of them need not be, nor need a covariance compounded over such distances be a covariance to
 // rounding.
 bool is_sound(const Pose3& T) { return is_valid(T); }
 bool is_sound(const RelativePose& measured) { return is_sound(measured.T_a_b) && measured.covariance.allFinite(); }

@@ -5,7 +5,7 @@
 
 namespace tutti::wire {
 
-/// What is wrong with a state that an agent is to go on from; null: nothing.
+/// Why an agent cannot go on from a state; null: it can.
 const char* what_is_wrong(const robot::AgentState& state);
 
 }  // namespace tutti::wire
