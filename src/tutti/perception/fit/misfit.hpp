@@ -34,7 +34,7 @@ enum class MisfitKind : std::uint8_t {
 /// Whose motion contradicts odometry's.
 enum class Witness : std::uint8_t { scans, images };
 
-/// One such contradiction, with its size. What is said of scans and the LiDAR holds for images and cameras alike.
+/// One such contradiction, with its size. All that is said of scans and the LiDAR holds for images and cameras alike.
 struct Misfit {
   MisfitKind kind = MisfitKind::clock;
   /// clock: added to the scans' stamps it gives odometry's time, s. turned: angle, degrees. displaced: m. scale: factor

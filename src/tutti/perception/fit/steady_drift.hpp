@@ -17,7 +17,7 @@ class SteadyDrift {
   /// where the two are nowhere near each other, nothing is learnt.
   void add(const ScanStep& far, const Pose3& T_by_odometry, double distance_m, double other_rad2 = 0.0);
 
-  /// What has been learnt so far; the sigma is of the registrations, or of the values' scatter where that is larger.
+  /// The estimate so far; the sigma is of the registrations, or of the values' scatter where that is larger.
   struct Estimate {
     double rad_per_m = 0.0, sigma = 0.0;
   };

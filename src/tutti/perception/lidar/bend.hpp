@@ -30,10 +30,10 @@ struct Contact {
   double weight = 1.0;
 };
 
-/// What the bends of both submaps add to a registration: covariance of the right perturbation of T_target_source, both
-/// submaps seen from their middle keyframes. A voxel is the mean of what hit it, and a sensor that looks all round hits
-/// it in proportion to 1 / distance^2, so point p moves with keyframe k by the share w_k(p) ~ 1 / distance^2. An error
-/// eta of the step from k to k + 1, beyond the middle, moves p by the share B(p), the sum of w over the keyframes
+/// The covariance that the bends of both submaps add to a registration: of the right perturbation of T_target_source,
+/// both submaps seen from their middle keyframes. A voxel is the mean of what hit it, and a sensor that looks all round
+/// hits it in proportion to 1 / distance^2, so point p moves with keyframe k by the share w_k(p) ~ 1 / distance^2. An
+/// error eta of the step from k to k + 1, beyond the middle, moves p by the share B(p), the sum of w over the keyframes
 /// beyond the step, and the least-squares estimate by H^-1 (sum B(p) g g^T) eta, H = sum g g^T over the contacts with
 /// gradients g. docs/math.md, "LiDAR closures".
 Matrix6d bend_covariance(const Bend& target, const Bend& source, const Pose3& T_target_source,

@@ -87,7 +87,7 @@ TEST(BendCovariance, countsBothSubmapsAlike) {
   EXPECT_TRUE(both.isApprox(source + target, 1e-6));
 }
 
-// What lies round the middle was mostly seen from there.
+// Points round the middle were mostly seen from there.
 TEST(BendCovariance, isSmallerWhereTheCloudsTouchNearTheMiddleKeyframes) {
   const Bend bent = walked(0.01);
   auto near = contacts_in_a_room({}, Rng(2)), far = near;

@@ -40,8 +40,8 @@ std::array<double, kBins> facing(const BirdsEyeView& view) {
   return blurred;
 }
 
-/// Image of the wall normals (x + i y) of a view turned by `yaw`. What lies outside the image is left out: wrapped
-/// around it would stand in a wrong place.
+/// Image of the wall normals (x + i y) of a view turned by `yaw`. Walls outside the image are left out: wrapped around
+/// they would stand in a wrong place.
 ComplexImage draw(const BirdsEyeView& view, double yaw, double cell_m) {
   constexpr int kMask = kImageSize - 1;
   constexpr float kReach = 0.5F * kImageSize - 1.0F;

@@ -20,7 +20,7 @@ namespace {
 constexpr int kSize = PlaceViews::kSize;
 constexpr std::uint8_t kDescriptorVersion = 1;  // raised with every change of the bytes, or of what they are made of
 
-/// What the bytes begin with: made with other settings, descriptors cannot be compared.
+/// The head of the bytes: descriptors made with other settings cannot be compared.
 constexpr std::size_t kHeadBytes = 9;
 std::string head_of(const LidarClosureConfig& config) {
   const std::array<float, 2> numbers{static_cast<float>(config.candidates.cell_m), static_cast<float>(config.voxel_m)};

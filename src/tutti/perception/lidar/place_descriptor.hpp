@@ -10,7 +10,7 @@
 
 namespace tutti::lidar {
 
-/// What a submap shows from above, in 4 kB: the turned views (birds_eye_view.hpp), of which the 32 x 32 longest
+/// A submap as seen from above, in 4 kB: the turned views (birds_eye_view.hpp), of which the 32 x 32 longest
 /// wavelengths are left, in 8 bits each. Wherever a submap stands and is turned to, its descriptor hardly changes.
 /// Empty when the submap is not usable or shows hardly any walls: then it is unknown.
 std::string describe_place(const Submap& submap, const LidarClosureConfig& config);

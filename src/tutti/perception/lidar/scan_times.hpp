@@ -20,7 +20,7 @@ inline constexpr double kLongestSweep_s = 0.5;
 /// No point is measured farther in time from its scan's pose than this, before or after it.
 inline constexpr double kLongestAge_s = 1.0;
 
-/// What a mission file has on a robot's scans: robots[].scans_deskewed (auto, yes, no), scan_time_unit (auto, s, ms,
+/// A mission file's settings of a robot's scans: robots[].scans_deskewed (auto, yes, no), scan_time_unit (auto, s, ms,
 /// us, ns) and scan_pose_at (end, begin).
 struct ScanTimesConfig {
   std::string deskewed = "auto";
@@ -28,7 +28,7 @@ struct ScanTimesConfig {
   std::string pose_at = "end";
 };
 
-/// What the numbers of a file's time field mean.
+/// The meaning of the numbers in a file's time field.
 struct PointTimes {
   enum class Zero { sweep_begin, sweep_end, odometry_clock, message, unknown };
   std::string field;

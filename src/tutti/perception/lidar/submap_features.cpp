@@ -48,9 +48,9 @@ Eigen::Vector3d find_up(const Submap& submap, std::span<const Pose3> poses, std:
   return by_body.support > kPriorPreference * by_odometry.support ? by_body.up : by_odometry.up;
 }
 
-/// What the points may be off by where two submaps of one place lie on each other: what they are off by within one
-/// cloud, and how far the odometry's rotation may have bent it. Not its translation: that is uncertain along corridors
-/// without features, where the few points that determine how far along one is must not be excused.
+/// The points' expected residuals where two submaps of one place lie on each other: those within one cloud, and how far
+/// the odometry's rotation may have bent it. Not its translation: that is uncertain along corridors without features,
+/// where the few points that determine how far along one is must not be excused.
 std::vector<float> expected_residuals(const OrientedCloud& cloud, const Middle& middle,
                                       const RegistrationConfig& config) {
   std::vector<float> out = self_residuals(cloud, config);

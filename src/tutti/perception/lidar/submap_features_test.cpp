@@ -92,7 +92,7 @@ TEST(ExtractFeatures, saysWhyASubmapIsNotUsable) {
   EXPECT_EQ(reason(bad), "too short: 2.5 s, at least 5.0 needed");
 }
 
-// By car a submap ends by its distance after 3 s. What short submaps lack is having moved.
+// By car a submap ends by its distance after 3 s. Short submaps lack motion.
 TEST(ExtractFeatures, AFewSecondsAreEnoughWhereTheyLeadFar) {
   Submap fast = make_submap(kId, furnished_room(), {}, Rng(1));
   for (auto& keyframe : fast.keyframes) keyframe.stamp.ns /= 4;

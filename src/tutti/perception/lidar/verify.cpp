@@ -118,7 +118,7 @@ void refine(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_ini
   const Vector6d gap = local(forward.T_target_source, turned.T_a_b);
   weakest_b = forward.weakest_source;
   out.T_a_b = retract(forward.T_target_source, 0.5 * gap);
-  // What the two directions disagree by is uncertainty, too.
+  // The disagreement of the two directions is uncertainty, too.
   out.covariance = 0.5 * (forward.covariance + turned.covariance) + 0.25 * gap * gap.transpose();
   out.overlap = 0.5 * (forward.overlap + backward.overlap);
   out.plane_rmse_m = std::max(forward.plane_rmse_m, backward.plane_rmse_m);
@@ -134,7 +134,7 @@ double allowed_misfit(double min_eigenvalue, const LidarClosureConfig& c) {
   return 1.0 + (c.max_misfit - 1.0) * min_eigenvalue / c.sure_eigenvalue;
 }
 
-/// What every gate measures, with its limit.
+/// The value that every gate measures, with its limit.
 std::vector<Refusal> gates(const PairVerification& v, const LidarClosureConfig& c) {
   using enum RefusalReason;
   return {{overlap, v.overlap, c.min_overlap},

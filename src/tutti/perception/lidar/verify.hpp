@@ -16,8 +16,8 @@ namespace tutti::lidar {
 /// their results, if only by a gate's default, raises it by hand: servers then ask again what another version answered.
 inline constexpr std::uint32_t kVerifierVersion = 3;
 
-/// What verify_pair() found. The measured quantities are those of the best alignment, also when it is refused, as far
-/// as they were measured: where a rival refuses a pair, the finest level is left out. Without any alignment they are 0.
+/// Result of verify_pair(). The measured quantities are those of the best alignment, also when it is refused, as far as
+/// they were measured: where a rival refuses a pair, the finest level is left out. Without any alignment they are 0.
 struct PairVerification {
   bool accepted = false;
   std::optional<Refusal> refusal;  ///< Set when not accepted.

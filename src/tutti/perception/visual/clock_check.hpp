@@ -32,8 +32,8 @@ class ClockCheck {
   /// Adds an image with its tracks, by increasing stamps.
   void add(Timestamp stamp, const TrackedImage& image);
   [[nodiscard]] std::size_t pairs() const { return pairs_.size(); }
-  /// What to add to the images' stamps, s, where this makes them fit the odometry far better; no value where they fit
-  /// as they are or do not determine it.
+  /// The offset to add to the images' stamps, s, where this makes them fit the odometry far better; no value where they
+  /// fit as they are or do not determine it.
   [[nodiscard]] std::optional<double> offset_s(const Trajectory& odometry) const;
   /// By how much the camera seems to be turned about its optical axis against Camera::T_body_camera, 90, 180 or 270
   /// degrees, where this fits the odometry far better; no value where the camera fits as stated or the motion does not

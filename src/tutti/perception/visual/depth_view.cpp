@@ -44,7 +44,7 @@ Camera depth_camera(const Camera& first, const DepthSensor& sensor, double sigma
   const double of_ray = std::max(sigma_of(kReference_m, sensor) / (kReference_m * kReference_m), 1e-4);
   const double baseline_m = kWide * sigma_px / (model.fx * of_ray);
   const double widest_px = model.fx * baseline_m / sensor.least_m;
-  // What it sees lies to the left of what the first one sees, the more the nearer it is.
+  // A point lies farther left in its image than in the first one's, the more the nearer it is.
   Camera out{{CameraKind::pinhole, model.width_px, model.height_px, model.fx, model.fy, model.cx, model.cy, {}}, {}};
   constexpr double kMargin = 2.0;  // undistorted, corners lie farther out
   out.model.width_px = static_cast<int>(kMargin * model.width_px + widest_px);

@@ -37,7 +37,7 @@ class DepthWatch {
   static constexpr int kImages = 5;
   /// Share of the pixels that must have one; walls beyond the sensor's range are no fault.
   static constexpr double kLeastShare = 0.05;
-  /// What is wrong, reported once, after kImages images: nearly all pixels are without depth, or the numbers are no
+  /// The problem, reported once, after kImages images: nearly all pixels are without depth, or the numbers are no
   /// depths in units of DepthSensor::unit_m. Otherwise no value.
   std::optional<std::string> add(const DepthImage& depth, const DepthSensor& sensor);
 

@@ -38,7 +38,7 @@ std::optional<std::uint32_t> its_landmark(const std::vector<NearRow>& near, cons
   return std::ranges::any_of(near, rivals) ? std::nullopt : std::optional(landmark);
 }
 
-/// Is no other observation of the image nearer to the landmark than this one, which has these rows near it? Of equal
+/// Is no other observation of the image nearer to the landmark than this one, which has these rows near it? Among equal
 /// ones the first is.
 bool is_nearest(const QueryFrame& image, std::uint32_t observation, const Descriptors& query, const SubmapFeatures& map,
                 std::uint32_t landmark, const std::vector<NearRow>& near, std::size_t& work) {

@@ -55,7 +55,7 @@ double cubic_root(double p, double q, double r) {
   return x;
 }
 
-/// What the equations of the distances miss by, m^2.
+/// The residuals of the equations of the distances, m^2.
 Eigen::Vector3d residual(const Triangle& t, const Eigen::Vector3d& l) {
   return {l[0] * l[0] + l[1] * l[1] - 2.0 * t.b12 * l[0] * l[1] - t.a12,
           l[0] * l[0] + l[2] * l[2] - 2.0 * t.b13 * l[0] * l[2] - t.a13,

@@ -10,9 +10,9 @@
 
 namespace tutti::visual {
 
-/// What a submap's images show: of each of its 512 landmarks that most keyframes saw, two descriptors (33 kB of ORB at
-/// most). Empty when fewer than config.min_landmarks have one, or when there are no images: then it is unknown.
-/// The payload's indices must be valid, as wire::decode_submap() checks.
+/// A submap as its images show it: two descriptors of each of its 512 landmarks that most keyframes saw (33 kB of ORB
+/// at most). Empty when fewer than config.min_landmarks have one, or when there are no images: then it is unknown. The
+/// payload's indices must be valid, as wire::decode_submap() checks.
 std::string describe_place(const Submap& submap, const VisualClosureConfig& config);
 
 /// True for what describe_place() returns, unless it is empty.

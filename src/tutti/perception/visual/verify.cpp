@@ -28,7 +28,7 @@ struct Localised {
   std::optional<LoopClosure> closure;
 };
 
-/// What the images of one keyframe see of the map.
+/// The landmarks of the map that the images of one keyframe see.
 struct SeenMap {
   std::vector<Sighting> sightings;
   std::vector<std::uint32_t> landmarks;  ///< Each sighting's.

@@ -107,7 +107,7 @@ Landmark to_landmark(const TriangulatedPoint& point) {
   return {point.position.cast<float>(), static_cast<float>(largest_sigma(point.covariance))};
 }
 
-/// What a track's views miss its point by, and what pixels and odometry explain of it: root mean squares over them.
+/// The reprojection errors of a track's views, and those that pixels and odometry explain: root mean squares.
 struct TrackResidual {
   std::size_t views;
   double rms_px, expected_px;
@@ -247,7 +247,7 @@ const Seen* most_typical(const Found& found, const std::vector<Image>& images) {
   return best;
 }
 
-/// What becomes of a keypoint.
+/// How much of a keypoint is kept.
 struct Fate {
   std::uint32_t found = kNoIndex;
   bool descriptor = false;

@@ -89,7 +89,7 @@ std::optional<double> watched_offset_s(const ImageStream& stream, const Trajecto
   return clock.offset_s(odometry);
 }
 
-/// What both cameras see at a few times spread over the recording, wherever the calibration expects it.
+/// The turn by what both cameras see at a few times spread over the recording, wherever the calibration expects it.
 std::optional<StereoTurn> watched_turn(const ImageStream& stream, const Trajectory& odometry, TrackerConfig config) {
   constexpr std::size_t kInstants = 12;
   constexpr double kWide_rad = 0.06;  // a turn of more is no slip, and points are not found where they are looked for
