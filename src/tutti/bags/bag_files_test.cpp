@@ -220,7 +220,7 @@ TEST_F(BagFolders, OfASqliteFileWithAHotJournalItIsReportedHowToReadIt) {
             std::string::npos)
       << refused.error().message;
   EXPECT_TRUE(fs::exists(killed.string() + "-journal"));
-  // What the advice does.
+  // Follow the advice.
   ASSERT_EQ(sqlite3_open(killed.c_str(), &db), SQLITE_OK);
   sqlite3_exec(db, "SELECT name FROM sqlite_schema", nullptr, nullptr, nullptr);
   sqlite3_close(db);

@@ -32,7 +32,7 @@ std::string frames_of(const RosOdometry& message) {
 }
 std::string frames_of(const auto& message) { return message.header.frame_id; }
 
-/// What the first message of a topic shows.
+/// Notes what the first message of a topic shows.
 void note_first(TopicInfo& topic, const BagMessage& message) {
   const auto encoding = to_encoding(message.channel->message_encoding);
   const auto decoded = encoding ? decode_message(topic.type, message.data, *encoding)

@@ -20,7 +20,7 @@ struct TopicInfo {
   std::uint64_t count = 0;
   Timestamp first = kLastTimestamp, last = kFirstTimestamp;  ///< Log times: the earliest and the latest.
   std::string frames;  ///< Frames of the first message ("odom -> base_link"); empty for types without a use.
-  std::optional<ImageLayout> image;  ///< What the first message shows, of images.
+  std::optional<ImageLayout> image;  ///< The first message's, of images.
   std::optional<RosCameraInfo> calibration;
   bool has_fix = false;                  ///< A message has a position fix that a robot would use.
   std::string refused_fix;               ///< Why the first fix that it would not is refused.
@@ -41,7 +41,7 @@ struct BagInfo {
 /// Reads the whole bag once, one chunk at a time.
 BagInfo inspect(BagReader& bag);
 
-/// What Tutti would take from the bag, for people, a line per kind of input: "odometry     /odom (odom -> base_link)".
+/// Inputs that Tutti would take from the bag, for people, a line per kind: "odometry     /odom (odom -> base_link)".
 /// All topics of a kind are named; where a kind is missing the line states what that means. A topic of depth is named
 /// with its camera, or with why it has none.
 std::vector<std::string> uses(const BagInfo& info);

@@ -44,7 +44,7 @@ tl::unexpected<Error> Db3Reader::fail_sqlite() const {
 Result<Db3Reader> Db3Reader::open(const std::string& path, std::int64_t most_bytes) {
   if (const auto file = open_file(path); !file) return tl::unexpected(file.error());
   std::error_code failure;
-  // What a recorder has left in a log beside the file belongs to it. SQLite reads a write-ahead log only where it may
+  // A log that a recorder has left beside the file belongs to it. SQLite reads a write-ahead log only where it may
   // write beside it, and takes back what a journal contains only where it may write the file itself, which nobody here
   // does. A file without either is read without a trace.
   const auto has = [&](const char* end) {

@@ -15,7 +15,7 @@ namespace tutti::bags {
 
 inline constexpr double kDepthUnit_m = 0.001;  ///< Unit of what to_depth() returns.
 
-/// What a message has on its image before it is decoded.
+/// The layout of a message's image, known before it is decoded.
 struct ImageLayout {
   std::string encoding, frame;
   std::uint32_t width_px = 0, height_px = 0;  ///< 0: of a file other than PNG.
@@ -35,9 +35,9 @@ std::uint32_t depth_bytes(std::string_view encoding);
 /// Fails unless a message has the encoding, frame and size of the `first` one of its topic.
 Status check_like_first(const ImageLayout& layout, const ImageLayout& first);
 
-/// The depth image in millimetres: of 16UC1 and mono16, which have these, of 32FC1, which has metres. What is not
-/// finite, not positive, or beyond 65.5 m is unknown. Rows may be padded, bytes in either order. Other encodings are an
-/// error.
+/// The depth image in millimetres: of 16UC1 and mono16, which have these, of 32FC1, which has metres. Depths that are
+/// not finite, not positive, or beyond 65.5 m are unknown. Rows may be padded, bytes in either order. Other encodings
+/// are an error.
 Result<DepthImage> to_depth(const RosImage& message);
 /// The same of a compressed message: a grey PNG image of 16 bits, behind the 12 bytes that compressedDepth puts before
 /// it, or without these; of 32FC1 it has the inverse depth, by the two numbers there. Another size than expected is

@@ -29,7 +29,7 @@ Result<DepthImage> to_depth(const ImageMessage& message, formats::ExpectedSize e
 struct ImageTopic {
   std::string topic;
   bool is_compressed = false;
-  std::optional<ImageLayout> first = {};   ///< What its first message shows that was added; before it, the last one.
+  std::optional<ImageLayout> first = {};   ///< As the first message that was added shows; before it, the last one.
   std::optional<RosCameraInfo> info = {};  ///< The first one beside it (camera_info_topic()).
   bool is_sure = false;                    ///< A message was added.
 
@@ -37,7 +37,7 @@ struct ImageTopic {
   /// with too few bytes, or with depth and another encoding, frame or size than the first that was added.
   Status add(const ImageMessage& message);
   [[nodiscard]] bool shows_depth() const;
-  /// What a camera sees, in an encoding that to_image() takes, or in a file.
+  /// Whether it shows what a camera sees, in an encoding that to_image() takes, or in a file.
   [[nodiscard]] bool shows_picture() const;
   /// Fails, naming topic and encoding, unless it shows pictures.
   [[nodiscard]] Status check_picture() const;

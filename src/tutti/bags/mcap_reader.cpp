@@ -219,7 +219,7 @@ Result<std::optional<BagMessage>> McapReader::take(const Record& record, std::st
   return std::nullopt;
 }
 
-/// What the file has of the record is in record_.
+/// The record, as far as the file has it, is in record_.
 Status McapReader::enter_chunk(const Record& record, bool cut) {
   Cursor cursor(record_);
   cursor.take(8 + 8, "first and last time");
@@ -262,7 +262,7 @@ void McapReader::define_in_chunk() {
   }
 }
 
-/// What is before a byte that is jumped to may define its channel: of a file without a summary it is read once.
+/// Records before a byte that is jumped to may define its channel: of a file without a summary they are read once.
 void McapReader::define_until(std::uint64_t offset) {
   offset_ = defined_until_;
   while (offset_ < offset && !ended_) {

@@ -25,11 +25,11 @@ using FindTransform = std::function<std::optional<Pose3>(const std::string& a, c
 /// same place by the transforms, within 1 mm and 1 mrad. The error names value and expected value.
 Status check_registered(const ImageTopic& depth, const ImageTopic& camera, const FindTransform& find);
 
-/// What was configured for the topics to use, and how to configure it.
+/// The topics to use as configured, and how to configure them.
 struct CameraWishes {
   bool are_named = false;   ///< The cameras; otherwise they were found by type.
   int most_cameras = 2;     ///< 1: of two cameras only the first is used.
-  std::string images_flag;  ///< What to put before a camera's topic to choose it, such as "--images ".
+  std::string images_flag;  ///< Put before a camera's topic to choose it, such as "--images ".
   std::string depth_flag;   ///< The same of a topic of depth.
 };
 
@@ -39,11 +39,11 @@ struct CameraChoice {
   std::string note;                  ///< Why no depth is used although there is some; else empty.
 };
 
-/// Uses one or two cameras; of all topics a first message has been seen. What is there raw and compressed counts once;
-/// two topics that one CameraInfo calibrates are an error. Where they were not named and a topic of depth
+/// Uses one or two cameras; of all topics a first message has been seen. A topic that is there raw and compressed
+/// counts once; two topics that one CameraInfo calibrates are an error. Where they were not named and a topic of depth
 /// is registered to one of them alone, this one is used, with its depth; where to several, or where there are more than
-/// two cameras, the error lists them and the flag that decides. Depth is used with one camera, if exactly one
-/// topic is registered to it.
+/// two cameras, the error lists them and the flag that decides. Depth is used with one camera, if exactly one topic is
+/// registered to it.
 Result<CameraChoice> choose_cameras(std::span<const ImageTopic> cameras, std::span<const ImageTopic> depths,
                                     const CameraWishes& wishes, const FindTransform& find);
 

@@ -17,7 +17,7 @@ RosCameraInfo info(double focal_px, double x_px = 320.0, std::uint32_t width_px 
   return out;
 }
 
-/// What a RealSense publishes: depth as its left infrared camera sees it, and aligned to the colour camera.
+/// The topics of a RealSense: depth as its left infrared camera sees it, and aligned to the colour camera.
 const ImageTopic kColour{"/color/image_raw", false, ImageLayout{"rgb8", "color_optical", 640, 480}, info(610)},
     kInfra1{"/infra1/image_rect_raw", false, ImageLayout{"mono8", "infra1_optical", 848, 480}, info(420, 320, 848)},
     kInfra2{"/infra2/image_rect_raw", false, ImageLayout{"mono8", "infra2_optical", 848, 480}, info(420, 320, 848)},

@@ -39,7 +39,7 @@ class Ros1Reader final : public BagReader {
 
  private:
   enum class Op : std::uint8_t { message = 2, bag_header, index, chunk, chunk_info, connection };
-  /// What a record's header has; fields that it lacks stay zero.
+  /// A record's header; fields that it lacks stay zero.
   struct Record {
     Op op{};
     std::uint32_t connection = 0;

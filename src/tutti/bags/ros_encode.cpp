@@ -50,7 +50,7 @@ class Cdr {
   ByteWriter out_{ByteWriter::Layout::aligned};
 };
 
-/// What differs between the visualization_msgs/msg/Marker that are written.
+/// The fields that differ between the visualization_msgs/msg/Marker that are written.
 struct Marker {
   enum Type : std::int32_t { none = 0, sphere = 2, line_list = 5, text_view_facing = 9 };
   enum Action : std::int32_t { add = 0, delete_all = 3 };

@@ -121,14 +121,14 @@ struct RosNavSatFix {
   std::uint8_t position_covariance_type = 0;                         ///< 0: unknown.
 };
 
-/// What Tutti reads of sensor_msgs/BatteryState; NaN where the robot does not know it.
+/// The fields that Tutti reads of sensor_msgs/BatteryState; NaN where the robot does not know it.
 struct RosBatteryState {
   RosHeader header;
   float voltage_v = 0.0F;
   float percentage = 0.0F;  ///< 0 to 1.
 };
 
-/// What Tutti reads of sensor_msgs/Range.
+/// The fields that Tutti reads of sensor_msgs/Range.
 struct RosRange {
   RosHeader header;
   float min_range_m = 0.0F, max_range_m = 0.0F, range_m = 0.0F;

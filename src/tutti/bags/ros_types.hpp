@@ -20,7 +20,7 @@ inline constexpr const char *kOdometryType = "nav_msgs/msg/Odometry", *kPoseType
                             *kFixType = "sensor_msgs/msg/NavSatFix", *kBatteryType = "sensor_msgs/msg/BatteryState",
                             *kRangeType = "sensor_msgs/msg/Range";
 
-/// What Tutti can use a topic for, by its message type alone.
+/// The use that Tutti has for a topic, by its message type alone.
 enum class Use { nothing, odometry, scans, images, calibration, imu, fixes, poses, transforms, battery, ranges };
 
 using RosMessage = std::variant<RosOdometry, RosPoseStamped, std::vector<RosTransform>, RosPointCloud, RosImage,

@@ -10,8 +10,8 @@
 
 namespace tutti::bags {
 
-/// What BagFiles needs of rosbag2's metadata.yaml. How files are stored and compressed is not read: that is in the
-/// files themselves.
+/// The fields of rosbag2's metadata.yaml that BagFiles needs. How files are stored and compressed is not read: that is
+/// in the files themselves.
 struct Rosbag2Metadata {
   std::vector<std::string> files;  ///< Names in the bag's folder, in the order of recording.
   std::optional<std::uint64_t> messages;

@@ -23,7 +23,7 @@ inline constexpr double kDoubtedClock_s = 1.0;
 /// difference, and where `setting` names one, the value of it that would align the two.
 Status check_clock(Timestamp stamp, const std::optional<Timestamp>& newest_odometry, const std::string& setting = "");
 
-/// What odometry was newest at a time of a bag's recorder.
+/// Finds the odometry that was newest at a time of a bag's recorder.
 class OdometryArrivals {
  public:
   /// Nothing is known if the log times of the bag do not advance as the stamps do: then they are no times of arrival.

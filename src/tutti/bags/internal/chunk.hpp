@@ -14,13 +14,13 @@ namespace tutti::bags::internal {
 inline constexpr std::uint64_t kMaxChunkBytes = std::uint64_t{1} << 30;
 inline constexpr std::uint64_t kMaxMessageBytes = std::uint64_t{256} << 20;
 
-/// What so many packed bytes may unpack to. A recording does not become a thousandth as a whole, but a chunk of black
-/// images may: up to `little` bytes are taken whatever they come from.
+/// The most that so many packed bytes may unpack to. A recording does not become a thousandth as a whole, but a chunk
+/// of black images may: up to `little` bytes are taken whatever they come from.
 constexpr std::uint64_t most_unpacked(std::uint64_t packed, std::uint64_t little = std::uint64_t{64} << 20) {
   return std::max(little, 1000 * packed);
 }
 
-/// What MCAP calls CRC32: that of zlib and PNG, polynomial 0xedb88320. `before`: of the bytes in front of these.
+/// MCAP's CRC32: that of zlib and PNG, polynomial 0xedb88320. `before`: of the bytes in front of these.
 std::uint32_t crc32(std::string_view bytes, std::uint32_t before = 0);
 
 /// One zstd frame that states its size.

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string_view>
 
-/// What reader and writer of MCAP share (https://mcap.dev/spec).
+/// Constants that reader and writer of MCAP share (https://mcap.dev/spec).
 namespace tutti::bags::internal {
 
 inline constexpr std::string_view kMagic("\x89MCAP0\r\n", 8);

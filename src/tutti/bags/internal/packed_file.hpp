@@ -12,11 +12,11 @@ namespace tutti::bags::internal {
 
 inline constexpr std::string_view kZstdMagic = "\x28\xb5\x2f\xfd";
 
-/// What a file that is packed by zstd contains, in a file among the system's temporary ones, which is gone with this.
+/// The content of a file that is packed by zstd, in a file among the system's temporary ones, which is gone with this.
 class PackedFile {
  public:
-  /// Piece by piece. What comes out of a file that is cut off before the cut is kept. More than
-  /// most_unpacked(its size, `little`) is an error.
+  /// Unpacks piece by piece. The content of a file that is cut off is kept up to the cut. More than most_unpacked(its
+  /// size, `little`) is an error.
   static Result<PackedFile> unpack(const std::string& path, std::uint64_t little = std::uint64_t{1} << 30);
   ~PackedFile();
   PackedFile(PackedFile&& other) noexcept : path_(std::exchange(other.path_, {})) {}
