@@ -14,8 +14,8 @@
 
 namespace tutti {
 
-/// What an operator decides on the closures between two submaps, which outranks the server's own judgement. The numbers
-/// are sent and stored, so they never change.
+/// An operator's wish for the closures between two submaps, which outranks the server's own judgement. The numbers are
+/// sent and stored, so they never change.
 enum class Wish : std::uint8_t {
   accept = 1,   ///< The closures are right: they are in the map, with their covariance, whatever contradicts them.
   reject = 2,   ///< The closures are wrong: they never enter the map.

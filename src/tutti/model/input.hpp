@@ -36,15 +36,15 @@ using ImuSamples = std::vector<ImuSample>;
 using Input = std::variant<OdometrySample, Scan, EncodedImages, TrackedImages, ImuSamples, PositionFix, Health,
                            StartPose, RobotRange>;
 
-/// What has no stamp: it holds from when it comes.
+/// Samples without a stamp: they hold from when they come.
 template <class Sample>
 concept Stampless = std::is_same_v<Sample, Health> || std::is_same_v<Sample, StartPose>;
 
-/// What a robot's program uses itself. Its agent takes the other kinds.
+/// Samples that a robot's program uses itself. Its agent takes the other kinds.
 template <class Sample>
 concept FedOnly = std::is_same_v<Sample, EncodedImages> || std::is_same_v<Sample, ImuSamples> || Stampless<Sample>;
 
-/// What is waited for and how long, by odometry's time, so that what belongs together comes together.
+/// How long inputs are waited for, by odometry's time, so that what belongs together comes together.
 namespace waiting {
 
 inline constexpr double kAhead_s = 1.0;    ///< A sensor may be heard this long before odometry of its stamp,
@@ -57,7 +57,7 @@ inline constexpr double kHeld_s = 20.0;    ///< For images, where odometry waits
 
 }  // namespace waiting
 
-/// What must have reached an input's stamp before it can be used.
+/// The data that must have reached an input's stamp before it can be used.
 enum class Needs { nothing, odometry, odometry_and_imu };
 
 struct InputKind {

@@ -74,8 +74,8 @@ struct Packed<Keyframe> {
   [[nodiscard]] Keyframe get() const { return {index, stamp, pose.get(), representative}; }
 };
 
-/// A list that grows for a whole day. What is in it stays where it is: to add an element always takes the same time,
-/// and there is never room for a second copy. Elements are kept packed and given by value.
+/// A list that grows for a whole day. Elements stay where they are: to add one always takes the same time, and there is
+/// never room for a second copy. Elements are kept packed and given by value.
 template <class T>
 class LongList {
  public:

@@ -60,8 +60,8 @@ struct ClosureVerdict {
   std::vector<LoopClosure> closures;  ///< From keyframes of pair.first to keyframes of pair.second.
   std::optional<Refusal> refusal;     ///< Why there are no closures.
   MethodId verifier;                  ///< server::ClosureVerifier::id() of the verifier that verified the pair.
-  // What follows is for people, and only set with closures; the map does not depend on it.
-  std::vector<Refusal> evidence;  ///< What the verifier measured, with the limit that each value met.
+  // The next three are for people, and only set with closures; the map does not depend on them.
+  std::vector<Refusal> evidence;  ///< The verifier's measurements, with the limit that each value met.
   std::uint64_t worker = 0;       ///< 1 + the number of the worker that verified the pair; 0 when unknown.
   std::int64_t verified_ns = 0;   ///< When, by that worker's clock, since the Unix epoch; 0 when unknown.
   template <class V>

@@ -13,7 +13,7 @@
 
 namespace tutti {
 
-/// What somebody has written on the map: a place in a submap, so that it moves with the map, and a text.
+/// A note that somebody has made on the map: a place in a submap, so that it moves with the map, and a text.
 struct MapMark {
   static constexpr std::size_t kMostBytes = 2'000;           ///< The text may have so many,
   static constexpr std::size_t kMostPhotoBytes = 1U << 20U;  ///< and the photo, which is kept beside it.
@@ -40,7 +40,7 @@ struct MapMark {
   friend bool operator==(const MapMark&, const MapMark&) = default;
 };
 
-/// What an operator asks of the server: a mark to be stored under a number, or, without a mark, to be removed.
+/// An operator's order to the server: a mark to be stored under a number, or, without a mark, to be removed.
 struct MarkOrder {
   std::uint64_t number = 0;
   std::optional<MapMark> mark;

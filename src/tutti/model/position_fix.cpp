@@ -7,7 +7,7 @@
 namespace tutti {
 namespace {
 
-/// What rounding makes, as a share of the largest variance.
+/// The error by rounding, as a share of the largest variance.
 constexpr double kRounding = 1e-5;
 
 }  // namespace

@@ -55,7 +55,7 @@ struct LastSeen {
   ChainId chain;
   Timestamp stamp;
   Pose3 T_world_body;
-  std::string name;  ///< What the robot calls itself; empty where the server does not know.
+  std::string name;  ///< The robot's own name for itself; empty where the server does not know.
   friend bool operator==(const LastSeen&, const LastSeen&) = default;
 };
 

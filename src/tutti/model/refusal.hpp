@@ -55,7 +55,7 @@ enum class RefusalReason : std::uint8_t {
   unverified = 30,
 };
 
-/// What is measured for a reason, and its words for people and for report.json.
+/// The quantity that is measured for a reason, and its words for people and for report.json.
 struct RefusalKind {
   enum class Bound { none, at_least, at_most };
   const char* words;
@@ -98,7 +98,7 @@ inline constexpr std::array<RefusalKind, 31> kRefusalKinds = {{
     {"no worker could verify it"},
 }};
 
-/// What is measured for a reason; numbers of newer versions count as `other`.
+/// The kind of a reason; numbers of newer versions count as `other`.
 constexpr const RefusalKind& kind_of(RefusalReason reason) {
   return kRefusalKinds[static_cast<std::size_t>(reason) < kRefusalKinds.size() ? static_cast<std::size_t>(reason) : 0];
 }

@@ -23,8 +23,8 @@ struct RobotRange {
   double distance_m = 0.0;
   double sigma_m = 0.0;                                      ///< Standard deviation; 0: not stated.
   Eigen::Vector3d p_body_antenna = Eigen::Vector3d::Zero();  ///< This robot's antenna, m.
-  /// What the other robot is called; empty where `to` is its number already. It is neither sent nor stored: who knows
-  /// the mission's names sets `to` by it.
+  /// The other robot's name; empty where `to` is its number already. It is neither sent nor stored: who knows the
+  /// mission's names sets `to` by it.
   std::string name;
   using InColumns = void;
   template <class V>

@@ -13,12 +13,12 @@
 #include "tutti/geometry/pose3.hpp"
 #include "tutti/model/method_id.hpp"
 
-/// What nodes report about their state. Every time is mission time by the sender's clock, which others do not share.
-/// What is added to a list of fields here is sent, checked, shown and recorded everywhere, and status.proto and the
+/// The reports of nodes about their state. Every time is mission time by the sender's clock, which others do not share.
+/// A field that is added to a list here is sent, checked, shown and recorded everywhere, and status.proto and the
 /// page's tables are made of it (docs/extending.md).
 namespace tutti {
 
-/// What a robot's body reports of itself, through its live feed or ROS.
+/// A robot's report on its own body, through its live feed or ROS.
 struct Health {
   std::optional<double> battery_v;
   std::optional<double> battery_percent;
@@ -202,8 +202,8 @@ struct MissionStatus {
     friend bool operator==(const Decision&, const Decision&) = default;
   };
 
-  /// What the server has exchanged with a robot since it was started, of one kind and direction: messages as the bus is
-  /// given them and gives them, without what the bus adds. One that comes or goes again counts again.
+  /// The messages that the server has exchanged with a robot since it was started, of one kind and direction: as the
+  /// bus is given them and gives them, without what the bus adds. One that comes or goes again counts again.
   struct Radio {
     RobotId robot;
     bool is_down = false;
@@ -221,7 +221,7 @@ struct MissionStatus {
     friend bool operator==(const Radio&, const Radio&) = default;
   };
 
-  /// What robots that localise in a map have found of one of its submaps, together (localise::PlaceTrust).
+  /// The findings of robots that localise in a map on one of its submaps, together (localise::PlaceTrust).
   struct Place {
     std::string submap;
     std::string name;

@@ -143,7 +143,7 @@ struct ImuPreintegration {
   Eigen::Vector3d accelerometer_bias = Eigen::Vector3d::Zero();  ///< The linearisation's, m/s^2.
 };
 
-/// What one robot's cameras saw along one submap.
+/// The visual data of one robot's cameras along one submap.
 struct VisualPayload {
   std::vector<Camera> cameras;
   std::vector<VisualFrame> frames;  ///< Sorted by keyframe, then by camera.
