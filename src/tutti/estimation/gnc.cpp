@@ -103,7 +103,7 @@ GncResult truncated_least_squares(const PoseGraph& graph, const GncConfig& confi
                            {.is_factorised = out.outer_iterations > 0 && kFewChange * changed < edges, .stop = stop});
     out.solution.summary.factorisations += before;
     if (!is_usable(out.solution.summary.termination)) return out;
-    // What is far off may be long gone, and all else fit.
+    // Edges that are far off may be long gone, and all others fit.
     mu = std::max(kControlStep * mu, convex_until(std::max(1.0, measure())));
   }
   out.solution.weights = out.inlier_weight;

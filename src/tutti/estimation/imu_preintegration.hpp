@@ -22,9 +22,9 @@ inline constexpr double kMaxImuGap_s = 0.1;
 
 /// The relative motion between two keyframes by the samples, eqs. (35) to (38), with its covariance, eq. (63), and its
 /// derivatives by the biases, eq. (44), at `bias`. Between two samples the rate and the acceleration are the means of
-/// both, and the acceleration acts at the attitude half way; at the keyframes' stamps samples are interpolated. Of
-/// `samples` only those of that time are read: they must cover it, be finite, and have increasing stamps without a gap
-/// above kMaxImuGap_s; else ErrorCode::invalid.
+/// both, and the acceleration acts at the attitude half way; at the keyframes' stamps samples are interpolated. Only
+/// `samples` of that time are read: they must cover it, be finite, and have increasing stamps without a gap above
+/// kMaxImuGap_s; else ErrorCode::invalid.
 Result<ImuPreintegration> preintegrate(std::span<const ImuSample> samples, const Keyframe& from, const Keyframe& to,
                                        const ImuBias& bias, const ImuNoise& noise);
 

@@ -54,7 +54,7 @@ struct Pull {
   Eigen::VectorXd force;  ///< J^T (I - K)^-1 r; shift = H^-1 force
 };
 
-/// What the loss of a group does, to first order, seen from the ends of its edges: closures come by the product of the
+/// The effect of losing a group, to first order, seen from the ends of its edges: closures come by the product of the
 /// keyframes that they join, so the ends are far fewer than the edges. With C = L L^T the rows and columns of H^-1 at
 /// the ends, J and r the Jacobian and the residuals of all edges there, M = L^T J^T J L has the eigenvalues of K, and
 /// by the push-through identity J^T (I - K)^-1 = L^-T (I - M)^-1 L^T J^T.

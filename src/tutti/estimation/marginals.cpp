@@ -40,7 +40,7 @@ std::pair<PoseGraph, std::vector<double>> edges_of(const PoseGraph& graph, std::
   return out;
 }
 
-/// What is known of the components that are left, and their factor.
+/// The components that are left, and their factor.
 struct Sound {
   std::vector<bool> components;  ///< The others' poses are open.
   internal::BlockStructure structure;

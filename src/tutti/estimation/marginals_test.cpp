@@ -185,7 +185,7 @@ TEST(Marginals, AnUndeterminedComponentLeavesTheOthers) {
   EXPECT_TRUE(covariance.diagonal().segment<6>(6).array().isInf().all());
 }
 
-// What comes of few samples depends on how they are drawn: their fourth moments are those of normal numbers.
+// Results of few samples depend on how they are drawn: their fourth moments are those of normal numbers.
 TEST(Marginals, SamplesAreNearlyNormal) {
   constexpr std::size_t kSamples = 4'000;
   Rng rng(6);

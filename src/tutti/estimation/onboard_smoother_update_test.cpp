@@ -92,7 +92,7 @@ RC_GTEST_PROP(OnboardSmootherUpdate, ARestoredOneGoesOnToTheBit, ()) {
   RC_ASSERT(restored.state() == smoother.state());
 }
 
-/// What is stored of one: poses only where they do not follow from the rest.
+/// A stored smoother has poses only where they do not follow from the rest.
 RC_GTEST_PROP(OnboardSmootherUpdate, ItsPosesFollowToTheBitFromTheSolution, ()) {
   Rng rng(*rc::gen::arbitrary<std::uint32_t>());
   const auto m = mission(rng, 300, 12);

@@ -5,7 +5,7 @@
 
 namespace tutti::estimation {
 
-/// What a factor with whitened squared error s = r^T Omega r costs, rho(s), with c = scale (same unit as sqrt(s)):
+/// The cost rho(s) of a factor with whitened squared error s = r^T Omega r, with c = scale (same unit as sqrt(s)):
 ///   none     rho = s
 ///   huber    rho = s for s <= c^2, else 2 c sqrt(s) - c^2
 ///   cauchy   rho = c^2 log(1 + s / c^2)

@@ -45,14 +45,14 @@ struct BundleOdometry {
   RelativePose measurement;
 };
 
-/// What the IMU measured between two keyframes; indices into BundleProblem::keyframes.
+/// The IMU's measurement between two keyframes; indices into BundleProblem::keyframes.
 struct BundleImu {
   std::size_t from = 0;
   std::size_t to = 0;
   ImuPreintegration measurement;
 };
 
-/// What is adjusted (keyframes, landmarks) and what is measured (observations, odometry, IMU).
+/// The variables (keyframes, landmarks) and the measurements (observations, odometry, IMU).
 struct BundleProblem {
   std::vector<BundleKeyframe> keyframes;
   std::vector<BundleCamera> cameras;

@@ -95,7 +95,7 @@ class ProjectionCost final : public ceres::SizedCostFunction<2, 7, 3> {
   }
 
  private:
-  static constexpr double kUnseen = 100.0;  ///< What a landmark behind its camera costs: no step gains by it.
+  static constexpr double kUnseen = 100.0;  ///< Residual of a landmark behind its camera: no step gains by it.
   const Camera& camera_;
   const BundleObservation& view_;
 };

@@ -34,7 +34,7 @@ BundleProblem started_at(BundleProblem problem, const BundleSolution& solution) 
   return problem;
 }
 
-/// What the factors of every run are worth.
+/// Judges what the factors of every run are worth.
 class Trial {
  public:
   Trial(const BundleProblem& problem, std::vector<std::size_t> run_of) : problem_(problem), run_of_(std::move(run_of)) {

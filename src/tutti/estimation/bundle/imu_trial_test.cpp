@@ -17,7 +17,7 @@ RefinementConfig with_imu() {
   return config;
 }
 
-/// What a room's flight of so many keyframes makes of its IMU.
+/// Refines a flight of so many keyframes in a room, with its IMU.
 RefinedMap refined(int keyframes, const RefinementConfig& config, double segment = 1.0) {
   Scene scene = make_scene({.keyframes = keyframes, .points = 60, .imu = true}, 3);
   for (PosedSubmap& posed : scene.input.submaps) {

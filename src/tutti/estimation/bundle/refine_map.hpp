@@ -41,7 +41,7 @@ struct RelativeFactor {
   RelativePose measurement;  ///< T_from_to with the covariance of the joint posterior.
 };
 
-/// What refine_map() found. A worker's tutti::Refinement carries the part of it that the server uses.
+/// The result of refine_map(). A worker's tutti::Refinement carries the part of it that the server uses.
 struct RefinedMap {
   std::vector<BundleKeyframe> keyframes;  ///< Sorted by id.
   /// From every keyframe to the next one of its submap, unless both are constant; sorted by id.

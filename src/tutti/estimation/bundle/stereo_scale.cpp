@@ -24,7 +24,7 @@ std::set<RobotId> robots_with_several(const BundleProblem& problem) {
   return out;
 }
 
-/// What the robot's images measure without anybody else's, and without the lengths of its odometry.
+/// The problem of the robot's images without anybody else's, and without the lengths of its odometry.
 BundleProblem alone(const BundleProblem& problem, RobotId robot) {
   BundleProblem out = problem;
   out.imu.clear();

@@ -84,7 +84,7 @@ class BlockCholesky {
   CholeskyFactor factor_;      ///< Without values before factorise().
   std::vector<int> position_;  ///< Per block of the matrix its row in its supernode, in blocks.
   std::size_t workspace_;
-  std::vector<double> update_;  ///< What a supernode takes from a group: rows by columns.
+  std::vector<double> update_;  ///< A supernode's update of a group: rows by columns.
   bool is_factorised_ = false;
 };
 

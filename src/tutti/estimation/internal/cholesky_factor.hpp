@@ -45,7 +45,7 @@ struct CholeskyFactor {
     return values.get() + layout->panels[supernode].begin;
   }
 
-  /// What solving needs of a supernode J with the rows I below it. b_J and b_I: as many rows as J has columns and rows
+  /// The part of solving by a supernode J with the rows I below it. b_J and b_I: as many rows as J has columns and rows
   /// below. b_J <- L_JJ^-1 b_J, or L_JJ^-T b_J.
   void solve_within(std::size_t supernode, bool is_transposed, Eigen::Ref<Eigen::MatrixXd> b_J) const;
   /// L_IJ b_J

@@ -20,7 +20,7 @@ constexpr double kReuseContraction = 0.1;
 /// rad): weak directions, which hardly show in the cost, are where an old factor is wrong first.
 constexpr double kReuseStepContraction = 0.3;
 constexpr double kReuseStepBelow = 1e-4;
-/// What rounding makes in a cost, as a share of it.
+/// The error by rounding in a cost, as a share of it.
 constexpr double kRounding = 1e-11;
 
 /// How far a sequence of steps goes on after one of this size, if they keep shrinking as they just did. Nothing is

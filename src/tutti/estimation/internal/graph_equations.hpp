@@ -9,7 +9,7 @@
 
 namespace tutti::estimation::internal {
 
-/// What an edge costs: scale[e] * rho(r^T Omega r), rho only where the role is robust.
+/// The cost of an edge: scale[e] * rho(r^T Omega r), rho only where the role is robust.
 struct EdgeCosts {
   RobustLoss loss;
   std::span<const EdgeRole> roles;  ///< Empty: all robust.

@@ -12,8 +12,7 @@ namespace tutti::estimation::internal {
 
 /// L^-T Z for a Z of independent numbers of zero mean and unit variance, nearly normal: `count` columns of zero mean
 /// and covariance (L L^T)^-1. Only the rows of the asked block variables (6 each; < 0: anchored, zero) are returned,
-/// and only what they depend on is solved for. What comes out for a variable does not depend on which others are asked
-/// for.
+/// and only what they depend on is solved for. The samples of a variable do not depend on which others are asked for.
 Eigen::MatrixXd posterior_samples(const CholeskyFactor& factor, std::span<const int> variables, std::size_t count,
                                   Rng rng);
 

@@ -11,7 +11,7 @@
 namespace tutti::bundle::internal {
 namespace pose_block_test {
 
-/// What the adjuster gives to Ceres.
+/// The manifold that the adjuster gives to Ceres.
 class OurManifold final : public ceres::Manifold {
  public:
   [[nodiscard]] int AmbientSize() const override { return 7; }

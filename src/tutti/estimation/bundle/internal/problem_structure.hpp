@@ -8,7 +8,7 @@
 
 namespace tutti::bundle::internal {
 
-/// What hangs together in a bundle problem.
+/// The connectivity of a bundle problem.
 struct ProblemStructure {
   std::vector<int> component;  ///< Per keyframe.
   int components = 0;
