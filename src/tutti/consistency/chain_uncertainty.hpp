@@ -9,7 +9,7 @@
 
 namespace tutti::consistency {
 
-/// What the map knows about the errors of the n proxy nodes of one chain, to first order. Rows are right tangents
+/// The map's knowledge of the errors of the n proxy nodes of one chain, to first order. Rows are right tangents
 /// [translation m; rotation rad], six per node, nodes in time order.
 struct ChainKnowledge {
   /// (6 n) x samples: joint draws of the nodes' errors, with zero mean.

@@ -47,8 +47,8 @@ std::vector<Pose3> corridor_with_gap(std::size_t nodes) {
 
 test::WalkWithClosures usual_map(std::size_t nodes = kNodes) { return {nodes, 30, {0.01, 5e-4}, {0.02, 2e-3}}; }
 
-/// What the coefficients of one kind of error really are like: per node and scale the covariance of the three axes,
-/// from the covariance of the nodes (the same along every axis) through the exact filter.
+/// The true coefficients of one kind of error: per node and scale the covariance of the three axes, from the covariance
+/// of the nodes (the same along every axis) through the exact filter.
 class TrueCoefficients {
  public:
   TrueCoefficients(const Scene& scene, const MatrixXd& covariance, bool positions)
@@ -162,7 +162,7 @@ double combination(const KnownDirection& direction, const std::vector<Pose3>& se
   return out;
 }
 
-/// What rounding of poses adds to its variance.
+/// The variance that rounding of poses adds along a direction.
 double rounding_variance(const KnownDirection& direction) {
   double out = 0.0;
   for (std::size_t i = 0; i < direction.position.size(); ++i)

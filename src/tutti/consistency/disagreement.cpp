@@ -45,7 +45,7 @@ MatrixXd at(const MatrixXd& rows, std::span<const std::size_t> ranks) {
   return out;
 }
 
-/// What node k is off by when the first nodes are laid on each other, [position; rotation] in the axes of `world`.
+/// By how much node k is off when the first nodes are laid on each other, [position; rotation] in the axes of `world`.
 Vector6d off_by(const Pose3& T_world_first, const Pose3& T_world_k, const Pose3& robot_first, const Pose3& robot_k) {
   const Pose3 T = T_world_first * (robot_first.inverse() * robot_k);
   Vector6d out;

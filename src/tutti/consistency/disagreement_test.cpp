@@ -103,7 +103,7 @@ TEST(DisagreementTest, FindsABumpAJumpAndSlowDrift) {
   EXPECT_TRUE(test(drift).disagrees());
 }
 
-// What odometry knows of two far ends is nothing beside what a closure between them measures.
+// Odometry knows nothing of two far ends beside what a closure between them measures.
 TEST(DisagreementTest, DirectionsFindWhatOnlyClosuresKnow) {
   const test::WalkWithClosures map(kNodes, kNodes - 1, {0.02, 1e-4}, {0.005, 1e-4});
   const Scene scene(map);

@@ -8,7 +8,7 @@
 
 namespace tutti::consistency {
 
-/// What an update did to the ledger, in constraints.
+/// The changes of the ledger by an update, in constraints.
 struct LedgerUpdate {
   std::size_t added = 0;
   std::size_t replaced = 0;

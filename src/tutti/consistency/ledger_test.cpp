@@ -38,7 +38,7 @@ TEST(Ledger, KeepsAConstraintUntilItDiffersReasonably) {
   EXPECT_EQ(ledger.constraints()[0].revision, 4U);
 }
 
-/// What a constraint weighs follows the server.
+/// The weight of a constraint follows the server.
 TEST(Ledger, ReplacesAConstraintThatCountsOtherwise) {
   const auto weighing = [](double sigma, std::uint64_t revision) {
     Constraint out = link(0, 1, 1.0, 0.0, revision);

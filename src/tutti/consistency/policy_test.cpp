@@ -25,7 +25,7 @@ struct Scene {
   [[nodiscard]] Selection choose(const char* policy) const {
     return (*make_policy({.name = policy}, {}))->choose(input());
   }
-  /// What `spectral` makes of a disagreement that is set by hand.
+  /// The selection by `spectral` from a disagreement that is set by hand.
   [[nodiscard]] Selection spectral(const PolicyConfig& config) const {
     return internal::links_where(input(), disagreement, config);
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What each signal can and cannot see: the claims of docs/math.md, one test each.
+// The errors that each signal can and cannot see: the claims of docs/math.md, one test each.
 #include "tutti/consistency/signal.hpp"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ constexpr const char* kSignals[] = {"distance", "pose", "relative_motion"};
 Eigen::VectorXd change(const char* name, const std::vector<Pose3>& server, const std::vector<Pose3>& robot) {
   return (evaluate_signal(name, robot) - evaluate_signal(name, server)).rowwise().norm();
 }
-/// What the robot is off by at each node, metres and radians.
+/// The robot's error at each node, metres and radians.
 Eigen::VectorXd metres(const std::vector<Pose3>& server, const std::vector<Pose3>& robot) {
   return pose_difference(server, robot).leftCols<3>().rowwise().norm();
 }

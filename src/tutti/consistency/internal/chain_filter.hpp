@@ -13,15 +13,15 @@
 namespace tutti::consistency::internal {
 
 inline constexpr int kScales = 4;
-/// What the wire rounds poses to (wire/codec.hpp): an error of its own at every node.
+/// The rounding of poses on the wire (wire/codec.hpp): an error of its own at every node.
 inline constexpr PoseSigma kRounding{5e-4, 1e-4};
 
 /// Laplacian (eqs. 1, 2) of the chain's nodes by the graph's rule, with at most 32 nearest neighbours; of the carried
 /// edges between them when the graph is reduced. Rows in the nodes' order.
 spectral::SparseMatrix chain_laplacian(const ProxyGraph& graph, const ChainId& chain);
 
-/// Takes the best-fitting small rigid motion out of displacements of fixed points. What the points do not determine of
-/// it (a turn about the line they all lie on) moves none of them.
+/// Takes the best-fitting small rigid motion out of displacements of fixed points. A motion that the points do not
+/// determine (a turn about the line they all lie on) moves none of them.
 class RigidMotion {
  public:
   explicit RigidMotion(std::span<const ProxyNode> nodes);

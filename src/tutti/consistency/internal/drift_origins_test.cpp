@@ -144,7 +144,7 @@ TEST(DriftSegments, FindsTwoFailuresApart) {
   EXPECT_GE(count(runs, second, 4).start, kSeeds * 9 / 10);
 }
 
-// What stands out does so less the smaller the covariance that odometry stated.
+// A slide stands out by its size against the covariance that odometry stated.
 TEST(DriftSegments, AStrongerSlideStandsOutMore) {
   double before = 1.0;
   for (const double slide : {0.1, 0.2, 0.4}) {

@@ -11,7 +11,7 @@
 
 namespace tutti::consistency::internal {
 
-/// What raw odometry is off by along the server's estimate, to first order in what a single step is off by.
+/// The error of raw odometry along the server's estimate, to first order in the error of a single step.
 ///
 /// With the first nodes laid on each other, odometry puts node k at exp(E_k) T_k, T_k being the server's; E_k is the
 /// sum of what the steps before are off by, each moved to one common frame.

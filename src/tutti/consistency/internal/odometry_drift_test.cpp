@@ -87,7 +87,7 @@ TEST(OdometryDrift, BeyondTheLastFixedNodeItIsWhatOdometryMisses) {
   for (const std::size_t node : {0U, 8U}) EXPECT_LT((off.row(node).transpose() - drift.missed(9, node)).norm(), 1e-12);
 }
 
-// What is left when links fix nodes on the server's map is what the onboard smoother leaves.
+// The error left when links fix nodes on the server's map is the one that the onboard smoother leaves.
 TEST(OdometryDrift, IsTheFirstStepOfTheOnboardSmoother) {
   constexpr double kSize = 1e-3;
   const std::vector<std::size_t> fixed{3, 10, 11, 25, 40};
