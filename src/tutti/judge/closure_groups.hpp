@@ -11,8 +11,8 @@
 
 namespace tutti::judge {
 
-/// What makes a group. Neighbours are as near in time as one submap is long; segments longer than three submaps do not
-/// resemble each other; larger groups cost more to test than they are worth.
+/// The limits of a group. Neighbours are as near in time as one submap is long; segments longer than three submaps do
+/// not resemble each other; larger groups cost more to test than they are worth.
 struct GroupLimits {
   double near_s = 10.0;
   double longest_s = 30.0;

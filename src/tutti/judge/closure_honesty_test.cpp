@@ -55,7 +55,7 @@ void add_closures(const Case& c, RobotId first, RobotId second, const std::vecto
   }
 }
 
-/// What is found of the closures between two robots.
+/// The honesty found for the closures between two robots.
 ClosureHonesty found(const Case& c, std::uint64_t seed) {
   Rng rng(seed);
   std::vector<Pose3> one, two;

@@ -44,7 +44,7 @@ class Search {
     return true;
   }
 
-  /// What is disregarded when all odometry may be, in windows around it.
+  /// Disregards windows around the odometry that is disregarded when all of it may be.
   [[nodiscard]] Solution proposed() const {
     if (solver_.runs() == 0) return {};
     Solution all = solver_.solve({{{0, solver_.runs() - 1}}, {}});

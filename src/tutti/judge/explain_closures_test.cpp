@@ -39,7 +39,7 @@ struct Laps {
   PoseGraph graph{.poses = {Pose3{}}, .edges = {}};
   std::size_t odometry_edges = kNodes - 1;
 
-  /// What odometry misses at the step from node `failed_at` (radians of yaw).
+  /// Odometry misses `missed_rad` of yaw at the step from node `failed_at`.
   explicit Laps(std::size_t failed_at = 0, double missed_rad = 0.0) {
     const Pose3 step{so3_exp({0.0, 0.0, 2.0 * M_PI / kLap}), {kStep_m, 0.0, 0.0}};
     for (std::size_t k = 0; k + 1 < kNodes; ++k) {
@@ -101,7 +101,7 @@ TEST(OdometryTrajectories, KnowsTheSegmentsAndWhatLiesBetween) {
   EXPECT_NEAR(ways.turn_variance(10, 14), 4 * 3 * 1e-6, 1e-9);
 }
 
-// Keyframes come by distance, so odometry that diverges has most of all steps. What is usual follows from the time.
+// Keyframes come by distance, so odometry that diverges has most of all steps. The usual speed follows from the time.
 TEST(OdometryTrajectories, AFlightCountsAtItsLength) {
   Laps laps;
   for (std::size_t k = 60; k < 200; ++k) laps.graph.edges[k].T_from_to.translation *= 50.0;
@@ -243,8 +243,8 @@ TEST(OutlierRejection, OdometryMissesNoMoreThanTheRobotCanHaveMoved) {
   EXPECT_EQ(accepted(14.0), 0);
 }
 
-// Visual-inertial odometry that diverges flies kilometres. What it misses then is what it says, not what the robot did,
-// and the closures of a healthy robot bring it home.
+// Visual-inertial odometry that diverges flies kilometres. Its error then is what it says, not what the robot did, and
+// the closures of a healthy robot bring it home.
 TEST(OutlierRejection, OdometryThatFliesMissesAsMuchAsItSays) {
   Laps laps;
   for (std::size_t k = 140; k < 160; ++k) laps.graph.edges[k].T_from_to.translation.x() *= 30.0;

@@ -19,7 +19,7 @@ namespace tutti::judge {
 namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
-/// What is wrong for certain counts so little (as a factor on its information) that it moves nothing.
+/// A closure that is wrong for certain counts so little (as a factor on its information) that it moves nothing.
 constexpr double kNothing = 1e-9;
 /// Closures do not tell exactly where in a segment odometry failed. Each place is possible where the failure would be
 /// at most this many times as large as at the place where it would be smallest, plus the usual motion of so many
@@ -37,7 +37,7 @@ constexpr double kStillShare = 0.01, kStill_radps = 0.1 * kRadPerDeg, kLeastStil
 /// steps, and says nothing.
 constexpr double kBeginning = 1e-3;
 
-/// What a segment missed, seen from one of its nodes: a wrong turn shifts everything the more the farther away it was.
+/// A segment's error, seen from one of its nodes: a wrong turn shifts everything the more the farther away it was.
 Pose3 seen_from(const OdometryTrajectories& odometry, const FailedSegment& failed, std::size_t node) {
   const Pose3 T_to_node = odometry.T(failed.to, node);
   return T_to_node.inverse() * (retract(Pose3{}, failed.missed) * T_to_node);
@@ -228,10 +228,10 @@ Solution HypothesisSolver::judge(Hypothesis hypothesis, estimation::GncResult op
   return out;
 }
 
-/// What a segment pays for how far it failed, in truncations: the logarithm of the density of its error over that of
-/// odometry's own errors. Along each of its six axes the density falls with the power 1.25 of the error's size, up to
-/// what a body can do, so that large failures are rarer than small ones. With the power 1, errors of any size are as
-/// likely, to a factor, and two failures that cancel each other explain a group of look-alikes too cheaply.
+/// The price that a segment pays for how far it failed, in truncations: the logarithm of the density of its error over
+/// that of odometry's own errors. Along each of its six axes the density falls with the power 1.25 of the error's size,
+/// up to what a body can do, so that large failures are rarer than small ones. With the power 1, errors of any size are
+/// as likely, to a factor, and two failures that cancel each other explain a group of look-alikes too cheaply.
 double HypothesisSolver::votes_for(const FailedSegment& failed) const {
   if (!is_possible(odometry_, failed)) return kInfinite;
   const Matrix6d covariance = odometry_.between(failed.from, failed.to).covariance;

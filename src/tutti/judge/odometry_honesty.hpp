@@ -10,7 +10,7 @@
 
 namespace tutti::judge {
 
-/// What a chain's odometry is worth, as factors on the variances that it states. Each is the least factor with which a
+/// The honesty of a chain's odometry, as factors on the variances that it states. Each is the least factor with which a
 /// given share of the chain's loops (odometry_loops.hpp) miss by no more than chi-square allows that share; only loops
 /// count in which odometry's covariance exceeds the closures'. 1 with fewer than 8 such loops. Loops over the same
 /// odometry repeat each other, so a factor below 1 is raised to where misses this small still have a chance of 10 % for

@@ -30,7 +30,7 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// What is above 0, where that is not.
+/// The value, or the least one above 0.
 double positive(double value) { return std::max(value, std::numeric_limits<double>::min()); }
 
 /// The median of the segments' medians by the time that they took. `segments` is not empty.

@@ -70,7 +70,7 @@ Settled settle_closures(const PoseGraph& graph, std::size_t odometry_edges, std:
     for (std::size_t c = 0; c < closures; ++c) out.prices[c].paid = prices[odometry_edges + c];
     if (round == kRounds) break;
     std::vector<char> next = next_round(out, certain, limit, times_out);
-    // What has come and gone may have led the poses into a basin of its own.
+    // Closures that have come and gone may have led the poses into a basin of their own.
     if (next == out.in && !switched.improve_from_measurements()) break;
     out.in = std::move(next);
   }

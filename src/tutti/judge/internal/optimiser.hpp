@@ -25,13 +25,13 @@ class Optimiser {
   [[nodiscard]] Optimum decide() const;
 
  private:
-  /// A map decided by one search. What nothing supports takes no part in the search, or it does.
+  /// A map decided by one search. Closures that nothing supports take no part in it, unless `least_support` is 0.
   [[nodiscard]] Optimum searched(int least_support) const;
   /// True if the map counts odometry as the search does: what is settled for the one is settled for the other.
   [[nodiscard]] bool is_searched_as_it_counts() const;
   /// A graph of odometry, to which closures will be added: edges are large, and are copied once.
   [[nodiscard]] PoseGraph with_room(const PoseGraph& odometry) const;
-  /// Objections to each closure, and the odometry that failed, without a map. What it takes is gone when the map is
+  /// Objections to each closure, and the odometry that failed, without a map. Its memory is free again when the map is
   /// optimised.
   [[nodiscard]] Optimum explain(int least_support) const;
   /// The segments of odometry at a closure's ends, the first one first.
@@ -57,7 +57,7 @@ class Optimiser {
   /// Nothing is asked of it before the last closure is decided.
   [[nodiscard]] Optimum solved(Optimum out) const;
 
-  /// What follows changes a map that is settled.
+  /// The functions below change a map that is settled.
   [[nodiscard]] static bool is_usable(const Optimum& map);
   /// The cost of a map: its factors' errors, the closures it refuses and the odometry it disregards. The least is
   /// taken.
