@@ -67,7 +67,7 @@ class ImageFolder : public ::testing::Test {
     fs::create_directories((folder_ / relative).parent_path());
     std::ofstream(folder_ / relative) << text;
   }
-  /// What is wrong with the EuRoC folder once one file states something else.
+  /// The error on the EuRoC folder once one file states something else.
   [[nodiscard]] std::string error_with(const std::string& file, const std::string& text) const {
     write(file, text);
     const auto result = read_euroc_folder(folder_.string());

@@ -129,7 +129,7 @@ Result<internal::Semidefinite> jrl_covariance(const JrlValue& value) {
   return nearest;
 }
 
-/// What the document contains, before vertices have their places.
+/// The document's content, before vertices have their places.
 class JrlReader {
  public:
   Status read(const JrlValue& document);

@@ -34,7 +34,7 @@ Result<Trajectory> parse_kitti_poses(std::string_view text, const std::string& n
 std::string to_kitti_poses(const Trajectory& trajectory);
 Status write_kitti_poses(const std::string& path, const Trajectory& trajectory);
 
-/// What read_trajectory() made of rows that are not as they should be.
+/// How read_trajectory() took rows that are not as they should be.
 struct RowReport {
   std::vector<Error> left_out;      ///< Why each row is not in the trajectory.
   std::size_t steps_back = 0;       ///< Rows that are earlier than the one before them.
@@ -44,8 +44,8 @@ struct RowReport {
   [[nodiscard]] std::vector<std::string> notes(const std::string& path) const;
 };
 
-/// What other programs write: `format` is tum, euroc, kitti (stamps k / kitti_rate_hz where it has none), or auto.
-/// Blanks, commas or semicolons separate; names of columns in a first row or in the comment before it are heeded;
+/// Reads what other programs write: `format` is tum, euroc, kitti (stamps k / kitti_rate_hz where it has none), or
+/// auto. Blanks, commas or semicolons separate; names of columns in a first row or in the comment before it are heeded;
 /// stamps may count s, ms, us or ns; a matrix may have 12 or 16 numbers, with a stamp before it. With `report`, a row
 /// that cannot be read, has a stamp twice or is not finite is left out, and rows are sorted; a file most of whose rows
 /// cannot be read is an error all the same, and without `report` any such row is.

@@ -48,14 +48,14 @@ struct Whereabouts {
   std::string name;  ///< LastSeen::name
 };
 
-/// What one proxy graph changed on the robot.
+/// The changes that one proxy graph made on the robot.
 struct UpdateSummary {
   std::uint64_t revision = 0;
   std::size_t synchronised = 0;      ///< Pairs of nodes that were compared.
   std::size_t proposed = 0;          ///< Constraints that the policy chose.
   std::size_t constraints = 0;       ///< Constraints in the ledger afterwards.
   int order = 0;                     ///< Selection::order
-  consistency::LedgerUpdate ledger;  ///< What the update did to the ledger.
+  consistency::LedgerUpdate ledger;  ///< The changes of the ledger.
   /// How the optimisation with the new constraints ended.
   estimation::Termination optimised = estimation::Termination::not_run;
   /// The optimisation failed. The ledger is then what it was before, without withdrawn constraints; or nothing if

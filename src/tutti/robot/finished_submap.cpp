@@ -11,7 +11,7 @@
 namespace tutti::robot {
 namespace {
 
-/// What the IMU measured from keyframe to keyframe, where it covers that time, at the gyro bias that the odometry
+/// Preintegrates the IMU from keyframe to keyframe, where it covers that time, at the gyro bias that the odometry
 /// shows.
 std::vector<ImuPreintegration> imu_steps(const Submap& submap, const std::vector<TrackedImages>& images) {
   std::vector<ImuSample> samples;
@@ -28,7 +28,7 @@ std::vector<ImuPreintegration> imu_steps(const Submap& submap, const std::vector
   return out;
 }
 
-/// What the cameras saw along the submap.
+/// The visual payload of the submap.
 Result<VisualPayload> see(const Submap& submap, const std::vector<TrackedImages>& images,
                           const visual::VisualSubmapConfig& config) {
   std::vector<visual::KeyframeImages> seen;

@@ -30,10 +30,10 @@ class FitWatch {
   /// A submap that has ended with the motions within it, and odometry's drift as far as it is known.
   void add(const FinishedSubmap& submap, const SubmapSteps& steps, const fit::SteadyDrift& drift);
 
-  /// What contradicts since the last call, as two submaps in a row say, that was not said before or is of quite another
+  /// Contradictions since the last call, as two submaps in a row say, that were not said before or are of quite another
   /// size than was said. Odometry that stood still is said at once.
   std::vector<fit::Misfit> take_news() { return std::exchange(news_, {}); }
-  /// What contradicts as of the last submap.
+  /// The contradictions as of the last submap.
   [[nodiscard]] const std::vector<fit::Misfit>& misfits() const { return misfits_; }
   /// That the steps took.
   [[nodiscard]] std::uint64_t registrations() const { return registrations_; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What an agent makes of odometry that jumps, begins anew or repeats itself.
+// How an agent handles odometry that jumps, begins anew or repeats itself.
 #include <gtest/gtest.h>
 
 #include <string>

@@ -22,10 +22,10 @@ std::string to_string(const OdometryJump& jump);
 /// from there, so that `odom` is always the frame of the first sample. Before the first jump the output equals the
 /// input, bit for bit. The output is a function of the samples so far.
 ///
-/// What a body can do in a step of dt: a slack (1 m, 30 degrees: noise, and corrections by the front end), plus dt
-/// times the allowed speed. This is ten times the greatest speed so far, plus what an acceleration of 10 m/s^2 (50
-/// rad/s^2) adds within dt, but at most 100 m/s (2000 degrees/s); for the first step only these count. A step raises
-/// the greatest speed only as far as that acceleration allows.
+/// In a step of dt a body can move by a slack (1 m, 30 degrees: noise, and corrections by the front end), plus dt times
+/// the allowed speed. This is ten times the greatest speed so far, plus what an acceleration of 10 m/s^2 (50 rad/s^2)
+/// adds within dt, but at most 100 m/s (2000 degrees/s); for the first step only these count. A step raises the
+/// greatest speed only as far as that acceleration allows.
 class OdometryWatch {
  public:
   /// All that the watch remembers.

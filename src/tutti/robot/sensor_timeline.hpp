@@ -32,7 +32,7 @@ OdometryStep joined(const OdometryStep& first, const OdometryStep& second);
 /// in proportion to time. Compounding the two gives the step again, up to rounding.
 std::pair<OdometryStep, OdometryStep> split(const StampedPose& from, const OdometryStep& to, Timestamp at);
 
-/// What sensors saw at one time. With neither, it is a time at which a sensor saw something that nobody keeps.
+/// The data of sensors at one time. With neither, it is a time at which a sensor saw something that nobody keeps.
 struct SensorSample {
   Timestamp stamp;
   std::optional<Scan> scan;

@@ -69,7 +69,7 @@ RelativePose SubmapBuilder::since_keyframe() const {
   return since;
 }
 
-/// What sensors saw at times for which the robot's pose is unknown.
+/// Drops sensor data of times for which the robot's pose is unknown.
 void SubmapBuilder::drop_between(Timestamp before, Timestamp after, const std::string& why) {
   std::erase_if(state_.waiting.sensors, [&](const SensorSample& sample) {
     const bool is_between = sample.stamp > before && sample.stamp < after;

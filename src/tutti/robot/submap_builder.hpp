@@ -105,7 +105,7 @@ struct PlacedFix {
 /// All that a builder remembers.
 struct SubmapBuilderState {
   std::uint32_t next_submap = 0;
-  Pose3 T_mended_odom;                 ///< What raw odometry is multiplied by in submaps (mend()).
+  Pose3 T_mended_odom;                 ///< Raw odometry is multiplied by it in submaps (mend()).
   fit::SteadyDrift drift;              ///< How much raw odometry turns too far.
   std::vector<Keyframe> keyframes;     ///< Those of the open submap.
   std::vector<RelativePose> odometry;  ///< Between those keyframes.

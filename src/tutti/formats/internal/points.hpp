@@ -10,7 +10,7 @@
 
 #include "tutti/formats/internal/text.hpp"
 
-/// What point files share: records of fixed size with x, y, z somewhere in them.
+/// Point files have records of fixed size with x, y, z somewhere in them.
 namespace tutti::formats::internal {
 
 /// Bound on one header number, so that products of two fit an int64 and nonsense is refused before it is allocated.

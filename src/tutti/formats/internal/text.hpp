@@ -11,7 +11,7 @@
 #include "tutti/base/file.hpp"
 #include "tutti/model/trajectory.hpp"
 
-/// What the readers share: numbers, and lines that know where they are.
+/// The readers share numbers, and lines that know where they are.
 namespace tutti::formats::internal {
 
 /// Stamps are kept within +-2^61 ns (years 1896 to 2043), so that the difference of any two fits an int64 twice.

@@ -57,7 +57,7 @@ std::string plain(std::string_view name) {
   return out.substr(std::min(out.find_first_not_of("_./"), out.size()));
 }
 
-/// What follows the last point or slash: "field.header.stamp" is "stamp".
+/// The part after the last point or slash: "field.header.stamp" is "stamp".
 std::string last_part(const std::string& name) { return name.substr(name.find_last_of("./") + 1); }
 
 /// Which of x y z qx qy qz qw a name means; kNone for none of them.
@@ -208,7 +208,7 @@ std::optional<Named> named_in_comment(std::string_view text, Separator separator
   return out;
 }
 
-/// What the stamps look like.
+/// How the stamps look.
 struct Stamps {
   bool have_fractions = false;
   double median = 0.0;

@@ -39,7 +39,7 @@ class YamlValues {
   Status status_;
 };
 
-/// What other programs state of a camera.
+/// A camera as other programs state it.
 struct ForeignCamera {
   std::string model, distortion_model;
   std::vector<double> size_px;       ///< Width, height.
@@ -47,8 +47,8 @@ struct ForeignCamera {
   std::vector<double> coefficients;  ///< Four; of radial-tangential also OpenCV's five or eight.
 };
 
-/// EuRoC and maplab call the same things by these names: pinhole with radial-tangential or equidistant. What cannot be
-/// is complained of, at `where`.
+/// EuRoC and maplab call the same things by these names: pinhole with radial-tangential or equidistant. Impossible
+/// values are complained of, at `where`.
 CameraModel to_camera_model(YamlValues& yaml, const ConfigNode& where, const ForeignCamera& camera);
 
 /// Five or eight numbers of a pinhole are OpenCV's, and those of a rational camera.
