@@ -24,8 +24,8 @@
 /// such structs. This header is all that a settings struct needs; base/config_io.hpp reads, writes and lists settings.
 namespace tutti {
 
-/// What a setting may be: the range of a number, closed at both ends unless `low_open`; an infinite end is no limit.
-/// Strings may list their choices.
+/// The values that a setting may have: the range of a number, closed at both ends unless `low_open`; an infinite end is
+/// no limit. Strings may list their choices.
 struct Bound {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();

@@ -39,7 +39,7 @@ struct ConfigNode::Entry {
   ConfigNode value;
 };
 
-/// What parse_yaml() takes: ten times the metadata of a bag of a thousand files.
+/// The most that parse_yaml() takes: ten times the metadata of a bag of a thousand files.
 inline constexpr std::size_t kMaxYamlBytes = std::size_t{4} << 20;
 /// Parses one YAML document; `name` stands for it in messages. Errors: bad syntax, a repeated key, and more bytes,
 /// values, nesting or aliases than any honest file has.
@@ -96,7 +96,7 @@ std::string check_bound(const Bound& bound, const T& value) {
     return violation(bound, static_cast<double>(value));
 }
 
-/// What was found while a document was read into one or several structs.
+/// The findings of reading a document into one or several structs.
 struct Findings {
   /// A map of the document, and the keys that some struct knows there.
   struct Place {
@@ -127,7 +127,7 @@ class Loader {
   }
 
  private:
-  /// What is given by this name or by the former one; the command line counts before a document.
+  /// The value given by this name or by the former one; the command line counts before a document.
   const ConfigNode* newest(const ConfigNode* child, const std::string& former_name, const std::string& path) {
     const ConfigNode* former = node_.find(former_name);
     if (former == nullptr) return child;

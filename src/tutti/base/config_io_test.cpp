@@ -358,7 +358,7 @@ TEST(Config, NotANumberIsOutsideEveryBound) {
   EXPECT_EQ(config_internal::violation({.high = 1.0}, 1.5), "must be <= 1");
 }
 
-/// What another reader takes from the documents of Settings.
+/// The settings that another reader takes from the documents of Settings.
 struct More {
   struct Robot {
     double speed_mps = 1.0;

@@ -17,7 +17,7 @@ namespace {
 constexpr int kMaxDepth = 32;
 constexpr int kMaxNodes = 200'000;
 
-/// What is wrong with a document's content, with its line.
+/// An error in a document's content, with its line.
 struct ContentError {
   int line;
   std::string text;

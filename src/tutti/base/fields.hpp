@@ -12,7 +12,7 @@
 
 #include "tutti/base/plain_text.hpp"
 
-/// What a message or record consists of, listed once, as base/config.hpp does it for settings:
+/// The fields of a message or record, listed once, as base/config.hpp does it for settings:
 ///
 ///   struct Battery {
 ///     double voltage_v = 0.0;

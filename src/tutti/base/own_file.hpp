@@ -14,7 +14,7 @@ namespace tutti {
 /// new one gets mode 0640 under the program's umask, or `mode`. Returns the descriptor, which the caller closes.
 Result<int> open_own_file(const std::filesystem::path& file, int flags, unsigned mode = 0640);
 
-/// What replace_file() writes first: `file` with ".new" behind it.
+/// The file that replace_file() writes first: `file` with ".new" behind it.
 std::filesystem::path beside_of(const std::filesystem::path& file);
 
 /// Writes a new file beside `file` and renames it, so that readers see either all of the old text or all of the new.

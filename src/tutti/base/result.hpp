@@ -9,7 +9,7 @@
 
 namespace tutti {
 
-/// What kind of thing in the outside world went wrong.
+/// The kind of a failure of the outside world.
 enum class ErrorCode {
   io,           ///< A file could not be opened, read or written.
   parse,        ///< Text or bytes do not follow their format.

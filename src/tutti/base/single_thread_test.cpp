@@ -18,7 +18,7 @@ class OpenBlas : public testing::Test {
  protected:
   OpenBlas() { openblas_set_num_threads(kUsers); }
   ~OpenBlas() override { openblas_set_num_threads(1); }
-  static constexpr int kUsers = 3;  ///< What whoever uses the library has set.
+  static constexpr int kUsers = 3;  ///< As whoever uses the library has set it.
 };
 
 TEST_F(OpenBlas, HasOneThreadUntilTheLastHolderGoes) {

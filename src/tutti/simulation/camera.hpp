@@ -41,7 +41,7 @@ class SimulatedCamera {
   /// The image from T_world_camera. `time_s` sets the exposure, `rng` the noise. One ray is cast per pixel, through its
   /// centre; pixels that see nothing (no direction, or out of the hall) are black.
   [[nodiscard]] Image image(const Pose3& T_world_camera, double time_s, Rng rng) const;
-  /// What a depth sensor with the same pixels would measure from T_world_camera, with its noise.
+  /// The depths that a sensor with the same pixels would measure from T_world_camera, with its noise.
   [[nodiscard]] DepthImage depth(const Pose3& T_world_camera, const DepthSensor& sensor, Rng rng) const;
 
  private:

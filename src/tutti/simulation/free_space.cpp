@@ -101,7 +101,7 @@ double FreeSpace::passage(const Passage& passage, const Eigen::Vector3d& p) cons
   const double smooth = rounded_rectangle(across, above - 0.5 * height, half_width, 0.5 * height,
                                           std::min({radius, half_width, 0.5 * height}));
   if (passage.roughness <= 0.0 || std::abs(smooth) > 3.0 * passage.roughness) return smooth;
-  const double floor = std::clamp((above - 0.1) / 0.5, 0.0, 1.0);  // What walks on it has made it smoother.
+  const double floor = std::clamp((above - 0.1) / 0.5, 0.0, 1.0);  // Whatever walks on it has made it smoother.
   return smooth + passage.roughness * (0.3 + 0.7 * floor) * bumps(p);
 }
 

@@ -65,7 +65,7 @@ struct FlownRecording {
 /// The recordings of a simulated hall, and the hall's surface.
 struct SimulatedHall {
   std::vector<FlownRecording> robots;           ///< Robots 0, 1, ...
-  std::shared_ptr<const TriangleMesh> surface;  ///< What a survey would measure.
+  std::shared_ptr<const TriangleMesh> surface;  ///< As a survey would measure it.
 };
 
 /// Simulates all robots of a hall; the first sample of each is at `start` + start_s. Fails when a robot has no name, or

@@ -15,7 +15,7 @@ namespace tutti::simulation {
 /// The ray hits no face.
 inline constexpr std::uint32_t kNoFace = std::numeric_limits<std::uint32_t>::max();
 
-/// What a ray hits first.
+/// The face that a ray hits first.
 struct SeenFace {
   float distance_m = 0.0F;
   std::uint32_t face = kNoFace;  ///< Index into Hall::faces.

@@ -206,7 +206,7 @@ std::vector<ScriptedError> place_scripted(const Trajectory& truth, std::span<con
   return out;
 }
 
-/// What is wrong with an increment, and what the robot thinks of it; translations in the frame of its start.
+/// The error of an increment, and the covariance that the robot states; translations in the frame of its start.
 struct IncrementError {
   Vector6d error;
   Matrix6d covariance;

@@ -63,7 +63,7 @@ std::vector<SimulatedRobotConfig> single_robots(const std::vector<SimulatedRobot
 struct SimulatedWorld {
   CorridorWorld network;
   std::vector<Recording> recordings;            ///< Robots 0, 1, ... in the order of single_robots().
-  std::shared_ptr<const TriangleMesh> surface;  ///< What a survey would measure; null without sensors.
+  std::shared_ptr<const TriangleMesh> surface;  ///< As a survey would measure it; null without sensors.
 };
 
 /// The walls of the world that simulate_recordings() makes from the same configuration and seed; in the frame
