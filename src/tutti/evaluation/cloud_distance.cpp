@@ -20,7 +20,7 @@ constexpr std::size_t kNeighbours = 8;     // the point itself included
 constexpr double kFlat = 0.05;             // smallest over middle eigenvalue of their scatter
 constexpr std::size_t kLeastOfAPlane = 4;  // any three points are flat
 
-/// What a point and its neighbours determine about the surface there.
+/// The surface at a point, as it and its neighbours determine it.
 struct Patch {
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< Zero: not flat.
   float offset = 0.0F;                               ///< normal . x = offset on the plane.

@@ -13,7 +13,7 @@ using Matrix23 = Eigen::Matrix<double, 2, 3>;
 using Distortion = std::array<double, 8>;
 
 /// A polynomial in Bernstein form lies between its smallest and largest coefficient and starts and ends at the outer
-/// ones; de Casteljau's halves come closer and closer to it. What stays undecided touches zero.
+/// ones; de Casteljau's halves come closer and closer to it. One that stays undecided touches zero.
 template <std::size_t N>
 bool is_positive(const std::array<double, N>& b, int halvings_left) {
   if (!(b.front() > 0.0) || !(b.back() > 0.0)) return false;
@@ -204,7 +204,7 @@ Direction unproject_double_sphere(const Distortion& distortion, const Eigen::Vec
 
 // --- the table ---
 
-/// What a kind does at unit focal length. The Jacobian is by the point.
+/// The projection of a kind at unit focal length. The Jacobian is by the point.
 struct Formula {
   Projected (*project)(const Distortion&, const Eigen::Vector3d&, Matrix23&);
   Direction (*unproject)(const Distortion&, const Eigen::Vector2d&);

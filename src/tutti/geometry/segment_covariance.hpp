@@ -24,7 +24,7 @@ class SegmentCovariance {
   [[nodiscard]] std::size_t size() const { return poses_.size(); }
   /// Covariance of T_a_b = T_w_a^-1 T_w_b (right tangent, first order), a <= b < size(); zero for a == b.
   [[nodiscard]] Matrix6d operator()(std::size_t a, std::size_t b) const;
-  [[nodiscard]] std::size_t bytes() const;  ///< What it has on the heap.
+  [[nodiscard]] std::size_t bytes() const;  ///< Its size on the heap.
 
  private:
   /// Places, of which every 16th is one of the next level. `step`: from the place before, `upto`: from the begin of the

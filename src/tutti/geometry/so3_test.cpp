@@ -128,7 +128,7 @@ TEST(So3, RightJacobianIsAccurateAtEveryAngle) {
     }
 }
 
-// What the Jacobians mean, by central differences: Exp(theta)^-1 Exp(theta + d) ~ Exp(Jr d).
+// The meaning of the Jacobians, by central differences: Exp(theta)^-1 Exp(theta + d) ~ Exp(Jr d).
 TEST(So3, JacobiansMatchDifferences) {
   Rng rng(7);
   const double h = 1e-5;

@@ -19,8 +19,8 @@ namespace tutti::localise {
 /// A place is trusted by this share of its cubes that were seen; by 1 where none was.
 double share_that_fits(std::uint64_t matched, std::uint64_t missing, std::uint64_t appeared);
 
-/// How one submap of a map fits what a robot that is localised has seen of it lately, in cubes of kFitCube_m. What it
-/// did not see is in none of the counts.
+/// How one submap of a map fits what a robot that is localised has seen of it lately, in cubes of kFitCube_m. Cubes
+/// that it did not see are in none of the counts.
 struct SubmapFit {
   std::uint32_t matched = 0;   ///< Where the submap has something, and scans, too.
   std::uint32_t missing = 0;   ///< Where the submap has something that scans looked through: it is gone.

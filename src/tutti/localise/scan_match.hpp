@@ -29,7 +29,7 @@ struct ScanMatch {
 /// ways: points of the scan where the map's robots looked through, and points of the map where the scan did.
 ScanMatch match_scan(const LocalMap& map, const fit::FitScan& scan, const Pose3& T_world_body);
 
-/// What a scan says about where the robot should be.
+/// The evidence of a scan on where the robot should be.
 enum class Evidence {
   confirms,  ///< It lies on the map there.
   nothing,   ///< The map shows too little of what the scan sees.

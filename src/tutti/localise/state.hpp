@@ -13,13 +13,13 @@
 
 namespace tutti::localise {
 
-/// What a robot knows of where it is in a map that does not move.
+/// How well a robot knows where it is in a map that does not move.
 enum class State : std::uint8_t {
   searching,  ///< It has not found its place yet.
-  ambiguous,  ///< What it sees fits several places.
+  ambiguous,  ///< Several places fit what it sees.
   localised,  ///< One place explains what it sees.
   off_map,    ///< It has left what the map shows; odometry goes on from its last place.
-  lost,       ///< What it sees contradicts where it was; it searches again.
+  lost,       ///< Its sensors contradict where it was; it searches again.
   stale,      ///< Its sensors have shown nothing for some time.
   between,    ///< It is shut in, in a map with several floors: it may be in a lift.
 };
@@ -40,7 +40,7 @@ struct PlaceFound {
 struct Located {
   Timestamp stamp;  ///< The pose's, by the robot's clock.
   State state = State::searching;
-  std::string why;          ///< What has led to the state, as a sentence's end.
+  std::string why;          ///< Why it is in the state, as a sentence's end.
   std::uint32_t floor = 1;  ///< KnownMap::Entry::floor of where T_world_body is.
   /// In the map's frame; nothing unless the state is localised, off_map or stale. Only when it is localised does the
   /// map show that the robot is there.

@@ -184,7 +184,7 @@ TEST(WaveletFilter, ConstantsPerComponentPassExactly) {
   EXPECT_EQ(coefficients.rightCols(3), MatrixXd::Zero(6, 3));
 }
 
-// What is true of samples of an error is true of the error only if the filter does not depend on what it filters.
+// A statement on samples of an error holds for the error only if the filter does not depend on what it filters.
 TEST(WaveletFilter, IsOneLinearMapWhateverTheSignal) {
   Rng rng(11);
   const SparseMatrix L = laplacian(proximity_adjacency(testing::tunnel(150, 1.0, Rng(5)), 7.0, 1.0));

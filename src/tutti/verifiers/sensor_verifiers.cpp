@@ -189,7 +189,7 @@ Result<JointClosureVerifier::Inspection> JointClosureVerifier::inspect(
   return out;
 }
 
-/// What one verifier alone finds as that verifier words it; several parts after kJoined, and the length of each, as
+/// The place of one verifier alone as that verifier words it; several parts after kJoined, and the length of each, as
 /// text.
 std::string JointClosureVerifier::place_of(const Submap& submap) const {
   const PayloadSize size = payload_size(submap);

@@ -18,7 +18,7 @@ namespace tutti::spectral::internal {
 class RowBlocks {
  public:
   static constexpr int kRows = 8;
-  static constexpr std::size_t kCacheBytes = std::size_t{1} << 20U;  ///< What a core may be taken to have to itself.
+  static constexpr std::size_t kCacheBytes = std::size_t{1} << 20U;  ///< A core may be taken to have it to itself.
 
   explicit RowBlocks(const SparseMatrix& matrix);
 
