@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-/** What the page asks the server beside events. */
+/** The page's requests to the server beside events. */
 import { decode_me, decode_registration, decode_why } from "./decode";
 import { TIMES } from "./limits";
 import type { Me, Pose, Registration, SubmapId, Vec3, Why, Wish } from "./schema";

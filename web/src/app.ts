@@ -41,7 +41,7 @@ export class App {
   cursor: number | null = null;
   robots: RobotView[] = [];
   correction: Correction | null = null;
-  /** What somebody considers keeping would change. */
+  /** The changes if what somebody considers were kept. */
   preview: Correction | null = null;
   dark = true;
   ready = false;
@@ -119,7 +119,7 @@ export class App {
   shown(): number {
     return this.time ?? this.now();
   }
-  /** What to ask the store for. */
+  /** The time to ask the store for. */
   at(): number {
     return this.time ?? Infinity;
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-/** What follows from the store and is in no message: where robots may be, when backlogs are empty, what a correction moved. */
+/** Derives from the store what is in no message: where robots may be, when backlogs are empty, what a correction moved. */
 import { LOST_ROBOT, REACH_M, SLOWEST_MPS, TIMES } from "./limits";
 import { compose, distance, inverse } from "./pose";
 import { POSE_ROW } from "./schema";
@@ -157,7 +157,7 @@ export interface Correction {
   keeper: Map<number, number>;
 }
 
-/** What the newest poses at t changed; null when nothing did. */
+/** The correction by the newest poses at t; null when nothing changed. */
 export function correction_at(store: Store, t: number): Correction | null {
   const track = store.track("poses");
   const i = track ? track.index(t) : -1;

@@ -54,7 +54,7 @@ export function figure(x: Figure, unit = ""): string {
   return `${x.toFixed(digits)}${unit ? `\u00a0${unit}` : ""}`;
 }
 
-/** What fits a label, and a sign that there is more. */
+/** As much as fits a label, and a sign that there is more. */
 export const beginning = (text: string, most: number): string =>
   text.length > most ? `${text.slice(0, most - 1).trimEnd()}…` : text;
 export const many = (n: number, one: string, several = `${one}s`): string => `${n} ${n === 1 ? one : several}`;

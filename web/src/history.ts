@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-/** What was before this page was opened, as the program remembers it; and of which times nothing is known. */
+/** The time before this page was opened, as the program remembers it; and times of which nothing is known. */
 import { moment } from "./format";
 import { LIMITS, TIMES } from "./limits";
 import type { Message } from "./schema";
@@ -17,7 +17,7 @@ export async function recall(store: Store): Promise<void> {
   }
 }
 
-/** Of the time that is shown, or of the time before all others: that nothing is known of it; "" where something is. */
+/** Says that nothing is known of the time that is shown, or of the time before all others; "" where something is. */
 export function unknown_at(store: Store, t: number | null): string {
   const known = store.get("history");
   if (!known || known.first_s === null) return "";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-/** What the page keeps, and when it calls something old: all bounds in one place. */
+/** How much the page keeps, and when it calls something old: all bounds in one place. */
 export const LIMITS = {
   /** Messages kept per key in a running mission; older ones are thinned. A report keeps everything. */
   history: {

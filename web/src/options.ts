@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-/** What the operator has chosen to see. Remembered by this browser. */
+/** The view that the operator has chosen. Remembered by this browser. */
 
 export const COLOUR_MODES = {
   robot: "robot",
@@ -105,7 +105,7 @@ export const PHASES = {
 >;
 export type Phase = keyof typeof PHASES;
 
-/** What this browser remembers; a page opened as a file may not be allowed to. */
+/** This browser's memory; a page opened as a file may not be allowed any. */
 export const memory = {
   read<T>(key: string, otherwise: T): T {
     try {

@@ -6,7 +6,7 @@ import type { Poses, Submap, Vec3 } from "./schema";
 
 export interface Part {
   component: number;
-  /** What is added to its frame. */
+  /** Added to its frame. */
   offset: Vec3;
   low: Vec3;
   high: Vec3;

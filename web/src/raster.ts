@@ -15,7 +15,7 @@ export interface Painted {
   shades?: Uint8Array;
 }
 
-/** What part of the world is drawn: heights, and the distance to a plane. */
+/** The part of the world that is drawn: heights, and the distance to a plane. */
 export interface Window3 {
   low_m: number;
   high_m: number;

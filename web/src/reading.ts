@@ -6,7 +6,7 @@ export class DecodeError extends Error {}
 export type Fields = Record<string, unknown>;
 /** From JSON to a value; `what` names it in errors. */
 export type Reader<T> = (value: unknown, what: string) => T;
-/** What reads each field of a record. */
+/** The reader of each field of a record. */
 type Table = Readonly<Record<string, Reader<unknown>>>;
 export type Decoded<T extends Table> = { [K in keyof T]: ReturnType<T[K]> };
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /**
- * What the program sends the page: {key, t, value}. A key is KIND or KIND/NAME. Of records that have a list of fields in
- * the program the tables are in records.ts, which is made of these; the others are here.
+ * The program sends the page {key, t, value}. A key is KIND or KIND/NAME. Tables of records that have a list of fields
+ * in the program are in records.ts, which is made of these; the others are here.
  */
 import { count, list, maybe, maybe_list, maybe_text, number, numbers, one_of, or_null } from "./reading";
 import { pose, record, text, truth, vec3, words } from "./reading";
@@ -194,7 +194,7 @@ export interface RadioBytes {
 export const acknowledged = { alert: text, by: words };
 export type Acknowledged = Decoded<typeof acknowledged>;
 
-/** Of which times the program knows something. */
+/** The times of which the program knows something. */
 export const history = {
   /** Null: of none yet. */
   first_s: maybe,
@@ -251,11 +251,11 @@ export type Me = Decoded<typeof me>;
 export const registration = {
   found: truth,
   why: words,
-  /** What would help; "": every gate is passed. */
+  /** Advice; "": every gate is passed. */
   hint: words,
   T_from_to: or_null(pose),
   evidence: maybe_list(record(gate)),
-  /** What to ask for the map with it by; null: nothing was found. */
+  /** The number to ask for the map with it by; null: nothing was found. */
   look: maybe,
 };
 export type Registration = Decoded<typeof registration>;

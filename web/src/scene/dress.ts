@@ -98,7 +98,7 @@ export class Dresser {
   private height = height_ramp();
   private bad = Uint32Array.from({ length: 256 }, (_, i) => abgr(bad(i / 255)));
 
-  /** Of what the eye sees. `all`: also of what it does not see. */
+  /** Colours the clouds that the eye sees. `all`: also those that it does not see. */
   dress(world: World, clouds: Clouds, eye: Eye, d: Dressing, all = false): Map<string, Painted> {
     const out = new Map<string, Painted>();
     if (!d.options.layers.clouds) return out;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-/** What is drawn, as balls: what the picture has to hold so that all of it is seen. */
+/** All that is drawn, as balls: the picture has to hold them so that all of it is seen. */
 import type { App } from "../app";
 import type { Cloud } from "../cloud";
 import { transform } from "../pose";
@@ -10,7 +10,7 @@ import { position_of } from "./where";
 /** Points of a trajectory or a survey that are looked at. */
 const kSamples = 500;
 
-/** Of a cloud's box, in its submap's frame. */
+/** The corners of a cloud's box, in its submap's frame. */
 export function corners_of({ centre, half_m }: Pick<Cloud, "centre" | "half_m">): Vec3[] {
   return Array.from(
     { length: 8 },

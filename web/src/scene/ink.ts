@@ -143,7 +143,7 @@ export class Ink {
     this.c.stroke();
   }
 
-  /** What lies at a pixel: robots and marks before closures before submaps. */
+  /** The target at a pixel: robots and marks before closures before submaps. */
   find(x: number, y: number): Target | null {
     const order = ["robot", "mark", "closure", "submap"];
     let best: { rank: number; away: number; target: Target } | null = null;

@@ -191,7 +191,7 @@ export class GpuPainter implements Painter {
   }
 }
 
-/** What draws WebGL here: a GPU's name, or null when there is none or only software. */
+/** The name of the GPU that draws WebGL here; null when there is none or only software. */
 export function gpu_name(): string | null {
   const gl = document.createElement("canvas").getContext("webgl2");
   if (!gl) return null;

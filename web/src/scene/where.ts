@@ -7,7 +7,7 @@ import type { Vec3 } from "../schema";
 
 /**
  * Where a robot is now: beyond its newest submap by its odometry, where the submap states how its frame lies in odometry and
- * the server has heard the robot. Of one that only the map knows, nobody knows more than the map.
+ * the server has heard the robot. Nobody knows more than the map of one that only the map knows.
  */
 export function position_of(app: App, robot: RobotView): Vec3 | null {
   const { newest, status } = robot;

@@ -9,7 +9,7 @@ import type { SseEvent } from "./sse";
 export class LiveSource implements Source {
   readonly mode = "live";
   private incarnation: string | null = null;
-  /** Of the last message that came. */
+  /** The id of the last message that came. */
   private last = "";
   private link: LinkState = { state: "connecting", heard_ms: 0, why: "" };
   private abort = new AbortController();

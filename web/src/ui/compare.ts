@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-/** What `tutti compare` found between trajectories (docs/compare.md). */
+/** The findings of `tutti compare` between trajectories (docs/compare.md). */
 import type { App } from "../app";
 import { degrees, figure, metres, moment, span } from "../format";
 import type { View } from "../scene/view";

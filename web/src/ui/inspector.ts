@@ -81,7 +81,7 @@ function legend(app: App, closure: Closure, clouds: PairView): Child {
   );
 }
 
-/** What a person may decide on a closure now. */
+/** The decisions that a person may take on a closure now. */
 function decisions(app: App, name: string, closure: Closure): Child {
   if (!app.may("decide")) return null;
   const say = (wish: Wish, text: string, props = {}) =>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-/** What colours and lines mean, in a corner of the picture. It folds, and is never more than a third of the picture. */
+/** Legend of colours and lines, in a corner of the picture. It folds, and is never more than a third of the picture. */
 import type { App } from "../app";
 import { css, robot_rgb } from "../colours";
 import { LIMITS } from "../limits";
@@ -11,7 +11,7 @@ import type { View } from "../scene/view";
 import { button, h, panel, swatch } from "./dom";
 import type { Child } from "./dom";
 
-/** What this browser remembers of it; "": nobody has chosen. */
+/** Its state as this browser remembers it; "": nobody has chosen. */
 type Fold = "folded" | "open" | "";
 
 export function legend(app: App, view: View): HTMLElement {
@@ -73,7 +73,7 @@ function gradient(scale: NonNullable<Legend["scale"]>): Child {
   );
 }
 
-/** What the lines mean that are drawn now. */
+/** The meaning of the lines that are drawn now. */
 function lines(app: App): Child {
   const palette = palette_of(app.dark);
   const { layers } = app.options;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-/** What robots that localise in a map have found of its places: what has changed, how far each is trusted, who saw it last. */
+/** Findings of robots that localise in a map on its places: what has changed, how far each is trusted, who saw it last. */
 import type { App } from "../app";
 import { bad, css } from "../colours";
 import { many, share, span } from "../format";

@@ -45,5 +45,5 @@ export class Node {
 
 export const reading = (report: Report | null): Node => new Node(report);
 
-/** What is true of the policy that the robot followed. */
+/** The part on the policy that the robot followed. */
 export const followed = (report: Node, robot: Node): Node => robot.at("policies").at(report.s("default_policy"));

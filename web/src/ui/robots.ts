@@ -69,7 +69,7 @@ const is_troubled = ({ status }: RobotView): boolean =>
   status !== null &&
   (status.trouble !== "" || status.conflict !== "" || (status.battery_percent !== null && status.battery_percent < 15));
 
-/** What the search looks at. */
+/** The words that the search looks at. */
 function words_of(robot: RobotView): string {
   const { status } = robot;
   return [
@@ -207,7 +207,7 @@ const kHeard: Record<RobotView["presence"], [string, "on" | "off" | "bad"]> = {
 };
 const heard = (robot: RobotView): (typeof kHeard)["here"] => (robot.is_heard ? kHeard.here : kHeard[robot.presence]);
 
-/** What a robot can do now. */
+/** Icons of what a robot can do now. */
 function icons(app: App, robot: RobotView): Child[] {
   const { status } = robot;
   const away = is_away(robot);
@@ -292,7 +292,7 @@ function details(app: App, robot: RobotView): Child[] {
   return out;
 }
 
-/** What it has sent and was sent since the server's start, the most first; and at what rate of late. */
+/** The bytes it has sent and was sent since the server's start, the most first; and their rate of late. */
 function radio(app: App, robot: RobotView): Child[] {
   const track = app.store.track("radio");
   const last = track ? track.index(app.at()) : -1;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-/** What lies over the 3-D picture: colours, heights, section, layers, measuring. */
+/** The tools over the 3-D picture: colours, heights, section, layers, measuring. */
 import type { App } from "../app";
 import { metres } from "../format";
 import { COLOUR_MODES, LAYERS } from "../options";
