@@ -5,7 +5,7 @@
 
 namespace tutti {
 
-/// What the tests link was built with a sanitizer; their own files need not be (cmake/TuttiTargets.cmake).
+/// Whether what the tests link was built with a sanitizer; their own files need not be (cmake/TuttiTargets.cmake).
 /// Known when linking only, so that test files compile to the same with and without.
 extern const bool kSanitized;
 

@@ -101,7 +101,7 @@ inline void write_db3(const std::filesystem::path& path, const std::vector<Sampl
   sqlite3_close(db);
 }
 
-/// What readers need of a metadata.yaml.
+/// The parts of a metadata.yaml that readers need.
 inline std::string metadata_of(const std::vector<std::string>& files, std::size_t messages) {
   std::string out = "rosbag2_bagfile_information:\n  version: 5\n  message_count: " + std::to_string(messages) +
                     "\n  relative_file_paths:\n";

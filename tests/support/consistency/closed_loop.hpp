@@ -15,7 +15,7 @@
 
 namespace tutti::consistency::test {
 
-/// What happens, independent of how the robot reacts.
+/// A mission, independent of how the robot reacts.
 struct Mission {
   std::vector<Pose3> truth;
   std::vector<Pose3> increments;  ///< Raw odometry, node to node.
@@ -39,7 +39,7 @@ inline Mission corridor_mission(std::size_t length, const OdometryNoise& noise, 
   return out;
 }
 
-/// What the server broadcasts after `count` nodes.
+/// The server's broadcast after `count` nodes.
 inline std::vector<ServerNode> server_after(const Mission& mission, std::size_t count) {
   if (mission.settling) {
     const double done = static_cast<double>(count) / (0.8 * static_cast<double>(mission.truth.size()));

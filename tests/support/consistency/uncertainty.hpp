@@ -32,7 +32,7 @@ ChainKnowledge knowledge(const ProxyGraph& graph, const ChainId& chain, Draw dra
   return out;
 }
 
-/// What server_estimate() is off by: three waves of random phase and white noise, the same along the whole run.
+/// The errors of server_estimate(): three waves of random phase and white noise, the same along the whole run.
 inline ChainUncertainty uncertainty_by(const ServerNoise& noise, const ProxyGraph& graph, const ChainId& chain) {
   return chain_uncertainty(graph, chain, knowledge(graph, chain, [&](const std::vector<Pose3>& poses, Rng rng) {
                              return server_estimate(poses, noise, rng);
@@ -54,7 +54,7 @@ class WalkWithClosures {
   /// The same for every axis.
   [[nodiscard]] const Eigen::MatrixXd& position_covariance() const { return position_; }
   [[nodiscard]] const Eigen::MatrixXd& rotation_covariance() const { return rotation_; }
-  /// What is known of the whole run, which is this chain of the graph.
+  /// Knowledge of the whole run, which is this chain of the graph.
   [[nodiscard]] ChainKnowledge knowledge(const ProxyGraph& graph, const ChainId& chain) const {
     ChainKnowledge out = test::knowledge(
         graph, chain, [this](std::vector<Pose3> poses, Rng rng) { return displace(std::move(poses), rng); });

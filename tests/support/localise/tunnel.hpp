@@ -78,7 +78,7 @@ inline PointCloud lift() {
   return out;
 }
 
-/// What is on the way of a robot that drives on one floor, rides a lift for 20 s and drives on another.
+/// The stages of a robot that drives on one floor, rides a lift for 20 s and drives on another.
 enum class Ride { before, in_lift, after };
 /// Feeds what the third robots of two worlds see on such a way to what takes inputs. `after_each` hears after each
 /// sample where that was, and its number in the recording.

@@ -33,7 +33,7 @@ class ExplainingVerifier final : public server::WrappedVerifier {
     verdict->evidence = {{RefusalReason::overlap, 0.75, 0.3}};
     return verdict;
   }
-  /// What verify() finds, not what the wrapped verifier would.
+  /// Finds what verify() does, not what the wrapped verifier would.
   [[nodiscard]] Result<Inspection> inspect(const Submap& first, const Submap& second,
                                            const server::PayloadStore& payloads,
                                            const std::optional<Pose3>& T_first_second) const override {

@@ -30,7 +30,7 @@ inline std::string raised(std::string frame) {
   return frame;
 }
 
-/// What the program that wrote it would read: the next version's are numbered as ours.
+/// The frame as the program that wrote it would read it: the next version's are numbered as ours.
 inline std::string lowered(std::string frame) {
   const auto kind = static_cast<wire::MessageKind>(frame.at(4));
   if (frame.at(2) == static_cast<char>(wire::versions(kind).current + 1)) --frame[2];
@@ -71,7 +71,7 @@ class Site {
     settle();
   }
   void upgrade_server(bool newer) {
-    // What the next version has stored it has stored as such.
+    // The next version has stored its submaps as its own.
     if (server_is_newer_ && !newer) server_store_ = with_submaps(raise_stored());
     server_is_newer_ = newer;
     start_server();

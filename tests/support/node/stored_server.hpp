@@ -19,7 +19,7 @@ namespace tutti::node::test {
 /// A server on a store in memory, whose steps are committed.
 class StoredServer : public testing::Test {
  protected:
-  /// From the bytes of its store, where there was one before. What it does first: of a map without news, it is
+  /// From the bytes of its store, where there was one before. Returns what it does first; a map without news is
   /// computed.
   Step start(const std::set<RobotId>& robots, const ServerNodeConfig& config) {
     store_ = std::make_unique<storage::MemoryStore>(storage::map_schema(),
@@ -43,7 +43,7 @@ class StoredServer : public testing::Test {
     std::ranges::copy_if(step.messages, std::back_inserter(out), [&](const auto& m) { return m.kind == kind; });
     return out;
   }
-  /// What is sent of this kind when all that is due until `later` has been.
+  /// Waits, and returns what is sent of this kind until `later`.
   std::vector<bus::Envelope> wait_for(bus::MessageKind kind, double later) {
     std::vector<bus::Envelope> out;
     const Timestamp end = now_ + later;

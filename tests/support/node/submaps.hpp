@@ -42,7 +42,7 @@ inline bus::Envelope from_server(RobotId to, bus::MessageKind kind, std::string 
       bus::Endpoint::server(), bus::Endpoint::of(to), kind, {}, std::make_shared<const std::string>(std::move(bytes))};
 }
 
-/// What an operator sends.
+/// The message of an operator.
 inline bus::Envelope envelope(const ClosureDecision& decision) {
   return {bus::Endpoint::viewer(7), bus::Endpoint::server(), bus::MessageKind::decision,
           decision.closure + "/" + std::to_string(decision.given_ns),

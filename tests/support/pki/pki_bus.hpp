@@ -89,8 +89,8 @@ class PkiBus : public ::testing::Test {
       return std::ranges::any_of(refusals, [&](const auto& one) { return one.what.find(words) != std::string::npos; });
     });
   }
-  /// What members were refused since the last call that is not theirs to do. A handshake in whose midst the bus reads
-  /// its rights again is refused, too, and tried again by whoever connects: that is none of these.
+  /// The refusals since the last call of what is not members' to do. A handshake in whose midst the bus reads its
+  /// rights again is refused, too, and tried again by whoever connects: that is none of these.
   std::vector<bus::BusRefusal> rights_refused() {
     std::vector<bus::BusRefusal> out = child_->take_refusals().all;
     std::erase_if(out, [](const bus::BusRefusal& refusal) {
@@ -111,7 +111,7 @@ class PkiBus : public ::testing::Test {
     EXPECT_TRUE(port.has_value()) << port.error().message;
     return port ? std::move(*port) : nullptr;
   }
-  /// What a port gets within a while.
+  /// The messages that a port gets within a while.
   static std::vector<bus::Envelope> heard(bus::Port& port, std::size_t count) {
     std::vector<bus::Envelope> all;
     test::within(10.0, [&] {

@@ -9,7 +9,7 @@
 
 namespace tutti::test {
 
-/// What the owner of a seed ("SU..") signs, as libnats does it for a bus: 64 bytes.
+/// The signature of the owner of a seed ("SU.."), as libnats makes it for a bus: 64 bytes.
 inline std::string sign(const std::string& seed, const std::string& message) {
   static const natsStatus opened = nats_Open(-1);  // what it decodes keys with it makes here
   unsigned char* bytes = nullptr;

@@ -25,7 +25,7 @@ class SentPort final : public bus::Port {
   std::vector<bus::Envelope>* sent_;
 };
 
-/// What of HostedRobot is about being fed.
+/// The part of HostedRobot that is about being fed.
 class Hosting final : public Hosted {
  public:
   Hosting(std::unique_ptr<drive::Driver> robot, FeedFront& front, Host& host, const Clock& clock,

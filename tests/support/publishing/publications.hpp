@@ -43,7 +43,7 @@ class Publications : public ::testing::Test {
   [[nodiscard]] static bus::BusCredentials add(pki::Pki& to, bus::BusRole role, const std::string& name) {
     return bus::read_credentials(to.add(role, name, std::nullopt).value().string()).value();
   }
-  /// Of `pieces` pieces, the last one short.
+  /// A file of `pieces` pieces, the last one short.
   [[nodiscard]] static std::string file_of(std::size_t pieces, char first = 'a') {
     std::string out(pieces * kPieceBytes - 100, first);
     for (std::size_t i = 0; i < out.size(); i += 997) out[i] = static_cast<char>(i / 997);

@@ -77,7 +77,7 @@ inline void fail_odometry(Trajectory& odometry, const Failure& failure) {
   }
 }
 
-/// What `look_alikes` give, in place of what true closures these pairs have.
+/// Adds the closures of `look_alikes`, in place of any true ones of these pairs.
 inline void add_look_alikes(CorridorRun& run, const CorridorRunConfig& config, Rng rng) {
   const auto truth_at = [&](RobotId robot, Timestamp stamp) {
     const Trajectory& truth = run.truth.at(robot);

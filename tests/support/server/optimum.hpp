@@ -8,7 +8,7 @@
 
 namespace tutti::server::test {
 
-/// What the map believes costs no more at its poses than at any other solution that is found from the measurements: by
+/// The factors of the map cost no more at its poses than at any other solution that is found from the measurements: by
 /// the chordal relaxation, or from dead reckoning. Not asked are maps that bundle adjustment refines, and those where
 /// odometry was found to have failed, as their graph is less sure of that segment than the solution's was.
 inline void expect_optimum(const MapServer& server) {

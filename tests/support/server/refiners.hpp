@@ -10,7 +10,7 @@
 /// Who refines maps in tests: submaps with a cloud.
 namespace tutti::server::test {
 
-/// Knows the truth of world.hpp to a millimetre. What is fixed stays where it is.
+/// Knows the truth of world.hpp to a millimetre. Fixed submaps stay where they are.
 class Oracle final : public MapRefiner {
  public:
   [[nodiscard]] bool can_refine(const PayloadSize& size) const override { return size.points > 0; }

@@ -6,7 +6,7 @@
 
 #include "support/wire/messages.hpp"
 
-/// What cameras saw, for the tests of wire/.
+/// Visual payloads, for the tests of wire/.
 namespace tutti::wire::test {
 
 inline ImuPreintegration any_imu(Rng& rng, std::uint32_t from_keyframe) {

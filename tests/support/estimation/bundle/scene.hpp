@@ -42,7 +42,7 @@ inline Pose3 scene_pose(double t, int keyframes_per_circle) {
   return {yaw * so3_exp({0.1 * std::sin(2.0 * w * t), 0.1 * std::cos(3.0 * w * t), 0.0}), position};
 }
 
-/// What an ideal IMU at rest in that motion would measure, by central differences.
+/// The sample of an ideal IMU at rest in that motion, by central differences.
 inline ImuSample scene_imu(double t, int keyframes_per_circle) {
   constexpr double h = 1e-3;
   const Pose3 before = scene_pose(t - h, keyframes_per_circle);
@@ -71,7 +71,7 @@ struct Scene {
   RefinementInput input;
   std::vector<Pose3> truth;  ///< T_world_body per keyframe.
   std::vector<Eigen::Vector3d> points;
-  std::map<LandmarkId, std::size_t> point_of;  ///< What each landmark really is.
+  std::map<LandmarkId, std::size_t> point_of;  ///< The point that each landmark really is.
 };
 
 class SceneMaker {
@@ -140,7 +140,7 @@ class SceneMaker {
     }
   }
 
-  /// What keyframe k sees: the same pixels whoever asks.
+  /// The views of keyframe k: the same pixels whoever asks.
   const std::map<std::size_t, Eigen::Vector2f>& views(int k, int number) {
     const auto [it, is_new] = views_.try_emplace({k, number});
     if (!is_new) return it->second;

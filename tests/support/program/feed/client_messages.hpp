@@ -6,7 +6,7 @@
 #include "tutti/program/feed/internal/feed_messages.hpp"
 #include "tutti/wire/field_bytes.hpp"
 
-/// What a client of the live feed sends, as its messages (feed.proto). Clients are other programs.
+/// Writes the messages (feed.proto) of a client of the live feed. Clients are other programs.
 namespace tutti::program::test {
 
 using internal::write;

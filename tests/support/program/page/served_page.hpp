@@ -29,7 +29,7 @@ namespace tutti::page::served {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-/// What the server answers to a request of ours.
+/// The server's answer to a request of ours.
 inline std::pair<int, json> ask(httplib::Client http, const char* path, const json& body,
                                 const httplib::Headers& headers = {{"X-Tutti", "1"}}) {
   const auto answer = http.Post(path, headers, body.dump(), "application/json");
