@@ -277,7 +277,7 @@ class CommandLine(unittest.TestCase):
                                      out / "report.json", "--json").stdout)
         for figure in ("mean_m", "p95_m", "within_10cm"):
             self.assertAlmostEqual(map_error["map_to_survey"][figure], report["server"]["map_error"][figure], delta=1e-5)
-        # What the server's map says about the robots' odometry, from the files alone.
+        # The server's map is compared with the robots' odometry, from the files alone.
         self.expect(tutti("compare", out, out, "--out", out / "compare"), 0, "alpha", "bravo", "compare.html")
         compared = json.loads((out / "compare" / "compare.json").read_text())
         self.assertEqual([robot["name"] for robot in compared["robots"]], ["alpha", "bravo"])

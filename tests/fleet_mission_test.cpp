@@ -57,7 +57,7 @@ std::size_t joining_submaps(const formats::PyfgFile& graph) {
   }));
 }
 
-/// What is true of every fleet, whatever is made of its closures.
+/// Checks what is true of every fleet, whatever is made of its closures.
 void expect_the_graph(const FleetRun& run) {
   const auto& [record, graph] = run;
   std::size_t keyframes = 0;

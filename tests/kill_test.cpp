@@ -91,11 +91,11 @@ struct Killer {
   }
 };
 
-/// What a program of its own would be: a node, its port, and its store, which outlives both.
+/// Stands for a program of its own: a node, its port, and its store, which outlives both.
 template <class Node>
 struct Program {
   Endpoint self;
-  storage::MemoryStore::Tables saved;  ///< What lies on its disk while nobody runs.
+  storage::MemoryStore::Tables saved;  ///< Its disk while nobody runs.
   std::unique_ptr<storage::MemoryStore> store;
   std::unique_ptr<bus::Port> port;
   std::unique_ptr<Node> node;
@@ -103,8 +103,8 @@ struct Program {
 
 class Mission {
  public:
-  /// `refiner`: null for a map that is its pose graph's. `unchanged_every_s`: the server's setting. What it keeps back
-  /// is sent at once by a server that starts again, so robots get other maps meanwhile than without a kill.
+  /// `refiner`: null for a map that is its pose graph's. `unchanged_every_s`: the server's setting. A server that
+  /// starts again sends at once what it keeps back, so robots get other maps meanwhile than without a kill.
   Mission(const World& world, const bus::LinkConfig& link, Killer& killer,
           std::shared_ptr<const server::MapRefiner> refiner = nullptr, double unchanged_every_s = 0.0)
       : world_(world),
@@ -205,7 +205,7 @@ class Mission {
       static_cast<void>(carry_out(program, "start", program.node->resume(now_)));
     if constexpr (std::is_same_v<Node, node::ServerNode>) compute();
   }
-  /// What was there before goes out again before anything new comes: robots hear what they would have heard.
+  /// The map of before goes out again before anything new comes: robots hear what they would have heard.
   void compute() {
     const auto is_due = [&] { return server_.node->next_timer() && *server_.node->next_timer() <= now_; };
     while (computes_at_once_ && !server_.node->has_map() && !server_.node->map_server().has_news() && is_due())
@@ -282,7 +282,7 @@ class Mission {
     const Trajectory& odometry = world_.recordings[r].recording.odometry;
     while (next_[r] < odometry.size() && odometry[next_[r]].stamp <= now_) feed_until(r, next_[r] + 1);
   }
-  /// What the robot had taken and not stored, before it hears anything.
+  /// Feeds what the robot had taken and not stored, before it hears anything.
   void feed_again(std::size_t r) {
     const Trajectory& odometry = world_.recordings[r].recording.odometry;
     const auto newest = robots_[r].node->agent().newest_sample();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What makes each scenario of missions/ the scenario it is, by the truth: where the error is and how large, what the
-// server's map does over time; and that robots end as good as that map. Bounds on errors: about 1.5 times the measured.
+// The traits of each scenario of missions/, by the truth: where the error is and how large, what the server's map does
+// over time; and that robots end as good as that map. Bounds on errors: about 1.5 times the measured.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -58,14 +58,14 @@ std::vector<FromStart> from_start(const Recording& recording) {
   return out;
 }
 
-/// What odometry makes of a segment, seen at its end: right tangent.
+/// The error of odometry over a segment, seen at its end: right tangent.
 Vector6d error_over(const Recording& recording, std::size_t from, std::size_t until) {
   const auto increment = [&](const Trajectory& t) { return t[from].pose.inverse() * t[until].pose; };
   return local(increment(recording.reference), increment(recording.odometry));
 }
 
-/// What a robot that corrects itself is to be: as good as the server's map, and better than its odometry where that is
-/// not as good anyway.
+/// A robot that corrects itself is to be as good as the server's map, and better than its odometry where that is not as
+/// good anyway.
 void expect_repaired(const MissionRecord& record, const std::string& what) {
   EXPECT_EQ(record.server.components, 1U) << what;
   ASSERT_TRUE(record.server.closure_check.has_value()) << what;
@@ -140,7 +140,7 @@ TEST(Scenarios, SpinTurnsHalfOfTheTrajectoryAboutTheStartAndDistancesToItCannotS
   }
   EXPECT_NEAR(error, 11.8, 1.5);
   EXPECT_LT(seen, 0.06 * error);
-  // What distances do see is the ordinary drift: without the spin it is as large.
+  // Distances do see the ordinary drift: without the spin it is as large.
   lab::MissionConfig straight = config;
   straight.simulation.robots[0].odometry.scripted.clear();
   double ordinary = 0.0;

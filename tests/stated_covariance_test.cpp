@@ -51,7 +51,7 @@ void drive(robot::RobotAgent& agent, double sigma_m, double sigma_rad, double ot
   agent.finish();
 }
 
-/// What the server makes of the robot's submaps and true closures, 1 cm and 1 mrad off.
+/// The server's map of the robot's submaps and true closures, 1 cm and 1 mrad off.
 server::MapEstimate map_of(robot::RobotAgent& agent) {
   server::SubmapSet submaps;
   for (SubmapMessage& message : agent.take_outgoing())

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A fuzzer that any compiler builds: mutations of the corpus, always the same ones in the same order, for so
-// many seconds. Some inputs are grown, up to a million bytes. What fails, or takes too much time or memory, is written
-// to a file, which replays it.
+// many seconds. Some inputs are grown, up to a million bytes. An input that fails, or takes too much time or memory, is
+// written to a file, which replays it.
 //   tutti_fuzz TARGET SECONDS CORPUS [SEED]    tries mutations of the files in CORPUS/TARGET
 //   tutti_fuzz TARGET FILE                     tries this input
 //   tutti_fuzz --write-seeds CORPUS            writes the seeds
@@ -38,7 +38,7 @@ constexpr std::uint64_t kGrownFirst = 2;  // before any other input
 constexpr double kGrown = 0.002;          // the share of the others
 constexpr double kSanitized = 5.0;        // times slower
 
-/// What one input may cost.
+/// The most that one input may cost.
 double most_cpu_s(std::size_t size) { return 5.0 + 1e-5 * static_cast<double>(size); }
 std::size_t most_memory(std::size_t size) { return 256 * kMegabyte + 256 * size; }
 

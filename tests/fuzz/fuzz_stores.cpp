@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What stores contain, and what is left of them.
+// The contents of stores, and what is left of them.
 #include <unistd.h>
 
 #include <Eigen/LU>

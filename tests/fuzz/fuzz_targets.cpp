@@ -56,7 +56,7 @@ namespace {
 
 using wire::MessageKind;
 
-/// What was decoded can be encoded and decoded again. The first byte decides whether the others are a frame, or what is
+/// A decoded value can be encoded and decoded again. The first byte decides whether the others are a frame, or what is
 /// in one: few mutations of a frame pass its checksum.
 template <class Decode>
 void frame(MessageKind kind, std::string_view bytes, const Decode& decode) {
@@ -158,7 +158,7 @@ void kitti_poses(std::string_view bytes) {
   static_cast<void>(formats::parse_kitti_poses(bytes, "fuzz", 10.0, Timestamp{0}));
 }
 
-/// What is counted adds up, whatever is in the file.
+/// Counts add up, whatever is in the file.
 void add_up(bags::BagReader& bag) {
   const bags::BagInfo info = bags::inspect(bag);
   std::uint64_t messages = 0;
@@ -194,7 +194,7 @@ void grid(std::string_view bytes) {
       TUTTI_CHECK(bags::decode_occupancy_grid(**made), "what a grid is made into is none");
   }
 }
-/// What was read can be written; and a message about its keys is short.
+/// A document that was read can be written; and a message about its keys is short.
 void yaml(std::string_view bytes) {
   const auto node = parse_yaml(std::string(bytes), "fuzz");
   if (!node) return;
@@ -203,7 +203,7 @@ void yaml(std::string_view bytes) {
   if (const Status read = load_config(*node, settings, "fuzz"); !read)
     TUTTI_CHECK(read.error().message.size() < 100'000, "a message of {} letters", read.error().message.size());
 }
-/// The first byte decides which type. What is a cloud is one of points, too, and an image a picture or depth.
+/// The first byte decides which type. A cloud is one of points, too, and an image a picture or depth.
 void message(std::string_view bytes, bags::RosEncoding encoding) {
   if (bytes.empty()) return;
   const std::string_view rest = bytes.substr(1);

@@ -109,8 +109,8 @@ class IntrudersSystem : public ::testing::Test {
   std::vector<std::unique_ptr<Running>> robots_;
 };
 
-/// What a robot that was lost, a worker, a viewer and a second program with alpha's credential send, again and again
-/// while the mission runs.
+/// Sends what a robot that was lost, a worker, a viewer and a second program with alpha's credential do, again and
+/// again while the mission runs.
 void intrude(const bus::NatsConnection& connection) {
   NodeStatus bravo{.name = "bravo", .version = "0"};
   bravo.session = test::kSession + 1;

@@ -124,7 +124,7 @@ std::string scan(std::int64_t i) {
   return bags::encode(bags::to_point_cloud({{kStart + i * kPeriod}, "lidar"}, points));
 }
 
-/// What ROS's drivers publish is heard, and what tutti answers comes back: one transform for each sample of odometry.
+/// ROS's drivers are heard, and tutti's answers come back: one transform for each sample of odometry.
 TEST_P(RosDiscovery, ARobotHearsAndIsHeard) {
   const auto ros = join(GetParam().configuration);
   const auto odom = ros->writer("/r1/odom", kOdometry, {.depth = 1000}, "").value();

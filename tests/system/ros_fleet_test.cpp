@@ -121,7 +121,7 @@ class RosFleet : public ::testing::TestWithParam<bool>, protected ros::test::Pro
   RosFleet() : Programs("ros_fleet_", kPatience_s) {}
 };
 
-/// What one robot's stack has.
+/// The grid and path of one robot's stack.
 struct Stack {
   std::string prefix;  ///< Its frames begin with this.
   std::unique_ptr<ros::Reader> grid, path;

@@ -164,7 +164,7 @@ agent: {submap: {duration_s: 6.0}}
 closures: {verifier: lidar}
 )";
 
-/// What is published of map -> odom, by robot: its stamps, and when that was.
+/// The published transforms map -> odom of a robot: their stamps, and when that was.
 struct Heard {
   std::vector<Timestamp> stamps, published;
 };
@@ -205,7 +205,7 @@ std::string latency_of(const Heard& heard, const std::map<Timestamp, Timestamp>&
   return fmt::format("{} of {}: {}", latencies_ms.size(), heard.stamps.size(), in_words(latencies_ms));
 }
 
-/// What submaps carry, by robot and number: of the same images it is as much.
+/// The payloads of submaps, by robot and number: those of the same images are as large.
 using Sizes = std::map<std::pair<std::uint32_t, std::uint32_t>, PayloadSize>;
 struct Closed {
   server::MapEstimate estimate;
