@@ -27,7 +27,7 @@ def in_pythons_words(text):
 
 
 def split_doc(doc):
-    """What pybind11 puts first, the signature, and what follows."""
+    """The signature, which pybind11 puts first, and the rest."""
     first, _, rest = (doc or "").strip().partition("\n")
     return in_pythons_words(first), inspect.cleandoc(rest)
 

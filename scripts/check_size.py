@@ -50,7 +50,7 @@ def room_of(order, relative):
 
 
 def tags_of(headers):
-    """What headers declare, by Universal Ctags."""
+    """The declarations in headers, by Universal Ctags."""
     if shutil.which("ctags") is None:
         raise ValueError("ctags is not installed: apt install universal-ctags")
     made = subprocess.run(["ctags", "--output-format=json", "--languages=C++", "--langmap=C++:.hpp", "--kinds-C++=+p", "--fields=+sKa",

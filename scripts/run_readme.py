@@ -117,7 +117,7 @@ def run_live(reader, lines):
 
 
 def run(page, program):
-    """What is wrong with the commands, each with what it said."""
+    """The commands that failed, each with its output."""
     if not shutil.which("nats-server"):
         raise SystemExit(print("TUTTI_ALL_SKIPPED: no nats-server; apt install nats-server"))
     with tempfile.TemporaryDirectory() as folder:

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a person meets at the command line: exit codes and messages. Usage: cli_test.py TUTTI_PROGRAM SOURCE_DIR [CommandLine.TEST...]"""
+"""The command line as a person meets it: exit codes and messages. Usage: cli_test.py TUTTI_PROGRAM SOURCE_DIR [CommandLine.TEST...]"""
 import contextlib
 import json
 import math

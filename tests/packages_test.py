@@ -20,7 +20,7 @@ def run(*command, **more):
 
 
 def names_in(relation):
-    """Of "a (>= 1), b | c"."""
+    """The names in "a (>= 1), b | c"."""
     return set(re.findall(r"(?:^|[,|])\s*([a-z0-9.+-]+)", relation))
 
 

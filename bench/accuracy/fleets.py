@@ -159,7 +159,7 @@ def is_worse(estimate_m, odometry_m):
 
 
 def avoidably_worse_updates(report):
-    """Of the updates whose closures a perfect judge has judged, too: how many leave a robot worse than its odometry though the judge's
+    """Counts updates whose closures a perfect judge has judged, too: how many leave a robot worse than its odometry though the judge's
     map would not, and how many these are."""
     judged = [(update["policies"][report["default_policy"]]["rmse_m"], update["onboard_rmse_m"], update["perfect_rmse_m"])
               for robot in report["robots"] for update in robot["course"]]

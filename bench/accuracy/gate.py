@@ -107,7 +107,7 @@ def print_table(lines):
 
 
 def last_lines(lines, name, version, figures):
-    """What is worse and what is better, and then the line for a commit."""
+    """The figures that are worse or better, and then the line for a commit."""
     count = lambda verdict: sum(line.verdict.startswith(verdict) for line in lines)
     out = [f"{line.verdict}: {line.figure}: {shown(line.committed)} -> {shown(line.now)}"
            for verdict in ("better", "WORSE") for line in lines if line.verdict.startswith(verdict)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the gate runs, and the figures that it takes from it.
+"""The runs of the gate, and the figures that it takes from them.
 
 A job gives figures by name, each with its kind (gate.py, KINDS). One whose files are not there gives none.
 """
@@ -51,7 +51,7 @@ def outcome(places, job, source, seed=1, settings=()):
 
 
 def mission_figures(report, timing):
-    """What every mission is asked for. A robot without a reference is compared with the map."""
+    """The figures that every mission is asked for. A robot without a reference is compared with the map."""
     figures = {}
     for robot in report["robots"]:
         own = robot["policies"][report["default_policy"]]

@@ -201,7 +201,7 @@ def cells(robots):
 
 
 def start_cells(once, often):
-    """Of all starts; a submap that begins with one is over after 10 s."""
+    """The cells of all starts; a submap that begins with one is over after 10 s."""
     all_starts = [start for robots in (once, often) for robot in robots for start in robot["starts"]]
     starts = [start["fix_after_s"] for start in all_starts]
     fixes = sorted(after for after in starts if after is not None)
@@ -230,7 +230,7 @@ def right_at_the_end(robot):
 
 
 def beside_cells(robots, key, cpu_ms):
-    """Of one method's robots, by the scores under `key`."""
+    """The cells of one method's robots, by the scores under `key`."""
     scores = [robot[key] for robot in robots if robot[key] and robot[key]["scored"]]
     scored, wrong = sum(score["scored"] for score in scores), sum(score["wrong"] for score in scores)
     published = [f"{wrong} of {scored}", percent(wrong / scored) if scored else "-"]

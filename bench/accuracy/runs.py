@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the accuracy scripts share: one run of tutti as JSON, and rows of Markdown tables."""
+"""Shared by the accuracy scripts: one run of tutti as JSON, and rows of Markdown tables."""
 import hashlib
 import json
 import pathlib

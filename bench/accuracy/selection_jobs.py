@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What bench/accuracy/selection.py runs: every job once, its result kept in a folder, several at a time; and the rows
+"""The jobs of bench/accuracy/selection.py: every job once, its result kept in a folder, several at a time; and the rows
 that are read from them."""
 import concurrent.futures
 import json

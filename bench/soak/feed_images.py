@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a robot's live feed costs: how soon odometry at 200 Hz is answered, alone and beside stereo images at 20 Hz.
+"""Measures what a robot's live feed costs: how soon odometry at 200 Hz is answered, alone and beside stereo images at 20 Hz.
 Needs nats-server and python3-protobuf; PROTO_PYTHON_DIR as for tests/system/robot_feed_test.py.
 
 usage: feed_images.py TUTTI_PROGRAM PROTO_PYTHON_DIR [--stereo] [--seconds 30]

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""What strangers who connect and send nothing cost a bus with rights: a server with --pki, N connections that are opened again as
+"""Measures what strangers who connect and send nothing cost a bus with rights: a server with --pki, N connections that are opened again as
 soon as the bus closes them, and how long a member's `tutti status` takes before, meanwhile and afterwards. Prints a table for
 docs/results/robustness.md. The machine must allow this program N open files (ulimit -n).
 """

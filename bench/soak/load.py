@@ -36,7 +36,7 @@ def head(*cells):
 
 
 def status(folder):
-    """What a program last reported of itself, and when by the wall clock."""
+    """The newest status of a program, and when it was written by the wall clock."""
     file = folder / "status.json"
     try:
         return json.loads(file.read_text()), file.stat().st_mtime
@@ -130,7 +130,7 @@ class Mission:
 
 
 def latencies(mission, names):
-    """Of each submap, from when the server has stored it until its robot has taken up a map with it; lateness of each
+    """For each submap the time from when the server has stored it until its robot has taken up a map with it; lateness of each
     update."""
     stored, updates, late = [], [], [0.0]  # updates: (stored before it, revision)
     since = None  # mission time of the first news

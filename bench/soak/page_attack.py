@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""What an attack on the page costs the mission: robots of the fleet mission send submaps to a server whose page is attacked and left alone in
+"""Measures what an attack on the page costs the mission: robots of the fleet mission send submaps to a server whose page is attacked and left alone in
 turn. A commit is timed on the bus, from a robot's submap to the receipt that the server sends it after storing. Prints a table for
 docs/results/robustness.md. Without credentials, so that the attackers are also let to ask what
 only a viewer may. They are niced by 19: theirs is another machine's time.

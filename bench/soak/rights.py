@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""What TLS and rights cost a mission: `tutti mission up` without and with --pki, by turns. Prints for each the time that it took,
+"""Measures what TLS and rights cost a mission: `tutti mission up` without and with --pki, by turns. Prints for each the time that it took,
 what the robots' connections to the bus carried (as the kernel counts it: TLS, acknowledgements of NATS and all), the CPU time of
 the bus, and how long a fresh `tutti status` takes meanwhile; then whether the maps are the same to the bit. Prints a table for
 docs/results/robustness.md. Needs `ss` (package iproute2).

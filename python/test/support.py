@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the tests of the package share. Usage of each: PYTHONPATH=BUILD/python xyz_test.py TUTTI_PROGRAM SOURCE_DIR [unittest's]"""
+"""Shared by the tests of the package. Usage of each: PYTHONPATH=BUILD/python xyz_test.py TUTTI_PROGRAM SOURCE_DIR [unittest's]"""
 import pathlib
 import subprocess
 import sys
@@ -17,7 +17,7 @@ def run():
 
 
 def program(*arguments):
-    """What the program prints."""
+    """The program's output."""
     return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=120, check=True).stdout
 
 

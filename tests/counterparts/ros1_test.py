@@ -58,7 +58,7 @@ string frame_id
 
 
 def copied(said, out):
-    """What ROS 2's message says, in ROS 1's, whose fields have the same names."""
+    """ROS 1's message with the content of ROS 2's, whose fields have the same names."""
     for _, field in said.fields_:
         value = getattr(said, field)
         if field == "stamp":

@@ -28,7 +28,7 @@ class Places(common.ProgramsTest):
         return done.stdout
 
     def changed(self, bus):
-        """Of the map's submaps those of which a robot has said that something is gone or new."""
+        """The map's submaps of which a robot has said that something is gone or new."""
         places = common.json.loads(self.said(bus, "--json"))["places"]
         return {place["name"]: place for place in places if place["missing"] + place["appeared"] > 0}
 

@@ -39,7 +39,7 @@ def rows(file, table):
 
 
 def children(parent):
-    """Of a process."""
+    """The children of a process."""
     found = []
     for stat in pathlib.Path("/proc").glob("[0-9]*/stat"):
         try:
@@ -137,7 +137,7 @@ class ProgramsTest(unittest.TestCase):
             time.sleep(0.02)
 
     def wait_for_map(self, what="end"):
-        """Of a status that is written after this is asked: the one before may not know the last submaps yet."""
+        """Waits for a status that is written after this is asked: the one before may not know the last submaps yet."""
         asked = time.time()
         file = self.path / "server/status.json"
         self.wait_for(lambda: file.stat().st_mtime > asked + 0.1 and self.status("server")["pending_jobs"] == 0 and
@@ -318,7 +318,7 @@ class Programs(ProgramsTest):
         self.expect_same_map_file()
 
     def test_a_bare_worker_has_the_servers_settings(self):
-        """Of a LiDAR's mission, and not the default ones: no pair is ever one place."""
+        """Those of a LiDAR's mission, and not the default ones: no pair is ever one place."""
         settings = ["--set", "closures.verifier=lidar", "--set", "simulation.sensors=lidar", "--set", "duration_s=40",
                     "--set", "agent.submap.duration_s=8", "--set", "closures.min_submap_gap=1",
                     "--set", "closures.lidar.min_points=999000"]

@@ -22,7 +22,7 @@ PIECE = 128 << 10
 
 
 def put_row(file, key, value):
-    """Of a map's table `meta`, with its hash (docs/storage.md)."""
+    """Writes a row of a map's table `meta`, with its hash (docs/storage.md)."""
     code = 0xcbf29ce484222325
     for byte in key.encode() + value:
         code = ((code ^ byte) * 0x100000001b3) & 0xffffffffffffffff
@@ -71,7 +71,7 @@ class Publish(common.ProgramsTest):
         return self.status("charlie").get("localisation_why", "")
 
     def missing(self):
-        """Of the map that is being fetched, when that was begun each time."""
+        """How many pieces were missing each time that fetching the map was begun."""
         return [int(found) for found in re.findall(r"(\d+) of \d+ pieces are missing", self.log())]
 
     def log(self):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is sent to a robot, and sent again: run by tutti_ros_test.py."""
+"""Sending to a robot, and sending again: run by tutti_ros_test.py."""
 import struct
 import unittest
 

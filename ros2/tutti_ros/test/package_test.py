@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What colcon and ros2 launch take: run by tutti_ros_test.py."""
+"""The package as colcon and ros2 launch take it: run by tutti_ros_test.py."""
 import pathlib
 import shutil
 import subprocess

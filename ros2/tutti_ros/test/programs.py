@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What tests with programs at the other end have in common."""
+"""Shared by tests with programs at the other end."""
 import json
 import os
 import pathlib
@@ -42,7 +42,7 @@ class WithPrograms(unittest.TestCase):
         return server, words[words.index("--bus") + 1]
 
     def run_tutti(self, *arguments):
-        """What it prints, once it has ended well."""
+        """Its output, once it has ended well."""
         done = subprocess.run([TUTTI, *map(str, arguments)], capture_output=True, text=True)
         self.assertEqual(done.returncode, 0, done.stderr)
         return done.stdout
@@ -79,7 +79,7 @@ class WithPrograms(unittest.TestCase):
             return {}
 
     def fed(self, name):
-        """What its status reports of its feed."""
+        """The feed's part of its status."""
         return self.status(name).get("feed", {})
 
     def wait_for_map(self):

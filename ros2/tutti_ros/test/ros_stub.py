@@ -108,7 +108,7 @@ for type_name, text in DEFINITIONS.items():
 
 
 class Reader:
-    """Of XCDR1: alignment counts from the end of the encapsulation header."""
+    """In XCDR1 alignment counts from the end of the encapsulation header."""
 
     def __init__(self, cdr):
         self.order, self.data, self.at = "<" if cdr[1] & 1 else ">", memoryview(cdr)[4:], 0

@@ -85,7 +85,7 @@ class Exporting(unittest.TestCase):
         self.addCleanup(self.source.close)
 
     def play(self, script):
-        """What the program does in the end."""
+        """Has the program do as the script says."""
         (self.path / "made.yaml").write_text(YAML)
         (self.path / "made.pgm").write_bytes(self.pgm)
         self.program.write_text(f'#!/bin/sh\necho "$@" >>{self.path}/runs\n{script}\n'

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What /diagnostics reports of the robot."""
+"""The robot's report on /diagnostics."""
 OK, WARN, ERROR = 0, 1, 2  # diagnostic_msgs/DiagnosticStatus
 COUNTED = ("odometry", "odometry_missed", "scans", "scans_missed", "fixes", "images", "imu", "corrections", "refused", "jumps", "forgotten_while_away")
 

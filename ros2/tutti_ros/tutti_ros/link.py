@@ -142,7 +142,7 @@ class Link:
 
     # The connection.
     def connected(self):
-        """What to send first."""
+        """Begins with a connection; returns the frame to send first."""
         self.state, self.received, self.welcome = "greeting", b"", None
         self.waiting.clear()
         self.once.clear()
@@ -158,7 +158,7 @@ class Link:
         return wait_s
 
     def next_frame(self):
-        """What to send now; empty: nothing."""
+        """The frame to send now; empty: none."""
         if self.state != "feeding":
             return b""
         if self.once:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What both nodes have: how they run, quality of service, diagnostics."""
+"""Shared by both nodes: how they run, quality of service, diagnostics."""
 import sys
 
 import rclpy

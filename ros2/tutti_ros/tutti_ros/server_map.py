@@ -126,7 +126,7 @@ class ServerMap:
         return None
 
     def signature_now(self):
-        """Of the files; another one where anything was stored. None: they are not there."""
+        """The state of the files; another one where anything was stored. None: they are not there."""
         def state(path):
             try:
                 found = path.stat()

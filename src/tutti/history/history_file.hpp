@@ -14,7 +14,7 @@ inline constexpr const char* kHistoryFile = "history.tutti";
 /// A history, whatever is at its place.
 struct OpenedHistory {
   std::unique_ptr<History> history;  ///< Never null.
-  std::string said;                  ///< What the operator should know, in a sentence; empty: nothing.
+  std::string said;                  ///< A sentence that the operator should read; empty: none.
 };
 
 /// Opens or makes a history in a file of at most kMostFile bytes. A file that is damaged, of a newer version or no
