@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Writes docs/results/starts.md: many starts without a start pose, in worlds that nothing was tuned on.
 
-Usage: bench/accuracy/starts.py TUTTI_PROGRAM [--starts 10000] [--jobs CORES] [--first-seed 1001]
+Usage: bench/accuracy/starts.py TUTTI_PROGRAM [--starts 10000] [--jobs CORES] [--first-seed 1001] [--keep FOLDER]
+A start takes about one second of one core. With --keep a bench that was stopped goes on where it was.
 """
 import argparse
+import collections
 import concurrent.futures
 import json
 import os
@@ -12,7 +14,7 @@ import pathlib
 import tempfile
 
 from localise import ONE_SUBMAP_S, percent, run, set_words
-from runs import mission_file, page, row, write_results
+from runs import SOURCE, mission_file, page, row, write_results
 
 MAPPED_M = 5.0
 # A name, the mission, how often robots forget where they are, and what is set: who maps comes first, robots that search begin when these
@@ -20,7 +22,7 @@ MAPPED_M = 5.0
 WORLDS = [
     ("a tunnel", "next_day", 15, ["simulation.robots.2.copies=8"]),
     ("a regular grid of look-alike corridors", "look_alike", 15, []),
-    ("a network of tunnels, half of it mapped", "next_day", 60, [
+    ("a network of tunnels, half of it mapped", "next_day", 15, [
         "simulation.robots.2.copies=8", "simulation.world.network.rows=4", "simulation.world.network.columns=4"]),
 ]
 
@@ -33,7 +35,20 @@ def starts_in(tutti, world, seed):
         run(tutti, "run", *common, "--set", "duration_s=500", "--map", folder / "map.tutti", "-o", folder / "mapped")
         run(tutti, "run", *common, "--map-in", folder / "map.tutti", "--frozen", "--restart-every", every_s,
             "-o", folder / "starts")
-        return json.loads((folder / "starts" / "localise.json").read_text())["robots"]
+        return (folder / "starts" / "localise.json").read_text()
+
+
+def robots_of(tutti, world, seed, keep):
+    """Those of one world, from the folder of a bench that was stopped if they are there."""
+    kept = keep / f"{world[0].replace(' ', '_')}-{seed}.json" if keep else None
+    if kept and kept.exists():
+        return json.loads(kept.read_text())["robots"]
+    text = starts_in(tutti, world, seed)
+    if kept:
+        part = kept.with_suffix(".part")
+        part.write_text(text)
+        part.rename(kept)
+    return json.loads(text)["robots"]
 
 
 def cells(robots):
@@ -55,23 +70,29 @@ def main():
     parser.add_argument("--starts", type=int, default=10000)
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--first-seed", type=int, default=1001)
+    parser.add_argument("--keep", type=pathlib.Path)
     arguments = parser.parse_args()
+    if arguments.keep:
+        arguments.keep.mkdir(parents=True, exist_ok=True)
     found = [[] for _ in WORLDS]
     done, seed = 0, arguments.first_seed
     with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
+        begin = lambda one: [pool.submit(robots_of, arguments.tutti, world, one, arguments.keep) for world in WORLDS]
+        ahead = collections.deque(begin(seed + i) for i in range(arguments.jobs))
         while done < arguments.starts:
-            seeds = range(seed, seed + arguments.jobs)
-            jobs = [(k, pool.submit(starts_in, arguments.tutti, world, one))
-                    for one in seeds for k, world in enumerate(WORLDS)]
-            for k, job in jobs:
-                found[k] += job.result()
-                done = sum(len(robot["starts"]) for robots in found for robot in robots)
-                print(f"{done} starts; " + "; ".join(f"{WORLDS[k][0]}: {', '.join(cells(robots))}"
-                                                     for k, robots in enumerate(found) if robots), flush=True)
-            seed += arguments.jobs
+            for robots, job in zip(found, ahead.popleft()):
+                robots += job.result()
+            done = sum(len(robot["starts"]) for robots in found for robot in robots)
+            print(f"{done} starts; " + "; ".join(f"{world[0]}: {', '.join(cells(robots))}"
+                                                 for world, robots in zip(WORLDS, found)), flush=True)
+            seed += 1
+            if done < arguments.starts:
+                ahead.append(begin(seed + arguments.jobs - 1))
+        pool.shutdown(cancel_futures=True)
     table = [row("world", "starts", "on mapped ground", "of these a fix in one submap", "fixes elsewhere", "ambiguous",
                  "wrong poses", "worst"), row("---", *["---:"] * 7)]
     table += [row(world[0], *cells(robots)) for world, robots in zip(WORLDS, found)]
+    _, section, by_hand = (SOURCE / "docs/results/starts.md").read_text().partition("\n## Wrong fixes")
     write_results("starts.md", page(
         "Starts without a start pose",
         ["Asked was how often a robot that knows nothing of where it is finds its place in somebody else's map, and whether it is",
@@ -83,7 +104,7 @@ def main():
         f"has been. *a fix in one submap*: within {ONE_SUBMAP_S} s: 10 s of driving, and scans that confirm what it shows. *ambiguous*: share of",
         "the whole time. *wrong poses*: published, and off in the map ([localise.md](localise.md)) by more than 1 m or 5 degrees. *worst*:",
         "error of a published pose there.",
-    ))
+    ) + [section + by_hand])
 
 
 if __name__ == "__main__":
