@@ -28,22 +28,30 @@ def without_partial(report):
     return report
 
 
-def report_of(*command, keep=None):
-    """report.json of one call of the program, without partial figures. Its output folder is thrown away; the report stays in
-    the folder `keep`, if there is one, and then the same call is not made again (use a new folder for a new program)."""
-    words = [str(part) for part in command]
-    kept = pathlib.Path(keep) / (hashlib.sha256(json.dumps(words).encode()).hexdigest()[:16] + ".json") if keep else None
+def remembered(keep, what, make):
+    """make(), which must be JSON. It stays in the folder `keep`, if there is one, and is then not made again for the same `what`
+    (use a new folder for a new program); a bench that was stopped goes on where it was."""
+    kept = pathlib.Path(keep) / (hashlib.sha256(json.dumps(what).encode()).hexdigest()[:16] + ".json") if keep else None
     if kept and kept.exists():
-        return without_partial(json.loads(kept.read_text()))
-    with tempfile.TemporaryDirectory() as out:
-        subprocess.run(words + ["--out", out], check=True, capture_output=True)
-        text = (pathlib.Path(out) / "report.json").read_text()
+        return json.loads(kept.read_text())
+    made = make()
     if kept:
         kept.parent.mkdir(parents=True, exist_ok=True)
         unfinished = kept.with_suffix(".unfinished")
-        unfinished.write_text(text)
+        unfinished.write_text(json.dumps(made))
         unfinished.rename(kept)
-    return without_partial(json.loads(text))
+    return made
+
+
+def report_of(*command, keep=None):
+    """report.json of one call of the program, without partial figures, by remembered(); its output folder is thrown away."""
+    words = [str(part) for part in command]
+
+    def make():
+        with tempfile.TemporaryDirectory() as out:
+            subprocess.run(words + ["--out", out], check=True, capture_output=True)
+            return json.loads((pathlib.Path(out) / "report.json").read_text())
+    return without_partial(remembered(keep, words, make))
 
 
 def outcome_of(out, *command):

@@ -3,18 +3,17 @@
 """Writes docs/results/starts.md: many starts without a start pose, in worlds that nothing was tuned on.
 
 Usage: bench/accuracy/starts.py TUTTI_PROGRAM [--starts 10000] [--jobs CORES] [--first-seed 1001] [--keep FOLDER]
-A start takes about one second of one core. With --keep a bench that was stopped goes on where it was.
+A start takes about one second of one core. With --keep a bench that was stopped goes on where it was (runs.remembered()).
 """
 import argparse
 import collections
 import concurrent.futures
-import json
 import os
 import pathlib
 import tempfile
 
-from localise import ONE_SUBMAP_S, percent, run, set_words
-from runs import SOURCE, mission_file, page, row, write_results
+from localise import ONE_SUBMAP_S, percent, robots_of, run, set_words
+from runs import SOURCE, mission_file, page, remembered, row, write_results
 
 MAPPED_M = 5.0
 # A name, the mission, how often robots forget where they are, and what is set: who maps comes first, robots that search begin when these
@@ -27,28 +26,19 @@ WORLDS = [
 ]
 
 
-def starts_in(tutti, world, seed):
+def starts_in(tutti, world, seed, keep):
+    """The robots of one world."""
     _, mission, every_s, settings = world
-    with tempfile.TemporaryDirectory() as folder:
-        folder = pathlib.Path(folder)
-        common = [mission_file(mission), "--seed", seed, *set_words(settings)]
-        run(tutti, "run", *common, "--set", "duration_s=500", "--map", folder / "map.tutti", "-o", folder / "mapped")
-        run(tutti, "run", *common, "--map-in", folder / "map.tutti", "--frozen", "--restart-every", every_s,
-            "-o", folder / "starts")
-        return (folder / "starts" / "localise.json").read_text()
 
-
-def robots_of(tutti, world, seed, keep):
-    """Those of one world, from the folder of a bench that was stopped if they are there."""
-    kept = keep / f"{world[0].replace(' ', '_')}-{seed}.json" if keep else None
-    if kept and kept.exists():
-        return json.loads(kept.read_text())["robots"]
-    text = starts_in(tutti, world, seed)
-    if kept:
-        part = kept.with_suffix(".part")
-        part.write_text(text)
-        part.rename(kept)
-    return json.loads(text)["robots"]
+    def make():
+        with tempfile.TemporaryDirectory() as folder:
+            folder = pathlib.Path(folder)
+            common = [mission_file(mission), "--seed", seed, *set_words(settings)]
+            run(tutti, "run", *common, "--set", "duration_s=500", "--map", folder / "map.tutti", "-o", folder / "mapped")
+            run(tutti, "run", *common, "--map-in", folder / "map.tutti", "--frozen", "--restart-every", every_s,
+                "-o", folder / "starts")
+            return robots_of(folder / "starts")
+    return remembered(keep, [*world, seed], make)
 
 
 def cells(robots):
@@ -70,14 +60,12 @@ def main():
     parser.add_argument("--starts", type=int, default=10000)
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--first-seed", type=int, default=1001)
-    parser.add_argument("--keep", type=pathlib.Path)
+    parser.add_argument("--keep", help="folder for finished worlds, which are not repeated")
     arguments = parser.parse_args()
-    if arguments.keep:
-        arguments.keep.mkdir(parents=True, exist_ok=True)
     found = [[] for _ in WORLDS]
     done, seed = 0, arguments.first_seed
     with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
-        begin = lambda one: [pool.submit(robots_of, arguments.tutti, world, one, arguments.keep) for world in WORLDS]
+        begin = lambda one: [pool.submit(starts_in, arguments.tutti, world, one, arguments.keep) for world in WORLDS]
         ahead = collections.deque(begin(seed + i) for i in range(arguments.jobs))
         while done < arguments.starts:
             for robots, job in zip(found, ahead.popleft()):
