@@ -204,10 +204,11 @@ void Localiser::follow(const Scan& scan) {
   ScanMatch match = match_scan(*local, usable->scan, track_->T_world_body.T_a_b);
   ++work_.registered;
   match.T_world_body.covariance *= kAlike;
-  // Off the map it may have been carried: what it must show there is what it had to show when it was found.
-  const bool is_guess = track_->to_confirm > 0 || state_ == State::off_map;
-  const Assessment assessment = is_guess ? assess_guess(match, track_->T_world_body, track_->gate)
-                                         : assess(match, track_->T_world_body, track_->usual_quality.value_or(0.0));
+  // Off the map it may have been carried: it must show what a found place must, as nobody vouches for where it is.
+  const bool is_guess = track_->to_confirm > 0, may_be_elsewhere = is_guess || state_ == State::off_map;
+  const Assessment assessment =
+      may_be_elsewhere ? assess_guess(match, track_->T_world_body, is_guess ? track_->gate : GuessGate::of_found())
+                       : assess(match, track_->T_world_body, track_->usual_quality.value_or(0.0));
   if (assessment.evidence != Evidence::confirms) return doubt(assessment, scan.stamp);
   confirm(match);
   if (track_->to_confirm == 0) map_fit_.see(*local, usable->scan, track_->T_world_body.T_a_b);
@@ -223,7 +224,6 @@ void Localiser::confirm(const ScanMatch& match) {
   track_->confirmed = track_->at.stamp;
   track_->overlap = match.overlap;
   if (track_->to_confirm > 0 && --track_->to_confirm > 0) return;
-  track_->gate = GuessGate::of_found();  // who gave a start pose does not vouch for where the robot is later
   state_ = State::localised;
   why_ = fmt::format("{:.0f} % of the scan lies on the map, {:.0f} % contradicts it", 100.0 * match.overlap,
                      100.0 * match.contradiction);

@@ -383,13 +383,13 @@ Scan spoiled(const Scan& scan, double share, Rng& rng) {
 /// that would do for a start pose: nobody vouches for where it is now.
 TEST(Localiser, OffTheMapItMustShowWhatAFoundPlaceMust) {
   const Recording& robot = world().robots[2];
-  for (const bool was_told : {false, true}) {
+  for (const bool has_start_pose : {false, true}) {
     Localiser one = localiser(world().map);
-    if (was_told) {
+    if (has_start_pose) {
       feed(robot, robot.odometry, 0, 1, one);
       ASSERT_TRUE(one.add(StartPose{RelativePose{robot.reference[0].pose, Matrix6d::Identity() * 0.01}}).has_value());
     }
-    std::size_t k = drive_until_localised(robot, one, was_told ? 1 : 0);
+    std::size_t k = drive_until_localised(robot, one, has_start_pose ? 1 : 0);
     Rng rng(4);
     const auto see = [&](int samples, double share) {
       for (const std::size_t end = k + static_cast<std::size_t>(samples); k < end; ++k) {
