@@ -83,18 +83,18 @@ int run(const SettingsOptions& options) {
 void add_settings_command(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<SettingsOptions>();
   auto* command = app.add_subcommand(
-      "settings", "List what an operator sets: key, default, bounds and meaning; --all: all there is to set.");
+      "settings", "List what an operator sets: key, default, bounds and meaning; --all, --simulation: everything.");
   command->footer(
       "A mission file sets them as YAML, tutti run with --set KEY=VALUE; robots[] stands for robots[0], robots[1], "
       "...\n"
-      "What one mission has: tutti run MISSION.yaml --print-config\n"
+      "All settings of one mission: tutti run MISSION.yaml --print-config\n"
       "Example: tutti settings agreement\n");
   command
       ->add_option("word", options->words, "Only what has this in its key or meaning; of several words, all of them.")
       ->type_name("WORD");
   command->add_flag("--all", options->all, "All that recordings and live robots have, not only what an operator sets");
   command->add_flag("--simulation", options->simulation,
-                    "What simulates robots, and spoils what they measure, find or say");
+                    "Settings that simulate robots, and spoil what they measure, find or say");
   command->add_option("--of", options->program, "All that a server, a robot or a worker knows of a mission file")
       ->type_name("PROGRAM")
       ->check(CLI::IsMember({"server", "robot", "worker"}));

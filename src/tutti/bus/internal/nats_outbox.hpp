@@ -47,7 +47,7 @@ class Outbox {
   void refuse(std::uint64_t number, Time now);
   /// Everything under way counts as refused.
   void refuse_all(Time now);
-  /// Pieces that were under way for too long wait again.
+  /// Parts that were under way for too long wait again.
   void expire(Time now);
   /// All that was under way waits again: the connection was gone, and with it maybe the messages.
   void resend_all();

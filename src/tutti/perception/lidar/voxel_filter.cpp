@@ -106,6 +106,7 @@ class VoxelTable {
     return slots_.size();
   }
 
+  /// False as of add().
   bool grow() {
     --shift_;
     slots_.assign(2 * slots_.size(), kFree);
