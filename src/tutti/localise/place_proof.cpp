@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/geometry/symmetric.hpp"
 #include "tutti/localise/scan_match.hpp"
 
 namespace tutti::localise {
@@ -31,6 +32,32 @@ std::vector<Hypothesis> turned(const Hypothesis& place) {
     T_world_body.rotation = Eigen::Quaterniond(turn) * T_world_body.rotation;
   }
   return out;
+}
+
+/// The place moved the way in which scans fix it least, which is along a tunnel, as it is and turned about.
+std::vector<Hypothesis> beside(const Hypothesis& place) {
+  const auto& [T_world_body, covariance] = place.T_world_body;
+  const Eigen::Vector3d along =
+      T_world_body.rotation * eigen_of(Eigen::Matrix3d(covariance.topLeftCorner<3, 3>())).vectors.col(2);
+  const std::vector<Hypothesis> turns = turned(place);
+  std::vector<Hypothesis> out{turns[1]};
+  for (const double step_m : {-8.0, -4.0, 4.0, 8.0}) {
+    for (Hypothesis one : {place, turns[1]}) {
+      one.T_world_body.T_a_b.translation += step_m * along;
+      out.push_back(std::move(one));
+    }
+  }
+  return out;
+}
+
+/// What a rival of the best must fit, where there is a best. Along a tunnel walls alone make most of the quality:
+/// beside the best it is how much more of the scans is not explained that tells. In eight wrong fixes this was 2.6
+/// times as much at most, at right places without a feature near 3.1 times at least.
+double least_of_rival(const std::vector<Hypothesis>& places, bool is_beside) {
+  constexpr double kMisfits = 3.0;
+  if (places.empty()) return 0.0;
+  const double best = places.front().quality, least = kRival * best;
+  return is_beside ? std::max(least, 1.0 - kMisfits * (1.0 - best)) : least;
 }
 
 bool is_better(const Hypothesis& a, const Hypothesis& b) { return a.quality > b.quality; }
@@ -69,7 +96,6 @@ std::optional<Hypothesis> proven(LocalMaps& maps, std::span<const ReadyScan> sca
     out.T_world_body = std::move(match.T_world_body);
     out.at = seen.at;
   }
-  if (!is_same_place(out, place, scans.back().at.pose)) return std::nullopt;
   out.quality = quality / count;
   out.shown = shown_by(overlap / count, contradiction / count, out.quality);
   return out;
@@ -80,12 +106,14 @@ std::vector<Hypothesis> all_proven(LocalMaps& maps, std::span<const ReadyScan> s
   std::ranges::stable_sort(found, is_better);
   if (found.size() > kMostProven) found.resize(kMostProven);
   std::vector<Hypothesis> out;
-  const auto prove = [&](const std::vector<Hypothesis>& places) {
+  const auto is_same = [&](const Hypothesis& a, const Hypothesis& b) {
+    return is_same_place(a, b, scans.back().at.pose);
+  };
+  const auto prove = [&](const std::vector<Hypothesis>& places, bool are_beside) {
     for (const Hypothesis& place : places) {
-      auto one = proven(maps, scans, place, out.empty() ? 0.0 : kRival * out.front().quality, registered);
-      if (!one) continue;
-      const auto same = std::ranges::find_if(
-          out, [&](const Hypothesis& other) { return is_same_place(other, *one, scans.back().at.pose); });
+      auto one = proven(maps, scans, place, least_of_rival(out, are_beside), registered);
+      if (!one || (!are_beside && !is_same(*one, place))) continue;
+      const auto same = std::ranges::find_if(out, [&](const Hypothesis& other) { return is_same(other, *one); });
       if (same == out.end())
         out.push_back(std::move(*one));
       else if (is_better(*one, *same))
@@ -93,8 +121,11 @@ std::vector<Hypothesis> all_proven(LocalMaps& maps, std::span<const ReadyScan> s
       std::ranges::stable_sort(out, is_better);
     }
   };
-  prove(found);
-  if (!out.empty()) prove(turned(out.front()));
+  prove(found, false);
+  if (!out.empty()) prove(turned(out.front()), false);
+  const bool counts = !out.empty() && out.front().shown != Shown::no &&
+                      (out.size() == 1 || out[1].quality < least_of_rival(out, false));
+  if (counts) prove(beside(out.front()), true);
   return out;
 }
 

@@ -131,14 +131,15 @@ inline std::shared_ptr<KnownMap> as_floors(const KnownMap& first, const KnownMap
   return out;
 }
 
-inline World make_world(std::uint64_t seed) {
+/// `featureless`: share of the tunnels that have nothing but walls.
+inline World make_world(std::uint64_t seed, double featureless = 0.0) {
   simulation::SimulationConfig config;
   config.sensors = "lidar";
   config.lidar.rays_share = 0.5;
   config.world.network.rows = 2;
   config.world.network.columns = 2;
   config.world.network.block_m = 22.0;
-  config.world.featureless_share = 0.0;
+  config.world.featureless_share = featureless;
   config.robots.resize(3);
   for (auto& robot : config.robots) {
     robot.walk.duration_s = 110.0;
