@@ -125,6 +125,11 @@ auto with_copy(const std::filesystem::path& file, Use use) -> decltype(use(file)
   const Status copied = storage::copy_sqlite_store(file, copy);
   auto made = copied ? use(copy) : tl::unexpected(copied.error());
   fs::remove_all(folder, failure);  // an open file stays until it is closed
+  if (!made) {                      // whoever reads the message knows the file, and not the copy
+    std::string& message = made.error().message;
+    if (const auto at = message.find(copy.string()); at != std::string::npos)
+      message.replace(at, copy.string().size(), file.string());
+  }
   return made;
 }
 

@@ -41,6 +41,8 @@ TEST(Content, OfAMapThatIsOpenACopyIsRead) {
   }
   EXPECT_TRUE(open(file).has_value());
   EXPECT_FALSE(open_copy(folder / "none").has_value());
+  ASSERT_TRUE(write_file((folder / "text").string(), "no map"));
+  EXPECT_EQ(open_copy(folder / "text").error().message.find((folder / "text").string() + ": not an SQLite file"), 0U);
   EXPECT_TRUE(fs::is_empty(temporary));
   setenv("TMPDIR", usual.c_str(), 1);
   fs::remove_all(folder);
