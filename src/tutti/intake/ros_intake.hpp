@@ -79,6 +79,8 @@ class RosIntake {
   enum class TfOf { all, robot };
   /// Adds the transforms of one message, and returns the first of their errors.
   Status add_tf(std::string_view bytes, bool is_static, TfOf of = TfOf::all, Encoding encoding = Encoding::cdr);
+  /// Transforms have come on a topic of the robot's own, by which it goes instead of /tf.
+  [[nodiscard]] bool has_own_frames() const { return has_own_odometry_ || !own_frames_.empty(); }
 
   /// The next odometry sample to feed, in order of arrival. With `wait_for_scans` it is held back until a scan with its
   /// stamp or a later one has arrived. Also held back, for waiting::kUnknown_s once, while the first scans wait

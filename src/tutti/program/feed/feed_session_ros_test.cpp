@@ -68,6 +68,47 @@ TEST_F(FeedSessionRos, OdometryIsAnsweredAsEverAndAsMessagesToPublish) {
   EXPECT_FALSE(path[0].raw().data().empty());
 }
 
+/// As amcl or a SLAM node beside it does. Its own transforms come back from the same topic.
+TEST_F(FeedSessionRos, WhoeverElsePublishesWhereOdometryIsIsNamedOnce) {
+  begin();
+  std::vector<std::string> refused;
+  const auto hear = [&](const std::string& message) {
+    std::string own;
+    for (const Feed& told : say(1, message)) {
+      if (told.what_case() == Feed::kRefused) refused.push_back(told.refused().why());
+      if (told.what_case() == Feed::kRaw && told.raw().topic() == "/tf") own = told.raw().data();
+    }
+    return own;
+  };
+  const auto tf = [](const std::string& bytes) { return raw("/tf", "tf2_msgs/msg/TFMessage", bytes); };
+  for (int i = 0; i < 30; ++i) {
+    const std::string own = hear(odometry_at(i));
+    ASSERT_FALSE(own.empty());
+    hear(tf(own));
+    auto again = bags::decode_tf(own).value();  // as tutti_ros publishes it while the robot is silent
+    again.front().header.stamp.ns += 3;
+    hear(tf(bags::encode(again)));
+    hear(tf(transform(kStart + i * kPeriod, "r1/odom", "r1/base_link", {})));
+    hear(tf(transform(kStart + i * kPeriod, "map", "r2/odom", {})));
+  }
+  EXPECT_TRUE(refused.empty()) << refused.front();
+  for (int i = 30; i < 60; ++i) {
+    hear(tf(transform(kStart + i * kPeriod, "r1/map", "r1/odom", {Eigen::Quaterniond::Identity(), {2, 0, 0}})));
+    hear(odometry_at(i));
+  }
+  ASSERT_EQ(refused.size(), 1U);
+  EXPECT_EQ(refused[0].find("/tf: somebody else publishes r1/map -> r1/odom, as this robot does r1/map -> r1/odom"), 0U)
+      << refused[0];
+}
+
+TEST_F(FeedSessionRos, AFixedFrameOfOdometryBesideTheRobotsIsNamedToo) {
+  begin();
+  say(1, odometry_at(0));
+  const auto told = say(1, raw("/tf_static", "tf2_msgs/msg/TFMessage", transform(0, "map", "r1/odom", {})));
+  ASSERT_EQ(kinds(told), std::vector{Feed::kRefused});
+  EXPECT_EQ(told[0].refused().why().find("/tf_static: somebody else publishes map -> r1/odom"), 0U);
+}
+
 TEST_F(FeedSessionRos, TheClientStatesFramesAndToleranceAndIsAnsweredByItsOwnClock) {
   constexpr std::int64_t kOffset = 5 * kSecond;
   Feed::Ros ros;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/program/feed/ros_answers.hpp"
 
+#include <algorithm>
+
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::program {
@@ -67,12 +69,20 @@ std::optional<std::string> RosAnswers::transform() {
                                        .child_frame_id = odom_,
                                        .translation = last_->T_map_odom.translation,
                                        .rotation = last_->T_map_odom.rotation}};
+  if (own_.empty()) first_own_ = out.front().header.stamp;
+  own_.push_back(out.front().translation);
+  if (own_.size() > kMostOwn) own_.pop_front();
   said_world_.reset();
   if (T_world_map_ && world_ != map_) {
     out.push_back(world_transform(*said_));
     said_world_.emplace(world_, *T_world_map_);
   }
   return bags::encode(out);
+}
+
+bool RosAnswers::may_be_own(const bags::RosTransform& heard) const {
+  return own_.empty() || heard.header.stamp <= first_own_ ||
+         (heard.header.frame_id == map_ && std::ranges::find(own_, heard.translation) != own_.end());
 }
 
 std::optional<std::string> RosAnswers::moved_world() {

@@ -50,6 +50,11 @@ class RosAnswers {
   [[nodiscard]] std::vector<std::pair<std::string, std::string>> team_mate_poses() const;
 
   [[nodiscard]] const std::string& map_frame() const { return map_; }
+  [[nodiscard]] const std::string& odom_frame() const { return odom_; }
+  /// True for a transform to the odometry's frame that is one of the last of transform(), as it comes back from /tf,
+  /// also with another stamp, which tutti_ros gives it while the robot is silent; and for one from before the first of
+  /// these.
+  [[nodiscard]] bool may_be_own(const bags::RosTransform& heard) const;
 
  private:
   /// As transform() and moved_world() publish it.
@@ -59,6 +64,9 @@ class RosAnswers {
   double tolerance_s_;
   std::optional<FeedAnswer> last_;
   std::optional<Timestamp> said_;
+  static constexpr std::size_t kMostOwn = 1'000;
+  std::deque<Eigen::Vector3d> own_;  ///< Translations, for may_be_own().
+  Timestamp first_own_;
   std::optional<std::pair<std::string, Pose3>> said_world_;
   std::int64_t repeats_ns_ = 0;   // of moved_world() since said_
   Trajectory trajectory_;         ///< T_map_body

@@ -5,6 +5,7 @@
 
 #include <utility>
 
+#include "tutti/bags/robot_namespace.hpp"
 #include "tutti/bags/ros_encode.hpp"
 #include "tutti/bags/ros_messages.hpp"
 #include "tutti/bags/ros_types.hpp"
@@ -81,7 +82,31 @@ void RosClient::hear(const FeedTrajectory& trajectory) {
   if (answers_) answers_->hear(trajectory);
 }
 
+/// A frame has one parent, and tf2 takes whoever spoke last. Ten messages are no message that was under way.
+Status RosClient::look_for_others(const intake::RawMessage& raw) {
+  constexpr int kSure = 10;
+  if (!answers_ || others_ >= kSure || raw.bytes.find(answers_->odom_frame()) == std::string_view::npos) return {};
+  if (raw.topic == "/tf" && intake_.odometry().has_own_frames()) return {};  // another robot's, by the same names
+  const auto transforms = bags::decode_tf(raw.bytes);
+  if (!transforms) return {};
+  const bool is_static = bags::is_static_tf(raw.topic);
+  for (const bags::RosTransform& one : *transforms) {
+    if (bags::frame_name(one.child_frame_id) != answers_->odom_frame()) continue;
+    if (!is_static && answers_->may_be_own(one)) continue;
+    others_ += is_static ? kSure : 1;
+    if (others_ >= kSure)
+      return fail(ErrorCode::invalid,
+                  "{}: somebody else publishes {} -> {}, as this robot does {} -> {}: where two say where a frame is, "
+                  "the robot's pose jumps; stop the other, as amcl or a SLAM node, or have it publish no transform",
+                  plain_text(raw.topic, kLongest), plain_text(one.header.frame_id, kLongest), answers_->odom_frame(),
+                  answers_->map_frame(), answers_->odom_frame());
+  }
+  return {};
+}
+
 Status RosClient::add(const intake::RawMessage& raw) {
+  if (raw.type == bags::kTfType)
+    if (Status alone = look_for_others(raw); !alone) return alone;
   if (raw.type == bags::kTfType && !said_.world_frame.empty()) {
     const auto own = without_world(raw.bytes, said_.world_frame);
     return intake_.add(own ? intake::RawMessage{raw.topic, raw.type, raw.encoding, *own} : raw);

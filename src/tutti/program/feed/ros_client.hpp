@@ -55,6 +55,8 @@ class RosClient {
 
  private:
   Status take_start_pose(std::string_view cdr);
+  /// Said once, where somebody else publishes transforms to the odometry's frame.
+  Status look_for_others(const intake::RawMessage& raw);
   std::vector<FeedRaw> team_mates(const std::vector<TeamMate>& team_mates);
   RosClient(intake::IntakeConfig config, FeedRos ros) : said_(std::move(ros)), intake_(std::move(config)) {}
 
@@ -70,6 +72,7 @@ class RosClient {
   std::string world_;                 ///< Its frame.
   std::optional<Timestamp> located_;  ///< The last one that was published.
   bool wants_scan_ = false;
+  int others_ = 0;  ///< Transforms to the odometry's frame that are not this robot's.
 };
 
 }  // namespace tutti::program
