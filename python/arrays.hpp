@@ -124,6 +124,7 @@ void bind_clouds(py::module_& m);
 void bind_bags(py::module_& m);
 void bind_map_file(py::module_& m);
 void bind_mission(py::module_& m);
+void bind_localise(py::module_& m);
 void bind_robot(py::module_& m);
 void bind_server(py::module_& m);
 

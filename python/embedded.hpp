@@ -2,11 +2,13 @@
 #pragma once
 
 #include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include "settings.hpp"
 #include "tutti/base/config_io.hpp"
+#include "tutti/model/input.hpp"
 
 namespace tutti::python {
 
@@ -37,5 +39,9 @@ void set(Config& config, const py::dict& settings) {
   for (const std::string& assignment : to_assignments(settings)) check(apply_override(root, assignment));
   check(load_config(root, config, "settings"));
 }
+
+/// What Python says of a robot's odometry and of a sweep, as RobotAgent's docstrings have it.
+OdometrySample to_odometry(double stamp, const ArrayLike& T_odom_body, const ArrayLike& covariance);
+Scan to_scan(double stamp, const ArrayLike& points, const std::optional<ArrayLike>& age_s);
 
 }  // namespace tutti::python

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "mission.hpp"
+
+#include <chrono>
 #include <filesystem>
 
 #include "pose_graph.hpp"
 #include "settings.hpp"
 #include "tutti/lab/run_mission.hpp"
-#include "tutti/mapfile/make_map.hpp"
+#include "tutti/mapfile/hold_map.hpp"
 #include "tutti/mission/bag_mission.hpp"
 #include "tutti/mission/report/report.hpp"
 
@@ -42,13 +45,12 @@ std::function<void(const mission::Progress&)> watch(const py::object& progress) 
 
 struct Options {
   std::string data;
-  std::optional<std::string> out, map;
+  std::optional<std::string> out, map, map_in;
   std::uint64_t seed = 1;
   int threads = 0;
 };
 
-Outcome run(const Result<lab::MissionConfig>& config, const Options& options, const py::object& progress) {
-  const lab::MissionConfig mission = value_of(config);
+Outcome run(const lab::MissionConfig& mission, const Options& options, const py::object& progress) {
   check_range(options.threads, 0, 1024, "threads");
   mission::RunOptions run{
       .data = options.data, .seed = options.seed, .threads = options.threads, .version = TUTTI_VERSION};
@@ -58,8 +60,14 @@ Outcome run(const Result<lab::MissionConfig>& config, const Options& options, co
   if (options.map) {
     if (std::filesystem::exists(*options.map, failure))
       throw FileProblem(fmt::format("map: {}: is there already", *options.map));
-    run.keep_map = [&options](const storage::TableStore& map) { return mapfile::copy_map(map, *options.map); };
+    run.keep_map = [&options, &run](const storage::TableStore& map) {
+      return mapfile::keep_extended(run.map, map, *options.map);
+    };
   }
+  if (options.map_in && !options.map)
+    refuse("map_in: {} is not changed: say with map= where the map with what is added goes", *options.map_in);
+  const std::chrono::nanoseconds since_1970 = std::chrono::system_clock::now().time_since_epoch();
+  if (options.map_in) run.map = value_of(mapfile::read_held(*options.map_in, since_1970.count()));
   run.progress = watch(progress);
   const py::gil_scoped_release release;
   Outcome outcome{std::make_shared<const MissionRecord>(value_of(lab::run_mission(mission, run)))};
@@ -72,23 +80,17 @@ std::optional<std::string> optional_path(const std::optional<PathLike>& path) {
 }
 
 Outcome run_mission(const PathLike& mission, const PathLike& data, const std::optional<PathLike>& out,
-                    const std::optional<PathLike>& map, const py::dict& settings, std::uint64_t seed, int threads,
-                    const py::object& progress) {
-  const std::string file = path_of(mission);
-  return run(lab::load_mission(file, to_assignments(settings)),
-             {path_of(data), optional_path(out), optional_path(map), seed, threads}, progress);
+                    const std::optional<PathLike>& map, const std::optional<PathLike>& map_in, const py::dict& settings,
+                    std::uint64_t seed, int threads, const py::object& progress) {
+  return run(mission_config(mission, settings),
+             {path_of(data), optional_path(out), optional_path(map), optional_path(map_in), seed, threads}, progress);
 }
 
 Outcome run_bags(const py::dict& bags, const py::dict& topics, const std::optional<PathLike>& out,
-                 const std::optional<PathLike>& map, const py::dict& settings, std::uint64_t seed, int threads,
-                 const py::object& progress) {
-  std::vector<std::string> of_robots;
-  for (const auto& [name, path] : bags)
-    of_robots.push_back(py::str(name).cast<std::string>() + "=" + path_of(py::reinterpret_borrow<PathLike>(path)));
-  if (of_robots.empty()) refuse("bags: holds no robot, expected {{name: path}}");
-  const auto text = value_of(mission::bag_mission(of_robots, to_assignments(topics)));
-  return run(lab::parse_mission(text, "bags", to_assignments(settings)),
-             {"", optional_path(out), optional_path(map), seed, threads}, progress);
+                 const std::optional<PathLike>& map, const std::optional<PathLike>& map_in, const py::dict& settings,
+                 std::uint64_t seed, int threads, const py::object& progress) {
+  return run(bags_config(bags, topics, settings),
+             {"", optional_path(out), optional_path(map), optional_path(map_in), seed, threads}, progress);
 }
 
 Graph graph_of(const MissionRecord& record) {
@@ -148,8 +150,9 @@ void bind_robot_result(py::module_& m) {
 
 constexpr const char* kRunDoc = R"(
 
-out: folder for the report and its files; map: file for the server's map; neither is written unless it is named. settings:
-{"agent.submap.duration_s": 5}. The same mission, data and seed give the same result, whatever the threads (0: all cores).
+out: folder for the report and its files; map: file for the server's map; neither is written unless it is named. map_in: a
+map's file that the robots add to: no pose of it moves, and map has it with what is new (localise_mission() adds nothing).
+settings: {"agent.submap.duration_s": 5}. The same mission, data and seed give the same result, whatever the threads (0: all cores).
 progress: is called with mission time, its duration (seconds), submaps and accepted closures, as the mission goes on; what
 it raises, and Ctrl-C, end the mission. OSError: files. ValueError: settings, recordings.)";
 
@@ -164,6 +167,19 @@ std::vector<std::string> to_assignments(const py::dict& settings) {
     out.push_back(py::str(key).cast<std::string>() + "=" + text);
   }
   return out;
+}
+
+lab::MissionConfig mission_config(const PathLike& mission, const py::dict& settings) {
+  return value_of(lab::load_mission(path_of(mission), to_assignments(settings)));
+}
+
+lab::MissionConfig bags_config(const py::dict& bags, const py::dict& topics, const py::dict& settings) {
+  std::vector<std::string> of_robots;
+  for (const auto& [name, path] : bags)
+    of_robots.push_back(py::str(name).cast<std::string>() + "=" + path_of(py::reinterpret_borrow<PathLike>(path)));
+  if (of_robots.empty()) refuse("bags: holds no robot, expected {{name: path}}");
+  const auto text = value_of(mission::bag_mission(of_robots, to_assignments(topics)));
+  return value_of(lab::parse_mission(text, "bags", to_assignments(settings)));
 }
 
 void bind_mission(py::module_& m) {
@@ -202,14 +218,16 @@ void bind_mission(py::module_& m) {
 data: folder that the mission's file names are relative to.)") +
       kRunDoc;
   m.def("run_mission", &run_mission, "mission"_a, "data"_a = "", "out"_a = py::none(), "map"_a = py::none(),
-        "settings"_a = py::dict(), "seed"_a = 1, "threads"_a = 0, "progress"_a = py::none(), mission_doc.c_str());
+        "map_in"_a = py::none(), "settings"_a = py::dict(), "seed"_a = 1, "threads"_a = 0, "progress"_a = py::none(),
+        mission_doc.c_str());
   static const std::string bags_doc =
       std::string(R"(Runs what robots have recorded, {name: bag}, as `tutti run --bag` does: topics are found by type.
 
 topics: where several would do, {"alpha.scans": "/points", "alpha.odometry": "/odom"}.)") +
       kRunDoc;
   m.def("run_bags", &run_bags, "bags"_a, "topics"_a = py::dict(), "out"_a = py::none(), "map"_a = py::none(),
-        "settings"_a = py::dict(), "seed"_a = 1, "threads"_a = 0, "progress"_a = py::none(), bags_doc.c_str());
+        "map_in"_a = py::none(), "settings"_a = py::dict(), "seed"_a = 1, "threads"_a = 0, "progress"_a = py::none(),
+        bags_doc.c_str());
 }
 
 }  // namespace tutti::python

@@ -28,6 +28,7 @@ PYBIND11_MODULE(_tutti, m) {
   bind_bags(m);
   bind_map_file(m);
   bind_mission(m);
+  bind_localise(m);
   bind_robot(m);
   bind_server(m);
   m.attr("__name__") = own_name;

@@ -21,31 +21,12 @@ std::unique_ptr<Agent> make_agent(std::uint32_t robot, std::uint64_t session, co
 }
 
 void add_odometry(Agent& agent, double stamp, const ArrayLike& T_odom_body, const ArrayLike& covariance) {
-  const Timestamp at = to_stamp(stamp, "stamp");
-  const Pose3 T = to_pose(T_odom_body, "T_odom_body");
-  const Matrix6d of_step = to_matrix6(covariance, "covariance");
-  check(agent.call([&](RobotAgent& a) { return a.add(OdometrySample{at, T, of_step}); }));
+  const OdometrySample sample = to_odometry(stamp, T_odom_body, covariance);
+  check(agent.call([&](RobotAgent& a) { return a.add(sample); }));
 }
 
 void add_scan(Agent& agent, double stamp, const ArrayLike& points, const std::optional<ArrayLike>& age_s) {
-  Scan scan{.stamp = to_stamp(stamp, "stamp")};
-  if (age_s) {
-    const Doubles all = numbers(points, "points", {-1, 3}), ages = finite_numbers(*age_s, "age_s", {-1});
-    if (ages.size() != all.shape(0))
-      refuse("age_s: are {}, expected one of each of {} points", ages.size(), all.shape(0));
-    PointCloud cloud;
-    std::vector<float> of_points;
-    for (py::ssize_t i = 0; i < ages.size(); ++i) {
-      const Eigen::Vector3f point = Eigen::Vector3d(all.data() + 3 * i).cast<float>();
-      if (!point.allFinite()) continue;
-      cloud.points.push_back(point);
-      of_points.push_back(static_cast<float>(ages.data()[i]));
-    }
-    scan.cloud = std::make_shared<const PointCloud>(std::move(cloud));
-    scan.age_s = std::make_shared<const std::vector<float>>(std::move(of_points));
-  } else {
-    scan.cloud = std::make_shared<const PointCloud>(to_cloud(points, "points"));
-  }
+  const Scan scan = to_scan(stamp, points, age_s);
   check(agent.call([&](RobotAgent& a) { return a.add(scan); }));
 }
 
@@ -106,6 +87,32 @@ auto pose_of(const F& get) {
 }
 
 }  // namespace
+
+OdometrySample to_odometry(double stamp, const ArrayLike& T_odom_body, const ArrayLike& covariance) {
+  return {to_stamp(stamp, "stamp"), to_pose(T_odom_body, "T_odom_body"), to_matrix6(covariance, "covariance")};
+}
+
+Scan to_scan(double stamp, const ArrayLike& points, const std::optional<ArrayLike>& age_s) {
+  Scan scan{.stamp = to_stamp(stamp, "stamp")};
+  if (age_s) {
+    const Doubles all = numbers(points, "points", {-1, 3}), ages = finite_numbers(*age_s, "age_s", {-1});
+    if (ages.size() != all.shape(0))
+      refuse("age_s: are {}, expected one of each of {} points", ages.size(), all.shape(0));
+    PointCloud cloud;
+    std::vector<float> of_points;
+    for (py::ssize_t i = 0; i < ages.size(); ++i) {
+      const Eigen::Vector3f point = Eigen::Vector3d(all.data() + 3 * i).cast<float>();
+      if (!point.allFinite()) continue;
+      cloud.points.push_back(point);
+      of_points.push_back(static_cast<float>(ages.data()[i]));
+    }
+    scan.cloud = std::make_shared<const PointCloud>(std::move(cloud));
+    scan.age_s = std::make_shared<const std::vector<float>>(std::move(of_points));
+  } else {
+    scan.cloud = std::make_shared<const PointCloud>(to_cloud(points, "points"));
+  }
+  return scan;
+}
 
 void bind_robot(py::module_& m) {
   bind_values(m);

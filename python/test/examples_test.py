@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import tutti
 from clouds_test import room
-from support import SOURCE, InFolder, run, shift, turn, walk
+from support import SOURCE, InFolder, program, run, shift, turn, walk
 
 MISSION = """mission: small
 source: simulation
@@ -69,6 +69,15 @@ class Examples(InFolder):
         said = self.example("run_mission.py", self.path / "small.yaml", self.path / "map.tutti")
         self.assertIn("alpha:", said)
         self.assertIn("% free", said)
+
+    def test_localise(self):
+        (self.path / "small.yaml").write_text(MISSION)
+        tutti.run_mission(self.path / "small.yaml", map=self.path / "site.tutti")
+        program("simulate", self.path / "small.yaml", "-o", self.path / "bags")
+        said = self.example("localise.py", self.path / "site.tutti", self.path / "bags/bravo", self.path / "out.tum")
+        self.assertIn("searching; it has not seen enough yet", said)
+        self.assertIn("s: localised; ", said)
+        self.assertGreater(len(tutti.read_trajectory(self.path / "out.tum")), 50)
 
     def test_embed(self):
         self.assertIn("corrected", self.example("embed.py"))

@@ -189,6 +189,15 @@ double LocalisedRobot::share(localise::State state) const {
   return duration_s > 0.0 ? in_state_s / duration_s : 0.0;
 }
 
+Trajectory LocalisedRobot::published(std::uint32_t floor) const {
+  Trajectory out;
+  for (const localise::Located& located : course)
+    if (located.state == localise::State::localised && located.T_world_body && located.floor == floor &&
+        (out.empty() || out.back().stamp < located.stamp))
+      out.push_back({located.stamp, located.T_world_body->T_a_b});
+  return out;
+}
+
 std::map<SubmapId, localise::PlaceTrust> trust_of(const std::vector<LocalisedRobot>& robots) {
   std::map<SubmapId, localise::PlaceTrust> out;
   for (const LocalisedRobot& robot : robots)

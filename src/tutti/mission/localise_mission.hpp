@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
@@ -16,6 +17,7 @@
 #include "tutti/mission/mission_config.hpp"
 #include "tutti/mission/recordings.hpp"
 #include "tutti/model/start_pose.hpp"
+#include "tutti/model/trajectory.hpp"
 #include "tutti/server/closure_verifier.hpp"
 
 namespace tutti::mission {
@@ -56,6 +58,8 @@ struct LocalisedRobot {
   std::vector<std::string> troubles;                ///< RobotActor::troubles()
   /// Share of the time in this state.
   [[nodiscard]] double share(localise::State state) const;
+  /// The poses on this floor of the map, in its frame, that were published as localised.
+  [[nodiscard]] Trajectory published(std::uint32_t floor) const;
 };
 
 /// The robots' findings on each submap of the map that any of them saw.

@@ -174,12 +174,8 @@ std::string changes_of(const LocalisedRobot& robot, const localise::KnownMap& ma
 Status write_published(const LocalisedRobot& robot, const localise::KnownMap& map,
                        const std::filesystem::path& out_dir) {
   for (std::uint32_t floor = 1; floor <= map.floors; ++floor) {
-    Trajectory published;
-    for (const Located& located : robot.course)
-      if (located.state == State::localised && located.T_world_body && located.floor == floor &&
-          (published.empty() || published.back().stamp < located.stamp))
-        published.push_back({located.stamp, located.T_world_body->T_a_b});
     const std::string name = floor == 1 ? "localised" : fmt::format("localised_floor_{}", floor);
+    const Trajectory published = robot.published(floor);
     if (auto ok = formats::write_tum((out_dir / trajectory_file_name(robot.name, name)).string(), published); !ok)
       return ok;
   }
@@ -188,22 +184,26 @@ Status write_published(const LocalisedRobot& robot, const localise::KnownMap& ma
 
 }  // namespace
 
-Status write_localised(const std::vector<LocalisedRobot>& robots, const localise::KnownMap& map,
-                       const std::filesystem::path& out_dir) {
-  if (auto made = make_folder(out_dir.string()); !made) return made;
+std::string localised_json(const std::vector<LocalisedRobot>& robots, const localise::KnownMap& map) {
   Json json{{"map", map.id},
             {"version", map.revision},
             {"submaps", map.submaps.size()},
             {"floors", map.floors},
             {"robots", Json::array()}};
   json["places"] = places_json(trust_of(robots), map);
+  for (const LocalisedRobot& robot : robots) json["robots"].push_back(json_of(robot));
+  return dump(json);
+}
+
+Status write_localised(const std::vector<LocalisedRobot>& robots, const localise::KnownMap& map,
+                       const std::filesystem::path& out_dir) {
+  if (auto made = make_folder(out_dir.string()); !made) return made;
   for (const LocalisedRobot& robot : robots) {
-    json["robots"].push_back(json_of(robot));
     if (auto ok = write_published(robot, map, out_dir); !ok) return ok;
     const auto csv = (out_dir / trajectory_file_name(robot.name, "states")).replace_extension(".csv");
     if (auto ok = write_file(csv.string(), states_csv(robot)); !ok) return ok;
   }
-  return write_file((out_dir / "localise.json").string(), dump(json));
+  return write_file((out_dir / "localise.json").string(), localised_json(robots, map));
 }
 
 std::string localised_text(const std::vector<LocalisedRobot>& robots, const localise::KnownMap& map) {

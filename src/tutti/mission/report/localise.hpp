@@ -11,8 +11,11 @@
 
 namespace tutti::mission {
 
-/// Writes what became of robots in a map that does not move: localise.json (figures; what depends on this machine's
-/// clock is under "timing"), and a robot each NAME_localised.tum (published poses in the map's frame) and
+/// What became of robots in a map that does not move, as localise.json has it: figures; what depends on this machine's
+/// clock is under "timing".
+std::string localised_json(const std::vector<LocalisedRobot>& robots, const localise::KnownMap& map);
+
+/// Writes it, localise.json, and a robot each NAME_localised.tum (published poses in the map's frame) and
 /// NAME_states.csv (every state with its pose, standard deviations and cause). Fails when a file cannot be written.
 Status write_localised(const std::vector<LocalisedRobot>& robots, const localise::KnownMap& map,
                        const std::filesystem::path& out_dir);
