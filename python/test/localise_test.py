@@ -47,6 +47,7 @@ class Localise(InFolder):
         self.assertEqual(own, said)
         self.assertGreater(own["robots"][0]["score"]["scored"], 50)
         self.assertEqual(own["robots"][0]["score"]["wrong"], 0)
+        self.assertGreater(own["robots"][0]["fresh_share_since_fix"], 0.95)
         self.assertIn("charlie", str(found))
 
     def test_a_robot_of_ones_own_finds_itself(self):

@@ -189,6 +189,16 @@ double LocalisedRobot::share(localise::State state) const {
   return duration_s > 0.0 ? in_state_s / duration_s : 0.0;
 }
 
+std::optional<double> LocalisedRobot::fresh_share() const {
+  const auto is_localised = [](const localise::Located& one) { return one.state == localise::State::localised; };
+  const auto first = std::ranges::find_if(course, is_localised);
+  double fresh_s = 0.0;
+  for (auto now = first; now != course.end() && now + 1 != course.end(); ++now)
+    if (is_localised(*now) && now->age_s <= kFresh_s) fresh_s += (now + 1)->stamp - now->stamp;
+  const double since_s = first == course.end() ? 0.0 : course.back().stamp - first->stamp;
+  return since_s > 0.0 ? std::optional(fresh_s / since_s) : std::nullopt;
+}
+
 Trajectory LocalisedRobot::published(std::uint32_t floor) const {
   Trajectory out;
   for (const localise::Located& located : course)

@@ -58,6 +58,9 @@ struct LocalisedRobot {
   std::vector<std::string> troubles;                ///< RobotActor::troubles()
   /// Share of the time in this state.
   [[nodiscard]] double share(localise::State state) const;
+  /// Share of the time since its first fix in which it was localised, and the map had shown that within kFresh_s.
+  [[nodiscard]] std::optional<double> fresh_share() const;
+  static constexpr double kFresh_s = 0.2;
   /// The poses on this floor of the map, in its frame, that were published as localised.
   [[nodiscard]] Trajectory published(std::uint32_t floor) const;
 };

@@ -62,6 +62,7 @@ Json json_of(const LocalisedRobot& robot) {
           {"starts", starts},
           {"kidnaps", kidnaps},
           {"share_of_time", shares},
+          {"fresh_share_since_fix", number(robot.fresh_share())},
           {"score", json_of(robot.score, begin)},
           {"score_since_kidnap", json_of(robot.score_since_kidnap, begin)},
           {"work",
