@@ -333,7 +333,7 @@ def main():
         "map by them shows what the solver makes of given closures, and nothing of finding a place: no row here. EuRoC V1_01 is at hand as",
         "tracks, and as 100 of its stereo pairs, which are too far apart to follow points. There the covariance is too small (*sigma*).",
         "",
-        "Thousands of starts, and the wrong ones among them, are in [starts.md](starts.md).",
+        "Thousands of starts are in [starts.md](starts.md).",
     ))
 
 
