@@ -80,9 +80,8 @@ void bind_place(py::module_& m) {
           "floor", [](const Place& p) { return p.located.floor; }, "The map's, from 1: each has a frame of its own.")
       .def_property_readonly(
           "T_world_body", [](const Place& p) { return or_none(p.located.T_world_body, false); },
-          "(4, 4) in the map's frame; None unless it is localised, off the map or stale. Only where it is localised "
-          "does "
-          "the map show that the robot is there.")
+          "(4, 4) in the map's frame; None unless localised, off the map or stale. Only localised means that the map "
+          "shows it.")
       .def_property_readonly(
           "covariance", [](const Place& p) { return or_none(p.located.T_world_body, true); },
           "(6, 6) of its right perturbation [translation m; rotation rad], or None.")
@@ -198,7 +197,7 @@ void bind_outcome(py::module_& m) {
             return py::dict(
                 py::module_::import("json").attr("loads")(mission::localised_json(o.robots, *o.map->known)));
           },
-          "All figures, as localise.json has them (docs/report.md): a dict.")
+          "All figures, as localise.json has them (docs/localise.md): a dict.")
       .def(
           "write",
           [](const LocalisedMission& o, const PathLike& folder) {
@@ -232,7 +231,7 @@ constexpr const char* kLocaliseDoc = R"(
 
 map: a file of run_mission(map=..), `tutti run --map` or a server; it is not changed, and no pose of it moves. Each robot that did
 not make it finds its place alone and without a start pose. settings: as run_mission(). progress: is called with the robot's
-name and how far it is (0 to 1); what it raises, and Ctrl-C, end it. OSError: files. ValueError: settings, recordings.)";
+name and how far it is (0 to 1), at each sample; what it raises, and Ctrl-C, end it. OSError: files. ValueError: settings, recordings.)";
 
 }  // namespace
 

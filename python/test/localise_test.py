@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import json
+import pathlib
+import tempfile
 
 import numpy as np
 import tutti
@@ -19,10 +21,12 @@ def words(settings):
 
 
 class Localise(InFolder):
-    def setUp(self):
-        super().setUp()
-        self.map = self.path / "site.tutti"
-        tutti.run_mission("demo", settings={**TUNNEL, "duration_s": 100}, map=self.map)
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        cls.map = pathlib.Path(folder.name) / "site.tutti"
+        tutti.run_mission("demo", settings={**TUNNEL, "duration_s": 100}, map=cls.map)
 
     def test_a_robot_finds_itself_as_the_program_says(self):
         heard = []
