@@ -49,6 +49,8 @@ class Garbage(InFolder):
             "read_timed_cloud": ("nowhere.pcd",), "write_cloud": (self.path / "x.ply", points), "voxel_downsample": (points, 0.1),
             "register_clouds": (points, points), "cloud_distances": (points, points), "bag_info": (bag,), "read_bag": (bag,),
             "read_bag_trajectory": (bag, "/odom"), "open_map": ("nowhere.tutti",), "run_mission": ("nowhere.yaml",), "run_bags": ({"a": "nowhere"},),
+            "localise_mission": ("nowhere.yaml", "nowhere.tutti"), "localise_bags": ({"a": "nowhere"}, "nowhere.tutti"),
+            "Localiser": ("nowhere.tutti",),
             "BagWriter": (self.path / "x.mcap",),
         }.items()
         yield "Trajectory.transformed", (trajectory, np.eye(4))
