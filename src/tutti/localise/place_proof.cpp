@@ -50,9 +50,9 @@ std::vector<Hypothesis> beside(const Hypothesis& place) {
   return out;
 }
 
-/// What a rival of the best must fit, where there is a best. Along a tunnel walls alone make most of the quality:
-/// beside the best it is how much more of the scans is not explained that tells. In eight wrong fixes this was 2.6
-/// times as much at most, at right places without a feature near 3.1 times at least.
+/// The quality from which a place is a rival of the best; 0 where there is no best. Along a tunnel walls alone make
+/// most of the quality: beside the best it is how much more of the scans is not explained that tells. At eight wrong
+/// fixes this was 2.6 times as much at most, at right places between walls alone 3.1 times and more.
 double least_of_rival(const std::vector<Hypothesis>& places, bool is_beside) {
   constexpr double kMisfits = 3.0;
   if (places.empty()) return 0.0;
@@ -123,9 +123,8 @@ std::vector<Hypothesis> all_proven(LocalMaps& maps, std::span<const ReadyScan> s
   };
   prove(found, false);
   if (!out.empty()) prove(turned(out.front()), false);
-  const bool counts = !out.empty() && out.front().shown != Shown::no &&
-                      (out.size() == 1 || out[1].quality < least_of_rival(out, false));
-  if (counts) prove(beside(out.front()), true);
+  if (!out.empty() && out.front().shown != Shown::no && SearchResult{out}.rivals().empty())
+    prove(beside(out.front()), true);
   return out;
 }
 

@@ -74,9 +74,9 @@ TEST_F(FeedSessionRos, WhoeverElsePublishesWhereOdometryIsIsNamedOnce) {
   std::vector<std::string> refused;
   const auto hear = [&](const std::string& message) {
     std::string own;
-    for (const Feed& told : say(1, message)) {
-      if (told.what_case() == Feed::kRefused) refused.push_back(told.refused().why());
-      if (told.what_case() == Feed::kRaw && told.raw().topic() == "/tf") own = told.raw().data();
+    for (const Feed& answer : say(1, message)) {
+      if (answer.what_case() == Feed::kRefused) refused.push_back(answer.refused().why());
+      if (answer.what_case() == Feed::kRaw && answer.raw().topic() == "/tf") own = answer.raw().data();
     }
     return own;
   };
@@ -104,9 +104,9 @@ TEST_F(FeedSessionRos, WhoeverElsePublishesWhereOdometryIsIsNamedOnce) {
 TEST_F(FeedSessionRos, AFixedFrameOfOdometryBesideTheRobotsIsNamedToo) {
   begin();
   say(1, odometry_at(0));
-  const auto told = say(1, raw("/tf_static", "tf2_msgs/msg/TFMessage", transform(0, "map", "r1/odom", {})));
-  ASSERT_EQ(kinds(told), std::vector{Feed::kRefused});
-  EXPECT_EQ(told[0].refused().why().find("/tf_static: somebody else publishes map -> r1/odom"), 0U);
+  const auto answers = say(1, raw("/tf_static", "tf2_msgs/msg/TFMessage", transform(0, "map", "r1/odom", {})));
+  ASSERT_EQ(kinds(answers), std::vector{Feed::kRefused});
+  EXPECT_EQ(answers[0].refused().why().find("/tf_static: somebody else publishes map -> r1/odom"), 0U);
 }
 
 TEST_F(FeedSessionRos, TheClientStatesFramesAndToleranceAndIsAnsweredByItsOwnClock) {

@@ -70,7 +70,7 @@ std::optional<std::string> RosAnswers::transform() {
                                        .translation = last_->T_map_odom.translation,
                                        .rotation = last_->T_map_odom.rotation}};
   if (own_.empty()) first_own_ = out.front().header.stamp;
-  own_.push_back(out.front().translation);
+  if (own_.empty() || own_.back() != out.front().translation) own_.push_back(out.front().translation);
   if (own_.size() > kMostOwn) own_.pop_front();
   said_world_.reset();
   if (T_world_map_ && world_ != map_) {
@@ -82,7 +82,7 @@ std::optional<std::string> RosAnswers::transform() {
 
 bool RosAnswers::may_be_own(const bags::RosTransform& heard) const {
   return own_.empty() || heard.header.stamp <= first_own_ ||
-         (heard.header.frame_id == map_ && std::ranges::find(own_, heard.translation) != own_.end());
+         (heard.header.frame_id == map_ && std::find(own_.rbegin(), own_.rend(), heard.translation) != own_.rend());
 }
 
 std::optional<std::string> RosAnswers::moved_world() {

@@ -65,7 +65,7 @@ class RosAnswers {
   std::optional<FeedAnswer> last_;
   std::optional<Timestamp> said_;
   static constexpr std::size_t kMostOwn = 1'000;
-  std::deque<Eigen::Vector3d> own_;  ///< Translations, for may_be_own().
+  std::deque<Eigen::Vector3d> own_;  ///< Translations, distinct ones in a row, for may_be_own().
   Timestamp first_own_;
   std::optional<std::pair<std::string, Pose3>> said_world_;
   std::int64_t repeats_ns_ = 0;   // of moved_world() since said_
