@@ -40,7 +40,7 @@ void set(Config& config, const py::dict& settings) {
   check(load_config(root, config, "settings"));
 }
 
-/// What Python says of a robot's odometry and of a sweep, as RobotAgent's docstrings have it.
+/// A robot's odometry and a sweep as Python states them; RobotAgent's docstrings have shapes and errors.
 OdometrySample to_odometry(double stamp, const ArrayLike& T_odom_body, const ArrayLike& covariance);
 Scan to_scan(double stamp, const ArrayLike& points, const std::optional<ArrayLike>& age_s);
 

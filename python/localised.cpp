@@ -49,7 +49,7 @@ void set_start(RobotLocaliser& robot, const ArrayLike& T_world_body, const Array
                           .floor = floor});
 }
 
-/// With what names its submaps.
+/// A robot's place, and the map, which names its submaps.
 struct Place {
   Located located;
   std::shared_ptr<const localise::KnownMap> map;
@@ -144,7 +144,7 @@ perturbation. The next scans have to confirm it; else the whole map is searched.
           "map_id", [](const RobotLocaliser& robot) { return robot.map->id; }, "The same for all versions of the map.")
       .def_property_readonly(
           "map_version", [](const RobotLocaliser& robot) { return robot.map->revision; },
-          "Of the map that poses hold in.")
+          "The version of the map that poses hold in.")
       .def_property_readonly(
           "floors", [](const RobotLocaliser& robot) { return robot.map->floors; }, "How many it has.");
 }

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes docs/results/starts.md: many starts without a start pose, in worlds that nothing was tuned on.
+"""Writes docs/results/starts.md: many starts without a start pose, in simulated worlds.
 
 Usage: bench/accuracy/starts.py TUTTI_PROGRAM [--starts 10000] [--jobs CORES] [--first-seed 1001] [--keep FOLDER]
 A start takes about one second of one core. With --keep a bench that was stopped goes on where it was (runs.remembered()).

@@ -11,8 +11,8 @@
 
 namespace tutti::mission {
 
-/// What became of robots in a map that does not move, as localise.json has it: figures; what depends on this machine's
-/// clock is under "timing".
+/// Returns localise.json, the figures of robots in a map that does not move; those that depend on this machine's clock
+/// are under "timing".
 std::string localised_json(const std::vector<LocalisedRobot>& robots, const localise::KnownMap& map);
 
 /// Writes it, localise.json, and a robot each NAME_localised.tum (published poses in the map's frame) and

@@ -106,7 +106,7 @@ class VoxelTable {
     return slots_.size();
   }
 
-  /// False as of add().
+  /// False where add() is.
   bool grow() {
     --shift_;
     slots_.assign(2 * slots_.size(), kFree);
