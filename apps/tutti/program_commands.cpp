@@ -61,14 +61,13 @@ void add_server_command(CLI::App& app, int& exit_code) {
           ->add_option("--map", options->held_map,
                        "With --frozen, where STATE has no map yet: the map's file to begin with, which is not changed")
           ->type_name("MAP");
-  const auto frozen = std::make_shared<bool>(false);
-  CLI::Option* const frozen_option =
-      command
-          ->add_flag("--frozen", *frozen,
-                     "No pose of MAP moves, to the bit: robots are laid into it and beside each other, and what they "
-                     "see of new ground grows\nbeside it in STATE/map.tutti (docs/localise.md)")
+  CLI::Option* const frozen =
+      command->add_flag("--frozen")
+          ->description(
+              "No pose of MAP moves, to the bit: robots are laid into it and beside each other, and what they "
+              "see of new ground grows\nbeside it in STATE/map.tutti (docs/localise.md)")
           ->needs(held);
-  held->needs(frozen_option);
+  held->needs(frozen);
   add_bus_options(*command, options->bus, "A bus that runs already",
                   "Let other machines in without --pki: whoever reaches the port can write to the map");
   command

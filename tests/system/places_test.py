@@ -20,8 +20,7 @@ RATE = ["--rate", "4"]
 class Places(common.ProgramsTest):
     def start_server(self, *more):
         server = self.start("server", "--state", self.path / "server", *TODAY, *RATE, *more)
-        words = server.line().split()
-        return server, words[words.index("--bus") + 1]
+        return server, server.bus()
 
     def said(self, bus, *more):
         done = common.run("status", "--bus", bus, *more)

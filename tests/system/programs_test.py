@@ -97,7 +97,16 @@ class Program:
                                         text=True, env={**os.environ, **(env or {})})
 
     def line(self):
-        return self.process.stdout.readline().strip()
+        """The next line of its output; when it has ended instead, why."""
+        line = self.process.stdout.readline().strip()
+        if not line:
+            raise AssertionError("ended without a line: {}, {}".format(*self.end(stop=False)))
+        return line
+
+    def bus(self):
+        """The bus of a server that has just been started: its first line is the command that starts a robot."""
+        words = self.line().split()
+        return words[words.index("--bus") + 1]
 
     def kill(self):
         self.process.kill()

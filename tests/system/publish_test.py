@@ -90,8 +90,7 @@ class Publish(common.ProgramsTest):
             self.expect(0, "pki", "add-operator", "anna", "--pki", self.path / folder)
         self.expect(0, "pki", "add-robot", "charlie", "--number", "2", "--pki", self.path / "pki")
         server = self.start("server", "--state", self.path / "server", "--pki", self.path / "pki", *MISSION, "--rate", "5")
-        words = server.line().split()
-        self.bus = words[words.index("--bus") + 1]
+        self.bus = server.bus()
 
         robot = self.start_robot()
         self.wait_for(lambda: "no map is published" in self.why(), "no map yet")

@@ -177,8 +177,7 @@ class Client(threading.Thread):
 class LiveRobots(common.ProgramsTest):
     def start_server(self, *more):
         server = self.start("server", "--state", self.path / "server", *RATE, *more)
-        words = server.line().split()
-        return server, words[words.index("--bus") + 1]
+        return server, server.bus()
 
     def start_robot(self, name, bus, *more):
         return self.start("robot", "--name", name, "--bus", bus, "--state", self.path / name, *more)
