@@ -86,14 +86,17 @@ TEST(SubmapCodec, AnOutlineTellsNothingOfWhatIsInThePayloads) {
   submap.add_stamp_ns(1);
   submap.add_representative(true);
   for (int i = 0; i < 6; ++i) submap.add_pose(0);
-  submap.mutable_cloud()->set_voxel_m(0.3);
-  submap.mutable_cloud()->set_offset_bits(77);
-  submap.mutable_cloud()->add_voxel(1);
-  for (auto* offset : {submap.mutable_cloud()->mutable_offset_x(), submap.mutable_cloud()->mutable_offset_y(),
-                       submap.mutable_cloud()->mutable_offset_z()})
+  v1::Cloud cloud;
+  cloud.set_voxel_m(0.3);
+  cloud.set_offset_bits(77);
+  cloud.add_voxel(1);
+  for (auto* offset : {cloud.mutable_offset_x(), cloud.mutable_offset_y(), cloud.mutable_offset_z()})
     offset->push_back('\x01');
-  submap.mutable_visual()->set_observations(5);
-  submap.mutable_visual()->set_body("none");
+  submap.set_cloud(cloud.SerializeAsString());
+  v1::Visual visual;
+  visual.set_observations(5);
+  visual.set_body("none");
+  submap.set_visual(visual.SerializeAsString());
   const std::string frame = pack_frame(MessageKind::submap, submap.SerializeAsString());
   EXPECT_FALSE(decode_submap(frame).has_value());
   const auto outline = decode_outline(frame);

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "tutti/v1/messages.pb.h"
-#include "tutti/v1/outline.pb.h"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/field_columns.hpp"
 #include "tutti/wire/frame.hpp"
@@ -43,9 +42,7 @@ void write_odometry(const Submap& submap, v1::Submap& out) {
   if (!odometry_follows_from_poses(submap)) write_columns(poses, *out.mutable_odometry());
 }
 
-/// `In`, here and below, is v1::Submap or its outline.
-template <class In>
-Status read_keyframes(const In& in, Submap& submap) {
+Status read_keyframes(const v1::Submap& in, Submap& submap) {
   const auto count = static_cast<std::size_t>(in.stamp_ns_size());
   if (count == 0) return fail(ErrorCode::invalid, "no keyframes, expected at least one");
   const auto stamps = read_columns<1>(in.stamp_ns(), count);
@@ -62,8 +59,7 @@ Status read_keyframes(const In& in, Submap& submap) {
   return {};
 }
 
-template <class In>
-Status read_odometry(const In& in, Submap& submap) {
+Status read_odometry(const v1::Submap& in, Submap& submap) {
   const std::size_t count = submap.keyframes.size() - 1;
   const auto covariances = read_columns<21>(in.odometry_covariance(), count);
   if (!covariances)
@@ -148,8 +144,7 @@ Status read_ranges(const std::string& bytes, std::vector<RobotRange>& ranges) {
 }
 
 /// All but the payloads.
-template <class In>
-Result<SubmapMessage> read_trajectory_message(const In& in) {
+Result<SubmapMessage> read_trajectory_message(const v1::Submap& in) {
   SubmapMessage message;
   const ChainId chain{RobotId{in.header().robot()}, in.header().session()};
   message.header = {chain.robot, chain.session, in.header().sequence()};
@@ -161,6 +156,13 @@ Result<SubmapMessage> read_trajectory_message(const In& in) {
   if (auto ok = read_ranges(in.ranges().SerializeAsString(), message.submap.ranges); !ok)
     return in_context(where + ": ranges", ok.error());
   return message;
+}
+
+/// The payloads, or their sizes.
+template <class CloudPart, class VisualPart>
+Status read_payloads(const v1::Submap& in, CloudPart& cloud, VisualPart& visual) {
+  if (cloud.ParseFromString(in.cloud()) && visual.ParseFromString(in.visual())) return {};
+  return fail(ErrorCode::parse, "its payloads are not the messages expected");
 }
 
 }  // namespace
@@ -186,8 +188,16 @@ std::string encode(const SubmapMessage& message, const CloudCodec& cloud) {
   write_odometry(submap, out);
   if (!submap.fixes.empty()) write_fixes(submap, *out.mutable_fixes());
   if (!submap.ranges.empty()) TUTTI_CHECK(out.mutable_ranges()->ParseFromString(ranges_bytes(submap.ranges)), "ranges");
-  if (submap.cloud && !submap.cloud->points.empty()) encode_cloud(*submap.cloud, cloud, *out.mutable_cloud());
-  if (submap.visual) encode_visual(*submap.visual, submap.keyframes.front().index, *out.mutable_visual());
+  if (submap.cloud && !submap.cloud->points.empty()) {
+    v1::Cloud payload;
+    encode_cloud(*submap.cloud, cloud, payload);
+    out.set_cloud(payload.SerializeAsString());
+  }
+  if (submap.visual) {
+    v1::Visual payload;
+    encode_visual(*submap.visual, submap.keyframes.front().index, payload);
+    out.set_visual(payload.SerializeAsString());
+  }
   return pack_frame(MessageKind::submap, out.SerializeAsString());
 }
 
@@ -199,13 +209,16 @@ Result<SubmapMessage> decode_submap(std::string_view bytes) {
   if (!trajectory) return trajectory;
   SubmapMessage message = std::move(*trajectory);
   const std::string where = "submap " + to_string(message.submap.id);
-  if (in.has_cloud() && in.cloud().voxel_size() > 0) {
-    auto cloud = decode_cloud(in.cloud());
+  v1::Cloud cloud_in;
+  v1::Visual visual_in;
+  if (auto ok = read_payloads(in, cloud_in, visual_in); !ok) return in_context(where, ok.error());
+  if (cloud_in.voxel_size() > 0) {
+    auto cloud = decode_cloud(cloud_in);
     if (!cloud) return in_context(where, cloud.error());
     message.submap.cloud = std::move(*cloud);
   }
   if (in.has_visual()) {
-    auto visual = decode_visual(in.visual(), in.first_keyframe());
+    auto visual = decode_visual(visual_in, in.first_keyframe());
     if (!visual) return in_context(where, visual.error());
     message.submap.visual = std::move(*visual);
   }
@@ -214,18 +227,16 @@ Result<SubmapMessage> decode_submap(std::string_view bytes) {
 }
 
 Result<SubmapOutline> decode_outline(std::string_view bytes) {
-  const auto parsed = parse_frame<v1::SubmapOutline>(MessageKind::submap, bytes);
+  const auto parsed = parse_frame<v1::Submap>(MessageKind::submap, bytes);
   if (!parsed) return tl::unexpected(parsed.error());
-  const v1::SubmapOutline& in = *parsed;
-  auto trajectory = read_trajectory_message(in);
+  auto trajectory = read_trajectory_message(*parsed);
   if (!trajectory) return tl::unexpected(trajectory.error());
   if (auto ok = validate(*trajectory); !ok) return tl::unexpected(ok.error());
   SubmapOutline outline{std::move(trajectory->submap), {}};
-  v1::CloudOutline cloud;
-  v1::VisualOutline visual;
-  if (!cloud.ParseFromString(in.cloud()) || !visual.ParseFromString(in.visual()))
-    return fail(ErrorCode::parse, "submap {}: its payloads are not the messages expected",
-                to_string(outline.submap.id));
+  v1::CloudSize cloud;
+  v1::VisualSize visual;
+  if (auto ok = read_payloads(*parsed, cloud, visual); !ok)
+    return in_context("submap " + to_string(outline.submap.id), ok.error());
   outline.size = {cloud.offset_x().size(), visual.observations()};
   return outline;
 }
