@@ -109,6 +109,12 @@ TEST_P(RobotClock, AClockThatGoesBackIsASessionOfItsOwn) {
     EXPECT_EQ(node_->backlog().size(), submaps + 1);  // the last one of the old session is ended
     EXPECT_EQ(node_->agent().newest_sample(), kStart + (driven_s_ + back_s));
     drive(20.0, back_s);
+    ASSERT_EQ(node_->alerts().size(), 1U);
+    EXPECT_EQ(node_->alerts().front().since, node_->agent().keyframes().front().stamp);
+    if (GetParam() < 10.0) {
+      drive(RobotNodeConfig().jump_told_s, back_s);
+      EXPECT_TRUE(node_->alerts().empty());
+    }
     done(node_->store_all());
     const std::string before = state();
     begun_.clear();

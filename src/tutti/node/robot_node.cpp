@@ -148,7 +148,7 @@ Step RobotNode::resume(Timestamp now) {
   if (const auto why = std::exchange(why_lost_, {})) {
     if (config_.keeps_state) step.writes.push_back({kMeta, kLost, std::nullopt});
     step.emit(now, StateLost{agent_.robot(), agent_.chain().session, *why});
-    session_begun_ = {now, "what was stored could not be read: " + *why};
+    why_begun_ = "what was stored could not be read: " + *why;
   }
   send_submaps(now, {}, step);
   return step;
@@ -200,8 +200,8 @@ void RobotNode::expect_sensors(bool scans, bool images) {
 void RobotNode::settle(Timestamp now, Step& step) {
   for (const robot::OdometryJump& jump : agent_.take_odometry_jumps()) {
     step.emit(now, OdometryJumped{agent_.robot(), jump});
-    ++jumps_;
-    newest_jump_ = {now, jump};
+    ++jumps_.count;
+    jumps_.newest = jump;
     if (localiser_) localiser_->search_anew("odometry has jumped");
   }
   for (Error& error : agent_.take_scan_errors())
@@ -326,15 +326,22 @@ bus::Envelope RobotNode::submap_envelope(SubmapId id, std::shared_ptr<const std:
           message_id(id, receipt_incarnation_), std::move(frame)};
 }
 
-std::string RobotNode::odometry_trouble(Timestamp now) const {
-  if (std::string refused = gate_.trouble(); !refused.empty()) return refused;
-  if (session_begun_ && now - session_begun_->first < config_.jump_told_s)
-    return fmt::format("session {} has begun: {}", agent_.chain().session, session_begun_->second);
-  if (newest_jump_ && now - newest_jump_->first < config_.jump_told_s)
-    return fmt::format("{} ({} so far)", to_string(newest_jump_->second), jumps_);
-  if (const auto& misfits = agent_.fit().misfits(); !misfits.empty())
-    return fmt::format("{}: {}", to_string(misfits.front()), way_on(misfits.front()));
-  return {};
+std::vector<RobotAlert> RobotNode::alerts() const {
+  std::vector<RobotAlert> out;
+  if (const std::string text = dispute(); !text.empty()) out.push_back({text, disputed_, disputed_, disputed_});
+  const Timestamp newest = agent_.newest_sample().value_or(Timestamp{});
+  const Timestamp begun = agent_.keyframes().empty() ? newest : agent_.keyframes().front().stamp;
+  if (!why_begun_.empty() && newest - begun < config_.jump_told_s)
+    out.push_back({fmt::format("session {} has begun, a map of its own until places are seen again: {}",
+                               agent_.chain().session, why_begun_),
+                   begun, begun, begun});
+  if (const auto& jump = jumps_.newest; jump && newest - jump->to < config_.jump_told_s)
+    out.push_back({fmt::format("{} ({} so far): no body moves so, and only the map tells where the robot is",
+                               to_string(*jump), jumps_.count),
+                   jump->to, jump->from, jump->to});
+  for (const fit::Misfit& misfit : agent_.fit().misfits())
+    out.push_back({fmt::format("{}: {}", to_string(misfit), way_on(misfit)), misfit.to, misfit.from, misfit.to});
+  return out;
 }
 
 NodeStatus RobotNode::status(Timestamp now) const {
@@ -356,7 +363,9 @@ NodeStatus RobotNode::status(Timestamp now) const {
                     .trouble = {}};
   status.in_map = in_map();
   if (updated_) status.update_age_s = now - *updated_;
-  status.trouble = plain_text(dispute().empty() ? odometry_trouble(now) : dispute());
+  const std::vector<RobotAlert> known = alerts();
+  const std::string refused = dispute().empty() ? gate_.trouble() : "";
+  status.trouble = plain_text(refused.empty() && !known.empty() ? known.front().text : refused);
   for (const auto& [kind, unread] : unread_)
     status.trouble =
         plain_text(fmt::format("cannot read what the server sends ({} so far), one of the two is to be upgraded: {}",

@@ -15,6 +15,7 @@
 #include "tutti/node/journal.hpp"
 #include "tutti/node/odometry_gate.hpp"
 #include "tutti/node/place_record.hpp"
+#include "tutti/node/robot_alert.hpp"
 #include "tutti/node/step.hpp"
 #include "tutti/node/uplink.hpp"
 #include "tutti/robot/agent.hpp"
@@ -39,7 +40,8 @@ struct RobotNodeConfig {
   /// Keyframes without a scan (or images) after which SensorMissing is reported.
   std::uint64_t most_keyframes_without = 20;
   std::shared_ptr<const localise::Localiser::Setup> localise;  ///< Null: it does not localise in a map.
-  double jump_told_s = 600.0;  ///< How long status() reports that odometry has jumped, or why a session has begun.
+  /// How long a jump of odometry, or why a session has begun, is an alert; of the robot's own time.
+  double jump_told_s = 600.0;
 };
 
 /// A robot as a node: RobotAgent with its store and messages. It takes odometry, sensor data and proxy graphs, and
@@ -87,6 +89,8 @@ class RobotNode {
   /// `observer` is called when each stage of an update ends, so that a host with a clock can time them.
   void observe(robot::StageObserver observer) { observer_ = std::move(observer); }
 
+  /// What is wrong with the robot and its odometry, the worst first; about the map and missing sensors events tell.
+  [[nodiscard]] std::vector<RobotAlert> alerts() const;
   /// The robot's status, without what only the host knows: version, trouble.
   [[nodiscard]] NodeStatus status(Timestamp now) const;
   /// Why, by the server, another program owns this robot's name or number; nothing when it does not report so of this
@@ -145,7 +149,8 @@ class RobotNode {
   /// To be called after each input: reports what became of earlier inputs.
   void settle(Timestamp now, Step& step);
   [[nodiscard]] bool is_refused_as_it_is(SubmapId id, const Receipt& receipt) const;
-  [[nodiscard]] std::string odometry_trouble(Timestamp now) const;
+  /// Reports that another program owns what this robot does in this session.
+  void refuse(std::uint64_t session, const std::string& why, Timestamp now, Step& step);
   void note_conflict(const Receipt& receipt, Timestamp now, Step& step);
   /// Under these sessions the map has submaps of somebody else, in the place of this robot's.
   void note_foreign(const std::set<std::uint64_t>& sessions, Timestamp now, Step& step);
@@ -189,8 +194,11 @@ class RobotNode {
   std::map<bus::MessageKind, Unread> unread_;  // since the last one of the kind that could be read
   std::optional<ProxyGraph> base_;             // the last graph that came in full
   std::shared_ptr<const std::string> delta_;   // the last message that gave differences from base_
-  std::uint64_t jumps_ = 0;                    // since the start
-  std::optional<std::pair<Timestamp, robot::OdometryJump>> newest_jump_;  // when it was reported
+  struct Jumps {
+    std::uint64_t count = 0;                    // since the start
+    std::optional<robot::OdometryJump> newest;  // of the session
+  };
+  Jumps jumps_;
   bool tells_no_scan_ = false, tells_no_images_ = false;
   std::uint64_t journal_ = 0;           // number of entries since the checkpoint that are written
   std::vector<std::string> unwritten_;  // and the entries that are not
@@ -200,9 +208,9 @@ class RobotNode {
   std::vector<std::string> obsolete_;  // rows of the checkpoint, until the next one
   std::vector<storage::Write> aside_;  // what could not be read, likewise
   std::optional<std::string> why_lost_;
-  std::optional<std::pair<Timestamp, std::string>> session_begun_;  // when, and why
-  bool is_new_ = false;                                             // there is no checkpoint yet
-  std::uint64_t starts_ = 1;                                        // number of starts on this store
+  std::string why_begun_;     // of the session; empty: it is the first
+  bool is_new_ = false;       // there is no checkpoint yet
+  std::uint64_t starts_ = 1;  // number of starts on this store
   bool finished_ = false;
   std::optional<Timestamp> updated_;
   std::pair<std::uint64_t, std::uint64_t> mapped_age_;  // ProxyGraph::age() of the newest graph since the start,
@@ -211,6 +219,7 @@ class RobotNode {
   Timestamp mapped_until_ = kFirstTimestamp;            // and the stamp of the last own node in it
   std::uint64_t alerts_ = 0;                            // of the last update
   std::optional<std::string> conflict_;
+  Timestamp disputed_;                        // the newest sample when it was said last that it is refused
   std::set<std::uint64_t> foreign_sessions_;  // that are of another body, too
   std::string foreign_;                       // that submaps of these wait for ever; else empty
   std::optional<std::uint64_t> owner_session_;

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "tutti/base/plain_text.hpp"
 #include "tutti/node/robot_node.hpp"
 #include "tutti/storage/memory_store.hpp"
 #include "tutti/wire/agent_state/agent_state.hpp"
@@ -59,8 +60,11 @@ TEST_F(RobotOdometry, OdometryThatJumpsIsReportedAndAKillChangesNothing) {
   EXPECT_EQ(reported[0].jump.to, kStart + 15.0);
   EXPECT_NEAR(reported[0].jump.translation_m, 14.9, 1e-9);
   EXPECT_NEAR(reported[1].jump.translation_m, 500.1, 1e-9);
-  EXPECT_EQ(node_->status(now_).trouble, to_string(reported[1].jump) + " (2 so far)");
-  EXPECT_EQ(node_->status(now_ + config_.jump_told_s).trouble, "");
+  ASSERT_EQ(node_->alerts().size(), 1U);
+  const RobotAlert told = node_->alerts().front();
+  EXPECT_TRUE(told.text.starts_with(to_string(reported[1].jump) + " (2 so far)")) << told.text;
+  EXPECT_EQ(std::pair(told.from, told.until), std::pair(reported[1].jump.from, reported[1].jump.to));
+  EXPECT_EQ(node_->status(now_).trouble, plain_text(told.text));
   const std::string whole = wire::encode(node_->agent().state());
   const Pose3 T_odom_fed = node_->agent().T_odom_fed();
 
@@ -78,6 +82,13 @@ TEST_F(RobotOdometry, OdometryThatJumpsIsReportedAndAKillChangesNothing) {
     EXPECT_EQ(node_->agent().T_odom_fed(), T_odom_fed) << kill;
     EXPECT_LE(reported.size(), 2U) << kill;
   }
+  config_.jump_told_s = 10.0;
+  store_.reset();
+  restart();
+  live(0, 300);
+  EXPECT_EQ(node_->alerts().size(), 1U);
+  live(300, 400);
+  EXPECT_TRUE(node_->alerts().empty());
 }
 
 TEST_F(RobotOdometry, SamplesThatAreRefusedInARowAreItsTrouble) {

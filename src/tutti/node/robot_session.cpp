@@ -28,12 +28,12 @@ void RobotNode::change_session(const std::string& why, Timestamp now, Step& step
   stored_ = {};
   finished_ = false;
   updated_.reset();
-  newest_jump_.reset();
+  jumps_.newest.reset();
   mapped_age_ = {};
   mapped_until_ = kFirstTimestamp;
   alerts_ = 0;
   tells_no_scan_ = tells_no_images_ = false;
-  session_begun_ = {now, why};
+  why_begun_ = why;
   save_checkpoint(step);
   if (config_.keeps_state) step.writes.push_back({kMeta, kSession, storage::key_of({session})});
   step.emit(now, SessionBegun{agent_.robot(), session, why});
@@ -51,6 +51,11 @@ Status RobotNode::set_aside(const wire::StateRows& checkpoint, std::uint64_t ses
   });
 }
 
+void RobotNode::refuse(std::uint64_t session, const std::string& why, Timestamp now, Step& step) {
+  disputed_ = agent_.newest_sample().value_or(Timestamp{});
+  step.emit(now, RobotRefused{agent_.robot(), session, why});
+}
+
 void RobotNode::note_conflict(const Receipt& receipt, Timestamp now, Step& step) {
   owner_session_ = receipt.owner_session;
   const std::optional<std::string> before = std::exchange(conflict_, std::nullopt);
@@ -58,7 +63,7 @@ void RobotNode::note_conflict(const Receipt& receipt, Timestamp now, Step& step)
   const auto& conflict = receipt.conflict;
   if (!conflict || conflict->session != session || conflict->start != start()) return;
   conflict_ = conflict->why;
-  if (conflict_ != before) step.emit(now, RobotRefused{agent_.robot(), session, conflict->why});
+  if (conflict_ != before) refuse(session, conflict->why, now, step);
   if (receipt.owner_session == session) leave(session, conflict->why, now, step);
 }
 
@@ -69,7 +74,7 @@ void RobotNode::note_foreign(const std::set<std::uint64_t>& sessions, Timestamp 
         "under session {} the map has other submaps than this robot's: another program has sent them, with "
         "a copy of its state folder",
         session);
-    step.emit(now, RobotRefused{agent_.robot(), session, why});
+    refuse(session, why, now, step);
     leave(session, why, now, step);
   }
   const auto waiting = std::ranges::count_if(

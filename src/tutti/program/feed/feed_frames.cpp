@@ -99,7 +99,7 @@ std::string situation_frame(const FeedState& state, std::int64_t offset_ns) {
     to.set_same_component(mate.T_map_body.has_value());
     if (mate.T_map_body) write(*mate.T_map_body, *to.mutable_t_map_body());
   }
-  for (const FeedAlert& alert : state.alerts) {
+  for (const node::RobotAlert& alert : state.alerts) {
     auto& to = *out.add_alert();
     to.set_text(plain_text(alert.text));
     to.set_since_stamp_ns(client_stamp_ns(alert.since, offset_ns));

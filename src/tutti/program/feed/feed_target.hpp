@@ -12,6 +12,7 @@
 #include "tutti/base/result.hpp"
 #include "tutti/model/input.hpp"
 #include "tutti/model/trajectory.hpp"
+#include "tutti/node/robot_alert.hpp"
 #include "tutti/robot/next_keyframe.hpp"
 #include "tutti/robot/odometry_watch.hpp"
 
@@ -24,14 +25,6 @@ struct TeamMate {
   /// Where, in this robot's map; nothing when it is in another component of the server's map.
   std::optional<Pose3> T_map_body;
   friend bool operator==(const TeamMate&, const TeamMate&) = default;
-};
-
-/// Reports a segment of odometry where localisation failed or the map is wrong, or a sensor without data.
-struct FeedAlert {
-  std::string text;
-  Timestamp since;        ///< The newest sample when the alert was first raised.
-  Timestamp from, until;  ///< The segment that the alert is about.
-  friend bool operator==(const FeedAlert&, const FeedAlert&) = default;
 };
 
 /// A robot's knowledge as its live feed reports it.
@@ -53,7 +46,7 @@ struct FeedState {
   Timestamp located;
   bool wants_scan = false;  ///< A scan from now on would be used.
   std::vector<TeamMate> team_mates;
-  std::vector<FeedAlert> alerts;
+  std::vector<node::RobotAlert> alerts;
   /// field_texts() of the robot's NodeStatus, another one whenever these change; null before the first. Shared, because
   /// the state is copied for every odometry sample.
   std::shared_ptr<const std::vector<std::pair<std::string, std::string>>> status;

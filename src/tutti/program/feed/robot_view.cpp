@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "tutti/consistency/alerts.hpp"
@@ -11,8 +12,6 @@
 
 namespace tutti::program {
 namespace {
-
-constexpr double kJumpAlert_s = 600.0;  // of odometry
 
 /// In a map that does not move the robot's own trajectory is tied to the world of the floor on which the map shows the
 /// robot.
@@ -43,15 +42,7 @@ void RobotView::note(const node::Event& event, const node::RobotNode& node) {
                                                missing->keyframes, missing->sensor == "scan" ? "a scan" : "images"),
                                    *newest, *newest, *newest};
   }
-  if (std::holds_alternative<node::RobotRefused>(event.what)) disputed_ = newest.value_or(Timestamp{});
-  if (const auto* begun = std::get_if<node::SessionBegun>(&event.what)) {
-    *this = RobotView(std::move(name_), std::move(names_));
-    begun_ = fmt::format("session {} has begun, a map of its own until places are seen again: {}", begun->session,
-                         begun->why);
-  }
-  if (const auto* jumped = std::get_if<node::OdometryJumped>(&event.what))
-    jump_ = {to_string(jumped->jump) + ": no body moves so, and only the map tells where the robot is", jumped->jump.to,
-             jumped->jump.from, jumped->jump.to};
+  if (std::holds_alternative<node::SessionBegun>(event.what)) *this = RobotView(std::move(name_), std::move(names_));
   if (update == nullptr || update->summary.synchronised == 0 || !newest) return;
   if (!first_) first_ = *newest;
   consistency::Suspicion record{.time_s = *newest - *first_, .revision = update->summary.revision};
@@ -91,14 +82,7 @@ FeedState RobotView::state(const node::RobotNode& node) const {
   if (const localise::Localiser* localiser = node.localiser(); localiser != nullptr && out.newest)
     set_place(localiser->located(), localiser->wants_scan(out.newest->stamp), agent.T_map_body(), out);
   for (const auto& [sensor, alert] : missing_) out.alerts.push_back(alert);
-  if (const std::string dispute = node.dispute(); !dispute.empty())
-    out.alerts.push_back({dispute, disputed_, disputed_, disputed_});
-  if (!begun_.empty() && !agent.keyframes().empty())
-    if (const Timestamp since = agent.keyframes().front().stamp; out.newest->stamp - since < kJumpAlert_s)
-      out.alerts.push_back({begun_, since, since, since});
-  for (const fit::Misfit& misfit : agent.fit().misfits())
-    out.alerts.push_back({fmt::format("{}: {}", to_string(misfit), way_on(misfit)), misfit.to, misfit.from, misfit.to});
-  if (jump_ && out.newest && out.newest->stamp - jump_->until < kJumpAlert_s) out.alerts.push_back(*jump_);
+  std::ranges::copy(node.alerts(), std::back_inserter(out.alerts));
   for (const robot::Whereabouts& other : agent.whereabouts()) {
     const auto given = names_.find(other.robot);
     std::string name = given == names_.end() ? other.name : given->second;

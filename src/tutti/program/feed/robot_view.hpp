@@ -30,11 +30,8 @@ class RobotView {
   std::map<RobotId, std::string> names_;
   std::optional<Timestamp> first_;  ///< The newest sample at the first update; the times in updates_ count from it.
   std::vector<consistency::Suspicion> updates_;
-  std::vector<FeedAlert> alerts_;
-  std::map<std::string, FeedAlert> missing_;  ///< By sensor.
-  std::optional<FeedAlert> jump_;             ///< The latest jump of odometry.
-  Timestamp disputed_;                        ///< The newest sample when RobotNode::dispute() began.
-  std::string begun_;                         ///< Why the session has begun; empty: it is the first.
+  std::vector<node::RobotAlert> alerts_;             ///< Where odometry and map differ.
+  std::map<std::string, node::RobotAlert> missing_;  ///< By sensor.
 };
 
 /// The number of a robot that no mission gives one, made from its name: FNV-1a of 32 bits, with the highest set.
