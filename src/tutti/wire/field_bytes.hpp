@@ -220,6 +220,7 @@ class FieldChecker {
   }
   template <class T>
   static Status check(const T& value, const FieldRule& rule = {}) {
+    static_assert(!IsOptionalField<T> && !IsListField<T>, "field() checks what is in them");
     if constexpr (HasFields<T>) {
       FieldChecker inside;
       visit_fields(value, inside);
