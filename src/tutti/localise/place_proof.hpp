@@ -44,8 +44,8 @@ std::optional<Hypothesis> proven(LocalMaps& maps, std::span<const ReadyScan> sca
 /// degrees, as it may be in a corridor or at a crossing, as the scans show them: distinct ones, best first. Scans that
 /// lie on the map only farther off than is_same_place() allows show none of these. Where the best has no rival, it is
 /// also tried some metres on along its tunnel, as it is and turned about, wherever the scans come to lie: in a tunnel
-/// that nobody has mapped they may fit a mapped one closely, but then they do so in more than one place of it. Those
-/// that are no rivals of the best may be missing.
+/// that nobody has mapped they may fit a mapped one closely, but then they do so in more than one place of it. Where
+/// they fit half as well there, the best is shown by nothing. Those that are no rivals of the best may be missing.
 std::vector<Hypothesis> all_proven(LocalMaps& maps, std::span<const ReadyScan> scans, std::vector<Hypothesis> found,
                                    std::size_t& registered);
 inline constexpr std::size_t kMostProven = 6;
