@@ -337,7 +337,7 @@ class CommandLine(unittest.TestCase):
 
     def test_a_simulation_says_how_long_yet(self):
         with subprocess.Popen([TUTTI, "simulate", "demo", "-o", str(self.path / "bags")], stderr=subprocess.PIPE, text=True) as program:
-            self.assertRegex(program.stderr.readline(), r"^ +[1-9][0-9]? %   alpha(, about [0-9]+ (s|min) yet)?$")
+            self.assertRegex(program.stderr.readline(), r"^ +1?[0-9] %   alpha(, about [0-9]+ (s|min) yet)?$")
             program.kill()
 
     def test_a_mission_removes_nothing_of_the_users(self):

@@ -105,8 +105,9 @@ class Program:
 
     def bus(self):
         """The bus of a server that has just been started: its first line is the command that starts a robot."""
-        words = self.line().split()
-        return words[words.index("--bus") + 1]
+        line, begin = self.line(), "tutti robot --name NAME --bus "
+        assert line.startswith(begin), f"{line}, {self.process.poll()}"
+        return line.removeprefix(begin).split()[0]
 
     def kill(self):
         self.process.kill()
@@ -169,10 +170,9 @@ class Programs(ProgramsTest):
 
     def start_server(self, *more, rate=RATE, env=None):
         server = self.start("server", "--state", self.path / "server", MISSION, *rate, *more, env=env)
-        line = server.line()
-        self.assertIn("tutti robot --name NAME --bus nats://127.0.0.1:", line, server.process.poll())
-        words = line.split()
-        return server, words[words.index("--bus") + 1]
+        bus = server.bus()
+        self.assertTrue(bus.startswith("nats://127.0.0.1:"), bus)
+        return server, bus
 
     def start_robot(self, name, bus, *more, rate=RATE):
         return self.start("robot", "--name", name, "--bus", bus, "--state", self.path / name, MISSION, *rate,

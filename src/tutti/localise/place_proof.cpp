@@ -55,10 +55,10 @@ std::vector<Hypothesis> beside(const Hypothesis& place) {
 /// fixes this was 2.9 times as much at most, at right places between walls alone 3.1 times and more. Where the best
 /// misfits much itself, three times that is nearly all: so a rival there fits half as well, too.
 double least_of_rival(const std::vector<Hypothesis>& places, bool is_beside) {
-  constexpr double kMisfits = 3.0, kHalf = 0.5;
+  constexpr double kMisfits = 3.0, kRivalBeside = 0.5;
   if (places.empty()) return 0.0;
   const double best = places.front().quality;
-  return is_beside ? std::max(kHalf * best, 1.0 - kMisfits * (1.0 - best)) : kRival * best;
+  return is_beside ? std::max(kRivalBeside * best, 1.0 - kMisfits * (1.0 - best)) : kRival * best;
 }
 
 bool is_better(const Hypothesis& a, const Hypothesis& b) { return a.quality > b.quality; }

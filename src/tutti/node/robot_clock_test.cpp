@@ -112,7 +112,7 @@ TEST_P(RobotClock, AClockThatGoesBackIsASessionOfItsOwn) {
     ASSERT_EQ(node_->alerts().size(), 1U);
     EXPECT_EQ(node_->alerts().front().since, node_->agent().keyframes().front().stamp);
     if (GetParam() < 10.0) {
-      drive(RobotNodeConfig().jump_told_s, back_s);
+      drive(RobotNodeConfig().alert_s, back_s);
       EXPECT_TRUE(node_->alerts().empty());
     }
     done(node_->store_all());

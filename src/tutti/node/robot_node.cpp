@@ -2,6 +2,7 @@
 #include "tutti/node/robot_node.hpp"
 
 #include <algorithm>
+#include <ranges>
 #include <utility>
 
 #include "tutti/base/plain_text.hpp"
@@ -328,19 +329,19 @@ bus::Envelope RobotNode::submap_envelope(SubmapId id, std::shared_ptr<const std:
 
 std::vector<RobotAlert> RobotNode::alerts() const {
   std::vector<RobotAlert> out;
-  if (const std::string text = dispute(); !text.empty()) out.push_back({text, disputed_, disputed_, disputed_});
+  for (const fit::Misfit& misfit : std::views::reverse(agent_.fit().misfits()))
+    out.push_back({fmt::format("{}: {}", to_string(misfit), way_on(misfit)), misfit.to, misfit.from, misfit.to});
   const Timestamp newest = agent_.newest_sample().value_or(Timestamp{});
-  const Timestamp begun = agent_.keyframes().empty() ? newest : agent_.keyframes().front().stamp;
-  if (!why_begun_.empty() && newest - begun < config_.jump_told_s)
-    out.push_back({fmt::format("session {} has begun, a map of its own until places are seen again: {}",
-                               agent_.chain().session, why_begun_),
-                   begun, begun, begun});
-  if (const auto& jump = jumps_.newest; jump && newest - jump->to < config_.jump_told_s)
+  if (const auto& jump = jumps_.newest; jump && newest - jump->to < config_.alert_s)
     out.push_back({fmt::format("{} ({} so far): no body moves so, and only the map tells where the robot is",
                                to_string(*jump), jumps_.count),
                    jump->to, jump->from, jump->to});
-  for (const fit::Misfit& misfit : agent_.fit().misfits())
-    out.push_back({fmt::format("{}: {}", to_string(misfit), way_on(misfit)), misfit.to, misfit.from, misfit.to});
+  const Timestamp begun = agent_.keyframes().empty() ? newest : agent_.keyframes().front().stamp;
+  if (!why_begun_.empty() && newest - begun < config_.alert_s)
+    out.push_back({fmt::format("session {} has begun, a map of its own until places are seen again: {}",
+                               agent_.chain().session, why_begun_),
+                   begun, begun, begun});
+  if (const std::string text = dispute(); !text.empty()) out.push_back({text, disputed_, disputed_, disputed_});
   return out;
 }
 
@@ -365,7 +366,7 @@ NodeStatus RobotNode::status(Timestamp now) const {
   if (updated_) status.update_age_s = now - *updated_;
   const std::vector<RobotAlert> known = alerts();
   const std::string refused = dispute().empty() ? gate_.trouble() : "";
-  status.trouble = plain_text(refused.empty() && !known.empty() ? known.front().text : refused);
+  status.trouble = plain_text(refused.empty() && !known.empty() ? known.back().text : refused);
   for (const auto& [kind, unread] : unread_)
     status.trouble =
         plain_text(fmt::format("cannot read what the server sends ({} so far), one of the two is to be upgraded: {}",

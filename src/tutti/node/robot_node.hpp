@@ -41,7 +41,7 @@ struct RobotNodeConfig {
   std::uint64_t most_keyframes_without = 20;
   std::shared_ptr<const localise::Localiser::Setup> localise;  ///< Null: it does not localise in a map.
   /// How long a jump of odometry, or why a session has begun, is an alert; of the robot's own time.
-  double jump_told_s = 600.0;
+  double alert_s = 600.0;
 };
 
 /// A robot as a node: RobotAgent with its store and messages. It takes odometry, sensor data and proxy graphs, and
@@ -89,7 +89,8 @@ class RobotNode {
   /// `observer` is called when each stage of an update ends, so that a host with a clock can time them.
   void observe(robot::StageObserver observer) { observer_ = std::move(observer); }
 
-  /// What is wrong with the robot and its odometry, the worst first; about the map and missing sensors events tell.
+  /// Everything that is wrong with the robot and its odometry, the worst last: the status and /diagnostics say that
+  /// one. Where odometry and map differ, and which sensor is missing, are events.
   [[nodiscard]] std::vector<RobotAlert> alerts() const;
   /// The robot's status, without what only the host knows: version, trouble.
   [[nodiscard]] NodeStatus status(Timestamp now) const;

@@ -82,13 +82,28 @@ TEST_F(RobotOdometry, OdometryThatJumpsIsReportedAndAKillChangesNothing) {
     EXPECT_EQ(node_->agent().T_odom_fed(), T_odom_fed) << kill;
     EXPECT_LE(reported.size(), 2U) << kill;
   }
-  config_.jump_told_s = 10.0;
+  config_.alert_s = 10.0;
   store_.reset();
   restart();
   live(0, 300);
   EXPECT_EQ(node_->alerts().size(), 1U);
   live(300, 400);
   EXPECT_TRUE(node_->alerts().empty());
+}
+
+TEST_F(RobotOdometry, TheStatusSaysTheWorstOfItsAlerts) {
+  const auto add = [&](int i) {
+    const Pose3 T_odom_body{Eigen::Quaterniond::Identity(), {0.1 * i + (i < 250 ? 0.0 : 500.0), 0.0, 0.0}};
+    done(node_->add(OdometrySample{kStart + 0.1 * i, T_odom_body, 1e-6 * Matrix6d::Identity()}, now_));
+  };
+  for (int i = 0; i < 100; ++i) add(i);
+  done(node_->begin_session("its clock went back", now_));
+  for (int i = 100; i < 400; ++i) add(i);
+  const std::vector<RobotAlert> alerts = node_->alerts();
+  ASSERT_EQ(alerts.size(), 2U);
+  EXPECT_NE(alerts[0].text.find("no body moves so"), std::string::npos) << alerts[0].text;
+  EXPECT_NE(alerts[1].text.find("its clock went back"), std::string::npos) << alerts[1].text;
+  EXPECT_EQ(node_->status(now_).trouble, plain_text(alerts[1].text));
 }
 
 TEST_F(RobotOdometry, SamplesThatAreRefusedInARowAreItsTrouble) {
