@@ -314,11 +314,6 @@ Result<std::optional<EncodedImages>> ImagesIntake::next_images(Timestamp stamp, 
   while (!camera.waiting.empty() && odometry_.is_before_all(camera.waiting.front().stamp)) camera.pop();
   if (camera.waiting.empty() || camera.waiting.front().stamp > stamp) return none;
   const Timestamp instant = camera.waiting.front().stamp;
-  if (stamp - instant > waiting::kLate_s) {
-    camera.pop();
-    return fail(ErrorCode::invalid, "image at {} ns comes {:.1f} s after odometry of its time, expected at most {} s",
-                instant.ns, stamp - instant, waiting::kLate_s);
-  }
   const bool is_patient = !is_last && stamp - instant < waiting::kPartner_s;
   const auto may_come = [&](const OneTopic& topic) {
     return is_patient && !(topic.newest && *topic.newest >= instant);

@@ -64,8 +64,8 @@ class ImagesIntake {
   [[nodiscard]] bool is_filling() const;
 
   /// The next images that odometry up to `stamp` covers, of both cameras if the second's come in time; nothing when
-  /// there are none; an error for images that come too late. With `is_last` nothing more comes. After describe() has
-  /// filled in cameras.
+  /// there are none; an error when depth cannot be read. Images that come too late the robot refuses, as any client's.
+  /// With `is_last` nothing more comes. After describe() has filled in cameras.
   Result<std::optional<EncodedImages>> next_images(Timestamp stamp, bool is_last = false);
   /// Drops images that are too late when odometry is at `stamp`.
   void drop_late(Timestamp stamp);

@@ -101,6 +101,13 @@ TEST_F(ClosuresOfAMap, WhatIsNotThereCannotBeAccepted) {
   const auto before = store_.tables();
   for (const char* name : {"alpha/0-bravo/999", "alpha/0-charlie/1", "nonsense", "alpha/0-alpha/1"})
     EXPECT_FALSE(put_decision(store_, {name, Wish::accept, "ada", 5}).has_value()) << name;
+  LoopClosure by_hand = first(infos(), ClosureState::accepted)->closures.front().closure;
+  const std::string name = first(infos(), ClosureState::accepted)->name;
+  by_hand.to.index = 100'000;
+  const auto refused = put_decision(store_, {name, Wish::accept, "ada", 5, {by_hand}});
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_NE(refused.error().message.find("and 100000, which these do not have"), std::string::npos)
+      << refused.error().message;
   EXPECT_EQ(store_.tables(), before);
   ASSERT_TRUE(put_decision(store_, {"alpha/0-alpha/1", Wish::reject, "ada", 5}).has_value());  // in advance
   EXPECT_EQ(named("alpha/0-alpha/1").state, ClosureState::rejected);

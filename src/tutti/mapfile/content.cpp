@@ -12,6 +12,7 @@
 #include "tutti/mapfile/check_map_file.hpp"
 #include "tutti/node/decisions.hpp"
 #include "tutti/node/submap_frames.hpp"
+#include "tutti/server/kept_decision.hpp"
 #include "tutti/server/known_ground.hpp"
 #include "tutti/server/map_job.hpp"
 #include "tutti/storage/map_tables.hpp"
@@ -180,21 +181,16 @@ Status put_decision(storage::TableStore& map, const ClosureDecision& decision) {
   if (!content) return tl::unexpected(content.error());
   const auto pair = content->closure_names().find(decision.closure);
   if (!pair) return tl::unexpected(pair.error());
-  for (const SubmapId& id : {pair->first, pair->second})
-    if (!content->submaps.contains(id))
-      return fail(ErrorCode::invalid, "{}: submap {} is not in the map", decision.closure,
-                  content->closure_names().of(id));
-  const auto verdict = content->verdicts.find(*pair);
-  const bool has_closures = verdict != content->verdicts.end() && !verdict->second.closures.empty();
-  if (decision.wish == Wish::accept && !has_closures && decision.by_hand.empty())
-    return fail(ErrorCode::invalid, "{}: no closure was found there that could be accepted", decision.closure);
-  const auto known = content->decisions.find(*pair);
-  if (known != content->decisions.end() && !holds_over(decision, known->second))
-    return fail(ErrorCode::invalid, "{}: a later decision holds: {} of {} ns", decision.closure,
-                to_string(known->second.wish), known->second.given_ns);
+  const auto kept = server::kept_decision(*pair, decision, content->submaps, content->verdicts, content->decisions);
+  if (!kept) return tl::unexpected(kept.error());
+  if (!*kept) {
+    const ClosureDecision& later = content->decisions.at(*pair);
+    return fail(ErrorCode::invalid, "{}: a later decision holds: {} of {} ns", decision.closure, to_string(later.wish),
+                later.given_ns);
+  }
   node::MapMeta meta = content->meta;
   meta.news = true;  // whoever opens it makes the next revision
-  const std::vector<storage::Write> writes{{map_tables::kDecisions, node::key_of(*pair), wire::encode(decision)},
+  const std::vector<storage::Write> writes{{map_tables::kDecisions, node::key_of(*pair), wire::encode(**kept)},
                                            node::to_row(meta)};
   return map.commit(writes);
 }

@@ -8,13 +8,10 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/geometry/covariance.hpp"
+#include "tutti/server/kept_decision.hpp"
 
 namespace tutti::server {
 namespace {
-
-bool has_keyframe(const Submap& submap, const KeyframeId& keyframe) {
-  return submap.keyframes.front().index <= keyframe.index && keyframe.index <= submap.keyframes.back().index;
-}
 
 /// Between neighbouring keyframes. Odometry that diverged beyond this would leave the joint map without a solution.
 constexpr double kLongestStep_m = 1e4;
@@ -282,29 +279,17 @@ void MapServer::take(const ClosureVerdict& verdict) {
 }
 
 Status MapServer::receive(const SubmapPair& pair, const ClosureDecision& given) {
-  const ClosureDecision decision = with_sessions(given, pair);
-  const auto where = [&] {
-    return fmt::format("decision on submaps {} and {}", to_string(pair.first), to_string(pair.second));
-  };
-  if (!(pair.first < pair.second)) return fail(ErrorCode::invalid, "{}: expected the first to be the smaller", where());
-  for (const SubmapId& id : {pair.first, pair.second})
-    if (!state_.submaps.contains(id))
-      return fail(ErrorCode::invalid, "{}: submap {} is not in the map", where(), to_string(id));
+  const auto kept = kept_decision(pair, given, state_.submaps, state_.verdicts, state_.decisions);
+  if (!kept) return tl::unexpected(kept.error());
+  if (!*kept) return {};
+  const ClosureDecision& decision = **kept;
   const auto known = state_.decisions.find(pair);
-  if (known != state_.decisions.end() && !holds_over(decision, known->second)) return {};
+  const bool is_new = known == state_.decisions.end();
+  const bool was_accepted = says(state_.decisions, pair, Wish::accept);
+  const bool changes = is_new ? decision.wish != Wish::withdraw : known->second.wish != decision.wish;
+  const bool adds = !decision.by_hand.empty() || (!is_new && !known->second.by_hand.empty());
   const auto verdict = state_.verdicts.find(pair);
   const bool has_closures = verdict != state_.verdicts.end() && !verdict->second.closures.empty();
-  if (decision.wish == Wish::accept && !has_closures && decision.by_hand.empty())
-    return fail(ErrorCode::invalid, "{}: no closure was found there that could be accepted", where());
-  for (const LoopClosure& closure : decision.by_hand)
-    if (!has_keyframe(*state_.submaps.at(pair.first), closure.from) ||
-        !has_keyframe(*state_.submaps.at(pair.second), closure.to))
-      return fail(ErrorCode::invalid, "{}: its closure is between keyframes {} and {}, which these do not have",
-                  where(), closure.from.index, closure.to.index);
-  const bool was_accepted = known != state_.decisions.end() && known->second.wish == Wish::accept;
-  const bool changes =
-      known == state_.decisions.end() ? decision.wish != Wish::withdraw : known->second.wish != decision.wish;
-  const bool adds = !decision.by_hand.empty() || (known != state_.decisions.end() && !known->second.by_hand.empty());
   state_.decisions.insert_or_assign(pair, decision);
   if (was_accepted && decision.wish != Wish::accept) plan_verification(pair);  // other verifiers were not asked
   if ((changes && has_closures) || adds) note_news();

@@ -51,7 +51,7 @@ Status FeedFront::hear(OdometrySample& sample) {
   if (passed->waited)
     if (Status ok = take(*passed->waited); !ok) return ok;
   if (Status ok = take(sample); !ok) return ok;
-  if (waiting() > limits_.inputs) {
+  if (due() > limits_.inputs) {
     note_behind(sample.stamp);
     thin();
   }
@@ -99,21 +99,23 @@ void FeedFront::note_behind(Timestamp stamp) {
   if (now == Load{}) behind_since_ = stamp;
 }
 
-/// Two samples that are closer than finest_s_ become one, as in SensorTimeline::add(); never across a jump.
+/// Adds what is due, before what is held. Two samples that are closer than finest_s_ become one, as in
+/// SensorTimeline::add(); never across a jump.
 void FeedFront::push_back(Queued input) {
+  const auto at = inputs_.end() - static_cast<std::ptrdiff_t>(held_);
   const auto* sample = sample_in<OdometrySample>(*input);
-  if (sample != nullptr && waiting() >= 2) {
-    const auto* last = sample_in<OdometrySample>(*inputs_.back());
-    const auto* before = sample_in<OdometrySample>(*inputs_[inputs_.size() - 2]);
+  if (sample != nullptr && due() >= 2) {
+    const auto* last = sample_in<OdometrySample>(**std::prev(at));
+    const auto* before = sample_in<OdometrySample>(**std::prev(at, 2));
     const auto jumps = [&](const OdometrySample& one) { return jumps_.contains(one.stamp); };
     if (last != nullptr && before != nullptr && sample->stamp - before->stamp < finest_s_ && !jumps(*last) &&
         !jumps(*sample)) {
-      inputs_.back() = std::make_shared<const FeedInput>(joined(*last, *sample));
+      *std::prev(at) = std::make_shared<const FeedInput>(joined(*last, *sample));
       ++samples_joined_;
       return;
     }
   }
-  inputs_.push_back(std::move(input));
+  inputs_.insert(at, std::move(input));
 }
 
 /// Drops waiting odometry samples until a quarter of the room is free. Those that stay are evenly spaced, so that the
@@ -128,11 +130,12 @@ void FeedFront::thin() {
     span_s = std::max(span_s, stamp_of(*inputs_[i]) - stamp_of(*inputs_[first]));
   }
   finest_s_ = std::max(2.0 * finest_s_, 2.0 * span_s / static_cast<double>(limits_.inputs));
-  while (waiting() > limits_.inputs / 4 * 3 && finest_s_ < 4.0 * span_s) {
-    std::deque<Queued> all = std::exchange(inputs_, {});
-    const auto of_robot = all.begin() + static_cast<std::ptrdiff_t>(taken_);
-    inputs_.assign(std::make_move_iterator(all.begin()), std::make_move_iterator(of_robot));
-    for (auto input = of_robot; input != all.end(); ++input) push_back(std::move(*input));
+  while (due() > limits_.inputs / 4 * 3 && finest_s_ < 4.0 * span_s) {
+    const auto begin = inputs_.begin() + static_cast<std::ptrdiff_t>(taken_),
+               end = inputs_.end() - static_cast<std::ptrdiff_t>(held_);
+    std::vector<Queued> all(std::make_move_iterator(begin), std::make_move_iterator(end));
+    inputs_.erase(begin, end);
+    for (Queued& input : all) push_back(std::move(input));
     finest_s_ *= 2.0;
   }
 }
@@ -146,7 +149,7 @@ FeedState FeedFront::state() const {
     out.T_map_odom = robot_.T_map_odom * robot_.T_odom_fed.inverse() * out.T_odom_fed;
   out.covariance = carried_.covariance();
   out.stored = stored_;
-  out.ended = ended_ && inputs_.empty();
+  out.ended = ended_ && inputs_.size() == held_;
   // It would want a scan at samples that it has not heard yet where it wanted one, or where a keyframe is due.
   if (carried_.steps() > 0 || (out.newest && !robot_.newest))
     out.wants_scan =
@@ -200,7 +203,7 @@ std::vector<FeedTrajectory> FeedFront::take_trajectories() {
 
 std::shared_ptr<const FeedInput> FeedFront::take(double wall_s) {
   std::unique_lock lock(mutex_);
-  const auto has_more = [&] { return inputs_.size() > taken_; };
+  const auto has_more = [&] { return due() > 0; };
   if (!fed_.wait_for(lock, std::chrono::duration<double>(wall_s), has_more)) return nullptr;
   in_hand_ = true;
   return inputs_[taken_++];
@@ -223,7 +226,7 @@ std::vector<ImuSample> FeedFront::imu(Timestamp from, Timestamp until) const {
 
 bool FeedFront::is_drained() const {
   const std::scoped_lock lock(mutex_);
-  return taken_ == inputs_.size();
+  return due() == 0;
 }
 
 void FeedFront::free_bytes_of(const FeedInput& input) {
@@ -246,7 +249,7 @@ void FeedFront::note_stored() {
     stored.push_back(std::move(inputs_.front()));
     inputs_.pop_front();
   }
-  if (!inputs_.empty()) return;
+  if (inputs_.size() > held_) return;
   left_out_ = {};
   samples_joined_ = 0;
   finest_s_ = 0.0;
@@ -313,12 +316,12 @@ void FeedFront::close() {
 
 bool FeedFront::has_ended() const {
   const std::scoped_lock lock(mutex_);
-  return ended_ && inputs_.empty();
+  return ended_ && inputs_.size() == held_;
 }
 
 FeedFront::Load FeedFront::load() const {
   const std::scoped_lock lock(mutex_);
-  return {inputs_.size() - taken_, left_out_[index_of<Scan>()], samples_joined_, left_out_[index_of<EncodedImages>()]};
+  return {due(), left_out_[index_of<Scan>()], samples_joined_, left_out_[index_of<EncodedImages>()]};
 }
 
 bool FeedFront::is_filling() const {

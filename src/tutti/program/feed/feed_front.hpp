@@ -121,6 +121,7 @@ class FeedFront final : public FeedTarget {
 
  private:
   [[nodiscard]] std::size_t waiting() const { return inputs_.size() - taken_; }
+  [[nodiscard]] std::size_t due() const { return waiting() - held_; }
   Status hear(OdometrySample& sample);
   Status hear(Scan& scan) { return hear_sensor(std::move(scan)); }
   Status hear(EncodedImages& images);
@@ -136,6 +137,7 @@ class FeedFront final : public FeedTarget {
   using Queued = std::shared_ptr<const FeedInput>;
   void push(FeedInput input) { push_back(std::make_shared<const FeedInput>(std::move(input))); }
   void push_back(Queued input);
+  [[nodiscard]] bool is_due(Timestamp images) const;
   void note_behind(Timestamp stamp);
   [[nodiscard]] bool is_ahead(Timestamp stamp, const InputKind& kind) const;
   [[nodiscard]] Status may_wait(const Input& input) const;
@@ -155,11 +157,11 @@ class FeedFront final : public FeedTarget {
   FeedState robot_;          // as it was published
   node::OdometryGate gate_;  // before carried_
   CarriedPose carried_;
-  std::deque<Queued> inputs_;
-  std::size_t taken_ = 0;            // of them, from the front
+  std::deque<Queued> inputs_;        // taken ones, then those that are due, then held ones
+  std::size_t taken_ = 0;            // of them, how many the robot has taken
+  std::size_t held_ = 0;             // of them, how many wait for odometry or the IMU (Needs::odometry_and_imu)
   std::size_t anew_ = 0;             // of them, how many FeedAnew
-  std::deque<Queued> held_;          // what waits for odometry or the IMU (Needs::odometry_and_imu)
-  OfKinds<std::size_t> bytes_{};     // in them and in inputs_
+  OfKinds<std::size_t> bytes_{};     // in them
   OfKinds<std::size_t> left_out_{};  // since all was taken last
   OfKinds<std::optional<Timestamp>> newest_;
   std::shared_ptr<const Sensors> sensors_ = std::make_shared<const Sensors>();

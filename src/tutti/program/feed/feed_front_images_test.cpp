@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -102,6 +104,53 @@ TEST(FeedFrontImages, StampsThatJumpBackOrFarAheadAreRefusedAndDoNoHarm) {
   EXPECT_FALSE(front.add(images(now + 0.05)));
   EXPECT_EQ(front.figures().images, 1U);
   EXPECT_EQ(front.figures().images_left_out, 2U);
+}
+
+TEST(FeedFrontImages, ImagesThatComeTooLateAreRefusedAndSayHowLate) {
+  FeedFront front(test::NodeTarget().state(), {});
+  front.set_sensors(eyes());
+  std::size_t i = 0;
+  for (; i == 0 || kOdometry[i - 1].stamp - kOdometry[0].stamp <= waiting::kLate_s; ++i)
+    EXPECT_TRUE(front.add(sample(i)));
+  const Timestamp now = kOdometry[i - 1].stamp;
+  const Status late = front.add(images(now + -waiting::kLate_s - 0.1));
+  ASSERT_FALSE(late);
+  EXPECT_NE(late.error().message.find("0.6 s after odometry of their time, expected at most 0.5 s"), std::string::npos)
+      << late.error().message;
+  EXPECT_TRUE(front.add(images(now + -waiting::kLate_s)));
+  EXPECT_EQ(front.figures().images_left_out, 1U);
+}
+
+/// While images wait for odometry, what comes later is not behind them.
+TEST(FeedFrontImages, OdometryPassesImagesThatWaitAndIsJoinedAsWithoutThem) {
+  const Trajectory odometry = robot::test::fine_odometry(3);
+  const auto run = [&](bool with_images) {
+    FeedFront front(test::NodeTarget().state(), {.inputs = 8});
+    front.set_sensors(eyes());
+    EXPECT_EQ(next(front), 's');
+    front.note_stored();
+    const auto add = [&](const StampedPose& at) {
+      EXPECT_TRUE(front.add(OdometrySample{at.stamp, at.pose, robot::test::kStepCovariance}));
+    };
+    add(odometry[0]);
+    for (std::size_t i = 1; with_images && i <= 3; ++i)
+      EXPECT_TRUE(front.add(images(odometry[19].stamp + 0.001 * static_cast<double>(i))));
+    std::for_each(odometry.begin() + 1, odometry.begin() + 19, add);
+    std::vector<std::int64_t> stamps;
+    while (const auto input = front.take(0.0)) {
+      front.note_heard();
+      stamps.push_back(stamp_of(*input).ns);
+    }
+    EXPECT_TRUE(front.is_drained());
+    front.note_stored();
+    EXPECT_EQ(front.load(), FeedFront::Load{});
+    EXPECT_TRUE(front.finish());
+    EXPECT_EQ(next(front), with_images ? 'i' : 's');
+    return stamps;
+  };
+  const auto alone = run(false);
+  EXPECT_LE(alone.size(), 8U);
+  EXPECT_EQ(run(true), alone);
 }
 
 TEST(FeedFrontImages, WhatWaitsInImagesIsBoundedAndCounted) {

@@ -48,7 +48,10 @@ Status FeedFront::may_wait(const Input& input) const {
     return fail(ErrorCode::invalid, "{}: there was one at {} ns, stamps must increase", where(), newest->ns);
   if (scan == nullptr && is_ahead(stamp, kind))
     return fail(ErrorCode::invalid, "{}: no odometry within {} s before", where(), kind.ahead_s);
-  const std::size_t inputs = waiting() + held_.size(), bytes = bytes_[input.index()];
+  if (kind.needs == Needs::odometry_and_imu && carried_.newest()->stamp - stamp > waiting::kLate_s)
+    return fail(ErrorCode::invalid, "{}: {:.1f} s after odometry of their time, expected at most {} s", where(),
+                carried_.newest()->stamp - stamp, waiting::kLate_s);
+  const std::size_t inputs = waiting(), bytes = bytes_[input.index()];
   if (bytes + bytes_of(input) <= most_bytes(input) && inputs < limits_.inputs / 2) return {};
   return fail(ErrorCode::io,
               "the map is behind: {} inputs and {} bytes of this kind wait, at most {} with {}; left out: {}", inputs,
@@ -72,7 +75,8 @@ Status FeedFront::hear_sensor(Input input) {
     push(std::move(input));
     return {};
   }
-  held_.push_back(std::make_shared<const FeedInput>(std::move(input)));
+  inputs_.push_back(std::make_shared<const FeedInput>(std::move(input)));
+  ++held_;
   release();
   return {};
 }
@@ -86,15 +90,15 @@ Status FeedFront::hear(TrackedImages& images) {
   return fail(ErrorCode::unsupported, "tracked images at {} ns, expected the images", images.stamp.ns);
 }
 
-/// Those whose odometry and IMU have come, or all: what has not come yet will not help them any more.
+bool FeedFront::is_due(Timestamp images) const {
+  const Timestamp newest = carried_.newest()->stamp;
+  if (newest < images) return false;
+  return !sensors_->imu || (!imu_.empty() && imu_.back().stamp >= images) || newest - images >= waiting::kImu_s;
+}
+
+/// Held images whose odometry and IMU have come are due, or all: what has not come yet will not help them any more.
 void FeedFront::release(bool all) {
-  const auto is_due = [&](Timestamp stamp) {
-    if (all) return true;
-    if (carried_.newest()->stamp < stamp) return false;
-    return !sensors_->imu || (!imu_.empty() && imu_.back().stamp >= stamp) ||
-           carried_.newest()->stamp - stamp >= waiting::kImu_s;
-  };
-  for (; !held_.empty() && is_due(stamp_of(*held_.front())); held_.pop_front()) push_back(std::move(held_.front()));
+  while (held_ > 0 && (all || is_due(stamp_of(*inputs_[inputs_.size() - held_])))) --held_;
 }
 
 Status FeedFront::hear(ImuSamples& samples) {
