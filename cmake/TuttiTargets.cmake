@@ -301,7 +301,7 @@ function(tutti_computes)
 endfunction()
 
 # tutti_waits_for(<who> <test>..): mostly waiting, for `programs` or for `nats` (nats-server and timeouts). They are begun
-# first, and of each `who` one at a time: more would disturb each other's times.
+# as soon as there is a slot, and of each `who` one at a time: more would disturb each other's times.
 function(tutti_waits_for who)
   if(NOT who MATCHES "^(programs|nats)$")
     message(FATAL_ERROR "waits for '${who}': expected programs or nats (scripts/test.sh counts them)")
