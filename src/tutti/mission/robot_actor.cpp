@@ -49,14 +49,13 @@ void RobotActor::finish(Timestamp now) {
 }
 
 void RobotActor::receive(const bus::Envelope& envelope, Timestamp now) {
-  std::optional<ProxyGraphMessage> graph;  // nothing: a receipt, or one that the node refuses or keeps
-  if (envelope.kind != bus::MessageKind::receipt)
-    if (auto in = node().graph_in(envelope)) graph = std::move(*in);
+  const auto before = node().newest_graph();
   const std::size_t updates = updates_.size();
   driver_.receive(envelope, now);
   note_step();
   const auto times = driver_.take_update_times();
-  if (!graph) return;
+  const auto& graph = node().newest_graph();
+  if (graph == before) return;  // a receipt, or a graph that the node refuses or keeps
   if (companions_) companions_->receive(*graph, node().agent());
   if (updates_.size() == updates) return;
   for (const drive::UpdateTime& time : times) timing_.add(time);

@@ -44,15 +44,12 @@ void RobotNode::remember_incarnations(Step& step) const {
 /// another map. The newest of a kind comes last (bus::Delivery::retained), so that no start is heard after a later one
 /// for long.
 void RobotNode::receive_graph(const bus::Envelope& envelope, Timestamp now, Step& step) {
-  const auto graph = graph_in(envelope);
+  auto graph = read_graph(envelope);
   if (!graph) return refuse(envelope, graph.error(), now, step);
   unread_.erase(envelope.kind);
-  if (envelope.kind == bus::MessageKind::proxy_graph_delta)
-    delta_ = envelope.bytes;
-  else
-    base_ = wire::decode_proxy_graph(*envelope.bytes).value().graph;
   if (!*graph) return;
-  const ProxyGraph& heard = (*graph)->graph;
+  newest_ = std::move(*graph);
+  const ProxyGraph& heard = newest_->graph;
   if (heard.incarnation != graph_incarnation_) {
     graph_incarnation_ = heard.incarnation;
     remember_incarnations(step);
@@ -71,7 +68,7 @@ void RobotNode::receive_graph(const bus::Envelope& envelope, Timestamp now, Step
     const auto own = nodes_of(heard, agent_.chain());
     mapped_until_ = own.empty() ? kFirstTimestamp : own.back().stamp;
   }
-  if (agent_.is_news(heard)) follow(**graph, now, step);
+  if (agent_.is_news(heard)) follow(*newest_, now, step);
 }
 
 void RobotNode::follow(const ProxyGraphMessage& graph, Timestamp now, Step& step) {
@@ -109,14 +106,23 @@ void RobotNode::note(const robot::UpdateSummary& summary) {
       std::ranges::count_if(summary.explanation.origins, [](const auto& origin) { return origin.alert; }));
 }
 
-Result<std::optional<ProxyGraphMessage>> RobotNode::graph_in(const bus::Envelope& envelope) const {
-  if (envelope.kind == bus::MessageKind::proxy_graph_delta)
-    return wire::decode_delta(*envelope.bytes, base_ ? *base_ : ProxyGraph{});
+/// The graph of a message, of a delta with the last whole one, both of which are kept. Null where that has not come.
+Result<std::shared_ptr<const ProxyGraphMessage>> RobotNode::read_graph(const bus::Envelope& envelope) {
+  const auto with_base = [&](const std::string& delta) -> Result<std::shared_ptr<const ProxyGraphMessage>> {
+    auto graph = wire::decode_delta(delta, base_ ? base_->graph : ProxyGraph{});
+    if (!graph) return tl::unexpected(graph.error());
+    return *graph ? std::make_shared<const ProxyGraphMessage>(std::move(**graph)) : nullptr;
+  };
+  if (envelope.kind == bus::MessageKind::proxy_graph_delta) {
+    auto graph = with_base(*envelope.bytes);
+    if (graph) delta_ = envelope.bytes;
+    return graph;
+  }
   auto message = wire::decode_proxy_graph(*envelope.bytes);
   if (!message) return tl::unexpected(message.error());
-  auto newer = delta_ ? wire::decode_delta(*delta_, message->graph) : std::nullopt;
-  if (newer && *newer) return newer;
-  return std::optional(std::move(*message));
+  base_ = std::make_shared<const ProxyGraphMessage>(std::move(*message));
+  const auto newer = delta_ ? with_base(*delta_) : nullptr;
+  return newer && *newer ? *newer : base_;
 }
 
 void RobotNode::receive_receipt(const bus::Envelope& envelope, Timestamp now, Step& step) {

@@ -79,9 +79,9 @@ class RobotNode {
   [[nodiscard]] bool is_stored() const { return unwritten_.empty() && !gate_.holds_one(); }
   /// Takes a message that was sent to the robot.
   Step receive(const bus::Envelope& envelope, Timestamp now);
-  /// The newest graph that the robot would know after this message. Nothing when the message has no graph, or gives
-  /// differences from a graph that has not come; an error when it is garbage.
-  [[nodiscard]] Result<std::optional<ProxyGraphMessage>> graph_in(const bus::Envelope& envelope) const;
+  /// The newest graph that came since the start, whether or not the robot followed it, and another one whenever one
+  /// comes; null when none has come.
+  [[nodiscard]] const std::shared_ptr<const ProxyGraphMessage>& newest_graph() const { return newest_; }
   /// When on_timer() is to be called next, to write or send what waits.
   [[nodiscard]] std::optional<Timestamp> next_timer() const;
   /// Does what is due, if anything.
@@ -146,6 +146,7 @@ class RobotNode {
   using Frames = std::map<SubmapId, std::shared_ptr<const std::string>>;
   /// Sends the submaps that may go now; `fresh` has frames that are not in the store yet.
   void send_submaps(Timestamp now, const Frames& fresh, Step& step);
+  Result<std::shared_ptr<const ProxyGraphMessage>> read_graph(const bus::Envelope& envelope);
   void receive_graph(const bus::Envelope& envelope, Timestamp now, Step& step);
   /// To be called after each input: reports what became of earlier inputs.
   void settle(Timestamp now, Step& step);
@@ -192,9 +193,9 @@ class RobotNode {
     std::uint64_t count = 0;
     std::string why;
   };
-  std::map<bus::MessageKind, Unread> unread_;  // since the last one of the kind that could be read
-  std::optional<ProxyGraph> base_;             // the last graph that came in full
-  std::shared_ptr<const std::string> delta_;   // the last message that gave differences from base_
+  std::map<bus::MessageKind, Unread> unread_;               // since the last one of the kind that could be read
+  std::shared_ptr<const ProxyGraphMessage> base_, newest_;  // the last graph that came in full, and the last of any
+  std::shared_ptr<const std::string> delta_;                // the last message that gave differences from base_
   struct Jumps {
     std::uint64_t count = 0;                    // since the start
     std::optional<robot::OdometryJump> newest;  // of the session

@@ -459,9 +459,11 @@ TEST_F(RobotNodeTest, ADeltaIsHeardAsSoonAsItsBaseIsThere) {
   const ProxyGraph base = wire::decode_proxy_graph(first)->graph;
   const auto delta = test::from_server(kRobot, MessageKind::proxy_graph_delta, wire::encode_delta(graph(2), base));
   EXPECT_TRUE(done(node_->receive(delta, now_)).events.empty());  // it waits
+  EXPECT_EQ(node_->newest_graph(), nullptr);
   const Step step = done(node_->receive(test::from_server(kRobot, MessageKind::proxy_graph, first), now_));
   ASSERT_EQ(step.events.size(), 1U);  // for both
   EXPECT_EQ(std::get<RobotUpdated>(step.events[0].what).summary.revision, 2U);
+  EXPECT_EQ(node_->newest_graph()->graph.revision, 2U);
   const std::string heard = wire::encode(node_->agent().state());
 
   restart();  // the journal does without the base
@@ -474,11 +476,13 @@ TEST_F(RobotNodeTest, ADeltaIsHeardAsSoonAsItsBaseIsThere) {
   const auto of_another =
       test::from_server(kRobot, MessageKind::proxy_graph_delta, wire::encode_delta(graph(4), graph(3).graph));
   EXPECT_TRUE(done(node_->receive(of_another, now_)).events.empty());
+  EXPECT_EQ(node_->newest_graph()->graph.revision, 3U);
   hear(5);  // in full; the waiting delta is of no use any more
   EXPECT_EQ(node_->agent().state().revision, 5U);
   const Step garbage = done(node_->receive(test::from_server(kRobot, MessageKind::proxy_graph_delta, "garbage"), now_));
   ASSERT_EQ(garbage.events.size(), 1U);
   EXPECT_TRUE(std::holds_alternative<MessageRefused>(garbage.events[0].what));
+  EXPECT_EQ(node_->newest_graph()->graph.revision, 5U);
 }
 
 }  // namespace robot_node_test

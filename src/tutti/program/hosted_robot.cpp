@@ -40,10 +40,7 @@ Json changed_places(const localise::Localiser& localiser, Timestamp now) {
 }  // namespace
 
 Answer HostedRobot::receive(const bus::Received& message, Timestamp now) {
-  std::optional<Trajectory> map;
-  if ((feed_ && feed_->front().wants_trajectory()) || options_.replay.score)
-    if (const auto graph = driver_.node().graph_in(message.envelope); graph && *graph)
-      map = trajectory_of((*graph)->graph, driver_.node().agent().chain());
+  const auto before = driver_.node().newest_graph();
   driver_.receive(message.envelope, now);
   for (drive::UpdateTime& time : driver_.take_update_times()) {
     Json line{{"event", kUpdateTimed}};
@@ -57,9 +54,12 @@ Answer HostedRobot::receive(const bus::Received& message, Timestamp now) {
     return update != nullptr && update->summary.synchronised > 0;
   });
   const robot::RobotAgent& agent = driver_.node().agent();
-  if (!map || !has_updated) return out;
-  if (options_.replay.score) log_.write(options_.replay.score(*map, agent));
-  if (feed_) feed_->front().say({agent.map_age(), agent.ledger().size(), agent.corrected(), std::move(*map)});
+  const auto& graph = driver_.node().newest_graph();
+  const bool is_wanted = options_.replay.score || (feed_ && feed_->front().wants_trajectory());
+  if (graph == before || !has_updated || !is_wanted) return out;
+  Trajectory map = trajectory_of(graph->graph, agent.chain());
+  if (options_.replay.score) log_.write(options_.replay.score(map, agent));
+  if (feed_) feed_->front().say({agent.map_age(), agent.ledger().size(), agent.corrected(), std::move(map)});
   return out;
 }
 
