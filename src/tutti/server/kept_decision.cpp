@@ -10,6 +10,11 @@ bool has_keyframe(const Submap& submap, const KeyframeId& keyframe) {
 
 }  // namespace
 
+bool has_closures(const VerdictSet& verdicts, const SubmapPair& pair) {
+  const auto verdict = verdicts.find(pair);
+  return verdict != verdicts.end() && !verdict->second.closures.empty();
+}
+
 Result<std::optional<ClosureDecision>> kept_decision(const SubmapPair& pair, const ClosureDecision& given,
                                                      const SubmapSet& submaps, const VerdictSet& verdicts,
                                                      const DecisionSet& decisions) {
@@ -22,9 +27,7 @@ Result<std::optional<ClosureDecision>> kept_decision(const SubmapPair& pair, con
     if (!submaps.contains(id)) return fail(ErrorCode::invalid, "{}: submap {} is not in the map", where, to_string(id));
   const auto known = decisions.find(pair);
   if (known != decisions.end() && !holds_over(decision, known->second)) return std::optional<ClosureDecision>();
-  const auto verdict = verdicts.find(pair);
-  const bool has_closures = verdict != verdicts.end() && !verdict->second.closures.empty();
-  if (decision.wish == Wish::accept && !has_closures && decision.by_hand.empty())
+  if (decision.wish == Wish::accept && !has_closures(verdicts, pair) && decision.by_hand.empty())
     return fail(ErrorCode::invalid, "{}: no closure was found there that could be accepted", where);
   for (const LoopClosure& closure : decision.by_hand)
     if (!has_keyframe(*submaps.at(pair.first), closure.from) || !has_keyframe(*submaps.at(pair.second), closure.to))

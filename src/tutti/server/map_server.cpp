@@ -288,11 +288,9 @@ Status MapServer::receive(const SubmapPair& pair, const ClosureDecision& given) 
   const bool was_accepted = says(state_.decisions, pair, Wish::accept);
   const bool changes = is_new ? decision.wish != Wish::withdraw : known->second.wish != decision.wish;
   const bool adds = !decision.by_hand.empty() || (!is_new && !known->second.by_hand.empty());
-  const auto verdict = state_.verdicts.find(pair);
-  const bool has_closures = verdict != state_.verdicts.end() && !verdict->second.closures.empty();
   state_.decisions.insert_or_assign(pair, decision);
   if (was_accepted && decision.wish != Wish::accept) plan_verification(pair);  // other verifiers were not asked
-  if ((changes && has_closures) || adds) note_news();
+  if ((changes && has_closures(state_.verdicts, pair)) || adds) note_news();
   return {};
 }
 

@@ -149,7 +149,7 @@ FeedState FeedFront::state() const {
     out.T_map_odom = robot_.T_map_odom * robot_.T_odom_fed.inverse() * out.T_odom_fed;
   out.covariance = carried_.covariance();
   out.stored = stored_;
-  out.ended = ended_ && inputs_.size() == held_;
+  out.ended = ended_ && is_stored();
   // It would want a scan at samples that it has not heard yet where it wanted one, or where a keyframe is due.
   if (carried_.steps() > 0 || (out.newest && !robot_.newest))
     out.wants_scan =
@@ -249,7 +249,7 @@ void FeedFront::note_stored() {
     stored.push_back(std::move(inputs_.front()));
     inputs_.pop_front();
   }
-  if (inputs_.size() > held_) return;
+  if (!is_stored()) return;
   left_out_ = {};
   samples_joined_ = 0;
   finest_s_ = 0.0;
@@ -316,7 +316,7 @@ void FeedFront::close() {
 
 bool FeedFront::has_ended() const {
   const std::scoped_lock lock(mutex_);
-  return ended_ && inputs_.size() == held_;
+  return ended_ && is_stored();
 }
 
 FeedFront::Load FeedFront::load() const {

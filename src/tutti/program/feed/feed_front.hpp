@@ -122,6 +122,7 @@ class FeedFront final : public FeedTarget {
  private:
   [[nodiscard]] std::size_t waiting() const { return inputs_.size() - taken_; }
   [[nodiscard]] std::size_t due() const { return waiting() - held_; }
+  [[nodiscard]] bool is_stored() const { return inputs_.size() == held_; }  // all that was due
   Status hear(OdometrySample& sample);
   Status hear(Scan& scan) { return hear_sensor(std::move(scan)); }
   Status hear(EncodedImages& images);
